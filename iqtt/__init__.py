@@ -1,0 +1,1 @@
+"""3D-IQTT mental-rotation questions."""

@@ -1,0 +1,1 @@
+"""Rooms with exact ground truth."""

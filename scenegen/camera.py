@@ -1,0 +1,98 @@
+"""Cameras, pixel rays and back-projection in numpy: frames and pixel conventions stated once.
+
+World: right-handed, y up; the room is the half-open unit box with floor y = 0 and walls x = 0 and
+z = 0; its edge is the unit of length ("scene unit").
+Camera: x right, y up, looking along -z (OpenGL). `world_from_camera` maps camera to world points.
+Pixels: row 0 on top, column 0 on the left, centres at +0.5.
+Depth: planar, -z in the camera frame. A pixel's ray is (x, y, -1) in the camera frame, so the ray
+parameter of a hit IS its depth.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector3 = tuple[float, float, float]
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera with square pixels, its principal point in the middle, and y up.
+
+    Attributes:
+        position: centre of projection, world, scene units.
+        target: the point it looks at, world; not straight above or below `position`.
+        fov_y_degrees: vertical field of view.
+    """
+
+    position: Vector3
+    target: Vector3
+    fov_y_degrees: float
+
+    @staticmethod
+    def fov_y_from_longer_side(fov_degrees: float, height: int, width: int) -> float:
+        """Return the vertical field of view where the longer image side spans `fov_degrees`."""
+        if height >= width:
+            return fov_degrees
+        half = math.tan(math.radians(fov_degrees) / 2) * height / width
+        return math.degrees(2 * math.atan(half))
+
+    @property
+    def world_from_camera(self) -> NDArray[np.float64]:
+        """(4, 4) rigid transform from camera to world coordinates."""
+        back = np.subtract(self.position, self.target)
+        back /= np.linalg.norm(back)
+        right = np.array([back[2], 0.0, -back[0]])  # y axis x back
+        length = math.hypot(back[2], back[0])
+        if length < 1e-9:
+            raise ValueError(f"camera: {self.position} looks straight along y; its roll is undefined")
+        right /= length
+        matrix = np.eye(4)
+        matrix[:3, 0] = right
+        matrix[:3, 1] = _cross(back, right)
+        matrix[:3, 2] = back
+        matrix[:3, 3] = self.position
+        return matrix
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Cross product of two 3-vectors (np.cross is ten times slower on so few numbers)."""
+    return np.array(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )
+
+
+def pixel_directions(height: int, width: int, fov_y_degrees: float) -> NDArray[np.float64]:
+    """Return the rays through the pixel centres, camera frame, z = -1: (height, width, 3)."""
+    pixel = 2 * math.tan(math.radians(fov_y_degrees) / 2) / height  # side of a pixel at depth 1
+    directions = np.empty((height, width, 3))
+    directions[..., 0] = (np.arange(width) + 0.5 - width / 2) * pixel
+    directions[..., 1] = ((height / 2 - 0.5) - np.arange(height))[:, None] * pixel
+    directions[..., 2] = -1.0
+    return directions
+
+
+def back_project(depth: Array, fov_y_degrees: float) -> NDArray[np.float64]:
+    """Return the surfel positions of a planar depth map, camera frame: (H, W) -> (H, W, 3)."""
+    height, width = depth.shape
+    return pixel_directions(height, width, fov_y_degrees) * np.asarray(depth)[..., None]
+
+
+def transform_points(matrix: Array, points: Array) -> NDArray[np.float64]:
+    """Apply a (4, 4) `to_from` transform to points (..., 3)."""
+    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
+
+
+def transform_vectors(matrix: Array, vectors: Array) -> NDArray[np.float64]:
+    """Apply the rotation of a rigid (4, 4) `to_from` transform to vectors (..., 3)."""
+    return np.asarray(vectors @ matrix[:3, :3].T)
+
+
+def intrinsics(height: int, width: int, fov_y_degrees: float) -> NDArray[np.float64]:
+    """Return the (3, 3) matrix of OpenCV-style tools (x right, y DOWN, z forward), in pixels."""
+    focal = height / 2 / math.tan(math.radians(fov_y_degrees) / 2)
+    return np.array([[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]])

@@ -1,0 +1,169 @@
+"""Render a data set: propose, cast, check, write; overlapped, in flat memory."""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenegen.backend import select_variant
+from scenegen.errors import SpecError
+from scenegen.packing import SceneBatch, pack
+from scenegen.renderer import launch
+from scenegen.sampling import MAX_ATTEMPTS, refusal, sample_scene
+from scenegen.scene_writer import RoomsWriter, check_writable
+from scenegen.specs import DatasetSpec, SceneSpec
+from scenegen.truth import GroundTruth, visible_pixels
+
+DEFAULT_BATCH = 64
+MAX_BATCH = 4096
+WINDOW = 4  # batches that may be in the making while the oldest item is still being retried
+
+
+@dataclass(frozen=True, eq=False)
+class _Finished:
+    """An accepted item: row `row` of a rendered batch."""
+
+    scene: SceneSpec
+    row: int
+    truth: GroundTruth
+
+
+def make_dataset(
+    path: str | Path,
+    spec: DatasetSpec,
+    count: int,
+    *,
+    batch: int = DEFAULT_BATCH,
+    device: str = "auto",
+    compression: str = "gzip",
+    overwrite: bool = False,
+    command: str = "",
+    progress: Callable[[int], Any] = lambda done: None,
+) -> None:
+    """Render items 0 .. count - 1 of `spec` to a rooms file.
+
+    Args:
+        batch: images in one wavefront; bounds memory, never changes a byte of a row.
+        device, compression: as in `backend.DEVICES` and `scene_writer.COMPRESSIONS`.
+        command: what to record as the file's creation command.
+        progress: is told, now and then, how many more rows were written.
+
+    Raises:
+        SpecError, BackendError: a setting.
+        PlacementError: no scene meets the request.
+        OSError: the path, or the disk.
+    """
+    if not 1 <= batch <= MAX_BATCH:
+        raise SpecError(f"batch: found {batch}, expected from 1 to {MAX_BATCH}")
+    check_writable(Path(path), overwrite)
+    variant = select_variant(device)
+    attributes = {"creation_command": command, "variant": variant, "compression": compression}
+    with (
+        RoomsWriter(
+            path,
+            spec,
+            count,
+            compression=compression,
+            overwrite=overwrite,
+            attributes=attributes,
+        ) as writer,
+        ThreadPoolExecutor(1) as pool,
+    ):
+        writing: deque[Future[int]] = deque()
+
+        def write(items: list[_Finished]) -> int:
+            scenes = [item.scene for item in items]
+            writer.append(scenes, pack(spec, scenes), _gather(items))
+            return len(items)
+
+        for items in render_items(spec, range(count), batch, device):
+            writing.append(pool.submit(write, items))
+            if len(writing) > 2:
+                progress(writing.popleft().result())
+        while writing:
+            progress(writing.popleft().result())
+
+
+def render_items(
+    spec: DatasetSpec, indices: range, batch: int, device: str = "auto"
+) -> Iterator[list[_Finished]]:
+    """Yield accepted items in order, as they become complete.
+
+    While a batch is cast, the next one is proposed. An item whose objects do not all show enough
+    pixels is proposed again in the next batch; new items wait when the oldest falls far behind.
+    """
+    queue = deque(indices)
+    retries: deque[int] = deque()
+    attempts = dict.fromkeys(indices[:0], 0)
+    rendered = dict.fromkeys(indices[:0], 0)
+    finished: dict[int, _Finished] = {}
+    next_out = 0
+
+    def propose() -> list[SceneSpec]:
+        scenes: list[SceneSpec] = []
+        while len(scenes) < batch:
+            if retries:
+                index = retries.popleft()
+            elif queue and (queue[0] - indices[next_out]) < WINDOW * batch:
+                index = queue.popleft()
+            else:
+                break
+            scenes.append(_next_proposal(spec, index, attempts, rendered))
+        return scenes
+
+    scenes: list[SceneSpec] = []
+    pending: Callable[[], GroundTruth] | None = None
+    while True:
+        if pending is None:
+            scenes = propose()
+            if not scenes:
+                return
+            pending = launch(pack(spec, scenes), device)
+        following = propose()
+        truth = pending()
+        pending = launch(pack(spec, following), device) if following else None
+        visible = visible_pixels(truth.object_id, spec.object_slots)
+        for row, scene in enumerate(scenes):
+            shown = visible[row, : len(scene.objects)]
+            if (shown >= spec.min_visible_pixels).all():
+                finished[scene.index] = _Finished(scene, row, truth)
+                attempts.pop(scene.index)
+                rendered.pop(scene.index)
+            else:
+                retries.append(scene.index)
+                rendered[scene.index] += 1
+        scenes = following
+        ready = []
+        while next_out < len(indices) and indices[next_out] in finished:
+            ready.append(finished.pop(indices[next_out]))
+            next_out += 1
+        if ready:
+            yield ready
+
+
+def _next_proposal(
+    spec: DatasetSpec, index: int, attempts: dict[int, int], rendered: dict[int, int]
+) -> SceneSpec:
+    """Return the item's next proposal that places all its objects."""
+    rendered.setdefault(index, 0)
+    for attempt in range(attempts.get(index, 0), MAX_ATTEMPTS):
+        scene = sample_scene(spec, index, attempt)
+        if scene is not None:
+            attempts[index] = attempt + 1
+            return scene
+    raise refusal(spec, index, rendered[index])
+
+
+def _gather(items: list[_Finished]) -> GroundTruth:
+    """Collect rows of several batches."""
+    first = items[0].truth
+    if all(item.truth is first for item in items) and len(items) == len(first.depth):
+        return first
+    names = ("image", "depth", "normal", "object_id")
+    return GroundTruth(
+        *(np.stack([getattr(item.truth, name)[item.row] for item in items]) for name in names)
+    )

@@ -1,0 +1,164 @@
+"""The HDF5 layout of a rooms file, as data: `docs/rooms-file.md` is printed from this table."""
+
+from dataclasses import dataclass
+
+from scenegen.specs import DatasetSpec
+
+FORMAT_NAME = "pix2shape-bench/rooms"
+FORMAT_VERSION = "1.0"
+
+
+@dataclass(frozen=True)
+class Field:
+    """One dataset: a row per image.
+
+    Attributes:
+        shape: of a row; letters as in `sizes`.
+        dtype: NumPy name; "image" stands for the spec's image type, "text" for UTF-8 strings.
+        per_pixel: whether a row is a chunk of its own.
+    """
+
+    name: str
+    shape: tuple[str | int, ...]
+    dtype: str
+    unit: str
+    frame: str
+    meaning: str
+    per_pixel: bool = False
+
+
+FIELDS = (
+    Field(
+        "image",
+        ("H", "W", 3),
+        "image",
+        "linear radiance, times `scale`",
+        "pixels: row 0 on top",
+        "RGB of the shading equation; stored value times `scale` is radiance (no gamma)",
+        True,
+    ),
+    Field(
+        "depth",
+        ("H", "W"),
+        "float32",
+        "scene unit",
+        "camera",
+        "planar depth, -z in the camera frame, of the one ray through the pixel's centre;"
+        " NaN where it meets nothing",
+        True,
+    ),
+    Field(
+        "normal",
+        ("H", "W", 3),
+        "float32",
+        "1",
+        "camera",
+        "unit surface normal of the same hit, facing the viewer; zero where nothing is hit",
+        True,
+    ),
+    Field(
+        "object_id",
+        ("H", "W"),
+        "int8",
+        "1",
+        "pixels: row 0 on top",
+        "what the same ray hits: -1 nothing, 0 the room, k the k-th object (from 1)",
+        True,
+    ),
+    Field("scene_index", (), "int64", "1", "-", "which scene the image shows"),
+    Field("view_index", (), "int32", "1", "-", "which view of that scene, from 0"),
+    Field(
+        "camera/world_from_camera",
+        (4, 4),
+        "float64",
+        "scene unit",
+        "world from camera",
+        "rigid transform; the camera looks along -z, x right, y up",
+    ),
+    Field(
+        "camera/fov_y_degrees",
+        (),
+        "float64",
+        "degree",
+        "-",
+        "vertical field of view; pixels are square, the principal point is the image's middle",
+    ),
+    Field("light/count", (), "int32", "1", "-", "number of point lights"),
+    Field(
+        "light/position",
+        ("L", 3),
+        "float64",
+        "scene unit",
+        "world",
+        "point lights; slots from light/count on are unused",
+    ),
+    Field(
+        "light/color", ("L", 3), "float64", "radiance", "RGB", "L_j; zero in unused slots"
+    ),
+    Field("light/ambient", (3,), "float64", "radiance", "RGB", "L_a"),
+    Field(
+        "light/attenuation",
+        (2,),
+        "float64",
+        "1 / scene unit, 1 / scene unit squared",
+        "-",
+        "k_l and k_q",
+    ),
+    Field(
+        "material/reflectance",
+        ("K+1", 3),
+        "float64",
+        "1",
+        "RGB by object id",
+        "rho of the room (row 0) and of each object (row k); zero in unused slots",
+    ),
+    Field("object/count", (), "int32", "1", "-", "number of objects"),
+    Field(
+        "object/shape",
+        ("K",),
+        "int8",
+        "1",
+        "-",
+        "index into the attribute `names`; -1 in unused slots",
+    ),
+    Field(
+        "object/world_from_object",
+        ("K", 4, 4),
+        "float64",
+        "scene unit",
+        "world from object",
+        "similarity that places the unit shape (bounding radius 1); zero in unused slots",
+    ),
+    Field(
+        "object/scale",
+        ("K",),
+        "float64",
+        "scene unit",
+        "-",
+        "bounding radius, the scale in world_from_object",
+    ),
+    Field("object/visible_pixels", ("K",), "int32", "pixel", "-", "pixels that show the object"),
+    Field("scene", (), "text", "-", "-", "full description of the scene, JSON"),
+)
+
+
+def row_shape(field: Field, spec: DatasetSpec) -> tuple[int, ...]:
+    """Return the shape of a row under that spec."""
+    sizes: dict[str | int, int] = {
+        "H": spec.height,
+        "W": spec.width,
+        "K": spec.object_slots,
+        "K+1": spec.object_slots + 1,
+        "L": spec.light_slots,
+    }
+    return tuple(sizes[s] if isinstance(s, str) else s for s in field.shape)
+
+
+def numpy_dtype(field: Field, spec: DatasetSpec) -> str:
+    """Return the NumPy dtype of a field that is not text."""
+    return spec.image_dtype if field.dtype == "image" else field.dtype
+
+
+def image_scale(spec: DatasetSpec) -> float:
+    """Return what a stored pixel is multiplied by to give radiance."""
+    return 1 / 255 if spec.image_dtype == "uint8" else 1.0

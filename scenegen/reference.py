@@ -1,0 +1,162 @@
+"""The same images in plain numpy, given something that casts rays at unit shapes.
+
+Two uses: the fallback where no LLVM can be had (Mitsuba's scalar variant casts), and an
+independent check of the wavefront (any other ray caster does). One image at a time, float64.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.camera import pixel_directions
+from scenegen.packing import SceneBatch
+from scenegen.shading import shade
+from scenegen.shapes import unit_shape
+from scenegen.truth import GroundTruth, encode_image
+
+Array = NDArray[Any]
+SHADOW_OFFSET = 1e-4  # scene units; shadow rays start so far off the surface
+SAMPLE_STEPS = (0.7548776662466927, 0.5698402909980532)  # Roberts' R2 sequence
+
+# (shape name, origins (R, 3), directions (R, 3)) -> ray parameter (inf: no hit), normals (R, 3);
+# unit shape's frame; directions need not be unit; normals are smooth, face the ray's origin.
+Cast = Callable[[str, Array, Array], tuple[Array, Array]]
+
+
+def render_reference(batch: SceneBatch, cast: Cast) -> GroundTruth:
+    """Render a batch image by image; same meaning of every value as the wavefront's."""
+    images = [_render_one(batch, b, cast) for b in range(len(batch))]
+    return GroundTruth(*(np.stack(parts) for parts in zip(*images, strict=True)))
+
+
+def sample_positions(spp: int) -> NDArray[np.float64]:
+    """Return where in a pixel its colour samples lie, (spp, 2): the centre first, the others by a
+    low-discrepancy sequence that covers a square evenly at any count.
+    """
+    return np.asarray((0.5 + np.arange(spp)[:, None] * np.array(SAMPLE_STEPS)) % 1.0)
+
+
+def _render_one(batch: SceneBatch, b: int, cast: Cast) -> tuple[Array, Array, Array, Array]:
+    spec = batch.spec
+    world_from_camera = batch.world_from_camera[b]
+    directions = pixel_directions(spec.height, spec.width, float(batch.fov_y_degrees[b]))
+    pixel = 2 * math.tan(math.radians(float(batch.fov_y_degrees[b])) / 2) / spec.height
+    origin = world_from_camera[:3, 3]
+    total = np.zeros((spec.height * spec.width, 3))
+    for sample, (x, y) in enumerate(sample_positions(spec.spp)):
+        local = directions + [(x - 0.5) * pixel, (0.5 - y) * pixel, 0.0]
+        rays = local.reshape(-1, 3) @ world_from_camera[:3, :3].T
+        t, normal, object_id = _closest(batch, b, origin, rays, cast)
+        hit = object_id >= 0
+        points = origin + np.where(hit, t, 0.0)[:, None] * rays
+        radiance = _shade(batch, b, points, normal, object_id, cast)
+        total += np.where(hit[:, None], radiance, 0.0)
+        if sample == 0:
+            truth = (np.where(hit, t, np.nan), normal @ world_from_camera[:3, :3], object_id)
+    depth, normals, object_ids = truth
+    shape = (spec.height, spec.width)
+    return (
+        encode_image((total / spec.spp).reshape(*shape, 3), spec.image_dtype),
+        depth.reshape(shape).astype(np.float32),
+        normals.reshape(*shape, 3).astype(np.float32),
+        object_ids.reshape(shape).astype(np.int8),
+    )
+
+
+def _closest(
+    batch: SceneBatch, b: int, origin: Array, rays: Array, cast: Cast
+) -> tuple[Array, Array, Array]:
+    """Return ray parameter, world normal and object id of the nearest hits of rays (R, 3)."""
+    with np.errstate(divide="ignore"):
+        walls = np.where(rays < 0, -origin / rays, np.inf)
+    axis = walls.argmin(axis=1)
+    t = walls.min(axis=1)
+    inside = np.isfinite(t)
+    inside[inside] = (origin + t[inside, None] * rays[inside] <= 1.0).all(axis=1)
+    t = np.where(inside, t, np.inf)
+    normal = np.where(inside[:, None], np.eye(3)[axis], 0.0)
+    object_id = np.where(inside, 0, -1)
+    for k in range(int(batch.object_count[b])):
+        name = batch.spec.shapes[batch.shape[b, k]]
+        start, along, meets = _to_object_frame(batch, b, k, np.broadcast_to(origin, rays.shape), rays)
+        distance, local_normal = cast(name, start[meets], along[meets])
+        nearer = np.zeros(len(rays), bool)
+        nearer[meets] = distance <= t[meets]
+        taken = nearer[meets]
+        t[nearer] = distance[taken]
+        rotation = batch.world_from_object[b, k, :3, :3] / batch.object_scale[b, k]
+        normal[nearer] = local_normal[taken] @ rotation.T
+        object_id[nearer] = k + 1
+    return t, normal, object_id
+
+
+def _shade(
+    batch: SceneBatch, b: int, points: Array, normal: Array, object_id: Array, cast: Cast
+) -> Array:
+    reflectance = batch.reflectance[b, np.maximum(object_id, 0)]
+    light_count = int(batch.light_count[b])
+    positions, colors = batch.light_position[b, :light_count], batch.light_color[b, :light_count]
+    ambient, attenuation = batch.ambient[b], batch.attenuation[b]
+    if not batch.spec.shadows:
+        return shade(points, normal, reflectance, positions, colors, ambient, attenuation)
+    dark = np.zeros((0, 3))
+    total = shade(points, normal, reflectance, dark, dark, ambient, attenuation)
+    for position, color in zip(positions, colors, strict=True):
+        start = points + SHADOW_OFFSET * normal
+        lit = ~_occluded(batch, b, start, position - points, cast)
+        one = shade(
+            points, normal, reflectance, position[None], color[None], 0 * ambient, attenuation
+        )
+        total += np.where(lit[:, None], one, 0.0)
+    return total
+
+
+def _occluded(batch: SceneBatch, b: int, start: Array, to_light: Array, cast: Cast) -> Array:
+    blocked = np.zeros(len(start), bool)
+    for k in range(int(batch.object_count[b])):
+        name = batch.spec.shapes[batch.shape[b, k]]
+        local, along, meets = _to_object_frame(batch, b, k, start, to_light)
+        distance, _ = cast(name, local[meets], along[meets])
+        blocked[meets] |= (distance > 0) & (distance < 1)
+    return blocked
+
+
+def _to_object_frame(
+    batch: SceneBatch, b: int, k: int, origins: Array, rays: Array
+) -> tuple[Array, Array, Array]:
+    """Return origins and directions in the object's frame, and which rays meet its sphere."""
+    world_from_object = batch.world_from_object[b, k]
+    linear = world_from_object[:3, :3].T / batch.object_scale[b, k] ** 2
+    start = (origins - world_from_object[:3, 3]) @ linear.T
+    along = rays @ linear.T
+    middle = -np.einsum("ri,ri->r", start, along) / np.einsum("ri,ri->r", along, along)
+    miss = start + middle[:, None] * along
+    return start, along, np.einsum("ri,ri->r", miss, miss) < 1.0002
+
+
+def smooth_normals(name: str, triangle: Array, u: Array, v: Array, directions: Array) -> Array:
+    """Return unit normals facing the rays at points (u, v) of triangles, unit shape's frame.
+
+    Args:
+        triangle, u, v: (R,); the point is (1 - u - v) a + u b + v c of the triangle's corners.
+        directions: of the rays that hit, (R, 3).
+    """
+    shape = unit_shape(name)
+    corners, normals = shape.triangles[triangle], shape.normals[triangle]
+    weights = np.stack([1 - u - v, u, v], axis=1)
+    n = np.einsum("rk,rki->ri", weights, normals)
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    n[np.einsum("ri,ri->r", face, directions) > 0] *= -1
+    return face_viewer(n, directions)
+
+
+def face_viewer(normals: Array, directions: Array) -> Array:
+    """Lay normals that lean away from the viewer, just inside a silhouette, across their rays."""
+    away = np.einsum("ri,ri->r", normals, directions)
+    squared = np.einsum("ri,ri->r", directions, directions)
+    across = normals - (np.maximum(away, 0.0) / squared)[:, None] * directions
+    return np.asarray(across / np.linalg.norm(across, axis=1, keepdims=True))

@@ -1,0 +1,33 @@
+"""The only place where random generators are made.
+
+Every random choice derives from (dataset seed, item index, purpose, attempt) through NumPy's
+`SeedSequence` spawn keys, so that neighbouring seeds and neighbouring items share no stream
+(`seed + index` would).
+"""
+
+from enum import IntEnum
+
+import numpy as np
+
+
+class Purpose(IntEnum):
+    """What a stream of random numbers is for. Append only: the numbers are part of the seed."""
+
+    CAMERA = 0
+    LIGHTS = 1
+    OBJECTS = 2
+    POSES = 3
+    SELECTION = 4
+
+
+def item_rng(seed: int, index: int, purpose: Purpose, attempt: int = 0) -> np.random.Generator:
+    """Return the generator of one item, purpose and attempt.
+
+    Args:
+        seed: dataset seed, >= 0.
+        index: item index, >= 0.
+        purpose: what the numbers are for.
+        attempt: number of the retry, >= 0; a retry never continues the stream of the one before.
+    """
+    key = np.random.SeedSequence(seed, spawn_key=(index, int(purpose), attempt))
+    return np.random.Generator(np.random.PCG64(key))

@@ -1,0 +1,122 @@
+"""One Dr.Jit wavefront for all pixels of a batch: upload, launch, fetch."""
+
+from collections.abc import Callable
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.kernel import Scenes, closest_hit, gather_row, normal_at, radiance_at
+from scenegen.packing import SceneBatch, pixel_size
+from scenegen.reference import SAMPLE_STEPS
+from scenegen.truth import GroundTruth
+from scenegen.unit_scene import unit_scene
+
+Array = NDArray[Any]
+LANES = 32  # rays of an image are padded to a multiple, so that no SIMD packet spans two images
+
+
+def launch_wavefront(batch: SceneBatch, variant: str) -> Callable[[], GroundTruth]:
+    """Start the kernel; the returned function waits for it and returns the pixels."""
+    scenes, cameras = _upload(batch, variant)
+    results = _trace(batch, scenes, cameras)
+    dr.eval(*results)
+    spec, count = batch.spec, len(batch)
+
+    def fetch() -> GroundTruth:
+        def pixels(values: Any, *channels: int) -> Array:
+            rows = values.numpy().reshape(count, -1, *channels)[:, : spec.height * spec.width]
+            return np.ascontiguousarray(rows).reshape(count, spec.height, spec.width, *channels)
+
+        image, depth, normal, object_id = results
+        return GroundTruth(
+            pixels(image, 3), pixels(depth), pixels(normal, 3), pixels(object_id)
+        )
+
+    return fetch
+
+
+def _upload(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
+    """Return the scenes, and the cameras as (B, 13): 3x4 world_from_camera, pixel size."""
+    spec, count = batch.spec, len(batch)
+    unit = unit_scene(variant, spec.shapes)
+    mi.set_variant(variant)
+    shape = np.maximum(batch.shape, 0)
+    center = batch.world_from_object[..., :3, 3]
+    squared = np.where(batch.shape >= 0, batch.object_scale, 1.0)[..., None, None] ** 2
+    # The inverse of a similarity s R is its transpose over s squared.
+    linear = np.swapaxes(batch.world_from_object[..., :3, :3], -1, -2) / squared
+    offset = unit.offset[shape] - np.einsum("bkij,bkj->bki", linear, center)
+    per_light = np.concatenate([batch.light_position, batch.light_color], axis=-1)
+    lights = [batch.ambient, batch.attenuation, per_light.reshape(count, -1)]
+    pixel = pixel_size(batch.fov_y_degrees, spec.height)
+    camera = [batch.world_from_camera[:, :3].reshape(count, 12), pixel[:, None]]
+    scenes = Scenes(
+        unit=unit.scene,
+        slots=spec.object_slots,
+        light_slots=spec.light_slots,
+        count=mi.UInt32(batch.object_count),
+        spheres=_table(np.concatenate([center, batch.object_scale[..., None]], axis=-1)),
+        from_world=_table(np.concatenate([linear, offset[..., None]], axis=-1)),
+        place=_table(unit.offset[shape]),
+        first_triangle=mi.UInt32(unit.first_triangle[shape].ravel()),
+        triangles=unit.normals,
+        reflectance=_table(batch.reflectance),
+        lights=_table(np.concatenate(lights, axis=1)),
+    )
+    return scenes, _table(np.concatenate(camera, axis=1))
+
+
+def _table(rows: Array) -> Any:
+    return mi.Float(rows.astype(np.float32).ravel())
+
+
+def _trace(batch: SceneBatch, scenes: Scenes, cameras: Any) -> list[Any]:
+    """Return image, depth, normal and object id of every ray, not yet evaluated."""
+    spec = batch.spec
+    height, width = spec.height, spec.width
+    rays = -(-height * width // LANES) * LANES
+    index = dr.arange(mi.UInt32, len(batch) * rays)
+    item = index // rays
+    pixel = dr.minimum(index - item * rays, height * width - 1)
+    row = pixel // width
+    column = pixel - row * width
+    camera = gather_row(cameras, item, 13)
+    right, up, back, origin = (mi.Vector3f(*camera[i:12:4]) for i in range(4))
+
+    def direction(x: Any, y: Any) -> Any:
+        """World direction through the image point (x, y), in pixels; its camera z is -1."""
+        return right * ((x - width / 2) * camera[12]) + up * ((height / 2 - y) * camera[12]) - back
+
+    def hit(d: Any) -> tuple[Any, Any, Any, Any]:
+        t, object_id, triangle, uv = closest_hit(scenes, item, origin, d)
+        p = origin + dr.select(object_id >= 0, t, 0) * d
+        return t, object_id, p, normal_at(scenes, item, p, d, object_id, triangle, uv)
+
+    t, object_id, p, n = hit(direction(mi.Float(column) + 0.5, mi.Float(row) + 0.5))
+    image = radiance_at(scenes, item, p, n, object_id, spec.shadows)
+
+    def add_sample(sample: Any, total: Any) -> tuple[Any, Any]:
+        x, y = (0.5 + mi.Float(sample) * step for step in SAMPLE_STEPS)
+        d = direction(mi.Float(column) + x - dr.floor(x), mi.Float(row) + y - dr.floor(y))
+        _, object_id, p, n = hit(d)
+        return sample + 1, total + radiance_at(scenes, item, p, n, object_id, spec.shadows)
+
+    if spec.spp > 1:
+        more = lambda sample, total: sample < spec.spp  # noqa: E731
+        state = (mi.UInt32(1), image)
+        _, total = dr.while_loop(state, more, add_sample, mode="symbolic")
+        image = total / spec.spp
+    if spec.image_dtype == "uint8":
+        image = dr.uint8_array_t(mi.Vector3f)(dr.round(dr.clip(image, 0, 1) * 255))
+    elif spec.image_dtype == "float16":
+        image = dr.float16_array_t(mi.Vector3f)(image)
+    normal = mi.Vector3f(dr.dot(n, right), dr.dot(n, up), dr.dot(n, back))
+    return [
+        dr.ravel(image),
+        dr.select(object_id >= 0, t, dr.nan),
+        dr.ravel(normal),
+        dr.int8_array_t(mi.Float)(object_id),
+    ]
