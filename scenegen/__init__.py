@@ -1,1 +1,53 @@
-"""Rooms with exact ground truth."""
+"""Rooms holding basic shapes, rendered with exact ground truth.
+
+Read a file:    `with scenegen.open_rooms("rooms.h5") as rooms: rooms[0].depth`
+Train on it:    `scenegen.RoomsDataset("rooms.h5", fields=("image", "depth"))`
+Make one:       `scenegen.make_dataset("rooms.h5", scenegen.DatasetSpec(seed=1), count=1000)`
+
+Names are loaded when first used, so that importing the package costs nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from scenegen.camera import Camera, back_project
+    from scenegen.dataset import make_dataset
+    from scenegen.errors import SceneGenError
+    from scenegen.scene_file import Room, RoomsDataset, RoomsFile, open_rooms
+    from scenegen.shading import shade
+    from scenegen.specs import DatasetSpec, SceneSpec
+
+_HOME = {
+    "Camera": "camera",
+    "DatasetSpec": "specs",
+    "Room": "scene_file",
+    "RoomsDataset": "scene_file",
+    "RoomsFile": "scene_file",
+    "SceneGenError": "errors",
+    "SceneSpec": "specs",
+    "back_project": "camera",
+    "make_dataset": "dataset",
+    "open_rooms": "scene_file",
+    "shade": "shading",
+}
+
+__all__ = [
+    "Camera",
+    "DatasetSpec",
+    "Room",
+    "RoomsDataset",
+    "RoomsFile",
+    "SceneGenError",
+    "SceneSpec",
+    "back_project",
+    "make_dataset",
+    "open_rooms",
+    "shade",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'scenegen' has no attribute {name!r}")
+    return getattr(import_module(f"scenegen.{_HOME[name]}"), name)

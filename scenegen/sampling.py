@@ -89,7 +89,7 @@ def _sample_lights(spec: DatasetSpec, index: int) -> tuple[Light, ...]:
     lights = []
     for _ in range(count):
         position = _around(spec.camera_target, distance, octant_direction(rng))
-        color = rng.uniform(0.4, 1.0, 3)
+        color = rng.uniform(0.3, 1.0, 3)
         red, green, blue = (color * (spec.light_level * falloff / count / color.max())).tolist()
         lights.append(Light(position, (red, green, blue)))
     return tuple(lights)

@@ -127,7 +127,7 @@ class DatasetSpec:
     width: int = 128
     objects: tuple[int, int] = (1, 3)
     shapes: tuple[str, ...] = SHAPE_NAMES
-    object_radius: tuple[float, float] = (0.1, 0.2)
+    object_radius: tuple[float, float] = (0.11, 0.22)
     pose: str = "resting"
     lights: tuple[int, int] = (1, 3)
     shadows: bool = False
@@ -139,8 +139,8 @@ class DatasetSpec:
     camera_radius: float = 1.5
     camera_target: Vector3 = (0.3, 0.3, 0.3)
     light_radius: float = 2.5
-    light_level: float = 0.55
-    ambient: Vector3 = (0.15, 0.15, 0.15)
+    light_level: float = 0.8
+    ambient: Vector3 = (0.1, 0.1, 0.1)
     attenuation: tuple[float, float] = (0.5, 0.5)
     reflectance: Vector3 = (0.8, 0.8, 0.8)
 

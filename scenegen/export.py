@@ -1,0 +1,125 @@
+"""One item of a rooms file in the formats of other tools: EXR, PNG, PLY, OBJ."""
+
+import errno
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import png
+from numpy.typing import NDArray
+
+from scenegen.camera import transform_vectors
+from scenegen.preview import srgb_bytes
+from scenegen.scene_file import Room
+from scenegen.shapes import scene_mesh
+
+Array = NDArray[Any]
+FORMATS = ("exr", "png", "ply", "obj")
+PNG_DEPTH_UNIT = 1e-4  # scene units a step: 16 bits reach 6.5535
+
+
+def export_room(room: Room, folder: str | Path, stem: str, form: str, overwrite: bool) -> list[Path]:
+    """Write one room as `form` (one of FORMATS); return the files written.
+
+    Raises FileExistsError where a file is there already and `overwrite` is not set.
+    """
+    folder = Path(folder)
+    names = {"png": [f"{stem}-{kind}.png" for kind in ("image", "depth", "normal", "object_id")]}
+    paths = [folder / name for name in names.get(form, [f"{stem}.{form}"])]
+    for path in paths:
+        if path.exists() and not overwrite:
+            raise FileExistsError(errno.EEXIST, "exists already; say --overwrite", str(path))
+    writers: dict[str, list[Callable[[Path], None]]] = {
+        "exr": [lambda path: write_exr(room, path)],
+        "png": [
+            lambda path: _write_png16(path, np.clip(room.radiance, 0, 1) * 65535),
+            lambda path: _write_png16(path, np.nan_to_num(room.depth) / PNG_DEPTH_UNIT),
+            lambda path: _write_png16(path, (room.normal * 0.5 + 0.5) * 65535),
+            lambda path: _write_png16(path, room.object_id.astype(float) + 1),
+        ],
+        "ply": [lambda path: write_surfels_ply(room, path)],
+        "obj": [lambda path: write_mesh_obj(room, path)],
+    }
+    for path, write in zip(paths, writers[form], strict=True):
+        temporary = path.with_name(f".{os.getpid()}.{path.name}")  # keeps the ending
+        try:
+            write(temporary)
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    return paths
+
+
+def write_exr(room: Room, path: str | Path) -> None:
+    """Write linear radiance R G B, planar depth Z, normal N.X N.Y N.Z and id, all float32.
+
+    Z is infinite where nothing is hit, as compositing tools expect; id is -1 there.
+    """
+    import OpenEXR
+
+    depth = np.where(np.isfinite(room.depth), room.depth, np.inf)
+    planes = {
+        "R": room.radiance[..., 0],
+        "G": room.radiance[..., 1],
+        "B": room.radiance[..., 2],
+        "Z": depth,
+        "N.X": room.normal[..., 0],
+        "N.Y": room.normal[..., 1],
+        "N.Z": room.normal[..., 2],
+        "id": room.object_id,
+    }
+    channels = {
+        name: OpenEXR.Channel(name, np.ascontiguousarray(plane, np.float32))
+        for name, plane in planes.items()
+    }
+    header = {
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "comments": "Z planar depth in scene units; N in the camera frame (x right, y up, -z view)",
+    }
+    OpenEXR.File(header, channels).write(str(path))
+
+
+def write_surfels_ply(room: Room, path: str | Path) -> None:
+    """Write the surfels in the world frame: position, normal, colour (sRGB), object id."""
+    hit = room.object_id >= 0
+    vertices = np.empty(
+        int(hit.sum()),
+        [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")]
+        + [(name, "u1") for name in ("red", "green", "blue")]
+        + [("object_id", "i1")],
+    )
+    points, normals = room.points_world[hit], transform_vectors(room.world_from_camera, room.normal[hit])
+    colors = srgb_bytes(room.radiance)[hit]
+    for i in range(3):
+        vertices["xyz"[i]], vertices["n" + "xyz"[i]] = points[:, i], normals[:, i]
+        vertices[("red", "green", "blue")[i]] = colors[:, i]
+    vertices["object_id"] = room.object_id[hit]
+    kinds = {"<f4": "float", "|u1": "uchar", "|i1": "char"}
+    properties = [f"property {kinds[kind]} {name}" for name, kind in vertices.dtype.descr]
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"comment surfels of room {room.index}: world frame, y up, scene units",
+        f"element vertex {len(vertices)}",
+        *properties,
+        "end_header",
+    ]
+    Path(path).write_bytes("\n".join([*header, ""]).encode() + vertices.tobytes())
+
+
+def write_mesh_obj(room: Room, path: str | Path) -> None:
+    """Write room and objects as triangles in the world frame."""
+    text = scene_mesh(room.scene).export(file_type="obj", include_normals=False, header=None)
+    Path(path).write_text(f"# scene of room {room.index}: world frame, y up, scene units\n{text}")
+
+
+def _write_png16(path: Path, values: Array) -> None:
+    """Write (H, W) or (H, W, 3) values, already scaled to 0..65535, as a 16-bit PNG."""
+    pixels = np.rint(np.clip(values, 0, 65535)).astype(np.uint16)
+    height, width = pixels.shape[:2]
+    writer = png.Writer(width, height, greyscale=pixels.ndim == 2, bitdepth=16)
+    with path.open("wb") as file:
+        writer.write(file, pixels.reshape(height, -1))

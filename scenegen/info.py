@@ -1,0 +1,72 @@
+"""What a rooms file holds, as text for a person."""
+
+from pathlib import Path
+
+import numpy as np
+
+from scenegen.layout import FIELDS
+from scenegen.scene_file import RoomsFile
+
+SAMPLED = 64  # rows read for the ranges
+
+
+def describe(path: str | Path) -> str:
+    """Return spec, counts, ranges, units, sizes, versions and fingerprint of a file, as lines.
+
+    Raises FileNotFoundError, FileFormatError as `RoomsFile`.
+    """
+    with RoomsFile(path) as rooms:
+        rows = np.unique(np.linspace(0, len(rooms) - 1, min(SAMPLED, len(rooms))).astype(int))
+        ranges, shapes = _ranges(rooms, rows)
+        attributes = rooms.attributes
+        lines = [
+            f"{path}: {len(rooms)} images of {rooms.spec.height}x{rooms.spec.width},"
+            f" {Path(path).stat().st_size / 1e6:.1f} MB",
+            "",
+            f"  format        {attributes['format']} {attributes['format_version']}",
+            f"  written by    {attributes['writer']}, {attributes.get('variant')}",
+            f"  command       {attributes.get('creation_command') or '-'}",
+            f"  fingerprint   {rooms.fingerprint}",
+            f"  conventions   {attributes.get('conventions')}",
+            "",
+            "  spec (* differs from the default)",
+        ]
+        changed = rooms.spec.changed_settings()
+        for name, value in vars(rooms.spec).items():
+            shown = ", ".join(map(str, value)) if isinstance(value, tuple) else value
+            lines.append(f"  {'*' if name in changed else ' '} {name:20} {shown}")
+        lines += ["", f"  ranges over {len(rows)} rows; shapes: {shapes}"]
+        lines += [f"    {name:10} {low:.4g} to {high:.4g}" for name, (low, high) in ranges.items()]
+        lines += ["", f"  {'dataset':27} {'row':14} {'unit':24} {'stored':>9} {'ratio':>6}"]
+        for field, (stored, raw) in zip(FIELDS, rooms.stored_bytes().values(), strict=True):
+            row = "(" + ", ".join(map(str, field.shape)) + ")"
+            unit = field.unit if len(field.unit) <= 24 else field.unit[:21] + "..."
+            ratio = f"{raw / stored:.1f}" if stored else "-"
+            lines.append(f"  {field.name:27} {row:14} {unit:24} {_size(stored):>9} {ratio:>6}")
+    return "\n".join(lines)
+
+
+def _ranges(rooms: RoomsFile, rows: np.ndarray) -> tuple[dict[str, tuple[float, float]], str]:  # type: ignore[type-arg]
+    low: dict[str, float] = {}
+    high: dict[str, float] = {}
+    counts: dict[str, int] = {}
+    for i in rows.tolist():
+        room = rooms[i]
+        for item in room.scene.objects:
+            counts[item.shape] = counts.get(item.shape, 0) + 1
+        values = {
+            "radiance": room.radiance,
+            "depth": room.depth[np.isfinite(room.depth)],
+            "n_z": room.normal[..., 2],
+            "object_id": room.object_id,
+        }
+        for name, array in values.items():
+            if array.size:
+                low[name] = min(low.get(name, np.inf), float(array.min()))
+                high[name] = max(high.get(name, -np.inf), float(array.max()))
+    shapes = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
+    return {name: (low[name], high[name]) for name in low}, shapes or "none"
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"

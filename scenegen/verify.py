@@ -1,0 +1,213 @@
+"""Is a rooms file what it says? Layout, invariants of every row, and rows rendered again."""
+
+import hashlib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.backend import select_variant
+from scenegen.camera import pixel_directions, transform_points, transform_vectors
+from scenegen.errors import FileFormatError, SpecError
+from scenegen.packing import SceneBatch, pack
+from scenegen.renderer import render
+from scenegen.sampling import MAX_ATTEMPTS, sample_scene
+from scenegen.scene_file import Room, RoomsFile
+from scenegen.shading import shade
+from scenegen.truth import visible_pixels
+
+Array = NDArray[Any]
+UNIT_TOLERANCE = 1e-5  # of a normal's length
+RADIANCE_TOLERANCE = 1e-5  # of the shading equation in float32
+OTHER_BACKEND_TOLERANCE = 1e-4  # scene units, where another backend or release rendered the file
+SHOWN = 5  # row numbers named in a message
+
+
+@dataclass(frozen=True)
+class Check:
+    """One rule and whether the file keeps it; `detail` says what was looked at or found wrong."""
+
+    name: str
+    ok: bool
+    detail: str
+
+
+def verify_file(
+    path: str | Path,
+    items: int = 8,
+    device: str = "auto",
+    progress: Callable[[int], Any] = lambda done: None,
+) -> list[Check]:
+    """Check a file: every row's values, and `items` rows, spread evenly, rendered again.
+
+    Args:
+        progress: is told how many more rows were read.
+
+    Raises:
+        FileNotFoundError, FileFormatError: it cannot be opened as a rooms file.
+        BackendError: nothing can render here.
+    """
+    with RoomsFile(path) as rooms:
+        broken: dict[str, list[str]] = {name: [] for name in _ROW_RULES}
+        digest = hashlib.sha256(rooms.spec.to_json().encode())
+        for i in range(len(rooms)):
+            digest.update(b"\n" + rooms.read("scene", i))
+            for name, problem in _row_problems(rooms, i):
+                broken[name].append(f"row {i}: {problem}")
+            progress(1)
+        checks = [Check("layout", True, f"{len(rooms)} rows, format {rooms.attributes['format_version']}")]
+        checks += [_row_check(name, broken[name], len(rooms)) for name in _ROW_RULES]
+        same = digest.hexdigest() == rooms.fingerprint
+        checks.append(Check("fingerprint", same, rooms.fingerprint if same else "does not match"))
+        rows = np.unique(np.linspace(0, len(rooms) - 1, min(items, len(rooms))).round().astype(int))
+        if len(rows):
+            checks.append(_sampled_again(rooms, rows))
+            checks.append(_rendered_again(rooms, rows, device))
+    return checks
+
+
+_ROW_RULES = {
+    "description": "the scene's JSON can be read and agrees with the arrays",
+    "depth": "finite and positive where something is hit, NaN elsewhere",
+    "normal": "unit and facing the viewer where something is hit, zero elsewhere",
+    "object_id": "from -1 to the object count; every object shows enough pixels",
+    "image": "finite, not negative, and the shading equation of the other values",
+}
+
+
+def _row_check(name: str, problems: list[str], count: int) -> Check:
+    if not problems:
+        return Check(name, True, f"{_ROW_RULES[name]} ({count} rows)")
+    more = f" and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
+    return Check(name, False, "; ".join(problems[:SHOWN]) + more)
+
+
+def _row_problems(rooms: RoomsFile, i: int) -> Iterable[tuple[str, str]]:
+    try:
+        room = rooms[i]
+        batch = pack(rooms.spec, [room.scene], room.view_index)
+    except (FileFormatError, SpecError, IndexError) as error:
+        yield "description", str(error)
+        return
+    yield from (("description", p) for p in _description_problems(rooms, room, batch))
+    yield from (("depth", p) for p in _depth_problems(room))
+    yield from (("normal", p) for p in _normal_problems(room))
+    yield from (("object_id", p) for p in _object_problems(rooms, room))
+    yield from (("image", p) for p in _image_problems(rooms, room, batch))
+
+
+def _description_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable[str]:
+    stored = {
+        "camera/world_from_camera": batch.world_from_camera,
+        "camera/fov_y_degrees": batch.fov_y_degrees,
+        "light/count": batch.light_count,
+        "light/position": batch.light_position,
+        "light/color": batch.light_color,
+        "light/ambient": batch.ambient,
+        "light/attenuation": batch.attenuation,
+        "material/reflectance": batch.reflectance,
+        "object/count": batch.object_count,
+        "object/shape": batch.shape,
+        "object/world_from_object": batch.world_from_object,
+        "object/scale": batch.object_scale,
+        "scene_index": np.array([room.scene.index]),
+    }
+    for name, values in stored.items():
+        if not np.allclose(rooms.read(name, room.index), values[0], rtol=0, atol=1e-12):
+            yield f"{name} differs from the scene's description"
+
+
+def _depth_problems(room: Room) -> Iterable[str]:
+    hit = room.object_id >= 0
+    if not (np.isfinite(room.depth[hit]).all() and (room.depth[hit] > 0).all()):
+        yield "a hit pixel's depth is not a positive number"
+    if not np.isnan(room.depth[~hit]).all():
+        yield "a pixel without a hit has a depth"
+
+
+def _normal_problems(room: Room) -> Iterable[str]:
+    hit = room.object_id >= 0
+    length = np.linalg.norm(room.normal.astype(np.float64), axis=-1)
+    if not (np.abs(length[hit] - 1) < UNIT_TOLERANCE).all():
+        yield f"a normal's length is off 1 by {np.nanmax(np.abs(length[hit] - 1)):.1e}"
+    if not (room.normal[~hit] == 0).all():
+        yield "a pixel without a hit has a normal"
+    rays = pixel_directions(*room.depth.shape, room.fov_y_degrees)
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    if not ((room.normal * rays).sum(-1)[hit] < UNIT_TOLERANCE).all():
+        yield "a normal faces away from the viewer"
+
+
+def _object_problems(rooms: RoomsFile, room: Room) -> Iterable[str]:
+    count = len(room.scene.objects)
+    if room.object_id.min() < -1 or room.object_id.max() > count:
+        yield f"object ids {room.object_id.min()} to {room.object_id.max()}, {count} objects"
+    visible = visible_pixels(room.object_id[None], rooms.spec.object_slots)[0]
+    if not np.array_equal(visible, rooms.read("object/visible_pixels", room.index)):
+        yield "object/visible_pixels does not count them"
+    if (visible[:count] < rooms.spec.min_visible_pixels).any():
+        yield f"an object shows {visible[:count].min()} pixels"
+
+
+def _image_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable[str]:
+    radiance = room.radiance
+    if not np.isfinite(radiance).all() or (radiance < 0).any():
+        yield "a value is negative or not finite"
+        return
+    if rooms.spec.spp > 1 or rooms.spec.shadows:
+        return
+    reference = shade(
+        transform_points(room.world_from_camera, np.nan_to_num(room.points)),
+        transform_vectors(room.world_from_camera, room.normal),
+        batch.reflectance[0, np.maximum(room.object_id, 0)],
+        batch.light_position[0, : batch.light_count[0]],
+        batch.light_color[0, : batch.light_count[0]],
+        batch.ambient[0],
+        batch.attenuation[0],
+    )
+    reference[room.object_id < 0] = 0.0
+    step = {"uint8": 0.5 / 255, "float16": 2.0**-11, "float32": 0.0}[rooms.spec.image_dtype]
+    if rooms.spec.image_dtype == "uint8":
+        reference = reference.clip(0, 1)
+    off = np.abs(radiance - reference) - step * np.maximum(reference, 1.0) - RADIANCE_TOLERANCE
+    if (off > 0).any():
+        yield f"{int((off > 0).any(-1).sum())} pixels are not what the shading equation gives"
+
+
+def _sampled_again(rooms: RoomsFile, rows: Array) -> Check:
+    """Whether the seed still gives the stored descriptions."""
+    wrong = []
+    for i in rows.tolist():
+        stored = rooms.scene(i)
+        attempts = (sample_scene(rooms.spec, stored.index, k) for k in range(MAX_ATTEMPTS))
+        if not any(scene == stored for scene in attempts):
+            wrong.append(f"row {i}")
+    detail = ", ".join(wrong) + " cannot be drawn again" if wrong else f"{len(rows)} rows"
+    return Check("drawn again from the seed", not wrong, detail)
+
+
+def _rendered_again(rooms: RoomsFile, rows: Array, device: str) -> Check:
+    """Whether the stored descriptions give the stored pixels: bit for bit on the same backend."""
+    variant = select_variant(device)
+    written_by = rooms.attributes.get("variant")
+    exact = variant == written_by
+    wrong = []
+    for i in rows.tolist():
+        room = rooms[i]
+        again = render(pack(rooms.spec, [room.scene], room.view_index), device)
+        names = ("image", "depth", "normal", "object_id")
+        pairs = [(getattr(room, name), getattr(again, name)[0]) for name in names]
+        if exact and not all(np.array_equal(a, b, equal_nan=True) for a, b in pairs):
+            differs = [n for n, (a, b) in zip(names, pairs, strict=True)
+                       if not np.array_equal(a, b, equal_nan=True)]
+            wrong.append(f"row {i} ({', '.join(differs)})")
+        if not exact:
+            off = np.abs(pairs[1][0] - pairs[1][1]) > OTHER_BACKEND_TOLERANCE
+            if off.mean() > 1e-3:
+                wrong.append(f"row {i} (depth)")
+    how = "bit for bit" if exact else f"to {OTHER_BACKEND_TOLERANCE} ({written_by}, here {variant})"
+    detail = "differ: " + ", ".join(wrong) if wrong else f"{len(rows)} rows, {how}"
+    return Check("rendered again", not wrong, detail)
