@@ -22,26 +22,30 @@ class FriendlyGroup(click.Group):
             return super().invoke(ctx)
         except OSError as error:
             where = f"{error.filename}: " if error.filename else ""
-            raise _failure(ctx, f"{where}{error.strerror or error}") from error
+            raise _failure(f"{where}{error.strerror or error}") from error
         except ValueError as error:
             from scenegen.errors import SceneGenError
 
             if not isinstance(error, SceneGenError):
                 raise
-            raise _failure(ctx, str(error)) from error
+            raise _failure(str(error)) from error
 
 
-def _failure(ctx: click.Context, text: str) -> click.ClickException:
-    failure = click.ClickException(" ".join(text.split()))
-    failure.exit_code = 2
-    return failure
+class UserError(click.ClickException):
+    """A mistake that the user can mend."""
+
+    exit_code = 2
 
 
-def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+def _failure(text: str) -> click.ClickException:
+    return UserError(" ".join(text.split()))
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     click.echo(f"note: {message}", err=True)
 
 
-class Range(click.ParamType):
+class Range(click.ParamType):  # type: ignore[type-arg]
     """`3` or `1-3`, as two numbers."""
 
     def __init__(self, number: Callable[[str], Any]) -> None:
@@ -61,7 +65,7 @@ class Range(click.ParamType):
         return parts[0], parts[-1]
 
 
-class Size(click.ParamType):
+class Size(click.ParamType):  # type: ignore[type-arg]
     """`128` or `HxW`, as (height, width)."""
 
     name = "N or HxW"
@@ -70,12 +74,13 @@ class Size(click.ParamType):
         """Parse."""
         parts = str(value).lower().split("x")
         if len(parts) not in (1, 2) or not all(part.isdecimal() for part in parts):
-            self.fail(f"found {value!r}, expected a number such as 128 or HxW such as 96x128",
-                      param, ctx)
+            self.fail(
+                f"found {value!r}, expected a number such as 128 or HxW such as 96x128", param, ctx
+            )
         return int(parts[0]), int(parts[-1])
 
 
-class Items(click.ParamType):
+class Items(click.ParamType):  # type: ignore[type-arg]
     """`0,5,7` or `0-7` or both, as a list of numbers."""
 
     name = "0,5,7 or 0-7"
@@ -91,7 +96,9 @@ class Items(click.ParamType):
         return chosen
 
 
-def _names(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[str, ...] | None:
+def _names(
+    _ctx: click.Context, _param: click.Parameter, value: str | None
+) -> tuple[str, ...] | None:
     return None if value is None else tuple(part.strip() for part in value.split(","))
 
 
@@ -106,27 +113,59 @@ def scenegen() -> None:
 @click.option("--out", default="rooms.h5", show_default=True, help="File to write.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of every random choice.")
 @click.option("--size", type=Size(), default="128", show_default=True, help="Image size in pixels.")
-@click.option("--objects", type=Range(int), default="1-3", show_default=True, help="Objects a scene.")
-@click.option("--shapes", callback=_names, help="Names to draw from, such as box,sphere [default: all].")
+@click.option(
+    "--objects", type=Range(int), default="1-3", show_default=True, help="Objects a scene."
+)
+@click.option(
+    "--shapes", callback=_names, help="Names to draw from, such as box,sphere [default: all]."
+)
 @click.option("--object-radius", type=Range(float), help="Bounding radius, scene units.")
-@click.option("--pose", type=click.Choice(["resting", "any"]), default="resting", show_default=True,
-              help="How objects lie: as they would stay, or turned anyhow.")
+@click.option(
+    "--pose",
+    type=click.Choice(["resting", "any"]),
+    default="resting",
+    show_default=True,
+    help="How objects lie: as they would stay, or turned anyhow.",
+)
 @click.option("--lights", type=Range(int), default="1-3", show_default=True, help="Lights a scene.")
-@click.option("--shadows/--no-shadows", default=False, help="Whether objects cast shadows [default: no].")
+@click.option(
+    "--shadows/--no-shadows", default=False, help="Whether objects cast shadows [default: no]."
+)
 @click.option("--spp", type=int, default=1, show_default=True, help="Colour samples a pixel.")
 @click.option("--min-visible-pixels", type=int, help="Least pixels of each object [default: 0.3%].")
 @click.option("--allow-cropped", is_flag=True, help="Let the image's border cut objects.")
-@click.option("--image-dtype", type=click.Choice(["uint8", "float16", "float32"]), default="uint8",
-              show_default=True, help="How radiance is stored.")
-@click.option("--compression", type=click.Choice(["gzip", "lzf", "none"]), default="gzip",
-              show_default=True, help="lzf is read by h5py only.")
+@click.option(
+    "--image-dtype",
+    type=click.Choice(["uint8", "float16", "float32"]),
+    default="uint8",
+    show_default=True,
+    help="How radiance is stored.",
+)
+@click.option(
+    "--compression",
+    type=click.Choice(["gzip", "lzf", "none"]),
+    default="gzip",
+    show_default=True,
+    help="lzf is read by h5py only.",
+)
 @click.option("--batch", type=int, default=64, show_default=True, help="Images in one wavefront.")
-@click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
-              show_default=True, help="auto: the CPU's fast path, else a slow one.")
+@click.option(
+    "--device",
+    type=click.Choice(["auto", "cpu", "cuda"]),
+    default="auto",
+    show_default=True,
+    help="auto: the CPU's fast path, else a slow one.",
+)
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 def render(
-    count: int, out: str, size: tuple[int, int], batch: int, device: str, compression: str,
-    overwrite: bool, **settings: Any,
+    count: int,
+    out: str,
+    size: tuple[int, int],
+    batch: int,
+    device: str,
+    compression: str,
+    overwrite: bool,
+    **settings: Any,
 ) -> None:
     """Render rooms to an HDF5 file: image, depth, normals, object ids, cameras, lights, scenes."""
     from tqdm import tqdm
@@ -140,8 +179,17 @@ def render(
     command = " ".join(["scenegen", *sys.argv[1:]])
     started = time.perf_counter()
     with tqdm(total=count, unit="img", disable=None, leave=False, smoothing=0.1) as bar:
-        make_dataset(out, spec, count, batch=batch, device=device, compression=compression,
-                     overwrite=overwrite, command=command, progress=bar.update)
+        make_dataset(
+            out,
+            spec,
+            count,
+            batch=batch,
+            device=device,
+            compression=compression,
+            overwrite=overwrite,
+            command=command,
+            progress=bar.update,
+        )
     seconds = time.perf_counter() - started
     megabytes = Path(out).stat().st_size / 1e6
     click.echo(f"{out}: {count} images, {megabytes:.1f} MB, {count / seconds:.0f} images/s")
@@ -151,7 +199,9 @@ def render(
 @click.argument("file")
 @click.option("--out", default="sheet.png", show_default=True, help="Picture to write.")
 @click.option("--items", type=Items(), help="Rows to show [default: the first 12].")
-@click.option("--random", "number", type=click.IntRange(1, 400), help="Show so many rows at random.")
+@click.option(
+    "--random", "number", type=click.IntRange(1, 400), help="Show so many rows at random."
+)
 @click.option("--seed", type=int, default=0, show_default=True, help="Which ones --random picks.")
 def preview(file: str, out: str, items: list[int] | None, number: int | None, seed: int) -> None:
     """Make a contact sheet: image, depth, normals, object ids, with labels."""
@@ -175,12 +225,19 @@ def info(file: str) -> None:
 
 @scenegen.command()
 @click.argument("file")
-@click.option("--items", type=click.IntRange(0), default=8, show_default=True,
-              help="Rows to draw and render again.")
-@click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True)
+@click.option(
+    "--items",
+    type=click.IntRange(0),
+    default=8,
+    show_default=True,
+    help="Rows to draw and render again.",
+)
+@click.option(
+    "--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto", show_default=True
+)
 @click.pass_context
 def verify(ctx: click.Context, file: str, items: int, device: str) -> None:
-    """Check layout and values of every row, and render some again; exits with 1 if a check fails."""
+    """Check layout and values of every row, render some again; exits with 1 if a check fails."""
     from tqdm import tqdm
 
     from scenegen.scene_file import RoomsFile
@@ -193,15 +250,22 @@ def verify(ctx: click.Context, file: str, items: int, device: str) -> None:
     for check in checks:
         click.echo(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:26} {check.detail}")
     failed = sum(not check.ok for check in checks)
-    click.echo(f"{file}: {failed} of {len(checks)} checks failed" if failed else f"{file}: verified")
+    click.echo(
+        f"{file}: {failed} of {len(checks)} checks failed" if failed else f"{file}: verified"
+    )
     ctx.exit(1 if failed else 0)
 
 
 @scenegen.command()
 @click.argument("file")
 @click.option("--items", type=Items(), required=True, help="Rows to export.")
-@click.option("--format", "form", type=click.Choice(["exr", "png", "ply", "obj"]), required=True,
-              help="exr: all channels; png: 16 bits; ply: surfels; obj: the scene's mesh.")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["exr", "png", "ply", "obj"]),
+    required=True,
+    help="exr: all channels; png: 16 bits; ply: surfels; obj: the scene's mesh.",
+)
 @click.option("--out", default=".", show_default=True, help="Folder to write to.")
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
 def export(file: str, items: list[int], form: str, out: str, overwrite: bool) -> None:

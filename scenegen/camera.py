@@ -49,7 +49,9 @@ class Camera:
         right = np.array([back[2], 0.0, -back[0]])  # y axis x back
         length = math.hypot(back[2], back[0])
         if length < 1e-9:
-            raise ValueError(f"camera: {self.position} looks straight along y; its roll is undefined")
+            raise ValueError(
+                f"camera: {self.position} looks straight along y; its roll is undefined"
+            )
         right /= length
         matrix = np.eye(4)
         matrix[:3, 0] = right
@@ -79,7 +81,8 @@ def pixel_directions(height: int, width: int, fov_y_degrees: float) -> NDArray[n
 def back_project(depth: Array, fov_y_degrees: float) -> NDArray[np.float64]:
     """Return the surfel positions of a planar depth map, camera frame: (H, W) -> (H, W, 3)."""
     height, width = depth.shape
-    return pixel_directions(height, width, fov_y_degrees) * np.asarray(depth)[..., None]
+    directions = pixel_directions(height, width, fov_y_degrees)
+    return np.asarray(directions * np.asarray(depth)[..., None])
 
 
 def transform_points(matrix: Array, points: Array) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from scenegen.backend import select_variant
 from scenegen.errors import SpecError
-from scenegen.packing import SceneBatch, pack
+from scenegen.packing import pack
 from scenegen.renderer import launch
 from scenegen.sampling import MAX_ATTEMPTS, refusal, sample_scene
 from scenegen.scene_writer import RoomsWriter, check_writable

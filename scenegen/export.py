@@ -20,7 +20,9 @@ FORMATS = ("exr", "png", "ply", "obj")
 PNG_DEPTH_UNIT = 1e-4  # scene units a step: 16 bits reach 6.5535
 
 
-def export_room(room: Room, folder: str | Path, stem: str, form: str, overwrite: bool) -> list[Path]:
+def export_room(
+    room: Room, folder: str | Path, stem: str, form: str, overwrite: bool
+) -> list[Path]:
     """Write one room as `form` (one of FORMATS); return the files written.
 
     Raises FileExistsError where a file is there already and `overwrite` is not set.
@@ -91,14 +93,18 @@ def write_surfels_ply(room: Room, path: str | Path) -> None:
         + [(name, "u1") for name in ("red", "green", "blue")]
         + [("object_id", "i1")],
     )
-    points, normals = room.points_world[hit], transform_vectors(room.world_from_camera, room.normal[hit])
+    points, normals = (
+        room.points_world[hit],
+        transform_vectors(room.world_from_camera, room.normal[hit]),
+    )
     colors = srgb_bytes(room.radiance)[hit]
     for i in range(3):
         vertices["xyz"[i]], vertices["n" + "xyz"[i]] = points[:, i], normals[:, i]
         vertices[("red", "green", "blue")[i]] = colors[:, i]
     vertices["object_id"] = room.object_id[hit]
     kinds = {"<f4": "float", "|u1": "uchar", "|i1": "char"}
-    properties = [f"property {kinds[kind]} {name}" for name, kind in vertices.dtype.descr]
+    fields = (vertices.dtype.fields or {}).items()
+    properties = [f"property {kinds[kind.str]} {name}" for name, (kind, *_) in fields]
     header = [
         "ply",
         "format binary_little_endian 1.0",

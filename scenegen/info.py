@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenegen.layout import FIELDS
 from scenegen.scene_file import RoomsFile
@@ -46,7 +47,9 @@ def describe(path: str | Path) -> str:
     return "\n".join(lines)
 
 
-def _ranges(rooms: RoomsFile, rows: np.ndarray) -> tuple[dict[str, tuple[float, float]], str]:  # type: ignore[type-arg]
+def _ranges(
+    rooms: RoomsFile, rows: NDArray[np.int_]
+) -> tuple[dict[str, tuple[float, float]], str]:
     low: dict[str, float] = {}
     high: dict[str, float] = {}
     counts: dict[str, int] = {}

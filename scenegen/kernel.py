@@ -74,7 +74,7 @@ def closest_hit(scenes: Scenes, item: Any, o: Any, d: Any) -> Any:
         near, far, meets = _bounding_interval(scenes, row, o, d)
         if dr.hint(meets & (near < t), exclude=[scenes]):
             start, along = _to_unit_scene(scenes, row, o + near * d, d)
-            ray = mi.Ray3f(start, along, far - near, 0.0, [])
+            ray = mi.Ray3f(mi.Ray3f(start, along), far - near)
             hit = scenes.unit.ray_intersect_preliminary(ray, coherent=False)
             nearer = hit.is_valid() & (near + hit.t <= t)
             t = dr.select(nearer, near + hit.t, t)
@@ -98,7 +98,7 @@ def occluded(scenes: Scenes, item: Any, o: Any, d: Any, active: Any) -> Any:
         far = dr.minimum(far, 1)
         if dr.hint(meets & (near < far), exclude=[scenes]):
             start, along = _to_unit_scene(scenes, row, o + near * d, d)
-            ray = mi.Ray3f(start, along, far - near, 0.0, [])
+            ray = mi.Ray3f(mi.Ray3f(start, along), far - near)
             blocked |= scenes.unit.ray_test(ray, coherent=False)
         k += 1
     return blocked & active
@@ -136,7 +136,7 @@ def normal_at(
 
 
 def radiance_at(scenes: Scenes, item: Any, p: Any, n: Any, object_id: Any, shadows: bool) -> Any:
-    """Return the shading equation at a hit, 0 where nothing is; `shading.shade` is its reference."""
+    """Return the shading equation at a hit, 0 where nothing is (reference: `shading.shade`)."""
     record = gather_row(scenes.lights, item, 5 + 6 * scenes.light_slots)
     total = mi.Vector3f(*record[:3])
     for j in range(scenes.light_slots):

@@ -92,9 +92,7 @@ FIELDS = (
         "world",
         "point lights; slots from light/count on are unused",
     ),
-    Field(
-        "light/color", ("L", 3), "float64", "radiance", "RGB", "L_j; zero in unused slots"
-    ),
+    Field("light/color", ("L", 3), "float64", "radiance", "RGB", "L_j; zero in unused slots"),
     Field("light/ambient", (3,), "float64", "radiance", "RGB", "L_a"),
     Field(
         "light/attenuation",

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import Camera
-from scenegen.shapes import UnitShape, rotation_matrix
+from scenegen.shapes import rotation_matrix
+from scenegen.solids import UnitShape
 
 Array = NDArray[Any]
 Quaternion = tuple[float, float, float, float]

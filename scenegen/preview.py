@@ -22,8 +22,16 @@ SMALLEST_TILE = 128  # smaller images are enlarged by a whole factor
 BACKGROUND, INK, FAINT = (250, 250, 250), (20, 20, 20), (110, 110, 110)
 NOTHING = (90, 0, 110)  # where a ray meets nothing
 PALETTE = np.array(  # object ids: the room grey, then Okabe and Ito's colours, again and again
-    [(200, 200, 200), (230, 159, 0), (86, 180, 233), (0, 158, 115), (240, 228, 66)]
-    + [(0, 114, 178), (213, 94, 0), (204, 121, 167)],
+    [
+        (200, 200, 200),
+        (230, 159, 0),
+        (86, 180, 233),
+        (0, 158, 115),
+        (240, 228, 66),
+        (0, 114, 178),
+        (213, 94, 0),
+        (204, 121, 167),
+    ],
     np.uint8,
 )
 TITLES = ("image", "depth, near is dark", "normal, xyz as rgb", "object id")
@@ -73,9 +81,7 @@ def tiles(room: Room) -> list[NDArray[np.uint8]]:
 def srgb_bytes(radiance: Array) -> NDArray[np.uint8]:
     """Encode linear radiance for the eye: sRGB (IEC 61966-2-1), 8 bits, clipped at 1."""
     linear = np.clip(radiance, 0.0, 1.0)
-    encoded = np.where(
-        linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055
-    )
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     return np.asarray(np.rint(encoded * 255).astype(np.uint8))
 
 

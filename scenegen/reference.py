@@ -47,7 +47,7 @@ def _render_one(batch: SceneBatch, b: int, cast: Cast) -> tuple[Array, Array, Ar
     origin = world_from_camera[:3, 3]
     total = np.zeros((spec.height * spec.width, 3))
     for sample, (x, y) in enumerate(sample_positions(spec.spp)):
-        local = directions + [(x - 0.5) * pixel, (0.5 - y) * pixel, 0.0]
+        local = directions + np.array([(x - 0.5) * pixel, (0.5 - y) * pixel, 0.0])
         rays = local.reshape(-1, 3) @ world_from_camera[:3, :3].T
         t, normal, object_id = _closest(batch, b, origin, rays, cast)
         hit = object_id >= 0
@@ -81,7 +81,9 @@ def _closest(
     object_id = np.where(inside, 0, -1)
     for k in range(int(batch.object_count[b])):
         name = batch.spec.shapes[batch.shape[b, k]]
-        start, along, meets = _to_object_frame(batch, b, k, np.broadcast_to(origin, rays.shape), rays)
+        start, along, meets = _to_object_frame(
+            batch, b, k, np.broadcast_to(origin, rays.shape), rays
+        )
         distance, local_normal = cast(name, start[meets], along[meets])
         nearer = np.zeros(len(rays), bool)
         nearer[meets] = distance <= t[meets]

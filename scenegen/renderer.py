@@ -1,7 +1,7 @@
 """Batches of scenes -> images with exact ground truth, on the best backend there is."""
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,7 @@ def launch(batch: SceneBatch, device: str = "auto") -> Callable[[], GroundTruth]
     return launch_wavefront(batch, variant)
 
 
-@lru_cache(maxsize=None)
+@cache
 def _scalar_scene(name: str) -> Any:
     import mitsuba as mi
 
@@ -53,8 +53,14 @@ def _scalar_cast(name: str, origins: Array, directions: Array) -> tuple[Array, A
     mi.set_variant("scalar_rgb")
     scene = _scalar_scene(name)
     t = np.full(len(origins), np.inf)
-    triangle, u, v = np.zeros(len(origins), np.int64), np.zeros(len(origins)), np.zeros(len(origins))
-    for i, (origin, direction) in enumerate(zip(origins.tolist(), directions.tolist(), strict=True)):
+    triangle, u, v = (
+        np.zeros(len(origins), np.int64),
+        np.zeros(len(origins)),
+        np.zeros(len(origins)),
+    )
+    for i, (origin, direction) in enumerate(
+        zip(origins.tolist(), directions.tolist(), strict=True)
+    ):
         hit = scene.ray_intersect_preliminary(mi.Ray3f(origin, direction), False)
         if hit.is_valid():
             t[i], triangle[i] = hit.t, hit.prim_index

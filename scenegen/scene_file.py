@@ -159,10 +159,12 @@ class RoomsFile:
         found = self.attributes.get("format")
         if found != FORMAT_NAME:
             what = "no format attribute" if found is None else repr(found)
-            raise FileFormatError(f"{self.path}: not a rooms file: found {what}, expected"
-                                  f" format {FORMAT_NAME!r} (written by scenegen render)")
+            raise FileFormatError(
+                f"{self.path}: not a rooms file: found {what}, expected"
+                f" format {FORMAT_NAME!r} (written by scenegen render)"
+            )
         version = str(self.attributes.get("format_version"))
-        if version.split(".")[0] != MAJOR:
+        if version.split(".", maxsplit=1)[0] != MAJOR:
             raise FileFormatError(
                 f"{self.path}: format version {version}, this program reads {MAJOR}.x;"
                 f" use the release that wrote it ({self.attributes.get('writer')})"

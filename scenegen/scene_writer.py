@@ -80,12 +80,11 @@ class RoomsWriter:
             self._abandon()
             raise
 
-    def append(
-        self, scenes: Sequence[SceneSpec], batch: SceneBatch, truth: GroundTruth
-    ) -> None:
+    def append(self, scenes: Sequence[SceneSpec], batch: SceneBatch, truth: GroundTruth) -> None:
         """Write one row for each scene, view 0."""
         visible = visible_pixels(truth.object_id, self.spec.object_slots)
-        small = {
+        descriptions = [scene.to_json() for scene in scenes]
+        small: dict[str, Any] = {
             "scene_index": np.array([scene.index for scene in scenes]),
             "view_index": np.zeros(len(scenes), np.int32),
             "camera/world_from_camera": batch.world_from_camera,
@@ -101,7 +100,7 @@ class RoomsWriter:
             "object/world_from_object": batch.world_from_object,
             "object/scale": batch.object_scale,
             "object/visible_pixels": visible,
-            "scene": [scene.to_json() for scene in scenes],
+            "scene": descriptions,
         }
         images = {name: getattr(truth, name) for name in ("image", "depth", "normal", "object_id")}
         for i in range(len(scenes)):
@@ -109,7 +108,7 @@ class RoomsWriter:
                 self._write_chunk(name, self._rows, values[i])
             for name, rows in small.items():
                 self._blocks[name].append(rows[i])
-            self._digest.update(b"\n" + small["scene"][i].encode())
+            self._digest.update(b"\n" + descriptions[i].encode())
             self._rows += 1
             if self._rows % BLOCK_ROWS == 0 or self._rows == self.count:
                 self._flush_block()
@@ -214,12 +213,16 @@ def check_writable(path: Path, overwrite: bool) -> None:
     """Raise the OSError that would end in a lost run: better before rendering than after."""
     parent = path.parent
     if not parent.exists():
-        raise FileNotFoundError(errno.ENOENT, "the folder does not exist; create it first", str(parent))
+        raise FileNotFoundError(
+            errno.ENOENT, "the folder does not exist; create it first", str(parent)
+        )
     if not parent.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, "is not a folder", str(parent))
     if path.is_dir():
         raise IsADirectoryError(errno.EISDIR, "is a folder; name a file in it", str(path))
     if path.exists() and not overwrite:
-        raise FileExistsError(errno.EEXIST, "exists already; say --overwrite to replace it", str(path))
+        raise FileExistsError(
+            errno.EEXIST, "exists already; say --overwrite to replace it", str(path)
+        )
     if not os.access(parent, os.W_OK):
         raise PermissionError(errno.EACCES, "cannot be written to", str(parent))

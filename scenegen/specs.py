@@ -40,7 +40,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Light:
-    """A point light. `position` in world scene units, `color` the RGB of L_j (paper, eq. shading)."""
+    """A point light: its place in the world, and the RGB of L_j of the shading equation."""
 
     position: Vector3
     color: Vector3

@@ -8,7 +8,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.shapes import UnitShape, unit_shape
+from scenegen.shapes import unit_shape
+from scenegen.solids import UnitShape
 
 Array = NDArray[Any]
 LATTICE = 4.0  # distance between the shapes' origins; their bounding radius is 1

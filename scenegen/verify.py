@@ -58,7 +58,9 @@ def verify_file(
             for name, problem in _row_problems(rooms, i):
                 broken[name].append(f"row {i}: {problem}")
             progress(1)
-        checks = [Check("layout", True, f"{len(rooms)} rows, format {rooms.attributes['format_version']}")]
+        checks = [
+            Check("layout", True, f"{len(rooms)} rows, format {rooms.attributes['format_version']}")
+        ]
         checks += [_row_check(name, broken[name], len(rooms)) for name in _ROW_RULES]
         same = digest.hexdigest() == rooms.fingerprint
         checks.append(Check("fingerprint", same, rooms.fingerprint if same else "does not match"))
@@ -135,7 +137,7 @@ def _normal_problems(room: Room) -> Iterable[str]:
         yield f"a normal's length is off 1 by {np.nanmax(np.abs(length[hit] - 1)):.1e}"
     if not (room.normal[~hit] == 0).all():
         yield "a pixel without a hit has a normal"
-    rays = pixel_directions(*room.depth.shape, room.fov_y_degrees)
+    rays = pixel_directions(room.depth.shape[0], room.depth.shape[1], room.fov_y_degrees)
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
     if not ((room.normal * rays).sum(-1)[hit] < UNIT_TOLERANCE).all():
         yield "a normal faces away from the viewer"
@@ -201,8 +203,11 @@ def _rendered_again(rooms: RoomsFile, rows: Array, device: str) -> Check:
         names = ("image", "depth", "normal", "object_id")
         pairs = [(getattr(room, name), getattr(again, name)[0]) for name in names]
         if exact and not all(np.array_equal(a, b, equal_nan=True) for a, b in pairs):
-            differs = [n for n, (a, b) in zip(names, pairs, strict=True)
-                       if not np.array_equal(a, b, equal_nan=True)]
+            differs = [
+                n
+                for n, (a, b) in zip(names, pairs, strict=True)
+                if not np.array_equal(a, b, equal_nan=True)
+            ]
             wrong.append(f"row {i} ({', '.join(differs)})")
         if not exact:
             off = np.abs(pairs[1][0] - pairs[1][1]) > OTHER_BACKEND_TOLERANCE

@@ -31,9 +31,7 @@ def launch_wavefront(batch: SceneBatch, variant: str) -> Callable[[], GroundTrut
             return np.ascontiguousarray(rows).reshape(count, spec.height, spec.width, *channels)
 
         image, depth, normal, object_id = results
-        return GroundTruth(
-            pixels(image, 3), pixels(depth), pixels(normal, 3), pixels(object_id)
-        )
+        return GroundTruth(pixels(image, 3), pixels(depth), pixels(normal, 3), pixels(object_id))
 
     return fetch
 
@@ -73,6 +71,11 @@ def _table(rows: Array) -> Any:
     return mi.Float(rows.astype(np.float32).ravel())
 
 
+def _cast(kind: Any, values: Any) -> Any:
+    """Convert to one of Dr.Jit's computed types, which its stubs do not know to be callable."""
+    return kind(values)
+
+
 def _trace(batch: SceneBatch, scenes: Scenes, cameras: Any) -> list[Any]:
     """Return image, depth, normal and object id of every ray, not yet evaluated."""
     spec = batch.spec
@@ -110,13 +113,13 @@ def _trace(batch: SceneBatch, scenes: Scenes, cameras: Any) -> list[Any]:
         _, total = dr.while_loop(state, more, add_sample, mode="symbolic")
         image = total / spec.spp
     if spec.image_dtype == "uint8":
-        image = dr.uint8_array_t(mi.Vector3f)(dr.round(dr.clip(image, 0, 1) * 255))
+        image = _cast(dr.uint8_array_t(mi.Vector3f), dr.round(dr.clip(image, 0, 1) * 255))
     elif spec.image_dtype == "float16":
-        image = dr.float16_array_t(mi.Vector3f)(image)
+        image = _cast(dr.float16_array_t(mi.Vector3f), image)
     normal = mi.Vector3f(dr.dot(n, right), dr.dot(n, up), dr.dot(n, back))
     return [
         dr.ravel(image),
         dr.select(object_id >= 0, t, dr.nan),
         dr.ravel(normal),
-        dr.int8_array_t(mi.Float)(object_id),
+        _cast(dr.int8_array_t(mi.Float), object_id),
     ]

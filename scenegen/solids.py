@@ -1,0 +1,145 @@
+"""Unit shapes from polyhedra and profiles: surfaces, normals, hulls, and how they come to rest."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+Array = NDArray[Any]
+SEGMENTS = 512  # around an axis
+STRIPS = 16  # along a straight profile: long slivers would make rays three times as expensive
+
+
+@dataclass(frozen=True, eq=False)
+class UnitShape:
+    """A shape of bounding radius 1 about its origin.
+
+    Attributes:
+        name: as in `specs.SHAPE_NAMES`.
+        triangles: corners, (F, 3, 3), counter-clockwise seen from outside.
+        normals: unit normals at those corners, (F, 3, 3).
+        hull_points, hull_discs, rounding: a convex body that contains the shape, for placement:
+            the hull of horizontal discs about the points (V, 3) with radii (V,), grown by a ball.
+        resting_directions: unit directions, (S, 3), each of which may point down when the shape
+            lies still; empty where all may.
+        is_sphere: whether it is rendered as the exact unit sphere.
+    """
+
+    name: str
+    triangles: Array
+    normals: Array
+    hull_points: Array
+    hull_discs: Array
+    rounding: float
+    resting_directions: Array
+    is_sphere: bool = False
+
+    def support(self, directions: Array) -> Array:
+        """Return how far the convex body reaches along unit directions: (M, 3) -> (M,)."""
+        reach = self.hull_points @ directions.T
+        reach += self.hull_discs[:, None] * np.hypot(directions[:, 0], directions[:, 2])
+        return np.asarray(reach.max(axis=0) + self.rounding)
+
+
+def polyhedron(name: str, points: Array) -> UnitShape:
+    """Return the convex hull of points, centred and scaled to bounding radius 1, faces flat."""
+    points = points - (points.min(0) + points.max(0)) / 2
+    points = points / np.linalg.norm(points, axis=1).max()
+    hull = ConvexHull(points)
+    triangles = points[hull.simplices]
+    normals = np.repeat(hull.equations[:, None, :3], 3, axis=1)
+    triangles, normals = face_outwards(triangles, normals)
+    resting = resting_directions(points)
+    return UnitShape(name, triangles, normals, points, np.zeros(len(points)), 0.0, resting)
+
+
+def revolution(
+    name: str,
+    pieces: list[tuple[Array, Array]],
+    hull_rings: list[tuple[float, float]],
+    rounding: float = 0.0,
+    resting: Array | None = None,
+    is_sphere: bool = False,
+) -> UnitShape:
+    """Turn profile pieces, each (radius, height) points and normals of shape (n, 2), about y.
+
+    The result is scaled by the largest distance from the origin, rounding included.
+    """
+    angle = np.linspace(0, 2 * np.pi, SEGMENTS + 1)
+
+    def turn(values: Array, at: Array) -> Array:
+        radius, height = (
+            values[:, None, 0],
+            np.broadcast_to(values[:, None, 1], (len(values), at.size)),
+        )
+        return np.stack([radius * np.cos(at), height, radius * np.sin(at)], axis=-1)
+
+    corners, normals = [], []
+    for profile, profile_normals in pieces:
+        p, n = turn(profile, angle), turn(profile_normals, angle)
+        for a, b, c in (((0, 0), (1, 0), (1, 1)), ((0, 0), (1, 1), (0, 1))):
+            rows, columns = len(profile) - 1, SEGMENTS
+            take = [np.s_[i : i + rows, j : j + columns] for i, j in (a, b, c)]
+            corners.append(np.stack([p[t] for t in take], axis=2).reshape(-1, 3, 3))
+            normals.append(np.stack([n[t] for t in take], axis=2).reshape(-1, 3, 3))
+    rings = np.array(hull_rings)
+    scale = 1 / (np.linalg.norm(rings, axis=1).max() + rounding)
+    triangles, corner_normals = face_outwards(
+        np.concatenate(corners) * scale, np.concatenate(normals)
+    )
+    if resting is None:
+        resting = resting_directions(np.unique(turn(rings, angle[:-1]).reshape(-1, 3), axis=0))
+    discs, heights = (rings * scale).T
+    hull = np.stack([0 * heights, heights, 0 * heights], axis=1)
+    return UnitShape(
+        name, triangles, corner_normals, hull, discs, rounding * scale, resting, is_sphere
+    )
+
+
+def face_outwards(triangles: Array, normals: Array) -> tuple[Array, Array]:
+    """Drop degenerate triangles and wind the others so that they agree with their normals."""
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    keep = np.linalg.norm(cross, axis=1) > 1e-12
+    triangles, normals, cross = triangles[keep], normals[keep], cross[keep]
+    inward = np.einsum("fi,fi->f", cross, normals.sum(1)) < 0
+    triangles[inward] = triangles[inward][:, ::-1]
+    normals[inward] = normals[inward][:, ::-1]
+    return triangles, normals
+
+
+def resting_directions(points: Array) -> Array:
+    """Outward normals of the hull's faces on which the body stays when put down.
+
+    It stays where the plumb line from its centre of mass meets the face that it stands on.
+    """
+    hull = ConvexHull(points)
+    corners, normal = points[hull.simplices], hull.equations[:, :3]
+    inside = points.mean(axis=0)
+    spokes = corners - inside  # tetrahedra from `inside` to each triangle
+    volume = np.abs(np.linalg.det(spokes))
+    center = inside + volume @ spokes.sum(axis=1) / (4 * volume.sum())
+    foot = center - (normal @ center + hull.equations[:, 3])[:, None] * normal
+    edges = np.roll(corners, -1, axis=1) - corners
+    sides = np.einsum("fki,fi->fk", np.cross(edges, foot[:, None] - corners), normal)
+    stays = (sides > -1e-9).all(axis=1) | (sides < 1e-9).all(axis=1)  # whichever way it is wound
+    return np.asarray(np.unique(np.round(normal[stays], 9), axis=0))
+
+
+def arc(
+    center: tuple[float, float], radius: float, low: float, high: float, segments: int
+) -> tuple[Array, Array]:
+    """Profile and normals of an arc, angles in degrees from the radial direction."""
+    angle = np.radians(np.linspace(low, high, segments + 1))
+    normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    normals[np.abs(normals) < 1e-15] = 0.0
+    return np.array(center) + radius * normals, normals
+
+
+def line(start: tuple[float, float], end: tuple[float, float]) -> tuple[Array, Array]:
+    """Profile and normals of a straight piece whose outside is on its right."""
+    along = np.subtract(end, start)
+    normal = np.array([along[1], -along[0]]) / np.linalg.norm(along)
+    fraction = np.linspace(0.0, 1.0, STRIPS + 1)[:, None]
+    return start + fraction * along, np.repeat(normal[None], STRIPS + 1, axis=0)
