@@ -3,33 +3,21 @@
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from scenegen.backend import select_variant
 from scenegen.errors import SpecError
 from scenegen.packing import pack
 from scenegen.renderer import launch
 from scenegen.sampling import MAX_ATTEMPTS, refusal, sample_scene
-from scenegen.scene_writer import RoomsWriter, check_writable
+from scenegen.scene_writer import RenderedRoom, RoomsWriter, check_writable
 from scenegen.specs import DatasetSpec, SceneSpec
 from scenegen.truth import GroundTruth, visible_pixels
 
 DEFAULT_BATCH = 64
 MAX_BATCH = 4096
 WINDOW = 4  # batches that may be in the making while the oldest item is still being retried
-
-
-@dataclass(frozen=True, eq=False)
-class _Finished:
-    """An accepted item: row `row` of a rendered batch."""
-
-    scene: SceneSpec
-    row: int
-    truth: GroundTruth
 
 
 def make_dataset(
@@ -75,9 +63,8 @@ def make_dataset(
     ):
         writing: deque[Future[int]] = deque()
 
-        def write(items: list[_Finished]) -> int:
-            scenes = [item.scene for item in items]
-            writer.append(scenes, pack(spec, scenes), _gather(items))
+        def write(items: list[RenderedRoom]) -> int:
+            writer.append(items, pack(spec, [item.scene for item in items]))
             return len(items)
 
         for items in render_items(spec, range(count), batch, device):
@@ -90,7 +77,7 @@ def make_dataset(
 
 def render_items(
     spec: DatasetSpec, indices: range, batch: int, device: str = "auto"
-) -> Iterator[list[_Finished]]:
+) -> Iterator[list[RenderedRoom]]:
     """Yield accepted items in order, as they become complete.
 
     While a batch is cast, the next one is proposed. An item whose objects do not all show enough
@@ -100,7 +87,7 @@ def render_items(
     retries: deque[int] = deque()
     attempts = dict.fromkeys(indices[:0], 0)
     rendered = dict.fromkeys(indices[:0], 0)
-    finished: dict[int, _Finished] = {}
+    finished: dict[int, RenderedRoom] = {}
     next_out = 0
 
     def propose() -> list[SceneSpec]:
@@ -130,7 +117,14 @@ def render_items(
         for row, scene in enumerate(scenes):
             shown = visible[row, : len(scene.objects)]
             if (shown >= spec.min_visible_pixels).all():
-                finished[scene.index] = _Finished(scene, row, truth)
+                finished[scene.index] = RenderedRoom(
+                    scene,
+                    truth.image[row],
+                    truth.depth[row],
+                    truth.normal[row],
+                    truth.object_id[row],
+                    visible[row],
+                )
                 attempts.pop(scene.index)
                 rendered.pop(scene.index)
             else:
@@ -156,14 +150,3 @@ def _next_proposal(
             attempts[index] = attempt + 1
             return scene
     raise refusal(spec, index, rendered[index])
-
-
-def _gather(items: list[_Finished]) -> GroundTruth:
-    """Collect rows of several batches."""
-    first = items[0].truth
-    if all(item.truth is first for item in items) and len(items) == len(first.depth):
-        return first
-    names = ("image", "depth", "normal", "object_id")
-    return GroundTruth(
-        *(np.stack([getattr(item.truth, name)[item.row] for item in items]) for name in names)
-    )

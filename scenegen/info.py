@@ -47,9 +47,7 @@ def describe(path: str | Path) -> str:
     return "\n".join(lines)
 
 
-def _ranges(
-    rooms: RoomsFile, rows: NDArray[np.int_]
-) -> tuple[dict[str, tuple[float, float]], str]:
+def _ranges(rooms: RoomsFile, rows: NDArray[np.int_]) -> tuple[dict[str, tuple[float, float]], str]:
     low: dict[str, float] = {}
     high: dict[str, float] = {}
     counts: dict[str, int] = {}

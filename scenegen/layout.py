@@ -1,4 +1,7 @@
-"""The HDF5 layout of a rooms file, as data: `docs/rooms-file.md` is printed from this table."""
+"""The HDF5 layout of a rooms file, as data.
+
+`python -m scenegen.layout` prints it as the table of `docs/rooms-file.md`.
+"""
 
 from dataclasses import dataclass
 
@@ -160,3 +163,20 @@ def numpy_dtype(field: Field, spec: DatasetSpec) -> str:
 def image_scale(spec: DatasetSpec) -> float:
     """Return what a stored pixel is multiplied by to give radiance."""
     return 1 / 255 if spec.image_dtype == "uint8" else 1.0
+
+
+def markdown_table() -> str:
+    """Return the layout as a Markdown table."""
+    lines = [
+        "| dataset | row | type | unit | frame | meaning |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for f in FIELDS:
+        row = "(" + ", ".join(map(str, f.shape)) + ")"
+        dtype = {"image": "`--image-dtype`", "text": "UTF-8 string"}.get(f.dtype, f.dtype)
+        lines.append(f"| `{f.name}` | {row} | {dtype} | {f.unit} | {f.frame} | {f.meaning} |")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(markdown_table())

@@ -6,6 +6,7 @@ import importlib.metadata
 import os
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -27,12 +28,23 @@ from scenegen.layout import (
 )
 from scenegen.packing import SceneBatch
 from scenegen.specs import DatasetSpec, SceneSpec
-from scenegen.truth import GroundTruth, visible_pixels
 
 Array = NDArray[Any]
 COMPRESSIONS = ("gzip", "lzf", "none")
 DEFLATE_LEVEL = 1
 BLOCK_ROWS = 1024  # rows of the small datasets that are kept and written together
+
+
+@dataclass(frozen=True, eq=False)
+class RenderedRoom:
+    """An accepted item: its scene, and its pixels as in `GroundTruth` without the batch axis."""
+
+    scene: SceneSpec
+    image: Array
+    depth: Array
+    normal: Array
+    object_id: Array
+    visible_pixels: Array
 
 
 class RoomsWriter:
@@ -80,13 +92,12 @@ class RoomsWriter:
             self._abandon()
             raise
 
-    def append(self, scenes: Sequence[SceneSpec], batch: SceneBatch, truth: GroundTruth) -> None:
-        """Write one row for each scene, view 0."""
-        visible = visible_pixels(truth.object_id, self.spec.object_slots)
-        descriptions = [scene.to_json() for scene in scenes]
+    def append(self, rooms: Sequence[RenderedRoom], batch: SceneBatch) -> None:
+        """Write one row for each room, view 0; `batch` is their scenes, packed."""
+        descriptions = [room.scene.to_json() for room in rooms]
         small: dict[str, Any] = {
-            "scene_index": np.array([scene.index for scene in scenes]),
-            "view_index": np.zeros(len(scenes), np.int32),
+            "scene_index": np.array([room.scene.index for room in rooms]),
+            "view_index": np.zeros(len(rooms), np.int32),
             "camera/world_from_camera": batch.world_from_camera,
             "camera/fov_y_degrees": batch.fov_y_degrees,
             "light/count": batch.light_count,
@@ -99,13 +110,12 @@ class RoomsWriter:
             "object/shape": batch.shape,
             "object/world_from_object": batch.world_from_object,
             "object/scale": batch.object_scale,
-            "object/visible_pixels": visible,
+            "object/visible_pixels": [room.visible_pixels for room in rooms],
             "scene": descriptions,
         }
-        images = {name: getattr(truth, name) for name in ("image", "depth", "normal", "object_id")}
-        for i in range(len(scenes)):
-            for name, values in images.items():
-                self._write_chunk(name, self._rows, values[i])
+        for i, room in enumerate(rooms):
+            for name in ("image", "depth", "normal", "object_id"):
+                self._write_chunk(name, self._rows, getattr(room, name))
             for name, rows in small.items():
                 self._blocks[name].append(rows[i])
             self._digest.update(b"\n" + descriptions[i].encode())
