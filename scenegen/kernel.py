@@ -25,6 +25,8 @@ class Scenes:
         unit: the Mitsuba scene of unit shapes.
         slots, light_slots: K objects and L lights a scene at most.
         count: objects in each scene, (B,).
+        has_room: whether the scene has its room, (B,).
+        background: radiance of rays that meet nothing, (B, 3).
         spheres: bounding sphere of each object, (B K, 4): centre, radius (0 for an unused slot).
         from_world: affine map into the unit scene, (B K, 12): three rows of (linear, offset).
         place: where the object's unit shape lies in the unit scene, (B K, 3).
@@ -38,6 +40,8 @@ class Scenes:
     slots: int
     light_slots: int
     count: Any
+    has_room: Any
+    background: Any
     spheres: Any
     from_world: Any
     place: Any
@@ -62,7 +66,8 @@ def closest_hit(scenes: Scenes, item: Any, o: Any, d: Any) -> Any:
     walls = [dr.select(d[i] < 0, -o[i] / d[i], dr.inf) for i in range(3)]
     t = dr.minimum(walls[0], dr.minimum(walls[1], walls[2]))
     p = o + t * d
-    on_room = (t < dr.inf) & (p.x <= 1) & (p.y <= 1) & (p.z <= 1)
+    has_room = dr.gather(mi.Bool, scenes.has_room, item)
+    on_room = has_room & (t < dr.inf) & (p.x <= 1) & (p.y <= 1) & (p.z <= 1)
     t = dr.select(on_room, t, dr.inf)
     object_id = dr.select(on_room, mi.Int32(0), mi.Int32(-1))
     triangle = mi.UInt32(0)
@@ -136,7 +141,7 @@ def normal_at(
 
 
 def radiance_at(scenes: Scenes, item: Any, p: Any, n: Any, object_id: Any, shadows: bool) -> Any:
-    """Return the shading equation at a hit, 0 where nothing is (reference: `shading.shade`)."""
+    """Return the shading equation at a hit (reference: `shading.shade`), else the background."""
     record = gather_row(scenes.lights, item, 5 + 6 * scenes.light_slots)
     total = mi.Vector3f(*record[:3])
     for j in range(scenes.light_slots):
@@ -151,7 +156,8 @@ def radiance_at(scenes: Scenes, item: Any, p: Any, n: Any, object_id: Any, shado
         total += amount * mi.Vector3f(*light[3:])
     row = item * (1 + scenes.slots) + mi.UInt32(dr.maximum(object_id, 0))
     rho = mi.Vector3f(*gather_row(scenes.reflectance, row, 3))
-    return dr.select(object_id >= 0, rho * total, mi.Vector3f(0))
+    background = mi.Vector3f(*gather_row(scenes.background, item, 3))
+    return dr.select(object_id >= 0, rho * total, background)
 
 
 def _bounding_interval(scenes: Scenes, row: Any, o: Any, d: Any) -> tuple[Any, Any, Any]:

@@ -35,6 +35,8 @@ class SceneBatch:
         reflectance: rho by object id, (B, 1 + K, 3); [:, 0] is the room's.
         light_position, light_color: (B, L, 3), world.
         ambient: (B, 3).
+        has_room: (B,) bool.
+        background: radiance of rays that meet nothing, (B, 3).
         attenuation: (k_l, k_q), (B, 2).
     """
 
@@ -51,6 +53,8 @@ class SceneBatch:
     light_color: Array
     ambient: Array
     attenuation: Array
+    has_room: Array
+    background: Array
 
     def __len__(self) -> int:
         return len(self.fov_y_degrees)
@@ -91,7 +95,7 @@ def pack(spec: DatasetSpec, scenes: Sequence[SceneSpec], view_index: int = 0) ->
     world_from_object = np.zeros((batch, slots, 4, 4))
     world_from_object[used] = placed
     reflectance = np.zeros((batch, 1 + slots, 3))
-    reflectance[:, 0] = [scene.room_reflectance for scene in scenes]
+    reflectance[:, 0] = [scene.room_reflectance or (0.0, 0.0, 0.0) for scene in scenes]
     reflectance[:, 1:][used] = np.array([i.reflectance for i in objects]).reshape(-1, 3)
 
     lit = np.arange(light_slots) < light_count[:, None]
@@ -114,6 +118,8 @@ def pack(spec: DatasetSpec, scenes: Sequence[SceneSpec], view_index: int = 0) ->
         light_color=light_color,
         ambient=np.array([scene.ambient for scene in scenes]),
         attenuation=np.array([scene.attenuation for scene in scenes]),
+        has_room=np.array([scene.room_reflectance is not None for scene in scenes]),
+        background=np.array([scene.background for scene in scenes]),
     )
 
 

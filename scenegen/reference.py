@@ -53,7 +53,7 @@ def _render_one(batch: SceneBatch, b: int, cast: Cast) -> tuple[Array, Array, Ar
         hit = object_id >= 0
         points = origin + np.where(hit, t, 0.0)[:, None] * rays
         radiance = _shade(batch, b, points, normal, object_id, cast)
-        total += np.where(hit[:, None], radiance, 0.0)
+        total += np.where(hit[:, None], radiance, batch.background[b])
         if sample == 0:
             truth = (np.where(hit, t, np.nan), normal @ world_from_camera[:3, :3], object_id)
     depth, normals, object_ids = truth
@@ -74,7 +74,7 @@ def _closest(
         walls = np.where(rays < 0, -origin / rays, np.inf)
     axis = walls.argmin(axis=1)
     t = walls.min(axis=1)
-    inside = np.isfinite(t)
+    inside = np.isfinite(t) & bool(batch.has_room[b])
     inside[inside] = (origin + t[inside, None] * rays[inside] <= 1.0).all(axis=1)
     t = np.where(inside, t, np.inf)
     normal = np.where(inside[:, None], np.eye(3)[axis], 0.0)

@@ -51,7 +51,7 @@ def unit_mesh(name: str) -> trimesh.Trimesh:
 
 def scene_mesh(scene: SceneSpec) -> trimesh.Trimesh:
     """Return room and objects as one mesh, world frame, for export and for other engines."""
-    parts = [room_mesh()]
+    parts = [] if scene.room_reflectance is None else [room_mesh()]
     for item in scene.objects:
         mesh = unit_mesh(item.shape)
         mesh.apply_transform(world_from_object(item.position, item.rotation, item.scale))

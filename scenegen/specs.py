@@ -63,7 +63,11 @@ class PlacedObject:
 
 @dataclass(frozen=True)
 class SceneSpec:
-    """One scene in full. `attenuation` is (k_l, k_q) of the shading equation."""
+    """One scene in full.
+
+    `attenuation` is (k_l, k_q) of the shading equation; `room_reflectance` is None where there is
+    no room; `background` is the radiance of rays that meet nothing.
+    """
 
     index: int
     cameras: tuple[Camera, ...]
@@ -71,7 +75,8 @@ class SceneSpec:
     lights: tuple[Light, ...]
     ambient: Vector3
     attenuation: tuple[float, float]
-    room_reflectance: Vector3
+    room_reflectance: Vector3 | None
+    background: Vector3 = (0.0, 0.0, 0.0)
 
     def to_json(self) -> str:
         """Return the description as one line of JSON; floats keep every bit."""
@@ -139,7 +144,7 @@ class DatasetSpec:
     camera_radius: float = 1.5
     camera_target: Vector3 = (0.3, 0.3, 0.3)
     light_radius: float = 2.5
-    light_level: float = 0.8
+    light_level: float = 0.95
     ambient: Vector3 = (0.1, 0.1, 0.1)
     attenuation: tuple[float, float] = (0.5, 0.5)
     reflectance: Vector3 = (0.8, 0.8, 0.8)

@@ -170,7 +170,7 @@ def _image_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable
         batch.ambient[0],
         batch.attenuation[0],
     )
-    reference[room.object_id < 0] = 0.0
+    reference[room.object_id < 0] = room.scene.background
     step = {"uint8": 0.5 / 255, "float16": 2.0**-11, "float32": 0.0}[rooms.spec.image_dtype]
     if rooms.spec.image_dtype == "uint8":
         reference = reference.clip(0, 1)

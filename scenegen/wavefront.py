@@ -56,6 +56,8 @@ def _upload(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
         slots=spec.object_slots,
         light_slots=spec.light_slots,
         count=mi.UInt32(batch.object_count),
+        has_room=mi.Bool(batch.has_room),
+        background=_table(batch.background),
         spheres=_table(np.concatenate([center, batch.object_scale[..., None]], axis=-1)),
         from_world=_table(np.concatenate([linear, offset[..., None]], axis=-1)),
         place=_table(unit.offset[shape]),

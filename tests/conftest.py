@@ -1,0 +1,115 @@
+"""Shared fixtures: tiny rooms files, damaged copies of them, and the commands as a user sees them."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import pytest
+from click.testing import CliRunner, Result
+
+TINY = {"height": 32, "width": 32, "min_visible_pixels": 3, "seed": 3}
+
+Edit = Callable[[h5py.File], Any]
+
+
+@pytest.fixture(scope="session")
+def make_rooms() -> Callable[..., Path]:
+    """Write a tiny file of rooms; settings override those of TINY, `how` goes to make_dataset."""
+    from scenegen.dataset import make_dataset
+    from scenegen.specs import DatasetSpec
+
+    def make(path: Path, count: int = 6, how: dict[str, Any] | None = None, **settings: Any) -> Path:
+        spec = DatasetSpec(**{**TINY, **settings})
+        make_dataset(path, spec, count, **{"command": "tests", **(how or {})})
+        return path
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def rooms_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a file of 8 rooms that no test changes."""
+    return make_rooms(tmp_path_factory.mktemp("rooms") / "rooms.h5", 8)
+
+
+@pytest.fixture(scope="session")
+def float_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a file of 5 rooms with float32 images, wider than high."""
+    path = tmp_path_factory.mktemp("rooms") / "float.h5"
+    return make_rooms(path, 5, height=48, width=64, image_dtype="float32", min_visible_pixels=6)
+
+
+@pytest.fixture
+def damaged(rooms_path: Path, tmp_path: Path) -> Callable[[Edit], Path]:
+    """Return a function that copies the 8 rooms and lets `edit` at the copy."""
+
+    def damage(edit: Edit) -> Path:
+        path = tmp_path / "damaged.h5"
+        shutil.copy(rooms_path, path)
+        with h5py.File(path, "r+") as file:
+            edit(file)
+        return path
+
+    return damage
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+    """Run `scenegen ...` inside this process, in a folder of its own."""
+    import cli
+
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments: object) -> Result:
+        return CliRunner().invoke(cli.scenegen, [str(a) for a in arguments])
+
+    return call
+
+
+def refusal(code: int, out: str, err: str, words: tuple[str, ...] = ()) -> str:
+    """Check that a command failed as the project promises; return its one line of error.
+
+    Exit code 2, nothing on standard output, one line of error (after click's usage lines where it
+    is click that complains), each of `words` in it, and no traceback.
+    """
+    assert "Traceback" not in err, err[-2000:]
+    assert code == 2, f"exit code {code}: {out} {err}"
+    assert out == ""
+    lines = [line for line in err.splitlines() if line.strip()]
+    if lines[0].startswith("Usage: "):
+        assert lines[1].startswith("Try '")
+        lines = lines[2:]
+    assert len(lines) == 1, err
+    assert lines[0].startswith("Error: ")
+    assert [word for word in words if word not in lines[0]] == [], lines[0]
+    return lines[0]
+
+
+@pytest.fixture(scope="session")
+def check_refusal() -> Callable[..., str]:
+    """Return `refusal`, for commands that a test started by itself."""
+    return refusal
+
+
+@pytest.fixture
+def refuses(run: Callable[..., Result], tmp_path: Path) -> Callable[..., str]:
+    """Run a command that must fail as `refusal` says, and leave the disk as it was."""
+
+    def call(*arguments: object, words: tuple[str, ...] = ()) -> str:
+        before = contents(tmp_path)
+        result = run(*arguments)
+        after = contents(tmp_path)
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise AssertionError(f"a traceback: {result.exception!r}") from result.exception
+        line = refusal(result.exit_code, result.stdout, result.stderr, words)
+        assert after == before, "files were left or changed"
+        return line
+
+    return call
+
+
+def contents(folder: Path) -> dict[str, int]:
+    """Return names and sizes of all that lies in a folder."""
+    return {str(path): path.lstat().st_size for path in folder.rglob("*")}

@@ -1,0 +1,138 @@
+"""Frames, pixel conventions and back-projection, against their definitions."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from scenegen.camera import (
+    Camera,
+    back_project,
+    intrinsics,
+    pixel_directions,
+    transform_points,
+    transform_vectors,
+)
+
+COORDINATE = st.floats(-9.0, 9.0)
+POINT = st.tuples(COORDINATE, COORDINATE, COORDINATE)
+FOV = st.floats(5.0, 120.0)
+SIDE = st.integers(1, 40)
+
+
+def a_camera(position: tuple[float, float, float], target: tuple[float, float, float]) -> Camera:
+    level = math.hypot(position[0] - target[0], position[2] - target[2])
+    assume(level > 1e-3)
+    return Camera(position, target, 30.0)
+
+
+@settings(deadline=None)
+@given(position=POINT, target=POINT)
+def test_world_from_camera_is_rigid_and_looks_at_its_target(
+    position: tuple[float, float, float], target: tuple[float, float, float]
+) -> None:
+    matrix = a_camera(position, target).world_from_camera
+    rotation = matrix[:3, :3]
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(rotation) == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_array_equal(matrix[3], [0, 0, 0, 1])
+    np.testing.assert_array_equal(matrix[:3, 3], position)
+    distance = math.dist(position, target)
+    np.testing.assert_allclose(matrix @ [0, 0, -distance, 1], [*target, 1], atol=1e-11)
+    assert rotation[1, 0] == 0.0, "x axis is level: no roll"
+    assert rotation[1, 1] > 0.0, "y axis is up"
+
+
+def test_a_camera_on_the_z_axis_is_the_world_moved() -> None:
+    matrix = Camera((0.3, 0.3, 2.0), (0.3, 0.3, 0.3), 30.0).world_from_camera
+    expected = np.eye(4)
+    expected[:3, 3] = 0.3, 0.3, 2.0
+    np.testing.assert_allclose(matrix, expected, atol=1e-15)
+
+
+def test_a_camera_on_the_x_axis_has_minus_z_on_its_right() -> None:
+    matrix = Camera((2.0, 0.3, 0.3), (0.3, 0.3, 0.3), 30.0).world_from_camera
+    np.testing.assert_allclose(matrix[:3, 0], [0, 0, -1], atol=1e-15)
+    np.testing.assert_allclose(matrix[:3, 1], [0, 1, 0], atol=1e-15)
+    np.testing.assert_allclose(matrix[:3, 2], [1, 0, 0], atol=1e-15)
+
+
+@pytest.mark.parametrize("height", [2.0, -2.0])
+def test_looking_straight_up_or_down_is_refused(height: float) -> None:
+    with pytest.raises(ValueError, match="straight along y"):
+        _ = Camera((0.3, height, 0.3), (0.3, 0.3, 0.3), 30.0).world_from_camera
+
+
+def test_pixel_directions_by_hand() -> None:
+    """90 degrees over 2 rows: the image plane at depth 1 spans -1 .. 1, a pixel's side is 1."""
+    directions = pixel_directions(2, 4, 90.0)
+    assert directions.shape == (2, 4, 3)
+    np.testing.assert_allclose(directions[0, :, 0], [-1.5, -0.5, 0.5, 1.5])
+    np.testing.assert_allclose(directions[:, 0, 1], [0.5, -0.5])
+    assert (directions[..., 2] == -1.0).all()
+    assert (directions[0, :, 1] == directions[0, 0, 1]).all()
+    assert (directions[:, 0, 0] == directions[0, 0, 0]).all()
+
+
+@settings(deadline=None)
+@given(height=SIDE, width=SIDE, fov=FOV)
+def test_outer_pixels_lie_half_a_pixel_inside_the_field_of_view(
+    height: int, width: int, fov: float
+) -> None:
+    directions = pixel_directions(height, width, fov)
+    half = math.tan(math.radians(fov) / 2)
+    pixel = 2 * half / height
+    assert directions[0, 0, 1] + pixel / 2 == pytest.approx(half, rel=1e-9)
+    assert directions[-1, 0, 1] - pixel / 2 == pytest.approx(-half, rel=1e-9)
+    assert directions[0, -1, 0] + pixel / 2 == pytest.approx(half * width / height, rel=1e-9)
+    assert directions[0, 0, 0] == pytest.approx(-directions[0, -1, 0], abs=1e-12)
+
+
+@settings(deadline=None)
+@given(height=SIDE, width=SIDE, fov=FOV, seed=st.integers(0, 99))
+def test_projection_takes_back_projected_points_to_their_pixels(
+    height: int, width: int, fov: float, seed: int
+) -> None:
+    """Projection is written out here: OpenCV's, y down and z forward, pixel centres at + 0.5."""
+    depth = np.random.default_rng(seed).uniform(0.1, 5.0, (height, width))
+    points = back_project(depth, fov)
+    np.testing.assert_array_equal(points[..., 2], -depth)
+    seen = points * (1, -1, -1) @ intrinsics(height, width, fov).T
+    columns, rows = seen[..., 0] / seen[..., 2], seen[..., 1] / seen[..., 2]
+    np.testing.assert_allclose(columns, np.tile(np.arange(width) + 0.5, (height, 1)), atol=1e-9)
+    expected_rows = np.tile(np.arange(height)[:, None] + 0.5, (1, width))
+    np.testing.assert_allclose(rows, expected_rows, atol=1e-9)
+
+
+def test_intrinsics_by_hand() -> None:
+    np.testing.assert_allclose(
+        intrinsics(100, 200, 90.0), [[50, 0, 100], [0, 50, 50], [0, 0, 1]], rtol=1e-12
+    )
+
+
+def test_back_projection_keeps_misses_as_nan() -> None:
+    points = back_project(np.array([[1.0, np.nan]], np.float32), 40.0)
+    assert np.isfinite(points[0, 0]).all()
+    assert np.isnan(points[0, 1]).all()
+
+
+@settings(deadline=None)
+@given(height=SIDE, width=SIDE, fov=FOV)
+def test_longer_side_spans_the_field_of_view(height: int, width: int, fov: float) -> None:
+    fov_y = Camera.fov_y_from_longer_side(fov, height, width)
+    half = math.tan(math.radians(fov_y) / 2)
+    longer = half * max(1.0, width / height)
+    assert math.degrees(2 * math.atan(longer)) == pytest.approx(fov, rel=1e-9)
+
+
+def test_transforms_move_points_and_turn_vectors() -> None:
+    camera = Camera((1.0, 2.0, 3.0), (0.2, 0.1, 0.4), 30.0)
+    matrix = camera.world_from_camera
+    some = np.random.default_rng(0).standard_normal((5, 7, 3))
+    ones = np.ones((5, 7, 1))
+    expected = np.concatenate([some, ones], axis=-1) @ matrix.T
+    np.testing.assert_allclose(transform_points(matrix, some), expected[..., :3], atol=1e-12)
+    moved = transform_points(matrix, some) - transform_points(matrix, np.zeros(3))
+    np.testing.assert_allclose(transform_vectors(matrix, some), moved, atol=1e-12)
