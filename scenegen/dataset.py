@@ -10,8 +10,9 @@ from scenegen.backend import select_variant
 from scenegen.errors import SpecError
 from scenegen.packing import pack
 from scenegen.renderer import launch
+from scenegen.row_file import check_writable
 from scenegen.sampling import MAX_ATTEMPTS, refusal, sample_scene
-from scenegen.scene_writer import RenderedRoom, RoomsWriter, check_writable
+from scenegen.scene_writer import RenderedRoom, create_rooms
 from scenegen.specs import DatasetSpec, SceneSpec
 from scenegen.truth import GroundTruth, visible_pixels
 
@@ -49,9 +50,9 @@ def make_dataset(
         raise SpecError(f"batch: found {batch}, expected from 1 to {MAX_BATCH}")
     check_writable(Path(path), overwrite)
     variant = select_variant(device)
-    attributes = {"creation_command": command, "variant": variant, "compression": compression}
+    attributes = {"creation_command": command, "variant": variant}
     with (
-        RoomsWriter(
+        create_rooms(
             path,
             spec,
             count,

@@ -1,4 +1,4 @@
-"""Shared fixtures: tiny rooms files, damaged copies of them, and the commands as a user sees them."""
+"""Shared fixtures: tiny rooms files, damaged copies, and the commands as a user sees them."""
 
 import shutil
 from collections.abc import Callable
@@ -20,7 +20,9 @@ def make_rooms() -> Callable[..., Path]:
     from scenegen.dataset import make_dataset
     from scenegen.specs import DatasetSpec
 
-    def make(path: Path, count: int = 6, how: dict[str, Any] | None = None, **settings: Any) -> Path:
+    def make(
+        path: Path, count: int = 6, how: dict[str, Any] | None = None, **settings: Any
+    ) -> Path:
         spec = DatasetSpec(**{**TINY, **settings})
         make_dataset(path, spec, count, **{"command": "tests", **(how or {})})
         return path
@@ -36,9 +38,9 @@ def rooms_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPat
 
 @pytest.fixture(scope="session")
 def float_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a file of 5 rooms with float32 images, wider than high."""
+    """Return a file of 5 rooms with float32 images, higher than wide."""
     path = tmp_path_factory.mktemp("rooms") / "float.h5"
-    return make_rooms(path, 5, height=48, width=64, image_dtype="float32", min_visible_pixels=6)
+    return make_rooms(path, 5, height=48, width=40, image_dtype="float32", min_visible_pixels=6)
 
 
 @pytest.fixture

@@ -1,0 +1,170 @@
+"""(c): nothing but the nearest hits of the primary rays, the limit for any renderer of the scenes.
+
+Two structures. `unit_scene`: the one that scenegen uses; every object is cast at its unit shape, in
+a structure that is never rebuilt. `lattice`: all scenes of a batch side by side in one Mitsuba
+scene, objects as instances, rays bounded by the room; it must be built for every batch. Only the
+ray parameter and an id are evaluated.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.scenes import read_depth, read_scenes
+from benchmarks.timing import repeat, time
+from scenegen.backend import select_variant
+from scenegen.kernel import closest_hit
+from scenegen.packing import SceneBatch, pack, pixel_size
+from scenegen.shapes import unit_shape
+from scenegen.specs import DatasetSpec
+from scenegen.unit_scene import mitsuba_shape
+from scenegen.wavefront import _upload
+
+Array = NDArray[Any]
+BATCHES = (64, 256)
+SPACING = 2.0  # lattice: the camera is 1.5 from a point inside the unit room, so its rays stay near
+CHECKED = 16  # images whose depths are compared with the stored ones
+
+
+def unit_scene(rooms: str, count: int, repeats: int) -> dict[str, Any]:
+    """Time the cast at the unit scene, for the better batch size."""
+    variant = select_variant("cpu")
+    mi.set_variant(variant)
+    spec, scenes = read_scenes(rooms, count)
+    results = {}
+    for size in BATCHES:
+        batches = [pack(spec, scenes[i : i + size]) for i in range(0, count, size)]
+        uploads = [(_upload(batch, variant)[0], camera_table(batch)) for batch in batches]
+
+        def cast(number: int) -> tuple[Any, Any]:
+            on_device, cameras = uploads[number]  # noqa: B023
+            item, origin, direction, _ = rays(cameras, len(batches[number]), spec)  # noqa: B023
+            t, object_id, _, _ = closest_hit(on_device, item, origin, direction)
+            return t, object_id
+
+        numbers = range(len(batches))
+        seconds = repeat(lambda: evaluate(cast, numbers), repeats)  # noqa: B023
+        results[size] = seconds
+    wrong = share_of_wrong_depths(cast(0)[0], rooms, spec)
+    size = min(results, key=lambda key: min(results[key]))
+    note = f"no build; batches of {size}; depths off by > 1e-4: {wrong:.4%}"
+    return {"seconds": results[size], "images": count, "note": note}
+
+
+def lattice(rooms: str, count: int, repeats: int) -> dict[str, Any]:
+    """Time the cast at the lattice for the better batch size and kind of traversal; builds apart."""
+    mi.set_variant(select_variant("cpu"))
+    spec, scenes = read_scenes(rooms, count)
+    groups = shape_groups(spec)
+    results, build_ms = {}, {}
+    for size in BATCHES:
+        batches = [pack(spec, scenes[i : i + size]) for i in range(0, count, size)]
+        start = time.perf_counter()
+        built = [build_lattice(batch, groups) for batch in batches]
+        build_ms[size] = (time.perf_counter() - start) / count * 1e3
+        for coherent in (False, True):
+
+            def cast(number: int) -> tuple[Any, Any]:
+                scene, table = built[number]  # noqa: B023
+                return cast_at_lattice(scene, table, len(batches[number]), spec, coherent)  # noqa: B023
+
+            numbers = range(len(batches))
+            results[size, coherent] = repeat(lambda: evaluate(cast, numbers), repeats)  # noqa: B023
+    wrong = share_of_wrong_depths(cast(0)[0], rooms, spec)
+    size, coherent = min(results, key=lambda key: min(results[key]))
+    built_apart = ", ".join(f"{build_ms[key]:.2f} in batches of {key}" for key in BATCHES)
+    note = (
+        f"batches of {size}, coherent={coherent}; build apart, ms an image: {built_apart};"
+        f" depths off by > 1e-4: {wrong:.4%}"
+    )
+    return {
+        "seconds": results[size, coherent],
+        "images": count,
+        "note": note,
+        "build_ms": build_ms[size],
+    }
+
+
+def evaluate(cast: Callable[[int], tuple[Any, Any]], numbers: range) -> None:
+    """Run the casts one behind the other and wait for the last."""
+    for number in numbers:
+        dr.eval(*cast(number))
+    dr.sync_thread()
+
+
+def camera_table(batch: SceneBatch, offset: Array | float = 0.0) -> Any:
+    """Return 16 floats an image: 3x4 world_from_camera, pixel size, where its scene is moved to."""
+    camera = batch.world_from_camera[:, :3].reshape(-1, 12)
+    pixel = pixel_size(batch.fov_y_degrees, batch.spec.height)[:, None]
+    move = np.broadcast_to(offset, (len(batch), 3))
+    table = np.concatenate([camera, pixel, move], axis=1)
+    return mi.Float(table.astype(np.float32).ravel())
+
+
+def rays(table: Any, images: int, spec: DatasetSpec) -> tuple[Any, Any, Any, Any]:
+    """Return image number, origin and direction of each primary ray, and the scene's offset."""
+    pixels = spec.height * spec.width
+    index = dr.arange(mi.UInt32, images * pixels)
+    item = index // pixels
+    pixel = index - item * pixels
+    row = pixel // spec.width
+    column = pixel - row * spec.width
+    camera = [dr.gather(mi.Float, table, item * 16 + i) for i in range(16)]
+    right, up, back, origin = (mi.Vector3f(*camera[i:12:4]) for i in range(4))
+    x = (mi.Float(column) + 0.5 - spec.width / 2) * camera[12]
+    y = (spec.height / 2 - 0.5 - mi.Float(row)) * camera[12]
+    return item, origin, right * x + up * y - back, mi.Vector3f(*camera[13:])
+
+
+def shape_groups(spec: DatasetSpec) -> dict[str, Any]:
+    """Return what instances refer to. The exact sphere is none of them: it is as fast by itself,
+    and as an instance far from the origin Mitsuba finds it up to a third of a unit off.
+    """
+    meshes = {name: unit_shape(name) for name in spec.shapes if not unit_shape(name).is_sphere}
+    return {
+        name: mi.load_dict({"type": "shapegroup", "mesh": mitsuba_shape(shape, np.zeros(3))})
+        for name, shape in meshes.items()
+    }
+
+
+def build_lattice(batch: SceneBatch, groups: dict[str, Any]) -> tuple[Any, Any]:
+    """Return all scenes of a batch in one, on a compact centred lattice, and their camera table."""
+    side = int(np.ceil(len(batch) ** (1 / 3)))
+    cell = np.stack(np.unravel_index(np.arange(len(batch)), (side, side, side)), axis=1)
+    offset = (cell - (side - 1) / 2) * SPACING
+    matrices = batch.world_from_object.copy()
+    matrices[..., :3, 3] += offset[:, None]
+    contents: dict[str, Any] = {"type": "scene", **groups}
+    for b, k in np.argwhere(batch.shape >= 0):
+        group = groups.get(batch.spec.shapes[batch.shape[b, k]])
+        matrix = mi.ScalarTransform4f(matrices[b, k])
+        if group is None:
+            contents[f"object_{b}_{k}"] = {"type": "sphere", "to_world": matrix}
+        else:
+            contents[f"object_{b}_{k}"] = {"type": "instance", "group": group, "to_world": matrix}
+    return mi.load_dict(contents), camera_table(batch, offset)
+
+
+def cast_at_lattice(
+    scene: Any, table: Any, images: int, spec: DatasetSpec, coherent: bool
+) -> tuple[Any, Any]:
+    """Return ray parameter and instance of the nearest hits; the room is three planes."""
+    _, origin, direction, offset = rays(table, images, spec)
+    planes = [
+        dr.select(direction[i] < 0, -origin[i] / direction[i], dr.inf) for i in range(3)
+    ]
+    room = dr.minimum(planes[0], dr.minimum(planes[1], planes[2]))
+    ray = mi.Ray3f(mi.Ray3f(mi.Point3f(origin + offset), direction), room)
+    hit = scene.ray_intersect_preliminary(ray, coherent=coherent)
+    return dr.minimum(hit.t, room), dr.reinterpret_array(mi.UInt32, hit.instance)
+
+
+def share_of_wrong_depths(t: Any, rooms: str, spec: DatasetSpec) -> float:
+    """Return the share of the first images' depths that differ from the stored ones."""
+    stored = read_depth(rooms, CHECKED)
+    cast = t.numpy().reshape(-1, spec.height, spec.width)[:CHECKED]
+    return float((np.abs(cast - stored) > 1e-4).mean())

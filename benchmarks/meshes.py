@@ -1,0 +1,66 @@
+"""Unit meshes for other renderers: as fine as scenegen's own, or coarse."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from trimesh.grouping import unique_rows
+
+from scenegen.shapes import unit_shape
+
+Array = NDArray[Any]
+COARSE_FROM = 1000  # triangles; shapes with fewer stay as they are
+COARSE_GRID = 6  # cells a unit that the corners of coarse meshes are drawn to
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Corners (V, 3), their normals (V, 3) and triangles (F, 3)."""
+
+    points: Array
+    normals: Array
+    faces: Array
+
+
+def unit_meshes(names: tuple[str, ...], coarse: bool) -> dict[str, Mesh]:
+    """Return the welded unit meshes of all shapes but the exact sphere.
+
+    Coarse ones have about a thousand triangles: what a user may accept who has to build them anew
+    for every scene. They show it, and are here for their speed alone.
+    """
+    return {name: _weld(name, coarse) for name in names if not unit_shape(name).is_sphere}
+
+
+def moved(mesh: Mesh, world_from_object: Array) -> Mesh:
+    """Apply a similarity (4, 4); normals keep their directions only."""
+    linear = world_from_object[:3, :3].T
+    return Mesh(mesh.points @ linear + world_from_object[:3, 3], mesh.normals @ linear, mesh.faces)
+
+
+def join(meshes: list[Mesh]) -> Mesh:
+    """Put meshes into one."""
+    starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    return Mesh(
+        np.concatenate([mesh.points for mesh in meshes]),
+        np.concatenate([mesh.normals for mesh in meshes]),
+        np.concatenate([mesh.faces + s for mesh, s in zip(meshes, starts[:-1], strict=True)]),
+    )
+
+
+def _weld(name: str, coarse: bool) -> Mesh:
+    shape = unit_shape(name)
+    points, normals = shape.triangles.reshape(-1, 3), shape.normals.reshape(-1, 3)
+    corners = np.concatenate([points, normals], axis=1)
+    drawn = coarse and len(shape.triangles) >= COARSE_FROM
+    if drawn:
+        points = np.round(points * COARSE_GRID) / COARSE_GRID
+        corners = points
+    first, number = unique_rows(corners, digits=6)
+    faces = number.reshape(-1, 3)
+    if drawn:
+        faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+        faces = faces[np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]]
+    return Mesh(
+        points[first].astype(np.float32), normals[first].astype(np.float32), faces.astype(np.uint32)
+    )

@@ -1,0 +1,75 @@
+"""(b): `make_dataset` end to end, its rendering stage alone, and what the machine offers."""
+
+import importlib.metadata
+import statistics
+from pathlib import Path
+from typing import Any
+
+from benchmarks.timing import STARTED, repeat, seconds_of, time
+
+
+def machine() -> dict[str, Any]:
+    """Return the versions that only the process that renders can tell."""
+    from scenegen.backend import find_llvm, llvm_version, select_variant
+
+    names = ("mitsuba", "drjit", "numpy", "h5py", "isal")
+    versions = {name: importlib.metadata.version(name) for name in names}
+    library = find_llvm()
+    llvm = str(llvm_version(library)) if library else "none that works"
+    return {"versions": {**versions, "LLVM": llvm}, "variant": select_variant("auto")}
+
+
+def end_to_end(rooms: str, count: int, repeats: int) -> dict[str, Any]:
+    """Time make_dataset from nothing to a closed file; the last file stays.
+
+    Three figures: the time to the first, one-batch file from the start of the process, all imports
+    and compilations included; whole files in the process thus warmed; and the steady rate, which
+    two file sizes give: (count - count / 4) rows in the difference of their times, so that what
+    opening, filling and draining cost drops out.
+    """
+    from scenegen.dataset import DEFAULT_BATCH, make_dataset
+    from scenegen.specs import DatasetSpec
+
+    def make(rows: int) -> float:
+        Path(rooms).unlink(missing_ok=True)  # so that no file's disk pages burden the next one
+        return seconds_of(lambda: make_dataset(rooms, DatasetSpec(), rows))
+
+    make(DEFAULT_BATCH)
+    first = time.perf_counter() - STARTED
+    quarter = count // 4
+    seconds, steady = [], []
+    for _ in range(repeats):
+        short = make(quarter)
+        seconds.append(make(count))
+        steady.append((count - quarter) / (seconds[-1] - short))
+    size = Path(rooms).stat().st_size / count / 1024
+    note = (
+        f"steady {statistics.median(steady):.0f}; first {DEFAULT_BATCH} rows {first:.1f} s after"
+        f" the process began; {size:.0f} KiB a row"
+    )
+    return {"seconds": seconds, "images": count, "note": note}
+
+
+def stage(rooms: str, count: int, repeats: int) -> dict[str, Any]:
+    """Time pack, launch and fetch of scenes that were sampled before, as make_dataset does it:
+    a batch is packed while the one before is cast.
+    """
+    from benchmarks.scenes import read_scenes
+    from scenegen.dataset import DEFAULT_BATCH
+    from scenegen.packing import pack
+    from scenegen.renderer import launch
+
+    spec, scenes = read_scenes(rooms, count)
+    parts = [scenes[i : i + DEFAULT_BATCH] for i in range(0, count, DEFAULT_BATCH)]
+
+    def render_all() -> None:
+        batch = pack(spec, parts[0])
+        for following in [*parts[1:], None]:
+            fetch = launch(batch)
+            if following:
+                batch = pack(spec, following)
+            fetch()
+
+    seconds = repeat(render_all, repeats)
+    note = f"batches of {DEFAULT_BATCH}; pack, launch, fetch"
+    return {"seconds": seconds, "images": count, "note": note}

@@ -1,0 +1,164 @@
+"""HDF5 files that hold rows: written in order, compressed by us, renamed when complete."""
+
+import errno
+import importlib.metadata
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from isal import isal_zlib
+from numpy.typing import NDArray
+
+from scenegen.errors import SpecError
+
+Array = NDArray[Any]
+COMPRESSIONS = ("gzip", "lzf", "none")
+DEFLATE_LEVEL = 1
+BLOCK_ROWS = 1024  # rows of the small datasets that are kept and written together
+
+
+@dataclass(frozen=True)
+class Column:
+    """A dataset with one entry a row.
+
+    Attributes:
+        shape: of a row.
+        dtype: NumPy name, or "text" for UTF-8 strings.
+        own_chunk: whether each row is a compressed chunk of its own, as images are.
+        attributes: HDF5 attributes.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    dtype: str
+    own_chunk: bool = False
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Table:
+    """Columns of equal length in one HDF5 group, filled row by row.
+
+    The bytes written depend on the rows alone, not on when they come.
+    """
+
+    def __init__(
+        self, group: h5py.Group, columns: Sequence[Column], count: int, compression: str = "gzip"
+    ) -> None:
+        """Create the datasets. Raises SpecError for an unknown compression or a negative count."""
+        if compression not in COMPRESSIONS:
+            raise SpecError(
+                f"compression: found {compression!r}, expected one of {', '.join(COMPRESSIONS)}"
+            )
+        if count < 0:
+            raise SpecError(f"count: found {count}, expected 0 or more")
+        self.count, self.rows = count, 0
+        self._columns, self._compression = columns, compression
+        self._datasets = {column.name: self._create(group, column) for column in columns}
+        self._block: dict[str, list[Any]] = {c.name: [] for c in columns if not c.own_chunk}
+
+    def append(self, row: Mapping[str, Any]) -> None:
+        """Write the next row: one value for each column."""
+        for column in self._columns:
+            if column.own_chunk:
+                self._write_chunk(column.name, np.asarray(row[column.name]))
+            else:
+                self._block[column.name].append(row[column.name])
+        self.rows += 1
+        if self.rows % BLOCK_ROWS == 0 or self.rows == self.count:
+            self._flush()
+
+    def _create(self, group: h5py.Group, column: Column) -> h5py.Dataset:
+        text = column.dtype == "text"
+        options: dict[str, Any] = {}
+        if self.count:
+            chunk = 1 if column.own_chunk else min(self.count, BLOCK_ROWS)
+            options["chunks"] = (chunk, *column.shape)
+        if self.count and column.own_chunk and self._compression != "none":
+            options["compression"] = self._compression
+            options["shuffle"] = np.dtype(column.dtype).itemsize > 1
+            if self._compression == "gzip":
+                options["compression_opts"] = DEFLATE_LEVEL
+        dtype = h5py.string_dtype() if text else column.dtype
+        dataset = group.create_dataset(column.name, (self.count, *column.shape), dtype, **options)
+        dataset.attrs.update(column.attributes)
+        return dataset
+
+    def _write_chunk(self, name: str, values: Array) -> None:
+        dataset = self._datasets[name]
+        if self._compression == "lzf":
+            dataset[self.rows] = values
+            return
+        raw = np.ascontiguousarray(values, dataset.dtype)
+        if self._compression == "gzip":
+            payload = isal_zlib.compress(shuffle_bytes(raw), DEFLATE_LEVEL)
+        else:
+            payload = raw.tobytes()
+        dataset.id.write_direct_chunk((self.rows, *(0 for _ in raw.shape)), payload)
+
+    def _flush(self) -> None:
+        for name, rows in self._block.items():
+            if rows:
+                text = isinstance(rows[0], str)
+                values = rows if text else np.stack(rows)
+                self._datasets[name][self.rows - len(rows) : self.rows] = values
+                rows.clear()
+
+
+@contextmanager
+def new_file(path: str | Path, overwrite: bool = False) -> Iterator[h5py.File]:
+    """Open a file to write; it gets its final name when the block ends without an error.
+
+    Raises OSError as `check_writable`, and whatever the disk has to say.
+    """
+    path = Path(path)
+    check_writable(path, overwrite)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        file = h5py.File(temporary, "w")
+        try:
+            yield file
+            file.close()
+        finally:
+            with suppress(Exception):
+                file.close()
+        check_writable(path, overwrite)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def writer_name() -> str:
+    """Return the release that writes, as files record it."""
+    return f"pix2shape-bench {importlib.metadata.version('pix2shape-bench')}"
+
+
+def shuffle_bytes(values: Array) -> Array:
+    """Do HDF5's shuffle filter: all first bytes of the elements, then all second ones, ..."""
+    size = values.dtype.itemsize
+    flat = values.reshape(-1).view(np.uint8)
+    return flat if size == 1 else np.ascontiguousarray(flat.reshape(-1, size).T)
+
+
+def check_writable(path: Path, overwrite: bool) -> None:
+    """Raise the OSError that would end in a lost run: better before rendering than after."""
+    parent = path.parent
+    problems = (
+        (not parent.exists(), errno.ENOENT, "the folder does not exist; create it first", parent),
+        (not parent.is_dir(), errno.ENOTDIR, "is not a folder", parent),
+        (path.is_dir(), errno.EISDIR, "is a folder; name a file in it", path),
+        (
+            path.exists() and not overwrite,
+            errno.EEXIST,
+            "exists already; say --overwrite to replace it",
+            path,
+        ),
+        (not os.access(parent, os.W_OK), errno.EACCES, "cannot be written to", parent),
+    )
+    for wrong, number, text, where in problems:
+        if wrong:
+            raise OSError(number, text, str(where))
