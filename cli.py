@@ -1,5 +1,6 @@
 """The commands: parse, one library call, print. Heavy imports happen inside the commands."""
 
+import re
 import sys
 import time
 import warnings
@@ -9,7 +10,8 @@ from typing import Any
 
 import click
 
-FIELDS_OF_A_RANGE = 2
+NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
+MOST_ITEMS = 1_000_000  # of a range; keeps 0-99999999999 from eating the memory
 
 
 class FriendlyGroup(click.Group):
@@ -56,13 +58,14 @@ class Range(click.ParamType):  # type: ignore[type-arg]
         """Parse; a tuple (a default) passes."""
         if isinstance(value, tuple):
             return value
+        match = re.fullmatch(rf"({NUMBER})(?:-({NUMBER}))?", str(value).strip())
         try:
-            parts = [self.number(part) for part in str(value).split("-")]
+            ends = [self.number(end) for end in match.groups() if end] if match else []
         except ValueError:
-            parts = []
-        if len(parts) not in (1, FIELDS_OF_A_RANGE):
+            ends = []
+        if not ends:
             self.fail(f"found {value!r}, expected a number or a range such as 1-3", param, ctx)
-        return parts[0], parts[-1]
+        return ends[0], ends[-1]
 
 
 class Size(click.ParamType):  # type: ignore[type-arg]
@@ -89,10 +92,13 @@ class Items(click.ParamType):  # type: ignore[type-arg]
         """Parse."""
         chosen: list[int] = []
         for part in str(value).split(","):
-            ends = part.strip().split("-")
-            if len(ends) > FIELDS_OF_A_RANGE or not all(end.isdecimal() for end in ends):
+            match = re.fullmatch(r"([0-9]+)(?:-([0-9]+))?", part.strip())
+            if not match:
                 self.fail(f"found {value!r}, expected numbers such as 0,5,7 or 0-7", param, ctx)
-            chosen.extend(range(int(ends[0]), int(ends[-1]) + 1))
+            first, last = int(match[1]), int(match[2] or match[1])
+            if last < first:
+                self.fail(f"found {part!r}, expected a rising range such as 0-7", param, ctx)
+            chosen.extend(range(first, min(last, first + MOST_ITEMS) + 1))
         return chosen
 
 
@@ -270,15 +276,21 @@ def verify(ctx: click.Context, file: str, items: int, device: str) -> None:
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
 def export(file: str, items: list[int], form: str, out: str, overwrite: bool) -> None:
     """Write single rooms for other tools."""
-    from scenegen.export import export_room
+    from scenegen.export import export_paths, export_room
+    from scenegen.new_file import check_writable
     from scenegen.preview import pick_rows
     from scenegen.scene_file import RoomsFile
 
     with RoomsFile(file) as rooms:
-        for row in pick_rows(len(rooms), items):
-            stem = f"{Path(file).stem}-{row:06d}"
-            for path in export_room(rooms[row], out, stem, form, overwrite):
-                click.echo(path)
+        rows = pick_rows(len(rooms), items)
+        paths = {row: export_paths(row, out, Path(file).stem, form) for row in rows}
+        for some in paths.values():
+            for path in some:
+                check_writable(path, overwrite)
+        for row, some in paths.items():
+            export_room(rooms[row], some, form, overwrite)
+    for some in paths.values():
+        click.echo("\n".join(map(str, some)))
 
 
 @click.group(cls=FriendlyGroup)

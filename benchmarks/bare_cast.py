@@ -6,7 +6,9 @@ scene, objects as instances, rays bounded by the room; it must be built for ever
 ray parameter and an id are evaluated.
 """
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -15,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.scenes import read_depth, read_scenes
-from benchmarks.timing import repeat, time
+from benchmarks.timing import repeat
 from scenegen.backend import select_variant
-from scenegen.kernel import closest_hit
+from scenegen.kernel import Scenes, closest_hit
 from scenegen.packing import SceneBatch, pack, pixel_size
 from scenegen.shapes import unit_shape
 from scenegen.specs import DatasetSpec
@@ -35,64 +37,57 @@ def unit_scene(rooms: str, count: int, repeats: int) -> dict[str, Any]:
     variant = select_variant("cpu")
     mi.set_variant(variant)
     spec, scenes = read_scenes(rooms, count)
-    results = {}
+    seconds = {}
     for size in BATCHES:
         batches = [pack(spec, scenes[i : i + size]) for i in range(0, count, size)]
-        uploads = [(_upload(batch, variant)[0], camera_table(batch)) for batch in batches]
-
-        def cast(number: int) -> tuple[Any, Any]:
-            on_device, cameras = uploads[number]  # noqa: B023
-            item, origin, direction, _ = rays(cameras, len(batches[number]), spec)  # noqa: B023
-            t, object_id, _, _ = closest_hit(on_device, item, origin, direction)
-            return t, object_id
-
-        numbers = range(len(batches))
-        seconds = repeat(lambda: evaluate(cast, numbers), repeats)  # noqa: B023
-        results[size] = seconds
-    wrong = share_of_wrong_depths(cast(0)[0], rooms, spec)
-    size = min(results, key=lambda key: min(results[key]))
+        casts = [
+            partial(
+                cast_at_unit_scene,
+                _upload(batch, variant)[0],
+                camera_table(batch),
+                len(batch),
+                spec,
+            )
+            for batch in batches
+        ]
+        seconds[size] = repeat(partial(evaluate, casts), repeats)
+    wrong = share_of_wrong_depths(casts[0]()[0], rooms, spec)
+    size = min(seconds, key=lambda key: min(seconds[key]))
     note = f"no build; batches of {size}; depths off by > 1e-4: {wrong:.4%}"
-    return {"seconds": results[size], "images": count, "note": note}
+    return {"seconds": seconds[size], "images": count, "note": note}
 
 
 def lattice(rooms: str, count: int, repeats: int) -> dict[str, Any]:
-    """Time the cast at the lattice for the better batch size and kind of traversal; builds apart."""
+    """Time the cast at the lattice for the better batch size and kind of traversal."""
     mi.set_variant(select_variant("cpu"))
     spec, scenes = read_scenes(rooms, count)
     groups = shape_groups(spec)
-    results, build_ms = {}, {}
+    seconds, build = {}, {}
     for size in BATCHES:
         batches = [pack(spec, scenes[i : i + size]) for i in range(0, count, size)]
         start = time.perf_counter()
         built = [build_lattice(batch, groups) for batch in batches]
-        build_ms[size] = (time.perf_counter() - start) / count * 1e3
+        build[size] = time.perf_counter() - start
         for coherent in (False, True):
-
-            def cast(number: int) -> tuple[Any, Any]:
-                scene, table = built[number]  # noqa: B023
-                return cast_at_lattice(scene, table, len(batches[number]), spec, coherent)  # noqa: B023
-
-            numbers = range(len(batches))
-            results[size, coherent] = repeat(lambda: evaluate(cast, numbers), repeats)  # noqa: B023
-    wrong = share_of_wrong_depths(cast(0)[0], rooms, spec)
-    size, coherent = min(results, key=lambda key: min(results[key]))
-    built_apart = ", ".join(f"{build_ms[key]:.2f} in batches of {key}" for key in BATCHES)
+            casts = [
+                partial(cast_at_lattice, scene, table, len(batch), spec, coherent)
+                for batch, (scene, table) in zip(batches, built, strict=True)
+            ]
+            seconds[size, coherent] = repeat(partial(evaluate, casts), repeats)
+    wrong = share_of_wrong_depths(casts[0]()[0], rooms, spec)
+    size, coherent = min(seconds, key=lambda key: min(seconds[key]))
+    apart = ", ".join(f"{build[size] / count * 1e3:.2f} in batches of {size}" for size in BATCHES)
     note = (
-        f"batches of {size}, coherent={coherent}; build apart, ms an image: {built_apart};"
+        f"batches of {size}, coherent={coherent}; build apart, ms/image: {apart};"
         f" depths off by > 1e-4: {wrong:.4%}"
     )
-    return {
-        "seconds": results[size, coherent],
-        "images": count,
-        "note": note,
-        "build_ms": build_ms[size],
-    }
+    return {"seconds": seconds[size, coherent], "images": count, "note": note}
 
 
-def evaluate(cast: Callable[[int], tuple[Any, Any]], numbers: range) -> None:
-    """Run the casts one behind the other and wait for the last."""
-    for number in numbers:
-        dr.eval(*cast(number))
+def evaluate(casts: Sequence[Callable[[], tuple[Any, Any]]]) -> None:
+    """Run casts one behind the other and wait for the last."""
+    for cast in casts:
+        dr.eval(*cast())
     dr.sync_thread()
 
 
@@ -113,11 +108,20 @@ def rays(table: Any, images: int, spec: DatasetSpec) -> tuple[Any, Any, Any, Any
     pixel = index - item * pixels
     row = pixel // spec.width
     column = pixel - row * spec.width
-    camera = [dr.gather(mi.Float, table, item * 16 + i) for i in range(16)]
+    camera: list[Any] = [dr.gather(mi.Float, table, item * 16 + i) for i in range(16)]
     right, up, back, origin = (mi.Vector3f(*camera[i:12:4]) for i in range(4))
     x = (mi.Float(column) + 0.5 - spec.width / 2) * camera[12]
     y = (spec.height / 2 - 0.5 - mi.Float(row)) * camera[12]
     return item, origin, right * x + up * y - back, mi.Vector3f(*camera[13:])
+
+
+def cast_at_unit_scene(
+    scenes: Scenes, table: Any, images: int, spec: DatasetSpec
+) -> tuple[Any, Any]:
+    """Return ray parameter and object id of the nearest hits."""
+    item, origin, direction, _ = rays(table, images, spec)
+    t, object_id, _, _ = closest_hit(scenes, item, origin, direction)
+    return t, object_id
 
 
 def shape_groups(spec: DatasetSpec) -> dict[str, Any]:
@@ -154,9 +158,7 @@ def cast_at_lattice(
 ) -> tuple[Any, Any]:
     """Return ray parameter and instance of the nearest hits; the room is three planes."""
     _, origin, direction, offset = rays(table, images, spec)
-    planes = [
-        dr.select(direction[i] < 0, -origin[i] / direction[i], dr.inf) for i in range(3)
-    ]
+    planes = [dr.select(direction[i] < 0, -origin[i] / direction[i], dr.inf) for i in range(3)]
     room = dr.minimum(planes[0], dr.minimum(planes[1], planes[2]))
     ray = mi.Ray3f(mi.Ray3f(mi.Point3f(origin + offset), direction), room)
     hit = scene.ray_intersect_preliminary(ray, coherent=coherent)

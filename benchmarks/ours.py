@@ -2,10 +2,11 @@
 
 import importlib.metadata
 import statistics
+import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.timing import STARTED, repeat, seconds_of, time
+from benchmarks.timing import STARTED, repeat, seconds_of
 
 
 def machine() -> dict[str, Any]:

@@ -116,7 +116,7 @@ def describe(kit: Kit, scene: SceneSpec) -> dict[str, Any]:
     merged = [kit.room]
     for k, item in enumerate(scene.objects):
         matrix = world_from_object(item.position, item.rotation, item.scale)
-        to_world = mi.ScalarTransform4f(matrix)
+        to_world = mi.ScalarTransform4f(matrix.astype(np.float32))
         shape = kit.objects.get(item.shape)
         if shape is None:
             entry = {"type": "sphere", "to_world": to_world, "bsdf": kit.material}
@@ -168,7 +168,8 @@ def sensor(kit: Kit, scene: SceneSpec) -> dict[str, Any]:
 def room_planes() -> list[Any]:
     """Return what takes Mitsuba's rectangle, [-1, 1]^2 facing +z, to z = 0, x = 0 and y = 0."""
     unit = mi.ScalarTransform4f().translate([0.5, 0.5, 0]).scale([0.5, 0.5, 1])
-    turns = [np.eye(4), np.eye(4)[[2, 0, 1, 3]], np.eye(4)[[1, 2, 0, 3]]]
+    unit_axes = np.eye(4, dtype=np.float32)
+    turns = [unit_axes, unit_axes[[2, 0, 1, 3]], unit_axes[[1, 2, 0, 3]]]
     return [mi.ScalarTransform4f(turn) @ unit for turn in turns]
 
 
@@ -188,7 +189,7 @@ def mitsuba_mesh(name: str, mesh: Mesh, material: Any = None) -> Any:
 
 def check(image: Array, camera: Camera, depth: Array) -> None:
     """Raise AssertionError unless the image shows the scene whose depth map is given."""
-    directions = pixel_directions(*depth.shape, camera.fov_y_degrees)
+    directions = pixel_directions(depth.shape[0], depth.shape[1], camera.fov_y_degrees)
     planar = image[..., DEPTH] / np.linalg.norm(directions, axis=-1) + NEAR
     error = float(np.median(np.abs(planar - depth)))
     if error > 0.005:  # the jitter of the sample within its pixel stays far below

@@ -22,7 +22,7 @@ OLDEST_LLVM = 16
 DEVICES = ("auto", "cpu", "cuda")
 HOW_TO_GET_LLVM = (
     f"install LLVM {OLDEST_LLVM} or newer (on Linux x86-64: pip install {LLVM_WHEEL}) and, where it"
-    f" is not found by itself, set {LLVM_VARIABLE} to its libLLVM"
+    f" is not found by itself, set {LLVM_VARIABLE} to its libLLVM before drjit is imported"
 )
 
 
@@ -80,10 +80,18 @@ def find_llvm() -> str | None:
 
 @lru_cache(maxsize=1)
 def _point_to_llvm() -> str | None:
+    if "drjit" in sys.modules:  # it looked for its LLVM when it was imported, and keeps to that
+        return _llvm_of_drjit()
     library = find_llvm()
     if library:
         os.environ[LLVM_VARIABLE] = library
     return library
+
+
+def _llvm_of_drjit() -> str | None:
+    """Return which LLVM an imported Dr.Jit uses, unless that is too old."""
+    version = sys.modules["drjit"].detail.llvm_version()
+    return f"LLVM {version[0]}" if version[0] >= OLDEST_LLVM else None
 
 
 def _wheel_libraries() -> list[str]:

@@ -15,6 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.errors import SpecError
+from scenegen.records import check
+
 Vector3 = tuple[float, float, float]
 Array = NDArray[Any]
 
@@ -33,6 +36,10 @@ class Camera:
     target: Vector3
     fov_y_degrees: float
 
+    def __post_init__(self) -> None:
+        check(0 < self.fov_y_degrees < 180, "fov_y_degrees", self.fov_y_degrees, "0 to 180")
+        check(self.position != self.target, "camera", self.position, "a target elsewhere")
+
     @staticmethod
     def fov_y_from_longer_side(fov_degrees: float, height: int, width: int) -> float:
         """Return the vertical field of view where the longer image side spans `fov_degrees`."""
@@ -44,12 +51,12 @@ class Camera:
     @property
     def world_from_camera(self) -> NDArray[np.float64]:
         """(4, 4) rigid transform from camera to world coordinates."""
-        back = np.subtract(self.position, self.target)
+        back = np.subtract(self.position, self.target, dtype=np.float64)
         back /= np.linalg.norm(back)
         right = np.array([back[2], 0.0, -back[0]])  # y axis x back
         length = math.hypot(back[2], back[0])
         if length < 1e-9:
-            raise ValueError(
+            raise SpecError(
                 f"camera: {self.position} looks straight along y; its roll is undefined"
             )
         right /= length

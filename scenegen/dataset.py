@@ -8,9 +8,9 @@ from typing import Any
 
 from scenegen.backend import select_variant
 from scenegen.errors import SpecError
+from scenegen.new_file import check_writable
 from scenegen.packing import pack
 from scenegen.renderer import launch
-from scenegen.row_file import check_writable
 from scenegen.sampling import MAX_ATTEMPTS, refusal, sample_scene
 from scenegen.scene_writer import RenderedRoom, create_rooms
 from scenegen.specs import DatasetSpec, SceneSpec
@@ -84,20 +84,22 @@ def render_items(
     While a batch is cast, the next one is proposed. An item whose objects do not all show enough
     pixels is proposed again in the next batch; new items wait when the oldest falls far behind.
     """
-    queue = deque(indices)
+    next_in = 0
     retries: deque[int] = deque()
-    attempts = dict.fromkeys(indices[:0], 0)
-    rendered = dict.fromkeys(indices[:0], 0)
+    attempts: dict[int, int] = {}
+    rendered: dict[int, int] = {}
     finished: dict[int, RenderedRoom] = {}
     next_out = 0
 
     def propose() -> list[SceneSpec]:
+        nonlocal next_in
         scenes: list[SceneSpec] = []
         while len(scenes) < batch:
             if retries:
                 index = retries.popleft()
-            elif queue and (queue[0] - indices[next_out]) < WINDOW * batch:
-                index = queue.popleft()
+            elif next_in < len(indices) and next_in - next_out < WINDOW * batch:
+                index = indices[next_in]
+                next_in += 1
             else:
                 break
             scenes.append(_next_proposal(spec, index, attempts, rendered))

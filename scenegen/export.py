@@ -1,7 +1,5 @@
 """One item of a rooms file in the formats of other tools: EXR, PNG, PLY, OBJ."""
 
-import errno
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +9,7 @@ import png
 from numpy.typing import NDArray
 
 from scenegen.camera import transform_vectors
+from scenegen.new_file import written_beside
 from scenegen.preview import srgb_bytes
 from scenegen.scene_file import Room
 from scenegen.shapes import scene_mesh
@@ -20,38 +19,20 @@ FORMATS = ("exr", "png", "ply", "obj")
 PNG_DEPTH_UNIT = 1e-4  # scene units a step: 16 bits reach 6.5535
 
 
-def export_room(
-    room: Room, folder: str | Path, stem: str, form: str, overwrite: bool
-) -> list[Path]:
-    """Write one room as `form` (one of FORMATS); return the files written.
+def export_paths(row: int, folder: str | Path, stem: str, form: str) -> list[Path]:
+    """Return the files that one row becomes in a format (one of FORMATS)."""
+    name = f"{stem}-{row:06d}"
+    if form != "png":
+        return [Path(folder) / f"{name}.{form}"]
+    return [Path(folder) / f"{name}-{kind}.png" for kind in _PNG]
 
-    Raises FileExistsError where a file is there already and `overwrite` is not set.
-    """
-    folder = Path(folder)
-    names = {"png": [f"{stem}-{kind}.png" for kind in ("image", "depth", "normal", "object_id")]}
-    paths = [folder / name for name in names.get(form, [f"{stem}.{form}"])]
-    for path in paths:
-        if path.exists() and not overwrite:
-            raise FileExistsError(errno.EEXIST, "exists already; say --overwrite", str(path))
-    writers: dict[str, list[Callable[[Path], None]]] = {
-        "exr": [lambda path: write_exr(room, path)],
-        "png": [
-            lambda path: _write_png16(path, np.clip(room.radiance, 0, 1) * 65535),
-            lambda path: _write_png16(path, np.nan_to_num(room.depth) / PNG_DEPTH_UNIT),
-            lambda path: _write_png16(path, (room.normal * 0.5 + 0.5) * 65535),
-            lambda path: _write_png16(path, room.object_id.astype(float) + 1),
-        ],
-        "ply": [lambda path: write_surfels_ply(room, path)],
-        "obj": [lambda path: write_mesh_obj(room, path)],
-    }
-    for path, write in zip(paths, writers[form], strict=True):
-        temporary = path.with_name(f".{os.getpid()}.{path.name}")  # keeps the ending
-        try:
-            write(temporary)
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
-    return paths
+
+def export_room(room: Room, paths: list[Path], form: str, overwrite: bool = False) -> None:
+    """Write one room to its `export_paths`. Raises OSError as `new_file.written_beside`."""
+    writers = list(_PNG.values()) if form == "png" else [_WRITERS[form]]
+    for path, write in zip(paths, writers, strict=True):
+        with written_beside(path, overwrite) as temporary:
+            write(room, temporary)
 
 
 def write_exr(room: Room, path: str | Path) -> None:
@@ -129,3 +110,16 @@ def _write_png16(path: Path, values: Array) -> None:
     writer = png.Writer(width, height, greyscale=pixels.ndim == 2, bitdepth=16)
     with path.open("wb") as file:
         writer.write(file, pixels.reshape(height, -1))
+
+
+_PNG: dict[str, Callable[[Room, Path], None]] = {
+    "image": lambda room, path: _write_png16(path, np.clip(room.radiance, 0, 1) * 65535),
+    "depth": lambda room, path: _write_png16(path, np.nan_to_num(room.depth) / PNG_DEPTH_UNIT),
+    "normal": lambda room, path: _write_png16(path, (room.normal * 0.5 + 0.5) * 65535),
+    "object_id": lambda room, path: _write_png16(path, room.object_id.astype(float) + 1),
+}
+_WRITERS: dict[str, Callable[[Room, Path], None]] = {
+    "exr": write_exr,
+    "ply": write_surfels_ply,
+    "obj": write_mesh_obj,
+}

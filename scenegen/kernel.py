@@ -77,7 +77,8 @@ def closest_hit(scenes: Scenes, item: Any, o: Any, d: Any) -> Any:
     while dr.hint(k < count, exclude=[scenes]):
         row = item * scenes.slots + k
         near, far, meets = _bounding_interval(scenes, row, o, d)
-        if dr.hint(meets & (near < t), exclude=[scenes]):
+        near = dr.maximum(near, 0)
+        if dr.hint(meets & (near < t) & (near < far), exclude=[scenes]):
             start, along = _to_unit_scene(scenes, row, o + near * d, d)
             ray = mi.Ray3f(mi.Ray3f(start, along), far - near)
             hit = scenes.unit.ray_intersect_preliminary(ray, coherent=False)
@@ -150,6 +151,7 @@ def radiance_at(scenes: Scenes, item: Any, p: Any, n: Any, object_id: Any, shado
         distance = dr.norm(to_light)
         cosine = dr.maximum(dr.dot(n, to_light) / distance, 0)
         amount = cosine / ((record[3] + record[4] * distance) * distance)
+        amount = dr.select(distance > 0, amount, 0)
         if shadows:
             start = p + SHADOW_OFFSET * n
             amount = dr.select(occluded(scenes, item, start, to_light, cosine > 0), 0, amount)

@@ -4,7 +4,9 @@
 """
 
 from dataclasses import dataclass
+from typing import Any
 
+from scenegen.row_file import Column
 from scenegen.specs import DatasetSpec
 
 FORMAT_NAME = "pix2shape-bench/rooms"
@@ -163,6 +165,26 @@ def numpy_dtype(field: Field, spec: DatasetSpec) -> str:
 def image_scale(spec: DatasetSpec) -> float:
     """Return what a stored pixel is multiplied by to give radiance."""
     return 1 / 255 if spec.image_dtype == "uint8" else 1.0
+
+
+def columns(spec: DatasetSpec) -> list[Column]:
+    """Return the datasets of a file that answers that spec, with their attributes."""
+    return [_column(field, spec) for field in FIELDS]
+
+
+def _column(field: Field, spec: DatasetSpec) -> Column:
+    attributes: dict[str, Any] = {
+        "unit": field.unit,
+        "frame": field.frame,
+        "shape": "(" + ", ".join(["N", *map(str, field.shape)]) + ")",
+        "meaning": field.meaning,
+    }
+    if field.name == "image":
+        attributes["scale"] = image_scale(spec)
+    if field.name == "object/shape":
+        attributes["names"] = list(spec.shapes)
+    dtype = "text" if field.dtype == "text" else numpy_dtype(field, spec)
+    return Column(field.name, row_shape(field, spec), dtype, field.per_pixel, attributes)
 
 
 def markdown_table() -> str:

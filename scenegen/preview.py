@@ -1,6 +1,5 @@
 """Contact sheets: what a person looks at to trust a file of rooms."""
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from scenegen.errors import SpecError
+from scenegen.new_file import written_beside
 from scenegen.scene_file import Room
 from scenegen.seeding import Purpose, item_rng
 
@@ -120,6 +120,8 @@ def pick_rows(
     """
     if items is not None and number is not None:
         raise SpecError("items and random: found both, expected one of them")
+    if seed < 0:
+        raise SpecError(f"seed: found {seed}, expected 0 or more")
     if number is not None:
         rng = item_rng(seed, 0, Purpose.SELECTION)
         return sorted(rng.choice(count, min(number, count), replace=False).tolist())
@@ -127,8 +129,8 @@ def pick_rows(
     outside = [i for i in chosen if i >= count]
     if outside:
         raise SpecError(f"items: found {outside[0]}, expected rows from 0 to {count - 1}")
-    if len(chosen) > MAX_ROWS:
-        raise SpecError(f"items: found {len(chosen)}, expected at most {MAX_ROWS} on one sheet")
+    if not 0 < len(chosen) <= MAX_ROWS:
+        raise SpecError(f"items: found {len(chosen)} rows, expected from 1 to {MAX_ROWS}")
     return chosen
 
 
@@ -140,9 +142,5 @@ def save_picture(picture: Image.Image, path: str | Path) -> None:
     path = Path(path)
     if path.suffix.lower() not in (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff"):
         raise SpecError(f"out: found {path.name!r}, expected a picture's name such as sheet.png")
-    temporary = path.with_name(f".{os.getpid()}.{path.name}")
-    try:
+    with written_beside(path, overwrite=True) as temporary:
         picture.save(temporary)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)

@@ -86,7 +86,7 @@ def _closest(
         )
         distance, local_normal = cast(name, start[meets], along[meets])
         nearer = np.zeros(len(rays), bool)
-        nearer[meets] = distance <= t[meets]
+        nearer[meets] = np.isfinite(distance) & (distance <= t[meets])
         taken = nearer[meets]
         t[nearer] = distance[taken]
         rotation = batch.world_from_object[b, k, :3, :3] / batch.object_scale[b, k]

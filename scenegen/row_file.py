@@ -1,6 +1,5 @@
 """HDF5 files that hold rows: written in order, compressed by us, renamed when complete."""
 
-import errno
 import importlib.metadata
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,6 +14,7 @@ from isal import isal_zlib
 from numpy.typing import NDArray
 
 from scenegen.errors import SpecError
+from scenegen.new_file import written_beside
 
 Array = NDArray[Any]
 COMPRESSIONS = ("gzip", "lzf", "none")
@@ -111,25 +111,20 @@ class Table:
 
 @contextmanager
 def new_file(path: str | Path, overwrite: bool = False) -> Iterator[h5py.File]:
-    """Open a file to write; it gets its final name when the block ends without an error.
-
-    Raises OSError as `check_writable`, and whatever the disk has to say.
-    """
-    path = Path(path)
-    check_writable(path, overwrite)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
+    """Open an HDF5 file to write, under a temporary name as `written_beside` gives it."""
+    with written_beside(path, overwrite) as temporary:
         file = h5py.File(temporary, "w")
         try:
             yield file
+            file.flush()  # fails where closing would, but leaves everything in order
             file.close()
-        finally:
+        except BaseException:
+            # The file is lost. If it is the disk that is full, emptying it first makes room for
+            # HDF5 to close in order; half closed, it would crash the process.
+            os.truncate(temporary, 0)
             with suppress(Exception):
                 file.close()
-        check_writable(path, overwrite)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+            raise
 
 
 def writer_name() -> str:
@@ -142,23 +137,3 @@ def shuffle_bytes(values: Array) -> Array:
     size = values.dtype.itemsize
     flat = values.reshape(-1).view(np.uint8)
     return flat if size == 1 else np.ascontiguousarray(flat.reshape(-1, size).T)
-
-
-def check_writable(path: Path, overwrite: bool) -> None:
-    """Raise the OSError that would end in a lost run: better before rendering than after."""
-    parent = path.parent
-    problems = (
-        (not parent.exists(), errno.ENOENT, "the folder does not exist; create it first", parent),
-        (not parent.is_dir(), errno.ENOTDIR, "is not a folder", parent),
-        (path.is_dir(), errno.EISDIR, "is a folder; name a file in it", path),
-        (
-            path.exists() and not overwrite,
-            errno.EEXIST,
-            "exists already; say --overwrite to replace it",
-            path,
-        ),
-        (not os.access(parent, os.W_OK), errno.EACCES, "cannot be written to", parent),
-    )
-    for wrong, number, text, where in problems:
-        if wrong:
-            raise OSError(number, text, str(where))

@@ -1,5 +1,6 @@
 """Read a rooms file: typed records by index, and a map-style dataset for training loops."""
 
+import errno
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from scenegen.camera import back_project, transform_points
 from scenegen.errors import FileFormatError, SpecError
-from scenegen.layout import FIELDS, FORMAT_NAME, FORMAT_VERSION, numpy_dtype, row_shape
+from scenegen.layout import FIELDS, FORMAT_NAME, FORMAT_VERSION, columns
 from scenegen.specs import DatasetSpec, SceneSpec
 from scenegen.truth import decode_image
 
@@ -75,7 +76,9 @@ class RoomsFile:
         """
         self.path = Path(path)
         if not self.path.exists():
-            raise FileNotFoundError(2, "no such file", str(path))
+            raise FileNotFoundError(errno.ENOENT, "no such file", str(path))
+        if self.path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, "is a folder; name a rooms file", str(path))
         try:
             self._file = h5py.File(self.path, "r")
         except OSError as error:
@@ -93,9 +96,10 @@ class RoomsFile:
             self._file.close()
             raise
         self.fingerprint = str(self.attributes["fingerprint"])
+        self._count = int(self._file["image"].shape[0])
 
     def __len__(self) -> int:
-        return int(self._file["image"].shape[0])
+        return self._count
 
     def __getitem__(self, index: int) -> Room:
         """Read one row; negative indices count from the end. Raises IndexError, FileFormatError."""
@@ -118,7 +122,7 @@ class RoomsFile:
     def scene(self, index: int) -> SceneSpec:
         """Return the description of the scene that row `index` shows."""
         try:
-            return SceneSpec.from_json(self.read("scene", index).decode())
+            return SceneSpec.from_json(self.read("scene", index))
         except SpecError as error:
             raise FileFormatError(f"{self.path}: scene, row {index}: {error}") from error
 
@@ -126,19 +130,24 @@ class RoomsFile:
         """Read rows of one dataset. Raises FileFormatError where they are damaged."""
         try:
             return self._file[name][rows]
-        except (OSError, KeyError) as error:
+        except (OSError, KeyError, ValueError) as error:
             where = f"{self.path}: {name}, row {rows}"
             raise FileFormatError(f"{where}: cannot be read ({_reason(error)})") from error
 
+    def problems(self) -> list[str]:
+        """Return what is wrong with the layout, the datasets' own descriptions included."""
+        return layout_problems(self._file, self.spec) + attribute_problems(self._file, self.spec)
+
     def stored_bytes(self) -> dict[str, tuple[int, int]]:
-        """Return for each dataset its bytes on disk and in memory."""
-        return {
-            field.name: (
-                self._file[field.name].id.get_storage_size(),
-                self._file[field.name].nbytes,
-            )
-            for field in FIELDS
-        }
+        """Return for each dataset its bytes on disk and in memory.
+
+        HDF5 keeps texts in heaps of which it tells no size; they get what the others leave.
+        """
+        sizes = {f.name: self._file[f.name].id.get_storage_size() for f in FIELDS}
+        memory = {f.name: self._file[f.name].nbytes for f in FIELDS}
+        texts = self.path.stat().st_size - sum(sizes.values()) + sizes["scene"]
+        sizes["scene"] = memory["scene"] = texts
+        return {name: (sizes[name], memory[name]) for name in sizes}
 
     def close(self) -> None:
         """Close the file; idempotent."""
@@ -157,7 +166,7 @@ class RoomsFile:
 
     def _check_root(self) -> DatasetSpec:
         found = self.attributes.get("format")
-        if found != FORMAT_NAME:
+        if not isinstance(found, str) or found != FORMAT_NAME:
             what = "no format attribute" if found is None else repr(found)
             raise FileFormatError(
                 f"{self.path}: not a rooms file: found {what}, expected"
@@ -181,23 +190,34 @@ class RoomsFile:
 def layout_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
     """Say what is missing or has the wrong shape or type."""
     problems = []
-    count = file["image"].shape[0] if "image" in file else 0
-    for field in FIELDS:
-        if not isinstance(file.get(field.name), h5py.Dataset):
-            problems.append(f"dataset {field.name!r} is missing")
+    image = file.get("image")
+    count = image.shape[0] if isinstance(image, h5py.Dataset) and image.shape else 0
+    for column in columns(spec):
+        dataset = file.get(column.name)
+        if not isinstance(dataset, h5py.Dataset):
+            problems.append(f"dataset {column.name!r} is missing")
             continue
-        dataset = file[field.name]
-        expected = (count, *row_shape(field, spec))
+        expected = (count, *column.shape)
         if dataset.shape != expected:
-            problems.append(f"{field.name}: shape {dataset.shape}, expected {expected}")
-        if field.dtype != "text" and dataset.dtype != np.dtype(numpy_dtype(field, spec)):
-            problems.append(
-                f"{field.name}: type {dataset.dtype}, expected {numpy_dtype(field, spec)}"
-            )
-        if field.dtype == "text" and h5py.check_string_dtype(dataset.dtype) is None:
-            problems.append(f"{field.name}: type {dataset.dtype}, expected strings")
-    if not problems and count != file.attrs.get("count"):
-        problems.append(f"{count} rows, the attribute 'count' says {file.attrs.get('count')}")
+            problems.append(f"{column.name}: shape {dataset.shape}, expected {expected}")
+        if column.dtype != "text" and dataset.dtype != np.dtype(column.dtype):
+            problems.append(f"{column.name}: type {dataset.dtype}, expected {column.dtype}")
+        if column.dtype == "text" and h5py.check_string_dtype(dataset.dtype) is None:
+            problems.append(f"{column.name}: type {dataset.dtype}, expected strings")
+    told = file.attrs.get("count")
+    if not problems and (count == 0 or not np.array_equal(count, told)):
+        problems.append(f"found {count} rows, the attribute 'count' says {told}, expected over 0")
+    return problems
+
+
+def attribute_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
+    """Say which datasets describe themselves otherwise than `layout.columns` does."""
+    problems = []
+    for column in columns(spec):
+        for name, expected in column.attributes.items():
+            found = file[column.name].attrs.get(name)
+            if found is None or not np.array_equal(np.asarray(found), np.asarray(expected)):
+                problems.append(f"{column.name}: attribute {name} is {found!r:.60}")
     return problems
 
 

@@ -8,24 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.errors import SpecError
-from scenegen.layout import (
-    FIELDS,
-    FORMAT_NAME,
-    FORMAT_VERSION,
-    Field,
-    image_scale,
-    numpy_dtype,
-    row_shape,
-)
+from scenegen.layout import FORMAT_NAME, FORMAT_VERSION, columns
 from scenegen.packing import SceneBatch
-from scenegen.row_file import Column, Table, new_file, writer_name
+from scenegen.records import check
+from scenegen.row_file import Table, new_file, writer_name
 from scenegen.specs import DatasetSpec, SceneSpec
 
 Array = NDArray[Any]
+MAX_COUNT = 100_000_000
 CONVENTIONS = (
     "world: right-handed, y up, room = unit box with floor y = 0 and walls x = 0, z = 0; camera:"
     " x right, y up, looks along -z; pixels: row 0 on top, centres at +0.5; see docs/conventions.md"
@@ -49,8 +41,7 @@ class RoomsWriter:
 
     def __init__(self, file: h5py.File, spec: DatasetSpec, count: int, compression: str) -> None:
         """Create the datasets."""
-        columns = [_column(field, spec) for field in FIELDS]
-        self.table = Table(file, columns, count, compression)
+        self.table = Table(file, columns(spec), count, compression)
         self.digest = hashlib.sha256(spec.to_json().encode())
 
     def append(self, rooms: Sequence[RenderedRoom], batch: SceneBatch) -> None:
@@ -102,8 +93,7 @@ def create_rooms(
         SpecError: unknown compression, or a count below 1.
         OSError: the path, or the disk.
     """
-    if count < 1:
-        raise SpecError(f"n: found {count}, expected at least 1")
+    check(1 <= count <= MAX_COUNT, "n", count, f"from 1 to {MAX_COUNT:,} images")
     with new_file(path, overwrite) as file:
         file.attrs.update(
             {
@@ -122,18 +112,3 @@ def create_rooms(
         if writer.table.rows != count:
             raise RuntimeError(f"{path}: got {writer.table.rows} of {count} rows")
         file.attrs["fingerprint"] = writer.digest.hexdigest()
-
-
-def _column(field: Field, spec: DatasetSpec) -> Column:
-    attributes: dict[str, Any] = {
-        "unit": field.unit,
-        "frame": field.frame,
-        "shape": "(" + ", ".join(["N", *map(str, field.shape)]) + ")",
-        "meaning": field.meaning,
-    }
-    if field.name == "image":
-        attributes["scale"] = image_scale(spec)
-    if field.name == "object/shape":
-        attributes["names"] = np.array(spec.shapes, dtype=h5py.string_dtype())
-    dtype = "text" if field.dtype == "text" else numpy_dtype(field, spec)
-    return Column(field.name, row_shape(field, spec), dtype, field.per_pixel, attributes)

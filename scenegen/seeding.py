@@ -18,6 +18,10 @@ class Purpose(IntEnum):
     OBJECTS = 2
     POSES = 3
     SELECTION = 4
+    QUESTION = 5
+    VIEW = 6
+    CATALOGUE = 7
+    ANSWERS = 8
 
 
 def item_rng(seed: int, index: int, purpose: Purpose, attempt: int = 0) -> np.random.Generator:

@@ -32,6 +32,7 @@ def shade(
     for position, color in zip(light_positions, light_colors, strict=True):
         to_light = position - np.asarray(points, np.float64)
         distance = np.linalg.norm(to_light, axis=-1, keepdims=True)
+        distance[distance == 0] = np.inf  # a light on the surface itself gives nothing
         cosine = np.sum(normals * to_light, axis=-1, keepdims=True) / distance
         falloff = attenuation[0] * distance + attenuation[1] * distance**2
         total += color * np.maximum(cosine, 0.0) / falloff

@@ -5,13 +5,12 @@ and nothing random. Lengths are in scene units (the room's edge), frames as in `
 """
 
 import hashlib
-import json
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from typing import Any, Literal, TypeVar, get_args
+from typing import Any, Literal, get_args
 
 from scenegen.camera import Camera, Vector3
-from scenegen.errors import SpecError
+from scenegen.records import check, check_range, from_json, normalise, to_json
 
 ShapeName = Literal[
     "box",
@@ -34,8 +33,6 @@ POSES = ("resting", "any")
 MAX_OBJECTS = 100  # object ids are stored as int8
 MAX_LIGHTS = 16
 MAX_PIXELS = 4096 * 4096
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -60,6 +57,12 @@ class PlacedObject:
     scale: float
     reflectance: Vector3
 
+    def __post_init__(self) -> None:
+        check(self.shape in SHAPE_NAMES, "shape", repr(self.shape), f"one of {SHAPE_NAMES}")
+        check(self.scale > 0, "scale", self.scale, "a positive number")
+        norm = sum(q * q for q in self.rotation)
+        check(abs(norm - 1) < 1e-6, "rotation", self.rotation, "a unit quaternion")
+
 
 @dataclass(frozen=True)
 class SceneSpec:
@@ -78,25 +81,18 @@ class SceneSpec:
     room_reflectance: Vector3 | None
     background: Vector3 = (0.0, 0.0, 0.0)
 
+    def __post_init__(self) -> None:
+        check(self.index >= 0, "index", self.index, "0 or more")
+        check(len(self.cameras) > 0, "cameras", "none", "at least one")
+
     def to_json(self) -> str:
         """Return the description as one line of JSON; floats keep every bit."""
-        return json.dumps(self, default=vars, separators=(",", ":"))
+        return to_json(self)
 
     @classmethod
-    def from_json(cls, text: str) -> "SceneSpec":
+    def from_json(cls, text: str | bytes) -> "SceneSpec":
         """Read what `to_json` wrote. Raises SpecError where the text is no scene description."""
-        return _parse(text, "scene description", cls._from_dict)
-
-    @classmethod
-    def _from_dict(cls, raw: dict[str, Any]) -> "SceneSpec":
-        return cls(
-            **{
-                **_tuples(raw),
-                "cameras": tuple(Camera(**_tuples(camera)) for camera in raw["cameras"]),
-                "objects": tuple(PlacedObject(**_tuples(item)) for item in raw["objects"]),
-                "lights": tuple(Light(**_tuples(light)) for light in raw["lights"]),
-            }
-        )
+        return from_json(cls, text, "scene description")
 
 
 @dataclass(frozen=True)
@@ -150,60 +146,61 @@ class DatasetSpec:
     reflectance: Vector3 = (0.8, 0.8, 0.8)
 
     def __post_init__(self) -> None:
-        _check(0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2**63 - 1")
+        normalise(self)
+        check(0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2**63 - 1")
         sides = (self.height, self.width)
-        _check(min(sides) >= 8, "size", f"{sides[0]}x{sides[1]}", "at least 8 pixels a side")
-        _check(
+        check(min(sides) >= 8, "size", f"{sides[0]}x{sides[1]}", "at least 8 pixels a side")
+        check(
             self.height * self.width <= MAX_PIXELS,
             "size",
             f"{sides[0]}x{sides[1]}",
             f"at most {MAX_PIXELS:,} pixels",
         )
-        _check_range("objects", self.objects, 0, MAX_OBJECTS)
-        _check_range("lights", self.lights, 0, MAX_LIGHTS)
-        _check_range("object radius", self.object_radius, 0.005, 0.5)
-        _check(len(self.shapes) > 0, "shapes", "none", f"some of {', '.join(SHAPE_NAMES)}")
+        check_range("objects", self.objects, 0, MAX_OBJECTS)
+        check_range("lights", self.lights, 0, MAX_LIGHTS)
+        check_range("object radius", self.object_radius, 0.005, 0.5)
+        check(len(self.shapes) > 0, "shapes", "none", f"some of {', '.join(SHAPE_NAMES)}")
         for name in self.shapes:
-            _check(name in SHAPE_NAMES, "shapes", repr(name), f"some of {', '.join(SHAPE_NAMES)}")
-        _check(len(set(self.shapes)) == len(self.shapes), "shapes", self.shapes, "each name once")
-        _check(self.pose in POSES, "pose", self.pose, f"one of {', '.join(POSES)}")
-        _check(
+            check(name in SHAPE_NAMES, "shapes", repr(name), f"some of {', '.join(SHAPE_NAMES)}")
+        check(len(set(self.shapes)) == len(self.shapes), "shapes", self.shapes, "each name once")
+        check(self.pose in POSES, "pose", self.pose, f"one of {', '.join(POSES)}")
+        check(
             self.image_dtype in IMAGE_DTYPES,
             "image dtype",
             self.image_dtype,
             f"one of {', '.join(IMAGE_DTYPES)}",
         )
-        _check(1 <= self.spp <= 1024, "spp", self.spp, "from 1 to 1024")
+        check(1 <= self.spp <= 1024, "spp", self.spp, "from 1 to 1024")
         pixels = self.height * self.width
-        _check(
+        check(
             0 <= self.min_visible_pixels <= pixels,
             "min visible pixels",
             self.min_visible_pixels,
             f"from 0 to the image's {pixels} pixels",
         )
-        _check(1.0 <= self.fov_degrees <= 120.0, "fov", self.fov_degrees, "from 1 to 120 degrees")
-        _check(
+        check(1.0 <= self.fov_degrees <= 120.0, "fov", self.fov_degrees, "from 1 to 120 degrees")
+        check(
             1.22 <= self.camera_radius <= 10.0,
             "camera radius",
             self.camera_radius,
             "from 1.22 (just around the room) to 10 scene units",
         )
-        _check(
+        check(
             1.22 <= self.light_radius <= 100.0,
             "light radius",
             self.light_radius,
             "from 1.22 (just around the room) to 100 scene units",
         )
-        _check(
+        check(
             all(0.0 < x < 1.0 for x in self.camera_target),
             "camera target",
             self.camera_target,
             "inside the unit room",
         )
-        _check(0.0 <= self.light_level <= 100.0, "light level", self.light_level, "from 0 to 100")
+        check(0.0 <= self.light_level <= 100.0, "light level", self.light_level, "from 0 to 100")
         for name, color in (("ambient", self.ambient), ("reflectance", self.reflectance)):
-            _check(all(0.0 <= c <= 1.0 for c in color), name, color, "channels from 0 to 1")
-        _check(
+            check(all(0.0 <= c <= 1.0 for c in color), name, color, "channels from 0 to 1")
+        check(
             min(self.attenuation) >= 0.0 and sum(self.attenuation) > 0.0,
             "attenuation",
             self.attenuation,
@@ -227,12 +224,12 @@ class DatasetSpec:
 
     def to_json(self) -> str:
         """Return the request as one line of JSON with sorted keys."""
-        return json.dumps(self, default=vars, separators=(",", ":"), sort_keys=True)
+        return to_json(self, sort_keys=True)
 
     @classmethod
     def from_json(cls, text: str) -> "DatasetSpec":
         """Read what `to_json` wrote. Raises SpecError on anything else."""
-        return _parse(text, "dataset spec", lambda raw: cls(**_tuples(raw)))
+        return from_json(cls, text, "dataset spec")
 
     def changed_settings(self) -> dict[str, Any]:
         """Return the settings that differ from the defaults."""
@@ -252,30 +249,3 @@ def fingerprint(spec: DatasetSpec, scene_lines: Iterable[str]) -> str:
     for line in scene_lines:
         digest.update(b"\n" + line.encode())
     return digest.hexdigest()
-
-
-def _check(ok: bool, name: str, found: object, expected: str) -> None:
-    if not ok:
-        raise SpecError(f"{name}: found {found}, expected {expected}")
-
-
-def _check_range(name: str, value: tuple[float, float], low: float, high: float) -> None:
-    ok = len(value) == 2 and low <= value[0] <= value[1] <= high
-    shown = f"{value[0]}-{value[1]}" if len(value) == 2 else value
-    _check(ok, name, shown, f"a number or a rising range within {low}-{high}")
-
-
-def _tuples(raw: dict[str, Any]) -> dict[str, Any]:
-    return {key: tuple(v) if isinstance(v, list) else v for key, v in raw.items()}
-
-
-def _parse(text: str, what: str, build: Callable[[dict[str, Any]], T]) -> T:
-    try:
-        raw = json.loads(text)
-        if not isinstance(raw, dict):
-            raise TypeError(f"found {type(raw).__name__}, expected an object")
-        return build(raw)
-    except SpecError:
-        raise
-    except (TypeError, KeyError, ValueError, AttributeError) as error:
-        raise SpecError(f"{what}: cannot be read: {error}") from error

@@ -1,5 +1,6 @@
 """Shared fixtures: tiny rooms files, damaged copies, and the commands as a user sees them."""
 
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -108,6 +109,20 @@ def refuses(run: Callable[..., Result], tmp_path: Path) -> Callable[..., str]:
         line = refusal(result.exit_code, result.stdout, result.stderr, words)
         assert after == before, "files were left or changed"
         return line
+
+    return call
+
+
+@pytest.fixture
+def verdict(run: Callable[..., Result]) -> Callable[..., tuple[int, dict[str, str], str]]:
+    """Run verify; return exit code, "ok" or "FAIL" by name of the check, and the output."""
+
+    def call(path: Path, *options: object) -> tuple[int, dict[str, str], str]:
+        result = run("verify", path, *options)
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise AssertionError(f"a traceback: {result.exception!r}") from result.exception
+        lines = re.findall(r"^(ok|FAIL) +(\S+(?: \S+)*)", result.stdout, re.MULTILINE)
+        return result.exit_code, {name: word for word, name in lines}, result.output
 
     return call
 

@@ -15,6 +15,7 @@ from scenegen.camera import (
     transform_points,
     transform_vectors,
 )
+from scenegen.errors import SpecError
 
 COORDINATE = st.floats(-9.0, 9.0)
 POINT = st.tuples(COORDINATE, COORDINATE, COORDINATE)
@@ -61,8 +62,21 @@ def test_a_camera_on_the_x_axis_has_minus_z_on_its_right() -> None:
 
 @pytest.mark.parametrize("height", [2.0, -2.0])
 def test_looking_straight_up_or_down_is_refused(height: float) -> None:
-    with pytest.raises(ValueError, match="straight along y"):
+    with pytest.raises(SpecError, match="straight along y"):
         _ = Camera((0.3, height, 0.3), (0.3, 0.3, 0.3), 30.0).world_from_camera
+
+
+def test_whole_numbers_are_numbers() -> None:
+    whole, real = Camera((2, 1, 2), (0, 0, 1), 30), Camera((2.0, 1.0, 2.0), (0.0, 0.0, 1.0), 30.0)
+    np.testing.assert_array_equal(whole.world_from_camera, real.world_from_camera)
+
+
+def test_a_camera_looks_elsewhere_and_not_all_around() -> None:
+    with pytest.raises(SpecError, match="camera"):
+        Camera((0.3, 0.3, 0.3), (0.3, 0.3, 0.3), 30.0)
+    for fov in (0.0, 180.0, -5.0):
+        with pytest.raises(SpecError, match="fov"):
+            Camera((0.3, 0.3, 2.0), (0.3, 0.3, 0.3), fov)
 
 
 def test_pixel_directions_by_hand() -> None:

@@ -1,0 +1,97 @@
+"""Renders that the machine stops: killed, without permission, on a full disk."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="uses Linux system calls")
+# `scenegen` with a limit on the size of files, which to a program is a disk that fills up.
+PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
+UNPRIVILEGED = f"""
+import ctypes, os, sys
+ctypes.CDLL(None).prctl({PR_CAPBSET_DROP}, {CAP_DAC_OVERRIDE}, 0, 0, 0)
+command = [sys.executable, "-c", "import cli; cli.scenegen()", *sys.argv[1:]]
+os.execv(sys.executable, command)
+"""
+RENDER = ("render", "--size", "32", "--min-visible-pixels", "3", "--seed", "3")
+
+
+@LINUX
+def test_a_folder_without_write_permission(tmp_path, check_refusal):
+    """Root gives up the right to write anywhere, so that this tests something for root too."""
+    folder = tmp_path / "locked"
+    folder.mkdir()
+    folder.chmod(0o555)
+    done = subprocess.run(
+        [sys.executable, "-c", UNPRIVILEGED, *RENDER, "--n", "1", "--out", "locked/x.h5"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    check_refusal(done.returncode, done.stdout, done.stderr, ("locked: cannot be written to",))
+    assert list(folder.iterdir()) == []
+
+
+def test_a_killed_render_leaves_nothing_under_the_final_name(tmp_path):
+    command = [sys.executable, "-c", "import cli; cli.scenegen()", *RENDER, "--n", "100000"]
+    process = subprocess.Popen([*command, "--out", "x.h5"], cwd=tmp_path, stderr=subprocess.DEVNULL)
+    try:
+        wait_until(lambda: any(p.stat().st_size > 100_000 for p in tmp_path.iterdir()), process)
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    assert not (tmp_path / "x.h5").exists()
+    assert list(tmp_path.iterdir()), "the run was killed before it wrote anything: a weak test"
+    subprocess.run([*command[:-1], "2", "--out", "x.h5"], cwd=tmp_path, check=True)
+    assert (tmp_path / "x.h5").exists()
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """Mount disks of a given size, one after another; needs root, as CI has it."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    mounted = False
+
+    def mount(size):
+        nonlocal mounted
+        if mounted:
+            subprocess.run(["umount", place], check=True)
+        command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", place]
+        mounted = subprocess.run(command, capture_output=True, check=False).returncode == 0
+        if not mounted:
+            pytest.skip("cannot mount a small disk here")
+        return place
+
+    yield mount
+    if mounted:
+        subprocess.run(["umount", place], check=True)
+
+
+@LINUX
+@pytest.mark.parametrize("compression", ["gzip", "lzf", "none"])
+def test_a_full_disk_is_one_clear_line(tmp_path, small_disk, check_refusal, compression):
+    """Half of the file, its last block, its last byte do not fit: each fails at another place."""
+    command = [sys.executable, "-c", "import cli; cli.scenegen()", *RENDER, "--n", "12"]
+    command += ["--compression", compression, "--out", "x.h5"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    size = (tmp_path / "x.h5").stat().st_size
+    for missing in (size // 2, 9000, 5000, 4096):
+        disk = small_disk(size - missing)
+        done = subprocess.run(command, cwd=disk, capture_output=True, text=True, check=False)
+        line = check_refusal(done.returncode, done.stdout, done.stderr, ("x.h5", "No space left"))
+        assert ".partial" not in line
+        assert len(line) < 200, "a line for a person"
+        assert list(disk.iterdir()) == []
+
+
+def wait_until(condition, process, seconds=60):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert process.poll() is None, "ended too early"
+        assert time.monotonic() < end, "never happened"
+        time.sleep(0.02)

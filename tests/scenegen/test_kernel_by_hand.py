@@ -1,0 +1,107 @@
+"""Single rays worked out by hand: light, shadow, corners, and what a ray must never meet."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenegen.camera import Camera, pixel_directions
+from scenegen.packing import pack
+from scenegen.renderer import render
+from scenegen.specs import SHAPE_NAMES, DatasetSpec, Light, PlacedObject, SceneSpec
+
+GREY = (0.8, 0.8, 0.8)
+
+
+def test_a_room_pixel_by_hand() -> None:
+    """From z = 2.3, level, at the middle of the image: the wall z = 0, 2.3 away, facing us."""
+    camera = Camera((0.3, 0.3, 2.3), (0.3, 0.3, 0.3), 25.0)
+    light = Light((0.3, 0.3, 2.0), (1.0, 0.5, 0.25))
+    scene = SceneSpec(0, (camera,), (), (light,), (0.1, 0.1, 0.1), (0.5, 0.25), (0.8, 0.8, 0.4))
+    spec = DatasetSpec(height=9, width=9, objects=(0, 0), lights=(1, 1), image_dtype="float32",
+                       min_visible_pixels=0)  # fmt: skip
+    truth = render(pack(spec, [scene]))
+    assert truth.depth[0, 4, 4] == pytest.approx(2.3, abs=1e-6)
+    np.testing.assert_allclose(truth.normal[0, 4, 4], [0, 0, 1], atol=1e-6)
+    falloff = 0.5 * 2 + 0.25 * 2**2
+    expected = [
+        0.8 * (0.1 + 1 / falloff),
+        0.8 * (0.1 + 0.5 / falloff),
+        0.4 * (0.1 + 0.25 / falloff),
+    ]
+    np.testing.assert_allclose(truth.image[0, 4, 4], expected, rtol=1e-5)
+    np.testing.assert_allclose(truth.normal[0, 8, 4], [0, 1, 0], atol=1e-6)  # row 8: the floor
+    np.testing.assert_allclose(truth.normal[0, 4, 0], [1, 0, 0], atol=1e-6)  # column 0: wall x = 0
+
+
+@pytest.mark.parametrize(("z", "shadow"), [(0.5, True), (1.2, False)])
+def test_a_shadow_by_hand(z: float, shadow: bool) -> None:
+    """A small ball between a light and the wall z = 0 darkens just the pixels behind it.
+
+    One behind the light, seen from the wall, darkens none.
+    """
+    camera = Camera((0.5, 0.5, 2.3), (0.3, 0.3, 0.0), 40.0)
+    ball = PlacedObject("sphere", (0.3, 0.3, z), (1.0, 0.0, 0.0, 0.0), 0.02, GREY)
+    light = Light((0.3, 0.3, 1.0), (1.0, 1.0, 1.0))
+    scene = SceneSpec(0, (camera,), (ball,), (light,), (0.1,) * 3, (0.5, 0.5), GREY)
+    images = {}
+    for shadows in (False, True):
+        spec = DatasetSpec(height=33, width=33, objects=(1, 1), lights=(1, 1), shadows=shadows,
+                           image_dtype="float32", shapes=("sphere",))  # fmt: skip
+        images[shadows] = render(pack(spec, [scene])).image[0]
+    assert images[False][16, 16, 0] == pytest.approx(0.8 * (0.1 + 1.0), rel=1e-4)
+    changed = (images[False] != images[True]).any(axis=-1)
+    if shadow:
+        assert images[True][16, 16, 0] == pytest.approx(0.8 * 0.1, rel=1e-5)
+        assert 1 <= changed.sum() < 15, "elsewhere not a bit changes"
+    else:
+        assert not changed.any()
+
+
+def test_a_ray_meets_no_other_unit_shape() -> None:
+    """All shapes lie in one scene of unit shapes; each must be seen inside its own sphere only.
+
+    Without a room, so that nothing stops a ray that passes its object.
+    """
+    spec = DatasetSpec(height=96, width=96, objects=(1, 1), min_visible_pixels=0, lights=(0, 0))
+    rng = np.random.default_rng(3)
+    scenes = []
+    for index, name in enumerate(SHAPE_NAMES * 6):
+        turn = rng.standard_normal(4)
+        w, x, y, z = (turn / np.linalg.norm(turn)).tolist()
+        item = PlacedObject(name, (0.5, 0.5, 0.5), (w, x, y, z), 0.2, GREY)
+        away = rng.standard_normal(3) * (1, 0.5, 1)
+        at = 0.5 + 2 * away / np.linalg.norm(away)
+        camera = Camera(tuple(at.tolist()), item.position, 12.0)
+        scenes.append(SceneSpec(index, (camera,), (item,), (), (0.1,) * 3, (0.5, 0.5), None))
+    truth = render(pack(spec, scenes))
+    for depth, object_id in zip(truth.depth, truth.object_id, strict=True):
+        points = pixel_directions(96, 96, 12.0) * depth[..., None]
+        off_center = np.linalg.norm(points[object_id == 1] - [0, 0, -2], axis=-1)
+        assert off_center.max() < 0.2 * (1 + 1e-4)
+        assert len(off_center) > 500
+
+
+@pytest.mark.parametrize("room", [GREY, None])
+@pytest.mark.parametrize("shape", ["cone", "sphere"])
+@pytest.mark.parametrize("z", [0.9, 0.5])
+def test_what_is_behind_the_camera_or_around_it_is_not_in_front(
+    z: float, shape: str, room: Any
+) -> None:
+    """The camera stands at z = 0.5 and looks towards z = 0; at 0.5, its object is around it."""
+    camera = Camera((0.5, 0.5, 0.5), (0.5, 0.5, 0.1), 30.0)
+    item = PlacedObject(shape, (0.5, 0.5, z), (1.0, 0.0, 0.0, 0.0), 0.2, GREY)
+    scene = SceneSpec(0, (camera,), (item,), (), (0.1,) * 3, (0.5, 0.5), room)
+    spec = DatasetSpec(height=32, width=32, objects=(0, 1), shapes=("cone", "sphere"))
+    truth = render(pack(spec, [scene]))
+    assert not (truth.depth <= 0).any()
+    if z == 0.9:
+        assert (truth.object_id == (0 if room else -1)).all()
+
+
+def test_the_rooms_very_corner_is_lit() -> None:
+    camera = Camera((1.0, 1.0, 1.0), (0.0, 0.0, 0.0), 30.0)
+    scene = SceneSpec(0, (camera,), (), (), (0.1,) * 3, (0.5, 0.5), GREY)
+    spec = DatasetSpec(height=9, width=9, objects=(0, 0), lights=(0, 1), image_dtype="float32",
+                       min_visible_pixels=0)  # fmt: skip
+    np.testing.assert_allclose(render(pack(spec, [scene])).image, 0.08, rtol=1e-5)

@@ -1,0 +1,104 @@
+"""Which way an image is made, and that the slow way makes the same image."""
+
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenegen import renderer
+from scenegen.packing import SceneBatch, pack
+from scenegen.renderer import launch, render
+from scenegen.specs import DatasetSpec, SceneSpec
+from scenegen.truth import GroundTruth
+
+TINY = DatasetSpec(
+    height=18, width=22, objects=(2, 3), image_dtype="float32", shadows=True, spp=2, seed=1,
+    min_visible_pixels=0, shapes=("sphere", "cone", "teapot", "prism"),
+)  # fmt: skip
+
+SCALAR = """
+import pickle, sys
+from scenegen import renderer
+from scenegen.packing import pack
+from scenegen.truth import GroundTruth
+renderer.select_variant = lambda device: "scalar_rgb"
+spec, scenes = pickle.load(sys.stdin.buffer)
+truth = renderer.render(pack(spec, scenes))
+import mitsuba
+assert mitsuba.variant() == "scalar_rgb"
+assert "scenegen.wavefront" not in sys.modules
+pickle.dump(truth, sys.stdout.buffer)
+"""
+
+
+@pytest.fixture(scope="module")
+def scenes(scenes_of: Callable[..., list[SceneSpec]]) -> list[SceneSpec]:
+    return scenes_of(TINY, 4)
+
+
+def test_the_scalar_fallback_agrees_with_the_wavefront(scenes: list[SceneSpec]) -> None:
+    """In a process of its own, where no vectorised variant is ever loaded."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", SCALAR],
+        input=pickle.dumps((TINY, scenes)),
+        capture_output=True,
+        check=False,
+        cwd=Path(renderer.__file__).parents[1],
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr.decode()
+    slow: GroundTruth = pickle.loads(done.stdout)
+    fast = render(pack(TINY, scenes))
+    for name in vars(fast):
+        ours, theirs = getattr(fast, name), getattr(slow, name)
+        assert (ours.shape, ours.dtype) == (theirs.shape, theirs.dtype)
+    same = fast.object_id == slow.object_id
+    assert same.mean() > 0.997
+    assert (fast.object_id > 0).mean() > 0.03
+    assert (abs(fast.depth - slow.depth)[same] < 1e-5).mean() > 0.999
+    aligned = abs(fast.normal - slow.normal).max(axis=-1) < 1e-3
+    assert aligned[same].mean() > 0.999
+    assert (abs(fast.image - slow.image).max(axis=-1) < 1e-3).mean() > 0.99
+
+
+def test_without_llvm_the_work_is_done_when_fetched(
+    monkeypatch: pytest.MonkeyPatch, scenes: list[SceneSpec]
+) -> None:
+    made: list[SceneBatch] = []
+    monkeypatch.setattr(renderer, "select_variant", lambda device: "scalar_rgb")
+    monkeypatch.setattr(renderer, "render_reference", lambda batch, cast: made.append(batch))
+    batch = pack(TINY, scenes)
+    fetch = launch(batch)
+    assert made == []
+    fetch()
+    assert made == [batch]
+
+
+def test_the_cpu_is_what_auto_means_here(scenes: list[SceneSpec]) -> None:
+    """Bit for bit; the next process, and another machine of the kind, must do so too."""
+    batch = pack(TINY, scenes)
+    first, second = render(batch, "auto"), render(batch, "cpu")
+    for name in vars(first):
+        assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
+
+
+def test_another_process_gives_the_same_bits(scenes: list[SceneSpec]) -> None:
+    code = SCALAR.replace('renderer.select_variant = lambda device: "scalar_rgb"\n', "")
+    code = code.replace('assert mitsuba.variant() == "scalar_rgb"\n', "")
+    code = code.replace('assert "scenegen.wavefront" not in sys.modules\n', "")
+    done: Any = subprocess.run(
+        [sys.executable, "-c", code],
+        input=pickle.dumps((TINY, scenes)),
+        capture_output=True,
+        check=True,
+        cwd=Path(renderer.__file__).parents[1],
+        timeout=120,
+    )
+    there, here = pickle.loads(done.stdout), render(pack(TINY, scenes))
+    for name in vars(here):
+        np.testing.assert_array_equal(getattr(there, name), getattr(here, name))

@@ -1,0 +1,106 @@
+"""Who may import whom, and what a start-up must not load."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+HEAVY = ("mitsuba", "drjit", "numpy", "h5py", "trimesh", "scipy", "PIL", "OpenEXR", "tqdm", "torch")
+CHECK = f"""
+import sys
+{{code}}
+print(*sorted(set({HEAVY!r}) & set(sys.modules)))
+"""
+QUIETLY = """
+import contextlib, io
+import cli
+with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+    cli.{group}({arguments!r})
+"""
+
+
+def heavy_after(code, cwd):
+    """Return which heavy modules a fresh Python has loaded after running code."""
+    done = subprocess.run(
+        [sys.executable, "-c", CHECK.format(code=code)],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=cwd,
+    )
+    return done.stdout.split()
+
+
+@pytest.mark.parametrize("package", ["scenegen", "iqtt", "metrics", "cli"])
+def test_importing_a_package_loads_nothing_heavy(package, tmp_path):
+    assert heavy_after(f"import {package}", tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("group", "arguments"),
+    [
+        ("scenegen", ["--help"]),
+        ("scenegen", ["--version"]),
+        ("scenegen", ["render", "--help"]),
+        ("scenegen", ["verify", "--help"]),
+        ("scenegen", ["render", "--n", "x"]),
+        ("iqtt", ["--help"]),
+        ("bench", ["--help"]),
+    ],
+)
+def test_help_loads_nothing_heavy(group, arguments, tmp_path):
+    assert heavy_after(QUIETLY.format(group=group, arguments=arguments), tmp_path) == []
+
+
+def test_reading_a_file_loads_no_renderer(rooms_path, tmp_path):
+    code = f"import scenegen; scenegen.open_rooms({str(rooms_path)!r})[0].points_world"
+    assert heavy_after(code, tmp_path) == ["h5py", "numpy"]
+    code = f"import scenegen; scenegen.RoomsDataset({str(rooms_path)!r})[0]"
+    assert heavy_after(code, tmp_path) == ["h5py", "numpy"]
+
+
+def test_this_check_can_fail(tmp_path):
+    assert heavy_after("import scenegen; scenegen.make_dataset", tmp_path) != []
+    render = ["render", "--n", "1", "--size", "32", "--out", "nowhere/x.h5"]
+    assert "numpy" in heavy_after(QUIETLY.format(group="scenegen", arguments=render), tmp_path)
+
+
+def test_names_of_the_package():
+    import scenegen
+
+    for name in scenegen.__all__:
+        assert getattr(scenegen, name) is not None
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        _ = scenegen.nothing
+
+
+def lint(cwd):
+    code = "from importlinter.cli import lint_imports_command; lint_imports_command()"
+    command = [sys.executable, "-c", code, "--no-cache"]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+
+
+def test_contracts_between_packages():
+    pytest.importorskip("importlinter")
+    done = lint(ROOT)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert " 0 broken" in done.stdout
+
+
+def test_contracts_can_break(tmp_path):
+    """In a copy where a low module imports a high one, and where camera imports mitsuba."""
+    pytest.importorskip("importlinter")
+    for name in ("scenegen", "iqtt", "metrics"):
+        (tmp_path / name).mkdir()
+        for file in (ROOT / name).glob("*.py"):
+            (tmp_path / name / file.name).write_text(file.read_text())
+    for name in ("cli.py", "pyproject.toml"):
+        (tmp_path / name).write_text((ROOT / name).read_text())
+    with (tmp_path / "scenegen" / "camera.py").open("a") as file:
+        file.write("\nimport mitsuba\nfrom scenegen import dataset\n")
+    done = lint(tmp_path)
+    assert done.returncode == 1
+    assert " 2 broken" in done.stdout
+    assert "scenegen.camera -> mitsuba" in done.stdout
