@@ -1,5 +1,6 @@
 """Single rays worked out by hand: light, shadow, corners, and what a ray must never meet."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -58,28 +59,70 @@ def test_a_shadow_by_hand(z: float, shadow: bool) -> None:
         assert not changed.any()
 
 
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_the_nearer_of_two_objects_is_seen_although_their_spheres_overlap(
+    order: tuple[int, int],
+) -> None:
+    """Along z: the front one's face at 0.75, inside the bounding sphere of the one behind it."""
+    upright, half = (1.0, 0.0, 0.0, 0.0), 0.1 / 3**0.5
+    boxes = [
+        PlacedObject("box", (0.5, 0.5, 0.75 - half), upright, 0.1, GREY),
+        PlacedObject("box", (0.5, 0.5, 0.63 - 3 * half), upright, 0.3, GREY),
+    ]
+    camera = Camera((0.5, 0.5, 2.75), (0.5, 0.5, 0.0), 8.0)
+    spec = DatasetSpec(height=9, width=9, objects=(2, 2), shapes=("box",), min_visible_pixels=0)
+    objects = tuple(boxes[i] for i in order)
+    scene = SceneSpec(0, (camera,), objects, (), (0.1,) * 3, (0.5, 0.5), GREY)
+    truth = render(pack(spec, [scene]))
+    assert truth.depth[0, 4, 4] == pytest.approx(2.0, abs=1e-6)
+    assert (truth.object_id[0, 3:6, 3:6] == 1 + order.index(0)).all()
+    assert 1 + order.index(1) in truth.object_id
+
+
+def turned_shapes(room: Any) -> list[SceneSpec]:
+    """All shapes, turned anyhow, from and lit from anywhere above."""
+    rng, scenes = np.random.default_rng(3), []
+    for index, name in enumerate(SHAPE_NAMES * 6):
+        turn, away, up = rng.standard_normal((3, 4))
+        w, x, y, z = (turn / np.linalg.norm(turn)).tolist()
+        item = PlacedObject(name, (0.5, 0.5, 0.5), (w, x, y, z), 0.2, GREY)
+        back = abs(away[:3]) * (1, 0.5, 1) if room else away[:3] * (1, 0.5, 1)
+        camera = Camera(tuple((0.5 + 2 * back / np.linalg.norm(back)).tolist()), (0.5,) * 3, 12.0)
+        lamp = Light(tuple((0.5 + 2 * abs(up[:3])).tolist()), (1.0, 1.0, 1.0))
+        scenes.append(SceneSpec(index, (camera,), (item,), (lamp,), (0.1,) * 3, (0.5, 0.5), room))
+    return scenes
+
+
+SHAPES_SPEC = DatasetSpec(
+    height=96, width=96, objects=(1, 1), min_visible_pixels=0, lights=(1, 1),
+    image_dtype="float32",
+)  # fmt: skip
+
+
 def test_a_ray_meets_no_other_unit_shape() -> None:
     """All shapes lie in one scene of unit shapes; each must be seen inside its own sphere only.
 
     Without a room, so that nothing stops a ray that passes its object.
     """
-    spec = DatasetSpec(height=96, width=96, objects=(1, 1), min_visible_pixels=0, lights=(0, 0))
-    rng = np.random.default_rng(3)
-    scenes = []
-    for index, name in enumerate(SHAPE_NAMES * 6):
-        turn = rng.standard_normal(4)
-        w, x, y, z = (turn / np.linalg.norm(turn)).tolist()
-        item = PlacedObject(name, (0.5, 0.5, 0.5), (w, x, y, z), 0.2, GREY)
-        away = rng.standard_normal(3) * (1, 0.5, 1)
-        at = 0.5 + 2 * away / np.linalg.norm(away)
-        camera = Camera(tuple(at.tolist()), item.position, 12.0)
-        scenes.append(SceneSpec(index, (camera,), (item,), (), (0.1,) * 3, (0.5, 0.5), None))
-    truth = render(pack(spec, scenes))
+    truth = render(pack(SHAPES_SPEC, turned_shapes(None)))
     for depth, object_id in zip(truth.depth, truth.object_id, strict=True):
         points = pixel_directions(96, 96, 12.0) * depth[..., None]
         off_center = np.linalg.norm(points[object_id == 1] - [0, 0, -2], axis=-1)
         assert off_center.max() < 0.2 * (1 + 1e-4)
         assert len(off_center) > 500
+
+
+def test_a_shadow_ray_meets_no_other_unit_shape() -> None:
+    """Shadows are the same where the other shapes do not exist, but for a few on their outlines."""
+    scenes, differ = turned_shapes(GREY), []
+    spec = replace(SHAPES_SPEC, shadows=True)
+    together, lit = render(pack(spec, scenes)), render(pack(SHAPES_SPEC, scenes))
+    for first, name in enumerate(SHAPE_NAMES):
+        rows = slice(first, None, len(SHAPE_NAMES))
+        alone = render(pack(replace(spec, shapes=(name,)), scenes[rows]))
+        differ.append(abs(alone.image - together.image[rows]).max(axis=-1) > 1e-3)
+    assert (abs(together.image - lit.image).max(axis=-1) > 1e-3).mean() > 0.03
+    assert np.mean(differ) < 1e-4
 
 
 @pytest.mark.parametrize("room", [GREY, None])
