@@ -7,8 +7,10 @@ told of it. The wheel `karellen-llvm-core`, a dependency on Linux x86-64, brings
 
 import ctypes
 import ctypes.util
+import glob
 import importlib.metadata
 import os
+import re
 import sys
 import warnings
 from functools import lru_cache
@@ -71,7 +73,7 @@ def llvm_version(library: str) -> int:
 def find_llvm() -> str | None:
     """Return the first LLVM that works: the user's own choice, the wheel's, the system's."""
     chosen = os.environ.get(LLVM_VARIABLE)
-    candidates = [chosen] if chosen else [*_wheel_libraries(), ctypes.util.find_library("LLVM")]
+    candidates = [chosen] if chosen else [*_wheel_libraries(), *_system_libraries()]
     for library in candidates:
         if library and llvm_version(library) >= OLDEST_LLVM:
             return library
@@ -101,6 +103,20 @@ def _wheel_libraries() -> list[str]:
         return []
     found = [Path(str(f.locate())).resolve() for f in files if f.name.startswith("libLLVM.so")]
     return sorted(str(path) for path in found if path.exists())
+
+
+def _system_libraries() -> list[str]:
+    """Where package managers put LLVM (Debian, Fedora, Homebrew), the newest first."""
+    named = ctypes.util.find_library("LLVM")
+    patterns = (
+        "/usr/lib/*/libLLVM*.so*",
+        "/usr/lib64/libLLVM*.so*",
+        "/usr/lib/llvm*/lib/libLLVM.so",
+    )
+    found = [path for pattern in patterns for path in glob.glob(pattern)]
+    brew = glob.glob("/opt/homebrew/opt/llvm*/lib/libLLVM.dylib")
+    newest = sorted(found + brew, key=lambda p: int((re.findall(r"[0-9]+", p) or ["0"])[-1]))
+    return ([named] if named else []) + newest[::-1]
 
 
 def _cuda_driver() -> bool:

@@ -18,6 +18,7 @@ from scenegen.truth import GroundTruth, visible_pixels
 
 DEFAULT_BATCH = 64
 MAX_BATCH = 4096
+MAX_RAYS = 2**28  # of a wavefront; 8 GiB of pixels
 WINDOW = 4  # batches that may be in the making while the oldest item is still being retried
 
 
@@ -48,6 +49,9 @@ def make_dataset(
     """
     if not 1 <= batch <= MAX_BATCH:
         raise SpecError(f"batch: found {batch}, expected from 1 to {MAX_BATCH}")
+    if batch * spec.height * spec.width > MAX_RAYS:
+        most = MAX_RAYS // (spec.height * spec.width)
+        raise SpecError(f"batch: found {batch}, expected at most {most} images of this size")
     check_writable(Path(path), overwrite)
     variant = select_variant(device)
     attributes = {"creation_command": command, "variant": variant}

@@ -34,7 +34,7 @@ def to_json(record: Any, sort_keys: bool = False) -> str:
 
 
 def normalise(record: Any) -> None:
-    """Turn whole numbers in float fields of a dataclass into floats, and -0.0 into 0.0.
+    """Give fields Python's own types: floats where they should be, tuples for lists, 0.0 for -0.0.
 
     Equal records so have equal JSON. To be called by `__post_init__`.
     """
@@ -42,8 +42,12 @@ def normalise(record: Any) -> None:
         value = getattr(record, name)
         if kind is float:
             object.__setattr__(record, name, float(value) + 0.0)
-        elif typing.get_origin(kind) is tuple and typing.get_args(kind)[0] is float:
-            object.__setattr__(record, name, tuple(float(v) + 0.0 for v in value))
+        elif kind is int or kind is bool:
+            object.__setattr__(record, name, kind(value))
+        elif typing.get_origin(kind) is tuple:
+            element = typing.get_args(kind)[0]
+            zero = "" if element is str else element(0)
+            object.__setattr__(record, name, tuple(element(v) + zero for v in value))
 
 
 def check(ok: bool, name: str, found: object, expected: str) -> None:

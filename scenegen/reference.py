@@ -33,10 +33,14 @@ def render_reference(batch: SceneBatch, cast: Cast) -> GroundTruth:
 
 
 def sample_positions(spp: int) -> NDArray[np.float64]:
-    """Return where in a pixel its colour samples lie, (spp, 2): the centre first, the others by a
-    low-discrepancy sequence that covers a square evenly at any count.
+    """Return where in a pixel its colour samples lie, (spp, 2).
+
+    The centre, if their number is odd, and pairs that mirror each other in it, so that colour never
+    moves against depth; the pairs follow a low-discrepancy sequence, even at any count.
     """
-    return np.asarray((0.5 + np.arange(spp)[:, None] * np.array(SAMPLE_STEPS)) % 1.0)
+    pairs = (0.5 + np.arange(1, spp // 2 + 1)[:, None] * np.array(SAMPLE_STEPS)) % 1.0
+    mirrored = np.stack([pairs, 1.0 - pairs], axis=1).reshape(-1, 2)
+    return np.concatenate([np.full((spp % 2, 2), 0.5), mirrored])
 
 
 def _render_one(batch: SceneBatch, b: int, cast: Cast) -> tuple[Array, Array, Array, Array]:
@@ -45,18 +49,23 @@ def _render_one(batch: SceneBatch, b: int, cast: Cast) -> tuple[Array, Array, Ar
     directions = pixel_directions(spec.height, spec.width, float(batch.fov_y_degrees[b]))
     pixel = 2 * math.tan(math.radians(float(batch.fov_y_degrees[b])) / 2) / spec.height
     origin = world_from_camera[:3, 3]
-    total = np.zeros((spec.height * spec.width, 3))
-    for sample, (x, y) in enumerate(sample_positions(spec.spp)):
+
+    def look(x: float, y: float) -> tuple[Array, Array, Array, Array]:
+        """Return radiance, depth, world normal and object id at (x, y) of every pixel."""
         local = directions + np.array([(x - 0.5) * pixel, (0.5 - y) * pixel, 0.0])
         rays = local.reshape(-1, 3) @ world_from_camera[:3, :3].T
         t, normal, object_id = _closest(batch, b, origin, rays, cast)
         hit = object_id >= 0
         points = origin + np.where(hit, t, 0.0)[:, None] * rays
         radiance = _shade(batch, b, points, normal, object_id, cast)
-        total += np.where(hit[:, None], radiance, batch.background[b])
-        if sample == 0:
-            truth = (np.where(hit, t, np.nan), normal @ world_from_camera[:3, :3], object_id)
-    depth, normals, object_ids = truth
+        radiance = np.where(hit[:, None], radiance, batch.background[b])
+        return radiance, np.where(hit, t, np.nan), normal, object_id
+
+    radiance, depth, world_normals, object_ids = look(0.5, 0.5)
+    total = radiance
+    if spec.spp > 1:
+        total = sum((look(x, y)[0] for x, y in sample_positions(spec.spp)), 0 * radiance)
+    normals = world_normals @ world_from_camera[:3, :3]
     shape = (spec.height, spec.width)
     return (
         encode_image((total / spec.spp).reshape(*shape, 3), spec.image_dtype),
@@ -70,7 +79,7 @@ def _closest(
     batch: SceneBatch, b: int, origin: Array, rays: Array, cast: Cast
 ) -> tuple[Array, Array, Array]:
     """Return ray parameter, world normal and object id of the nearest hits of rays (R, 3)."""
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         walls = np.where(rays < 0, -origin / rays, np.inf)
     axis = walls.argmin(axis=1)
     t = walls.min(axis=1)

@@ -1,5 +1,6 @@
 """HDF5 files that hold rows: written in order, compressed by us, renamed when complete."""
 
+import errno
 import importlib.metadata
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,6 +20,7 @@ from scenegen.new_file import written_beside
 Array = NDArray[Any]
 COMPRESSIONS = ("gzip", "lzf", "none")
 DEFLATE_LEVEL = 1
+CLOSING_SLACK = 8192  # bytes that HDF5 may need on top of what it says it needs
 BLOCK_ROWS = 1024  # rows of the small datasets that are kept and written together
 
 
@@ -113,10 +115,10 @@ class Table:
 def new_file(path: str | Path, overwrite: bool = False) -> Iterator[h5py.File]:
     """Open an HDF5 file to write, under a temporary name as `written_beside` gives it."""
     with written_beside(path, overwrite) as temporary:
-        file = h5py.File(temporary, "w")
+        file = h5py.File(temporary, "w", rdcc_nbytes=0)  # no chunk stays behind unwritten
         try:
             yield file
-            file.flush()  # fails where closing would, but leaves everything in order
+            _check_room_to_close(file, temporary)
             file.close()
         except BaseException:
             # The file is lost. If it is the disk that is full, emptying it first makes room for
@@ -125,6 +127,15 @@ def new_file(path: str | Path, overwrite: bool = False) -> Iterator[h5py.File]:
             with suppress(Exception):
                 file.close()
             raise
+
+
+def _check_room_to_close(file: h5py.File, path: Path) -> None:
+    """Raise OSError where the disk has no room for what HDF5 still has to write."""
+    if not hasattr(os, "statvfs"):
+        return
+    disk, written = os.statvfs(path), os.stat(path).st_blocks * 512
+    if file.id.get_filesize() - written + CLOSING_SLACK > disk.f_bavail * disk.f_frsize:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
 
 def writer_name() -> str:

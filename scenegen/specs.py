@@ -5,6 +5,7 @@ and nothing random. Lengths are in scene units (the room's edge), frames as in `
 """
 
 import hashlib
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
@@ -180,23 +181,18 @@ class DatasetSpec:
         )
         check(1.0 <= self.fov_degrees <= 120.0, "fov", self.fov_degrees, "from 1 to 120 degrees")
         check(
-            1.22 <= self.camera_radius <= 10.0,
-            "camera radius",
-            self.camera_radius,
-            "from 1.22 (just around the room) to 10 scene units",
-        )
-        check(
-            1.22 <= self.light_radius <= 100.0,
-            "light radius",
-            self.light_radius,
-            "from 1.22 (just around the room) to 100 scene units",
-        )
-        check(
             all(0.0 < x < 1.0 for x in self.camera_target),
             "camera target",
             self.camera_target,
             "inside the unit room",
         )
+        corner = math.dist(self.camera_target, (1.0, 1.0, 1.0))
+        for name, radius, most in (
+            ("camera radius", self.camera_radius, 10.0),
+            ("light radius", self.light_radius, 100.0),
+        ):
+            expected = f"from {corner:.3f} (just around the room) to {most:g} scene units"
+            check(corner <= radius <= most, name, radius, expected)
         check(0.0 <= self.light_level <= 100.0, "light level", self.light_level, "from 0 to 100")
         for name, color in (("ambient", self.ambient), ("reflectance", self.reflectance)):
             check(all(0.0 <= c <= 1.0 for c in color), name, color, "channels from 0 to 1")

@@ -104,14 +104,17 @@ def _trace(batch: SceneBatch, scenes: Scenes, cameras: Any) -> list[Any]:
     image = radiance_at(scenes, item, p, n, object_id, spec.shadows)
 
     def add_sample(sample: Any, total: Any) -> tuple[Any, Any]:
-        x, y = (0.5 + mi.Float(sample) * step for step in SAMPLE_STEPS)
-        d = direction(mi.Float(column) + x - dr.floor(x), mi.Float(row) + y - dr.floor(y))
-        _, object_id, p, n = hit(d)
+        """Add the colour at one of `reference.sample_positions`, those besides the centre."""
+        mirrored = (sample & 1) == 1
+        x, y = (0.5 + mi.Float(sample // 2 + 1) * step for step in SAMPLE_STEPS)
+        x, y = (dr.select(mirrored, 1 - (f - dr.floor(f)), f - dr.floor(f)) for f in (x, y))
+        _, object_id, p, n = hit(direction(mi.Float(column) + x, mi.Float(row) + y))
         return sample + 1, total + radiance_at(scenes, item, p, n, object_id, spec.shadows)
 
     if spec.spp > 1:
-        more = lambda sample, total: sample < spec.spp  # noqa: E731
-        state = (mi.UInt32(1), image)
+        others = spec.spp // 2 * 2
+        state = (mi.UInt32(0), image if spec.spp % 2 else mi.Vector3f(0))
+        more = lambda sample, total: sample < others  # noqa: E731
         _, total = dr.while_loop(state, more, add_sample, mode="symbolic")
         image = total / spec.spp
     if spec.image_dtype == "uint8":

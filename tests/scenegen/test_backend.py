@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -60,6 +61,7 @@ def forgetful(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """What was found is remembered for the process: forget it before and after."""
     monkeypatch.setenv(LLVM_VARIABLE, "")  # so that it is restored, whatever is written to it
     monkeypatch.delenv(LLVM_VARIABLE)
+    monkeypatch.delitem(sys.modules, "drjit", raising=False)  # other tests may have imported it
     for remembered in (backend._point_to_llvm, backend._warn_once):
         remembered.cache_clear()
     yield
@@ -115,7 +117,7 @@ def test_the_order_is_own_choice_then_wheel_then_system(monkeypatch: pytest.Monk
     versions = {"own": 18, "wheel": 23, "system": 17, "old": 14}
     monkeypatch.setattr(backend, "llvm_version", lambda library: versions[library])
     monkeypatch.setattr(backend, "_wheel_libraries", lambda: ["wheel"])
-    monkeypatch.setattr(ctypes.util, "find_library", lambda name: "system")
+    monkeypatch.setattr(backend, "_system_libraries", lambda: ["system"])
     assert find_llvm() == "wheel"
     monkeypatch.setattr(backend, "_wheel_libraries", lambda: ["old"])
     assert find_llvm() == "system"
@@ -172,3 +174,17 @@ def test_rendering_goes_on_without_llvm_and_says_so_once(library: str) -> None:
     assert variant == "scalar_rgb"
     assert len(messages) == 1
     assert messages[0].startswith("SlowFallbackWarning: no usable LLVM found")
+
+
+@pytest.mark.parametrize(("version", "good"), [((15, 0, 7), False), ((23, 1, 4), True)])
+def test_a_drjit_imported_first_keeps_its_llvm(
+    version: tuple[int, int, int], good: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It binds its LLVM at import; to point it elsewhere afterwards would end in an abort."""
+    imported = SimpleNamespace(detail=SimpleNamespace(llvm_version=lambda: version))
+    monkeypatch.setitem(sys.modules, "drjit", imported)
+    if good:
+        assert select_variant("cpu") == "llvm_ad_rgb"
+    else:
+        with pytest.raises(BackendError, match="before drjit is imported"):
+            select_variant("cpu")

@@ -58,6 +58,17 @@ def test_impossible_descriptions_fail_a_check(verdict, damaged, change):
     assert "row 5" in output
 
 
+@pytest.mark.parametrize("view", [1, -1, 2**31 - 1])
+def test_a_view_that_the_scene_does_not_have(verdict, damaged, view):
+    def edit(file):
+        file["view_index"][5] = view
+
+    code, checks, output = verdict(damaged(edit))
+    assert code == 1
+    assert "description" in failed(checks)
+    assert "row 5" in output
+
+
 @pytest.mark.parametrize("name", ["image", "depth", "normal", "object_id"])
 def test_a_damaged_chunk_fails_a_check_that_names_it(verdict, damaged, name):
     def edit(file):
