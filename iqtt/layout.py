@@ -1,17 +1,15 @@
 """The HDF5 layout of question files: the released 3D-IQTT v2 layout, and a group of our own."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.polycube import MAX_CUBES, canonical, canonical_class, set_ids
 from iqtt.specs import SplitSpec
+from iqtt.views import Question
 from scenegen.row_file import Column, writer_name
 from scenegen.truth import GroundTruth, visible_pixels
-
-if TYPE_CHECKING:
-    from iqtt.split import Question
 
 Array = NDArray[Any]
 FORMAT_NAME = "pix2shape-bench/iqtt"
@@ -94,7 +92,7 @@ def truth_columns(spec: SplitSpec) -> list[Column]:
     return columns
 
 
-def truth_row(spec: SplitSpec, question: "Question", pixels: GroundTruth) -> dict[str, Any]:
+def truth_row(spec: SplitSpec, question: Question, pixels: GroundTruth) -> dict[str, Any]:
     """Return the values of `truth_columns` for one question."""
     shapes = question.shapes.cubes
     count = shapes.shape[1]

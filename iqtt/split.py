@@ -36,7 +36,7 @@ from iqtt.questions import (
     rotation_angle_degrees,
 )
 from iqtt.specs import SplitSpec
-from iqtt.views import View, pack_views
+from iqtt.views import Question, View, pack_views
 from scenegen.backend import select_variant
 from scenegen.errors import PlacementError
 from scenegen.new_file import check_writable
@@ -54,17 +54,6 @@ PROPOSALS_AT_ONCE = 128  # views judged at once, about
 VIEW_ATTEMPTS = 60  # views of one image, before the question gets other shapes
 QUESTION_ATTEMPTS = 50  # shapes of one question
 TURNS = 200  # rotations drawn until one is far enough from the reference's
-
-
-@dataclass(frozen=True, eq=False)
-class Question:
-    """A question ready to render: its shapes, and the reference's and the answers' views."""
-
-    index: int
-    attempt: int
-    shapes: Shapes
-    views: tuple[View, ...]
-    angle_degrees: float
 
 
 @dataclass

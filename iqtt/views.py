@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.polycube import box_centre
+from iqtt.questions import Shapes
 from iqtt.specs import SplitSpec
 from scenegen.packing import SceneBatch
 from scenegen.specs import DatasetSpec
@@ -34,6 +35,17 @@ class View:
     light_position: Array
     light_color: Array
     light_count: int
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """A question ready to render: its shapes, and the reference's and the answers' views."""
+
+    index: int
+    attempt: int
+    shapes: Shapes
+    views: tuple[View, ...]
+    angle_degrees: float
 
 
 def pack_views(spec: SplitSpec, render_spec: DatasetSpec, views: Sequence[View]) -> SceneBatch:

@@ -1,1 +1,1 @@
-"""Scores for predictions."""
+"""Scores: plain array functions, arrays in and numbers out."""

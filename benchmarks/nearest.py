@@ -1,0 +1,132 @@
+"""Milliseconds per pair for nearest neighbours both ways, on rooms and predictions of them.
+
+    OMP_NUM_THREADS=1 PYTHONPATH=. python benchmarks/nearest.py [--sizes 128 256] [--rounds 5]
+
+Ours starts from the depth images; the others are given the points. "error" is the largest
+difference of any method from scipy in double precision.
+"""
+
+import argparse
+import importlib.util
+import os
+import runpy
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.geometry import back_project
+from metrics.image_search import nearest_distances_on_image
+from metrics.points import NearestDistances, nearest_distances
+
+Array = NDArray[np.float64]
+Method = Callable[[Array, Array], NearestDistances]
+FOV = 20.0
+ROOMS = Path(__file__).resolve().parents[1] / "tests" / "metrics" / "conftest.py"
+
+
+def predictions(truth: Array, seed: int) -> Iterator[tuple[str, Array]]:
+    """Named predictions of a true depth image, good ones first."""
+    rng = np.random.default_rng(seed)
+    row, column = np.mgrid[: truth.shape[0], : truth.shape[1]] / truth.shape[0]
+    wave = np.sin(5.0 * column + 1.0) * np.cos(4.0 * row)
+    noise = rng.standard_normal(truth.shape)
+    wild = np.where(rng.random(truth.shape) < 0.01, rng.uniform(2.0, 3.0, truth.shape), truth)
+    yield "good: smooth 0.2%", truth * (1.0 + 0.002 * wave)
+    yield "good: smooth 0.5%", truth * (1.0 + 0.005 * wave)
+    yield "good: smooth 0.5%, 1% pixels wild", wild * (1.0 + 0.005 * wave)
+    yield "good: noise 1%", truth * (1.0 + 0.01 * noise)
+    yield "good: smooth 0.5%, noise 1%", truth * (1.0 + 0.005 * wave) * (1.0 + 0.01 * noise)
+    yield "fair: smooth 2%", truth * (1.0 + 0.02 * wave)
+    yield "bad: flat", np.full_like(truth, np.nanmean(truth))
+    yield "bad: scale 1.1", truth * 1.1
+    yield "bad: scale 0.5", truth * 0.5
+    yield "bad: scale 1000", truth * 1000.0
+    yield "bad: noise 5%", truth * (1.0 + 0.05 * noise)
+    yield "bad: uniform noise", rng.uniform(1.0, 4.0, truth.shape)
+
+
+def installed_methods() -> dict[str, Method]:
+    """The methods to compare with, those that are installed."""
+    methods: dict[str, Method] = {}
+    if importlib.util.find_spec("pykdtree"):
+        methods["pykdtree"] = partial(nearest_distances, backend="pykdtree")
+    methods["scipy"] = partial(nearest_distances, backend="scipy")
+    if importlib.util.find_spec("point_cloud_utils"):
+        methods["pcu"] = _point_cloud_utils
+    if importlib.util.find_spec("open3d"):
+        methods["open3d"] = _open3d
+    return methods
+
+
+def _point_cloud_utils(a: Array, b: Array) -> NearestDistances:
+    import point_cloud_utils
+
+    search = partial(point_cloud_utils.k_nearest_neighbors, k=1, num_threads=0)
+    return NearestDistances(search(a, b)[0].ravel(), search(b, a)[0].ravel())
+
+
+def _open3d(a: Array, b: Array) -> NearestDistances:
+    import open3d
+
+    first, second = (
+        open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points)) for points in (a, b)
+    )
+    return NearestDistances(
+        np.asarray(first.compute_point_cloud_distance(second)),
+        np.asarray(second.compute_point_cloud_distance(first)),
+    )
+
+
+def milliseconds(run: Callable[[], object], rounds: int) -> float:
+    """Median of several timed calls."""
+    times = []
+    for _ in range(rounds):
+        start = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - start)
+    return statistics.median(times) * 1e3
+
+
+def largest_difference(a: NearestDistances, b: NearestDistances) -> float:
+    """The largest difference between two results for one pair of clouds."""
+    return float(max(np.abs(a.forward - b.forward).max(), np.abs(a.reverse - b.reverse).max()))
+
+
+def bench_pair(predicted: Array, truth: Array, rounds: int) -> tuple[list[float], float]:
+    """Milliseconds of ours and of each installed method, and the largest difference from scipy."""
+    inside = np.isfinite(truth)
+    a, b = (back_project(depth, FOV)[inside] for depth in (predicted, truth))
+    runs: list[Callable[[], NearestDistances]] = [
+        partial(nearest_distances_on_image, predicted, truth, FOV),
+        *(partial(method, a, b) for method in installed_methods().values()),
+    ]
+    expected = nearest_distances(a, b, "scipy")
+    error = max(largest_difference(run(), expected) for run in runs)
+    return [milliseconds(run, rounds) for run in runs], error
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sizes", type=int, nargs="+", default=[128, 256])
+    parser.add_argument("--rounds", type=int, default=5)
+    arguments = parser.parse_args()
+    make_room = runpy.run_path(str(ROOMS))["make_room_depth"]
+    print("OMP_NUM_THREADS =", os.environ.get("OMP_NUM_THREADS", "not set"))
+    names = ["ours", *installed_methods()]
+    print(f"{'size  prediction':40s}", *(f"{name:>9s}" for name in names), "    error")
+    for size in arguments.sizes:
+        truth = make_room(1, size)
+        for name, predicted in predictions(truth, seed=1):
+            times, error = bench_pair(predicted, truth, arguments.rounds)
+            cells = " ".join(f"{value:9.2f}" for value in times)
+            print(f"{size:4d}  {name:34s} {cells}   {error:.1e}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
