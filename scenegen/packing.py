@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.errors import SpecError
+from scenegen.records import check
 from scenegen.shapes import rotation_matrix
 from scenegen.specs import DatasetSpec, SceneSpec
 
@@ -63,7 +64,8 @@ class SceneBatch:
 def pack(spec: DatasetSpec, scenes: Sequence[SceneSpec], view_index: int = 0) -> SceneBatch:
     """Gather one view of each scene into arrays.
 
-    Raises SpecError where a scene has more objects or lights, or other shapes, than `spec` allows.
+    Raises SpecError where a scene has more objects or lights, or other shapes, than `spec` allows,
+    or has no such view.
     """
     batch, slots, light_slots = len(scenes), spec.object_slots, spec.light_slots
     objects = [item for scene in scenes for item in scene.objects]
@@ -77,6 +79,9 @@ def pack(spec: DatasetSpec, scenes: Sequence[SceneSpec], view_index: int = 0) ->
         if count.max(initial=0) > most:
             worst = scenes[int(count.argmax())].index
             raise SpecError(f"scene {worst}: found {count.max()} {name}, the spec allows {most}")
+    for scene in scenes:
+        views = f"a view from 0 to {len(scene.cameras) - 1}"
+        check(0 <= view_index < len(scene.cameras), f"scene {scene.index}", view_index, views)
     unknown = {item.shape for item in objects} - set(spec.shapes)
     if unknown:
         raise SpecError(f"scene shapes: found {sorted(unknown)}, the spec has {spec.shapes}")
