@@ -41,12 +41,11 @@ class Camera:
         check(self.position != self.target, "camera", self.position, "a target elsewhere")
 
     @staticmethod
-    def fov_y_from_longer_side(fov_degrees: float, height: int, width: int) -> float:
-        """Return the vertical field of view where the longer image side spans `fov_degrees`."""
-        if height >= width:
-            return fov_degrees
-        half = math.tan(math.radians(fov_degrees) / 2) * height / width
-        return math.degrees(2 * math.atan(half))
+    def fov_y_from_square(fov_degrees: float, height: int, width: int) -> float:
+        """Return the vertical field of view of an image with the diagonal of a square one."""
+        diagonal = math.tan(math.radians(fov_degrees) / 2) * math.sqrt(2)
+        half = diagonal * height / math.hypot(height, width)
+        return fov_degrees if height == width else math.degrees(2 * math.atan(half))
 
     @property
     def world_from_camera(self) -> NDArray[np.float64]:

@@ -114,7 +114,7 @@ class DatasetSpec:
         image_dtype: "uint8" (linear radiance 0..1 as 0..255), "float16" or "float32" (radiance).
         min_visible_pixels: every object shows at least so many pixels in every view.
         allow_cropped: let the image's border cut objects (their centres stay in the image).
-        fov_degrees: field of view across the longer side of the image.
+        fov_degrees: field of view of a square image; others have its diagonal.
         camera_radius: distance from camera to target, scene units.
         camera_target: the fixed point of the room that cameras look at, world.
         light_radius: distance from the target to each light, scene units.
@@ -215,8 +215,8 @@ class DatasetSpec:
 
     @property
     def fov_y_degrees(self) -> float:
-        """Vertical field of view that gives `fov_degrees` across the longer side."""
-        return Camera.fov_y_from_longer_side(self.fov_degrees, self.height, self.width)
+        """Vertical field of view; the diagonal is that of a square image with `fov_degrees`."""
+        return Camera.fov_y_from_square(self.fov_degrees, self.height, self.width)
 
     def to_json(self) -> str:
         """Return the request as one line of JSON with sorted keys."""

@@ -21,6 +21,7 @@ OPTIONS = [
     ("--size", "4x4", "size: found 4x4", "at least 8"),
     ("--size", "999999", "size: found 999999", "at most"),
     ("--size", "4096x4097", "size: found 4096x4097", "at most"),
+    ("--size", "4096", "batch: found 64", "at most 16 images of this size"),
     ("--size", "12xx", "--size", "'12xx'", "HxW"),
     ("--size", "1x2x3", "--size", "'1x2x3'", "HxW"),
     ("--size", "-5", "--size", "'-5'", "HxW"),

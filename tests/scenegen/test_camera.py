@@ -134,11 +134,12 @@ def test_back_projection_keeps_misses_as_nan() -> None:
 
 @settings(deadline=None)
 @given(height=SIDE, width=SIDE, fov=FOV)
-def test_longer_side_spans_the_field_of_view(height: int, width: int, fov: float) -> None:
-    fov_y = Camera.fov_y_from_longer_side(fov, height, width)
+def test_every_image_has_the_diagonal_of_a_square_one(height: int, width: int, fov: float) -> None:
+    fov_y = Camera.fov_y_from_square(fov, height, width)
     half = math.tan(math.radians(fov_y) / 2)
-    longer = half * max(1.0, width / height)
-    assert math.degrees(2 * math.atan(longer)) == pytest.approx(fov, rel=1e-9)
+    diagonal = math.hypot(half, half * width / height)
+    square = math.tan(math.radians(fov) / 2) * math.sqrt(2)
+    assert diagonal == pytest.approx(square, rel=1e-9)
 
 
 def test_transforms_move_points_and_turn_vectors() -> None:

@@ -100,6 +100,12 @@ def test_odd_sizes(tmp_path, height, width):
             assert np.abs(points).min(axis=1).max() < 1e-5
 
 
+@pytest.mark.parametrize(("height", "width"), [(48, 64), (64, 48)])
+def test_defaults_can_be_placed_in_images_that_are_not_square(make_rooms, tmp_path, height, width):
+    with open_rooms(make_rooms(tmp_path / "x.h5", 60, height=height, width=width)) as rooms:
+        assert len(rooms) == 60
+
+
 def test_retries_keep_the_order_and_do_not_depend_on_batches(tmp_path):
     spec = DatasetSpec(height=32, width=32, min_visible_pixels=45, seed=5)
     easy = DatasetSpec(height=32, width=32, min_visible_pixels=3, seed=5)
