@@ -122,7 +122,11 @@ def test_objects_are_in_the_room_on_the_floor_in_the_image_and_disjoint(
     for scene in scenes_of(spec, 10):
         camera = scene.cameras[0]
         camera_from_world = np.linalg.inv(camera.world_from_camera)
-        half = math.tan(math.radians(spec.fov_degrees) / 2) / max(spec.height, spec.width)
+        half = (
+            math.tan(math.radians(spec.fov_degrees) / 2)
+            * math.sqrt(2)
+            / math.hypot(spec.height, spec.width)
+        )
         placed = [world_corners(item) for item in scene.objects]
         for item, corners in zip(scene.objects, placed, strict=True):
             assert corners.min() > -1e-12
@@ -141,7 +145,7 @@ def test_objects_are_in_the_room_on_the_floor_in_the_image_and_disjoint(
 def test_the_room_fills_the_image_from_everywhere_on_the_octant(size: tuple[int, int]) -> None:
     """Rays through the image's borders and inside, from corners, edges and inside the octant."""
     spec = DatasetSpec(height=size[0], width=size[1])
-    half = math.tan(math.radians(spec.fov_degrees) / 2) / max(size)
+    half = math.tan(math.radians(spec.fov_degrees) / 2) * math.sqrt(2) / math.hypot(*size)
     x, y = np.meshgrid(*(np.linspace(-half * side, half * side, 13) for side in size[::-1]))
     directions = np.stack([x, y, -np.ones_like(x)], axis=-1).reshape(-1, 3)
     for height in [*np.linspace(0, 1, 15)[:-1], 1 - 1e-9]:
