@@ -62,7 +62,10 @@ def verify_file(
         wrong = rooms.problems()
         layout = f"{len(rooms)} rows, format {rooms.attributes['format_version']}"
         checks = [Check("layout", not wrong, "; ".join(wrong[:SHOWN]) or layout)]
-        checks += [_row_check(name, broken[name], len(rooms)) for name in _ROW_RULES]
+        rules = dict(_ROW_RULES)
+        if rooms.spec.spp > 1 or rooms.spec.shadows:
+            rules["image"] = "finite, and no darker than ambient light alone"
+        checks += [_row_check(name, rules[name], broken[name], len(rooms)) for name in rules]
         same = digest.hexdigest() == rooms.fingerprint
         checks.append(Check("fingerprint", same, rooms.fingerprint if same else "does not match"))
         rows = np.unique(np.linspace(0, len(rooms) - 1, min(items, len(rooms))).round().astype(int))
@@ -72,6 +75,7 @@ def verify_file(
     return checks
 
 
+_PIXELS = ("image", "depth", "normal", "object_id")
 _ROW_RULES = {
     "description": "the scene's JSON can be read and agrees with the arrays",
     "depth": "finite and positive where something is hit, NaN elsewhere",
@@ -81,28 +85,22 @@ _ROW_RULES = {
 }
 
 
-def _row_check(name: str, problems: list[str], count: int) -> Check:
+def _row_check(name: str, rule: str, problems: list[str], count: int) -> Check:
     if not problems:
-        return Check(name, True, f"{_ROW_RULES[name]} ({count} rows)")
+        return Check(name, True, f"{rule} ({count} rows)")
     more = f" and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
     return Check(name, False, "; ".join(problems[:SHOWN]) + more)
 
 
 def _row_problems(rooms: RoomsFile, i: int) -> Iterable[tuple[str, str]]:
-    unreadable = False
-    for name in ("image", "depth", "normal", "object_id"):
-        try:
-            rooms.read(name, i)
-        except FileFormatError:
-            unreadable = True
-            yield name, f"{name} cannot be read"
-    if unreadable:
-        return
     try:
         room = rooms[i]
         batch = pack(rooms.spec, [room.scene], room.view_index)
     except (SceneGenError, IndexError) as error:
-        yield "description", str(error)
+        unreadable = [name for name in _PIXELS if not _can_read(rooms, name, i)]
+        yield from ((name, f"{name} cannot be read") for name in unreadable)
+        if not unreadable:
+            yield "description", str(error)
         return
     with np.errstate(all="ignore"):  # a damaged number may overflow, and is found all the same
         yield from (("description", p) for p in _description_problems(rooms, room, batch))
@@ -110,6 +108,14 @@ def _row_problems(rooms: RoomsFile, i: int) -> Iterable[tuple[str, str]]:
         yield from (("normal", p) for p in _normal_problems(room))
         yield from (("object_id", p) for p in _object_problems(rooms, room))
         yield from (("image", p) for p in _image_problems(rooms, room, batch))
+
+
+def _can_read(rooms: RoomsFile, name: str, row: int) -> bool:
+    try:
+        rooms.read(name, row)
+    except FileFormatError:
+        return False
+    return True
 
 
 def _description_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable[str]:
@@ -227,8 +233,7 @@ def _rendered_again(rooms: RoomsFile, rows: Array, device: str) -> Check:
         except (FileFormatError, SpecError):
             wrong.append(f"row {i} (cannot be read)")
             continue
-        names = ("image", "depth", "normal", "object_id")
-        pairs = {name: (getattr(room, name), getattr(again, name)[0]) for name in names}
+        pairs = {name: (getattr(room, name), getattr(again, name)[0]) for name in _PIXELS}
         if exact:
             differs = [n for n, (a, b) in pairs.items() if not np.array_equal(a, b, equal_nan=True)]
         else:
