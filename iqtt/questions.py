@@ -24,7 +24,6 @@ from iqtt.shapes import TooFewShapesError
 from iqtt.specs import SPLITS, SplitSpec
 from scenegen.errors import PlacementError
 from scenegen.seeding import Purpose, item_rng
-from scenegen.shapes import rotation_matrix
 
 Array = NDArray[Any]
 Drawn: TypeAlias = tuple[Array, Array]
@@ -33,6 +32,7 @@ KIND_NAMES = ("other", "near", "mirror")
 SHAPE_ATTEMPTS = 400  # references tried for one question
 MOVES = 60  # of one cube, tried for one reference
 TRIALS = 40  # references tried to see whether a kind of question can be asked
+FIRST_LIGHT_COSINE = 0.5  # of the widest angle between the first light and the camera
 DRAWN_CLASSES = 20_000  # of a split, where there are too many cubes to list all classes
 
 
@@ -251,30 +251,39 @@ def rotation_angle_degrees(a: Array, b: Array, symmetric: Array) -> float:
     return math.degrees(math.acos(min(1.0, max(-1.0, (float(traces.max()) - 1) / 2))))
 
 
-def draw_rotation(rng: np.random.Generator) -> Array:
-    """Draw a rotation uniform on SO(3), (3, 3)."""
-    quaternion = rng.standard_normal(4)
-    quaternion /= math.sqrt(quaternion @ quaternion)
-    w, x, y, z = quaternion.tolist()
-    return rotation_matrix((w, x, y, z))
+def draw_rotations(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
+    """Draw rotations uniform on SO(3), (*shape, 3, 3)."""
+    quaternion = rng.standard_normal((4, *shape))
+    w, x, y, z = quaternion / np.sqrt((quaternion * quaternion).sum(axis=0))
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def draw_lights(spec: SplitSpec, rng: np.random.Generator) -> tuple[Array, Array, int]:
-    """Draw light positions and colours, (L, 3) each, and their number: uniform on a sphere around
-    the shape, the first on the camera's half of it, so that no image is a silhouette. Unused slots
-    are zero.
+def draw_lights(
+    spec: SplitSpec, rng: np.random.Generator, images: int
+) -> tuple[Array, Array, Array]:
+    """Draw light positions and colours, (images, L, 3) each, and their numbers, (images,).
+
+    They are uniform on a sphere around the shape; the first one only where it is within 60 degrees
+    of the camera, so that what the camera sees is lit. Unused slots are zero.
     """
-    count = int(rng.integers(spec.lights[0], spec.lights[1] + 1))
-    direction = rng.standard_normal((count, 3))
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    direction[0, 2] = abs(direction[0, 2])
-    color = rng.uniform(0.5, 1.0, (count, 3))
-    distance = spec.camera_distance
+    most, distance = spec.lights[1], spec.light_distance
+    count = rng.integers(spec.lights[0], most, images, endpoint=True)
+    # Uniform in z and in the angle around it is uniform on the sphere, and on its caps.
+    z = rng.uniform(-1.0, 1.0, (images, most))
+    z[:, 0] = FIRST_LIGHT_COSINE + (1 - FIRST_LIGHT_COSINE) * (z[:, 0] + 1) / 2
+    around = rng.uniform(0.0, 2 * math.pi, (images, most))
+    r = np.sqrt(1 - z * z)
+    direction = np.stack([r * np.cos(around), r * np.sin(around), z], axis=2)
+    color = rng.uniform(0.5, 1.0, (images, most, 3))
     level = spec.light_level * distance**2 / count
-    positions, colors = np.zeros((2, spec.lights[1], 3))
-    positions[:count] = distance * direction
-    colors[:count] = color * (level / color.max(axis=1, keepdims=True))
-    return positions, colors, count
+    color *= level[:, None, None] / color.max(axis=2, keepdims=True)
+    used = (np.arange(most) < count[:, None])[..., None]
+    return np.where(used, distance * direction, 0.0), np.where(used, color, 0.0), count
 
 
 _MAKERS = {"other": _other, "near": _near, "mirror": _mirror}

@@ -1,39 +1,38 @@
 """Find a question's shapes and views: every cube of each of its images shows."""
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.polycube import symmetries
+from iqtt.polycube import ROTATIONS, symmetries
 from iqtt.questions import (
-    Drawn,
     Pools,
     Shapes,
     arrange,
     draw_lights,
-    draw_rotation,
+    draw_rotations,
     draw_shapes,
     question_key,
     rotation_angle_degrees,
 )
 from iqtt.specs import SplitSpec
-from iqtt.views import Question, View, pack_views
+from iqtt.views import Question, cube_centres, pack_views
 from scenegen.errors import PlacementError
-from scenegen.renderer import render
+from scenegen.renderer import launch_fields
 from scenegen.seeding import Purpose, item_rng
 from scenegen.truth import visible_pixels
 
 Array = NDArray[Any]
-SHRINK = 4  # of the images that visibility is first judged by
-MARGIN = 1.25  # pixels asked for in them, so that the full image seldom falls short
-PROPOSED = 3  # views of one image judged at once, at least
-PROPOSALS_AT_ONCE = 128  # views judged at once, about
-VIEW_ATTEMPTS = 60  # views of one image, before the question gets other shapes
+SHRINK = 2  # of the images that visibility is first judged by
+MARGIN = 1.5  # times the pixels asked for in them, so that the full image seldom falls short
+VIEWS = 60  # rotations proposed for one image, before the question gets other shapes
+PROPOSED = 2  # views of one image judged at once, at least
+PROPOSALS_AT_ONCE = 256  # views judged at once, about
 QUESTION_ATTEMPTS = 50  # shapes of one question
-TURNS = 200  # rotations drawn until one is far enough from the reference's
 
 
 @dataclass
@@ -42,15 +41,6 @@ class Tally:
 
     proposed: int = 0
     refused: int = 0
-
-
-@dataclass(eq=False)
-class _Draft:
-    index: int
-    attempt: int
-    shapes: Shapes
-    symmetries: Array
-    views: dict[int, View] = field(default_factory=dict)
 
 
 def settle(
@@ -72,14 +62,16 @@ def settle(
     waiting = list(requests)
     while waiting:
         drawn = draw_shapes(spec, pools, split, [(i, attempt) for i, _, attempt in waiting])
-        drafts = _drafts(spec, split, waiting, drawn)
-        _find_views(spec, split, drafts, (0,), tally, device)
-        seen = [draft for draft in drafts if draft.views]
-        _find_views(spec, split, seen, (1, 2, 3), tally, device)
+        shapes = []
+        for (index, place, attempt), one in zip(waiting, drawn, strict=True):
+            rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.ANSWERS, attempt)
+            shapes.append(arrange(one, place, rng))
+        symmetric = _symmetries(shapes)
+        turns = _find_views(spec, split, waiting, shapes, symmetric, tally, device)
         again = []
-        for (index, place, attempt), draft in zip(waiting, drafts, strict=True):
-            if len(draft.views) == 4:
-                done[index] = _question(spec, split, draft)
+        for i, (index, place, attempt) in enumerate(waiting):
+            if np.isfinite(turns[i]).all():
+                done[index] = _lit(spec, split, index, attempt, shapes[i], turns[i], symmetric[i])
             elif attempt + 1 < QUESTION_ATTEMPTS:
                 again.append((index, place, attempt + 1))
             else:
@@ -92,88 +84,132 @@ def settle(
     return [done[index] for index, _, _ in requests]
 
 
-def _drafts(
-    spec: SplitSpec, split: str, requests: Sequence[tuple[int, int, int]], drawn: Sequence[Drawn]
-) -> list[_Draft]:
-    """Put the answers in order, and find the shapes' symmetries, all of one size at once."""
-    drafts: list[_Draft] = []
-    by_size: dict[int, list[int]] = {}
-    for i, ((index, place, attempt), one) in enumerate(zip(requests, drawn, strict=True)):
-        rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.ANSWERS, attempt)
-        drafts.append(_Draft(index, attempt, arrange(one, place, rng), np.empty(0)))
-        by_size.setdefault(one[0].shape[1], []).append(i)
-    for rows in by_size.values():
-        found = symmetries(np.concatenate([drafts[i].shapes.cubes for i in rows]))
-        for i, four in zip(rows, found.reshape(len(rows), 4, -1), strict=True):
-            drafts[i].symmetries = four
-    return drafts
+def _symmetries(shapes: Sequence[Shapes]) -> Array:
+    """Return which of ROTATIONS leave each shape of each question as it is, (Q, 4, 24)."""
+    found = np.zeros((len(shapes), 4, len(ROTATIONS)), bool)
+    sizes = np.array([one.cubes.shape[1] for one in shapes])
+    for size in np.unique(sizes).tolist():
+        rows = np.flatnonzero(sizes == size)
+        cubes = np.concatenate([shapes[i].cubes for i in rows.tolist()])
+        found[rows] = symmetries(cubes).reshape(len(rows), 4, -1)
+    return found
 
 
 def _find_views(
     spec: SplitSpec,
     split: str,
-    drafts: Sequence[_Draft],
-    slots: tuple[int, ...],
+    requests: Sequence[tuple[int, int, int]],
+    shapes: Sequence[Shapes],
+    symmetric: Array,
     tally: Tally,
     device: str,
-) -> None:
-    """Propose views of these images until a small rendering shows every cube of each."""
+) -> Array:
+    """Return rotations under which every cube shows, (Q, 4, 3, 3); NaN where none was found.
+
+    Of the answers' proposals, those too near to the reference's view do not count.
+    """
+    questions, slots = len(shapes), spec.cubes[1]
+    turns = np.empty((questions, 4, VIEWS, 3, 3))
+    for i, (index, _, attempt) in enumerate(requests):
+        rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.VIEW, attempt)
+        turns[i] = draw_rotations(rng, (4, VIEWS))
+    centres = cube_centres([cubes for one in shapes for cubes in one.cubes], slots)
+    centres = centres.reshape(questions, 4, slots, 3)
+    counts = np.array([one.cubes.shape[1] for one in shapes])
+    found = np.full((questions, 4, 3, 3), np.nan)
+
+    def choose(rows: Array, some: slice, allowed: Array) -> None:
+        """Settle these images of these questions, of whose proposals some are allowed."""
+        proposals, images = turns[rows, some], allowed.shape[1]
+        chosen = _first_good(
+            spec,
+            proposals.reshape(-1, VIEWS, 3, 3),
+            allowed.reshape(-1, VIEWS),
+            centres[rows, some].reshape(-1, slots, 3),
+            np.repeat(counts[rows], images),
+            tally,
+            device,
+        ).reshape(-1, images)
+        question, image = np.nonzero(chosen >= 0)
+        best = proposals[question, image, chosen[question, image]]
+        found[rows[question], some.start + image] = best
+
+    everything = np.arange(questions)
+    choose(everything, slice(0, 1), np.ones((questions, 1, VIEWS), bool))
+    rows = np.flatnonzero(np.isfinite(found[:, 0]).all(axis=(1, 2)))
+    far = _far(spec, found[rows, 0], turns[rows, 1:], symmetric[rows, 1:])
+    choose(rows, slice(1, 4), far)
+    return found
+
+
+def _far(spec: SplitSpec, reference: Array, turns: Array, symmetric: Array) -> Array:
+    """Whether each rotation is far enough from the reference's, (Q, 3, VIEWS) bool.
+
+    Args:
+        reference: (Q, 3, 3).
+        turns: of the answers, (Q, 3, VIEWS, 3, 3).
+        symmetric: as `rotation_angle_degrees` takes it, (Q, 3, 24).
+    """
+    relative = np.swapaxes(reference, 1, 2)[:, None, None] @ turns
+    nearest = np.full(turns.shape[:3], -np.inf)
+    for rotation, has in zip(ROTATIONS, np.moveaxis(symmetric, 2, 0), strict=True):
+        trace = (relative[has] * rotation).sum(axis=(-2, -1))
+        nearest[has] = np.maximum(nearest[has], trace)
+    return np.asarray((nearest - 1) / 2 <= math.cos(math.radians(spec.min_angle_degrees)))
+
+
+def _first_good(
+    spec: SplitSpec,
+    turns: Array,
+    allowed: Array,
+    centres: Array,
+    counts: Array,
+    tally: Tally,
+    device: str,
+) -> Array:
+    """Return for each of R images its first allowed proposal that shows every cube, or -1, (R,).
+
+    Args:
+        turns: (R, VIEWS, 3, 3); allowed: (R, VIEWS).
+        centres: (R, slots, 3); counts: (R,).
+    """
     small = spec.render_spec(SHRINK)
     scale = (small.height * small.width) / (spec.height * spec.width)
-    enough = np.ceil(MARGIN * spec.min_cube_pixels * scale)
+    enough = math.ceil(MARGIN * spec.min_cube_pixels * scale)
+    rank = np.cumsum(allowed, axis=1) - 1
+    chosen = np.full(len(turns), -1)
     tried = 0
-    while tried < VIEW_ATTEMPTS:
-        missing = [(d, s) for d in drafts for s in slots if s not in d.views]
-        if not missing:
-            return
-        # The first view that will do is taken, so how many are judged at once changes nothing.
-        number = min(VIEW_ATTEMPTS - tried, max(PROPOSED, PROPOSALS_AT_ONCE // len(missing)))
-        proposals = [
-            (draft, slot, _propose_view(spec, split, draft, slot, tried + k))
-            for draft, slot in missing
-            for k in range(number)
-        ]
-        tried += number
-        batch = pack_views(spec, small, [view for _, _, view in proposals])
-        shown = visible_pixels(render(batch, device).object_id, small.object_slots)
-        for (draft, slot, view), pixels in zip(proposals, shown, strict=True):
-            if slot in draft.views:
-                continue
-            tally.proposed += 1
-            if (pixels[: len(view.cubes)] >= enough).all():
-                draft.views[slot] = view
-            else:
-                tally.refused += 1
+    while (waiting := np.flatnonzero((chosen < 0) & (rank[:, -1] >= tried))).size:
+        # The first that will do is taken, so how many are judged at once changes nothing.
+        upto = tried + max(PROPOSED, PROPOSALS_AT_ONCE // len(waiting))
+        ranks = rank[waiting]
+        row, proposal = np.nonzero(allowed[waiting] & (ranks >= tried) & (ranks < upto))
+        row = waiting[row]
+        batch = pack_views(spec, small, centres[row], counts[row], turns[row, proposal])
+        ids = launch_fields(batch, ("object_id",), device)()["object_id"]
+        shown = visible_pixels(ids, small.object_slots)
+        unused = np.arange(small.object_slots) >= counts[row][:, None]
+        good = ((shown >= enough) | unused).all(axis=1)
+        first_rows, first = np.unique(row[good], return_index=True)
+        chosen[first_rows] = proposal[good][first]
+        tried = upto
+    took = chosen >= 0
+    refused = np.where(took, rank[np.arange(len(rank)), chosen], rank[:, -1] + 1)
+    tally.refused += int(refused.sum())
+    tally.proposed += int(refused.sum() + took.sum())
+    return chosen
 
 
-def _propose_view(spec: SplitSpec, split: str, draft: _Draft, slot: int, attempt: int) -> View:
-    key = question_key(split, draft.index) * 4 + slot
-    rng = item_rng(spec.seed or 0, key, Purpose.VIEW, draft.attempt * VIEW_ATTEMPTS + attempt)
-    cubes = draft.shapes.cubes[slot]
-    rotation = draw_rotation(rng)
-    if slot:
-        reference = draft.views[0].world_from_shape
-        for _ in range(TURNS):
-            angle = rotation_angle_degrees(reference, rotation, draft.symmetries[slot])
-            if angle >= spec.min_angle_degrees:
-                break
-            rotation = draw_rotation(rng)
-    dark = np.zeros((spec.lights[1], 3))  # visibility needs no light
-    return View(cubes, rotation, dark, dark, 0)
-
-
-def _lit(spec: SplitSpec, split: str, draft: _Draft, slot: int) -> View:
-    """Return the view of an image with its lights, drawn apart from its rotation."""
-    key = question_key(split, draft.index) * 4 + slot
-    rng = item_rng(spec.seed or 0, key, Purpose.LIGHTS, draft.attempt)
-    view = draft.views[slot]
-    return View(view.cubes, view.world_from_shape, *draw_lights(spec, rng))
-
-
-def _question(spec: SplitSpec, split: str, draft: _Draft) -> Question:
-    views = tuple(_lit(spec, split, draft, slot) for slot in range(4))
-    right = views[1 + draft.shapes.answer]
-    angle = rotation_angle_degrees(
-        views[0].world_from_shape, right.world_from_shape, draft.symmetries[0]
-    )
-    return Question(draft.index, draft.attempt, draft.shapes, views, angle)
+def _lit(
+    spec: SplitSpec,
+    split: str,
+    index: int,
+    attempt: int,
+    shapes: Shapes,
+    turns: Array,
+    symmetric: Array,
+) -> Question:
+    """Return the question with its lights, which are drawn apart from its rotations."""
+    rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.LIGHTS, attempt)
+    angle = rotation_angle_degrees(turns[0], turns[1 + shapes.answer], symmetric[0])
+    return Question(index, attempt, shapes, turns, *draw_lights(spec, rng, 4), angle)

@@ -35,8 +35,10 @@ class SplitSpec:
         min_angle_degrees: least rotation between the reference's view and any answer's.
         min_cube_pixels: every cube shows at least so many pixels in every image.
         max_radius: of a shape's bounding sphere, cube edges; the camera frames just that sphere.
-        lights: fewest and most point lights; the first one is always on the camera's side.
-        background, ambient, reflectance: RGB; light_level as in `scenegen.specs.DatasetSpec`.
+        lights: fewest and most point lights; the first one is within 60 degrees of the camera.
+        background, ambient, reflectance: RGB. With the light_level, the radiance that all lights
+            together give a white surface that faces them at the origin, the defaults keep every
+            surface darker than the background.
         fov_degrees: across the shorter side of the image.
         with_depth: whether planar depth is stored too.
     """
@@ -54,12 +56,12 @@ class SplitSpec:
     image_dtype: str = "uint8"
     min_angle_degrees: float = 30.0
     min_cube_pixels: int = 12
-    max_radius: float = 4.0
+    max_radius: float = 3.5
     lights: tuple[int, int] = (2, 2)
     background: Vector3 = (1.0, 1.0, 1.0)
     ambient: Vector3 = (0.25, 0.25, 0.25)
     reflectance: Vector3 = (0.8, 0.8, 0.8)
-    light_level: float = 0.8
+    light_level: float = 0.75
     fov_degrees: float = 28.0
     with_depth: bool = False
 
@@ -131,6 +133,13 @@ class SplitSpec:
     def camera_distance(self) -> float:
         """Where the bounding sphere just fits the image, with 2% to spare; cube edges."""
         return 1.02 * self.max_radius / math.sin(math.radians(self.fov_degrees) / 2)
+
+    @property
+    def light_distance(self) -> float:
+        """Of the lights from the origin: far enough that near parts of a shape are hardly brighter;
+        cube edges.
+        """
+        return 2 * self.camera_distance
 
     @property
     def pixels_per_edge(self) -> float:

@@ -19,70 +19,107 @@ CUBE_SCALE = math.sqrt(3) / 2  # the unit box has bounding radius 1, so edge 2 /
 
 
 @dataclass(frozen=True, eq=False)
-class View:
-    """One image of a shape.
+class Question:
+    """A question ready to render: its shapes, how each image turns and lights them.
 
     Attributes:
-        cubes: (n, 3) integers.
-        world_from_shape: rotation about the shape's box centre, which lies at the world's origin,
-            (3, 3).
-        light_position, light_color: (L, 3), world, cube edges; zero in unused slots.
-        light_count: number of lights used.
+        index: of the question in its split.
+        attempt: how many choices of shapes were given up before.
+        shapes: the reference's and the answers'.
+        world_from_shape: rotations about the shapes' box centres, which lie at the world's origin,
+            (4, 3, 3).
+        light_position, light_color: (4, L, 3), world, cube edges; zero in unused slots.
+        light_count: lights of each image, (4,).
+        angle_degrees: smallest rotation from the reference's view to the right answer's.
     """
-
-    cubes: Array
-    world_from_shape: Array
-    light_position: Array
-    light_color: Array
-    light_count: int
-
-
-@dataclass(frozen=True, eq=False)
-class Question:
-    """A question ready to render: its shapes, and the reference's and the answers' views."""
 
     index: int
     attempt: int
     shapes: Shapes
-    views: tuple[View, ...]
+    world_from_shape: Array
+    light_position: Array
+    light_color: Array
+    light_count: Array
     angle_degrees: float
 
 
-def pack_views(spec: SplitSpec, render_spec: DatasetSpec, views: Sequence[View]) -> SceneBatch:
-    """Return a batch with one image for each view; `render_spec` says how large."""
-    batch, slots = len(views), render_spec.object_slots
-    counts = np.array([len(view.cubes) for view in views], np.int32)
+def cube_centres(shapes: Sequence[Array], slots: int) -> Array:
+    """Return where each shape's cubes lie about its box centre, (S, slots, 3), cube edges.
+
+    Args:
+        shapes: (n, 3) integers each; rows of the result beyond a shape's n are zero.
+        slots: the most cubes a shape may have.
+    """
+    counts = np.array([len(cubes) for cubes in shapes])
+    centres = np.zeros((len(shapes), slots, 3))
+    for count in np.unique(counts).tolist():
+        rows = np.flatnonzero(counts == count)
+        cubes = np.stack([shapes[i] for i in rows.tolist()])
+        # A cube's own centre is half an edge from its corner.
+        centres[rows, :count] = cubes + 0.5 - box_centre(cubes)[:, None]
+    return centres
+
+
+def pack_views(
+    spec: SplitSpec,
+    render_spec: DatasetSpec,
+    centres: Array,
+    counts: Array,
+    world_from_shape: Array,
+    lights: tuple[Array, Array, Array] | None = None,
+) -> SceneBatch:
+    """Return a batch with one image for each of V views; `render_spec` says how large.
+
+    Args:
+        centres: of the cubes, as `cube_centres` gives them, (V, slots, 3).
+        counts: cubes of each shape, (V,).
+        world_from_shape: (V, 3, 3).
+        lights: positions and colours, (V, L, 3), and numbers, (V,); None for darkness.
+    """
+    batch, slots = len(centres), render_spec.object_slots
     used = np.arange(slots) < counts[:, None]
-    rotations = np.stack([view.world_from_shape for view in views])
-    centers = np.zeros((batch, slots, 3))
-    # Box centres by number of cubes at once; a cube's own centre is half an edge from its corner.
-    for size in np.unique(counts).tolist():
-        rows = np.flatnonzero(counts == size).tolist()
-        cubes = np.stack([views[i].cubes for i in rows])
-        local = cubes + 0.5 - box_centre(cubes)[:, None]
-        centers[rows, :size] = local @ np.swapaxes(rotations[rows], 1, 2)
     world_from_object = np.zeros((batch, slots, 4, 4))
-    world_from_object[..., :3, :3] = CUBE_SCALE * rotations[:, None]
-    world_from_object[..., :3, 3] = centers
+    world_from_object[..., :3, :3] = CUBE_SCALE * world_from_shape[:, None]
+    world_from_object[..., :3, 3] = centres @ np.swapaxes(world_from_shape, 1, 2)
     world_from_object[..., 3, 3] = 1.0
     world_from_object[~used] = 0.0
     reflectance = np.zeros((batch, 1 + slots, 3))
     reflectance[:, 1:][used] = spec.reflectance
-    camera = spec.camera
+    camera, dark = spec.camera, np.zeros((batch, render_spec.light_slots, 3))
+    position, color, light_count = lights or (dark, dark, np.zeros(batch))
     return SceneBatch(
         spec=render_spec,
         world_from_camera=np.repeat(camera.world_from_camera[None], batch, axis=0),
         fov_y_degrees=np.full(batch, camera.fov_y_degrees),
-        object_count=counts,
-        light_count=np.array([view.light_count for view in views], np.int32),
+        object_count=counts.astype(np.int32),
+        light_count=light_count.astype(np.int32),
         shape=np.where(used, 0, -1).astype(np.int8),
         world_from_object=world_from_object,
         object_scale=np.where(used, CUBE_SCALE, 0.0),
         reflectance=reflectance,
-        light_position=np.stack([view.light_position for view in views]),
-        light_color=np.stack([view.light_color for view in views]),
+        light_position=position,
+        light_color=color,
         ambient=np.tile(spec.ambient, (batch, 1)),
         attenuation=np.tile((0.0, 1.0), (batch, 1)),
         has_room=np.zeros(batch, bool),
         background=np.tile(spec.background, (batch, 1)),
+        blocks=True,
+    )
+
+
+def pack_questions(spec: SplitSpec, questions: Sequence[Question]) -> SceneBatch:
+    """Return a batch with the four images of each question, one question after another."""
+    render_spec = spec.render_spec()
+    shapes = [cubes for question in questions for cubes in question.shapes.cubes]
+    return pack_views(
+        spec,
+        render_spec,
+        cube_centres(shapes, render_spec.object_slots),
+        np.array([len(cubes) for cubes in shapes]),
+        np.concatenate([question.world_from_shape for question in questions]),
+        (
+            np.concatenate([question.light_position for question in questions]),
+            np.concatenate([question.light_color for question in questions]),
+            np.concatenate([question.light_count for question in questions]),
+        ),
     )

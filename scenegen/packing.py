@@ -39,6 +39,9 @@ class SceneBatch:
         has_room: (B,) bool.
         background: radiance of rays that meet nothing, (B, 3).
         attenuation: (k_l, k_q), (B, 2).
+        blocks: whether each image shows boxes only, of one size and orientation, and no room; they
+            are then cast faster, to the same truth within rounding. It is said, not found out, so
+            that an image's bits cannot depend on the rest of its batch.
     """
 
     spec: DatasetSpec
@@ -56,6 +59,7 @@ class SceneBatch:
     attenuation: Array
     has_room: Array
     background: Array
+    blocks: bool = False
 
     def __len__(self) -> int:
         return len(self.fov_y_degrees)

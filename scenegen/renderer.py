@@ -1,6 +1,7 @@
 """Batches of scenes -> images with exact ground truth, on the best backend there is."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import fields
 from functools import cache
 from typing import Any
 
@@ -27,12 +28,25 @@ def launch(batch: SceneBatch, device: str = "auto") -> Callable[[], GroundTruth]
     Between the two calls the caller's thread is free, except on the scalar fallback, which does
     its work in the second.
     """
+    fetch = launch_fields(batch, tuple(field.name for field in fields(GroundTruth)), device)
+    return lambda: GroundTruth(**fetch())
+
+
+def launch_fields(
+    batch: SceneBatch, names: Sequence[str], device: str = "auto"
+) -> Callable[[], dict[str, Array]]:
+    """As `launch`, for some fields of `GroundTruth` by name; the others cost nothing."""
     variant = select_variant(device)
     if variant == "scalar_rgb":
-        return lambda: render_reference(batch, _scalar_cast)
+
+        def fetch() -> dict[str, Array]:
+            truth = render_reference(batch, _scalar_cast)
+            return {name: getattr(truth, name) for name in names}
+
+        return fetch
     from scenegen.wavefront import launch_wavefront  # imports drjit, which no other path needs
 
-    return launch_wavefront(batch, variant)
+    return launch_wavefront(batch, variant, names)
 
 
 @cache

@@ -42,6 +42,7 @@ def decode_image(image: Array) -> Array:
 
 def visible_pixels(object_id: Array, slots: int) -> NDArray[np.int32]:
     """Count the pixels of each object in each image: (B, H, W) -> (B, slots)."""
-    flat = object_id.reshape(len(object_id), -1)
-    counts = [np.count_nonzero(flat == k + 1, axis=1) for k in range(slots)]
-    return np.stack(counts, axis=1).astype(np.int32)
+    counts = np.empty((len(object_id), slots), np.int32)
+    for row, ids in zip(counts, object_id.reshape(len(object_id), -1), strict=True):
+        row[:] = np.bincount(ids + np.intp(1), minlength=slots + 2)[2 : slots + 2]
+    return counts

@@ -1,6 +1,6 @@
 """One Dr.Jit wavefront for all pixels of a batch: upload, launch, fetch."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import drjit as dr
@@ -8,32 +8,36 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.blocks import Blocks, closest_block, upload_blocks
 from scenegen.kernel import Scenes, closest_hit, gather_row, normal_at, radiance_at
 from scenegen.packing import SceneBatch, pixel_size
 from scenegen.reference import SAMPLE_STEPS
-from scenegen.truth import GroundTruth
 from scenegen.unit_scene import unit_scene
 
 Array = NDArray[Any]
 LANES = 32  # rays of an image are padded to a multiple, so that no SIMD packet spans two images
 
 
-def launch_wavefront(batch: SceneBatch, variant: str) -> Callable[[], GroundTruth]:
-    """Start the kernel; the returned function waits for it and returns the pixels."""
+def launch_wavefront(
+    batch: SceneBatch, variant: str, fields: Sequence[str]
+) -> Callable[[], dict[str, Array]]:
+    """Start the kernel; the returned function waits for it and returns the pixels.
+
+    What only other fields need is not computed.
+    """
     scenes, cameras = _upload(batch, variant)
-    results = _trace(batch, scenes, cameras)
-    dr.eval(*results)
+    blocks = upload_blocks(batch) if batch.blocks else None
+    everything = _trace(batch, scenes, cameras, blocks)
+    results = {name: everything[name] for name in fields}
+    dr.eval(*results.values())
     spec, count = batch.spec, len(batch)
 
-    def fetch() -> GroundTruth:
-        def pixels(values: Any, *channels: int) -> Array:
-            rows = values.numpy().reshape(count, -1, *channels)[:, : spec.height * spec.width]
-            return np.ascontiguousarray(rows).reshape(count, spec.height, spec.width, *channels)
+    def pixels(name: str) -> Array:
+        channels = (3,) if name in ("image", "normal") else ()
+        rows = results[name].numpy().reshape(count, -1, *channels)[:, : spec.height * spec.width]
+        return np.ascontiguousarray(rows).reshape(count, spec.height, spec.width, *channels)
 
-        image, depth, normal, object_id = results
-        return GroundTruth(pixels(image, 3), pixels(depth), pixels(normal, 3), pixels(object_id))
-
-    return fetch
+    return lambda: {name: pixels(name) for name in fields}
 
 
 def _upload(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
@@ -78,8 +82,10 @@ def _cast(kind: Any, values: Any) -> Any:
     return kind(values)
 
 
-def _trace(batch: SceneBatch, scenes: Scenes, cameras: Any) -> list[Any]:
-    """Return image, depth, normal and object id of every ray, not yet evaluated."""
+def _trace(
+    batch: SceneBatch, scenes: Scenes, cameras: Any, blocks: Blocks | None
+) -> dict[str, Any]:
+    """Return the fields of `truth.GroundTruth` for every ray, not yet evaluated."""
     spec = batch.spec
     height, width = spec.height, spec.width
     rays = -(-height * width // LANES) * LANES
@@ -96,6 +102,9 @@ def _trace(batch: SceneBatch, scenes: Scenes, cameras: Any) -> list[Any]:
         return right * ((x - width / 2) * camera[12]) + up * ((height / 2 - y) * camera[12]) - back
 
     def hit(d: Any) -> tuple[Any, Any, Any, Any]:
+        if blocks:
+            t, object_id, n = closest_block(blocks, item, origin, d)
+            return t, object_id, origin + dr.select(object_id >= 0, t, 0) * d, n
         t, object_id, triangle, uv = closest_hit(scenes, item, origin, d)
         p = origin + dr.select(object_id >= 0, t, 0) * d
         return t, object_id, p, normal_at(scenes, item, p, d, object_id, triangle, uv)
@@ -122,9 +131,9 @@ def _trace(batch: SceneBatch, scenes: Scenes, cameras: Any) -> list[Any]:
     elif spec.image_dtype == "float16":
         image = _cast(dr.float16_array_t(mi.Vector3f), image)
     normal = mi.Vector3f(dr.dot(n, right), dr.dot(n, up), dr.dot(n, back))
-    return [
-        dr.ravel(image),
-        dr.select(object_id >= 0, t, dr.nan),
-        dr.ravel(normal),
-        _cast(dr.int8_array_t(mi.Float), object_id),
-    ]
+    return {
+        "image": dr.ravel(image),
+        "depth": dr.select(object_id >= 0, t, dr.nan),
+        "normal": dr.ravel(normal),
+        "object_id": _cast(dr.int8_array_t(mi.Float), object_id),
+    }

@@ -70,12 +70,18 @@ def test_without_llvm_the_work_is_done_when_fetched(
     monkeypatch: pytest.MonkeyPatch, scenes: list[SceneSpec]
 ) -> None:
     made: list[SceneBatch] = []
+    truth = render(pack(TINY, scenes))
+
+    def reference(batch: SceneBatch, cast: object) -> GroundTruth:
+        made.append(batch)
+        return truth
+
     monkeypatch.setattr(renderer, "select_variant", lambda device: "scalar_rgb")
-    monkeypatch.setattr(renderer, "render_reference", lambda batch, cast: made.append(batch))
+    monkeypatch.setattr(renderer, "render_reference", reference)
     batch = pack(TINY, scenes)
     fetch = launch(batch)
     assert made == []
-    fetch()
+    assert fetch().image is truth.image
     assert made == [batch]
 
 
