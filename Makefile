@@ -12,8 +12,11 @@ demo: $(VENV)/.runtime
 	$(BIN)/scenegen preview demo/rooms.h5 --out demo/rooms.png
 	$(BIN)/scenegen verify demo/rooms.h5
 	$(BIN)/scenegen info demo/rooms.h5
+	$(BIN)/iqtt make-split --out demo/iqtt --overwrite
+	$(BIN)/iqtt audit demo/iqtt --json demo/audit.json --overwrite
+	$(BIN)/iqtt show demo/iqtt/iqtt-test.h5 --answers --out demo/questions.png
 	@echo
-	@echo "Look at the contact sheet: $(CURDIR)/demo/rooms.png"
+	@echo "Look at the pictures: $(CURDIR)/demo/rooms.png and $(CURDIR)/demo/questions.png"
 
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -q -n $(WORKERS) -m "not slow"
@@ -29,6 +32,7 @@ check: $(VENV)/.dev
 
 bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.render
+	$(BIN)/python -m benchmarks.questions
 
 clean:
 	rm -rf $(VENV) demo build dist *.egg-info

@@ -69,18 +69,14 @@ def cpu_model() -> str:
     return names[0] if names else platform.processor() or platform.machine()
 
 
-def print_table(rows: dict[str, Row]) -> None:
-    """Print the rows as Markdown."""
-    head = ["128x128, depth and normals", "images/s, median", "best", "ms/image", "images", "MiB"]
-    print("| " + " | ".join([*head, "remarks"]) + " |")
-    print("| --- |" + " ---: |" * (len(head) - 1) + " --- |")
+def print_table(rows: dict[str, Row], what: str, notes: str) -> None:
+    """Print the rows as Markdown; `what` heads the first column, `notes` follow the table."""
+    head = [what, "images/s, median", "best", "ms/image", "images", "MiB", "remarks"]
+    print("| " + " | ".join(head) + " |")
+    print("| --- |" + " ---: |" * (len(head) - 2) + " --- |")
     for row in rows.values():
         print("| " + " | ".join(row.cells()) + " |")
-    print(
-        "\nMiB: peak memory of the process. (a) writes no file and makes no ids, its kernels are"
-        "\ncompiled beforehand, and the fastest of three ways to load the objects counts; its"
-        "\ncoarse meshes, about 1,000 triangles, show. (c) evaluates nothing but t and an id."
-    )
+    print(f"\n{notes}")
 
 
 def print_ratios(rows: dict[str, Row]) -> None:

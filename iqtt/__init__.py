@@ -1,1 +1,47 @@
-"""3D-IQTT mental-rotation questions."""
+"""3D-IQTT mental-rotation questions.
+
+Read a file:    `with iqtt.open_questions("iqtt-split/iqtt-val.h5") as q: q[0].images, q[0].answer`
+Train on it:    `iqtt.QuestionsDataset("iqtt-split/iqtt-train.h5", "labeled")`
+Make a split:   `iqtt.make_split("iqtt-split", iqtt.preset_spec("small", seed=1))`
+
+Names are loaded when first used, so that importing the package costs nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from iqtt.question_file import (
+        QuestionRecord,
+        QuestionsDataset,
+        QuestionsFile,
+        open_questions,
+    )
+    from iqtt.specs import SplitSpec, preset_spec
+    from iqtt.split import make_split
+
+_HOME = {
+    "QuestionRecord": "question_file",
+    "QuestionsDataset": "question_file",
+    "QuestionsFile": "question_file",
+    "SplitSpec": "specs",
+    "make_split": "split",
+    "open_questions": "question_file",
+    "preset_spec": "specs",
+}
+
+__all__ = [
+    "QuestionRecord",
+    "QuestionsDataset",
+    "QuestionsFile",
+    "SplitSpec",
+    "make_split",
+    "open_questions",
+    "preset_spec",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'iqtt' has no attribute {name!r}")
+    return getattr(import_module(f"iqtt.{_HOME[name]}"), name)

@@ -1,12 +1,13 @@
 """Which shapes a question shows, from which side, and in what light: all of its randomness.
 
-The three answers are made so that nothing among themselves singles out the right one:
+The three answers are drawn first, and then which of them is right, each with the same chance; so
+nothing among themselves can single it out:
 
 - `other`: three classes drawn alike.
-- `near`: right answer and distractors share all cubes but one, which each has at a place of its
-  own; any two of them differ by one moved cube.
-- `mirror`: a shape, its mirror image, and a near shape, each equally likely to be the right one
-  (else "the odd one out is wrong" would leave two to guess from).
+- `near`: a shape, and two with one cube moved, the same in both; any two of the three differ by
+  that cube's place.
+- `mirror`: a chiral shape, its mirror image, and a near shape. (Were the reference always one of
+  the pair, "the odd one out is wrong" would leave two to guess from.)
 """
 
 import math
@@ -176,36 +177,35 @@ def _near(
     spec: SplitSpec, catalogue: Catalogue, split: int, rngs: Sequence[np.random.Generator]
 ) -> list[Drawn | None]:
     kinds = np.array([-1, 1, 1], np.int8)
-    return [
-        (np.stack([reference, *moved[:2]]), kinds) if len(moved) >= 2 else None
-        for reference, moved in _moved(spec, catalogue, split, rngs)
-    ]
+    made: list[Drawn | None] = []
+    for rng, (shape, moved) in zip(rngs, _moved(spec, catalogue, split, rngs), strict=True):
+        order = rng.permutation(3)
+        made.append((np.stack([shape, *moved])[order], kinds) if len(moved) == 2 else None)
+    return made
 
 
 def _mirror(
     spec: SplitSpec, catalogue: Catalogue, split: int, rngs: Sequence[np.random.Generator]
 ) -> list[Drawn | None]:
-    made: list[Drawn | None] = [None] * len(rngs)
     found = _moved(spec, catalogue, split, rngs)
-    rows = [i for i, (_, moved) in enumerate(found) if moved]
-    if not rows:
-        return made
-    # Of (shape, its mirror image, near shape), the right answer is each with the same chance.
-    paired = np.stack([found[i][1][0] if rngs[i].random() < 1 / 3 else found[i][0] for i in rows])
-    for i, chiral, shape in zip(rows, is_chiral(paired), paired, strict=True):
-        if chiral:
-            reference, moved = found[i]
-            made[i] = np.stack([reference, mirror(shape), moved[0]]), np.array([-1, 2, 1], np.int8)
+    chiral = is_chiral(np.stack([shape for shape, _ in found]))
+    made: list[Drawn | None] = []
+    for rng, (shape, moved), differs in zip(rngs, found, chiral, strict=True):
+        order, kinds = _MIRROR_ROLES[rng.integers(3)]
+        if moved and differs:
+            three = np.stack([shape, mirror(shape), moved[0]])[list(order)]
+            made.append((three, np.array(kinds, np.int8)))
+        else:
+            made.append(None)
     return made
 
 
 def _moved(
     spec: SplitSpec, catalogue: Catalogue, split: int, rngs: Sequence[np.random.Generator]
 ) -> list[tuple[Array, list[Array]]]:
-    """For each generator draw a reference and up to two shapes with one of its cubes moved.
+    """For each generator draw a shape of the split, and up to two with one of its cubes moved.
 
-    It is the same cube in both. They belong to the split, and they and the reference are of three
-    classes.
+    It is the same cube in both. They belong to the split too, and all are of different classes.
     """
     pool = catalogue.splits[split]
     references = np.stack([_either_hand(pool[rng.integers(len(pool))], rng) for rng in rngs])
@@ -286,4 +286,11 @@ def draw_lights(
     return np.where(used, distance * direction, 0.0), np.where(used, color, 0.0), count
 
 
+# Of (shape, its mirror image, near shape): which come right, wrong, wrong, and of what kinds. To
+# the near shape, the shape is near, and the mirror image is that of something near.
+_MIRROR_ROLES = (
+    ((0, 1, 2), (-1, 2, 1)),
+    ((1, 0, 2), (-1, 2, 1)),
+    ((2, 0, 1), (-1, 1, 2)),
+)
 _MAKERS = {"other": _other, "near": _near, "mirror": _mirror}

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 from iqtt.polycube import MAX_CUBES
 from iqtt.shapes import Kind
@@ -186,3 +187,22 @@ class SplitSpec:
     def from_json(cls, text: str | bytes) -> "SplitSpec":
         """Read what `to_json` wrote. Raises SpecError on anything else."""
         return from_json(cls, text, "split spec")
+
+
+def preset_spec(preset: str, **settings: Any) -> SplitSpec:
+    """Return a preset's numbers of questions with other settings on top.
+
+    Two settings that are not given follow others: `labeled` keeps the preset's share of `train`,
+    and `min_cube_pixels` the default's share of the image.
+
+    Raises SpecError.
+    """
+    check(preset in PRESETS, "preset", preset, f"one of {', '.join(PRESETS)}")
+    numbers = dict(PRESETS[preset])
+    if "train" in settings:
+        numbers["labeled"] = numbers["labeled"] * settings["train"] // numbers["train"]
+    chosen = {**numbers, **settings}
+    if "min_cube_pixels" not in chosen:
+        side = min(chosen.get("height", 128), chosen.get("width", 128))
+        chosen["min_cube_pixels"] = max(1, round(SplitSpec.min_cube_pixels * (side / 128) ** 2))
+    return SplitSpec(**chosen)

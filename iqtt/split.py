@@ -18,12 +18,12 @@ from iqtt.layout import (
     root_attributes,
     truth_attributes,
     truth_columns,
-    truth_rows,
 )
 from iqtt.questions import Pools, make_pools
 from iqtt.render import DEFAULT_BATCH, Rendered, groups, render_questions
 from iqtt.settle import Tally
 from iqtt.specs import SplitSpec
+from iqtt.truth_rows import truth_rows
 from scenegen.backend import select_variant
 from scenegen.new_file import check_writable
 from scenegen.row_file import Table, new_file

@@ -1,11 +1,13 @@
 """What a rooms file holds, as text for a person."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.layout import FIELDS
+from scenegen.records import changed_settings
 from scenegen.scene_file import RoomsFile
 
 SAMPLED = 64  # rows read for the ranges
@@ -32,10 +34,7 @@ def describe(path: str | Path) -> str:
             "",
             "  spec (* differs from the default)",
         ]
-        changed = rooms.spec.changed_settings()
-        for name, value in vars(rooms.spec).items():
-            shown = ", ".join(map(str, value)) if isinstance(value, tuple) else value
-            lines.append(f"  {'*' if name in changed else ' '} {name:20} {shown}")
+        lines += setting_lines(rooms.spec)
         lines += ["", f"  ranges over {len(rows)} rows; shapes: {shapes}"]
         lines += [f"    {name:10} {low:.4g} to {high:.4g}" for name, (low, high) in ranges.items()]
         lines += ["", f"  {'dataset':27} {'row':14} {'unit':24} {'stored':>9} {'ratio':>6}"]
@@ -43,8 +42,19 @@ def describe(path: str | Path) -> str:
             row = "(" + ", ".join(map(str, field.shape)) + ")"
             unit = field.unit if len(field.unit) <= 24 else field.unit[:21] + "..."
             ratio = f"{raw / stored:.1f}" if stored else "-"
-            lines.append(f"  {field.name:27} {row:14} {unit:24} {_size(stored):>9} {ratio:>6}")
+            lines.append(f"  {field.name:27} {row:14} {unit:24} {size_text(stored):>9} {ratio:>6}")
     return "\n".join(lines)
+
+
+def setting_lines(spec: Any) -> list[str]:
+    """Return a line for each setting, a star before those that differ from the default."""
+    changed = changed_settings(spec)
+    lines = []
+    for name, value in vars(spec).items():
+        shown = ", ".join(map(str, value)) if isinstance(value, tuple) else value
+        star = "*" if name in changed and value is not None else " "
+        lines.append(f"  {star} {name:20} {'not told' if value is None else shown}")
+    return lines
 
 
 def _ranges(rooms: RoomsFile, rows: NDArray[np.int_]) -> tuple[dict[str, tuple[float, float]], str]:
@@ -69,5 +79,6 @@ def _ranges(rooms: RoomsFile, rows: NDArray[np.int_]) -> tuple[dict[str, tuple[f
     return {name: (low[name], high[name]) for name in low}, shapes or "none"
 
 
-def _size(count: int) -> str:
+def size_text(count: int) -> str:
+    """Return a number of bytes in kB or MB."""
     return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"

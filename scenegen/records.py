@@ -33,6 +33,12 @@ def to_json(record: Any, sort_keys: bool = False) -> str:
     return json.dumps(record, default=vars, separators=(",", ":"), sort_keys=sort_keys)
 
 
+def changed_settings(record: Any) -> dict[str, Any]:
+    """Return the fields that differ from the defaults."""
+    found = {f.name: (getattr(record, f.name), f.default) for f in fields(record)}
+    return {name: value for name, (value, default) in found.items() if value != default}
+
+
 def normalise(record: Any) -> None:
     """Give fields Python's own types: floats where they should be, tuples for lists, 0.0 for -0.0.
 

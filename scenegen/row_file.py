@@ -1,4 +1,4 @@
-"""HDF5 files that hold rows: written in order, compressed by us, renamed when complete."""
+"""HDF5 files that hold rows: written in order, compressed by us, renamed when complete; opened."""
 
 import errno
 import importlib.metadata
@@ -14,7 +14,7 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
-from scenegen.errors import SpecError
+from scenegen.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.new_file import written_beside
 
 Array = NDArray[Any]
@@ -127,6 +127,85 @@ def new_file(path: str | Path, overwrite: bool = False) -> Iterator[h5py.File]:
             with suppress(Exception):
                 file.close()
             raise
+
+
+def open_file(path: str | Path, kind: str) -> h5py.File:
+    """Open an HDF5 file to read; `kind` is what it should be, such as "rooms file".
+
+    Raises:
+        OSError: no such file, a folder, or no regular file.
+        FileFormatError: not HDF5, or cut off.
+    """
+    problems = (
+        (not os.path.exists(path), errno.ENOENT, "no such file"),
+        (os.path.isdir(path), errno.EISDIR, f"is a folder; name a {kind}"),
+        (not os.path.isfile(path), errno.EINVAL, "is not a regular file"),
+    )
+    for wrong, number, text in problems:
+        if wrong:
+            raise OSError(number, text, str(path))
+    try:
+        return h5py.File(path, "r")
+    except OSError as error:
+        raise FileFormatError(f"{path}: not a readable HDF5 file ({reason(error)})") from error
+
+
+@contextmanager
+def checking(file: h5py.File) -> Iterator[None]:
+    """Close a file in which something is found wrong.
+
+    What HDF5 raises on damaged files becomes a FileFormatError of one line.
+    """
+    path = file.filename
+    try:
+        yield
+    except SceneGenError:
+        file.close()
+        raise
+    except (OSError, RuntimeError, KeyError, TypeError, ValueError, MemoryError) as error:
+        file.close()
+        raise FileFormatError(f"{path}: damaged ({reason(error)})") from error
+
+
+def check_version(path: str | Path, attributes: Mapping[str, Any], version: str) -> None:
+    """Raise FileFormatError where a file's major format version is not that of `version`."""
+    found, major = str(attributes.get("format_version")), version.split(".", maxsplit=1)[0]
+    if found.split(".", maxsplit=1)[0] != major:
+        raise FileFormatError(
+            f"{path}: format version {found}, this program reads {major}.x;"
+            f" use the release that wrote it ({attributes.get('writer')})"
+        )
+
+
+def column_problems(group: h5py.Group, columns: Sequence[Column], count: int) -> list[str]:
+    """Say which columns are missing or have the wrong shape or type."""
+    problems = []
+    for column in columns:
+        dataset = group.get(column.name)
+        if not isinstance(dataset, h5py.Dataset):
+            problems.append(f"dataset {column.name!r} is missing")
+            continue
+        expected = (count, *column.shape)
+        if dataset.shape != expected:
+            problems.append(f"{column.name}: shape {dataset.shape}, expected {expected}")
+        if column.dtype != "text" and dataset.dtype != np.dtype(column.dtype):
+            problems.append(f"{column.name}: type {dataset.dtype}, expected {column.dtype}")
+        if column.dtype == "text" and h5py.check_string_dtype(dataset.dtype) is None:
+            problems.append(f"{column.name}: type {dataset.dtype}, expected strings")
+    return problems
+
+
+def reason(error: BaseException) -> str:
+    """Return what HDF5's error says in its innermost words, on one line."""
+    text = str(error.args[0]) if error.args else type(error).__name__
+    inside = text[text.find("(") + 1 : text.rfind(")")] if "(" in text else text
+    return inside.split("\n")[0]
+
+
+def and_more(problems: Sequence[str]) -> str:
+    """Return the first problem and how many follow it."""
+    more = f" (and {len(problems) - 1} more problems)" if len(problems) > 1 else ""
+    return problems[0] + more
 
 
 def _check_room_to_close(file: h5py.File, path: Path) -> None:

@@ -1,6 +1,5 @@
 """Read a rooms file: typed records by index, and a map-style dataset for training loops."""
 
-import errno
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,11 +14,11 @@ from numpy.typing import NDArray
 from scenegen.camera import back_project, transform_points
 from scenegen.errors import FileFormatError, SpecError
 from scenegen.layout import FIELDS, FORMAT_NAME, FORMAT_VERSION, columns
+from scenegen.row_file import and_more, check_version, checking, column_problems, open_file, reason
 from scenegen.specs import DatasetSpec, SceneSpec
 from scenegen.truth import decode_image
 
 Array = NDArray[Any]
-MAJOR = FORMAT_VERSION.split(".")[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,26 +74,13 @@ class RoomsFile:
             FileFormatError: not HDF5, not a rooms file, of a newer format, or damaged.
         """
         self.path = Path(path)
-        if not self.path.exists():
-            raise FileNotFoundError(errno.ENOENT, "no such file", str(path))
-        if self.path.is_dir():
-            raise IsADirectoryError(errno.EISDIR, "is a folder; name a rooms file", str(path))
-        try:
-            self._file = h5py.File(self.path, "r")
-        except OSError as error:
-            raise FileFormatError(f"{path}: not a readable HDF5 file ({_reason(error)})") from error
-        try:
+        self._file = open_file(path, "rooms file")
+        with checking(self._file):
             self.attributes: dict[str, Any] = dict(self._file.attrs)
             self.spec = self._check_root()
             problems = layout_problems(self._file, self.spec)
             if problems:
-                raise FileFormatError(f"{path}: {problems[0]}" + _and_more(problems))
-        except (OSError, RuntimeError, KeyError) as error:
-            self._file.close()
-            raise FileFormatError(f"{path}: damaged ({_reason(error)})") from error
-        except FileFormatError:
-            self._file.close()
-            raise
+                raise FileFormatError(f"{path}: {and_more(problems)}")
         self.fingerprint = str(self.attributes["fingerprint"])
         self._count = int(self._file["image"].shape[0])
 
@@ -132,7 +118,7 @@ class RoomsFile:
             return self._file[name][rows]
         except (OSError, KeyError, ValueError) as error:
             where = f"{self.path}: {name}, row {rows}"
-            raise FileFormatError(f"{where}: cannot be read ({_reason(error)})") from error
+            raise FileFormatError(f"{where}: cannot be read ({reason(error)})") from error
 
     def problems(self) -> list[str]:
         """Return what is wrong with the layout, the datasets' own descriptions included."""
@@ -172,12 +158,7 @@ class RoomsFile:
                 f"{self.path}: not a rooms file: found {what}, expected"
                 f" format {FORMAT_NAME!r} (written by scenegen render)"
             )
-        version = str(self.attributes.get("format_version"))
-        if version.split(".", maxsplit=1)[0] != MAJOR:
-            raise FileFormatError(
-                f"{self.path}: format version {version}, this program reads {MAJOR}.x;"
-                f" use the release that wrote it ({self.attributes.get('writer')})"
-            )
+        check_version(self.path, self.attributes, FORMAT_VERSION)
         for name in ("spec", "fingerprint", "writer"):
             if name not in self.attributes:
                 raise FileFormatError(f"{self.path}: root attribute {name!r} is missing")
@@ -189,21 +170,9 @@ class RoomsFile:
 
 def layout_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
     """Say what is missing or has the wrong shape or type."""
-    problems = []
     image = file.get("image")
     count = image.shape[0] if isinstance(image, h5py.Dataset) and image.shape else 0
-    for column in columns(spec):
-        dataset = file.get(column.name)
-        if not isinstance(dataset, h5py.Dataset):
-            problems.append(f"dataset {column.name!r} is missing")
-            continue
-        expected = (count, *column.shape)
-        if dataset.shape != expected:
-            problems.append(f"{column.name}: shape {dataset.shape}, expected {expected}")
-        if column.dtype != "text" and dataset.dtype != np.dtype(column.dtype):
-            problems.append(f"{column.name}: type {dataset.dtype}, expected {column.dtype}")
-        if column.dtype == "text" and h5py.check_string_dtype(dataset.dtype) is None:
-            problems.append(f"{column.name}: type {dataset.dtype}, expected strings")
+    problems = column_problems(file, columns(spec), count)
     told = file.attrs.get("count")
     if not problems and (count == 0 or not np.array_equal(count, told)):
         problems.append(f"found {count} rows, the attribute 'count' says {told}, expected over 0")
@@ -256,13 +225,3 @@ class RoomsDataset:
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_open": None}
-
-
-def _reason(error: BaseException) -> str:
-    text = str(error.args[0]) if error.args else type(error).__name__
-    inside = text[text.find("(") + 1 : text.rfind(")")] if "(" in text else text
-    return inside.split("\n")[0]
-
-
-def _and_more(problems: list[str]) -> str:
-    return f" (and {len(problems) - 1} more problems)" if len(problems) > 1 else ""

@@ -7,8 +7,8 @@ and nothing random. Lengths are in scene units (the room's edge), frames as in `
 import hashlib
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
-from typing import Any, Literal, get_args
+from dataclasses import dataclass
+from typing import Literal, get_args
 
 from scenegen.camera import Camera, Vector3
 from scenegen.records import check, check_range, from_json, normalise, to_json
@@ -226,14 +226,6 @@ class DatasetSpec:
     def from_json(cls, text: str) -> "DatasetSpec":
         """Read what `to_json` wrote. Raises SpecError on anything else."""
         return from_json(cls, text, "dataset spec")
-
-    def changed_settings(self) -> dict[str, Any]:
-        """Return the settings that differ from the defaults."""
-        return {
-            f.name: getattr(self, f.name)
-            for f in fields(self)
-            if getattr(self, f.name) != f.default
-        }
 
 
 def fingerprint(spec: DatasetSpec, scene_lines: Iterable[str]) -> str:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from scenegen.camera import Camera
 from scenegen.errors import SpecError
+from scenegen.records import changed_settings
 from scenegen.sampling import sample_scene
 from scenegen.specs import (
     SHAPE_NAMES,
@@ -178,8 +179,8 @@ def test_what_is_no_scene_is_refused(text: str) -> None:
 
 
 def test_changed_settings_tells_just_those() -> None:
-    assert DatasetSpec().changed_settings() == {}
-    assert DatasetSpec(seed=4, spp=2).changed_settings() == {"seed": 4, "spp": 2}
+    assert changed_settings(DatasetSpec()) == {}
+    assert changed_settings(DatasetSpec(seed=4, spp=2)) == {"seed": 4, "spp": 2}
 
 
 def test_slots_hold_the_most_and_are_never_none() -> None:

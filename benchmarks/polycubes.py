@@ -1,0 +1,122 @@
+"""Jobs of `benchmarks.questions`: our pipeline, its parts, and one Mitsuba render an image."""
+
+import shutil
+import tempfile
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+
+from benchmarks.meshes import Mesh
+from benchmarks.plain_mitsuba import mitsuba_mesh
+from benchmarks.timing import repeat, seconds_of
+from iqtt.questions import make_pools
+from iqtt.render import render_questions
+from iqtt.specs import SplitSpec
+from iqtt.split import make_split
+from iqtt.views import Question, cube_centres, pack_questions
+from scenegen.backend import select_variant
+from scenegen.renderer import launch_fields
+from scenegen.shapes import unit_mesh
+
+
+def end_to_end(questions: int, repeats: int, folder: str) -> dict[str, Any]:
+    """Time make_split from nothing to closed files: all the images in one of them."""
+    spec = SplitSpec(train=questions, labeled=0, val=0, test=0)
+    out = Path(tempfile.mkdtemp(dir=folder)) / "split"
+    make_split(out, replace(spec, train=64))  # compiles the kernels
+    seconds = []
+    for _ in range(repeats):
+        shutil.rmtree(out)
+        seconds.append(seconds_of(lambda: make_split(out, spec)))
+    size = sum(path.stat().st_size for path in out.iterdir())
+    shutil.rmtree(out)
+    note = f"{questions / min(seconds):.0f} questions/s; {size / questions / 1024:.1f} KiB each"
+    return {"seconds": seconds, "images": 4 * questions, "note": note}
+
+
+def cast(questions: int, repeats: int, blocks: bool) -> dict[str, Any]:
+    """Time pack, launch and fetch of colour and ids, by the cubes' kernel or the general one."""
+    spec = SplitSpec()
+    batch = pack_questions(spec, _questions(spec, questions))
+    batch = replace(batch, blocks=blocks)
+    names = ("image", "object_id")
+    seconds = repeat(lambda: launch_fields(batch, names)(), repeats)  # noqa: PLW0108
+    return {"seconds": seconds, "images": 4 * questions, "note": "pixels of one batch"}
+
+
+def per_image(questions: int, repeats: int, variant: str) -> dict[str, Any]:
+    """Time one `mi.load_dict` and one `mi.render` an image, colour only, no file, no refusals.
+
+    The cubes of a shape enter as one mesh, made outside the clock, in the camera's frame.
+    """
+    if variant != "scalar_rgb":
+        select_variant("cpu")
+    spec = SplitSpec()
+    made = _questions(spec, questions)
+    mi.set_variant(variant)
+    mi.set_log_level(mi.LogLevel.Error)
+    images = [_image(spec, question, i) for question in made for i in range(4)]
+    integrator = mi.load_dict({"type": "direct", "emitter_samples": 1, "bsdf_samples": 0})
+    seconds = repeat(partial(_render_all, spec, images, integrator), repeats)
+    return {"seconds": seconds, "images": len(images), "note": "one load_dict, one render each"}
+
+
+def _questions(spec: SplitSpec, count: int) -> list[Question]:
+    pools = make_pools(spec)
+    batches = render_questions(spec, pools, "train", 0, count)
+    return [one.question for batch in batches for one in batch]
+
+
+def _image(spec: SplitSpec, question: Question, i: int) -> dict[str, Any]:
+    """Return mesh, lights and background of an image as `mi.load_dict` wants them."""
+    cubes = question.shapes.cubes[i]
+    box = unit_mesh("box")
+    corners = np.asarray(box.vertices) * np.sqrt(3) / 2
+    centres = cube_centres([cubes], len(cubes))[0]
+    points = (centres[:, None] + corners).reshape(-1, 3) @ question.world_from_shape[i].T
+    faces = np.concatenate([np.asarray(box.faces) + k * len(corners) for k in range(len(cubes))])
+    mesh = Mesh(points, np.zeros_like(points), faces)
+    grey = {"type": "rgb", "value": list(spec.reflectance)}
+    contents: dict[str, Any] = {
+        "mesh": mitsuba_mesh("cubes", mesh, mi.load_dict({"type": "diffuse", "reflectance": grey}))
+    }
+    for j in range(int(question.light_count[i])):
+        power = {"type": "rgb", "value": question.light_color[i, j].tolist()}
+        position = question.light_position[i, j].tolist()
+        contents[f"light{j}"] = {"type": "point", "position": position, "intensity": power}
+    return contents
+
+
+def _render_all(spec: SplitSpec, images: list[dict[str, Any]], integrator: Any) -> None:
+    for number, contents in enumerate(images):
+        scene = mi.load_dict(
+            {"type": "scene", "integrator": integrator, "sensor": _sensor(spec), **contents}
+        )
+        np.array(mi.render(scene, spp=1, seed=number))
+
+
+def _sensor(spec: SplitSpec) -> dict[str, Any]:
+    camera = spec.camera
+    view = mi.ScalarTransform4f().look_at(
+        origin=list(camera.position), target=list(camera.target), up=[0, 1, 0]
+    )
+    film = {
+        "type": "hdrfilm",
+        "width": spec.width,
+        "height": spec.height,
+        "pixel_format": "rgb",
+        "component_format": "float32",
+        "rfilter": {"type": "box"},
+    }
+    return {
+        "type": "perspective",
+        "fov": camera.fov_y_degrees,
+        "fov_axis": "y",
+        "to_world": view,
+        "film": film,
+        "sampler": {"type": "independent", "sample_count": 1},
+    }

@@ -1,0 +1,111 @@
+"""Shared fixtures: a tiny split of ours, damaged copies of its files, and files as released."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+Edit = Callable[[h5py.File], Any]
+
+
+@pytest.fixture(scope="session")
+def split_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the files of a split that no test changes: 6 + 6, 6 and 6 questions, with depth."""
+    from iqtt.specs import SplitSpec
+    from iqtt.split import make_split
+
+    spec = SplitSpec(
+        seed=5,
+        train=12,
+        labeled=6,
+        val=6,
+        test=6,
+        cubes=(5, 7),
+        lights=(1, 2),
+        height=32,
+        width=32,
+        min_cube_pixels=2,
+        with_depth=True,
+    )
+    folder = tmp_path_factory.mktemp("iqtt") / "split"
+    make_split(folder, spec, command="tests")
+    return folder
+
+
+@pytest.fixture
+def damaged(split_folder: Path, tmp_path: Path) -> Callable[..., Path]:
+    """Return a function that copies a file of the split and lets `edit` at the copy."""
+
+    def damage(edit: Edit, name: str = "iqtt-val.h5") -> Path:
+        path = tmp_path / name
+        shutil.copy(split_folder / name, path)
+        with h5py.File(path, "r+") as file:
+            edit(file)
+        return path
+
+    return damage
+
+
+@pytest.fixture
+def failing(split_folder: Path, tmp_path: Path) -> Callable[..., set[str]]:
+    """Let `edit` at a file in a copy of the split; return the audit's proofs that then fail."""
+    from iqtt.audit import audit
+
+    def fail(edit: Edit, name: str = "iqtt-val.h5") -> set[str]:
+        folder = tmp_path / "split"
+        shutil.copytree(split_folder, folder)
+        with h5py.File(folder / name, "r+") as file:
+            edit(file)
+        proofs = audit([folder], probed=0).proofs
+        assert {proof.status for proof in proofs} <= {"ok", "FAIL"}
+        return {proof.name for proof in proofs if proof.status == "FAIL"}
+
+    return fail
+
+
+@pytest.fixture
+def released(tmp_path: Path) -> Callable[..., Path]:
+    """Return a function that writes a file as released, with nothing but images and answers.
+
+    Arguments: for each part its number of questions, and its answers or None. Options: of
+    `create_dataset` for the questions.
+    """
+
+    def write(
+        name: str = "iqtt-val.h5",
+        tables: dict[str, tuple[int, Any]] | None = None,
+        dtype: str = "float32",
+        size: tuple[int, int] = (20, 24),
+        **options: Any,
+    ) -> Path:
+        rng = np.random.default_rng(3)
+        with h5py.File(tmp_path / name, "w") as file:
+            for part, (count, answers) in (tables or {"": (5, np.arange(5) % 3)}).items():
+                images = rng.random((count, 4, *size, 3))
+                values = np.rint(images * 255) if dtype == "uint8" else images
+                group = file.require_group(part or "/")
+                group.create_dataset("questions", data=values.astype(dtype), **options)
+                if answers is not None:
+                    group["answers"] = answers
+        return tmp_path / name
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def check_line() -> Callable[..., str]:
+    """Check that an error is one line that names the file first and has all words; return it."""
+
+    def check(error: pytest.ExceptionInfo[Exception], path: Path, *words: str) -> str:
+        line = str(error.value)
+        assert line.startswith(f"{path}: "), line
+        assert "\n" not in line
+        assert len(line) < 400
+        assert [word for word in words if word not in line] == [], line
+        return line
+
+    return check
