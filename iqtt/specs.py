@@ -68,6 +68,8 @@ class SplitSpec:
 
     def __post_init__(self) -> None:
         normalise(self)
+        if self.seed is not None:
+            object.__setattr__(self, "seed", int(self.seed))
         check(self.seed is None or 0 <= self.seed < 2**63, "seed", self.seed, "0 to 2**63 - 1")
         for name in ("train", "val", "test"):
             count = getattr(self, name)
@@ -111,6 +113,8 @@ class SplitSpec:
             self.min_angle_degrees,
             "from 0 to 90 degrees",
         )
+        check(1.5 <= self.max_radius <= 10, "max radius", self.max_radius, "from 1.5 to 10 edges")
+        check(5 <= self.fov_degrees <= 90, "fov", self.fov_degrees, "from 5 to 90 degrees")
         most = max(1, int(0.2 * self.pixels_per_edge**2))
         check(
             0 <= self.min_cube_pixels <= most,
@@ -118,14 +122,13 @@ class SplitSpec:
             self.min_cube_pixels,
             f"from 0 to {most}, a fifth of a cube's face at {sides}",
         )
-        check(1.5 <= self.max_radius <= 10, "max radius", self.max_radius, "from 1.5 to 10 edges")
         check(
             1 <= self.lights[0] <= self.lights[1] <= MAX_LIGHTS,
             "lights",
             f"{self.lights[0]}-{self.lights[1]}",
             f"a number or a rising range within 1-{MAX_LIGHTS}",
         )
-        check(5 <= self.fov_degrees <= 90, "fov", self.fov_degrees, "from 5 to 90 degrees")
+        check(0 <= self.light_level <= 100, "light level", self.light_level, "from 0 to 100")
         for name in ("background", "ambient", "reflectance"):
             color = getattr(self, name)
             check(all(0 <= c <= 1 for c in color), name, color, "channels from 0 to 1")

@@ -190,7 +190,10 @@ class TableFile:
         return found
 
     def _wrong(self, name: str, rows: int | slice, found: str) -> FileFormatError:
-        where = f"rows {rows.start} to {rows.stop}" if isinstance(rows, slice) else f"row {rows}"
+        where = f"row {rows}"
+        if isinstance(rows, slice):
+            first, end, _ = rows.indices(len(self))
+            where = f"rows {first} to {end - 1}"
         return FileFormatError(f"{self.path}: {name}, {where}: {found}")
 
 

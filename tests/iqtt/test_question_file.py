@@ -9,7 +9,7 @@ import pytest
 
 from iqtt.layout import NO_CUBE
 from iqtt.polycube import canonical, set_ids
-from iqtt.question_file import AnswersFile, QuestionsFile, answers_beside, open_questions, parts
+from iqtt.question_file import QuestionsFile, answers_beside, open_answers, open_questions, parts
 from scenegen.errors import SpecError
 
 TABLES = [  # of the tiny split: file, part, answers told, truth told
@@ -88,13 +88,15 @@ def test_answers_of_another_file(split_folder, damaged, released):
         kinds = [record.truth.distractor_kind.index(None) for record in questions]
         assert kinds == file["answers"][:].tolist()
         assert questions.read("cubes", 2).shape == (4, 7, 3)
-    with AnswersFile(answers) as known:
+    with open_answers(answers) as known:
         assert len(known) == 6
         assert known.fingerprint == questions.fingerprint
         assert known.truth(-1).distractor_kind == known.truth(5).distractor_kind
         assert known.read("answers", slice(1, 4)).tolist() == [
             known.read("answers", i) for i in (1, 2, 3)
         ]
+    with open_answers(split_folder / "iqtt-train.h5") as known:
+        assert (known.part, len(known)) == ("labeled", 6)
     plain = released("iqtt-test.h5", {"": (4, None)})
     with h5py.File(plain.with_name("iqtt-test-answers.h5"), "w") as file:
         file["answers"] = np.array([0, 2, 1, 1])
