@@ -5,19 +5,19 @@ import click
 from scenegen.command_line import PackageCommands
 
 
-@click.group(cls=PackageCommands, package="scenegen")
+@click.group(cls=PackageCommands, packages=("scenegen",))
 @click.version_option(package_name="pix2shape-bench")
 def scenegen() -> None:
     """Rooms holding basic shapes, rendered with exact ground truth."""
 
 
-@click.group(cls=PackageCommands, package="iqtt")
+@click.group(cls=PackageCommands, packages=("iqtt",))
 @click.version_option(package_name="pix2shape-bench")
 def iqtt() -> None:
     """3D-IQTT mental-rotation questions, made so that nothing but the shapes tells the answer."""
 
 
-@click.group(cls=PackageCommands, package="metrics")
+@click.group(cls=PackageCommands, packages=("metrics", "baselines"))
 @click.version_option(package_name="pix2shape-bench")
 def bench() -> None:
-    """Scores for predictions (no commands yet)."""
+    """Scores for the predictions of any model, which meets us through one file."""

@@ -13,14 +13,14 @@ MOST_ITEMS = 1_000_000  # of a range; keeps 0-99999999999 from eating the memory
 
 
 class PackageCommands(click.Group):
-    """The commands of a package, imported from its `commands` module when first asked for.
+    """The commands of some packages, imported from their `commands` modules when first asked for.
 
     What went wrong for a user is shown as one line, and ends with exit code 2.
     """
 
-    def __init__(self, *arguments: Any, package: str, **attributes: Any) -> None:
+    def __init__(self, *arguments: Any, packages: tuple[str, ...], **attributes: Any) -> None:
         super().__init__(*arguments, **attributes)
-        self.package = package
+        self.packages = packages
 
     def list_commands(self, _ctx: click.Context) -> list[str]:
         """Return the names of the commands."""
@@ -45,9 +45,9 @@ class PackageCommands(click.Group):
                 raise
             raise _failure(str(error)) from error
 
-    def _loaded(self) -> tuple[Any, ...]:
-        commands: tuple[Any, ...] = importlib.import_module(f"{self.package}.commands").COMMANDS
-        return commands
+    def _loaded(self) -> list[Any]:
+        modules = [importlib.import_module(f"{name}.commands") for name in self.packages]
+        return [command for module in modules for command in module.COMMANDS]
 
 
 class UserError(click.ClickException):

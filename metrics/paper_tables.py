@@ -1,0 +1,187 @@
+"""The figures of the Pix2Shape paper, Tables 1 to 4: as reported, on the authors' data.
+
+Rajeswar, Mannan, Golemo, Parent-Lévesque, Vazquez, Nowrouzezahrai, Courville: Pix2Shape: Towards
+Unsupervised Learning of 3D Scenes from Images using a View-based Representation. IJCV 2020,
+https://doi.org/10.1007/s11263-020-01322-1. Every figure is kept as it is printed.
+
+They were measured on other images and questions than any test set made here, and the paper states
+no unit of length, so no score made here ranks with them.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+SOURCE = "Pix2Shape (IJCV 2020, doi:10.1007/s11263-020-01322-1)"
+REPORTED = "as reported, on the authors' data"
+DEPTH_UNIT = "not stated"
+SHARE_UNIT = "fraction of questions"
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One number of the paper.
+
+    Attributes:
+        table: number of its table.
+        method: ours is "Pix2Shape"; the others as the paper names them.
+        data: what it was measured on, as the paper names it.
+        metric: what this benchmark calls the score.
+        text: as printed, without the part after "±".
+        spread: the part after "±" as printed, which the paper does not explain; or empty.
+        view_angle: degrees between the input's and the predicted view; None where not told.
+        labels: labelled questions trained on; None for other tasks.
+    """
+
+    table: int
+    method: str
+    data: str
+    metric: str
+    text: str
+    spread: str = ""
+    view_angle: int | None = None
+    labels: int | None = None
+
+    @property
+    def value(self) -> float:
+        """The number, in `PaperTable.unit`."""
+        return float(self.text)
+
+
+@dataclass(frozen=True)
+class PaperTable:
+    """A table of the paper.
+
+    Attributes:
+        number: as the paper counts.
+        caption: its title and first sentence.
+        unit: of its figures, as the paper states it.
+        remark: what a reader has to know.
+        figures: all numbers, row by row.
+    """
+
+    number: int
+    caption: str
+    unit: str
+    remark: str
+    figures: tuple[Figure, ...]
+
+    @property
+    def source(self) -> str:
+        """Where it is printed, and what its figures are."""
+        return f"{SOURCE}, Table {self.number}: {REPORTED}"
+
+
+_SHAPES, _SHAPENET, _MULTIPLE = "Shape scenes", "ShapeNet scenes", "Multiple-shape scenes"
+_ANGLES = (5, 35, 55, 80)
+
+
+def _table_1() -> Iterator[Figure]:
+    columns = (
+        ("Pix2Shape", _SHAPES),
+        ("Pix2Shape", _SHAPENET),
+        ("PTN", _SHAPES),
+        ("PTN", _SHAPENET),
+    )
+    rows = {
+        "chamfer": "0.103 0.133 0.145 0.181",
+        "hausdorff": "0.191 0.215 0.229 0.254",
+        "mse_depth": "0.038 0.053 0.056 0.103",
+    }
+    for metric, texts in rows.items():
+        for (method, data), text in zip(columns, texts.split(), strict=True):
+            yield Figure(1, method, data, metric, text)
+
+
+def _table_2() -> Iterator[Figure]:
+    rows = (
+        ("Pix2Shape", "hausdorff", "0.156 0.191 0.189 0.202 0.308 0.355 0.329 0.316"),
+        ("Pix2Shape", "chamfer", "0.098 0.112 0.110 0.126 0.141 0.148 0.134 0.108"),
+        ("Pix2Shape", "mse_depth", "0.012 0.021 0.022 0.027 0.070 0.091 0.088 0.083"),
+        ("PTN", "chamfer", "0.143 0.189 0.219 0.202 0.174 0.293 0.334 0.387"),
+        ("PTN", "mse_depth", "0.066 0.112 0.142 0.157 0.083 0.1969 0.1982 0.190"),
+    )
+    columns = [(data, angle) for data in (_SHAPES, _MULTIPLE) for angle in _ANGLES]
+    for method, metric, texts in rows:
+        for (data, angle), text in zip(columns, texts.split(), strict=True):
+            yield Figure(2, method, data, metric, text, view_angle=angle)
+
+
+def _table_3() -> Iterator[Figure]:
+    methods = (
+        "CNN",
+        "Siamese CNN",
+        "Human Evaluation",
+        "Persp. Transf. Nets",
+        "Rezende et al.",
+        "Pix2Shape",
+    )
+    rows = {
+        0: "0.3385 0.3698 0.7329±0.148 0.5344 0.5202 0.5519±0.013",
+        200: "0.3350 0.3610 - 0.6011 0.6155 0.6312±0.031",
+        1000: "0.3392 0.3701 - 0.6645 0.7001 0.7012±0.021",
+    }
+    for labels, texts in rows.items():
+        for method, printed in zip(methods, texts.split(), strict=True):
+            text, _, spread = printed.partition("±")
+            if text != "-":
+                yield Figure(3, method, "3D-IQTT", "iqtt_accuracy", text, spread, labels=labels)
+
+
+def _table_4() -> Iterator[Figure]:
+    rows = (
+        ("adversarial loss", "1.927 2.341 2.350 2.281", "0.4024 0.4454"),
+        ("reconstruction loss", "0.1066 0.1935 0.201 0.1925", "0.3321 0.3789"),
+        ("adversarial and reconstruction loss", "0.1120 0.1522 0.1483 0.1433", "0.4224 0.4921"),
+        ("reconstruction and mutual information loss", "", "0.4943 0.6272"),
+        ("all three losses", "", "0.5526 0.7020"),
+    )
+    for losses, chamfers, accuracies in rows:
+        method = f"Pix2Shape, {losses}"
+        for angle, text in zip((0, *_ANGLES[1:]), chamfers.split(), strict=False):
+            yield Figure(4, method, _SHAPENET, "chamfer", text, view_angle=angle)
+        for labels, text in zip((0, 1000), accuracies.split(), strict=True):
+            yield Figure(4, method, "3D-IQTT", "iqtt_accuracy", text, labels=labels)
+
+
+def _table(
+    number: int, caption: str, unit: str, remark: str, figures: Iterator[Figure]
+) -> PaperTable:
+    return PaperTable(number, caption, unit, remark, tuple(figures))
+
+
+TABLES: Sequence[PaperTable] = (
+    _table(
+        1,
+        "Scene reconstruction results. Evaluation of Pix2Shape on scene reconstruction with Chamfer"
+        " distance and Hausdorff metric on 2.5D surfels and MSE on the depth maps.",
+        DEPTH_UNIT,
+        "PTN: Perspective Transformer Nets.",
+        _table_1(),
+    ),
+    _table(
+        2,
+        "View point reconstruction. Quantitative evaluation of scene reconstruction for unseen"
+        " views by extrapolating the view angle from 0° (original) to 80°.",
+        DEPTH_UNIT,
+        "PTN: Perspective Transformer Nets, for which no HD is printed. The text calls the"
+        " multiple-shape scenes ShapeNet scenes.",
+        _table_2(),
+    ),
+    _table(
+        3,
+        "3D-IQTT results. Evaluation on the 3D-IQTT task of our model, two CNN-based baselines,"
+        " Perspective Transformer Nets and Rezende et al.",
+        SHARE_UNIT,
+        "Chance is 1/3. What ± stands for is not stated. People answered 20 questions each.",
+        _table_3(),
+    ),
+    _table(
+        4,
+        "Loss analysis. Ablation study of the different losses used to train our model on both"
+        " reconstruction task and 3D-IQTT task.",
+        f"{DEPTH_UNIT} (Chamfer), {SHARE_UNIT} (3D-IQTT)",
+        "The head names both losses L_ALI; the second is the reconstruction loss. All three losses"
+        " give 0.5526 and 0.7020 here, 0.5519 and 0.7012 in Table 3.",
+        _table_4(),
+    ),
+)
