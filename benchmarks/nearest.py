@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.geometry import back_project
 from metrics.image_search import nearest_distances_on_image
 from metrics.points import NearestDistances, nearest_distances
+from scenegen.camera import back_project
 
 Array = NDArray[np.float64]
 Method = Callable[[Array, Array], NearestDistances]

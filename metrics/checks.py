@@ -72,3 +72,9 @@ def require_depth_pair(
     require_finite(predicted, "predicted depth", inside)
     require_finite(true, "true depth", inside)
     return predicted, true, inside
+
+
+def require_fov(fov_y_degrees: float) -> None:
+    """Raise ValueError unless this is a field of view of a pinhole camera."""
+    if not 0.0 < fov_y_degrees < 180.0:
+        raise ValueError(f"fov_y_degrees must lie between 0 and 180, got {fov_y_degrees}")

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.checks import require_depth_pair
-from metrics.geometry import image_plane, pixel_pitch
+from metrics.checks import require_depth_pair, require_fov
 from metrics.points import NearestDistances, query_nearest
+from scenegen.camera import pixel_directions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -55,6 +55,7 @@ def nearest_distances_on_image(
     empty mask.
     """
     predicted, true, inside = require_depth_pair(predicted_depth, true_depth, mask)
+    require_fov(fov_y_degrees)
     if inside.ndim != 2:
         raise ValueError(f"depth must have shape (H, W), got {inside.shape}")
     grid = _Grid(inside)
@@ -102,8 +103,8 @@ class _Grid:
 def _lay_out_clouds(grid: _Grid, predicted: Array, true: Array, fov_y_degrees: float) -> Array:
     """Prediction and truth back-projected: (2, 3, size)."""
     height, width = grid.inside.shape
-    x, y = image_plane(height, width, fov_y_degrees)
-    slopes = (x, y[:, None], np.full((1, 1), -1.0))
+    rays = pixel_directions(height, width, fov_y_degrees)
+    slopes = (rays[:1, :, 0], rays[:, :1, 1], rays[:1, :1, 2])
     clouds = np.empty((2, 3, grid.size))
     for cloud, depth, nowhere in zip(clouds, (predicted, true), (_NOWHERE, -_NOWHERE), strict=True):
         cloud[...] = nowhere
@@ -122,7 +123,7 @@ def _rings_per_distance(grid: _Grid, z: Array, fov_y_degrees: float) -> Array:
     no ring settles it.
     """
     shape = grid.inside.shape
-    pitch = pixel_pitch(shape[0], fov_y_degrees)
+    pitch = 2.0 * math.tan(math.radians(fov_y_degrees) / 2.0) / shape[0]  # of pixels, at depth 1
     edge = (max(shape) - 1) / 2.0 * pitch
     bound = pitch / math.sqrt(1.0 + edge * edge) * _BOUND_MARGIN
     per_ring: Array = (1.0 / bound) / np.maximum(np.abs(z), 1e-100)

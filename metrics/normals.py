@@ -9,8 +9,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.checks import EmptyError, as_float64, require_finite, require_mask
-from metrics.geometry import back_project
+from metrics.checks import EmptyError, as_float64, require_finite, require_fov, require_mask
+from scenegen.camera import back_project
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -97,6 +97,7 @@ def normals_from_depth(
         raise ValueError(f"depth must have shape (H, W), got {planar.shape}")
     inside = require_mask(np.isfinite(planar) if mask is None else mask, planar.shape)
     require_finite(planar, "depth", inside)
+    require_fov(fov_y_degrees)
     rays = np.moveaxis(back_project(np.ones(planar.shape), fov_y_degrees), -1, 0)
     rays = rays / np.linalg.norm(rays, axis=0)
     points = np.moveaxis(back_project(np.where(inside, planar, 1.0), fov_y_degrees), -1, 0)

@@ -81,7 +81,7 @@ def number(value: float, like: float | None = None) -> str:
     scale = abs(value if like is None or like == 0.0 else like)
     if value == 0.0 and scale == 0.0:
         return "0"
-    if not 1e-5 <= scale < 1e6:
+    if not 1e-5 <= scale < 1e6 or abs(value) >= 1e6:
         return f"{value:.{DIGITS}g}"
     decimals = min(max(DIGITS - 1 - math.floor(math.log10(scale)), 0), 8)
     text = f"{value:.{decimals}f}"

@@ -85,10 +85,14 @@ def pixel_directions(height: int, width: int, fov_y_degrees: float) -> NDArray[n
 
 
 def back_project(depth: Array, fov_y_degrees: float) -> NDArray[np.float64]:
-    """Return the surfel positions of a planar depth map, camera frame: (H, W) -> (H, W, 3)."""
+    """Return the surfel positions of a planar depth map, camera frame: (H, W) -> (H, W, 3).
+
+    NaN where the depth is not finite.
+    """
     height, width = depth.shape
     directions = pixel_directions(height, width, fov_y_degrees)
-    return np.asarray(directions * np.asarray(depth)[..., None])
+    known = np.where(np.isfinite(depth), depth, np.nan)  # infinity times 0 would warn
+    return np.asarray(directions * known[..., None])
 
 
 def transform_points(matrix: Array, points: Array) -> NDArray[np.float64]:

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from metrics import image_search
 from metrics.checks import EmptyError, NonFiniteError
-from metrics.geometry import back_project
 from metrics.image_search import nearest_distances_on_image
 from metrics.points import nearest_distances
+from scenegen.camera import back_project
 
 
 def assert_exact(predicted, true, fov=20.0, mask=None):

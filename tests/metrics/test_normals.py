@@ -7,16 +7,15 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from metrics.checks import EmptyError, NonFiniteError
-from metrics.geometry import back_project, image_plane
 from metrics.normals import angular_errors_degrees, normal_scores, normals_from_depth
+from scenegen.camera import back_project, pixel_directions
 
 FOV = 20.0
 
 
 def plane_depth(normal, distance, shape=(24, 32), fov=FOV):
     """Planar depth of the plane normal . point = -distance."""
-    x, y = image_plane(*shape, fov)
-    return -distance / (normal[0] * x + normal[1] * y[:, None] - normal[2])
+    return -distance / (pixel_directions(*shape, fov) @ np.asarray(normal))
 
 
 def unit(vector):

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from metrics import points
 from metrics.checks import EmptyError, NonFiniteError
-from metrics.geometry import back_project
 from metrics.points import NearestDistances, nearest_distances, point_scores
+from scenegen.camera import back_project
 
 SEEDS = st.integers(0, 2**32 - 1)
 
