@@ -65,6 +65,12 @@ def inspect(file: h5py.File) -> Inspection:
     return result
 
 
+def as_doubles(values: NDArray[Any]) -> NDArray[np.float64]:
+    """Stored floats in double precision; NaN of any make stays NaN, without a warning."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return values.astype(np.float64)
+
+
 def id_problems(ids: Ids, name: str) -> list[Problem]:
     """Say which ids (M,) are negative or come twice; and that there are none."""
     if len(ids) == 0:
@@ -163,7 +169,7 @@ def _read_scores(item: h5py.Dataset, ids: Ids) -> tuple[Ids, list[Problem]]:
     answers, problems = np.empty(len(ids), np.int64), []
     for start in range(0, len(ids), BLOCK_ROWS):
         rows = slice(start, start + BLOCK_ROWS)
-        scores = item[rows].astype(np.float64)
+        scores = as_doubles(item[rows])
         wrong = score_problems(scores, ids[rows])
         problems += wrong
         if not wrong:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.answers_json import looks_like_json, read_answers
-from metrics.prediction_checks import Ids, Inspection, inspect
+from metrics.prediction_checks import Ids, Inspection, as_doubles, inspect
 from metrics.prediction_texts import READ_ERRORS
 from metrics.problems import Problem
 from scenegen.errors import FileFormatError
@@ -122,7 +122,7 @@ class RoomPredictions(Predictions):
 
     def _read(self, name: str, index: int) -> Array:
         try:
-            return np.asarray(self._datasets[name][index], dtype=np.float64)
+            return as_doubles(self._datasets[name][index])
         except READ_ERRORS as error:
             where = f"{self.path}: {name}, row {self.rows[index]}"
             raise FileFormatError(f"{where}: cannot be read ({reason(error)})") from error
@@ -157,7 +157,7 @@ class QuestionPredictions(Predictions):
         if self._scores is None:
             return None
         try:
-            return np.asarray(self._scores[()], dtype=np.float64)
+            return as_doubles(self._scores[()])
         except READ_ERRORS as error:
             text = f"{self.path}: scores: cannot be read ({reason(error)})"
             raise FileFormatError(text) from error

@@ -32,7 +32,11 @@ def table(scores: ScoreFile) -> str:
 
 def markdown_report(scores: ScoreFile) -> str:
     """Return the same as Markdown."""
-    lines = [_title(scores, markdown), "", *piped([HEAD, *_rows(scores, markdown)])]
+    lines = [
+        _title(scores, lambda text: markdown(plain(text))),
+        "",
+        *piped([HEAD, *_rows(scores, markdown)]),
+    ]
     for title, rows in _group_tables(scores, markdown):
         lines += ["", f"**{title}**", "", *piped(rows)]
     return "\n".join([*lines, "", *(f"- {markdown(note)}" for note in _notes(scores))])

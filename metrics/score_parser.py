@@ -132,7 +132,7 @@ def _items(node: Node, task: str, runs: int) -> dict[str, NDArray[Any]]:
     columns: dict[str, NDArray[Any]] = {}
     for name, column in node.entries():
         if name in required or name in optional:
-            columns[name] = column.whole_column()
+            columns[name] = column.whole_column(least=0 if name in required else -1)
         else:
             known = _metric(column, name, task)
             columns[name] = column.number_column(0.0, known.largest)

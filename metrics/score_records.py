@@ -116,8 +116,8 @@ class ScoreFile:
         alignment: what the method says it cannot know; "none" for questions.
         metrics: by name, see `metric_names`.
         items: columns of equal length with an entry for each image or question: the integers of
-            `ID_COLUMNS`, maybe those of `OPTIONAL_COLUMNS`, and float64 by name of the metric,
-            means over the runs.
+            `ID_COLUMNS`, maybe those of `OPTIONAL_COLUMNS` (-1 where not known), and float64 by
+            name of the metric, means over the runs.
         by_view_angle: scores by whole degrees between a view and its scene's first one, such as
             "35"; rooms only.
         by_distractor: by kind of wrong answers; questions only, as are the next two.

@@ -104,12 +104,12 @@ class Node:
         """A finite number within limits, or None."""
         return None if self.value is None else self.number(least, most)
 
-    def whole_column(self) -> NDArray[np.int64]:
-        """A list of whole numbers from 0."""
+    def whole_column(self, least: int = 0) -> NDArray[np.int64]:
+        """A list of whole numbers from `least`."""
         values = self._list_of({int})
         for i, value in enumerate(values):
-            if not 0 <= value <= LARGEST_WHOLE:
-                self._member(i).whole()
+            if not least <= value <= LARGEST_WHOLE:
+                self._member(i).whole(least)
         return np.array(values, np.int64)
 
     def number_column(

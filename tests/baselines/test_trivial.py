@@ -1,0 +1,84 @@
+"""Baselines: right where they can be, and learned from the training file alone."""
+
+import h5py
+import numpy as np
+import pytest
+
+from baselines.trivial import empty_room, write_chance, write_room_baseline
+from iqtt.specs import SplitSpec
+from iqtt.split import make_split
+from metrics.scoring import score
+from scenegen.errors import SpecError
+from scenegen.scene_file import RoomsFile
+
+
+def test_an_empty_room_is_the_truth_wherever_no_object_is(rooms_path):
+    with RoomsFile(rooms_path) as rooms:
+        for row in range(len(rooms)):
+            depth, normal = empty_room(rooms, row)
+            room = rooms[row]
+            wall = room.object_id == 0
+            assert np.isfinite(depth).all()
+            assert depth[wall] == pytest.approx(room.depth[wall], rel=1e-5)
+            assert normal[wall] == pytest.approx(room.normal[wall], abs=1e-5)
+            assert (depth[room.object_id > 0] > room.depth[room.object_id > 0] - 1e-4).all()
+
+
+def test_means_come_from_the_training_file(make_rooms, rooms_path, tmp_path):
+    train = make_rooms(tmp_path / "train.h5", 5, seed=77)
+    with h5py.File(train) as file:
+        depths = file["depth"][:]
+    write_room_baseline("constant", rooms_path, tmp_path / "constant.h5", train=train)
+    write_room_baseline("mean-depth", rooms_path, tmp_path / "mean.h5", train=train)
+    with h5py.File(tmp_path / "constant.h5") as file:
+        assert np.unique(file["depth"][:]) == pytest.approx(np.nanmean(depths), rel=1e-6)
+        assert "normal" not in file
+    with h5py.File(tmp_path / "mean.h5") as file:
+        assert file["depth"][3] == pytest.approx(np.nanmean(depths, axis=0), rel=1e-6)
+    assert score([tmp_path / "mean.h5"]).metrics["mse_depth"].value > 1e-4
+
+
+def test_baselines_rank_as_they_should(make_rooms, rooms_path, tmp_path):
+    train = make_rooms(tmp_path / "train.h5", 20, seed=77)
+    chamfer = {}
+    for name in ("oracle", "empty-room", "mean-depth", "constant"):
+        learned = train if name in ("mean-depth", "constant") else None
+        write_room_baseline(name, rooms_path, tmp_path / f"{name}.h5", train=learned)
+        chamfer[name] = score([tmp_path / f"{name}.h5"]).metrics["chamfer"].value
+    assert chamfer["oracle"] == 0
+    assert chamfer["oracle"] < chamfer["empty-room"] < chamfer["mean-depth"] < chamfer["constant"]
+
+
+@pytest.mark.parametrize(
+    ("name", "train", "words"),
+    [
+        ("best", None, "baseline: found 'best'"),
+        ("constant", None, "learns its means from a training file"),
+        ("oracle", "train.h5", "learns nothing"),
+        ("constant", "rooms", "the test file's own rooms"),
+        ("mean-depth", "small.h5", "images of"),
+    ],
+)
+def test_what_would_be_unfair_is_refused(make_rooms, rooms_path, tmp_path, name, train, words):
+    path = rooms_path if train == "rooms" else None
+    if train and path is None:
+        size = 40 if train == "small.h5" else 32
+        path = make_rooms(tmp_path / train, 2, seed=5, height=size, width=size)
+    with pytest.raises(SpecError, match=words):
+        write_room_baseline(name, rooms_path, tmp_path / "x.h5", train=path)
+    assert not (tmp_path / "x.h5").exists()
+
+
+def test_chance_is_a_third_and_the_seed_decides(tmp_path):
+    spec = SplitSpec(train=0, labeled=0, val=0, test=90, height=16, width=16, min_cube_pixels=0)
+    make_split(tmp_path / "split", spec)
+    answers = []
+    for seed in (0, 0, 1):
+        path = tmp_path / "chance.h5"
+        write_chance(tmp_path / "split/iqtt-test.h5", path, seed, overwrite=True)
+        with h5py.File(path) as file:
+            answers.append(file["answer"][:])
+    assert (answers[0] == answers[1]).all()
+    assert (answers[0] != answers[2]).any()
+    found = score([path]).metrics["iqtt_accuracy"]
+    assert found.low < 1 / 3 < found.high
