@@ -11,6 +11,10 @@ class NonFiniteError(ValueError):
     """A NaN, an infinity or an absurdly large magnitude where a number is scored."""
 
 
+class NoDirectionError(ValueError):
+    """A vector of length 0 where a direction is scored."""
+
+
 class EmptyError(ValueError):
     """Nothing to score: an empty cloud, an empty mask, no questions."""
 

@@ -78,7 +78,7 @@ def _shape(images: Sequence[_Image]) -> str | None:
     rivals = _simple_errors(images)
     best, found = np.inf, None
     for text, remedy in _REMEDIES.items():
-        mended = [remedy(image.sample)[image.sample.mask] for image in images]
+        mended = [_mended(image.sample, remedy) for image in images]
         scale = np.median(np.concatenate([m / i.true for m, i in zip(mended, images, strict=True)]))
         errors = np.array([_error(m / scale, i.true) for m, i in zip(mended, images, strict=True)])
         spreads = np.array([image.spread for image in images])
@@ -87,6 +87,12 @@ def _shape(images: Sequence[_Image]) -> str | None:
         if good.mean() >= SHARE and error < best and rivals.any():
             best, found = error, text
     return found
+
+
+def _mended(sample: Sample, remedy: Remedy) -> Array:
+    """The values (N,) that a remedy puts where both depths are finite; infinite for none."""
+    values = remedy(sample)[sample.mask]
+    return np.where(np.isfinite(values), values, np.inf)
 
 
 def _simple_errors(images: Sequence[_Image]) -> Array:

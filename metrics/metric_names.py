@@ -183,7 +183,8 @@ def _derived(metric: Metric) -> Metric:
         metric,
         name=DERIVED + metric.name,
         title=f"{metric.title}, from depth",
-        definition=f"`{metric.name}` of normals derived from the predicted depth.",
+        definition=f"`{metric.name}` of normals derived from the predicted depth, against those"
+        " derived in the same way from the true depth.",
     )
 
 
@@ -244,7 +245,7 @@ def markdown_table() -> str:
         (f"<depth score>{ending}", "as it", "as it", definition)
         for ending, (_, definition) in _ALIGNED.items()
     ]
-    derived = "the same of normals derived from the predicted depth."
+    derived = "the same of normals derived from the predicted and from the true depth."
     rows = [
         *map(_cells, (*_POINTS, *_DEPTH)),
         *forms,

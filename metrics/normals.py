@@ -9,7 +9,14 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.checks import EmptyError, as_float64, require_finite, require_fov, require_mask
+from metrics.checks import (
+    EmptyError,
+    NoDirectionError,
+    as_float64,
+    require_finite,
+    require_fov,
+    require_mask,
+)
 from scenegen.camera import back_project
 
 Array = NDArray[np.float64]
@@ -30,8 +37,8 @@ def angular_errors_degrees(
 
     angle = atan2(|p x t|, p . t), which needs no unit length and is exact for small angles, where
     acos(p . t) loses half of the digits. The mask (...) defaults to where the truth is finite and
-    not zero. Raises NonFiniteError on what is not finite inside the mask, ValueError on a vector of
-    length 0, which has no direction, and EmptyError on an empty mask.
+    not zero. Raises NonFiniteError on what is not finite inside the mask, NoDirectionError on a
+    vector of length 0, and EmptyError on an empty mask.
     """
     p, t = as_float64(predicted, "predicted normals"), as_float64(true, "true normals")
     if t.ndim < 1 or t.shape[-1] != 3 or p.shape != t.shape:
@@ -51,7 +58,8 @@ def _unit(vectors: Array, what: str) -> Array:
     # Dividing by the largest component first keeps the squares from overflowing or vanishing.
     largest = np.abs(vectors).max(axis=-1, keepdims=True)
     if not largest.all():
-        raise ValueError(f"{what}: {np.count_nonzero(largest == 0.0)} vectors have length 0")
+        count = np.count_nonzero(largest == 0.0)
+        raise NoDirectionError(f"{what}: {count} vectors have length 0")
     scaled = vectors / largest
     unit: Array = scaled / np.linalg.norm(scaled, axis=-1, keepdims=True)
     return unit

@@ -18,6 +18,7 @@ from scenegen.specs import MAX_PIXELS
 
 MOST_BYTES = 256 * 2**20  # to be unpacked for one row
 CHUNK_SLOTS = 10_007
+LEAST_CACHE = 1 << 20
 
 
 def open_dataset(
@@ -37,7 +38,11 @@ def open_dataset(
             return None, problems
         item = file[dataset.name]
         problems = _problems(item, dataset, count)
-        return (None, problems) if problems else (_with_cache(item), [])
+        if problems:
+            return None, problems
+        size = _slab_bytes(item)
+        del item  # an open dataset keeps the cache that it has
+        return _open_with_cache(file, dataset.name, size), []
     except READ_ERRORS as error:
         got = f"cannot be opened ({reason(error)})"
         return None, [Problem(dataset.name, "readable", dataset.kind, got)]
@@ -113,13 +118,11 @@ def _slab_bytes(item: h5py.Dataset) -> int:
     return int(item.chunks[0] * math.prod(padded) * item.dtype.itemsize)
 
 
-def _with_cache(item: h5py.Dataset) -> h5py.Dataset:
-    """The dataset, opened so that chunks of many rows are not unpacked anew for each row."""
-    if item.chunks is None or item.chunks[0] == 1:
-        return item
+def _open_with_cache(file: h5py.File, name: str, size: int) -> h5py.Dataset:
+    """Open a dataset so that chunks of many rows are not unpacked anew for each of them."""
     access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
-    access.set_chunk_cache(CHUNK_SLOTS, _slab_bytes(item), 1.0)
-    return h5py.Dataset(h5py.h5d.open(item.file.id, item.name.encode(), access))
+    access.set_chunk_cache(CHUNK_SLOTS, max(size, LEAST_CACHE), 1.0)
+    return h5py.Dataset(h5py.h5d.open(file.id, name.encode(), access))
 
 
 def _type_name(dtype: np.dtype[Any]) -> str:

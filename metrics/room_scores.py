@@ -13,7 +13,7 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.checks import NonFiniteError
+from metrics.checks import NoDirectionError, NonFiniteError
 from metrics.depth import Alignment
 from metrics.item_scores import ALIGNMENTS, NonFinite, TrueView, chamfer_floor, score_view
 from metrics.prediction_file import RoomPredictions, open_predictions
@@ -42,7 +42,8 @@ class RoomScores:
             degrees, (M,).
         scores: by name, (R, M): of each of R runs.
         floor: mean of `item_scores.chamfer_floor` over some rows, scene units.
-        penalised: row numbers in which a run held values that are not finite.
+        penalised: row numbers in which a run held values that are not finite, or normals of
+            length 0.
     """
 
     rows: Array
@@ -88,8 +89,8 @@ def score_rows(
             ", ..." if len(bad) > IDS_SHOWN else ""
         )
         raise ScoringError(
-            f"{bad[first]}, row {first}; {len(bad)} rows hold values that are not finite where the"
-            f" truth is: {shown}. Mend them, or score them at the worst with --non-finite penalise"
+            f"{bad[first]}, row {first}; {len(bad)} rows hold values that cannot be scored:"
+            f" {shown}. Mend them, or score them at the worst with --non-finite penalise"
         )
     names = list(table[0][0])
     scores = {name: np.array([[run[name] for run in row] for row in table]).T for name in names}
@@ -170,7 +171,7 @@ def _score_chunk(
                 depth, normal = file.depth(i), file.normal(i) if file.has_normals else None
                 try:
                     scores = score_view(depth, normal, view, alignments=alignments)
-                except NonFiniteError as error:
+                except (NonFiniteError, NoDirectionError) as error:
                     bad[row] = f"{path}: {error}"
                     scores = score_view(
                         depth, normal, view, alignments=alignments, non_finite="penalise"
