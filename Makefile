@@ -15,8 +15,10 @@ demo: $(VENV)/.runtime
 	$(BIN)/iqtt make-split --out demo/iqtt --overwrite
 	$(BIN)/iqtt audit demo/iqtt --json demo/audit.json --overwrite
 	$(BIN)/iqtt show demo/iqtt/iqtt-test.h5 --answers --out demo/questions.png
+	$(BIN)/bench baseline empty-room --data demo/rooms.h5 --out demo/empty-room.h5 --overwrite
+	$(BIN)/bench score demo/empty-room.h5 --html demo/report.html --overwrite
 	@echo
-	@echo "Look at the pictures: $(CURDIR)/demo/rooms.png and $(CURDIR)/demo/questions.png"
+	@echo "Look at $(CURDIR)/demo: rooms.png, questions.png, report.html"
 
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -q -n $(WORKERS) -m "not slow"
@@ -33,6 +35,7 @@ check: $(VENV)/.dev
 bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.render
 	$(BIN)/python -m benchmarks.questions
+	$(BIN)/python -m benchmarks.nearest
 
 clean:
 	rm -rf $(VENV) demo build dist *.egg-info
