@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt import proofs, shape_proofs, view_proofs
-from iqtt.audit_table import AuditTable, Source, find_tables, read_table
+from iqtt.audit_table import AuditTable, find_tables, read_table
 from iqtt.image_statistics import Statistics
 from iqtt.probes import Evidence, Probe, run_probes
 from iqtt.proofs import Proof
@@ -106,9 +106,9 @@ def audit(
         SpecError: no paths.
     """
     sources = find_tables(paths)
+    measured = _spread([source.count if source.answered else 0 for source in sources], probed)
     tables = [
-        read_table(source, rows, progress)
-        for source, rows in zip(sources, _spread(sources, probed), strict=True)
+        read_table(source, rows, progress) for source, rows in zip(sources, measured, strict=True)
     ]
     told = [table for table in tables if table.truth]
     shapes = dict(zip((t.name for t in told), shape_proofs.compare_shapes(told), strict=True))
@@ -118,9 +118,8 @@ def audit(
     return Audit(tuple(map(_audited, tables, right)), tuple(found), probes)
 
 
-def _spread(sources: Sequence[Source], most: int) -> list[Array]:
-    """Choose rows of all tables, evenly: `most` in all, or all there are."""
-    counts = [source.count for source in sources]
+def _spread(counts: Sequence[int], most: int) -> list[Array]:
+    """Choose rows of tables of so many rows, evenly: `most` in all, or all there are."""
     total = sum(counts)
     rows = np.unique(np.linspace(0, max(total - 1, 0), min(most, total)).astype(np.int64))
     starts = np.cumsum([0, *counts])
@@ -152,7 +151,7 @@ def _prove(
     ]
     if not told:
         return [Proof(name, "skipped", "no shape descriptions") for name in _BY_CUBES] + found
-    sample = _spread([table.source for table in told], CAST)
+    sample = _spread([len(table) for table in told], CAST)
     by_cubes = [
         shape_proofs.whole_shapes(told, shapes),
         shape_proofs.one_right_answer(told, shapes),
@@ -199,8 +198,12 @@ def _mirror_images(shapes: Shapes | None, place: Array, rows: Array) -> Array:
     if shapes is None:
         return np.full(len(rows), -1)
     right = 1 + place[rows, None]
-    same_class = shapes.mirrored[rows] == np.take_along_axis(shapes.mirrored[rows], right, axis=1)
-    mirror = same_class & (shapes.shape[rows] != np.take_along_axis(shapes.shape[rows], right, 1))
+    same_class = shapes.class_name[rows] == np.take_along_axis(
+        shapes.class_name[rows], right, axis=1
+    )
+    mirror = same_class & (
+        shapes.shape_name[rows] != np.take_along_axis(shapes.shape_name[rows], right, 1)
+    )
     mirror &= shapes.whole[rows, None]
     return np.where(mirror[:, 1:].any(axis=1), mirror[:, 1:].argmax(axis=1), -1)
 

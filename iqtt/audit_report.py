@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from iqtt.audit import Audit
-from iqtt.probes import LIGHT, MIRRORED, OUTLINE, WITHOUT, Probe
+from iqtt.probes import ERROR_RATE, LIGHT, MIRRORED, OUTLINE, WITHOUT, Probe
 
 _BLOCKS = (
     (WITHOUT, "answers alone", ("largest", "smallest", "most typical", "odd one out")),
@@ -82,10 +82,11 @@ def _conclusion(audit: Audit) -> str:
     if audit.probes:
         tried = sum(probe.sees != OUTLINE for probe in audit.probes)
         found = [f"{p.statistic}, {p.rule} ({p.sees})" for p in audit.shortcuts]
+        verdict = f"{len(found)} did: {'; '.join(found)}" if found else "none did"
         lines.append(
-            "Percent right with 95% Wilson intervals; * beats chance at the 5% level, corrected for"
-            f" the number of probes (Holm). Of {tried} probes that must not beat chance,"
-            f" {len(found) or 'none'} did{': ' + '; '.join(found) if found else ''}."
+            "Percent right with 95% Wilson intervals; * beats chance at the"
+            f" {100 * ERROR_RATE:g}% level, corrected for the number of probes (Holm)."
+            f" Of {tried} probes that must not beat chance, {verdict}."
         )
     else:
         lines.append("No probes: no right answers are known.")

@@ -36,6 +36,7 @@ class Source:
         name: short, and unlike those of the other tables: "iqtt-train.h5 labeled".
         part: "labeled" or "unlabeled" of a training file, else "".
         answers: the file with the answers, where they lie apart.
+        answered: whether right answers are told, or the shapes to find them.
         count: questions.
     """
 
@@ -43,6 +44,7 @@ class Source:
     path: Path
     part: str
     answers: Path | None
+    answered: bool
     count: int
 
     @contextmanager
@@ -120,7 +122,8 @@ def find_tables(paths: Sequence[str | Path]) -> list[Source]:
             beside = answers_beside(path)
             with open_questions(path, part, beside) as questions:
                 name = f"{shown} {part}".rstrip()
-                sources.append(Source(name, path, part, beside, len(questions)))
+                answered = questions.has_answers or questions.has_truth
+                sources.append(Source(name, path, part, beside, answered, len(questions)))
     return sources
 
 

@@ -2,12 +2,13 @@
 
 What a probe looks at decides what its success means:
 
-- WITHOUT: the three answers alone. Whatever beats chance there is a fault of the questions.
+- WITHOUT: the three answers alone, or even their cubes, or where the right ones stand. Whatever
+  beats chance there is a fault of the questions.
 - LIGHT: brightness and colours of the shape's own pixels, beside the reference's. Lights are drawn
   for each image, so they cannot tell a shape: a fault too.
-- MIRRORED: the right answer or its own mirror image, by size, framing, light and outline as a
-  mirror keeps them. They have one distribution for both, so what beats chance, 1/2 here, is a
-  fault of how images are made.
+- MIRRORED: the right answer or its mirror image, by what a mirror keeps of size, framing, light
+  and outline. Turned at random, both have the same distribution of these, so what beats chance,
+  1/2 here, is a fault of how images are made.
 - OUTLINE: size, framing and outline, beside the reference's. With one cube size and one camera for
   all images these are the shape's: a long shape has a long silhouette. A shape is told by them now
   and then, rightly; how often says how much the eye sees without turning anything in mind.
@@ -15,7 +16,7 @@ What a probe looks at decides what its success means:
 The rules fix beforehand which way they choose: nothing is tuned to the answers but by
 cross-validation. Whether a probe beats chance is decided by one-sided binomial tests, corrected
 (Holm, "A simple sequentially rejective multiple test procedure", 1979) for the number of probes
-that must not, so that a fair set of questions is accused once in twenty audits at most.
+that must not, so that a fair set of questions is accused once in a hundred audits.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -32,7 +33,7 @@ Array = NDArray[Any]
 WITHOUT, LIGHT, MIRRORED, OUTLINE = "without the reference", "light", "mirrored", "outline"
 FAULTS = (WITHOUT, LIGHT, MIRRORED)
 """What must not tell the right answer."""
-ERROR_RATE = 0.05  # of accusing any of the probes of a fair set
+ERROR_RATE = 0.01  # of any probe of a fair set of questions seeming to beat chance
 
 _LIGHT = {
     "brightness": "shape's brightness",
@@ -60,8 +61,8 @@ class Probe:
         correct, n: questions answered rightly, of how many.
         chance: the share that guessing gets right.
         low, high: 95% Wilson interval of the share.
-        p_value: of `correct` or more by guessing.
-        beats_chance: whether that is too seldom, all probes considered.
+        p_value: how often guessing gets so many right.
+        beats_chance: whether that is too seldom, the number of probes considered.
     """
 
     statistic: str

@@ -30,6 +30,7 @@ def judge(
     tables: Sequence[AuditTable],
     wrong: Sequence[ArrayLike],
     found: Callable[[int, int], str],
+    looked: int | None = None,
 ) -> Proof:
     """Return the verdict on a rule for each question.
 
@@ -37,15 +38,19 @@ def judge(
         rule: what is expected.
         wrong: for each table which questions break the rule, (Q,) bool.
         found: says what was found in a (table, row) that does.
+        looked: how many questions were looked at, if not all.
     """
-    total = sum(map(len, tables))
+    total = f"{sum(map(len, tables)):,}"
+    total = total if looked is None else f"{looked:,} of {total}"
     broken = [(t, row) for t, mask in enumerate(wrong) for row in np.flatnonzero(mask).tolist()]
     if not broken:
-        return Proof(name, "ok", f"{rule} ({total:,} questions)")
+        return Proof(name, "ok", f"{rule} ({total} questions)")
     named = [f"{tables[t].name} row {row}: {found(t, row)}" for t, row in broken[:SHOWN]]
     more = f" and {len(broken) - SHOWN:,} more" if len(broken) > SHOWN else ""
     text = "; ".join(named) + more
-    return Proof(name, "FAIL", f"{text}; expected: {rule} ({len(broken):,} of {total:,} fail)")
+    return Proof(
+        name, "FAIL", f"{text}; expected: {rule} ({len(broken):,} of {total} questions fail)"
+    )
 
 
 def balance(tables: Sequence[AuditTable], right: Sequence[Array]) -> Proof:
@@ -128,7 +133,7 @@ def visibility(tables: Sequence[AuditTable]) -> Proof:
 def distinct_images(tables: Sequence[AuditTable]) -> Proof:
     """Whether no image is stored twice, in all tables together."""
     first = _first_copies(np.concatenate([table.digests.reshape(-1) for table in tables]))
-    return _no_copies(tables, "images", "no image stored twice", first.reshape(-1, 4))
+    return _no_copies(tables, "distinct images", "no image stored twice", first.reshape(-1, 4))
 
 
 def distinct_questions(tables: Sequence[AuditTable]) -> Proof:
@@ -137,13 +142,13 @@ def distinct_questions(tables: Sequence[AuditTable]) -> Proof:
     # A sum of hashes does not know their order.
     keys = np.concatenate([words[:, 0], words[:, 1:].sum(axis=1, dtype=np.uint64)], axis=1)
     first = _first_copies(keys.view("V32").reshape(-1))
-    return _no_copies(tables, "questions", "no question asked twice", first[:, None])
+    return _no_copies(tables, "distinct questions", "no question asked twice", first[:, None])
 
 
 def _first_copies(keys: Array) -> Array:
     """Return where each key is met first, (N,)."""
     _, first, copy = np.unique(keys, return_index=True, return_inverse=True)
-    return np.asarray(first[copy.reshape(-1)])
+    return np.asarray(first[copy])
 
 
 def _no_copies(tables: Sequence[AuditTable], name: str, rule: str, first: Array) -> Proof:

@@ -75,14 +75,7 @@ def make_pools(spec: SplitSpec) -> Pools:
 
     Raises TooFewShapesError where no number of cubes allows the distractors in every split.
     """
-    catalogues = {}
-    for cubes in range(spec.cubes[0], spec.cubes[1] + 1):
-        size = DRAWN_CLASSES
-        if cubes <= EXACT_CUBES[spec.kind]:
-            size = len(known_classes(cubes, spec.kind, spec.max_radius)) // len(SPLITS)
-        rng = item_rng(spec.seed or 0, cubes, Purpose.CATALOGUE)
-        sizes = [size] * len(SPLITS)
-        catalogues[cubes] = make_catalogue(rng, cubes, sizes, spec.kind, spec.max_radius)
+    catalogues = {n: _catalogue(spec, n) for n in range(spec.cubes[0], spec.cubes[1] + 1)}
     kinds = KIND_NAMES if spec.distractors == "mixed" else (spec.distractors,)
     allowed = {}
     for kind in kinds:
@@ -91,9 +84,23 @@ def make_pools(spec: SplitSpec) -> Pools:
             raise TooFewShapesError(
                 f"cubes: {spec.shapes} shapes of {spec.cubes[0]}-{spec.cubes[1]} cubes within"
                 f" radius {spec.max_radius:g} are too few for {kind!r} questions of their own in"
-                f" each of {', '.join(SPLITS)}; take more --cubes"
+                f" each of {', '.join(SPLITS)}; take more --cubes, or a larger --max-radius"
             )
     return Pools(catalogues, allowed)
+
+
+def _catalogue(spec: SplitSpec, cubes: int) -> Catalogue:
+    """Give each split as many classes as there are, or as are found where not all are listed."""
+    size = DRAWN_CLASSES
+    if cubes <= EXACT_CUBES[spec.kind]:
+        size = len(known_classes(cubes, spec.kind, spec.max_radius)) // len(SPLITS)
+    while True:
+        rng = item_rng(spec.seed or 0, cubes, Purpose.CATALOGUE)
+        try:
+            sizes = [size] * len(SPLITS)
+            return make_catalogue(rng, cubes, sizes, spec.kind, spec.max_radius)
+        except TooFewShapesError:  # ends: there are always none
+            size //= 10
 
 
 def _allows(spec: SplitSpec, catalogue: Catalogue, kind: str, cubes: int) -> bool:

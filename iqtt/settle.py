@@ -61,6 +61,7 @@ def settle(
     done: dict[int, Question] = {}
     waiting = list(requests)
     while waiting:
+        _check_attempts(spec, split, waiting)
         drawn = draw_shapes(spec, pools, split, [(i, attempt) for i, _, attempt in waiting])
         shapes = []
         for (index, place, attempt), one in zip(waiting, drawn, strict=True):
@@ -72,16 +73,21 @@ def settle(
         for i, (index, place, attempt) in enumerate(waiting):
             if np.isfinite(turns[i]).all():
                 done[index] = _lit(spec, split, index, attempt, shapes[i], turns[i], symmetric[i])
-            elif attempt + 1 < QUESTION_ATTEMPTS:
-                again.append((index, place, attempt + 1))
             else:
-                raise PlacementError(
-                    f"{split} question {index}: no view of {QUESTION_ATTEMPTS} choices of shapes"
-                    f" shows {spec.min_cube_pixels} pixels of every cube; try a smaller"
-                    f" --min-cube-pixels, or fewer --cubes"
-                )
+                again.append((index, place, attempt + 1))
         waiting = again
     return [done[index] for index, _, _ in requests]
+
+
+def _check_attempts(spec: SplitSpec, split: str, requests: Sequence[tuple[int, int, int]]) -> None:
+    """Raise PlacementError where a question had its last attempt."""
+    for index, _, attempt in requests:
+        if attempt >= QUESTION_ATTEMPTS:
+            raise PlacementError(
+                f"{split} question {index}: no view of {QUESTION_ATTEMPTS} choices of shapes"
+                f" shows {spec.min_cube_pixels} pixels of every cube; try a smaller"
+                f" --min-cube-pixels, or fewer --cubes"
+            )
 
 
 def _symmetries(shapes: Sequence[Shapes]) -> Array:

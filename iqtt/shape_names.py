@@ -35,6 +35,11 @@ def cube_codes(cubes: Array) -> NDArray[np.int64]:
     return np.sort(low @ np.array([1_000_000, 1_000, 1]), axis=1)
 
 
+def row_keys(rows: Array) -> NDArray[np.void]:
+    """Return each row of an (N, K) array as one value, (N,): fast to sort, equal for equal rows."""
+    return np.ascontiguousarray(rows).view(f"V{rows.shape[1] * rows.itemsize}").reshape(-1)
+
+
 def name_shapes(cubes: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return two numbers for each shape: equal for the same shape; equal for it and its mirror.
 
@@ -43,7 +48,8 @@ def name_shapes(cubes: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
     Raises ValueError as `congruent_rows`.
     """
-    _, first, copy = np.unique(cube_codes(cubes), axis=0, return_index=True, return_inverse=True)
+    keys = row_keys(cube_codes(cubes))
+    _, first, copy = np.unique(keys, return_index=True, return_inverse=True)
     distinct = cubes[first]
     invariant = _invariants(distinct)
     leader = np.full(len(distinct), -1)
@@ -60,7 +66,6 @@ def name_shapes(cubes: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         found = same | mirrored
         leader[rest[found]] = leads[found]
         is_mirror[rest[found]] = mirrored[found]
-    copy = copy.reshape(-1)
     return (2 * leader + is_mirror)[copy], leader[copy]
 
 

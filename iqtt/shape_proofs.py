@@ -16,7 +16,7 @@ from iqtt.audit_table import AuditTable
 from iqtt.congruence import congruent_rows
 from iqtt.layout import NO_CUBE
 from iqtt.proofs import Proof, judge
-from iqtt.shape_names import name_shapes
+from iqtt.shape_names import name_shapes, row_keys
 
 Array = NDArray[Any]
 MOST_CUBES = 64  # more than any file stores; keeps names of shapes of unlike sizes apart
@@ -34,15 +34,16 @@ class Shapes:
             rest is told of these questions alone.
         count: cubes of each of its shapes, (Q,).
         right: which answers are congruent to the reference, (Q, 3) bool.
-        shape, mirrored: numbers for the four shapes, (Q, 4): equal for the same shape; equal for
-            it and its mirror image; unlike for others, in all tables together. -1 unless `whole`.
+        shape_name, class_name: numbers for the four shapes, (Q, 4): equal for the same shape;
+            equal for it and its mirror image; unlike for others, in all tables together. -1 unless
+            `whole`.
     """
 
     whole: Array
     count: Array
     right: Array
-    shape: Array
-    mirrored: Array
+    shape_name: Array
+    class_name: Array
 
     @property
     def place(self) -> Array:
@@ -71,7 +72,7 @@ def compare_shapes(tables: Sequence[AuditTable]) -> list[Shapes]:
         ends = np.cumsum([len(rows) for rows in chosen])[:-1]
         shape, mirrored = (np.split(v.reshape(-1, 4) * MOST_CUBES + n, ends) for v in names)
         for i, one in enumerate(results):
-            one.shape[chosen[i]], one.mirrored[chosen[i]] = shape[i], mirrored[i]
+            one.shape_name[chosen[i]], one.class_name[chosen[i]] = shape[i], mirrored[i]
     return results
 
 
@@ -137,7 +138,7 @@ def distractors_differ(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -
     """Whether no two answers of a question show the same shape."""
     pairs = list(itertools.combinations((1, 2, 3), 2))
     same = [
-        np.stack([(s.shape[:, a] == s.shape[:, b]) & s.whole for a, b in pairs], axis=1)
+        np.stack([(s.shape_name[:, a] == s.shape_name[:, b]) & s.whole for a, b in pairs], axis=1)
         for s in shapes
     ]
     return judge(
@@ -154,12 +155,13 @@ def stored_ids(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     wrong = [np.zeros(len(table), np.bool_) for table in tables]
     whole = np.concatenate([s.whole for s in shapes])
     ends = np.cumsum([len(table) for table in tables])[:-1]
-    for stored, names in (("shape_id", "shape"), ("class_id", "mirrored")):
+    for stored, names in (("shape_id", "shape_name"), ("class_id", "class_name")):
         ids = np.concatenate([table.truth[stored] for table in tables])[whole]
         own = np.concatenate([getattr(s, names) for s in shapes])[whole].reshape(-1)
-        _, given = np.unique(ids.reshape(own.size, -1), axis=0, return_inverse=True)
+        keys = row_keys(ids.reshape(own.size, ids.shape[2]))
+        _, given = np.unique(keys, return_inverse=True)
         bad = np.zeros(len(whole), np.bool_)
-        clash = _not_one_to_one(given.reshape(-1), own) | _not_one_to_one(own, given.reshape(-1))
+        clash = _not_one_to_one(given, own) | _not_one_to_one(own, given)
         bad[whole] = clash.reshape(-1, 4).any(axis=1)
         wrong = [a | b for a, b in zip(wrong, np.split(bad, ends), strict=True)]
     rule = "shape_id and class_id equal just where the cubes say so"
@@ -184,7 +186,7 @@ def splits_share_nothing(tables: Sequence[AuditTable], shapes: Sequence[Shapes])
         split: np.unique(
             np.concatenate(
                 [
-                    s.mirrored[s.whole].reshape(-1)
+                    s.class_name[s.whole].reshape(-1)
                     for s, n in zip(shapes, names, strict=True)
                     if n == split
                 ]
@@ -200,9 +202,9 @@ def splits_share_nothing(tables: Sequence[AuditTable], shapes: Sequence[Shapes])
         "splits apart",
         f"{rule} (classes: {number})",
         tables,
-        [np.isin(s.mirrored, shared).any(axis=1) & s.whole for s in shapes],
+        [np.isin(s.class_name, shared).any(axis=1) & s.whole for s in shapes],
         lambda t, row: (
-            f"its shape is in {_elsewhere(owned, shapes[t].mirrored[row], names[t])} too"
+            f"its shape is in {_elsewhere(owned, shapes[t].class_name[row], names[t])} too"
         ),
     )
 

@@ -22,7 +22,7 @@ def answer_statistics(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) ->
     image. (Not their references: a right answer has one beside it, so these would tell of other
     questions which answers are right, and of this one which is not.)
     """
-    everything = np.concatenate([s.mirrored[:, 1:].reshape(-1) for s in shapes])
+    everything = np.concatenate([s.class_name[:, 1:].reshape(-1) for s in shapes])
     names, times = np.unique(everything, return_counts=True)
     results = []
     for table, found in zip(tables, shapes, strict=True):
@@ -36,7 +36,7 @@ def answer_statistics(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) ->
             contacts += np.count_nonzero(both & (apart.sum(axis=3) == 1), axis=2) / 2
             spread += ((apart**2).sum(axis=3) * both).sum(axis=2)
         spread /= 2 * np.maximum(used.sum(axis=2), 1) ** 2
-        own = found.mirrored[:, 1:]
+        own = found.class_name[:, 1:]
         here = (own[:, :, None] == own[:, None]).sum(axis=2)
         elsewhere = times[np.searchsorted(names, own)] - here
         numbers = np.stack([contacts, spread, elsewhere], axis=2)

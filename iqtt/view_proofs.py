@@ -101,13 +101,13 @@ def cast_again(
                 problem = _difference(questions, row, int(one.count[row]))
                 if problem:
                     problems[-1][row] = problem
-    looked = sum(map(len, sample))
     return judge(
         "cast again",
-        f"{looked} questions' images and visible pixels are what their cubes and lights give",
+        "images and visible pixels are what the stored cubes and lights give",
         tables,
         [np.isin(np.arange(len(t)), list(p)) for t, p in zip(tables, problems, strict=True)],
         lambda t, row: problems[t][row],
+        sum(map(len, sample)),
     )
 
 

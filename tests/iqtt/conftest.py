@@ -60,9 +60,11 @@ def failing(split_folder: Path, tmp_path: Path) -> Callable[..., set[str]]:
         shutil.copytree(split_folder, folder)
         with h5py.File(folder / name, "r+") as file:
             edit(file)
-        proofs = audit([folder], probed=0).proofs
-        assert {proof.status for proof in proofs} <= {"ok", "FAIL"}
-        return {proof.name for proof in proofs if proof.status == "FAIL"}
+        found = audit([folder], probed=0)
+        assert {proof.status for proof in found.proofs} <= {"ok", "FAIL"}
+        failed = {proof.name for proof in found.proofs if proof.status == "FAIL"}
+        assert found.passed == (not failed)
+        return failed
 
     return fail
 

@@ -12,16 +12,23 @@ import pytest
 
 from iqtt.audit import audit, question_count
 from iqtt.audit_report import markdown, table
+from iqtt.congruence import are_congruent
 from iqtt.layout import NO_CUBE
-from iqtt.polycube import ROTATIONS, canonical, canonical_class, mirror, set_ids
+from iqtt.polycube import ROTATIONS, canonical, canonical_class, is_chiral, mirror, set_ids
 from scenegen.errors import FileFormatError, SpecError
 
 PROOFS = {
     *("shapes", "one right answer", "answers differ", "stored ids", "splits apart", "rotations"),
     *("angles", "visibility", "cast again", "answer places", "pixel values", "framing"),
-    *("images", "questions"),
+    *("distinct images", "distinct questions"),
 }
-BY_CUBES = PROOFS - {"answer places", "pixel values", "framing", "images", "questions"}
+BY_CUBES = PROOFS - {
+    "answer places",
+    "pixel values",
+    "framing",
+    "distinct images",
+    "distinct questions",
+}
 
 
 def statuses(*paths: Path, **options: Any) -> dict[str, str]:
@@ -96,6 +103,26 @@ def test_a_second_right_answer(failing: Callable[..., set[str]]) -> None:
     assert failing(edit) >= {"one right answer", "answers differ"}
 
 
+def test_a_second_right_answer_where_no_answers_are_told(failing: Callable[..., set[str]]) -> None:
+    def edit(file: h5py.File) -> None:
+        truth = file["truth/unlabeled"]
+        kinds = truth["distractor_kind"][2]
+        wrong = int((kinds >= 0).argmax())
+        set_shape(truth, 2, 1 + wrong, shape(truth, 2, 0))
+        kinds[wrong] = -1
+        truth["distractor_kind"][2] = kinds
+
+    assert "one right answer" in failing(edit, "iqtt-train.h5")
+
+
+def test_kinds_that_name_another(failing: Callable[..., set[str]]) -> None:
+    def edit(file: h5py.File) -> None:
+        kinds = file["truth/unlabeled/distractor_kind"]
+        kinds[2] = np.roll(kinds[2], 1)
+
+    assert failing(edit, "iqtt-train.h5") == {"one right answer"}
+
+
 def test_distractors_alike(failing: Callable[..., set[str]]) -> None:
     def edit(file: h5py.File) -> None:
         first, second = (1 + (file["answers"][2] + k) % 3 for k in (1, 2))
@@ -110,14 +137,20 @@ def test_a_mirror_image_in_another_split(
     failing: Callable[..., set[str]], split_folder: Path
 ) -> None:
     with h5py.File(split_folder / "iqtt-train.h5") as train:
-        truth = train["truth/labeled"]
-        cubes = [mirror(shape(truth, 1, image)) for image in range(4)]
+        truths = (train["truth/labeled"], train["truth/unlabeled"])
+        shapes = [shape(t, row, image) for t in truths for row in range(6) for image in range(4)]
+    # Train has it in one hand only.
+    chiral = next(
+        cubes
+        for cubes in shapes
+        if is_chiral(cubes[None])[0] and not any(are_congruent(mirror(cubes), s) for s in shapes)
+    )
 
     def edit(file: h5py.File) -> None:
-        file["truth/cube_count"][0] = len(cubes[0])
+        file["truth/cube_count"][0] = len(chiral)
         file["truth/cubes"][0] = NO_CUBE
         for image in range(4):
-            set_shape(file["truth"], 0, image, cubes[image])
+            set_shape(file["truth"], 0, image, mirror(chiral) @ ROTATIONS[image].T)
 
     assert "splits apart" in failing(edit)
 

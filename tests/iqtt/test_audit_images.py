@@ -38,12 +38,12 @@ def judged(tmp_path: Path) -> Callable[..., dict[str, str]]:
     return judge
 
 
-NAMES = ("answer places", "pixel values", "framing", "images", "questions")
+NAMES = ("answer places", "pixel values", "framing", "distinct images", "distinct questions")
 
 
 def test_released_files_pass(judged: Callable[..., dict[str, str]]) -> None:
     assert judged(plain(), np.arange(7) % 3) == dict.fromkeys(NAMES, "ok")
-    assert judged(plain(0), np.zeros(0, np.uint8))["images"] == "ok"
+    assert judged(plain(0), np.zeros(0, np.uint8))["distinct images"] == "ok"
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -0.5, 1.01])
@@ -51,6 +51,15 @@ def test_values_that_are_no_radiance(judged: Callable[..., dict[str, str]], valu
     images = plain()
     images[4, 2, 7, 7, 1] = value
     assert judged(images, np.arange(7) % 3) == {**dict.fromkeys(NAMES, "ok"), NAMES[1]: "FAIL"}
+
+
+def test_only_questions_with_answers_are_measured(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "iqtt-train.h5", "w") as file:
+        file["unlabeled/questions"] = plain(7)
+        file["labeled/questions"], file["labeled/answers"] = 1 - plain(3) / 2, np.arange(3)
+    found = audit([tmp_path], probed=3)
+    assert [(t.answers, t.probed) for t in found.tables] == [("stored", 3), ("unknown", 0)]
+    assert {p.n for p in found.probes} == {3}
 
 
 def test_uneven_answers(judged: Callable[..., dict[str, str]]) -> None:
@@ -74,7 +83,7 @@ def test_an_image_twice_in_two_files(failing: Failing, split_folder: Path) -> No
     def edit(file: h5py.File) -> None:
         file["questions"][5, 0] = image
 
-    assert failing(edit) >= {"images", "cast again"}
+    assert failing(edit) >= {"distinct images", "cast again"}
 
 
 def test_shapes_on_the_border(failing: Failing) -> None:
@@ -98,10 +107,10 @@ def test_another_background(failing: Failing) -> None:
 def test_a_hidden_cube(failing: Failing) -> None:
     def edit(file: h5py.File) -> None:
         shown = file["truth/visible_pixels"][2]
+        shown[3, 0] += shown[3, 1] - 1
         shown[3, 1] = 1
         file["truth/visible_pixels"][2] = shown
 
-    # Its other pixels are in the silhouette all the same.
     assert failing(edit) == {"visibility", "cast again"}
 
 
