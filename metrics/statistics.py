@@ -147,7 +147,11 @@ def _bca_ends(deviations: Array, resampled: Array, z: float) -> tuple[float, flo
     # Skewness of the jackknife values, which for a mean are the deviations times a constant.
     unit = deviations / math.sqrt(squares)
     acceleration = float((unit**3).sum()) / 6.0
-    below = np.count_nonzero(resampled < 0.0) + 0.5 * np.count_nonzero(resampled == 0.0)
+    # Resamples that equal the mean miss 0 by rounding, either way.
+    equal = 1e-12 * math.sqrt(squares)
+    below = np.count_nonzero(resampled < -equal) + 0.5 * np.count_nonzero(
+        np.abs(resampled) <= equal
+    )
     normal = NormalDist()
     share = min(max(below / len(resampled), 1.0 / len(resampled)), 1.0 - 1.0 / len(resampled))
     bias = normal.inv_cdf(share)

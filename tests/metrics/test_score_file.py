@@ -44,6 +44,18 @@ def test_every_double_survives(values):
     assert json.loads(to_json(replace(scores, items=held)))["items"]["rmse"] == values
 
 
+def test_scores_are_means_over_scenes_not_images(tmp_path):
+    scores = made_scores.rooms_scores("m", {"chamfer": [0.1, 0.1, 0.1, 0.5]}, [7, 7, 7, 2])
+    assert scores.metrics["chamfer"].value == pytest.approx(0.3)
+    write_scores(scores, tmp_path / "s.json")
+    over_images = {"chamfer": replace(scores.metrics["chamfer"], value=0.2)}
+    with pytest.raises(JsonError, match=r"value 0\.2, expected 0\.3.*, the mean of items\.chamfer"):
+        write_scores(replace(scores, metrics=over_images), tmp_path / "s.json", overwrite=True)
+    empty = {name: column[:0] for name, column in scores.items.items()}
+    with pytest.raises(JsonError, match="items: found none, expected at least one entry"):
+        write_scores(replace(scores, items=empty), tmp_path / "s.json", overwrite=True)
+
+
 def test_view_angles_may_be_unknown(tmp_path):
     scores = made_scores.simple_rooms()
     items = {**scores.items, "view_angle_degrees": np.array([0, 35, -1, -1])}

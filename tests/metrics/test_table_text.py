@@ -47,6 +47,11 @@ def test_any_name_is_one_cell_in_every_format(name):
     assert not re.search(r"[<>\"']", html(text))
 
 
+def test_entities_and_dashes_show_as_they_are():
+    assert markdown("&lt;b&gt; &amp; <b>") == "&amp;lt;b&amp;gt; &amp;amp; &lt;b&gt;"
+    assert latex("a-b--c---d") == "a-b-{}-c-{}-{}-d"
+
+
 SPECIAL = {
     r"\textbackslash{}": "\\",
     r"\textasciitilde{}": "~",
