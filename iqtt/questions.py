@@ -24,6 +24,7 @@ from iqtt.polycube import ROTATIONS, canonical_class, is_chiral, mirror, set_ids
 from iqtt.shapes import TooFewShapesError
 from iqtt.specs import SPLITS, SplitSpec
 from scenegen.errors import PlacementError
+from scenegen.records import check
 from scenegen.seeding import Purpose, item_rng
 
 Array = NDArray[Any]
@@ -73,8 +74,11 @@ class Pools:
 def make_pools(spec: SplitSpec) -> Pools:
     """Give each split its own shape classes, and find which questions they allow.
 
-    Raises TooFewShapesError where no number of cubes allows the distractors in every split.
+    Raises:
+        TooFewShapesError: no number of cubes allows the distractors in every split.
+        SpecError: the seed is not told.
     """
+    check(spec.seed is not None, "seed", "none, as in files that do not tell it", "a number")
     catalogues = {n: _catalogue(spec, n) for n in range(spec.cubes[0], spec.cubes[1] + 1)}
     kinds = KIND_NAMES if spec.distractors == "mixed" else (spec.distractors,)
     allowed = {}

@@ -1,5 +1,6 @@
 """Questions -> images -> the files of a split."""
 
+import errno
 import hashlib
 import os
 import shutil
@@ -28,6 +29,7 @@ from scenegen.backend import select_variant
 from scenegen.new_file import check_writable
 from scenegen.row_file import Table, new_file
 
+FILES = ("iqtt-train.h5", "iqtt-val.h5", "iqtt-test.h5", "iqtt-test-answers.h5")
 FINGERPRINTED = ("cubes", "world_from_shape", "light_position", "light_color")
 MOST_WAITING = 2  # batches that may wait to be written
 
@@ -43,7 +45,7 @@ def make_split(
     command: str = "",
     progress: Callable[[int], Any] = lambda done: None,
 ) -> Tally:
-    """Write the files of a split to a folder, which appears when all of them are complete.
+    """Write the files of a split to a folder, where they appear when all of them are complete.
 
     Seed and command would tell the test answers, so they are kept with those only.
 
@@ -60,7 +62,7 @@ def make_split(
     run = _Run(spec, make_pools(spec), batch, device, compression, progress)
     public = root_attributes(spec.public(), variant, "")
     private = root_attributes(spec, variant, command)
-    temporary = folder.with_name(f".{folder.name}.{os.getpid()}.partial")
+    temporary = (folder if folder.is_dir() else folder.parent) / f".iqtt-{os.getpid()}.partial"
     temporary.mkdir()
     try:
         for split in ("train", "val"):
@@ -75,10 +77,17 @@ def make_split(
             test.attrs.update({**public, "split": "test"})
             answers.attrs.update({**private, "split": "test"})
             _write_table(run, "test", "", test, answers)
-        _check_folder(folder, overwrite)
-        if folder.exists():
-            shutil.rmtree(folder)
-        os.replace(temporary, folder)
+        _check_folder(folder, overwrite, temporary.name)
+        if folder.is_dir():
+            for name in FILES:
+                os.replace(temporary / name, folder / name)
+        else:
+            os.replace(temporary, folder)
+    except OSError as error:
+        told = Path(str(error.filename))
+        if told.parent != temporary:
+            raise
+        raise OSError(error.errno, error.strerror, str(folder / told.name)) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
     return run.tally
@@ -146,13 +155,21 @@ def _write_table(
         file.attrs[name] = digest.hexdigest()
 
 
-def _check_folder(folder: Path, overwrite: bool) -> None:
-    if folder.is_dir() and overwrite:
-        strangers = [p.name for p in folder.iterdir() if not p.name.startswith("iqtt-")]
-        if strangers:
-            raise FileExistsError(17, f"holds other files too ({strangers[0]})", str(folder))
-        return
-    if not folder.exists():
+def _check_folder(folder: Path, overwrite: bool, own: str = "") -> None:
+    """Raise the OSError that would end in a lost run; `own` is a name in the folder to ignore."""
+    if not folder.is_dir():
+        if folder.is_symlink() and not folder.exists():
+            raise FileNotFoundError(errno.ENOENT, "is a link to nothing", str(folder))
+        if folder.exists():
+            raise NotADirectoryError(errno.ENOTDIR, "is a file; name a folder", str(folder))
         check_writable(folder, overwrite)
         return
-    raise FileExistsError(17, "exists already; say --overwrite to replace it", str(folder))
+    if not overwrite:
+        text = "exists already; say --overwrite to replace it"
+        raise FileExistsError(errno.EEXIST, text, str(folder))
+    ours = {own, *(name for name in FILES if (folder / name).is_file())}
+    strangers = sorted(set(os.listdir(folder)) - ours)
+    if strangers:
+        raise FileExistsError(errno.EEXIST, f"holds other files too ({strangers[0]})", str(folder))
+    if not os.access(folder, os.W_OK):
+        raise PermissionError(errno.EACCES, "cannot be written to", str(folder))

@@ -520,6 +520,8 @@ VALUES = [
     ("all NaN", ["depth", "finite"], edited(values("depth", lambda v: v * np.nan))),
     ("infinity", ["depth", "finite", "7"], edited(put("depth", (7, 0, 0), np.inf))),
     ("minus infinity", ["depth", "finite", "0"], edited(put("depth", (0, 31, 31), -np.inf))),
+    ("a signalling NaN", ["depth", "finite", "4"], edited(put(
+        "depth", (4, 2, 2), np.array(0x7FA00001, "u4").view("f4")))),
     ("absurd magnitude", ["depth", "finite"], edited(
         replaced("depth", lambda v: v.astype("f8") * 1e200))),
     ("overflow of half precision", ["depth", "finite"], edited(

@@ -1,0 +1,219 @@
+"""The files of a split: the released layout, our own group, and nothing that tells test answers."""
+
+import os
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from iqtt.layout import CONVENTIONS
+from iqtt.questions import Pools, make_pools
+from iqtt.render import Rendered, render_question
+from iqtt.settle import Tally
+from iqtt.specs import SplitSpec
+from iqtt.split import FILES, make_split
+from iqtt.truth_rows import truth_rows
+
+SECRET = 8_123_456_789_012_345
+SPEC = SplitSpec(
+    seed=SECRET, train=7, labeled=3, val=4, test=5, cubes=(6, 7), height=24, width=32,
+    min_cube_pixels=1, lights=(1, 2),
+)  # fmt: skip
+COMMAND = f"iqtt make-split --seed {SECRET}"
+TRUTH = {
+    "cube_count", "cubes", "shape_id", "class_id", "world_from_shape", "light_count",
+    "light_position", "light_color", "distractor_kind", "angle_degrees", "visible_pixels",
+}  # fmt: skip
+AGAIN = """
+import sys
+from iqtt.specs import SplitSpec
+from iqtt.split import make_split
+make_split(sys.argv[1], SplitSpec.from_json(sys.argv[2]), batch=3, command=sys.argv[3])
+"""
+
+
+@pytest.fixture(scope="module")
+def pools() -> Pools:
+    return make_pools(SPEC)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made") / "split"
+    tally = make_split(folder, SPEC, command=COMMAND)
+    assert isinstance(tally, Tally)
+    assert tally.proposed - tally.refused >= 4 * 16
+    return folder
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def everything(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:
+    found = {"/": file["/"]}
+    file.visititems(found.__setitem__)
+    return found
+
+
+def test_the_layout_is_the_released_one(folder):
+    assert sorted(contents(folder)) == sorted(FILES)
+    expected = {
+        "iqtt-train.h5": {
+            "labeled/questions": (3, 4, 24, 32, 3),
+            "labeled/answers": (3,),
+            "unlabeled/questions": (4, 4, 24, 32, 3),
+        },
+        "iqtt-val.h5": {"questions": (4, 4, 24, 32, 3), "answers": (4,)},
+        "iqtt-test.h5": {"questions": (5, 4, 24, 32, 3)},
+        "iqtt-test-answers.h5": {"answers": (5,)},
+    }
+    for name, shapes in expected.items():
+        with h5py.File(folder / name) as file:
+            datasets = {k: v for k, v in everything(file).items() if isinstance(v, h5py.Dataset)}
+            public = {k: v.shape for k, v in datasets.items() if not k.startswith("truth/")}
+            assert public == shapes
+            assert {datasets[k].dtype for k in public} == {np.dtype("uint8")}
+            for group in {"iqtt-train.h5": ("labeled", "unlabeled")}.get(name, ("",)):
+                rows = next(iter(v[0] for k, v in shapes.items() if k.startswith(group)))
+                known = {k for k in datasets if k.startswith(f"truth/{group}")}
+                if name == "iqtt-test.h5":
+                    assert not known
+                    continue
+                prefix = f"truth/{group}/" if group else "truth/"
+                assert known == {prefix + one for one in TRUTH}
+                assert {len(datasets[k]) for k in known} == {rows}
+
+
+def test_files_hold_the_questions_that_are_made_one_by_one(folder, pools):
+    with (
+        h5py.File(folder / "iqtt-train.h5") as train,
+        h5py.File(folder / "iqtt-val.h5") as val,
+        h5py.File(folder / "iqtt-test.h5") as test,
+        h5py.File(folder / "iqtt-test-answers.h5") as told,
+    ):
+        tables = [
+            (
+                "train",
+                0,
+                train["labeled/questions"],
+                train["truth/labeled"],
+                train["labeled/answers"],
+            ),
+            ("train", 3, train["unlabeled/questions"], train["truth/unlabeled"], None),
+            ("val", 0, val["questions"], val["truth"], val["answers"]),
+            ("test", 0, test["questions"], told["truth"], told["answers"]),
+        ]
+        for split, first, questions, truth, answers in tables:
+            for row in range(len(questions)):
+                one: Rendered = render_question(SPEC, pools, split, first + row)
+                assert questions[row].tobytes() == one.images.tobytes()
+                for name, value in truth_rows(SPEC, [one])[0].items():
+                    if name in TRUTH:
+                        assert np.array_equal(truth[name][row], value), name
+                answer = int(np.flatnonzero(truth["distractor_kind"][row] == -1)[0])
+                assert answer == one.question.shapes.answer
+                if answers is not None:
+                    assert answers[row] == answer
+            if answers is not None:
+                assert sorted(answers[:].tolist()) == sorted(i % 3 for i in range(len(answers)))
+
+
+def test_every_number_says_what_it_is(folder):
+    for name in FILES:
+        with h5py.File(folder / name) as file:
+            for path, item in everything(file).items():
+                if isinstance(item, h5py.Dataset):
+                    assert item.attrs["meaning"], path
+                    assert path.endswith("answers") or item.attrs["unit"], path
+            for path in ("truth", "truth/labeled", "truth/unlabeled"):
+                if "questions" not in file.get(path, {}) and "cubes" in file.get(path, {}):
+                    attributes = file[path].attrs
+                    np.testing.assert_array_equal(
+                        attributes["world_from_camera"], SPEC.camera.world_from_camera
+                    )
+                    assert attributes["fov_y_degrees"] == SPEC.camera.fov_y_degrees
+                    for one in ("ambient", "reflectance", "background"):
+                        assert tuple(attributes[one]) == getattr(SPEC, one)
+                    assert attributes["attenuation"].tolist() == [0, 1]
+            root = file.attrs
+            assert root["format"] == "pix2shape-bench/iqtt"
+            assert root["conventions"] == CONVENTIONS
+            assert root["split"] == name.split("-")[1].removesuffix(".h5")
+            spec = SplitSpec.from_json(root["spec"])
+            assert spec == (SPEC if "answers" in name else SPEC.public())
+            if "questions" in file:
+                assert file["questions"].attrs["scale"] == 1 / 255
+
+
+def test_nothing_handed_out_tells_the_test_answers(folder):
+    """No seed, no command, no truth; and no bytes that follow from the answers but a hash of much
+    more than them.
+    """
+    with h5py.File(folder / "iqtt-test.h5") as file:
+        assert set(everything(file)) == {"/", "questions"}
+        assert set(file.attrs) == {
+            "format", "format_version", "writer", "variant", "spec", "conventions", "split",
+            "fingerprint",
+        }  # fmt: skip
+        assert set(file["questions"].attrs) == {"unit", "shape", "frame", "meaning", "scale"}
+        assert re.fullmatch("[0-9a-f]{64}", file.attrs["fingerprint"])
+    with h5py.File(folder / "iqtt-test-answers.h5") as file:
+        assert file.attrs["creation_command"] == COMMAND
+    for name, raw in contents(folder).items():
+        secret = "answers" in name
+        assert (str(SECRET).encode() in raw) == secret
+        assert (SECRET.to_bytes(8, "little") in raw) is False
+        assert (b"creation_command" in raw) == secret
+
+
+def test_the_same_request_gives_the_same_bytes(folder, tmp_path):
+    """In another process, in batches of another size."""
+    command = [sys.executable, "-c", AGAIN, str(tmp_path / "again"), SPEC.to_json(), COMMAND]
+    subprocess.run(command, check=True, capture_output=True)
+    assert contents(tmp_path / "again") == contents(folder)
+    assert os.listdir(tmp_path) == ["again"]
+
+
+def test_another_seed_changes_every_file(folder, tmp_path):
+    make_split(tmp_path / "other", replace(SPEC, seed=SECRET + 1), command=COMMAND)
+    old, new = contents(folder), contents(tmp_path / "other")
+    assert all(old[name] != new[name] for name in FILES)
+    for name in FILES[:3]:
+        with h5py.File(folder / name) as a, h5py.File(tmp_path / "other" / name) as b:
+            assert a.attrs["spec"] == b.attrs["spec"]
+            for path in ("questions", "labeled/questions", "unlabeled/questions"):
+                if path in a:
+                    assert (a[path][:] != b[path][:]).any(axis=(1, 2, 3, 4)).all()
+
+
+def test_a_table_does_not_depend_on_the_size_of_the_others(folder, tmp_path):
+    """Fingerprints, which hold the whole request, apart."""
+    changed = replace(SPEC, val=1, test=0, labeled=3, train=3)
+    make_split(tmp_path / "changed", changed)
+    with (
+        h5py.File(folder / "iqtt-train.h5") as a,
+        h5py.File(tmp_path / "changed" / "iqtt-train.h5") as b,
+    ):
+        for path, item in everything(a).items():
+            if isinstance(item, h5py.Dataset) and "unlabeled" not in path:
+                assert item[:].tobytes() == b[path][:].tobytes()
+        assert b["unlabeled/questions"].shape == (0, 4, 24, 32, 3)
+        assert a.attrs["fingerprint_labeled"] != b.attrs["fingerprint_labeled"]
+
+
+def test_fingerprints_tell_tables_apart_and_join_a_test_set_to_its_answers(folder):
+    told = {}
+    for name in FILES:
+        with h5py.File(folder / name) as file:
+            told[name] = {k: v for k, v in file.attrs.items() if k.startswith("fingerprint")}
+    assert set(told["iqtt-train.h5"]) == {"fingerprint_labeled", "fingerprint_unlabeled"}
+    assert told["iqtt-test.h5"] == told["iqtt-test-answers.h5"]
+    every = [value for one in told.values() for value in one.values()]
+    assert len(every) == 5
+    assert len(set(every)) == 4
