@@ -1,5 +1,6 @@
 """The files of a split: the released layout, our own group, and nothing that tells test answers."""
 
+import hashlib
 import os
 import re
 import subprocess
@@ -207,13 +208,28 @@ def test_a_table_does_not_depend_on_the_size_of_the_others(folder, tmp_path):
         assert a.attrs["fingerprint_labeled"] != b.attrs["fingerprint_labeled"]
 
 
-def test_fingerprints_tell_tables_apart_and_join_a_test_set_to_its_answers(folder):
-    told = {}
+def test_fingerprints_are_of_the_public_request_and_of_all_that_tables_say(folder):
+    """So they tell tables apart, join a test set to its answers, and tell no seed."""
+    found = []
     for name in FILES:
+        split = name.split("-")[1].removesuffix(".h5")
         with h5py.File(folder / name) as file:
-            told[name] = {k: v for k, v in file.attrs.items() if k.startswith("fingerprint")}
-    assert set(told["iqtt-train.h5"]) == {"fingerprint_labeled", "fingerprint_unlabeled"}
-    assert told["iqtt-test.h5"] == told["iqtt-test-answers.h5"]
-    every = [value for one in told.values() for value in one.values()]
-    assert len(every) == 5
-    assert len(set(every)) == 4
+            for group in ("labeled", "unlabeled") if split == "train" else ("",):
+                told = file.attrs[f"fingerprint_{group}" if group else "fingerprint"]
+                if f"truth/{group}" not in file:
+                    assert told == found_in_answers(folder)
+                    continue
+                truth = {k: v[:] for k, v in file[f"truth/{group}"].items()}
+                digest = hashlib.sha256(f"{SPEC.public().to_json()} {split} {group}".encode())
+                for row, kinds in enumerate(truth["distractor_kind"]):
+                    for one in ("cubes", "world_from_shape", "light_position", "light_color"):
+                        digest.update(truth[one][row].tobytes())
+                    digest.update(bytes([kinds.tolist().index(-1)]))
+                assert told == digest.hexdigest()
+                found.append(told)
+    assert len(set(found)) == 4
+
+
+def found_in_answers(folder: Path) -> str:
+    with h5py.File(folder / "iqtt-test-answers.h5") as file:
+        return file.attrs["fingerprint"]

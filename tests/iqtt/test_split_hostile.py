@@ -55,7 +55,7 @@ def old(made: Path, tmp_path: Path) -> Path:
         {"cubes": (5, 6), "max_radius": 2.2, "distractors": "other"},
         {"cubes": (5, 5), "distractors": "other"},
         {"seed": 2**63 - 1, "background": (0, 0, 0)},
-        {"labeled": 3},
+        {"labeled": 3, "val": 6},
         {"labeled": 0},
         {"train": 0, "labeled": 0, "val": 0, "test": 0},
     ],
@@ -63,7 +63,7 @@ def old(made: Path, tmp_path: Path) -> Path:
 def test_odd_requests_are_answered_in_full(changed, tmp_path):
     spec = replace(TINY, **changed)
     done = []
-    make_split(tmp_path / "split", spec, batch=2, progress=done.append)
+    make_split(tmp_path / "split", spec, batch=1, progress=done.append)
     assert sum(done) == spec.train + spec.val + spec.test
     sizes = {
         "iqtt-train.h5": {"labeled/": spec.labeled, "unlabeled/": spec.train - spec.labeled},
@@ -115,7 +115,10 @@ def test_an_older_split_is_replaced_only_on_request(old, tmp_path):
         make_split(old, replace(TINY, seed=2))
     assert listing(tmp_path) == before
     (old / "iqtt-val.h5").unlink()
-    make_split(old, replace(TINY, seed=2), overwrite=True)
+    beside = set()
+    look = lambda _: beside.update(os.listdir(tmp_path))  # noqa: E731
+    make_split(old, replace(TINY, seed=2), overwrite=True, progress=look)
+    assert beside == {"old"}, "made inside, as another disk may be mounted there"
     after = listing(tmp_path)
     assert set(after) == set(before)
     assert all(after[f"old/{name}"] != before[f"old/{name}"] for name in FILES)
