@@ -12,13 +12,13 @@ import h5py
 import numpy as np
 import pytest
 
+from iqtt.congruence import are_congruent
 from iqtt.layout import CONVENTIONS
 from iqtt.questions import Pools, make_pools
 from iqtt.render import Rendered, render_question
 from iqtt.settle import Tally
 from iqtt.specs import SplitSpec
 from iqtt.split import FILES, make_split
-from iqtt.truth_rows import truth_rows
 
 SECRET = 8_123_456_789_012_345
 SPEC = SplitSpec(
@@ -114,9 +114,23 @@ def test_files_hold_the_questions_that_are_made_one_by_one(folder, pools):
             for row in range(len(questions)):
                 one: Rendered = render_question(SPEC, pools, split, first + row)
                 assert questions[row].tobytes() == one.images.tobytes()
-                for name, value in truth_rows(SPEC, [one])[0].items():
-                    if name in TRUTH:
-                        assert np.array_equal(truth[name][row], value), name
+                shapes, count = one.question.shapes.cubes, one.question.shapes.cubes.shape[1]
+                stored = {name: truth[name][row] for name in TRUTH}
+                assert stored["cube_count"] == count
+                assert np.array_equal(stored["cubes"][:, :count], shapes)
+                assert (stored["cubes"][:, count:] == -128).all()
+                assert np.array_equal(stored["distractor_kind"], one.question.shapes.kinds)
+                assert np.array_equal(stored["visible_pixels"], one.visible_pixels)
+                for name in ("world_from_shape", "light_count", "light_position", "light_color"):
+                    assert np.array_equal(stored[name], getattr(one.question, name)), name
+                assert stored["angle_degrees"] == one.question.angle_degrees
+                for i, j in ((i, j) for i in range(4) for j in range(i)):
+                    same = are_congruent(shapes[i], shapes[j])
+                    mirrored = are_congruent(shapes[i], -shapes[j])
+                    assert (stored["shape_id"][i] == stored["shape_id"][j]).all() == same
+                    assert (stored["class_id"][i] == stored["class_id"][j]).all() == (
+                        same or mirrored
+                    )
                 answer = int(np.flatnonzero(truth["distractor_kind"][row] == -1)[0])
                 assert answer == one.question.shapes.answer
                 if answers is not None:

@@ -183,8 +183,8 @@ def test_anything_goes_where_the_truth_shows_nothing(truths, tmp_path):
         file["normal"][:, 3, 4] = 0.0
     path = tmp_path / "predictions.h5"
     with RoomPredictionWriter(path, truth, method="m") as out:
-        for row, odd in enumerate([np.nan, np.inf, -np.inf, -1.0, 0.0, 1e30, 1e39, 1.0]):
-            out.add(row, spoiled(odd), spoiled(0.0 * row, (3, 4), GOOD_NORMAL))
+        for row, odd in enumerate([np.inf, np.nan, -1.0, -np.inf, 0.0, 1e39, 1e30, 1.0]):
+            out.add(row, spoiled(odd), spoiled(odd if row % 2 else 0.0, (3, 4), GOOD_NORMAL))
     assert validate(path) == []
     other = tmp_path / "other.h5"
     with pytest.raises(PredictionError), RoomPredictionWriter(other, truth, method="m") as out:
