@@ -1,5 +1,6 @@
 """Questions -> their images: batches in one wavefront, one question alone, the same bits."""
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,6 +18,7 @@ Array = NDArray[Any]
 Fetch = Callable[[], dict[str, Array]]
 DEFAULT_BATCH = 64  # questions in one wavefront
 SETTLED = 512  # questions whose shapes and views are found together
+FIRST_SETTLED = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +56,10 @@ def render_questions(
     tally = tally or Tally()
     places = answer_positions(spec, split, first, count)
     pending: tuple[list[Question], Fetch] | None = None
-    for start in range(0, count, SETTLED):
-        rows = range(start, min(start + SETTLED, count))
+    # A few come first, so that a request that cannot be met ends soon.
+    starts = [0, *range(min(FIRST_SETTLED, count), count, SETTLED), count]
+    for start, stop in itertools.pairwise(starts):
+        rows = range(start, stop)
         requests = [(first + i, int(places[i]), 0) for i in rows]
         settled = settle(spec, pools, split, requests, tally, device)
         for i in range(0, len(settled), batch):
