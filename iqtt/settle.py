@@ -8,16 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iqtt.draws import draw_lights, draw_rotations, rotation_angle_degrees
 from iqtt.polycube import ROTATIONS, symmetries
 from iqtt.questions import (
     Pools,
     Shapes,
     arrange,
-    draw_lights,
-    draw_rotations,
     draw_shapes,
     question_key,
-    rotation_angle_degrees,
 )
 from iqtt.specs import SplitSpec
 from iqtt.views import Question, cube_centres, pack_views

@@ -17,9 +17,9 @@ Array = NDArray[Any]
 TRUTHS = 4096  # rows of the truth among which the right one is sought
 PREDICTIONS = 64
 SIDE = 8  # pixels of each side by which rows are compared, at most twice as many
-OWN = 0.5  # the part of an own error to which another row's must fall
-CLEAR = 0.5  # the part of the second best row's error to which the best one's must fall
-FIT = 0.25  # the part of what a constant would score to which the best row's error must fall
+# Measured: of good predictions for other rooms 3 to 16% are so clear, among 8 to 4000 rows.
+CLEAR = 0.7  # the part of the second best row's error to which the best one's must fall
+FIT = 0.5  # the part of what a constant would score to which the best row's error must fall
 SHARE = 0.5  # of the predictions
 FEWEST = 4  # rows
 
@@ -60,7 +60,7 @@ def _other_row(predicted: Array, known: Array, own: int) -> int | None:
         return None
     best, second = np.argsort(errors)[:2].tolist()
     spread = float(np.nanmean(np.abs(known[best] - np.nanmedian(known[best]))))
-    most = min(CLEAR * errors[second], OWN * errors[own], FIT * spread)
+    most = min(CLEAR * errors[second], FIT * spread)
     return best if best != own and errors[best] <= most else None
 
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from iqtt.draws import draw_rotations, rotation_angle_degrees
 from iqtt.image_statistics import THUMBNAIL, Statistics, measure, silhouettes
 from iqtt.layout import NO_CUBE
 from iqtt.polycube import ROTATIONS, mirror, symmetries
-from iqtt.questions import draw_rotations, rotation_angle_degrees
 from iqtt.shape_proofs import compare_shapes
 from iqtt.shape_statistics import answer_statistics
 from iqtt.shapes import random_shapes

@@ -8,13 +8,11 @@ import pytest
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
+from iqtt.draws import draw_lights, draw_rotations, rotation_angle_degrees
 from iqtt.polycube import symmetries
 from iqtt.questions import (
     answer_positions,
-    draw_lights,
-    draw_rotations,
     question_key,
-    rotation_angle_degrees,
 )
 from iqtt.specs import SPLITS, SplitSpec
 

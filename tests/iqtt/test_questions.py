@@ -154,14 +154,6 @@ def test_any_cube_may_be_the_moved_one():
     assert (apart.sum(axis=0) >= 5).all()
 
 
-def test_the_seed_decides_which_split_has_which_classes():
-    one, other = (make_pools(replace(SPEC, cubes=(7, 7), seed=seed)) for seed in (2**63 - 1, 0))
-    for a, b in zip(one.catalogues[7].splits, other.catalogues[7].splits, strict=True):
-        assert len(a) == len(b)
-        shared = np.intersect1d(set_ids(a), set_ids(b))
-        assert len(shared) < 0.6 * len(a), "a third by chance"
-
-
 def check_that_answers_alone_tell_nothing(kind: str, cubes: int, count: int) -> None:
     """The odd one out, the most and the least compact, wide or symmetric: each is right as often as
     by chance, ties by lot, within 4 standard errors.
@@ -195,7 +187,7 @@ def test_answers_alone_tell_nothing(kind):
 @pytest.mark.parametrize("cubes", [6, 9, 12])
 @pytest.mark.parametrize("kind", KIND_NAMES)
 def test_many_answers_alone_tell_nothing(kind, cubes):
-    check_that_answers_alone_tell_nothing(kind, cubes, 20_000)
+    check_that_answers_alone_tell_nothing(kind, cubes, 10_000)
 
 
 def test_arranging_puts_the_right_answer_at_its_place():
@@ -214,57 +206,13 @@ def test_arranging_puts_the_right_answer_at_its_place():
     assert len(seen) == 6
 
 
-@pytest.mark.parametrize(
-    ("settings", "kind"),
-    [
-        ({"cubes": (3, 3)}, "other"),
-        ({"cubes": (4, 4)}, "other"),
-        ({"cubes": (4, 4), "shapes": "tree", "distractors": "near"}, "near"),
-        ({"cubes": (5, 5)}, "near"),
-        ({"cubes": (5, 5), "distractors": "mirror"}, "mirror"),
-        ({"cubes": (8, 8), "max_radius": 1.5, "min_cube_pixels": 1}, "other"),
-    ],
-)
-def test_too_few_shapes_are_told_before_anything_is_rendered(settings, kind, monkeypatch):
-    monkeypatch.setattr("scenegen.renderer.launch_fields", None)
-    spec = SplitSpec(**settings)
-    low, high = spec.cubes
-    with pytest.raises(TooFewShapesError) as error:
-        make_pools(spec)
-    assert str(error.value) == (
-        f"cubes: {spec.shapes} shapes of {low}-{high} cubes within radius {spec.max_radius:g} are"
-        f" too few for {kind!r} questions of their own in each of train, val, test;"
-        " take more --cubes, or a larger --max-radius"
-    )
-
-
-def test_a_request_that_does_not_tell_its_seed_is_refused():
-    with pytest.raises(SpecError, match="seed: found none, as in files that do not tell it"):
-        make_pools(SPEC.public())
-
-
-def test_sizes_that_do_not_allow_a_kind_are_left_out_of_it_alone():
-    sizes = pools_of(replace(SPEC, seed=0, cubes=(3, 7))).sizes
-    assert sizes == {"other": (5, 6, 7), "near": (6, 7), "mirror": (6, 7)}
-    assert draw(replace(SPEC, cubes=(5, 5), distractors="other"), 3)
-
-
-def test_where_few_shapes_of_many_cubes_are_found_those_are_shared_out(monkeypatch):
-    monkeypatch.setattr(questions, "DRAWN_CLASSES", 4000)
-    spec = replace(SPEC, cubes=(12, 12), max_radius=2.5)
-    pools = make_pools(spec)
-    assert [len(split) for split in pools.catalogues[12].splits] == [40] * 3
-    for shapes, _ in draw_shapes(spec, pools, "val", [(i, 0) for i in range(6)]):
-        assert (bounding_radius(shapes) <= 2.5).all()
-
-
 def test_a_reference_without_distractors_is_searched_for_so_often_only(monkeypatch):
+    spec = replace(SPEC, cubes=(7, 7), distractors="near")
+    pools = Pools(pools_of(SPEC).catalogues, {"near": (7,)})
     monkeypatch.setattr(questions, "SHAPE_ATTEMPTS", 3)
     monkeypatch.setitem(
         questions._MAKERS, "near", lambda spec, pool, split, rngs: [None] * len(rngs)
     )
-    spec = replace(SPEC, cubes=(7, 7), distractors="near")
-    pools = Pools(pools_of(SPEC).catalogues, {"near": (7,)})
     with pytest.raises(PlacementError) as error:
         draw_shapes(spec, pools, "test", [(4, 0), (9, 2)])
     assert str(error.value) == (

@@ -138,10 +138,13 @@ def test_a_question_alone_is_bit_for_bit_what_its_file_has(split, group):
         assert bits(alone) == bits(one)
 
 
-@pytest.mark.parametrize(("batch", "settled"), [(1, 512), (3, 512), (64, 1), (2, 5), (4, 4)])
-def test_neither_batch_nor_how_many_are_settled_changes_a_bit(batch, settled, monkeypatch):
+@pytest.mark.parametrize(
+    ("batch", "first", "settled"), [(1, 16, 512), (3, 7, 1), (64, 1, 1), (2, 1, 5), (4, 2, 4)]
+)
+def test_neither_batch_nor_how_many_are_settled_changes_a_bit(batch, first, settled, monkeypatch):
     tally, expected = Tally(), Tally()
     table = [bits(one) for one in rendered(SPEC, "train", "unlabeled", tally=expected)]
+    monkeypatch.setattr(module, "FIRST_SETTLED", first)
     monkeypatch.setattr(module, "SETTLED", settled)
     again = rendered(SPEC, "train", "unlabeled", batch=batch, tally=tally)
     assert [bits(one) for one in again] == table
@@ -166,6 +169,15 @@ def test_a_cube_hidden_in_the_full_image_after_all_has_its_question_made_anew(mo
         settle_module.PlacementError, match="no view of 1 choices of shapes shows 4"
     ):
         rendered(spec, "train", "unlabeled")
+
+
+def test_a_request_that_cannot_be_met_ends_after_a_few_questions(monkeypatch):
+    for name, value in {"MARGIN": 1000, "QUESTION_ATTEMPTS": 1, "VIEWS": 2}.items():
+        monkeypatch.setattr(settle_module, name, value)
+    tally = Tally()
+    with pytest.raises(settle_module.PlacementError, match="train question 0"):
+        rendered(replace(SPEC, train=600, labeled=0), "train", "unlabeled", tally=tally)
+    assert tally == Tally(2 * module.FIRST_SETTLED, 2 * module.FIRST_SETTLED)
 
 
 def test_every_cube_shows_in_every_image():

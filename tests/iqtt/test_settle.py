@@ -8,14 +8,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from iqtt import settle as module
+from iqtt.draws import draw_rotations, rotation_angle_degrees
 from iqtt.polycube import box_centre, symmetries
 from iqtt.questions import (
     Pools,
-    draw_rotations,
     draw_shapes,
     make_pools,
     question_key,
-    rotation_angle_degrees,
 )
 from iqtt.settle import Tally, settle
 from iqtt.specs import SplitSpec

@@ -371,6 +371,13 @@ def test_answers_to_a_training_file(truths, tmp_path):
                       answer=[0])  # fmt: skip
 
 
+def test_answers_to_no_questions(tmp_path):
+    with h5py.File(tmp_path / "iqtt-val.h5", "w") as file:
+        file["questions"] = np.zeros((0, 4, 32, 32, 3), "u1")
+    with pytest.raises(PredictionError, match="found no questions"):
+        write_answers(tmp_path / "a.h5", tmp_path / "iqtt-val.h5", method="m", answer=[])
+
+
 def test_answers_keep_an_existing_file(truths, tmp_path):
     (tmp_path / "a.h5").write_text("precious")
     given = {"method": "m", "answer": [0] * 6}

@@ -6,7 +6,7 @@ import tracemalloc
 import h5py
 import numpy as np
 import pytest
-from broken import CASES, edited, good_answers, good_rooms, make_truths, put
+from broken import CASES, damaged_chunk, edited, good_answers, good_rooms, make_truths, put
 
 from metrics.matching import match_problems, size_problems
 from metrics.prediction_file import find_truth, open_predictions
@@ -166,6 +166,18 @@ def test_only_the_first_few_ids_are_told(truths, tmp_path):
     )
 
 
+def test_a_damaged_row_does_not_hide_the_others(truths, tmp_path):
+    def spoil(file):
+        damaged_chunk("depth")(file)
+        file["depth"][6, 0, 0] = np.nan
+
+    problems = validate(edited(spoil)(tmp_path, truths.rooms))
+    assert [(one.dataset, one.rule, one.ids) for one in problems] == [
+        ("depth", "finite", (6,)),
+        ("depth", "readable", (3,)),
+    ]
+
+
 def test_problems_of_answers_at_once(truths, tmp_path):
     def spoil(file):
         file.attrs["run"] = 3
@@ -196,11 +208,14 @@ def test_without_depth_the_rest_is_still_told(truths, tmp_path):
 
 
 def test_another_truth_is_told_alone(truths, tmp_path):
-    """Held against the wrong rooms, no value means anything."""
+    """Held against the wrong rooms, neither size nor value means anything."""
 
     def spoil(file):
         file.attrs["truth_fingerprint"] = "f" * 64
-        file["depth"][0] = np.nan
+        for name in ("depth", "normal"):
+            half = file[name][:, ::2, ::2] * np.nan
+            del file[name]
+            file[name] = half
 
     (problem,) = validate(edited(spoil)(tmp_path, truths.rooms))
     assert problem.rule == "match"
