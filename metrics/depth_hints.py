@@ -17,6 +17,7 @@ SHARE = 0.6  # of the images in which it must
 CORRELATED = 0.6
 SWAPPED = 0.8
 SAME_SCALE = 1.5  # factors within which scales are taken for the same
+FEWEST = 3  # images that can share a scale
 OTHER_UNIT = 10.0
 UNITS = {1000.0: "millimetres for metres", 100.0: "centimetres for metres"}
 
@@ -130,7 +131,8 @@ def _scale(images: Sequence[_Image], alignment: str) -> str | None:
         return "looks normalised to 0..1"
     errors = [_error(image.predicted / scale, image.true) for image in images]
     near = np.mean([e <= 1.2 * i.spread for e, i in zip(errors, images, strict=True)]) >= SHARE
-    same = np.mean(np.abs(np.log(scales / scale)) <= 0.1) >= SHARE
+    alike = np.mean(np.abs(np.log(scales / scale)) <= 0.1) >= SHARE
+    same = alike and len(images) >= FEWEST
     other_unit = near and not 1.0 / OTHER_UNIT < scale < OTHER_UNIT
     if alignment != "none" or not (other_unit or (follows and same)):
         return None

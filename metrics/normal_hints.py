@@ -49,41 +49,6 @@ def _decoded(most: float) -> Callable[[Array, Sample], Array]:
     return lambda normal, _: 2.0 * normal / most - 1.0
 
 
-_REMEDIES.items():
-            angles = np.array([_mean_angle(s, remedy(normal, s)) for s, normal in pairs])
-            good = (angles <= BETTER * as_given) & (angles <= CLOSE_DEGREES)
-            if good.size and good.mean() >= SHARE and np.nanmedian(angles) < best:
-                best, found = float(np.nanmedian(angles)), text
-    expected = "vectors in the camera frame (x right, y up, z towards the viewer) facing the viewer"
-    return [] if found is None else [Problem("normal", HINT, expected, found)]
-
-
-def _mean_angle(sample: Sample, normal: Array) -> float:
-    """Mean angle to the true normals, in degrees; NaN where there is none to compare."""
-    mask = sample.mask & sample.true_normal.any(axis=-1)
-    p, t = normal[mask], sample.true_normal[mask]
-    p = p / np.abs(p).max(axis=-1, keepdims=True)
-    cosine = (p * t).sum(axis=-1) / np.linalg.norm(p, axis=-1)
-    angles = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    angles = angles[np.isfinite(angles)]
-    return float(angles.mean()) if 2 * len(angles) > np.count_nonzero(mask) else float("nan")
-
-
-def _signs(x: float, y: float, z: float) -> Callable[[Array, Sample], Array]:
-    return lambda normal, _: normal * np.array([x, y, z])
-
-
-def _decoded(most: float) -> Callable[[Array, Sample], Array]:
-    """2 n / most - 1, where no component is below 0 and some are near `most`."""
-
-    def decode(normal: Array, _: Sample) -> Array:
-        low, high = float(np.nanmin(normal)), float(np.nanmax(normal))
-        encoded = low >= 0.0 and 0.6 * most < high <= 1.001 * most
-        return 2.0 * normal / most - 1.0 if encoded else np.full_like(normal, np.nan)
-
-    return decode
-
-
 _REMEDIES: dict[str, Callable[[Array, Sample], Array]] = {
     "looks flipped: facing away from the viewer": _signs(-1, -1, -1),
     "looks like the world frame, not the camera frame": lambda n, s: n @ s.camera_from_world.T,

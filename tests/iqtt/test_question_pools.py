@@ -53,9 +53,10 @@ def test_a_request_that_does_not_tell_its_seed_is_refused():
 
 
 def test_sizes_that_do_not_allow_a_kind_are_left_out_of_it_alone():
-    sizes = pools_of(replace(SPEC, seed=0, cubes=(3, 7))).sizes
+    sizes = make_pools(replace(SPEC, seed=0, cubes=(3, 7))).sizes
     assert sizes == {"other": (5, 6, 7), "near": (6, 7), "mirror": (6, 7)}
-    assert draw(replace(SPEC, cubes=(5, 5), distractors="other"), 3)
+    alone = replace(SPEC, cubes=(5, 5), distractors="other")
+    assert len(draw_shapes(alone, make_pools(alone), "train", [(0, 0), (1, 0)])) == 2
 
 
 def test_where_few_shapes_of_many_cubes_are_found_those_are_shared_out(monkeypatch):

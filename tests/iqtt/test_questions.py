@@ -28,9 +28,8 @@ from iqtt.questions import (
     draw_shapes,
     make_pools,
 )
-from iqtt.shapes import TooFewShapesError
 from iqtt.specs import SPLITS, SplitSpec
-from scenegen.errors import PlacementError, SpecError
+from scenegen.errors import PlacementError
 
 SPEC = SplitSpec(seed=11, cubes=(6, 8), max_radius=2.7)
 CASES = [
