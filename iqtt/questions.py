@@ -125,7 +125,7 @@ def answer_positions(spec: SplitSpec, split: str, first: int, count: int) -> Arr
 
     The three positions come equally often, as nearly as the count allows.
     """
-    rng = item_rng(spec.seed or 0, question_key(split, first), Purpose.ANSWERS)
+    rng = item_rng(spec.seed or 0, question_key(split, first), Purpose.POSITIONS)
     return np.asarray(rng.permutation(np.arange(count) % 3).astype(np.uint8))
 
 

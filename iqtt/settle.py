@@ -31,6 +31,7 @@ VIEWS = 60  # rotations proposed for one image, before the question gets other s
 PROPOSED = 2  # views of one image judged at once, at least
 PROPOSALS_AT_ONCE = 256  # views judged at once, about
 QUESTION_ATTEMPTS = 50  # shapes of one question
+CROWDED = 10  # cubes from which a shape may well have no view that shows them all
 
 
 @dataclass
@@ -110,40 +111,46 @@ def _find_views(
 ) -> Array:
     """Return rotations under which every cube shows, (Q, 4, 3, 3); NaN where none was found.
 
-    Of the answers' proposals, those too near to the reference's view do not count.
+    Of the answers' proposals, those too near to the reference's view do not count. The right shape
+    is seen twice and a wrong one once, and a crowded shape often hides a cube: were that all, the
+    less crowded answers would be right more often. So from CROWDED cubes on each answer needs a
+    view as the reference too, and the answers keep away from all three; the right one's is used.
     """
     questions, slots = len(shapes), spec.cubes[1]
-    turns = np.empty((questions, 4, VIEWS, 3, 3))
+    turns = np.empty((questions, 6, VIEWS, 3, 3))  # of the answers as references, as answers
     for i, (index, _, attempt) in enumerate(requests):
         rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.VIEW, attempt)
-        turns[i] = draw_rotations(rng, (4, VIEWS))
-    centres = cube_centres([cubes for one in shapes for cubes in one.cubes], slots)
-    centres = centres.reshape(questions, 4, slots, 3)
+        turns[i] = draw_rotations(rng, (6, VIEWS))
+    centres = cube_centres([cubes for one in shapes for cubes in one.cubes[1:]], slots)
+    centres = np.tile(centres.reshape(questions, 3, slots, 3), (1, 2, 1, 1))
     counts = np.array([one.cubes.shape[1] for one in shapes])
-    found = np.full((questions, 4, 3, 3), np.nan)
+    right = np.array([one.answer for one in shapes])
+    found = np.full((questions, 6, 3, 3), np.nan)
 
-    def choose(rows: Array, some: slice, allowed: Array) -> None:
-        """Settle these images of these questions, of whose proposals some are allowed."""
-        proposals, images = turns[rows, some], allowed.shape[1]
+    def choose(some: slice, allowed: Array) -> None:
+        """Settle these images of all questions, (Q, 3, VIEWS) of whose proposals are allowed."""
         chosen = _first_good(
             spec,
-            proposals.reshape(-1, VIEWS, 3, 3),
+            turns[:, some].reshape(-1, VIEWS, 3, 3),
             allowed.reshape(-1, VIEWS),
-            centres[rows, some].reshape(-1, slots, 3),
-            np.repeat(counts[rows], images),
+            centres[:, some].reshape(-1, slots, 3),
+            np.repeat(counts, 3),
             tally,
             device,
-        ).reshape(-1, images)
+        ).reshape(-1, 3)
         question, image = np.nonzero(chosen >= 0)
-        best = proposals[question, image, chosen[question, image]]
-        found[rows[question], some.start + image] = best
+        best = turns[question, some.start + image, chosen[question, image]]
+        found[question, some.start + image] = best
 
-    everything = np.arange(questions)
-    choose(everything, slice(0, 1), np.ones((questions, 1, VIEWS), bool))
-    rows = np.flatnonzero(np.isfinite(found[:, 0]).all(axis=(1, 2)))
-    far = _far(spec, found[rows, 0], turns[rows, 1:], symmetric[rows, 1:])
-    choose(rows, slice(1, 4), far)
-    return found
+    needed = (np.arange(3) == right[:, None]) | (counts >= CROWDED)[:, None]
+    choose(slice(0, 3), np.repeat(needed[..., None], VIEWS, axis=2))
+    seen = np.isfinite(found[:, :3]).all(axis=(2, 3))
+    allowed = np.repeat((seen | ~needed).all(axis=1)[:, None], 3, axis=1)[..., None]
+    for reference in range(3):
+        far = _far(spec, found[:, reference], turns[:, 3:], symmetric[:, 1:])
+        allowed = allowed & (far | ~seen[:, reference, None, None])
+    choose(slice(3, 6), allowed)
+    return np.concatenate([found[np.arange(questions), right][:, None], found[:, 3:]], axis=1)
 
 
 def _far(spec: SplitSpec, reference: Array, turns: Array, symmetric: Array) -> Array:

@@ -196,7 +196,7 @@ def preset_spec(preset: str, **settings: Any) -> SplitSpec:
     """Return a preset's numbers of questions with other settings on top.
 
     Two settings that are not given follow others: `labeled` keeps the preset's share of `train`,
-    and `min_cube_pixels` the default's share of the image.
+    and `min_cube_pixels` the default's share of a cube's face.
 
     Raises SpecError.
     """
@@ -207,5 +207,7 @@ def preset_spec(preset: str, **settings: Any) -> SplitSpec:
     chosen = {**numbers, **settings}
     if "min_cube_pixels" not in chosen:
         side = min(chosen.get("height", 128), chosen.get("width", 128))
-        chosen["min_cube_pixels"] = max(1, round(SplitSpec.min_cube_pixels * (side / 128) ** 2))
+        radius = max(1.0, chosen.get("max_radius", SplitSpec.max_radius))  # 0 is refused below
+        edge = side / 128 * SplitSpec.max_radius / radius
+        chosen["min_cube_pixels"] = max(1, round(SplitSpec.min_cube_pixels * edge**2))
     return SplitSpec(**chosen)

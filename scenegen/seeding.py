@@ -22,6 +22,7 @@ class Purpose(IntEnum):
     VIEW = 6
     CATALOGUE = 7
     ANSWERS = 8
+    POSITIONS = 9
 
 
 def item_rng(seed: int, index: int, purpose: Purpose, attempt: int = 0) -> np.random.Generator:

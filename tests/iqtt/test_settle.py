@@ -12,6 +12,7 @@ from iqtt.draws import draw_rotations, rotation_angle_degrees
 from iqtt.polycube import box_centre, symmetries
 from iqtt.questions import (
     Pools,
+    Shapes,
     draw_shapes,
     make_pools,
     question_key,
@@ -157,14 +158,20 @@ def test_requests_that_say_so_begin_with_later_attempts(pools, settled):
     assert (first.light_position != later.light_position).any()
 
 
+def proposed(question):
+    """The rotations of which its reference's and its answers' were chosen, (4, VIEWS, 3, 3)."""
+    rng = item_rng(SPEC.seed, question_key("val", question.index), Purpose.VIEW, 0)
+    turns = draw_rotations(rng, (6, module.VIEWS))
+    return turns[[question.shapes.answer, 3, 4, 5]]
+
+
 def test_views_are_the_first_good_ones_of_those_drawn(pools, settled):
     """Which is what the tally counts: one accepted an image, and those before it refused."""
     questions, tally = settled
     assert {q.attempt for q in questions} == {0}
     refused = 0
     for question in questions:
-        rng = item_rng(SPEC.seed, question_key("val", question.index), Purpose.VIEW, 0)
-        proposals = draw_rotations(rng, (4, module.VIEWS))
+        proposals = proposed(question)
         for image in range(4):
             same = (proposals[image] == question.world_from_shape[image]).all(axis=(1, 2))
             assert same.sum() == 1
@@ -173,8 +180,7 @@ def test_views_are_the_first_good_ones_of_those_drawn(pools, settled):
     assert tally.refused <= refused, "those too near to the reference's view do not count"
     free, every = replace(SPEC, min_angle_degrees=0), Tally()
     for question in settle(free, pools, "val", REQUESTS, every):
-        rng = item_rng(SPEC.seed, question_key("val", question.index), Purpose.VIEW, 0)
-        proposals = draw_rotations(rng, (4, module.VIEWS))
+        proposals = proposed(question)
         found = (proposals == question.world_from_shape[:, None]).all(axis=(2, 3)).argmax(axis=1)
         every.refused -= int(found.sum())
     assert every.refused == 0
@@ -193,6 +199,36 @@ def test_a_shape_that_no_view_shows_whole_makes_way_for_another(pools, monkeypat
         assert (question.shapes.cubes[0] == cubes[0]).all()
     alone = [settle(SPEC, pools, "test", [request], Tally())[0] for request in REQUESTS]
     assert [bits(q) for q in alone] == [bits(q) for q in questions]
+
+
+def test_whether_crowded_shapes_are_asked_for_does_not_tell_which_is_right(monkeypatch):
+    """Given three shapes, a question comes about or not whichever of them is right; where each
+    answer needs but a view of its own, the right one is seen twice, and that tells."""
+    spec = replace(SPEC, cubes=(12, 12), max_radius=3.5, distractors="near", min_angle_degrees=60)
+    pools = make_pools(spec)
+    monkeypatch.setattr(module, "VIEWS", 12)
+    drawn = draw_shapes(spec, pools, "val", [(i, 0) for i in range(24)])
+    requests = [(i, 0, 0) for i in range(24)]
+
+    def came_about():
+        shown = []
+        for right in range(3):
+            order = [right, *(k for k in range(3) if k != right)]
+            shapes = [
+                Shapes(np.concatenate([cubes[[right]], cubes]), kinds[order], right)
+                for cubes, kinds in drawn
+            ]
+            symmetric = module._symmetries(shapes)
+            turns = module._find_views(spec, "val", requests, shapes, symmetric, Tally(), "auto")
+            shown.append(np.isfinite(turns).all(axis=(1, 2, 3)))
+        return np.array(shown)
+
+    fair = came_about()
+    assert (fair == fair[0]).all()
+    assert 0 < fair[0].sum() < 24
+    monkeypatch.setattr(module, "CROWDED", 13)
+    unfair = came_about()
+    assert (unfair != unfair[0]).any()
 
 
 def test_the_last_proposal_counts_as_well(pools, monkeypatch):
