@@ -53,7 +53,9 @@ SHOWN = 8  # questions that `show` draws unless told which
     help="Least rotation from the reference's view to an answer's, degrees.",
 )
 @click.option(
-    "--min-cube-pixels", type=int, help="Pixels every cube shows [default: 12 at 128x128 and radius 3.5]."
+    "--min-cube-pixels",
+    type=int,
+    help="Pixels every cube shows [default: 12 at 128x128, radius 3.5].",
 )
 @click.option("--max-radius", type=float, help="Of a shape, cube edges [default: 3.5].")
 @SIZE
