@@ -45,7 +45,8 @@ def score(
 ) -> None:
     """Score a submission, or several runs of one method, and print a table."""
     from metrics import report
-    from metrics.scoring import Settings, count_rows
+    from metrics.runs import Settings
+    from metrics.scoring import count_rows
     from metrics.scoring import score as score_files
     from scenegen.new_file import check_writable, written_beside
 

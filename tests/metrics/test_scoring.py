@@ -13,8 +13,9 @@ from iqtt.split import make_split
 from metrics.metric_names import metric
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.room_scores import ScoringError, view_angles
+from metrics.runs import Settings
 from metrics.score_file import read_scores, to_json, write_scores
-from metrics.scoring import Settings, score
+from metrics.scoring import score
 from scenegen.camera import Camera, back_project
 from scenegen.scene_file import RoomsFile
 
