@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 WIDTH, HEIGHT = 360, 170
-LEFT, RIGHT, TOP, BOTTOM = 46, 10, 24, 34
+LEFT, RIGHT, TOP, BOTTOM = 46, 28, 24, 34
 BINS = 30
 
 

@@ -41,7 +41,9 @@ svg .mean { stroke: #d55e00; stroke-width: 1.5; }
 svg .median { stroke: #009e73; stroke-width: 1.5; stroke-dasharray: 4 3; }
 .item { display: grid; grid-template-columns: repeat(4, minmax(0, 160px)); gap: .4rem;
   margin: .6rem 0 1.1rem; }
-.item p { grid-column: 1 / -1; margin: 0; } .item img { width: 100%; image-rendering: pixelated; }
+.item p { grid-column: 1 / -1; margin: 0; } .item figure { margin: 0; }
+.item img { width: 100%; image-rendering: pixelated; outline: 1px solid var(--line); }
+figcaption { font-size: 12px; color: var(--faint); }
 .note { color: var(--faint); } .warning { color: #b00020; font-weight: 600; }
 """
 
@@ -161,7 +163,8 @@ def _pictures(scores: ScoreFile, truth_path: Path, submission: Path) -> Iterator
                     predictions.depth(place[row]),
                 )
                 images = "".join(
-                    f'<img src="{url}" alt="{name} of row {row}" title="{name}">'
+                    f'<figure><img src="{url}" alt="{name} of row {row}">'
+                    f"<figcaption>{name}</figcaption></figure>"
                     for name, url in zip(COLUMNS, pictures, strict=True)
                 )
                 found = ", ".join(
