@@ -25,8 +25,9 @@ from benchmarks.scenes import read_depth, read_scenes
 from benchmarks.timing import repeat
 from scenegen.backend import select_variant
 from scenegen.camera import Camera, pixel_directions
+from scenegen.scenes import SceneSpec
 from scenegen.shapes import room_mesh, world_from_object
-from scenegen.specs import DatasetSpec, SceneSpec
+from scenegen.specs import DatasetSpec
 
 Array = NDArray[Any]
 WAYS = ("files", "merged", "instances")

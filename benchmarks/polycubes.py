@@ -20,7 +20,7 @@ from iqtt.split import make_split
 from iqtt.views import Question, cube_centres, pack_questions
 from scenegen.backend import select_variant
 from scenegen.renderer import launch_fields
-from scenegen.shapes import unit_mesh
+from scenegen.shapes import unit_shape, welded
 
 
 def end_to_end(questions: int, repeats: int, folder: str) -> dict[str, Any]:
@@ -74,7 +74,7 @@ def _questions(spec: SplitSpec, count: int) -> list[Question]:
 def _image(spec: SplitSpec, question: Question, i: int) -> dict[str, Any]:
     """Return mesh, lights and background of an image as `mi.load_dict` wants them."""
     cubes = question.shapes.cubes[i]
-    box = unit_mesh("box")
+    box = welded(unit_shape("box"))
     corners = np.asarray(box.vertices) * np.sqrt(3) / 2
     centres = cube_centres([cubes], len(cubes))[0]
     points = (centres[:, None] + corners).reshape(-1, 3) @ question.world_from_shape[i].T

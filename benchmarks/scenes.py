@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.scene_file import RoomsFile
-from scenegen.specs import DatasetSpec, SceneSpec
+from scenegen.scenes import SceneSpec
+from scenegen.specs import DatasetSpec
 
 Array = NDArray[Any]
 

@@ -13,7 +13,7 @@ from iqtt.question_truth import QuestionTruth
 from iqtt.table_file import TableFile, read_root, table_parts
 from scenegen.errors import FileFormatError, SpecError
 from scenegen.row_file import checking, open_file
-from scenegen.specs import IMAGE_DTYPES
+from scenegen.spec_checks import IMAGE_DTYPES
 from scenegen.truth import decode_image
 
 Array = NDArray[Any]

@@ -8,7 +8,8 @@ from iqtt.polycube import MAX_CUBES
 from iqtt.shapes import Kind
 from scenegen.camera import Camera, Vector3
 from scenegen.records import check, from_json, normalise, to_json
-from scenegen.specs import IMAGE_DTYPES, MAX_LIGHTS, DatasetSpec
+from scenegen.spec_checks import IMAGE_DTYPES, MAX_LIGHTS
+from scenegen.specs import DatasetSpec
 
 SPLITS = ("train", "val", "test")
 DISTRACTORS = ("other", "near", "mirror", "mixed")

@@ -12,6 +12,7 @@ from iqtt.polycube import box_centre
 from iqtt.questions import Shapes
 from iqtt.specs import SplitSpec
 from scenegen.packing import SceneBatch
+from scenegen.shapes import unit_shape
 from scenegen.specs import DatasetSpec
 
 Array = NDArray[Any]
@@ -89,6 +90,10 @@ def pack_views(
     position, color, light_count = lights or (dark, dark, np.zeros(batch))
     return SceneBatch(
         spec=render_spec,
+        names=render_spec.shapes,
+        shape_of=unit_shape,
+        index=np.zeros(batch, np.int64),
+        view=np.zeros(batch, np.int32),
         world_from_camera=np.repeat(camera.world_from_camera[None], batch, axis=0),
         fov_y_degrees=np.full(batch, camera.fov_y_degrees),
         object_count=counts.astype(np.int32),
@@ -97,6 +102,7 @@ def pack_views(
         world_from_object=world_from_object,
         object_scale=np.where(used, CUBE_SCALE, 0.0),
         reflectance=reflectance,
+        gloss=np.zeros((*reflectance.shape[:2], 2)),
         light_position=position,
         light_color=color,
         ambient=np.tile(spec.ambient, (batch, 1)),

@@ -14,7 +14,7 @@ from metrics.prediction_layout import MOST_ROWS, Dataset
 from metrics.prediction_texts import READ_ERRORS
 from metrics.problems import Problem
 from scenegen.row_file import reason
-from scenegen.specs import MAX_PIXELS
+from scenegen.spec_checks import MAX_PIXELS
 
 MOST_BYTES = 256 * 2**20  # to be unpacked for one row
 CHUNK_SLOTS = 10_007

@@ -1,4 +1,4 @@
-"""Rooms holding basic shapes, rendered with exact ground truth.
+"""Rooms holding objects, rendered with exact ground truth.
 
 Read a file:    `with scenegen.open_rooms("rooms.h5") as rooms: rooms[0].depth`
 Train on it:    `scenegen.RoomsDataset("rooms.h5", fields=("image", "depth"))`
@@ -15,8 +15,9 @@ if TYPE_CHECKING:
     from scenegen.dataset import make_dataset
     from scenegen.errors import SceneGenError
     from scenegen.scene_file import Room, RoomsDataset, RoomsFile, open_rooms
+    from scenegen.scenes import SceneSpec
     from scenegen.shading import shade
-    from scenegen.specs import DatasetSpec, SceneSpec
+    from scenegen.specs import DatasetSpec
 
 _HOME = {
     "Camera": "camera",
@@ -25,7 +26,7 @@ _HOME = {
     "RoomsDataset": "scene_file",
     "RoomsFile": "scene_file",
     "SceneGenError": "errors",
-    "SceneSpec": "specs",
+    "SceneSpec": "scenes",
     "back_project": "camera",
     "make_dataset": "dataset",
     "open_rooms": "scene_file",

@@ -119,6 +119,31 @@ class Items(click.ParamType):  # type: ignore[type-arg]
         return chosen
 
 
+class Names(click.ParamType):  # type: ignore[type-arg]
+    """`mug,bowl`, as a tuple of texts."""
+
+    name = "NAME,NAME"
+
+    def convert(
+        self, value: Any, _param: click.Parameter | None, _ctx: click.Context | None
+    ) -> Any:
+        """Parse."""
+        return tuple(part.strip() for part in str(value).split(","))
+
+
+class Numbers(click.ParamType):  # type: ignore[type-arg]
+    """`0,5,35`, as a tuple of numbers."""
+
+    name = "N,N"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse."""
+        parts = [part.strip() for part in str(value).split(",")]
+        if not all(re.fullmatch(NUMBER, part) for part in parts):
+            self.fail(f"found {value!r}, expected numbers such as 0,5,35", param, ctx)
+        return tuple(map(float, parts))
+
+
 class Color(click.ParamType):  # type: ignore[type-arg]
     """`white`, `black`, a grey such as `0.5`, or `R,G,B`, as three numbers."""
 
@@ -162,3 +187,22 @@ SIZE = click.option(
 SEED = click.option(
     "--seed", type=int, default=0, show_default=True, help="Seed of every random choice."
 )
+
+
+def MESHES(command: Any) -> Any:  # noqa: N802
+    """Add the options that say which meshes objects are made of."""
+    options = (
+        click.option("--shapenet-root", help="Folder of ShapeNetCore v1 or v2, for --classes."),
+        click.option("--objects-root", help="Folder of meshes, a sub-folder for each class."),
+        click.option(
+            "--up",
+            type=click.Choice(["y", "z"]),
+            default="y",
+            show_default=True,
+            help="Which axis points up in the meshes of --objects-root.",
+        ),
+        click.option("--cache-dir", help="Where cleaned meshes are kept [the user's cache]."),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command

@@ -7,41 +7,93 @@ from typing import Any
 
 import click
 
-from scenegen.command_line import COMPRESSION, DEVICE, IMAGE_DTYPE, SEED, SIZE, Items, Range
+from scenegen.command_line import (
+    COMPRESSION,
+    DEVICE,
+    IMAGE_DTYPE,
+    MESHES,
+    SEED,
+    Color,
+    Items,
+    Names,
+    Numbers,
+    Range,
+    Size,
+)
+from scenegen.mesh_commands import check_objects
 
+NUMBERS = Numbers()
 
-def _names(
-    _ctx: click.Context, _param: click.Parameter, value: str | None
-) -> tuple[str, ...] | None:
-    return None if value is None else tuple(part.strip() for part in value.split(","))
+OBJECT_OPTIONS = (
+    "shapes",
+    "classes",
+    "object_split",
+    "shapenet_root",
+    "objects_root",
+    "up",
+    "cache_dir",
+)
 
 
 @click.command()
-@click.option("--n", "count", type=int, required=True, help="Number of images.")
+@click.option("--n", "count", type=int, required=True, help="Number of scenes.")
 @click.option("--out", default="rooms.h5", show_default=True, help="File to write.")
+@click.option(
+    "--preset",
+    default="shapes",
+    show_default=True,
+    help="Settings to begin with; `scenegen presets` lists them. What follows goes on top.",
+)
 @SEED
-@SIZE
+@click.option("--size", type=Size(), help="Image size in pixels [128].")
+@click.option("--objects", type=Range(int), help="Objects a scene [1-3].")
+@click.option("--shapes", type=Names(), help="Basic shapes to draw from, such as box,sphere [all].")
+@click.option("--classes", type=Names(), help="Object classes to draw from, such as mug,bowl.")
 @click.option(
-    "--objects", type=Range(int), default="1-3", show_default=True, help="Objects a scene."
+    "--object-split",
+    type=click.Choice(["all", "train", "val", "test"]),
+    help="Which objects of a class to draw from [all].",
 )
+@MESHES
 @click.option(
-    "--shapes", callback=_names, help="Names to draw from, such as box,sphere [default: all]."
+    "--object-radius", type=Range(float), help="Bounding radius, scene units [0.11-0.22]."
 )
-@click.option("--object-radius", type=Range(float), help="Bounding radius, scene units.")
 @click.option(
     "--pose",
     type=click.Choice(["resting", "any"]),
-    default="resting",
-    show_default=True,
-    help="How objects lie: as they would stay, or turned anyhow.",
+    help="How objects lie: as they would stay, or turned anyhow [resting].",
 )
-@click.option("--lights", type=Range(int), default="1-3", show_default=True, help="Lights a scene.")
 @click.option(
-    "--shadows/--no-shadows", default=False, help="Whether objects cast shadows [default: no]."
+    "--views",
+    type=NUMBERS,
+    help="Degrees about the vertical from the input view to each view, as 0,5,35,55,80 [0].",
 )
-@click.option("--spp", type=int, default=1, show_default=True, help="Colour samples a pixel.")
-@click.option("--min-visible-pixels", type=int, help="Least pixels of each object [default: 0.3%].")
-@click.option("--allow-cropped", is_flag=True, help="Let the image's border cut objects.")
+@click.option("--min-visible-pixels", type=int, help="Least pixels of each object [0.3%].")
+@click.option("--allow-cropped", is_flag=True, default=None, help="Let the border cut objects.")
+@click.option("--reflectance", type=Color(), help="Of objects, and unless told of the room [0.8].")
+@click.option("--room-reflectance", type=Color(), help="Of floor and walls.")
+@click.option(
+    "--random-reflectance/--same-reflectance",
+    default=None,
+    help="A colour for every object [same].",
+)
+@click.option("--specular", type=Range(float), help="Phong's k_s of objects [0].")
+@click.option("--shininess", type=Range(float), help="Phong's exponent of objects [1].")
+@click.option("--lights", type=Range(int), help="Lights a scene [1-3].")
+@click.option("--light-saturation", type=float, help="How coloured, 0 (white) to 1 [0.7].")
+@click.option("--light-level", type=float, help="Radiance of white that faces all lights [0.95].")
+@click.option("--light-radius", type=float, help="Distance of lights, scene units [2.5].")
+@click.option("--ambient", type=Color(), help="Ambient light L_a [0.1].")
+@click.option("--attenuation", type=NUMBERS, help="k_l,k_q of the shading equation [0.5,0.5].")
+@click.option(
+    "--shading",
+    type=click.Choice(["paper", "path"]),
+    help="path: images by path tracing, with shadows and indirect light; slower [paper].",
+)
+@click.option("--shadows/--no-shadows", default=None, help="Whether objects cast shadows [no].")
+@click.option("--spp", type=int, help="Colour samples a pixel [1].")
+@click.option("--fov", "fov_degrees", type=float, help="Field of view, degrees [28].")
+@click.option("--camera-radius", type=float, help="Distance of cameras, scene units [1.5].")
 @IMAGE_DTYPE
 @COMPRESSION
 @click.option("--batch", type=int, default=64, show_default=True, help="Images in one wavefront.")
@@ -50,7 +102,8 @@ def _names(
 def render(
     count: int,
     out: str,
-    size: tuple[int, int],
+    preset: str,
+    size: tuple[int, int] | None,
     batch: int,
     device: str,
     compression: str,
@@ -61,14 +114,19 @@ def render(
     from tqdm import tqdm
 
     from scenegen.dataset import make_dataset
-    from scenegen.specs import DatasetSpec
+    from scenegen.object_sources import object_source
+    from scenegen.presets import preset_spec
 
+    objects = {name: settings.pop(name) for name in OBJECT_OPTIONS}
     chosen = {name: value for name, value in settings.items() if value is not None}
-    chosen.setdefault("min_visible_pixels", max(1, round(0.003 * size[0] * size[1])))
-    spec = DatasetSpec(height=size[0], width=size[1], **chosen)
+    if size is not None:
+        chosen["height"], chosen["width"] = size
+    source = object_source(preset, **objects)
+    spec = preset_spec(preset, **chosen, **source.settings)
     command = " ".join(["scenegen", *sys.argv[1:]])
+    images = count * len(spec.views)
     started = time.perf_counter()
-    with tqdm(total=count, unit="img", disable=None, leave=False, smoothing=0.1) as bar:
+    with tqdm(total=images, unit="img", disable=None, leave=False, smoothing=0.1) as bar:
         make_dataset(
             out,
             spec,
@@ -78,11 +136,30 @@ def render(
             compression=compression,
             overwrite=overwrite,
             command=command,
+            objects=source.objects,
             progress=bar.update,
         )
     seconds = time.perf_counter() - started
     megabytes = Path(out).stat().st_size / 1e6
-    click.echo(f"{out}: {count} images, {megabytes:.1f} MB, {count / seconds:.0f} images/s")
+    click.echo(f"{out}: {images} images, {megabytes:.1f} MB, {images / seconds:.0f} images/s")
+    for line in source.notes():
+        click.echo(line, err=True)
+
+
+@click.command()
+def presets() -> None:
+    """List the presets of `render`: the paper's data sets."""
+    from scenegen.presets import PRESETS
+
+    width = max(map(len, PRESETS))
+    for name, preset in PRESETS.items():
+        click.echo(f"{name:{width}}  {preset.meaning}")
+        options = (f"{key} {_shown(value)}" for key, value in preset.settings.items())
+        click.echo(f"{'':{width}}  {', '.join(options) or 'the defaults'}")
+
+
+def _shown(value: Any) -> str:
+    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 @click.command()
@@ -122,19 +199,22 @@ def info(file: str) -> None:
     show_default=True,
     help="Rows to draw and render again.",
 )
+@MESHES
 @DEVICE
 @click.pass_context
-def verify(ctx: click.Context, file: str, items: int, device: str) -> None:
+def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: Any) -> None:
     """Check layout and values of every row, render some again; exits with 1 if a check fails."""
     from tqdm import tqdm
 
+    from scenegen.object_sources import file_objects
     from scenegen.scene_file import RoomsFile
     from scenegen.verify import verify_file
 
     with RoomsFile(file) as rooms:
         count = len(rooms)
+        objects = file_objects(rooms.spec, **meshes)
     with tqdm(total=count, unit="img", disable=None, leave=False) as bar:
-        checks = verify_file(file, items, device, bar.update)
+        checks = verify_file(file, items, device, objects, bar.update)
     for check in checks:
         click.echo(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:26} {check.detail}")
     failed = sum(not check.ok for check in checks)
@@ -175,4 +255,4 @@ def export(file: str, items: list[int], form: str, out: str, overwrite: bool) ->
         click.echo("\n".join(map(str, some)))
 
 
-COMMANDS = (render, preview, info, verify, export)
+COMMANDS = (render, presets, preview, info, verify, export, check_objects)

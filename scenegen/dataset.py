@@ -9,11 +9,13 @@ from typing import Any
 from scenegen.backend import select_variant
 from scenegen.errors import SpecError
 from scenegen.new_file import check_writable
+from scenegen.objects import Objects, objects_of
 from scenegen.packing import pack
 from scenegen.renderer import launch
 from scenegen.sampling import MAX_ATTEMPTS, refusal, sample_scene
-from scenegen.scene_writer import RenderedRoom, create_rooms
-from scenegen.specs import DatasetSpec, SceneSpec
+from scenegen.scene_writer import RenderedScene, create_rooms
+from scenegen.scenes import SceneSpec
+from scenegen.specs import DatasetSpec
 from scenegen.truth import GroundTruth, visible_pixels
 
 DEFAULT_BATCH = 64
@@ -32,14 +34,16 @@ def make_dataset(
     compression: str = "gzip",
     overwrite: bool = False,
     command: str = "",
+    objects: Objects | None = None,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> None:
-    """Render items 0 .. count - 1 of `spec` to a rooms file.
+    """Render scenes 0 .. count - 1 of `spec` to a rooms file, each with a row for each view.
 
     Args:
         batch: images in one wavefront; bounds memory, never changes a byte of a row.
         device, compression: as in `backend.DEVICES` and `scene_writer.COMPRESSIONS`.
         command: what to record as the file's creation command.
+        objects: what the scenes are made of; None for `objects_of(spec)`.
         progress: is told, now and then, how many more rows were written.
 
     Raises:
@@ -54,6 +58,8 @@ def make_dataset(
         raise SpecError(f"batch: found {batch}, expected at most {most} images of this size")
     check_writable(Path(path), overwrite)
     variant = select_variant(device)
+    objects = objects or objects_of(spec)
+    views = range(len(spec.views))
     attributes = {"creation_command": command, "variant": variant}
     with (
         create_rooms(
@@ -68,11 +74,11 @@ def make_dataset(
     ):
         writing: deque[Future[int]] = deque()
 
-        def write(items: list[RenderedRoom]) -> int:
-            writer.append(items, pack(spec, [item.scene for item in items]))
-            return len(items)
+        def write(items: list[RenderedScene]) -> int:
+            writer.append(items, pack(spec, [item.scene for item in items], views, objects))
+            return len(items) * len(views)
 
-        for items in render_items(spec, range(count), batch, device):
+        for items in render_items(spec, range(count), batch, device, objects):
             writing.append(pool.submit(write, items))
             if len(writing) > 2:
                 progress(writing.popleft().result())
@@ -81,18 +87,25 @@ def make_dataset(
 
 
 def render_items(
-    spec: DatasetSpec, indices: range, batch: int, device: str = "auto"
-) -> Iterator[list[RenderedRoom]]:
+    spec: DatasetSpec,
+    indices: range,
+    batch: int,
+    device: str = "auto",
+    objects: Objects | None = None,
+) -> Iterator[list[RenderedScene]]:
     """Yield accepted items in order, as they become complete.
 
     While a batch is cast, the next one is proposed. An item whose objects do not all show enough
     pixels is proposed again in the next batch; new items wait when the oldest falls far behind.
     """
+    objects = objects or objects_of(spec)
+    views = range(len(spec.views))
+    batch = max(1, batch // len(views))  # scenes
     next_in = 0
     retries: deque[int] = deque()
     attempts: dict[int, int] = {}
     rendered: dict[int, int] = {}
-    finished: dict[int, RenderedRoom] = {}
+    finished: dict[int, RenderedScene] = {}
     next_out = 0
 
     def propose() -> list[SceneSpec]:
@@ -106,7 +119,7 @@ def render_items(
                 next_in += 1
             else:
                 break
-            scenes.append(_next_proposal(spec, index, attempts, rendered))
+            scenes.append(_next_proposal(spec, index, attempts, rendered, objects))
         return scenes
 
     scenes: list[SceneSpec] = []
@@ -116,27 +129,18 @@ def render_items(
             scenes = propose()
             if not scenes:
                 return
-            pending = launch(pack(spec, scenes), device)
+            pending = launch(pack(spec, scenes, views, objects), device)
         following = propose()
         truth = pending()
-        pending = launch(pack(spec, following), device) if following else None
-        visible = visible_pixels(truth.object_id, spec.object_slots)
-        for row, scene in enumerate(scenes):
-            shown = visible[row, : len(scene.objects)]
-            if (shown >= spec.min_visible_pixels).all():
-                finished[scene.index] = RenderedRoom(
-                    scene,
-                    truth.image[row],
-                    truth.depth[row],
-                    truth.normal[row],
-                    truth.object_id[row],
-                    visible[row],
-                )
-                attempts.pop(scene.index)
-                rendered.pop(scene.index)
-            else:
+        pending = launch(pack(spec, following, views, objects), device) if following else None
+        for scene, shown in zip(scenes, _shown(spec, scenes, truth), strict=True):
+            if shown is None:
                 retries.append(scene.index)
                 rendered[scene.index] += 1
+            else:
+                finished[scene.index] = shown
+                attempts.pop(scene.index)
+                rendered.pop(scene.index)
         scenes = following
         ready = []
         while next_out < len(indices) and indices[next_out] in finished:
@@ -146,14 +150,31 @@ def render_items(
             yield ready
 
 
+def _shown(
+    spec: DatasetSpec, scenes: list[SceneSpec], truth: GroundTruth
+) -> Iterator[RenderedScene | None]:
+    """Yield each scene with its pixels, or None where an object shows too few in some view."""
+    visible = visible_pixels(truth.object_id, spec.object_slots)
+    views = len(spec.views)
+    for row, scene in enumerate(scenes):
+        images = slice(row * views, (row + 1) * views)
+        enough = visible[images, : len(scene.objects)] >= spec.min_visible_pixels
+        pixels = (truth.image, truth.depth, truth.normal, truth.object_id, visible)
+        yield RenderedScene(scene, *(values[images] for values in pixels)) if enough.all() else None
+
+
 def _next_proposal(
-    spec: DatasetSpec, index: int, attempts: dict[int, int], rendered: dict[int, int]
+    spec: DatasetSpec,
+    index: int,
+    attempts: dict[int, int],
+    rendered: dict[int, int],
+    objects: Objects,
 ) -> SceneSpec:
     """Return the item's next proposal that places all its objects."""
     rendered.setdefault(index, 0)
     for attempt in range(attempts.get(index, 0), MAX_ATTEMPTS):
-        scene = sample_scene(spec, index, attempt)
+        scene = sample_scene(spec, index, attempt, objects)
         if scene is not None:
             attempts[index] = attempt + 1
             return scene
-    raise refusal(spec, index, rendered[index])
+    raise refusal(spec, index, rendered[index], objects)

@@ -64,7 +64,7 @@ def _ranges(rooms: RoomsFile, rows: NDArray[np.int_]) -> tuple[dict[str, tuple[f
     for i in rows.tolist():
         room = rooms[i]
         for item in room.scene.objects:
-            counts[item.shape] = counts.get(item.shape, 0) + 1
+            counts[item.name] = counts.get(item.name, 0) + 1
         values = {
             "radiance": room.radiance,
             "depth": room.depth[np.isfinite(room.depth)],

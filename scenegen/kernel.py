@@ -23,6 +23,7 @@ class Scenes:
 
     Attributes:
         unit: the Mitsuba scene of unit shapes.
+        grid: as in `UnitScene`; where it is not 0, `from_world` does not move to `place`.
         slots, light_slots: K objects and L lights a scene at most.
         count: objects in each scene, (B,).
         has_room: whether the scene has its room, (B,).
@@ -33,10 +34,12 @@ class Scenes:
         first_triangle: first row of `triangles` of the object's shape, or SPHERE, (B K).
         triangles: face normal and corner normals, (F, 12).
         reflectance: rho by object id, (B (1 + K), 3).
+        gloss: Phong's k_s and exponent by object id, (B (1 + K), 2); None where all is matte.
         lights: ambient, k_l, k_q, then position and colour of each light, (B, 5 + 6 L).
     """
 
     unit: Any
+    grid: float
     slots: int
     light_slots: int
     count: Any
@@ -48,6 +51,7 @@ class Scenes:
     first_triangle: Any
     triangles: Any
     reflectance: Any
+    gloss: Any
     lights: Any
 
 
@@ -141,25 +145,34 @@ def normal_at(
     return dr.select(object_id >= 0, n, mi.Vector3f(0))
 
 
-def radiance_at(scenes: Scenes, item: Any, p: Any, n: Any, object_id: Any, shadows: bool) -> Any:
+def radiance_at(
+    scenes: Scenes, item: Any, p: Any, d: Any, n: Any, object_id: Any, shadows: bool
+) -> Any:
     """Return the shading equation at a hit (reference: `shading.shade`), else the background."""
     record = gather_row(scenes.lights, item, 5 + 6 * scenes.light_slots)
-    total = mi.Vector3f(*record[:3])
+    row = item * (1 + scenes.slots) + mi.UInt32(dr.maximum(object_id, 0))
+    total, shine = mi.Vector3f(*record[:3]), mi.Vector3f(0)
+    if scenes.gloss is not None:
+        specular, shininess = gather_row(scenes.gloss, row, 2)
+        mirrored = dr.normalize(d - 2 * dr.dot(d, n) * n)  # where the viewer would see a mirror's
     for j in range(scenes.light_slots):
         light = record[5 + 6 * j : 11 + 6 * j]
         to_light = mi.Vector3f(*light[:3]) - p
         distance = dr.norm(to_light)
         cosine = dr.maximum(dr.dot(n, to_light) / distance, 0)
-        amount = cosine / ((record[3] + record[4] * distance) * distance)
-        amount = dr.select(distance > 0, amount, 0)
+        falloff = (record[3] + record[4] * distance) * distance
+        amount = dr.select(distance > 0, cosine / falloff, 0)
         if shadows:
             start = p + SHADOW_OFFSET * n
             amount = dr.select(occluded(scenes, item, start, to_light, cosine > 0), 0, amount)
         total += amount * mi.Vector3f(*light[3:])
-    row = item * (1 + scenes.slots) + mi.UInt32(dr.maximum(object_id, 0))
+        if scenes.gloss is not None:
+            toward = dr.maximum(dr.dot(mirrored, to_light) / distance, 0)
+            lobe = dr.select(amount > 0, specular * dr.power(toward, shininess) / falloff, 0)
+            shine += lobe * mi.Vector3f(*light[3:])
     rho = mi.Vector3f(*gather_row(scenes.reflectance, row, 3))
     background = mi.Vector3f(*gather_row(scenes.background, item, 3))
-    return dr.select(object_id >= 0, rho * total, background)
+    return dr.select(object_id >= 0, rho * total + shine, background)
 
 
 def _bounding_interval(scenes: Scenes, row: Any, o: Any, d: Any) -> tuple[Any, Any, Any]:
@@ -179,6 +192,9 @@ def _to_unit_scene(scenes: Scenes, row: Any, p: Any, d: Any) -> tuple[Any, Any]:
     table = gather_row(scenes.from_world, row, 12)
     linear = [mi.Vector3f(*table[i : i + 3]) for i in (0, 4, 8)]
     point = mi.Point3f(*(dr.dot(linear[i], p) + table[4 * i + 3] for i in range(3)))
+    if scenes.grid:
+        place = mi.Point3f(*gather_row(scenes.place, row, 3))
+        point = dr.round(point / scenes.grid) * scenes.grid + place
     return point, mi.Vector3f(*(dr.dot(linear[i], d) for i in range(3)))
 
 

@@ -10,7 +10,7 @@ from scenegen.row_file import Column
 from scenegen.specs import DatasetSpec
 
 FORMAT_NAME = "pix2shape-bench/rooms"
-FORMAT_VERSION = "1.0"
+FORMAT_VERSION = "2.0"
 
 
 @dataclass(frozen=True)
@@ -73,6 +73,14 @@ FIELDS = (
     Field("scene_index", (), "int64", "1", "-", "which scene the image shows"),
     Field("view_index", (), "int32", "1", "-", "which view of that scene, from 0"),
     Field(
+        "view_angle_degrees",
+        (),
+        "float64",
+        "degree",
+        "-",
+        "from the scene's input view (view 0), about the vertical axis",
+    ),
+    Field(
         "camera/world_from_camera",
         (4, 4),
         "float64",
@@ -115,14 +123,38 @@ FIELDS = (
         "RGB by object id",
         "rho of the room (row 0) and of each object (row k); zero in unused slots",
     ),
+    Field(
+        "material/specular",
+        ("K+1",),
+        "float64",
+        "1",
+        "by object id",
+        "k_s of Phong's lobe; 0 for the room and in unused slots",
+    ),
+    Field(
+        "material/shininess",
+        ("K+1",),
+        "float64",
+        "1",
+        "by object id",
+        "exponent of Phong's lobe; 1 for the room and in unused slots",
+    ),
     Field("object/count", (), "int32", "1", "-", "number of objects"),
     Field(
         "object/shape",
         ("K",),
-        "int8",
+        "int16",
         "1",
         "-",
-        "index into the attribute `names`; -1 in unused slots",
+        "basic shape or class, index into the attribute `names`; -1 in unused slots",
+    ),
+    Field(
+        "object/model",
+        ("K",),
+        "text",
+        "-",
+        "-",
+        "which model of the class, class/model; the shape's name for a basic shape",
     ),
     Field(
         "object/world_from_object",

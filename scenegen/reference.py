@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from scenegen.camera import pixel_directions
 from scenegen.packing import SceneBatch
 from scenegen.shading import shade
-from scenegen.shapes import unit_shape
+from scenegen.solids import UnitShape
 from scenegen.truth import GroundTruth, encode_image
 
 Array = NDArray[Any]
 SHADOW_OFFSET = 1e-4  # scene units; shadow rays start so far off the surface
 SAMPLE_STEPS = (0.7548776662466927, 0.5698402909980532)  # Roberts' R2 sequence
 
-# (shape name, origins (R, 3), directions (R, 3)) -> ray parameter (inf: no hit), normals (R, 3);
+# (object's name, origins (R, 3), directions (R, 3)) -> ray parameter (inf: no hit), normals (R, 3);
 # unit shape's frame; directions need not be unit; normals are smooth, face the ray's origin.
 Cast = Callable[[str, Array, Array], tuple[Array, Array]]
 
@@ -89,7 +89,7 @@ def _closest(
     normal = np.where(inside[:, None], np.eye(3)[axis], 0.0)
     object_id = np.where(inside, 0, -1)
     for k in range(int(batch.object_count[b])):
-        name = batch.spec.shapes[batch.shape[b, k]]
+        name = batch.names[batch.shape[b, k]]
         start, along, meets = _to_object_frame(
             batch, b, k, np.broadcast_to(origin, rays.shape), rays
         )
@@ -107,28 +107,41 @@ def _closest(
 def _shade(
     batch: SceneBatch, b: int, points: Array, normal: Array, object_id: Array, cast: Cast
 ) -> Array:
-    reflectance = batch.reflectance[b, np.maximum(object_id, 0)]
     light_count = int(batch.light_count[b])
     positions, colors = batch.light_position[b, :light_count], batch.light_color[b, :light_count]
-    ambient, attenuation = batch.ambient[b], batch.attenuation[b]
+    material = np.maximum(object_id, 0)
+    specular, shininess = batch.gloss[b, material].T
+
+    def lit(positions: Array, colors: Array, ambient: Array) -> Array:
+        return shade(
+            points,
+            normal,
+            batch.reflectance[b, material],
+            positions,
+            colors,
+            ambient,
+            batch.attenuation[b],
+            specular,
+            shininess,
+            batch.world_from_camera[b, :3, 3] if batch.spec.specular[1] > 0 else None,
+        )
+
+    ambient = batch.ambient[b]
     if not batch.spec.shadows:
-        return shade(points, normal, reflectance, positions, colors, ambient, attenuation)
+        return lit(positions, colors, ambient)
     dark = np.zeros((0, 3))
-    total = shade(points, normal, reflectance, dark, dark, ambient, attenuation)
+    total = lit(dark, dark, ambient)
     for position, color in zip(positions, colors, strict=True):
         start = points + SHADOW_OFFSET * normal
-        lit = ~_occluded(batch, b, start, position - points, cast)
-        one = shade(
-            points, normal, reflectance, position[None], color[None], 0 * ambient, attenuation
-        )
-        total += np.where(lit[:, None], one, 0.0)
+        seen = ~_occluded(batch, b, start, position - points, cast)
+        total += np.where(seen[:, None], lit(position[None], color[None], 0 * ambient), 0.0)
     return total
 
 
 def _occluded(batch: SceneBatch, b: int, start: Array, to_light: Array, cast: Cast) -> Array:
     blocked = np.zeros(len(start), bool)
     for k in range(int(batch.object_count[b])):
-        name = batch.spec.shapes[batch.shape[b, k]]
+        name = batch.names[batch.shape[b, k]]
         local, along, meets = _to_object_frame(batch, b, k, start, to_light)
         distance, _ = cast(name, local[meets], along[meets])
         blocked[meets] |= (distance > 0) & (distance < 1)
@@ -148,14 +161,15 @@ def _to_object_frame(
     return start, along, np.einsum("ri,ri->r", miss, miss) < 1.0002
 
 
-def smooth_normals(name: str, triangle: Array, u: Array, v: Array, directions: Array) -> Array:
+def smooth_normals(
+    shape: UnitShape, triangle: Array, u: Array, v: Array, directions: Array
+) -> Array:
     """Return unit normals facing the rays at points (u, v) of triangles, unit shape's frame.
 
     Args:
         triangle, u, v: (R,); the point is (1 - u - v) a + u b + v c of the triangle's corners.
         directions: of the rays that hit, (R, 3).
     """
-    shape = unit_shape(name)
     corners, normals = shape.triangles[triangle], shape.normals[triangle]
     weights = np.stack([1 - u - v, u, v], axis=1)
     n = np.einsum("rk,rki->ri", weights, normals)

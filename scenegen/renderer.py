@@ -2,19 +2,22 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.backend import select_variant
+from scenegen.backend import HOW_TO_GET_LLVM, select_variant
+from scenegen.errors import BackendError
 from scenegen.packing import SceneBatch
 from scenegen.reference import face_viewer, render_reference, smooth_normals
-from scenegen.shapes import unit_shape
+from scenegen.solids import UnitShape
 from scenegen.truth import GroundTruth
 
 Array = NDArray[Any]
+MOST_FACES = 2_000_000  # of one scene's models
+MOST_MODELS = 2000  # of one scene; `model_scene` has room for some more
 
 
 def render(batch: SceneBatch, device: str = "auto") -> GroundTruth:
@@ -37,35 +40,82 @@ def launch_fields(
 ) -> Callable[[], dict[str, Array]]:
     """As `launch`, for some fields of `GroundTruth` by name; the others cost nothing."""
     variant = select_variant(device)
+    if batch.spec.shading == "path" and "image" in names:
+        return _with_traced_image(batch, names, variant, device)
     if variant == "scalar_rgb":
 
+        def cast(name: str, origins: Array, directions: Array) -> tuple[Array, Array]:
+            return _scalar_cast(batch.shape_of(name), origins, directions)
+
         def fetch() -> dict[str, Array]:
-            truth = render_reference(batch, _scalar_cast)
+            truth = render_reference(batch, cast)
             return {name: getattr(truth, name) for name in names}
 
         return fetch
     from scenegen.wavefront import launch_wavefront  # imports drjit, which no other path needs
 
-    return launch_wavefront(batch, variant, names)
+    first, *others = parts(batch)
+    fetch_first = launch_wavefront(first, variant, names)
+    if not others:
+        return fetch_first
+
+    def fetch_all() -> dict[str, Array]:
+        found = [fetch_first()]
+        found += [launch_wavefront(part, variant, names)() for part in others]
+        return {name: np.concatenate([one[name] for one in found]) for name in names}
+
+    return fetch_all
 
 
-@cache
-def _scalar_scene(name: str) -> Any:
+def _with_traced_image(
+    batch: SceneBatch, names: Sequence[str], variant: str, device: str
+) -> Callable[[], dict[str, Array]]:
+    if variant == "scalar_rgb":
+        raise BackendError(f"shading path: needs the fast path; {HOW_TO_GET_LLVM}")
+    from scenegen.path_tracer import trace_images  # imports drjit, as above
+
+    fetch = launch_fields(batch, [name for name in names if name != "image"], device)
+    return lambda: {**fetch(), "image": trace_images(batch, variant)}
+
+
+def parts(batch: SceneBatch) -> list[SceneBatch]:
+    """Cut a batch where its models together would have too many faces for one scene.
+
+    An image's bits do not depend on the rest of its batch, so nobody can tell.
+    """
+    if batch.spec.source == "shapes":
+        return [batch]
+    starts, seen, faces = [0], set[int](), 0
+    for row, shapes in enumerate(batch.shape):
+        new = set(shapes[shapes >= 0].tolist()) - seen
+        more = sum(len(batch.shape_of(batch.names[i]).triangles) for i in new)
+        if row > starts[-1] and (faces + more > MOST_FACES or len(seen | new) > MOST_MODELS):
+            starts.append(row)
+            seen, faces = set(), 0
+            new = set(shapes[shapes >= 0].tolist())
+            more = sum(len(batch.shape_of(batch.names[i]).triangles) for i in new)
+        seen |= new
+        faces += more
+    ends = [*starts[1:], len(batch)]
+    return [batch.rows(start, end) for start, end in zip(starts, ends, strict=True)]
+
+
+@lru_cache(maxsize=64)
+def _scalar_scene(shape: UnitShape) -> Any:
     import mitsuba as mi
 
     from scenegen.unit_scene import mitsuba_shape
 
     mi.set_variant("scalar_rgb")
-    shape = unit_shape(name)
     return mi.load_dict({"type": "scene", "shape": mitsuba_shape(shape, np.zeros(3))})
 
 
-def _scalar_cast(name: str, origins: Array, directions: Array) -> tuple[Array, Array]:
+def _scalar_cast(shape: UnitShape, origins: Array, directions: Array) -> tuple[Array, Array]:
     """Cast rays one by one (a `reference.Cast`); slow, but there wherever Mitsuba is."""
     import mitsuba as mi
 
     mi.set_variant("scalar_rgb")
-    scene = _scalar_scene(name)
+    scene = _scalar_scene(shape)
     t = np.full(len(origins), np.inf)
     triangle, u, v = (
         np.zeros(len(origins), np.int64),
@@ -79,7 +129,7 @@ def _scalar_cast(name: str, origins: Array, directions: Array) -> tuple[Array, A
         if hit.is_valid():
             t[i], triangle[i] = hit.t, hit.prim_index
             u[i], v[i] = hit.prim_uv
-    if not unit_shape(name).is_sphere:
-        return t, smooth_normals(name, triangle, u, v, directions)
+    if not shape.is_sphere:
+        return t, smooth_normals(shape, triangle, u, v, directions)
     points = origins + np.where(np.isfinite(t), t, 0.0)[:, None] * directions
     return t, face_viewer(points / np.linalg.norm(points, axis=1, keepdims=True), directions)

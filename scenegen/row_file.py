@@ -105,9 +105,10 @@ class Table:
     def _flush(self) -> None:
         for name, rows in self._block.items():
             if rows:
-                text = isinstance(rows[0], str)
-                values = rows if text else np.stack(rows)
-                self._datasets[name][self.rows - len(rows) : self.rows] = values
+                dataset = self._datasets[name]
+                text = h5py.check_string_dtype(dataset.dtype) is not None
+                values = np.array(rows, object) if text else np.stack(rows)
+                dataset[self.rows - len(rows) : self.rows] = values
                 rows.clear()
 
 

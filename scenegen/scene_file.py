@@ -15,7 +15,8 @@ from scenegen.camera import back_project, transform_points
 from scenegen.errors import FileFormatError, SpecError
 from scenegen.layout import FIELDS, FORMAT_NAME, FORMAT_VERSION, columns
 from scenegen.row_file import and_more, check_version, checking, column_problems, open_file, reason
-from scenegen.specs import DatasetSpec, SceneSpec
+from scenegen.scenes import SceneSpec
+from scenegen.specs import DatasetSpec
 from scenegen.truth import decode_image
 
 Array = NDArray[Any]
@@ -133,6 +134,7 @@ class RoomsFile:
         memory = {f.name: self._file[f.name].nbytes for f in FIELDS}
         texts = self.path.stat().st_size - sum(sizes.values()) + sizes["scene"]
         sizes["scene"] = memory["scene"] = texts
+        memory["object/model"] = sizes["object/model"]
         return {name: (sizes[name], memory[name]) for name in sizes}
 
     def close(self) -> None:

@@ -8,13 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.layout import FORMAT_NAME, FORMAT_VERSION, columns
 from scenegen.packing import SceneBatch
 from scenegen.records import check
 from scenegen.row_file import Table, new_file, writer_name
-from scenegen.specs import DatasetSpec, SceneSpec
+from scenegen.scenes import SceneSpec
+from scenegen.specs import DatasetSpec
 
 Array = NDArray[Any]
 MAX_COUNT = 100_000_000
@@ -25,8 +27,8 @@ CONVENTIONS = (
 
 
 @dataclass(frozen=True, eq=False)
-class RenderedRoom:
-    """An accepted item: its scene, and its pixels as in `GroundTruth` without the batch axis."""
+class RenderedScene:
+    """An accepted item: its scene, and the pixels of its V views, as in `GroundTruth`."""
 
     scene: SceneSpec
     image: Array
@@ -40,39 +42,49 @@ class RoomsWriter:
     """The rows of a rooms file in the making; `create_rooms` makes one."""
 
     def __init__(self, file: h5py.File, spec: DatasetSpec, count: int, compression: str) -> None:
-        """Create the datasets."""
-        self.table = Table(file, columns(spec), count, compression)
+        """Create the datasets of `count` scenes."""
+        self.classes, self.views = spec.shapes, spec.views
+        self.table = Table(file, columns(spec), count * len(spec.views), compression)
         self.digest = hashlib.sha256(spec.to_json().encode())
 
-    def append(self, rooms: Sequence[RenderedRoom], batch: SceneBatch) -> None:
-        """Write one row for each room, view 0; `batch` is their scenes, packed."""
-        for i, room in enumerate(rooms):
+    def append(self, rooms: Sequence[RenderedScene], batch: SceneBatch) -> None:
+        """Write a row for each view of each scene; `batch` is they, packed."""
+        images = iter(range(len(batch)))
+        classes = np.array([self.classes.index(name.partition("/")[0]) for name in batch.names])
+        for room in rooms:
             description = room.scene.to_json()
             self.digest.update(b"\n" + description.encode())
-            self.table.append(
-                {
-                    "image": room.image,
-                    "depth": room.depth,
-                    "normal": room.normal,
-                    "object_id": room.object_id,
-                    "scene_index": room.scene.index,
-                    "view_index": 0,
-                    "camera/world_from_camera": batch.world_from_camera[i],
-                    "camera/fov_y_degrees": batch.fov_y_degrees[i],
-                    "light/count": batch.light_count[i],
-                    "light/position": batch.light_position[i],
-                    "light/color": batch.light_color[i],
-                    "light/ambient": batch.ambient[i],
-                    "light/attenuation": batch.attenuation[i],
-                    "material/reflectance": batch.reflectance[i],
-                    "object/count": batch.object_count[i],
-                    "object/shape": batch.shape[i],
-                    "object/world_from_object": batch.world_from_object[i],
-                    "object/scale": batch.object_scale[i],
-                    "object/visible_pixels": room.visible_pixels,
-                    "scene": description,
-                }
-            )
+            models = [item.shape for item in room.scene.objects]
+            for view, i in zip(range(len(room.image)), images, strict=False):
+                shape = batch.shape[i]
+                self.table.append(
+                    {
+                        "image": room.image[view],
+                        "depth": room.depth[view],
+                        "normal": room.normal[view],
+                        "object_id": room.object_id[view],
+                        "scene_index": room.scene.index,
+                        "view_index": view,
+                        "view_angle_degrees": self.views[view],
+                        "camera/world_from_camera": batch.world_from_camera[i],
+                        "camera/fov_y_degrees": batch.fov_y_degrees[i],
+                        "light/count": batch.light_count[i],
+                        "light/position": batch.light_position[i],
+                        "light/color": batch.light_color[i],
+                        "light/ambient": batch.ambient[i],
+                        "light/attenuation": batch.attenuation[i],
+                        "material/reflectance": batch.reflectance[i],
+                        "material/specular": batch.gloss[i, :, 0],
+                        "material/shininess": batch.gloss[i, :, 1],
+                        "object/count": batch.object_count[i],
+                        "object/shape": np.where(shape >= 0, classes[shape], -1),
+                        "object/model": models + [""] * (len(shape) - len(models)),
+                        "object/world_from_object": batch.world_from_object[i],
+                        "object/scale": batch.object_scale[i],
+                        "object/visible_pixels": room.visible_pixels[view],
+                        "scene": description,
+                    }
+                )
 
 
 @contextmanager
@@ -85,7 +97,7 @@ def create_rooms(
     overwrite: bool = False,
     attributes: dict[str, str] | None = None,
 ) -> Iterator[RoomsWriter]:
-    """Open a rooms file to write `count` rows; it gets its name when the block ends well.
+    """Open a rooms file to write `count` scenes; it gets its name when the block ends well.
 
     Its bytes depend on the rows alone, not on how they were handed over.
 
@@ -93,7 +105,8 @@ def create_rooms(
         SpecError: unknown compression, or a count below 1.
         OSError: the path, or the disk.
     """
-    check(1 <= count <= MAX_COUNT, "n", count, f"from 1 to {MAX_COUNT:,} images")
+    rows = count * len(spec.views)
+    check(1 <= rows <= MAX_COUNT, "n", count, f"1 or more, and at most {MAX_COUNT:,} images")
     with new_file(path, overwrite) as file:
         file.attrs.update(
             {
@@ -101,7 +114,7 @@ def create_rooms(
                 "format_version": FORMAT_VERSION,
                 "writer": writer_name(),
                 "spec": spec.to_json(),
-                "count": count,
+                "count": rows,
                 "compression": compression,
                 "conventions": CONVENTIONS,
                 **(attributes or {}),
@@ -109,6 +122,6 @@ def create_rooms(
         )
         writer = RoomsWriter(file, spec, count, compression)
         yield writer
-        if writer.table.rows != count:
-            raise RuntimeError(f"{path}: got {writer.table.rows} of {count} rows")
+        if writer.table.rows != rows:
+            raise RuntimeError(f"{path}: got {writer.table.rows} of {rows} rows")
         file.attrs["fingerprint"] = writer.digest.hexdigest()

@@ -23,6 +23,9 @@ class Purpose(IntEnum):
     CATALOGUE = 7
     ANSWERS = 8
     POSITIONS = 9
+    MODELS = 10
+    MATERIALS = 11
+    PATHS = 12
 
 
 def item_rng(seed: int, index: int, purpose: Purpose, attempt: int = 0) -> np.random.Generator:
@@ -36,3 +39,9 @@ def item_rng(seed: int, index: int, purpose: Purpose, attempt: int = 0) -> np.ra
     """
     key = np.random.SeedSequence(seed, spawn_key=(index, int(purpose), attempt))
     return np.random.Generator(np.random.PCG64(key))
+
+
+def item_seed(seed: int, index: int, purpose: Purpose, attempt: int = 0) -> int:
+    """Return 32 bits for generators other than NumPy's; as `item_rng`."""
+    key = np.random.SeedSequence(seed, spawn_key=(index, int(purpose), attempt))
+    return int(key.generate_state(1)[0])

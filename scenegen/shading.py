@@ -14,10 +14,21 @@ def shade(
     light_colors: NDArray[Any],
     ambient: NDArray[Any],
     attenuation: NDArray[Any],
+    specular: NDArray[Any] | float = 0.0,
+    shininess: NDArray[Any] | float = 1.0,
+    viewpoint: NDArray[Any] | None = None,
 ) -> NDArray[np.float64]:
     """Return linear radiance, Pix2Shape (IJCV 2020), appendix "Rendering Details":
 
-    I = rho (L_a + sum_j L_j max(0, n . d_j / |d_j|) / (k_l |d_j| + k_q |d_j|^2)), d_j = l_j - p.
+    I = rho (L_a + sum_j L_j max(0, n . d_j / |d_j|) / (k_l |d_j| + k_q |d_j|^2)), d_j = l_j - p,
+
+    and, where `specular` is given, with Phong's lobe (Phong, CACM 1975; the paper names the model
+    and gives no equation)
+
+    + k_s sum_j L_j max(0, r . d_j / |d_j|)^m / (k_l |d_j| + k_q |d_j|^2)
+
+    of the lights with n . d_j > 0, r being the direction from the viewpoint as the surface mirrors
+    it.
 
     All positions and normals are in one frame (camera or world), lengths in scene units.
 
@@ -27,8 +38,15 @@ def shade(
         light_positions, light_colors: (L, 3).
         ambient: L_a, (3,).
         attenuation: (k_l, k_q), (2,).
+        specular, shininess: k_s and m, scalars or (...).
+        viewpoint: the camera's position, (3,), same frame; needed where `specular` is not 0.
     """
     total = np.broadcast_to(np.asarray(ambient, np.float64), np.shape(points)).copy()
+    shine = np.zeros_like(total)
+    if viewpoint is not None:
+        view = np.asarray(points, np.float64) - viewpoint
+        mirrored = view - 2 * np.sum(view * normals, axis=-1, keepdims=True) * normals
+        mirrored /= np.linalg.norm(mirrored, axis=-1, keepdims=True)
     for position, color in zip(light_positions, light_colors, strict=True):
         to_light = position - np.asarray(points, np.float64)
         distance = np.linalg.norm(to_light, axis=-1, keepdims=True)
@@ -36,4 +54,8 @@ def shade(
         cosine = np.sum(normals * to_light, axis=-1, keepdims=True) / distance
         falloff = attenuation[0] * distance + attenuation[1] * distance**2
         total += color * np.maximum(cosine, 0.0) / falloff
-    return np.asarray(reflectance * total)
+        if viewpoint is not None:
+            toward = np.sum(mirrored * to_light, axis=-1, keepdims=True) / distance
+            lobe = np.maximum(toward, 0.0) ** np.asarray(shininess)[..., None]
+            shine += np.where(cosine > 0, color * lobe / falloff, 0.0)
+    return np.asarray(reflectance * total + np.asarray(specular)[..., None] * shine)

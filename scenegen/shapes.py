@@ -17,6 +17,7 @@ from scipy.spatial import ConvexHull
 
 from scenegen import teapot
 from scenegen.errors import SpecError
+from scenegen.scenes import SceneSpec
 from scenegen.solids import (
     UnitShape,
     arc,
@@ -26,7 +27,6 @@ from scenegen.solids import (
     resting_directions,
     revolution,
 )
-from scenegen.specs import SceneSpec
 
 Array = NDArray[Any]
 
@@ -39,9 +39,9 @@ def unit_shape(name: str) -> UnitShape:
     return _BUILDERS[name]()
 
 
-def unit_mesh(name: str) -> trimesh.Trimesh:
-    """Return the unit shape as a welded mesh."""
-    triangles = unit_shape(name).triangles
+def welded(shape: UnitShape) -> trimesh.Trimesh:
+    """Return a unit shape as a mesh whose triangles share corners."""
+    triangles = shape.triangles
     mesh = trimesh.Trimesh(
         triangles.reshape(-1, 3), np.arange(triangles.size // 3).reshape(-1, 3), process=False
     )
@@ -49,11 +49,13 @@ def unit_mesh(name: str) -> trimesh.Trimesh:
     return mesh
 
 
-def scene_mesh(scene: SceneSpec) -> trimesh.Trimesh:
+def scene_mesh(
+    scene: SceneSpec, shape_of: Callable[[str], UnitShape] = unit_shape
+) -> trimesh.Trimesh:
     """Return room and objects as one mesh, world frame, for export and for other engines."""
     parts = [] if scene.room_reflectance is None else [room_mesh()]
     for item in scene.objects:
-        mesh = unit_mesh(item.shape)
+        mesh = welded(shape_of(item.shape))
         mesh.apply_transform(world_from_object(item.position, item.rotation, item.scale))
         parts.append(mesh)
     return trimesh.util.concatenate(parts)

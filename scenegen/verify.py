@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scenegen.backend import select_variant
 from scenegen.camera import pixel_directions, transform_points, transform_vectors
 from scenegen.errors import FileFormatError, SceneGenError, SpecError
+from scenegen.objects import Objects, objects_of
 from scenegen.packing import SceneBatch, pack
 from scenegen.renderer import render
 from scenegen.sampling import MAX_ATTEMPTS, sample_scene
@@ -40,38 +41,45 @@ def verify_file(
     path: str | Path,
     items: int = 8,
     device: str = "auto",
+    objects: Objects | None = None,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> list[Check]:
     """Check a file: every row's values, and `items` rows, spread evenly, rendered again.
 
     Args:
+        objects: what its scenes are made of; None where that is built in.
         progress: is told how many more rows were read.
 
     Raises:
         FileNotFoundError, FileFormatError: it cannot be opened as a rooms file.
+        SpecError: it shows meshes, and `objects` are not given.
         BackendError: nothing can render here.
     """
     with RoomsFile(path) as rooms:
+        objects = objects or objects_of(rooms.spec)
         broken: dict[str, list[str]] = {name: [] for name in _ROW_RULES}
         digest = hashlib.sha256(rooms.spec.to_json().encode())
         for i in range(len(rooms)):
-            digest.update(b"\n" + rooms.read("scene", i))
-            for name, problem in _row_problems(rooms, i):
+            if rooms.read("view_index", i) == 0:
+                digest.update(b"\n" + rooms.read("scene", i))
+            for name, problem in _row_problems(rooms, i, objects):
                 broken[name].append(f"row {i}: {problem}")
             progress(1)
         wrong = rooms.problems()
         layout = f"{len(rooms)} rows, format {rooms.attributes['format_version']}"
         checks = [Check("layout", not wrong, "; ".join(wrong[:SHOWN]) or layout)]
         rules = dict(_ROW_RULES)
-        if rooms.spec.spp > 1 or rooms.spec.shadows:
+        if rooms.spec.shading == "path":
+            rules["image"] = "finite and not negative"
+        elif rooms.spec.spp > 1 or rooms.spec.shadows:
             rules["image"] = "finite, and no darker than ambient light alone"
         checks += [_row_check(name, rules[name], broken[name], len(rooms)) for name in rules]
         same = digest.hexdigest() == rooms.fingerprint
         checks.append(Check("fingerprint", same, rooms.fingerprint if same else "does not match"))
         rows = np.unique(np.linspace(0, len(rooms) - 1, min(items, len(rooms))).round().astype(int))
         if len(rows):
-            checks.append(_sampled_again(rooms, rows))
-            checks.append(_rendered_again(rooms, rows, device))
+            checks.append(_sampled_again(rooms, rows, objects))
+            checks.append(_rendered_again(rooms, rows, device, objects))
     return checks
 
 
@@ -92,10 +100,10 @@ def _row_check(name: str, rule: str, problems: list[str], count: int) -> Check:
     return Check(name, False, "; ".join(problems[:SHOWN]) + more)
 
 
-def _row_problems(rooms: RoomsFile, i: int) -> Iterable[tuple[str, str]]:
+def _row_problems(rooms: RoomsFile, i: int, objects: Objects) -> Iterable[tuple[str, str]]:
     try:
         room = rooms[i]
-        batch = pack(rooms.spec, [room.scene], room.view_index)
+        batch = pack(rooms.spec, [room.scene], (room.view_index,), objects)
     except (SceneGenError, IndexError) as error:
         unreadable = [name for name in _PIXELS if not _can_read(rooms, name, i)]
         yield from ((name, f"{name} cannot be read") for name in unreadable)
@@ -128,15 +136,24 @@ def _description_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> It
         "light/ambient": batch.ambient,
         "light/attenuation": batch.attenuation,
         "material/reflectance": batch.reflectance,
+        "material/specular": batch.gloss[..., 0],
+        "material/shininess": batch.gloss[..., 1],
         "object/count": batch.object_count,
-        "object/shape": batch.shape,
         "object/world_from_object": batch.world_from_object,
         "object/scale": batch.object_scale,
         "scene_index": np.array([room.scene.index]),
+        "view_angle_degrees": np.array(rooms.spec.views)[[room.view_index]],
     }
     for name, values in stored.items():
         if not np.allclose(rooms.read(name, room.index), values[0], rtol=0, atol=1e-12):
             yield f"{name} differs from the scene's description"
+    unused = rooms.spec.object_slots - len(room.scene.objects)
+    models = [item.shape for item in room.scene.objects] + [""] * unused
+    if [name.decode() for name in rooms.read("object/model", room.index)] != models:
+        yield "object/model differs from the scene's description"
+    classes = [rooms.spec.shapes.index(item.name) for item in room.scene.objects]
+    if rooms.read("object/shape", room.index).tolist() != classes + [-1] * unused:
+        yield "object/shape differs from the scene's description"
 
 
 def _depth_problems(room: Room) -> Iterable[str]:
@@ -179,6 +196,8 @@ def _image_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable
     if not np.isfinite(radiance).all() or (radiance < 0).any():
         yield "a value is negative or not finite"
         return
+    if rooms.spec.shading == "path":
+        return
     if rooms.spec.spp > 1 or rooms.spec.shadows:
         # Whatever the shadows, and whatever else a pixel sees: no darker than ambient light.
         darkest = (batch.reflectance[0, : batch.object_count[0] + 1] * batch.ambient[0]).min(axis=0)
@@ -193,6 +212,9 @@ def _image_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable
         batch.light_color[0, : batch.light_count[0]],
         batch.ambient[0],
         batch.attenuation[0],
+        batch.gloss[0, np.maximum(room.object_id, 0), 0],
+        batch.gloss[0, np.maximum(room.object_id, 0), 1],
+        room.world_from_camera[:3, 3] if rooms.spec.specular[1] > 0 else None,
     )
     reference[room.object_id < 0] = room.scene.background
     step = {"uint8": 0.5 / 255, "float16": 2.0**-11, "float32": 0.0}[rooms.spec.image_dtype]
@@ -203,7 +225,7 @@ def _image_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable
         yield f"{int((off > 0).any(-1).sum())} pixels are not what the shading equation gives"
 
 
-def _sampled_again(rooms: RoomsFile, rows: Array) -> Check:
+def _sampled_again(rooms: RoomsFile, rows: Array, objects: Objects) -> Check:
     """Whether the seed still gives the stored descriptions."""
     wrong = []
     for i in rows.tolist():
@@ -212,14 +234,14 @@ def _sampled_again(rooms: RoomsFile, rows: Array) -> Check:
         except FileFormatError:
             wrong.append(f"row {i}")
             continue
-        attempts = (sample_scene(rooms.spec, stored.index, k) for k in range(MAX_ATTEMPTS))
+        attempts = (sample_scene(rooms.spec, stored.index, k, objects) for k in range(MAX_ATTEMPTS))
         if not any(scene == stored for scene in attempts):
             wrong.append(f"row {i}")
     detail = ", ".join(wrong) + " cannot be drawn again" if wrong else f"{len(rows)} rows"
     return Check("drawn again from the seed", not wrong, detail)
 
 
-def _rendered_again(rooms: RoomsFile, rows: Array, device: str) -> Check:
+def _rendered_again(rooms: RoomsFile, rows: Array, device: str, objects: Objects) -> Check:
     """Whether the stored descriptions give the stored pixels: bit for bit on the same backend."""
     variant = select_variant(device)
     written_by = rooms.attributes.get("variant")
@@ -229,7 +251,7 @@ def _rendered_again(rooms: RoomsFile, rows: Array, device: str) -> Check:
         try:
             room = rooms[i]
             with np.errstate(all="ignore"):
-                again = render(pack(rooms.spec, [room.scene], room.view_index), device)
+                again = render(pack(rooms.spec, [room.scene], (room.view_index,), objects), device)
         except (FileFormatError, SpecError):
             wrong.append(f"row {i} (cannot be read)")
             continue

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from scenegen.blocks import Blocks, closest_block, upload_blocks
 from scenegen.kernel import Scenes, closest_hit, gather_row, normal_at, radiance_at
+from scenegen.model_scene import model_scene
 from scenegen.packing import SceneBatch, pixel_size
 from scenegen.reference import SAMPLE_STEPS
 from scenegen.unit_scene import unit_scene
@@ -43,20 +44,25 @@ def launch_wavefront(
 def _upload(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
     """Return the scenes, and the cameras as (B, 13): 3x4 world_from_camera, pixel size."""
     spec, count = batch.spec, len(batch)
-    unit = unit_scene(variant, spec.shapes)
+    if spec.source == "shapes":
+        unit = unit_scene(variant, batch.names)
+    else:
+        unit = model_scene(variant, [batch.shape_of(name) for name in batch.names])
     mi.set_variant(variant)
     shape = np.maximum(batch.shape, 0)
     center = batch.world_from_object[..., :3, 3]
     squared = np.where(batch.shape >= 0, batch.object_scale, 1.0)[..., None, None] ** 2
     # The inverse of a similarity s R is its transpose over s squared.
     linear = np.swapaxes(batch.world_from_object[..., :3, :3], -1, -2) / squared
-    offset = unit.offset[shape] - np.einsum("bkij,bkj->bki", linear, center)
+    place = unit.offset[shape]
+    offset = -np.einsum("bkij,bkj->bki", linear, center) + (0.0 if unit.grid else place)
     per_light = np.concatenate([batch.light_position, batch.light_color], axis=-1)
     lights = [batch.ambient, batch.attenuation, per_light.reshape(count, -1)]
     pixel = pixel_size(batch.fov_y_degrees, spec.height)
     camera = [batch.world_from_camera[:, :3].reshape(count, 12), pixel[:, None]]
     scenes = Scenes(
         unit=unit.scene,
+        grid=unit.grid,
         slots=spec.object_slots,
         light_slots=spec.light_slots,
         count=mi.UInt32(batch.object_count),
@@ -64,10 +70,11 @@ def _upload(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
         background=_table(batch.background),
         spheres=_table(np.concatenate([center, batch.object_scale[..., None]], axis=-1)),
         from_world=_table(np.concatenate([linear, offset[..., None]], axis=-1)),
-        place=_table(unit.offset[shape]),
+        place=_table(place),
         first_triangle=mi.UInt32(unit.first_triangle[shape].ravel()),
         triangles=unit.normals,
         reflectance=_table(batch.reflectance),
+        gloss=_table(batch.gloss) if spec.specular[1] > 0 else None,
         lights=_table(np.concatenate(lights, axis=1)),
     )
     return scenes, _table(np.concatenate(camera, axis=1))
@@ -109,16 +116,18 @@ def _trace(
         p = origin + dr.select(object_id >= 0, t, 0) * d
         return t, object_id, p, normal_at(scenes, item, p, d, object_id, triangle, uv)
 
-    t, object_id, p, n = hit(direction(mi.Float(column) + 0.5, mi.Float(row) + 0.5))
-    image = radiance_at(scenes, item, p, n, object_id, spec.shadows)
+    d = direction(mi.Float(column) + 0.5, mi.Float(row) + 0.5)
+    t, object_id, p, n = hit(d)
+    image = radiance_at(scenes, item, p, d, n, object_id, spec.shadows)
 
     def add_sample(sample: Any, total: Any) -> tuple[Any, Any]:
         """Add the colour at one of `reference.sample_positions`, those besides the centre."""
         mirrored = (sample & 1) == 1
         x, y = (0.5 + mi.Float(sample // 2 + 1) * step for step in SAMPLE_STEPS)
         x, y = (dr.select(mirrored, 1 - (f - dr.floor(f)), f - dr.floor(f)) for f in (x, y))
-        _, object_id, p, n = hit(direction(mi.Float(column) + x, mi.Float(row) + y))
-        return sample + 1, total + radiance_at(scenes, item, p, n, object_id, spec.shadows)
+        d = direction(mi.Float(column) + x, mi.Float(row) + y)
+        _, object_id, p, n = hit(d)
+        return sample + 1, total + radiance_at(scenes, item, p, d, n, object_id, spec.shadows)
 
     if spec.spp > 1:
         others = spec.spp // 2 * 2

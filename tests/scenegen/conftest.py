@@ -47,9 +47,9 @@ def gap_between() -> Callable[[Array, Array], float]:
 @pytest.fixture(scope="session")
 def unit_corners() -> Callable[[str], Array]:
     """Corners of a unit shape's mesh, each once."""
-    from scenegen.shapes import unit_mesh
+    from scenegen.shapes import unit_shape, welded
 
-    return cache(lambda name: np.asarray(unit_mesh(name).vertices))
+    return cache(lambda name: np.asarray(welded(unit_shape(name)).vertices))
 
 
 @pytest.fixture(scope="session")
@@ -123,6 +123,7 @@ def embree_cast() -> Callable[[str, Array, Array], tuple[Array, Array]]:
             t[rays] /= np.einsum("ri,ri->r", along, along)
             triangle[rays] = faces
             weights[rays] = points_to_barycentric(unit_shape(name).triangles[faces], points)
-        return t, smooth_normals(name, triangle, weights[:, 1], weights[:, 2], directions)
+        u, v = weights[:, 1], weights[:, 2]
+        return t, smooth_normals(unit_shape(name), triangle, u, v, directions)
 
     return cast

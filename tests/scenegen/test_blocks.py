@@ -14,7 +14,8 @@ from scenegen.camera import Camera
 from scenegen.packing import SceneBatch, pack
 from scenegen.reference import Cast, render_reference
 from scenegen.renderer import launch_fields, render
-from scenegen.specs import DatasetSpec, Light, PlacedObject, SceneSpec
+from scenegen.scenes import Light, PlacedObject, SceneSpec
+from scenegen.specs import DatasetSpec
 from scenegen.truth import GroundTruth
 
 Array = NDArray[Any]

@@ -9,8 +9,8 @@ import trimesh
 from scenegen import open_rooms
 from scenegen.camera import pixel_directions, transform_vectors
 from scenegen.export import PNG_DEPTH_UNIT, export_paths, export_room
+from scenegen.scenes import SHAPE_NAMES
 from scenegen.shapes import scene_mesh
-from scenegen.specs import SHAPE_NAMES
 
 
 @pytest.fixture(scope="module")

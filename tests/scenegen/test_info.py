@@ -24,7 +24,7 @@ def test_header_and_spec(float_path):
     assert text.splitlines()[0] == f"{float_path}: 5 images of 48x40, {size:.1f} MB"
     assert value(text, "fingerprint") == root["fingerprint"]
     assert value(text, "command") == "tests"
-    assert value(text, "format") == "pix2shape-bench/rooms 1.0"
+    assert value(text, "format") == "pix2shape-bench/rooms 2.0"
     assert value(text, "written by") == f"{root['writer']}, {root['variant']}"
     assert "y up" in value(text, "conventions")
     for name, setting in json.loads(root["spec"]).items():
@@ -70,8 +70,8 @@ def test_sizes_of_text_count_the_text(rooms_path):
     table = describe(rooms_path).partition(" dataset ")[2]
     with h5py.File(rooms_path) as file:
         lines = file["scene"].asstr()[:]
-    kilobytes = float(re.findall(r"([\d.]+) kB", value(table, "scene"))[0])
-    assert kilobytes > sum(map(len, lines)) / 2e3
+    [(size, unit)] = re.findall(r"([\d.]+) (kB|MB)", value(table, "scene"))
+    assert float(size) * {"kB": 1e3, "MB": 1e6}[unit] > sum(map(len, lines)) / 2
 
 
 def test_unknown_pixels_do_not_spoil_the_ranges(damaged):

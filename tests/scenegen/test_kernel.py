@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scenegen.camera import Camera, pixel_directions
 from scenegen.packing import pack
 from scenegen.renderer import render
-from scenegen.specs import DatasetSpec, PlacedObject, SceneSpec
+from scenegen.scenes import PlacedObject, SceneSpec
+from scenegen.specs import DatasetSpec
 from scenegen.truth import GroundTruth
 
 Array = NDArray[Any]

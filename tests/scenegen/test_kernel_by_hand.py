@@ -9,7 +9,8 @@ import pytest
 from scenegen.camera import Camera, pixel_directions
 from scenegen.packing import pack
 from scenegen.renderer import render
-from scenegen.specs import SHAPE_NAMES, DatasetSpec, Light, PlacedObject, SceneSpec
+from scenegen.scenes import SHAPE_NAMES, Light, PlacedObject, SceneSpec
+from scenegen.specs import DatasetSpec
 
 GREY = (0.8, 0.8, 0.8)
 

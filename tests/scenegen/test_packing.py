@@ -8,8 +8,9 @@ import pytest
 from scenegen.camera import Camera
 from scenegen.errors import SpecError
 from scenegen.packing import pack, pixel_size
+from scenegen.scenes import Light, PlacedObject, SceneSpec
 from scenegen.shapes import world_from_object
-from scenegen.specs import DatasetSpec, Light, PlacedObject, SceneSpec
+from scenegen.specs import DatasetSpec
 
 SPEC = DatasetSpec(objects=(0, 3), lights=(0, 2), shapes=("cone", "box"), height=50, width=80)
 TURN = (0.5, 0.5, 0.5, 0.5)
@@ -53,7 +54,7 @@ def test_every_number_is_in_its_slot() -> None:
 
 @pytest.mark.parametrize("view", [0, 1])
 def test_the_view_asked_for_is_the_one_packed(view: int) -> None:
-    batch = pack(SPEC, [FULL, LAST], view_index=view)
+    batch = pack(SPEC, [FULL, LAST], (view,))
     expected = VIEWS[view].world_from_camera
     np.testing.assert_array_equal(batch.world_from_camera, [expected, expected])
     assert batch.fov_y_degrees.tolist() == [VIEWS[view].fov_y_degrees] * 2

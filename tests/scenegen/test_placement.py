@@ -20,8 +20,8 @@ from scenegen.placement import (
     frustum_normals,
     random_rotation,
 )
+from scenegen.scenes import SHAPE_NAMES
 from scenegen.shapes import rotation_matrix, unit_shape
-from scenegen.specs import SHAPE_NAMES
 
 Array = NDArray[Any]
 CAMERA = Camera((1.2, 1.1, 1.3), (0.3, 0.3, 0.3), 30.0)

@@ -15,8 +15,9 @@ from scenegen.camera import Camera, pixel_directions
 from scenegen.packing import pack
 from scenegen.reference import Cast, render_reference, sample_positions
 from scenegen.renderer import render
+from scenegen.scenes import SHAPE_NAMES, PlacedObject, SceneSpec
 from scenegen.shapes import scene_mesh, unit_shape
-from scenegen.specs import SHAPE_NAMES, DatasetSpec, PlacedObject, SceneSpec
+from scenegen.specs import DatasetSpec
 from scenegen.truth import GroundTruth
 
 Array = NDArray[Any]

@@ -13,7 +13,8 @@ import pytest
 from scenegen import renderer
 from scenegen.packing import SceneBatch, pack
 from scenegen.renderer import launch, render
-from scenegen.specs import DatasetSpec, SceneSpec
+from scenegen.scenes import SceneSpec
+from scenegen.specs import DatasetSpec
 from scenegen.truth import GroundTruth
 
 TINY = DatasetSpec(

@@ -15,7 +15,8 @@ from scenegen import sampling
 from scenegen.camera import Camera
 from scenegen.errors import PlacementError
 from scenegen.sampling import MAX_ATTEMPTS, POSES_PER_OBJECT, refusal, sample_scene
-from scenegen.specs import SHAPE_NAMES, DatasetSpec, SceneSpec
+from scenegen.scenes import SHAPE_NAMES, SceneSpec
+from scenegen.specs import DatasetSpec
 
 Array = NDArray[Any]
 CROWD = DatasetSpec(objects=(40, 40))

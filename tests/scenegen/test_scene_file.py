@@ -11,7 +11,8 @@ import pytest
 from scenegen import open_rooms, shade
 from scenegen.camera import transform_vectors
 from scenegen.layout import FIELDS
-from scenegen.specs import SHAPE_NAMES, DatasetSpec, SceneSpec, fingerprint
+from scenegen.scenes import SHAPE_NAMES, SceneSpec
+from scenegen.specs import DatasetSpec, fingerprint
 
 # The layout as promised, written out: name, row, type, unit. K = 3 objects, L = 3 lights here.
 LAYOUT = [
@@ -21,6 +22,7 @@ LAYOUT = [
     ("object_id", (32, 32), "int8", "1"),
     ("scene_index", (), "int64", "1"),
     ("view_index", (), "int32", "1"),
+    ("view_angle_degrees", (), "float64", "degree"),
     ("camera/world_from_camera", (4, 4), "float64", "scene unit"),
     ("camera/fov_y_degrees", (), "float64", "degree"),
     ("light/count", (), "int32", "1"),
@@ -29,8 +31,11 @@ LAYOUT = [
     ("light/ambient", (3,), "float64", "radiance"),
     ("light/attenuation", (2,), "float64", "1 / scene unit, 1 / scene unit squared"),
     ("material/reflectance", (4, 3), "float64", "1"),
+    ("material/specular", (4,), "float64", "1"),
+    ("material/shininess", (4,), "float64", "1"),
     ("object/count", (), "int32", "1"),
-    ("object/shape", (3,), "int8", "1"),
+    ("object/shape", (3,), "int16", "1"),
+    ("object/model", (3,), "object", "-"),
     ("object/world_from_object", (3, 4, 4), "float64", "scene unit"),
     ("object/scale", (3,), "float64", "scene unit"),
     ("object/visible_pixels", (3,), "int32", "pixel"),
@@ -63,7 +68,7 @@ def test_root_attributes(rooms_path):
     with h5py.File(rooms_path) as file:
         root = dict(file.attrs)
     assert root["format"] == "pix2shape-bench/rooms"
-    assert root["format_version"] == "1.0"
+    assert root["format_version"] == "2.0"
     assert root["writer"].startswith("pix2shape-bench ")
     assert root["count"] == 8
     assert root["creation_command"] == "tests"

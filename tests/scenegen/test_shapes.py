@@ -10,15 +10,15 @@ from scipy.spatial.transform import Rotation
 
 from scenegen.camera import Camera
 from scenegen.errors import SpecError
+from scenegen.scenes import SHAPE_NAMES, PlacedObject, SceneSpec
 from scenegen.shapes import (
     room_mesh,
     rotation_matrix,
     scene_mesh,
-    unit_mesh,
     unit_shape,
+    welded,
     world_from_object,
 )
-from scenegen.specs import SHAPE_NAMES, PlacedObject, SceneSpec
 
 Array = NDArray[np.float64]
 CURVED = ("sphere", "cone", "torus", "cylinder", "capsule")
@@ -80,7 +80,7 @@ def test_bounding_radius_is_one_and_normals_agree_with_faces(name: str) -> None:
 
 @pytest.mark.parametrize("name", SOLID)
 def test_solids_are_closed_and_have_the_volume_of_their_formula(name: str) -> None:
-    mesh = unit_mesh(name)
+    mesh = welded(unit_shape(name))
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
     missing = VOLUMES[name] - mesh.volume
@@ -108,7 +108,7 @@ def test_curved_meshes_follow_the_smooth_surface(name: str) -> None:
 
 
 def test_the_teapot_is_open_at_its_seams_only() -> None:
-    mesh = unit_mesh("teapot")
+    mesh = welded(unit_shape("teapot"))
     assert mesh.is_winding_consistent
     users = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_counts=True)[1]
     assert users.max() == 2
@@ -119,7 +119,7 @@ def test_the_teapot_is_open_at_its_seams_only() -> None:
 @pytest.mark.parametrize("name", SHAPE_NAMES)
 def test_support_bounds_the_mesh_closely(name: str) -> None:
     shape, d = unit_shape(name), directions(200)
-    corners = unit_mesh(name).vertices
+    corners = welded(unit_shape(name)).vertices
     reach = np.array([(corners @ one).max() for one in d])
     excess = shape.support(d) - reach
     assert excess.min() > -1e-12, "the body must contain the mesh"
@@ -129,7 +129,7 @@ def test_support_bounds_the_mesh_closely(name: str) -> None:
 @pytest.mark.parametrize("name", SHAPE_NAMES)
 def test_bodies_stay_on_every_resting_side(name: str) -> None:
     """The plumb line from the centre of mass meets the points touched: a convex combination."""
-    shape, mesh = unit_shape(name), unit_mesh(name)
+    shape, mesh = unit_shape(name), welded(unit_shape(name))
     solid = mesh.convex_hull if name == "teapot" else mesh
     sides = shape.resting_directions
     if name in SIDES:
@@ -146,7 +146,7 @@ def test_bodies_stay_on_every_resting_side(name: str) -> None:
 @pytest.mark.parametrize("name", CURVED)
 def test_round_bodies_do_not_roll_off_their_resting_sides(name: str) -> None:
     """Tilting a little, any way, lifts the centre of mass, or leaves it as high (rolling)."""
-    mesh, rng = unit_mesh(name), np.random.default_rng(2)
+    mesh, rng = welded(unit_shape(name)), np.random.default_rng(2)
     sides = unit_shape(name).resting_directions
     for down in sides[:: max(1, len(sides) // 4)]:
         tilted = down + 0.03 * rng.standard_normal((8, 3))

@@ -12,14 +12,8 @@ from scenegen.camera import Camera
 from scenegen.errors import SpecError
 from scenegen.records import changed_settings
 from scenegen.sampling import sample_scene
-from scenegen.specs import (
-    SHAPE_NAMES,
-    DatasetSpec,
-    Light,
-    PlacedObject,
-    SceneSpec,
-    fingerprint,
-)
+from scenegen.scenes import SHAPE_NAMES, Light, PlacedObject, SceneSpec
+from scenegen.specs import DatasetSpec, fingerprint
 
 NUMBER = st.floats(-1e9, 1e9)
 VECTOR = st.tuples(NUMBER, NUMBER, NUMBER)
@@ -36,11 +30,14 @@ def rising(values: st.SearchStrategy[Any]) -> st.SearchStrategy[tuple[Any, Any]]
 CAMERAS = st.builds(Camera, VECTOR, st.just((0.3, 0.25, -0.1)), st.floats(1.0, 179.0))
 OBJECTS = st.builds(
     PlacedObject,
-    st.sampled_from(SHAPE_NAMES),
+    st.sampled_from([*SHAPE_NAMES, "mug/0001", "chair/ä b/c"]),
     VECTOR,
     st.sampled_from(QUATERNIONS),
     st.floats(1e-6, 1e3),
     VECTOR,
+    st.floats(0.0, 10.0),
+    st.floats(1.0, 1e4),
+    st.text("0123456789abcdef", max_size=16),
 )
 SCENES = st.builds(
     SceneSpec,
@@ -76,6 +73,14 @@ DATASETS = st.builds(
     ambient=COLOR,
     attenuation=st.tuples(st.floats(0.1, 9.0), st.floats(0.0, 9.0)),
     reflectance=COLOR,
+    room_reflectance=COLOR,
+    random_reflectance=st.booleans(),
+    specular=rising(st.floats(0.0, 10.0)),
+    shininess=rising(st.floats(1.0, 10_000.0)),
+    light_saturation=UNIT,
+    views=st.lists(st.floats(0.1, 80.0), unique=True, max_size=5).map(
+        lambda some: (0.0, *sorted(some))
+    ),
 )
 
 NAN, INF = float("nan"), float("inf")
@@ -98,6 +103,14 @@ OUT_OF_RANGE: dict[str, list[Any]] = {
     "light_level": [-0.1, 101.0, NAN],
     "ambient": [(0.1, 1.1, 0.1), (-0.1, 0.1, 0.1), (0.1, 0.1, NAN)],
     "attenuation": [(-0.1, 1.0), (1.0, -0.1), (0.0, 0.0), (NAN, 1.0), (1.0, NAN)],
+    "source": ["meshes"],
+    "object_split": ["dev", "train"],
+    "views": [(), (5.0,), (0.0, 5.0, 5.0), (0.0, 80.1), (0.0, -5.0), (0.0, NAN)],
+    "shading": ["phong"],
+    "light_saturation": [-0.1, 1.1, NAN],
+    "room_reflectance": [(0.1, 0.1, 1.1), (-0.1, 0.1, 0.1), (NAN, 0.1, 0.1)],
+    "specular": [(-0.1, 0.1), (0.2, 0.1), (0.0, 10.1), (0.0, NAN)],
+    "shininess": [(0.9, 2.0), (3.0, 2.0), (1.0, 10_001.0), (NAN, 2.0)],
     "reflectance": [(0.1, 0.1, 1.1), (-0.1, 0.1, 0.1), (NAN, 0.1, 0.1)],
 }
 SHOWN = {"height": "size", "width": "size", "fov_degrees": "fov"}  # where not the field's name
@@ -140,6 +153,10 @@ def test_a_setting_out_of_range_is_named(field: str, value: Any) -> None:
         {"cameras": ()},
         {"index": -1},
         {"objects": [{"shape": "cube"}]},
+        {"objects": [{"shape": "mug/"}]},
+        {"objects": [{"shape": "/0001"}]},
+        {"objects": [{"specular": -0.1}]},
+        {"objects": [{"shininess": 0.0}]},
         {"objects": [{"scale": 0.0}]},
         {"objects": [{"scale": -0.1}]},
         {"objects": [{"rotation": (1.0, 0.1, 0.0, 0.0)}]},
@@ -163,7 +180,12 @@ def test_what_no_scene_can_be_is_refused(change: dict[str, Any]) -> None:
 
 
 def test_every_setting_with_a_range_is_tried_above() -> None:
-    assert {f.name for f in fields(DatasetSpec)} - set(OUT_OF_RANGE) == {"shadows", "allow_cropped"}
+    assert {f.name for f in fields(DatasetSpec)} - set(OUT_OF_RANGE) == {
+        "shadows",
+        "allow_cropped",
+        "listing",
+        "random_reflectance",
+    }
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "3", "null", '{"sed": 1}', '{"seed": "x"}'])

@@ -18,11 +18,17 @@ def test_fingerprint_notices_every_setting() -> None:
     valid |= {"fov_degrees": 27.0, "camera_radius": 1.6, "camera_target": (0.3, 0.3, 0.31)}
     valid |= {"light_radius": 3.0, "light_level": 0.7, "ambient": (0.1, 0.1, 0.0)}
     valid |= {"attenuation": (0.5, 0.6), "reflectance": (0.8, 0.7, 0.8)}
-    assert set(valid) == {f.name for f in fields(DatasetSpec)}
+    valid |= {"room_reflectance": (0.8, 0.7, 0.8), "random_reflectance": True}
+    valid |= {"specular": (0.1, 0.2), "shininess": (1.0, 9.0), "light_saturation": 0.5}
+    valid |= {"views": (0.0, 5.0), "shading": "path", "listing": "ab"}
+    several = {"source", "object_split"}  # these need others beside them
+    mugs = DatasetSpec(source="families", shapes=("mug",))
+    assert set(valid) | several == {f.name for f in fields(DatasetSpec)}
     changed = [replace(DatasetSpec(), **{name: value}) for name, value in valid.items()]
     reordered = replace(DatasetSpec(), shapes=("box", "cone"))  # objects draw shapes by position
     found = {fingerprint(spec, ["a"]) for spec in (DatasetSpec(), reordered, *changed)}
-    assert len(found) == 2 + len(valid)
+    found |= {fingerprint(spec, ["a"]) for spec in (mugs, replace(mugs, object_split="val"))}
+    assert len(found) == 4 + len(valid)
 
 
 def test_fingerprint_notices_scenes_and_their_borders() -> None:

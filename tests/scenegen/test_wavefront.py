@@ -11,8 +11,9 @@ from scenegen.camera import Camera, back_project, transform_points
 from scenegen.packing import pack
 from scenegen.renderer import launch, render
 from scenegen.sampling import sample_scene
+from scenegen.scenes import PlacedObject, SceneSpec
 from scenegen.shading import shade
-from scenegen.specs import DatasetSpec, PlacedObject, SceneSpec
+from scenegen.specs import DatasetSpec
 from scenegen.truth import GroundTruth, decode_image
 
 ODD = DatasetSpec(

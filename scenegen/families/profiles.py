@@ -1,0 +1,180 @@
+"""Curves in a plane: profiles that are turned or lofted, and centre lines of tubes.
+
+A curve is (points, tangents), both (n, 2); tangents point along it and have any length but 0.
+Joined curves keep both rows where they meet, so that a corner is a sharp crease.
+A profile's columns are (radius, height); its outside is on the right of its direction.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+Curve = tuple[Array, Array]
+Point = tuple[float, float]
+
+
+def line(start: Point, end: Point, strips: int = 1) -> Curve:
+    """A straight piece."""
+    along = np.array([[end[0] - start[0], end[1] - start[1]]])
+    points = np.array([start]) + np.linspace(0.0, 1.0, strips + 1)[:, None] * along
+    points[-1] = end
+    return points, np.repeat(along, strips + 1, axis=0)
+
+
+def polyline(*corners: Point) -> Curve:
+    """Straight pieces from corner to corner, all creased."""
+    points = np.array(corners, float)
+    along = np.diff(points, axis=0)
+    return (
+        np.repeat(points, 2, axis=0)[1:-1],
+        np.repeat(along, 2, axis=0),
+    )
+
+
+def arc(center: Point, radius: float | Point, low: float, high: float, segments: int = 8) -> Curve:
+    """An arc of a circle, or of an ellipse of two radii; degrees from the first axis.
+
+    It runs from low to high, counter-clockwise if low < high.
+    """
+    a, b = radius if isinstance(radius, tuple) else (radius, radius)
+    angle = np.radians(np.linspace(low, high, segments + 1))
+    cosine, sine = np.cos(angle), np.sin(angle)
+    cosine[np.abs(cosine) < 1e-15] = 0.0
+    sine[np.abs(sine) < 1e-15] = 0.0
+    way = 1.0 if high > low else -1.0
+    points = np.stack([center[0] + a * cosine, center[1] + b * sine], axis=1)
+    return points, way * np.stack([-a * sine, b * cosine], axis=1)
+
+
+def bezier(a: Point, b: Point, c: Point, d: Point, segments: int = 10) -> Curve:
+    """A cubic from a to d that leaves towards b and arrives from c; b != a and c != d.
+
+    Points are dense where it bends: a step has its share of the length, and twice that of the
+    turning.
+    """
+    corners = np.array([a, b, c, d], float)
+    _, tangents = _cubic(corners, _FINE)
+    speed = np.hypot(tangents[:, 0], tangents[:, 1])
+    u, v = tangents[:-1], tangents[1:]
+    turn = np.abs(np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], (u * v).sum(axis=1)))
+    length = speed[:-1] + speed[1:]
+    share = np.zeros(len(_FINE))
+    np.cumsum(length / length.sum() + 2 * turn / (turn.sum() + 0.1), out=share[1:])
+    t = np.interp(np.linspace(0.0, share[-1], segments + 1), share, _FINE)
+    t[[0, -1]] = 0.0, 1.0
+    return _cubic(corners, t)
+
+
+_FINE = np.linspace(0.0, 1.0, 49)
+
+
+def _cubic(corners: Array, t: Array) -> Curve:
+    """Points of a Bezier curve and a third of its derivative."""
+    s = 1.0 - t
+    weights = np.stack([s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t], axis=1)
+    slopes = np.stack([s * s, 2 * s * t, t * t], axis=1)
+    # Sums in a fixed order: a matrix product's last bits depend on the machine.
+    points = sum(weights[:, i : i + 1] * corners[i] for i in range(4))
+    steps = np.diff(corners, axis=0)
+    return np.asarray(points), np.asarray(sum(slopes[:, i : i + 1] * steps[i] for i in range(3)))
+
+
+def fillet(corners: Sequence[Point], radius: float, segments: int = 6) -> Curve:
+    """A polyline whose inner corners are rounded by arcs of this radius, which must fit."""
+    points, tangents = [], []
+    start = np.array(corners[0], float)
+    for i in range(1, len(corners) - 1):
+        corner, following = np.array(corners[i], float), np.array(corners[i + 1], float)
+        into, out = corner - start, following - corner
+        into, out = into / math.hypot(*into), out / math.hypot(*out)
+        side = math.copysign(1.0, into[0] * out[1] - into[1] * out[0])
+        turn = math.acos(max(-1.0, min(1.0, float(into[0] * out[0] + into[1] * out[1]))))
+        begin = corner - radius * math.tan(turn / 2) * into
+        center = begin + side * radius * np.array([-into[1], into[0]])
+        spoke = math.degrees(math.atan2(begin[1] - center[1], begin[0] - center[0]))
+        bend = arc(
+            (center[0], center[1]), radius, spoke, spoke + side * math.degrees(turn), segments
+        )
+        points += [start[None], bend[0]]
+        tangents += [into[None], bend[1]]
+        start = corner + radius * math.tan(turn / 2) * out
+        tangents += [out[None]]
+        points += [start[None]]
+    last = np.array(corners[-1], float)
+    points.append(last[None])
+    tangents.append((last - start)[None])
+    joined, along = np.concatenate(points), np.concatenate(tangents)
+    step = np.abs(np.diff(joined, axis=0)).max(axis=1)
+    keep = np.concatenate([[True], step > 1e-9])  # a bend ends where the next straight begins
+    return joined[keep], along[keep]
+
+
+def reverse(curve: Curve) -> Curve:
+    """The same curve from its end."""
+    return curve[0][::-1], -curve[1][::-1]
+
+
+def inset(curve: Curve, distance: float) -> Curve:
+    """The parallel curve on the left (a profile's inside), mitred at creases.
+
+    No bend to the left may be tighter than the distance.
+    """
+    points, tangents = curve
+    along = tangents / np.hypot(tangents[:, :1], tangents[:, 1:])
+    left = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    crease = np.flatnonzero(np.abs(points[1:] - points[:-1]).max(axis=1) < 1e-12)
+    before, after = left[crease], left[crease + 1]
+    miter = (before + after) / (1.0 + (before * after).sum(axis=1, keepdims=True))
+    left[crease], left[crease + 1] = miter, miter
+    return points + distance * left, tangents
+
+
+def tightest(curve: Curve) -> float:
+    """The least radius of curvature between neighbouring points, about; creases do not count."""
+    points, tangents = curve
+    along = tangents / np.hypot(tangents[:, :1], tangents[:, 1:])
+    u, v = along[:-1], along[1:]
+    turn = np.abs(np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], (u * v).sum(axis=1)))
+    step = np.hypot(*(points[1:] - points[:-1]).T)
+    return float((step / np.maximum(turn, 1e-9))[step > 1e-9].min())
+
+
+def wave(low: Point, high: Point, depth: float, count: int) -> Curve:
+    """A straight piece with as many grooves; it begins and ends on the ridge, along the line."""
+    t = np.linspace(0.0, 1.0, 5 * count + 1)
+    points, tangents = line(low, high, 5 * count)
+    phase = 2 * np.pi * count * t
+    side = np.array([[low[1] - high[1], high[0] - low[0]]]) / math.dist(low, high)
+    points = points + (depth * 0.5 * (1.0 - np.cos(phase)))[:, None] * side
+    return points, tangents + (depth * np.pi * count * np.sin(phase))[:, None] * side
+
+
+def join(*curves: Curve) -> Curve:
+    """One curve after the other; each must begin where the one before it ends."""
+    return np.concatenate([c[0] for c in curves]), np.concatenate([c[1] for c in curves])
+
+
+def hull_rows(points: Array) -> list[int]:
+    """Rows of (n, 2) points that are corners of their convex hull, to 1e-13."""
+    points = np.round(points, 13)  # else points on an upright line come in any order
+    order = np.lexsort((points[:, 1], points[:, 0]))
+    repeats = (np.diff(points[order], axis=0) == 0.0).all(axis=1)
+    once = np.delete(order, np.flatnonzero(repeats) + 1).tolist()
+    place = points.tolist()
+    rows: set[int] = set()
+    for sweep in (once, once[::-1]):  # the lower chain, then the upper
+        chain: list[int] = []
+        for i in sweep:
+            x, y = place[i]
+            while len(chain) > 1:
+                (ax, ay), (bx, by) = place[chain[-2]], place[chain[-1]]
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
+                    break
+                chain.pop()
+            chain.append(i)
+        rows.update(chain)
+    return sorted(rows)

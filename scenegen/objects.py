@@ -1,0 +1,69 @@
+"""What the objects of a data set are: names of classes and models, and how they look."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+from scenegen.errors import SpecError
+from scenegen.families.members import MEMBERS, member_shape
+from scenegen.meshes.folders import object_split
+from scenegen.meshes.store import MeshStore
+from scenegen.scenes import SHAPE_NAMES
+from scenegen.shapes import unit_shape
+from scenegen.solids import UnitShape
+from scenegen.specs import DatasetSpec
+
+
+@dataclass(frozen=True, eq=False)
+class Objects:
+    """What a data set's scenes are made of.
+
+    Attributes:
+        models: by class, names as in `scenes.PlacedObject.shape`.
+        shape: the unit shape of such a name. Raises BadMeshError where its file cannot be used.
+        digest: of the file that the shape was made from; empty for what the program makes.
+    """
+
+    models: Mapping[str, Sequence[str]]
+    shape: Callable[[str], UnitShape]
+    digest: Callable[[str], str]
+
+
+def objects_of(spec: DatasetSpec) -> Objects:
+    """Return the built-in objects that a request draws from.
+
+    Raises SpecError where they are meshes in a folder, of which the request does not know where
+    it lies.
+    """
+    if spec.source not in ("shapes", "families"):
+        raise SpecError(
+            f"objects: they are meshes of a {spec.source} folder; say where it lies with"
+            f" --{'objects' if spec.source == 'folder' else 'shapenet'}-root"
+        )
+    return _built_in(spec.source, spec.shapes, spec.object_split)
+
+
+def mesh_objects(store: MeshStore) -> Objects:
+    """Return the objects of a folder of meshes."""
+    models = {name: [one.name for one in some] for name, some in store.folder.models.items()}
+    return Objects(models, store.shape, store.digest)
+
+
+def built_in_shape(name: str) -> UnitShape:
+    """Return a basic shape, or a member of a built-in family. Raises SpecError for another name."""
+    if name in SHAPE_NAMES:
+        return unit_shape(name)
+    family, _, member = name.partition("/")
+    if not member.isdecimal():
+        raise SpecError(f"object: found {name!r}, expected a basic shape, or class/number")
+    return member_shape(family, int(member))
+
+
+@lru_cache(maxsize=16)
+def _built_in(source: str, names: tuple[str, ...], split: str) -> Objects:
+    models: dict[str, Sequence[str]] = {name: (name,) for name in names}
+    if source == "families":
+        for name in names:
+            members = (f"{name}/{i:04d}" for i in range(MEMBERS))
+            models[name] = [m for m in members if split in ("all", object_split(m))]
+    return Objects(models, built_in_shape, lambda name: "")

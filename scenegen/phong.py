@@ -1,0 +1,105 @@
+"""The shading equation's diffuse and Phong lobes as a Mitsuba material, for the path tracer."""
+
+from typing import Any
+
+import drjit
+import mitsuba
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+dr: Any = drjit  # their stubs are not exact enough to be of use here
+mi: Any = mitsuba
+
+
+def phong_bsdf(reflectance: Array, specular: float, shininess: float) -> Any:
+    """Return a two-sided material with f cos(theta) = (rho cos(theta) + k_s (r . l)^m) / pi.
+
+    Under a point light this is what `shading.shade` computes. The lobe sends on at most
+    2 k_s / (m + 1) of what it receives. Its class is made for the variant in force.
+    """
+    return _phong_class(mi.variant())(reflectance, specular, shininess)
+
+
+_classes: dict[str, Any] = {}
+
+
+def _phong_class(variant: str) -> Any:
+    """Return the material's class, which has to derive from the variant's own base class."""
+    if variant in _classes:
+        return _classes[variant]
+
+    class Phong(mi.BSDF):  # type: ignore[misc]
+        """Lobes are chosen by their share of the reflected light at normal incidence."""
+
+        def __init__(self, reflectance: Array, specular: float, shininess: float) -> None:
+            mi.BSDF.__init__(self, mi.Properties())
+            self.rho = mi.Color3f(*(float(c) for c in reflectance))
+            self.specular, self.shininess = mi.Float(specular), mi.Float(shininess)
+            lobe = 2 * specular / (shininess + 1)
+            self.lobe_share = mi.Float(lobe / max(lobe + float(np.mean(reflectance)), 1e-6))
+            sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
+            diffuse, glossy = mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection
+            self.m_components = [diffuse | sides, glossy | sides]
+            self.m_flags = self.m_components[0] | self.m_components[1]
+
+        def _oriented(self, si: Any, wo: Any) -> tuple[Any, Any, Any]:
+            """Return incoming, outgoing and mirrored direction, on the side of the viewer."""
+            side = dr.mulsign(mi.Float(1), si.wi.z)
+            wi, wo = (mi.Vector3f(w.x, w.y, w.z * side) for w in (si.wi, wo))
+            return wi, wo, mi.Vector3f(-wi.x, -wi.y, wi.z)
+
+        def _density(self, wo: Any, mirrored: Any) -> Any:
+            lobe = dr.power(dr.maximum(dr.dot(mirrored, wo), 0), self.shininess)
+            glossy = lobe * (self.shininess + 1) / (2 * dr.pi)
+            diffuse = mi.warp.square_to_cosine_hemisphere_pdf(wo)
+            mixed = self.lobe_share * glossy + (1 - self.lobe_share) * diffuse
+            return dr.select(wo.z > 0, mixed, 0)
+
+        def eval(self, _ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            """Return f cos(theta)."""
+            _, wo, mirrored = self._oriented(si, wo)
+            lobe = dr.power(dr.maximum(dr.dot(mirrored, wo), 0), self.shininess)
+            value = (self.rho * wo.z + self.specular * lobe) / dr.pi
+            return dr.select(active & (wo.z > 0), value, 0)
+
+        def pdf(self, _ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            """Return the density of `sample` per solid angle."""
+            _, wo, mirrored = self._oriented(si, wo)
+            return dr.select(active, self._density(wo, mirrored), 0)
+
+        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            """Return both."""
+            return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+
+        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
+            """Draw a direction from either lobe; weigh it by both."""
+            side = dr.mulsign(mi.Float(1), si.wi.z)
+            mirrored = mi.Vector3f(-si.wi.x, -si.wi.y, si.wi.z * side)
+            cosine = dr.power(sample2.y, 1 / (self.shininess + 1))
+            sine = dr.sqrt(dr.maximum(1 - cosine * cosine, 0))
+            s, c = dr.sincos(2 * dr.pi * sample2.x)
+            glossy = mi.Frame3f(mirrored).to_world(mi.Vector3f(sine * c, sine * s, cosine))
+            diffuse = mi.warp.square_to_cosine_hemisphere(sample2)
+            wo = dr.select(sample1 < self.lobe_share, glossy, diffuse)
+            found = dr.zeros(mi.BSDFSample3f)
+            found.wo = mi.Vector3f(wo.x, wo.y, wo.z * side)
+            found.pdf = self.pdf(ctx, si, found.wo, active)
+            found.eta = 1.0
+            found.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
+            found.sampled_component = 0
+            active = active & (found.pdf > 0)
+            value = self.eval(ctx, si, found.wo, active) / found.pdf
+            return found, dr.select(active, value, 0)
+
+        def traverse(self, callback: Any) -> None:
+            """Show the parameters."""
+            for name in ("rho", "specular", "shininess", "lobe_share"):
+                callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
+
+        def to_string(self) -> str:
+            """Name it."""
+            return "Phong[]"
+
+    _classes[variant] = Phong
+    return Phong
