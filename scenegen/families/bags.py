@@ -90,7 +90,7 @@ def _paper_bag(rng: Generator) -> list[Part]:
 def _band(path: Curve, z: float, wide: float) -> Part:
     """A band that lies flat in the plane of x and y at z."""
     wide = min(wide, 0.7 * tightest(path))
-    return tube(path, 0.025, wide, origin=(0.0, 0.0, z), corner=0.02, segments=12, thin=True)
+    return tube(path, 0.025, wide, origin=(0.0, 0.0, z), corner=0.02, segments=16, thin=True)
 
 
 def _sack(rng: Generator) -> list[Part]:
@@ -114,7 +114,7 @@ def _sack(rng: Generator) -> list[Part]:
             0.06,
             origin=(0.0, height, 0.0),
             up=(0.0, 0.0, 1.0),
-            segments=12,
+            segments=16,
         )
         return [loft(side), cord]
     top = span(rng, 0.8, 1.15)

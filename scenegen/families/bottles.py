@@ -43,8 +43,8 @@ def bottle(rng: Generator) -> list[Part]:
         round_slope = (bevel * depth * most - neck) / (most - neck)
         base = (0.0, neck * (1 - slope), neck * (1 - round_slope))
         parts = [
-            loft(body, size=(1.0, slope), corner=round_slope, base=base, segments=32),
-            loft(join(line((neck, top - 0.02), (neck, top)), stem)),
+            loft(body, size=(1.0, slope), corner=round_slope, base=base, segments=28),
+            loft(join(line((neck, top - 0.02), (neck, top)), stem), segments=24),
         ]
     return parts + _closure(rng, mouth)
 
@@ -124,5 +124,5 @@ def _closure(rng: Generator, mouth: tuple[float, float]) -> list[Part]:
         loft(polyline((wide, skirt), (wide, high + 0.4 * rise)), segments=24),
         loft(polyline((bar, high), (bar, head + 0.5 * bar)), segments=16),
         loft(polyline((1.5 * bar, head), (1.5 * bar, head + 2 * bar)), segments=24),
-        tube(path, 0.8 * bar, across=(0.0, 0.0, 1.0)),
+        tube(path, 0.8 * bar, across=(0.0, 0.0, 1.0), segments=12),
     ]

@@ -84,7 +84,7 @@ def _crushed(rng: Generator) -> list[Part]:
     folds, height = 2 + int(4 * rng.random()), span(rng, 0.9, 2.6)
     steps = [span(rng, 0.6, 1.4) for _ in range(2 * folds + 1)]
     levels = np.cumsum([0.12, *(step * (height - 0.12) / sum(steps) for step in steps)]).tolist()
-    radii = [span(rng, 0.78, 0.94) if i % 2 else span(rng, 0.97, 1.06) for i in range(len(levels))]
+    radii = [span(rng, 0.84, 0.96) if i % 2 else span(rng, 0.97, 1.06) for i in range(len(levels))]
     corners = list(zip(radii, levels, strict=True))
     neck = 0.75
     side = polyline((0.75, 0.0), *corners, (neck, levels[-1] + 0.15))

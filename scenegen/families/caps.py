@@ -168,6 +168,7 @@ def _peak(rng: Generator, ahead: float) -> Part:
     edge_x = 0.96 * math.sin(half)
     fall = arch / edge_x**2
     y = 0.012 + arch - fall * x**2 - slope * (z - corner_z) + slope * 0.03
+    y = y - y.min() + 0.012
     up = np.stack([2 * fall * x, np.ones_like(x), slope + 0 * x], axis=-1)
     grid = np.stack([x, y, z + ahead], axis=-1)
     return plate(grid, up, THICK)

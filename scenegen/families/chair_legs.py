@@ -65,7 +65,7 @@ def legs(rng: Generator, width: float, depth: float, under: float) -> list[Part]
     else:
         corner = pick(rng, (0.0, 1.0))
         foot = span(rng, 0.5, 1.0) * thin
-        legs = loft(line((foot, 0.0), (thin, top)), at=feet, lean=lean, corner=corner, segments=12)
+        legs = loft(line((foot, 0.0), (thin, top)), at=feet, lean=lean, corner=corner, segments=16)
     parts = [legs]
     if chance(rng, 0.45):  # stretchers between the legs
         y, half = span(rng, 0.15, 0.45) * top, 0.45 * thin
@@ -107,4 +107,4 @@ def _star(rng: Generator, top: float) -> list[Part]:
                 bar.append((along * c - across * s, y, along * s + across * c))
         bars.append(bar)
     castor = arc((0.0, ball), ball, -90, 90, 6)
-    return [*parts, boxes(bars), loft(castor, at=wheels, segments=12)]
+    return [*parts, boxes(bars), loft(castor, at=wheels, segments=16)]

@@ -91,5 +91,5 @@ def _tub(rng: Generator) -> list[Part]:
         plate = polyline((0.7, 0.0), (0.7, 0.06), (0.12, 0.08), (0.12, foot + 0.1))
         return [wall, seat, loft(plate, segments=32)]
     spots = [(x, 0.7 * deep), (-x, 0.7 * deep), (x, -z), (-x, -z)]
-    feet = loft(line((0.06, 0.0), (0.1, foot + 0.15)), at=spots, segments=12)
+    feet = loft(line((0.06, 0.0), (0.1, foot + 0.15)), at=spots, segments=16)
     return [wall, seat, feet]

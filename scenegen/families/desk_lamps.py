@@ -40,7 +40,7 @@ def _hang(rng: Generator, at: tuple[float, float], tilt: float) -> list[Part]:
     offset = (0.0, at[1] - rise * math.cos(tilt), at[0] + rise * math.sin(tilt))
     lid = loft(polyline((crown + 0.01, rise - 0.05), (0.8 * crown, rise + 0.08)), segments=24)
     bulb = loft(arc((0.0, 0.45 * rise), 0.6 * crown, -80, 80, 8), segments=16)
-    stem = loft(polyline((0.3 * crown, 0.5 * rise), (0.3 * crown, rise)), segments=12)
+    stem = loft(polyline((0.3 * crown, 0.5 * rise), (0.3 * crown, rise)), segments=16)
     parts = [loft(ring(wall, 0.025), closed=True, segments=32), lid, buried(bulb), buried(stem)]
     return [moved(part, offset, turn) for part in parts]
 

@@ -44,7 +44,7 @@ def _pole(rng: Generator, height: float) -> list[Part]:
         lean = [(-x * 0.95 / hub, -z * 0.95 / hub) for x, z in feet]
         leg = line((1.2 * thin, 0.0), (thin, hub))
         return [
-            loft(leg, at=feet, lean=lean, segments=12),
+            loft(leg, at=feet, lean=lean, segments=16),
             loft(polyline((thin, hub - 0.15), (thin, height)), segments=16),
             loft(polyline((2.2 * thin, hub - 0.1), (2.2 * thin, hub + 0.05)), segments=16),
         ]
@@ -98,7 +98,7 @@ def _tripod(rng: Generator, top: float, wide: float) -> list[Part]:
     feet = [(spread * math.cos(a), spread * math.sin(a)) for a in angle]
     lean = [(-x * 0.9 / top, -z * 0.9 / top) for x, z in feet]
     hub = loft(polyline((2.6 * thin, top - 0.12), (2.6 * thin, top + 0.02)), segments=20)
-    return [loft(line((thin, 0.0), (thin, top)), at=feet, lean=lean, segments=12), hub]
+    return [loft(line((thin, 0.0), (thin, top)), at=feet, lean=lean, segments=16), hub]
 
 
 def _balls(rng: Generator, top: float, wide: float) -> list[Part]:
@@ -110,7 +110,7 @@ def _balls(rng: Generator, top: float, wide: float) -> list[Part]:
     pieces = [polyline((wide, 0.0), (0.95 * wide, 0.1), (0.3 * radius, 0.1))]
     for i in range(count):
         bulge, middle = radius * shrink**i, 0.1 + half * (2 * i + 1)
-        piece = arc((0.0, middle), (bulge, half), -72, 72, 8)
+        piece = arc((0.0, middle), (bulge, half), -72, 72, 7)
         pieces.append(piece)
     return [loft(_bridged(pieces), segments=28)]
 

@@ -160,7 +160,7 @@ def join(*curves: Curve) -> Curve:
 
 def hull_rows(points: Array) -> list[int]:
     """Rows of (n, 2) points that are corners of their convex hull, to 1e-13."""
-    points = np.round(points, 13)  # else points on an upright line come in any order
+    points = np.round(points, 13)  # else rounding makes corners along straight pieces
     order = np.lexsort((points[:, 1], points[:, 0]))
     repeats = (np.diff(points[order], axis=0) == 0.0).all(axis=1)
     once = np.delete(order, np.flatnonzero(repeats) + 1).tolist()

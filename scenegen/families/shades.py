@@ -32,7 +32,11 @@ def shade(rng: Generator, height: float, radius: float) -> list[Part]:
         )
     else:
         wall = bezier(
-            (radius, low), (radius, low + 0.6 * rise), (0.8 * radius, high), (narrow, high), 8
+            (radius, low),
+            (radius, low + 0.6 * rise),
+            ((radius + narrow) / 2, high),
+            (narrow, high),
+            8,
         )
     outline = pick(rng, ("round", "round", "round", "square", "oval"))
     size, corner = (1.0, 1.0), 1.0
@@ -54,13 +58,13 @@ def shade(rng: Generator, height: float, radius: float) -> list[Part]:
     parts = [
         loft(ring(wall, thick), size=size, corner=corner, closed=True),
         buried(boxes(cross)),
-        loft(stem, segments=12),
-        loft(bulb, segments=20),
+        loft(stem, segments=16),
+        loft(bulb, segments=16),
     ]
     if chance(rng, 0.3):  # a finial
         ball = span(rng, 0.05, 0.1)
         parts += [
-            loft(polyline((0.03, level), (0.03, high + ball)), segments=12),
+            loft(polyline((0.03, level), (0.03, high + ball)), segments=16),
             loft(arc((0.0, high + 1.5 * ball), ball, -80, 90, 8), segments=16),
         ]
     return parts

@@ -12,7 +12,7 @@ Generator = np.random.Generator
 
 def strap(path: Curve, z: float, wide: float, thick: float) -> Part:
     """A flat band in the plane of x and y at z."""
-    return tube(path, wide, thick, origin=(0.0, 0.0, z), corner=thick, segments=12, thin=True)
+    return tube(path, wide, thick, origin=(0.0, 0.0, z), corner=thick, segments=16, thin=True)
 
 
 def arch(rng: Generator, half: float, low: float, rise: float) -> Curve:

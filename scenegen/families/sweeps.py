@@ -22,7 +22,7 @@ def tube(
     across: Vector = (1.0, 0.0, 0.0),
     up: Vector = (0.0, 1.0, 0.0),
     corner: float | None = None,
-    segments: int = 12,
+    segments: int = 16,
     thin: bool = False,
 ) -> Part:
     """Sweep a rounded rectangle along a curve in the plane of two unit vectors; ends are flat.

@@ -54,7 +54,7 @@ def four(rng: Generator, x: float, z: float, top: float) -> list[Part]:
         if chance(rng, 0.4):  # a drawer's front
             wide = span(rng, 0.2, 0.6) * x
             boards.append(
-                box((-wide, top - 0.85 * drop, z - thin), (wide, top - 0.05, z + 0.9 * thin))
+                box((-wide, top - 0.85 * drop, z - thin), (wide, top - 0.1 * drop, z + 0.9 * thin))
             )
     low = span(rng, 0.12, 0.5) * top
     share = 1.0 - low / top
@@ -99,7 +99,7 @@ def panels(rng: Generator, x: float, z: float, top: float) -> list[Part]:
         for i in range(count):
             y = low + i * gap
             boards.append(
-                box((left + 0.03, y + 0.03, 0.0), (right - 0.03, y + gap - 0.03, b + 0.01))
+                box((left + 0.03, y + 0.1 * gap, 0.0), (right - 0.03, y + 0.9 * gap, b + 0.01))
             )
     return [boxes(boards)]
 

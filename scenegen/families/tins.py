@@ -95,7 +95,7 @@ def paint(rng: Generator) -> list[Part]:
         bail = moved(tube(path, 0.05, segments=8, thin=True), (0.0, -high, 0.0))
         parts.append(moved(moved(bail, (0.0, 0.0, 0.0), turn), (0.0, high, 0.0)))
         ears = polyline((0.1, high - 0.12), (0.1, high + 0.12))
-        parts.append(loft(ears, at=[(1.02, 0.0), (-1.02, 0.0)], segments=12))
+        parts.append(loft(ears, at=[(1.02, 0.0), (-1.02, 0.0)], segments=16))
     return parts
 
 
@@ -113,7 +113,7 @@ def churn(rng: Generator) -> list[Part]:
             (1.0, height + span(rng, 0.2, 0.8) * rise),
             (neck, height + span(rng, 0.2, 0.7) * rise),
             (neck, high),
-            8,
+            12,
         ),
         polyline((neck, high), (lip, high + 0.7 * lid), (lip, high + lid), (0.0, high + lid + 0.1)),
     )
@@ -121,5 +121,5 @@ def churn(rng: Generator) -> list[Part]:
     if chance(rng, 0.7):
         low, far = height - 0.15, span(rng, 1.25, 1.7)
         path = bezier((0.9, low), (far, low), (far, high + 0.1), (neck * 0.9, high + 0.1), 12)
-        parts += [tube(path, 0.07, across=(way, 0.0, 0.0), thin=True) for way in (1.0, -1.0)]
+        parts += [tube(path, 0.07, across=(way, 0.0, 0.0)) for way in (1.0, -1.0)]
     return parts

@@ -57,7 +57,14 @@ def bowl(rng: Generator) -> list[Part]:
         )
         bar = min(span(rng, 0.035, 0.06), 0.4 * (height - level + foot) + 0.03)
         parts += [
-            tube(hoop, bar, origin=(0.0, level, 0.0), across=(way, 0.0, 0.0), up=(0.0, 0.0, way))
+            tube(
+                hoop,
+                bar,
+                origin=(0.0, level, 0.0),
+                across=(way, 0.0, 0.0),
+                up=(0.0, 0.0, way),
+                segments=12,
+            )
             for way in (1.0, -1.0)
         ]
     return parts
