@@ -1,5 +1,6 @@
 """Unit meshes for other renderers: as fine as scenegen's own, or coarse."""
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from trimesh.grouping import unique_rows
 
-from scenegen.shapes import unit_shape
+from scenegen.solids import UnitShape
 
 Array = NDArray[Any]
 COARSE_FROM = 1000  # triangles; shapes with fewer stay as they are
@@ -23,13 +24,16 @@ class Mesh:
     faces: Array
 
 
-def unit_meshes(names: tuple[str, ...], coarse: bool) -> dict[str, Mesh]:
+def unit_meshes(
+    names: Iterable[str], coarse: bool, shape_of: Callable[[str], UnitShape]
+) -> dict[str, Mesh]:
     """Return the welded unit meshes of all shapes but the exact sphere.
 
     Coarse ones have about a thousand triangles: what a user may accept who has to build them anew
     for every scene. They show it, and are here for their speed alone.
     """
-    return {name: _weld(name, coarse) for name in names if not unit_shape(name).is_sphere}
+    shapes = {name: shape_of(name) for name in names}
+    return {name: _weld(shape, coarse) for name, shape in shapes.items() if not shape.is_sphere}
 
 
 def moved(mesh: Mesh, world_from_object: Array) -> Mesh:
@@ -48,8 +52,7 @@ def join(meshes: list[Mesh]) -> Mesh:
     )
 
 
-def _weld(name: str, coarse: bool) -> Mesh:
-    shape = unit_shape(name)
+def _weld(shape: UnitShape, coarse: bool) -> Mesh:
     points, normals = shape.triangles.reshape(-1, 3), shape.normals.reshape(-1, 3)
     corners = np.concatenate([points, normals], axis=1)
     drawn = coarse and len(shape.triangles) >= COARSE_FROM

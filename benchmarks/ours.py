@@ -20,7 +20,9 @@ def machine() -> dict[str, Any]:
     return {"versions": {**versions, "LLVM": llvm}, "variant": select_variant("auto")}
 
 
-def end_to_end(rooms: str, count: int, repeats: int) -> dict[str, Any]:
+def end_to_end(
+    rooms: str, count: int, repeats: int, preset: str = "shapes", root: str = ""
+) -> dict[str, Any]:
     """Time make_dataset from nothing to a closed file; the last file stays.
 
     Three figures: the time to the first, one-batch file from the start of the process, all imports
@@ -29,11 +31,15 @@ def end_to_end(rooms: str, count: int, repeats: int) -> dict[str, Any]:
     opening, filling and draining cost drops out.
     """
     from scenegen.dataset import DEFAULT_BATCH, make_dataset
-    from scenegen.specs import DatasetSpec
+    from scenegen.object_sources import object_source
+    from scenegen.presets import preset_spec
+
+    source = object_source(preset, objects_root=root or None)
+    spec = preset_spec(preset, **source.settings)
 
     def make(rows: int) -> float:
         Path(rooms).unlink(missing_ok=True)  # so that no file's disk pages burden the next one
-        return seconds_of(lambda: make_dataset(rooms, DatasetSpec(), rows))
+        return seconds_of(lambda: make_dataset(rooms, spec, rows, objects=source.objects))
 
     make(DEFAULT_BATCH)
     first = time.perf_counter() - STARTED
@@ -51,24 +57,25 @@ def end_to_end(rooms: str, count: int, repeats: int) -> dict[str, Any]:
     return {"seconds": seconds, "images": count, "note": note}
 
 
-def stage(rooms: str, count: int, repeats: int) -> dict[str, Any]:
+def stage(rooms: str, count: int, repeats: int, root: str = "") -> dict[str, Any]:
     """Time pack, launch and fetch of scenes that were sampled before, as make_dataset does it:
     a batch is packed while the one before is cast.
     """
-    from benchmarks.scenes import read_scenes
+    from benchmarks.scenes import read_objects, read_scenes
     from scenegen.dataset import DEFAULT_BATCH
     from scenegen.packing import pack
     from scenegen.renderer import launch
 
     spec, scenes = read_scenes(rooms, count)
+    objects = read_objects(spec, root)
     parts = [scenes[i : i + DEFAULT_BATCH] for i in range(0, count, DEFAULT_BATCH)]
 
     def render_all() -> None:
-        batch = pack(spec, parts[0])
+        batch = pack(spec, parts[0], objects=objects)
         for following in [*parts[1:], None]:
             fetch = launch(batch)
             if following:
-                batch = pack(spec, following)
+                batch = pack(spec, following, objects=objects)
             fetch()
 
     seconds = repeat(render_all, repeats)

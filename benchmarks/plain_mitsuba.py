@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.meshes import Mesh, join, moved, unit_meshes
-from benchmarks.scenes import read_depth, read_scenes
+from benchmarks.scenes import read_depth, read_objects, read_scenes
 from benchmarks.timing import repeat
 from scenegen.backend import select_variant
 from scenegen.camera import Camera, pixel_directions
@@ -48,7 +48,7 @@ class Kit:
 
 
 def per_scene(
-    rooms: str, count: int, repeats: int, variant: str, coarse: bool, folder: str
+    rooms: str, count: int, repeats: int, variant: str, coarse: bool, folder: str, root: str = ""
 ) -> dict[str, Any]:
     """Time load, render and conversion to numpy of every scene, in the fastest way.
 
@@ -59,7 +59,8 @@ def per_scene(
     mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)
     spec, scenes = read_scenes(rooms, count)
-    meshes = unit_meshes(spec.shapes, coarse)
+    names = {item.shape: None for scene in scenes for item in scene.objects}
+    meshes = unit_meshes(names, coarse, read_objects(spec, root).shape)
     seconds = {}
     for way in WAYS:
         kit = prepare(spec, way, meshes, f"{folder}/{variant}-{coarse}")
@@ -90,7 +91,7 @@ def prepare(spec: DatasetSpec, way: str, meshes: dict[str, Mesh], stem: str) -> 
     objects: dict[str, Any] = {}
     for name, mesh in meshes.items():
         if way == "files":
-            objects[name] = f"{stem}-{name}.ply"
+            objects[name] = f"{stem}-{name.replace('/', '-')}.ply"
             mitsuba_mesh(name, mesh).write_ply(objects[name])
         elif way == "instances":
             inside = mitsuba_mesh(name, mesh, material)
@@ -124,7 +125,7 @@ def describe(kit: Kit, scene: SceneSpec) -> dict[str, Any]:
         elif kit.way == "files":
             entry = {"type": "ply", "filename": shape, "to_world": to_world, "bsdf": kit.material}
         elif kit.way == "instances":
-            contents[f"group-{item.shape}"] = shape
+            contents[f"group-{item.shape.replace('/', '-')}"] = shape
             entry = {"type": "instance", "group": shape, "to_world": to_world}
         else:
             merged.append(moved(shape, matrix))

@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.object_sources import file_objects
+from scenegen.objects import Objects, objects_of
 from scenegen.scene_file import RoomsFile
 from scenegen.scenes import SceneSpec
 from scenegen.specs import DatasetSpec
@@ -16,6 +18,11 @@ def read_scenes(rooms: str, count: int) -> tuple[DatasetSpec, list[SceneSpec]]:
     """Return the request that the file answers, and its first `count` scenes."""
     with RoomsFile(rooms) as file:
         return file.spec, [file.scene(row) for row in range(count)]
+
+
+def read_objects(spec: DatasetSpec, root: str) -> Objects:
+    """Return what the scenes are made of: built in, or the meshes of a folder."""
+    return file_objects(spec, objects_root=root or None) or objects_of(spec)
 
 
 def read_depth(rooms: str, count: int) -> Array:
