@@ -84,10 +84,12 @@ def closest_hit(scenes: Scenes, item: Any, o: Any, d: Any) -> Any:
         near = dr.maximum(near, 0)
         if dr.hint(meets & (near < t) & (near < far), exclude=[scenes]):
             start, along = _to_unit_scene(scenes, row, o + near * d, d)
-            ray = mi.Ray3f(mi.Ray3f(start, along), far - near)
+            length = dr.norm(along)  # Mitsuba's sphere has holes for rays that are long
+            ray = mi.Ray3f(mi.Ray3f(start, along / length), (far - near) * length)
             hit = scenes.unit.ray_intersect_preliminary(ray, coherent=False)
-            nearer = hit.is_valid() & (near + hit.t <= t)
-            t = dr.select(nearer, near + hit.t, t)
+            hit_t = near + hit.t / length
+            nearer = hit.is_valid() & (hit_t <= t)
+            t = dr.select(nearer, hit_t, t)
             object_id = dr.select(nearer, mi.Int32(k) + 1, object_id)
             triangle = dr.select(nearer, hit.prim_index, triangle)
             uv = dr.select(nearer, hit.prim_uv, uv)
@@ -108,7 +110,8 @@ def occluded(scenes: Scenes, item: Any, o: Any, d: Any, active: Any) -> Any:
         far = dr.minimum(far, 1)
         if dr.hint(meets & (near < far), exclude=[scenes]):
             start, along = _to_unit_scene(scenes, row, o + near * d, d)
-            ray = mi.Ray3f(mi.Ray3f(start, along), far - near)
+            length = dr.norm(along)
+            ray = mi.Ray3f(mi.Ray3f(start, along / length), (far - near) * length)
             blocked |= scenes.unit.ray_test(ray, coherent=False)
         k += 1
     return blocked & active

@@ -66,9 +66,9 @@ def object_source(
         raise SpecError(
             "objects: found --shapes beside --classes or a folder of meshes, expected one of them"
         )
-    if shapes is not None:
-        return ObjectSource({"source": "shapes", "shapes": shapes})
     split = {} if object_split is None else {"object_split": object_split}
+    if shapes is not None:
+        return ObjectSource({"source": "shapes", "shapes": shapes, **split})
     if root is None:
         families = {} if classes is None else {"source": "families", "shapes": classes}
         return ObjectSource({**families, **split})

@@ -1,8 +1,10 @@
 """What the objects of a data set are: names of classes and models, and how they look."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+
+import numpy as np
 
 from scenegen.errors import SpecError
 from scenegen.families.members import MEMBERS, member_shape
@@ -57,6 +59,23 @@ def built_in_shape(name: str) -> UnitShape:
     if not member.isdecimal():
         raise SpecError(f"object: found {name!r}, expected a basic shape, or class/number")
     return member_shape(family, int(member))
+
+
+def outline(shape_of: Callable[[str], UnitShape], name: str) -> UnitShape:
+    """Return a unit shape without its triangles: what placement needs, small enough to be kept."""
+    return _known(shape_of, name)[0]
+
+
+def face_count(shape_of: Callable[[str], UnitShape], name: str) -> int:
+    """Return the number of a unit shape's triangles, also where these are not in memory."""
+    return _known(shape_of, name)[1]
+
+
+@lru_cache(maxsize=20_000)
+def _known(shape_of: Callable[[str], UnitShape], name: str) -> tuple[UnitShape, int]:
+    shape = shape_of(name)
+    nothing = np.zeros((0, 3, 3))
+    return replace(shape, triangles=nothing, normals=nothing), len(shape.triangles)
 
 
 @lru_cache(maxsize=16)

@@ -9,6 +9,7 @@ from scenegen.specs import DatasetSpec
 VESSELS = ("bag", "bottle", "bowl", "can", "cap", "lamp", "mug")
 PAPER_VIEWS = (0.0, 5.0, 35.0, 55.0, 80.0)  # degrees; the paper's table of unseen views
 VISIBLE_SHARE = 0.003  # of the image's pixels, that every object shows by default
+VIEWS_SHRINK = 0.75  # of objects that show whole in several views
 PATH_SAMPLES = 64  # colour samples a pixel of a path tracer, by default
 
 
@@ -62,8 +63,9 @@ PRESETS = {
 def preset_spec(preset: str, **settings: Any) -> DatasetSpec:
     """Return a preset with other settings on top.
 
-    Three that are not told follow others: `min_visible_pixels` is a share of the image, `spp` is
-    PATH_SAMPLES for a path tracer, and `room_reflectance` the objects' where only that is told.
+    Four that are not told follow others: `min_visible_pixels` is a share of the image, objects are
+    smaller where several views have to hold them, `spp` is PATH_SAMPLES for a path tracer, and
+    `room_reflectance` the objects' where only that is told.
 
     Raises SpecError.
     """
@@ -71,6 +73,9 @@ def preset_spec(preset: str, **settings: Any) -> DatasetSpec:
     chosen = {**PRESETS[preset].settings, **settings}
     pixels = chosen.get("height", DatasetSpec.height) * chosen.get("width", DatasetSpec.width)
     chosen.setdefault("min_visible_pixels", max(1, round(VISIBLE_SHARE * pixels)))
+    if len(chosen.get("views", ())) > 1 and "object_radius" not in settings:
+        low, high = chosen.get("object_radius", DatasetSpec.object_radius)
+        chosen["object_radius"] = (VIEWS_SHRINK * low, VIEWS_SHRINK * high)
     if chosen.get("shading") == "path":
         chosen.setdefault("spp", PATH_SAMPLES)
     if "reflectance" in settings:

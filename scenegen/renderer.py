@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from scenegen.backend import HOW_TO_GET_LLVM, select_variant
 from scenegen.errors import BackendError
+from scenegen.objects import face_count
 from scenegen.packing import SceneBatch
 from scenegen.reference import face_viewer, render_reference, smooth_normals
 from scenegen.solids import UnitShape
@@ -88,12 +89,12 @@ def parts(batch: SceneBatch) -> list[SceneBatch]:
     starts, seen, faces = [0], set[int](), 0
     for row, shapes in enumerate(batch.shape):
         new = set(shapes[shapes >= 0].tolist()) - seen
-        more = sum(len(batch.shape_of(batch.names[i]).triangles) for i in new)
+        more = sum(face_count(batch.shape_of, batch.names[i]) for i in new)
         if row > starts[-1] and (faces + more > MOST_FACES or len(seen | new) > MOST_MODELS):
             starts.append(row)
             seen, faces = set(), 0
             new = set(shapes[shapes >= 0].tolist())
-            more = sum(len(batch.shape_of(batch.names[i]).triangles) for i in new)
+            more = sum(face_count(batch.shape_of, batch.names[i]) for i in new)
         seen |= new
         faces += more
     ends = [*starts[1:], len(batch)]

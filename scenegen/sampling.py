@@ -14,7 +14,7 @@ import numpy as np
 from scenegen.camera import Camera, Vector3
 from scenegen.errors import PlacementError, SpecError
 from scenegen.meshes.errors import BadMeshError
-from scenegen.objects import Objects, objects_of
+from scenegen.objects import Objects, objects_of, outline
 from scenegen.placement import Body, find_place, frustum_normals, random_rotation
 from scenegen.scenes import Light, PlacedObject, SceneSpec
 from scenegen.seeding import Purpose, item_rng
@@ -158,15 +158,15 @@ def _sample_kinds(spec: DatasetSpec, index: int, objects: Objects) -> list[_Kind
 def _sample_model(
     spec: DatasetSpec, index: int, k: int, name: str, objects: Objects
 ) -> tuple[UnitShape, str]:
-    """Draw a usable model of a class for object k; return its unit shape and file's digest."""
+    """Draw a usable model of a class for object k; return its outline and file's digest."""
     models = objects.models[name]
-    if len(models) == 1:
-        return objects.shape(models[0]), objects.digest(models[0])
+    if spec.source == "shapes":
+        return outline(objects.shape, models[0]), objects.digest(models[0])
     rng = item_rng(spec.seed, index, Purpose.MODELS, k)
     for _ in range(MAX_MODELS):
         model = models[int(rng.integers(len(models)))]
         try:
-            return objects.shape(model), objects.digest(model)
+            return outline(objects.shape, model), objects.digest(model)
         except BadMeshError as error:
             reason = str(error)
     raise SpecError(

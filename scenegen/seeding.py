@@ -1,4 +1,4 @@
-"""The only place where random generators are made.
+"""The only place where random generators are made, but for those of `families.members`.
 
 Every random choice derives from (dataset seed, item index, purpose, attempt) through NumPy's
 `SeedSequence` spawn keys, so that neighbouring seeds and neighbouring items share no stream

@@ -46,7 +46,7 @@ def shade(
     if viewpoint is not None:
         view = np.asarray(points, np.float64) - viewpoint
         mirrored = view - 2 * np.sum(view * normals, axis=-1, keepdims=True) * normals
-        mirrored /= np.linalg.norm(mirrored, axis=-1, keepdims=True)
+        mirrored /= np.maximum(np.linalg.norm(mirrored, axis=-1, keepdims=True), 1e-300)
     for position, color in zip(light_positions, light_colors, strict=True):
         to_light = position - np.asarray(points, np.float64)
         distance = np.linalg.norm(to_light, axis=-1, keepdims=True)

@@ -113,7 +113,7 @@ def _check_light(spec: "DatasetSpec") -> None:
         ok = len(color) == 3 and all(0.0 <= c <= 1.0 for c in color)
         check(ok, name.replace("_", " "), color, "channels from 0 to 1")
     check(
-        min(spec.attenuation) >= 0.0 and sum(spec.attenuation) > 0.0,
+        len(spec.attenuation) == 2 and min(spec.attenuation) >= 0.0 and sum(spec.attenuation) > 0.0,
         "attenuation",
         spec.attenuation,
         "k_l and k_q, neither negative, not both 0",

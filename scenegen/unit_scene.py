@@ -62,9 +62,11 @@ def normal_table(shape: UnitShape) -> Array:
     if shape.is_sphere:
         return np.zeros((0, 12), np.float32)
     edges = shape.triangles[:, 1:] - shape.triangles[:, :1]
-    face = np.cross(edges[:, 0], edges[:, 1])
-    face /= np.linalg.norm(face, axis=1, keepdims=True)
-    return np.concatenate([face, shape.normals.reshape(-1, 9)], axis=1).astype(np.float32)
+    face = np.stack(_cross(edges[:, 0].T, edges[:, 1].T), axis=1)
+    face /= np.sqrt(np.einsum("fi,fi->f", face, face))[:, None]
+    table = np.empty((len(face), 12), np.float32)
+    table[:, :3], table[:, 3:] = face, shape.normals.reshape(-1, 9)
+    return table
 
 
 def stacked(tables: Sequence[Array]) -> tuple[Array, Any]:
@@ -94,12 +96,22 @@ def overlapping(triangles: Array) -> Array:
     A ray that meets an edge within rounding would otherwise slip through now and then: the test of
     either triangle may find it outside. No corner moves further than four times that.
     """
-    along = np.roll(triangles, -1, axis=1) - triangles
-    along = along / np.maximum(np.linalg.norm(along, axis=2, keepdims=True), 1e-30)
-    back = -np.roll(along, 1, axis=1)  # from each corner to the one before it
-    sine = np.linalg.norm(np.cross(along, back), axis=2, keepdims=True)
-    outward = -(along + back) / np.maximum(sine, 1e-12)
-    length = np.linalg.norm(outward, axis=2, keepdims=True)
-    return np.asarray(
-        triangles + outward * (OVERLAP * np.minimum(1, 4 / np.maximum(length, 1e-12)))
-    )
+    edges = triangles[:, _NEXT] - triangles  # from each corner to the next
+    length = np.sqrt(np.einsum("fki,fki->fk", edges, edges))
+    along = edges / np.maximum(length, 1e-30)[..., None]
+    # From a corner to its two neighbours; the edges that they are not on move along their sum.
+    outward = along[:, _BEFORE] - along
+    first, second = edges[:, 0].T, edges[:, 1].T
+    double_area = np.sqrt(sum(c * c for c in _cross(first, second)))
+    sine = double_area[:, None] / np.maximum(length * length[:, _BEFORE], 1e-30)
+    reach = np.sqrt(np.einsum("fki,fki->fk", outward, outward))
+    scale = OVERLAP / np.maximum(np.maximum(sine, reach / 4), 1e-30)
+    return np.asarray(triangles + outward * scale[..., None])
+
+
+_NEXT, _BEFORE = [1, 2, 0], [2, 0, 1]
+
+
+def _cross(a: Array, b: Array) -> tuple[Array, Array, Array]:
+    """Cross product by components, several times as fast as NumPy's."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

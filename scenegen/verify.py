@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scenegen.backend import select_variant
 from scenegen.camera import pixel_directions, transform_points, transform_vectors
 from scenegen.errors import FileFormatError, SceneGenError, SpecError
+from scenegen.meshes.errors import BadMeshError
 from scenegen.objects import Objects, objects_of
 from scenegen.packing import SceneBatch, pack
 from scenegen.renderer import render
@@ -23,7 +24,8 @@ from scenegen.truth import visible_pixels
 Array = NDArray[Any]
 UNIT_TOLERANCE = 1e-5  # of a normal's length
 PLANE_TOLERANCE = 1e-5  # scene units, of a float32 depth
-RADIANCE_TOLERANCE = 1e-5  # of the shading equation in float32
+RADIANCE_TOLERANCE = 1e-5  # of the shading equation in float32, where radiance is 1 or less
+LOBE_TOLERANCE = 4e-7  # of a highlight's radiance, times its exponent
 OTHER_BACKEND_TOLERANCE = 1e-4  # scene units, where another backend or release rendered the file
 SHOWN = 5  # row numbers named in a message
 
@@ -127,6 +129,13 @@ def _can_read(rooms: RoomsFile, name: str, row: int) -> bool:
 
 
 def _description_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable[str]:
+    views = len(rooms.spec.views)
+    first = room.index - room.index % views
+    if room.view_index != room.index - first or len(room.scene.cameras) != views:
+        yield f"view_index or the number of cameras is not that of the {views} views"
+        return
+    if rooms.read("scene", room.index) != rooms.read("scene", first):
+        yield "the scene's description differs from that of its first view"
     stored = {
         "camera/world_from_camera": batch.world_from_camera,
         "camera/fov_y_degrees": batch.fov_y_degrees,
@@ -204,23 +213,28 @@ def _image_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable
         if (room.object_id >= 0).all() and (radiance < darkest - 0.5 / 255 - 1e-3).any():
             yield "a pixel is darker than ambient light alone"
         return
-    reference = shade(
+    material = np.maximum(room.object_id, 0)
+    specular, shininess = batch.gloss[0, material, 0], batch.gloss[0, material, 1]
+    matte = (
         transform_points(room.world_from_camera, np.nan_to_num(room.points)),
         transform_vectors(room.world_from_camera, room.normal),
-        batch.reflectance[0, np.maximum(room.object_id, 0)],
+        batch.reflectance[0, material],
         batch.light_position[0, : batch.light_count[0]],
         batch.light_color[0, : batch.light_count[0]],
         batch.ambient[0],
         batch.attenuation[0],
-        batch.gloss[0, np.maximum(room.object_id, 0), 0],
-        batch.gloss[0, np.maximum(room.object_id, 0), 1],
-        room.world_from_camera[:3, 3] if rooms.spec.specular[1] > 0 else None,
     )
+    reference = shade(*matte)
+    tolerance = RADIANCE_TOLERANCE * np.maximum(reference, 1.0)
+    if rooms.spec.specular[1] > 0:
+        shine = shade(*matte, specular, shininess, room.world_from_camera[:3, 3]) - reference
+        tolerance += LOBE_TOLERANCE * shininess[..., None] * shine
+        reference += shine
     reference[room.object_id < 0] = room.scene.background
     step = {"uint8": 0.5 / 255, "float16": 2.0**-11, "float32": 0.0}[rooms.spec.image_dtype]
     if rooms.spec.image_dtype == "uint8":
         reference = reference.clip(0, 1)
-    off = np.abs(radiance - reference) - step * np.maximum(reference, 1.0) - RADIANCE_TOLERANCE
+    off = np.abs(radiance - reference) - step * np.maximum(reference, 1.0) - tolerance
     if (off > 0).any():
         yield f"{int((off > 0).any(-1).sum())} pixels are not what the shading equation gives"
 
@@ -231,11 +245,13 @@ def _sampled_again(rooms: RoomsFile, rows: Array, objects: Objects) -> Check:
     for i in rows.tolist():
         try:
             stored = rooms.scene(i)
-        except FileFormatError:
-            wrong.append(f"row {i}")
-            continue
-        attempts = (sample_scene(rooms.spec, stored.index, k, objects) for k in range(MAX_ATTEMPTS))
-        if not any(scene == stored for scene in attempts):
+            tries = (
+                sample_scene(rooms.spec, stored.index, k, objects) for k in range(MAX_ATTEMPTS)
+            )
+            same = any(scene == stored for scene in tries)
+        except (FileFormatError, SpecError):
+            same = False
+        if not same:
             wrong.append(f"row {i}")
     detail = ", ".join(wrong) + " cannot be drawn again" if wrong else f"{len(rows)} rows"
     return Check("drawn again from the seed", not wrong, detail)
@@ -252,7 +268,7 @@ def _rendered_again(rooms: RoomsFile, rows: Array, device: str, objects: Objects
             room = rooms[i]
             with np.errstate(all="ignore"):
                 again = render(pack(rooms.spec, [room.scene], (room.view_index,), objects), device)
-        except (FileFormatError, SpecError):
+        except (FileFormatError, SpecError, BadMeshError):
             wrong.append(f"row {i} (cannot be read)")
             continue
         pairs = {name: (getattr(room, name), getattr(again, name)[0]) for name in _PIXELS}

@@ -47,7 +47,7 @@ def _upload(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
     if spec.source == "shapes":
         unit = unit_scene(variant, batch.names)
     else:
-        unit = model_scene(variant, [batch.shape_of(name) for name in batch.names])
+        unit = model_scene(variant, batch.shape_of, batch.names)
     mi.set_variant(variant)
     shape = np.maximum(batch.shape, 0)
     center = batch.world_from_object[..., :3, 3]

@@ -29,7 +29,7 @@ _ENTROPY = 0x5E1F_0B7E  # never changes: it is part of every member's seed
 FAMILY_NAMES = tuple(sorted(_BUILDERS))
 
 
-@lru_cache(maxsize=512)
+@lru_cache(maxsize=256)
 def member_shape(family: str, member: int) -> UnitShape:
     """Return a member of a class, upright (+y), its front towards +z, of bounding radius 1.
 

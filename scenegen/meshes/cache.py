@@ -4,13 +4,13 @@ Several processes may fill one folder: each writes under a name of its own, then
 cannot be read back whole is made again. A folder that cannot be written to costs time, not the run.
 """
 
+import errno
 import hashlib
 import json
 import os
 import secrets
 import threading
 import warnings
-import zipfile
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -58,8 +58,9 @@ def default_cache_dir() -> Path:
 
 def content_hash(data: bytes, suffix: str, up: str) -> str:
     """Return the SHA-256, as hex, over cleaning version, file type, up axis and file bytes."""
-    head = f"{CLEANING_VERSION} {suffix.lower()} {up}\n".encode()
-    return hashlib.sha256(head + data).hexdigest()
+    digest = hashlib.sha256(f"{CLEANING_VERSION} {suffix.lower()} {up}\n".encode())
+    digest.update(data)
+    return digest.hexdigest()
 
 
 class MeshCache:
@@ -86,6 +87,17 @@ class MeshCache:
         if model.refusal is not None:
             raise BadMeshError(model.refusal)
         return digest, model
+
+    def try_out(self) -> None:
+        """Make the folder, so that the warning, if there is to be one, comes before the work."""
+        if self.folder is None:
+            return
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            if not os.access(self.folder, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        except OSError as error:
+            self._give_up(error)
 
     def _write(self, entry: Path, model: CachedModel) -> None:
         temporary = entry.with_name(f".{secrets.token_hex(8)}.partial")
@@ -122,16 +134,20 @@ def make_model(data: bytes, suffix: str, up: str) -> CachedModel:
     """Read and clean a file's bytes; what is wrong with them is told in the result.
 
     Raises:
-        BadMeshError: where memory ran out, which is not the file's doing alone.
+        BadMeshError: for reasons that may not lie in the file, and are not to be remembered.
     """
     try:
         mesh = clean_mesh(*parse_mesh(data, suffix), up)
         return CachedModel(mesh.vertices, mesh.faces, hull_points(mesh.vertices), mesh.mended)
-    except MemoryError as error:  # not kept: there may be more the next time
-        raise BadMeshError("needs more memory than there is; simplify it") from error
     except BadMeshError as error:
         none = np.empty((0, 3), np.float32)
         return CachedModel(none, none.astype(np.int32), none.astype(np.float64), {}, str(error))
+    except MemoryError as error:
+        raise BadMeshError("needs more memory than there is; simplify it") from error
+    except Exception as error:  # one bad model must not stop a run of a million
+        raise BadMeshError(
+            f"cannot be cleaned ({type(error).__name__}: {error}); please report the file"
+        ) from error
 
 
 def _read_entry(entry: Path) -> CachedModel | None:
@@ -146,7 +162,7 @@ def _read_entry(entry: Path) -> CachedModel | None:
                 about["mended"],
                 about["refusal"],
             )
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
+    except Exception:  # whatever is wrong with it, it is made again
         return None
     return model if _is_whole(model) else None
 

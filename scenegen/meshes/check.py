@@ -2,11 +2,15 @@
 
 import multiprocessing
 import time
+import warnings
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from scenegen.errors import SceneGenError
 from scenegen.meshes.cache import MeshCache
 from scenegen.meshes.errors import BadMeshError
 from scenegen.meshes.folders import ModelFile, ModelFolder
@@ -57,11 +61,18 @@ def check_models(
 
     Returns:
         One record per model, in the listing's order.
+
+    Raises:
+        SceneGenError: with more than one job, where processes cannot be started.
     """
     files = [file for name in folder.classes for file in folder.models[name]]
-    work = _one_by_one if jobs < 2 or len(files) < 2 else _in_processes
+    cache = MeshCache(cache_dir)
+    cache.try_out()
+    records: Iterator[ModelCheck] = (_check(file, folder.up, cache) for file in files)
+    if jobs > 1 and len(files) > 1:
+        records = _in_processes(files, folder.up, cache.folder, jobs)
     found = {}
-    for record in work(files, folder.up, cache_dir, jobs):
+    for record in records:
         found[record.name] = record
         if progress:
             progress(1)
@@ -78,18 +89,11 @@ def _check(file: ModelFile, up: str, cache: MeshCache) -> ModelCheck:
     return ModelCheck(file.name, True, "", len(model.faces), model.mended, seconds)
 
 
-def _one_by_one(
-    files: Sequence[ModelFile], up: str, cache_dir: str | Path | None, _jobs: int
-) -> Iterator[ModelCheck]:
-    cache = MeshCache(cache_dir)
-    for file in files:
-        yield _check(file, up, cache)
+_OWN_CACHE: list[MeshCache] = []  # one in each process
 
 
-_OWN_CACHE: list[MeshCache] = []  # one a process, so that each warns once at most
-
-
-def _start(cache_dir: str | Path | None) -> None:
+def _start(cache_dir: Path | None) -> None:
+    warnings.simplefilter("ignore")  # that the cache cannot be used, the caller has been told
     _OWN_CACHE[:] = [MeshCache(cache_dir)]
 
 
@@ -98,39 +102,47 @@ def _check_here(file: ModelFile, up: str) -> ModelCheck:
 
 
 def _in_processes(
-    files: Sequence[ModelFile], up: str, cache_dir: str | Path | None, jobs: int
+    files: Sequence[ModelFile], up: str, cache_dir: Path | None, jobs: int
 ) -> Iterator[ModelCheck]:
     """Keep processes busy; where one dies, try what was under way again, each on its own."""
-    waiting = list(reversed(files))
-    suspects: list[ModelFile] = []
-    while waiting or suspects:
-        workers = 1 if suspects else jobs
-        with _pool(workers, cache_dir) as pool:
-            running: dict[Future[ModelCheck], ModelFile] = {}
-            while suspects or waiting or running:
-                while len(running) < (1 if workers == 1 else 2 * jobs) and (suspects or waiting):
-                    if workers == 1 and not suspects:
-                        break
-                    file = suspects.pop() if suspects else waiting.pop()
-                    running[pool.submit(_check_here, file, up)] = file
-                if not running:
-                    break
-                done, _ = wait(running, return_when=FIRST_COMPLETED)
-                died = [future for future in done if future.exception() is not None]
-                for future in done:
-                    if future not in died:
-                        yield future.result()
-                        del running[future]
-                if died:
-                    left = list(running.values())
-                    if workers == 1:
-                        yield ModelCheck(left[0].name, False, _ENDED, 0)
-                    else:
-                        suspects = left
-                    break
+    waiting = deque(files)
+    while waiting:
+        lost: list[ModelFile] = []
+        yield from _until_one_dies(waiting, up, cache_dir, jobs, lost)
+        for file in lost:
+            guilty: list[ModelFile] = []
+            yield from _until_one_dies(deque([file]), up, cache_dir, 1, guilty)
+            if guilty:
+                yield ModelCheck(file.name, False, _ENDED, 0)
 
 
-def _pool(workers: int, cache_dir: str | Path | None) -> ProcessPoolExecutor:
+def _until_one_dies(
+    waiting: deque[ModelFile],
+    up: str,
+    cache_dir: Path | None,
+    jobs: int,
+    lost: list[ModelFile],
+) -> Iterator[ModelCheck]:
+    """Work off what waits; if a process dies, stop and name what was under way in `lost`."""
+    running: dict[Future[ModelCheck], ModelFile] = {}
     # Not forked: threads of the caller, such as a renderer's, must not come along.
     context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, context, _start, (cache_dir,))
+    with ProcessPoolExecutor(jobs, context, _start, (cache_dir,)) as pool:
+        try:
+            pool.submit(time.perf_counter).result()
+        except BrokenProcessPool as error:  # before it saw a model
+            raise SceneGenError(
+                "check_models: its processes cannot start; call it from under "
+                '`if __name__ == "__main__":`, or with jobs=1'
+            ) from error
+        try:
+            while waiting or running:
+                while waiting and len(running) < 2 * jobs:
+                    running[pool.submit(_check_here, waiting[0], up)] = waiting[0]
+                    waiting.popleft()
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    record = future.result()
+                    del running[future]
+                    yield record
+        except BrokenProcessPool:
+            lost.extend(running.values())

@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 Array = NDArray[Any]
 MOST_POINTS = 4096
-_DIRECTIONS = 1024
+_DIRECTIONS = 2048
 _MOST_GROWTH = 1.02
 _BLOCK = 512  # points at once, so that products stay in the processor's cache
 
@@ -47,7 +47,9 @@ def _coarser(points: Array, floor: float) -> Array:
     `floor`, under which there is none. Where that takes much (of a leaning sheet), all stay.
     """
     blocks = np.array_split(points, 1 + len(points) // _BLOCK)
-    some = _extreme(blocks, _even_directions(_DIRECTIONS))
+    # More of them across a body's long sides than at its ends, as if it were as long every way.
+    directions = _even_directions(_DIRECTIONS) / np.maximum(np.ptp(points, axis=0), 1e-9)
+    some = _extreme(blocks, directions)
     middle = some.mean(axis=0)
     hull = ConvexHull(some - middle)
     outward = hull.equations[:, :3] / -hull.equations[:, 3:]  # 1 on the hull, less inside

@@ -13,6 +13,7 @@ from scenegen.meshes.limits import MOST_FACES
 Array = NDArray[Any]
 NOWHERE = -1  # the vertex of a corner that could not be read
 _MOST_WORK = 1e10  # squares of corners of polygons whose ears are clipped: some 20 seconds
+_SMALL_AREA = 1e-9  # of a polygon, by the sum of its corners' squared distances from the middle
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,20 +70,17 @@ class Polygons:
 def _fans(vertices: Array, faces: Array) -> tuple[list[Array], Array]:
     """Cut polygons of one size, (P, n), into fans of triangles; return these and the other ones.
 
-    A fan from the first corner, or the second, is right if all its triangles face one way: then it
-    covers the polygon once. One of four corners always has one, if its sides do not cross.
+    A fan is right if all its triangles face one way: then it covers the polygon once. Of four
+    corners, one of any two that are neighbours has such a fan, if the sides do not cross.
     """
     size = faces.shape[1]
     if size == 3:
         return [faces], faces[:0]
-    fans = []
-    for _ in range(2):
-        good = _faces_one_way(vertices[faces])
-        fans.append(_fan(faces[good]))
-        faces = np.roll(faces[~good], -1, axis=1)
+    good = _faces_one_way(vertices[faces])
+    fans, others = [_fan(faces[good])], faces[~good]
     if size == 4:
-        return [*fans, _fan(faces)], faces[:0]
-    return fans, faces
+        return [*fans, _fan(np.roll(others, -1, axis=1))], others[:0]
+    return fans, others
 
 
 def _fan(faces: Array) -> Array:
@@ -92,25 +90,28 @@ def _fan(faces: Array) -> Array:
 
 def _faces_one_way(points: Array) -> Array:
     """Whether all of a fan's triangles agree with the polygon's normal: (P, n, 3) -> (P,)."""
-    with np.errstate(over="ignore", invalid="ignore", under="ignore"):
-        spokes = points[:, 1:] - points[:, :1]
-        cross = np.cross(spokes[:, :-1], spokes[:, 1:])
-        normal = cross.sum(axis=1, keepdims=True)
-        facing = (cross * normal).sum(axis=2)
-        return np.asarray((facing >= -1e-9 * (normal**2).sum(axis=2)).all(axis=1))
+    spokes = points[:, 1:] - points[:, :1]
+    cross = np.cross(spokes[:, :-1], spokes[:, 1:])
+    normal = cross.sum(axis=1, keepdims=True)
+    facing = (cross * normal).sum(axis=2)
+    return np.asarray((facing >= -1e-9 * (normal**2).sum(axis=2)).all(axis=1))
 
 
 def _clip_ears(points: Array, face: Array) -> Array:
     """Cut one polygon, (n, 3), in the plane that it lies in, or nearly."""
-    with np.errstate(over="ignore", invalid="ignore", under="ignore"):
-        centered = points - points.mean(axis=0)
-        normal = np.cross(centered, np.roll(centered, -1, axis=0)).sum(axis=0)
-        normal /= np.linalg.norm(normal)
-    if not np.isfinite(normal).all():
+    centered = points - points.mean(axis=0)
+    centered /= np.sqrt((centered**2).sum())
+    if not np.isfinite(centered).all():
         return _fan(face[None])
+    normal = np.cross(centered, np.roll(centered, -1, axis=0)).sum(axis=0)
+    if np.linalg.norm(normal) < _SMALL_AREA:  # its sides cross such that areas cancel
+        normal = np.linalg.svd(centered, full_matrices=False)[2][2]
+    normal /= np.linalg.norm(normal)
     # Two axes across the normal, from the coordinate axis that is farthest from it.
     u = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
     u /= np.linalg.norm(u)
     flat = np.ascontiguousarray(centered @ np.stack([u, np.cross(normal, u)], axis=1))
     ears = mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], np.uint32))
+    if not len(ears):  # all on a line; its triangles are then dropped and counted
+        return _fan(face[None])
     return np.asarray(face[np.asarray(ears, np.int64)].reshape(-1, 3))

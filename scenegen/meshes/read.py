@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.meshes.errors import BadMeshError
@@ -66,7 +67,8 @@ def parse_mesh(data: bytes, suffix: str) -> tuple[Array, Array]:
         known = ", ".join(_READERS)
         raise BadMeshError(f"found a file of type {suffix!r}, expected one of {known}")
     try:
-        return reader(data)
+        with np.errstate(all="ignore"):  # numbers that are not finite are dealt with later
+            return reader(data)
     except (BadMeshError, MemoryError):
         raise
     except Exception as error:  # one bad model must not stop a run of a million

@@ -1,17 +1,17 @@
 """STL files, binary and text; a file that starts with "solid" may be either."""
 
-import re
+from array import array
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.meshes.errors import BadMeshError
+from scenegen.meshes.text_lines import lines, point
 
 Array = NDArray[Any]
 _HEAD = 84
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
-_VERTEX = re.compile(rb"\bvertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.IGNORECASE)
 
 
 def read_stl(data: bytes) -> tuple[Array, Array]:
@@ -37,12 +37,11 @@ def read_stl(data: bytes) -> tuple[Array, Array]:
 
 
 def _text(data: bytes) -> Array:
-    numbers = []
-    for found in _VERTEX.finditer(data):
-        try:
-            numbers.append([float(word) for word in found.groups()])
-        except ValueError:
-            numbers.append([float("nan")] * 3)
-    if len(numbers) % 3:
-        raise BadMeshError(f"the STL file is cut short: {len(numbers)} corners of triangles")
-    return np.array(numbers, np.float64).reshape(-1, 3)
+    corners = array("d")
+    for line in lines(data):
+        words = line.split()
+        if words and words[0].lower() == b"vertex":
+            corners.extend(point(words[1:4]))
+    if len(corners) % 9:
+        raise BadMeshError(f"the STL file is cut short: {len(corners) // 3} corners of triangles")
+    return np.array(corners, np.float64).reshape(-1, 3)

@@ -4,12 +4,8 @@ Lines that cannot be read become vertices that are not finite and faces that are
 be dropped and counted when the mesh is cleaned: one bad line does not lose a model.
 """
 
-import codecs
-import io
-import math
 import re
 from array import array
-from collections.abc import Iterator
 from itertools import chain, islice
 
 import numpy as np
@@ -17,8 +13,8 @@ import numpy as np
 from scenegen.meshes.errors import BadMeshError
 from scenegen.meshes.limits import MOST_CORNERS
 from scenegen.meshes.polygons import NOWHERE, Polygons
+from scenegen.meshes.text_lines import lines, point
 
-_NAN = (math.nan,) * 3
 _FAR = 1 << 40  # more vertices than any file has
 
 
@@ -29,11 +25,9 @@ class _Faces:
         self.coordinates, self.sizes, self.corners = array("d"), array("q"), array("q")
 
     def add_vertex(self, words: list[bytes]) -> None:
-        try:
-            x, y, z = map(float, words)
-        except ValueError:
-            x, y, z = _NAN
-        self.coordinates.extend((x, y, z))
+        self.coordinates.extend(point(words))
+        if len(self.coordinates) > 3 * MOST_CORNERS:
+            raise BadMeshError(f"has more than {MOST_CORNERS} vertices; simplify it")
 
     def add_face(self, face: list[int]) -> None:
         self.sizes.append(len(face))
@@ -53,7 +47,7 @@ def read_obj(data: bytes) -> Polygons:
     """Read a Wavefront OBJ file. Raises BadMeshError where it has too many faces."""
     found = _Faces()
     held: list[bytes] = []  # of lines that go on in the next one
-    for line in chain(_lines(data), (b"",)):  # the last one, too, may say that it goes on
+    for line in chain(lines(data), (b"",)):  # the last one, too, may say that it goes on
         if line.startswith((b"vt", b"vn")):  # half of most files
             continue
         words = line.split()
@@ -95,7 +89,7 @@ def read_off(data: bytes) -> Polygons:
     Raises:
         BadMeshError: no OFF file, a binary one, fewer lines than it says, or too many faces.
     """
-    rows = (line.partition(b"#")[0].split() for line in _lines(data))
+    rows = (line.partition(b"#")[0].split() for line in lines(data))
     rows = (words for words in rows if words)
     first = next(rows, [b""])
     header = re.fullmatch(rb"(?:ST)?C?N?OFF(\d+)?", first[0])
@@ -127,13 +121,3 @@ def _off_face(words: list[bytes]) -> list[int]:
     except ValueError:
         return [NOWHERE]
     return face if len(face) == size else [NOWHERE]
-
-
-def _lines(data: bytes) -> Iterator[bytes]:
-    """Give lines one by one, however they end, of UTF-8, Latin or UTF-16 text."""
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        data = data.decode("utf-16", "replace").encode("utf-8", "replace")
-    data = data.removeprefix(codecs.BOM_UTF8)
-    if b"\n" not in data:
-        data = data.replace(b"\r", b"\n")
-    return iter(io.BytesIO(data))

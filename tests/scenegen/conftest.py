@@ -127,3 +127,15 @@ def embree_cast() -> Callable[[str, Array, Array], tuple[Array, Array]]:
         return t, smooth_normals(unit_shape(name), triangle, u, v, directions)
 
     return cast
+
+
+@pytest.fixture(scope="session")
+def variant() -> str:
+    """Put the fast variant in force; before that, no test may import Mitsuba or Dr.Jit."""
+    from scenegen.backend import select_variant
+
+    chosen = select_variant("auto")
+    import mitsuba as mi
+
+    mi.set_variant(chosen)
+    return chosen
