@@ -1,4 +1,4 @@
-"""All 820 models of Debian's sweethome3d-furniture, laid out as ShapeNet: meshes made by others.
+"""All 820 models of Debian's sweethome3d-furniture, laid out as ShapeNet, made by others.
 
 They are CC0 and CC-BY, and are fetched, never kept: from the folder that SWEETHOME3D_FURNITURE
 names (where `apt-get download sweethome3d-furniture; dpkg-deb -x *.deb DIR` put them), or else by
@@ -14,11 +14,13 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import trimesh
 from numpy.typing import NDArray
 
+from scenegen.dataset import make_dataset
 from scenegen.meshes import polygons
 from scenegen.meshes.check import check_models
 from scenegen.meshes.clean import clean_mesh
@@ -26,6 +28,9 @@ from scenegen.meshes.folders import ModelFolder, open_shapenet
 from scenegen.meshes.read import read_bytes, read_mesh
 from scenegen.meshes.store import MeshStore
 from scenegen.meshes.text_formats import read_obj
+from scenegen.object_sources import object_source
+from scenegen.presets import preset_spec
+from scenegen.verify import verify_file
 
 Array = NDArray[Any]
 PACKAGE = "sweethome3d-furniture"
@@ -184,3 +189,19 @@ def test_furniture_made_by_others(
     print(
         f"{len(cuts)} polygons clipped, area off by {np.abs(np.array(cuts) - 1).max():.1e} at most"
     )
+
+
+@pytest.mark.slow
+def test_scenes_of_furniture_made_by_others(roots: tuple[Path, Path], tmp_path: Path) -> None:
+    """Rendered, verified, and the same from either layout."""
+    depths = []
+    for root in roots:
+        source = object_source("shapes", shapenet_root=str(root), cache_dir=str(tmp_path / "cache"))
+        spec = preset_spec("shapes", objects=(2, 3), **source.settings)
+        path = tmp_path / f"{spec.source}.h5"
+        make_dataset(path, spec, 60, objects=source.objects)
+        failed = [c for c in verify_file(path, 6, objects=source.objects) if not c.ok]
+        assert failed == []
+        with h5py.File(path) as file:
+            depths.append(file["depth"][()])
+    np.testing.assert_array_equal(*depths)
