@@ -12,6 +12,7 @@ instances: prebuilt `shapegroup`s and an `instance` an object.
 Exact spheres are Mitsuba's own in all of them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -48,7 +49,14 @@ class Kit:
 
 
 def per_scene(
-    rooms: str, count: int, repeats: int, variant: str, coarse: bool, folder: str, root: str = ""
+    rooms: str,
+    count: int,
+    repeats: int,
+    variant: str,
+    coarse: bool,
+    folder: str,
+    root: str = "",
+    ways: Sequence[str] = WAYS,
 ) -> dict[str, Any]:
     """Time load, render and conversion to numpy of every scene, in the fastest way.
 
@@ -62,12 +70,12 @@ def per_scene(
     names = {item.shape: None for scene in scenes for item in scene.objects}
     meshes = unit_meshes(names, coarse, read_objects(spec, root).shape)
     seconds = {}
-    for way in WAYS:
+    for way in ways:
         kit = prepare(spec, way, meshes, f"{folder}/{variant}-{coarse}")
         check(render_scene(kit, scenes[0], 0), scenes[0].cameras[0], read_depth(rooms, 1)[0])
         seconds[way] = repeat(partial(render_all, kit, scenes), repeats)
-    fastest = min(WAYS, key=lambda way: min(seconds[way]))
-    rates = ", ".join(f"{way} {count / min(seconds[way]):.0f}" for way in WAYS)
+    fastest = min(ways, key=lambda way: min(seconds[way]))
+    rates = ", ".join(f"{way} {count / min(seconds[way]):.0f}" for way in ways)
     return {"seconds": seconds[fastest], "images": count, "note": f"of {rates}"}
 
 

@@ -39,7 +39,8 @@ class UnitShape:
     def support(self, directions: Array) -> Array:
         """Return how far the convex body reaches along unit directions: (M, 3) -> (M,)."""
         reach = self.hull_points @ directions.T
-        reach += self.hull_discs[:, None] * np.hypot(directions[:, 0], directions[:, 2])
+        if self.hull_discs.any():
+            reach += self.hull_discs[:, None] * np.hypot(directions[:, 0], directions[:, 2])
         return np.asarray(reach.max(axis=0) + self.rounding)
 
 

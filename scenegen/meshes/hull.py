@@ -7,17 +7,17 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 Array = NDArray[Any]
-MOST_POINTS = 4096
-_DIRECTIONS = 2048
-_MOST_GROWTH = 1.02
+MOST_POINTS = 400  # placement asks for their support again and again
+_DIRECTIONS = 300
+_MOST_GROWTH = 1.03
 _BLOCK = 512  # points at once, so that products stay in the processor's cache
 
 
 def hull_points(vertices: Array) -> Array:
     """Return corners of a convex body that holds all vertices, (V, 3) -> (H, 3) float64.
 
-    It is their convex hull, within 1e-9; where that has more than MOST_POINTS corners, a body a
-    percent or two larger, of fewer. Along -y it reaches exactly as far as the vertices.
+    It is their convex hull, within 1e-9; where that has more than MOST_POINTS corners, a body some
+    percent larger, of fewer. Along -y it reaches exactly as far as the vertices.
     """
     points = np.asarray(vertices, np.float64)
     lowest = points[[int(points[:, 1].argmin())]]

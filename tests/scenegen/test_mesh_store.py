@@ -131,11 +131,11 @@ def test_a_coarser_hull_holds_the_model_and_stands_where_it_stands() -> None:
         body = hull_points(points)
         shape = UnitShape("x", points, points, body, np.zeros(len(body)), 0.0, DOWN)
         check_hull(shape, points)
-        assert len(body) < hull.MOST_POINTS
+        assert len(body) < 2 * hull.MOST_POINTS
         assert body[:, 1].min() == points[:, 1].min(), "nothing below the floor"
         directions = points[::50] / np.linalg.norm(points[::50], axis=1, keepdims=True)
         reach = (points @ directions.T).max(axis=0)
-        assert (shape.support(directions) < 1.015 * reach).all(), "and it is little larger"
+        assert (shape.support(directions) < 1.03 * reach).all(), "and it is little larger"
 
 
 def test_a_hair_below_a_level_base_is_not_lost_in_rounding() -> None:
