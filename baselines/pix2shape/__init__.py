@@ -1,0 +1,1 @@
+"""The paper's reference model, in torch: it meets data and scorer only through files."""
