@@ -62,6 +62,12 @@ class _Models:
 _models = _Models()
 
 
+def forget_models() -> None:
+    """Let go of all models that are kept."""
+    _models.kept.clear()
+    _models.faces = 0
+
+
 def model_scene(variant: str, shape_of: ShapeOf, names: Sequence[str]) -> UnitScene:
     """Build the scene of these models, at most MOST_MODELS, for a Mitsuba variant."""
     mi.set_variant(variant)

@@ -73,10 +73,17 @@ def _with_traced_image(
 ) -> Callable[[], dict[str, Array]]:
     if variant == "scalar_rgb":
         raise BackendError(f"shading path: needs the fast path; {HOW_TO_GET_LLVM}")
-    from scenegen.path_tracer import trace_images  # imports drjit, as above
+    from scenegen.model_scene import forget_models  # imports drjit, as above
+    from scenegen.path_tracer import trace_images
 
     fetch = launch_fields(batch, [name for name in names if name != "image"], device)
-    return lambda: {**fetch(), "image": trace_images(batch, variant)}
+
+    def fetch_all() -> dict[str, Array]:
+        found = fetch()
+        forget_models()  # Dr.Jit would trace every path through every one of them
+        return {**found, "image": trace_images(batch, variant)}
+
+    return fetch_all
 
 
 def parts(batch: SceneBatch) -> list[SceneBatch]:

@@ -50,7 +50,8 @@ class RoomsWriter:
     def append(self, rooms: Sequence[RenderedScene], batch: SceneBatch) -> None:
         """Write a row for each view of each scene; `batch` is they, packed."""
         images = iter(range(len(batch)))
-        classes = np.array([self.classes.index(name.partition("/")[0]) for name in batch.names])
+        numbers = [self.classes.index(name.partition("/")[0]) for name in batch.names]
+        classes = np.array([*numbers, -1])  # the last one is that of unused slots
         for room in rooms:
             description = room.scene.to_json()
             self.digest.update(b"\n" + description.encode())
@@ -77,7 +78,7 @@ class RoomsWriter:
                         "material/specular": batch.gloss[i, :, 0],
                         "material/shininess": batch.gloss[i, :, 1],
                         "object/count": batch.object_count[i],
-                        "object/shape": np.where(shape >= 0, classes[shape], -1),
+                        "object/shape": classes[shape],
                         "object/model": models + [""] * (len(shape) - len(models)),
                         "object/world_from_object": batch.world_from_object[i],
                         "object/scale": batch.object_scale[i],

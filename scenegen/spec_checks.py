@@ -113,8 +113,10 @@ def _check_light(spec: "DatasetSpec") -> None:
         ok = len(color) == 3 and all(0.0 <= c <= 1.0 for c in color)
         check(ok, name.replace("_", " "), color, "channels from 0 to 1")
     check(
-        len(spec.attenuation) == 2 and min(spec.attenuation) >= 0.0 and sum(spec.attenuation) > 0.0,
+        len(spec.attenuation) == 2
+        and all(0.0 <= k <= 100.0 for k in spec.attenuation)
+        and sum(spec.attenuation) >= 1e-6,
         "attenuation",
         spec.attenuation,
-        "k_l and k_q, neither negative, not both 0",
+        "k_l and k_q from 0 to 100, not both 0",
     )

@@ -126,6 +126,30 @@ def test_a_shadow_ray_meets_no_other_unit_shape() -> None:
     assert np.mean(differ) < 1e-4
 
 
+@pytest.mark.parametrize("scale", [0.2, 0.05, 0.02, 0.01, 0.005])
+def test_a_ball_of_any_size_has_no_holes_and_the_depth_of_a_ball(scale: float) -> None:
+    """The exact quadric, against its own formula, up to its outline."""
+    rng, wrong = np.random.default_rng(2), []
+    spec = DatasetSpec(height=64, width=64, objects=(1, 1), shapes=("sphere",))
+    fov = float(np.degrees(2 * np.arctan(1.1 * scale / 1.5)))
+    for index in range(8):
+        center, away = rng.uniform(0.1, 0.8, 3), abs(rng.standard_normal(3))
+        eye = center + 1.5 * away / np.linalg.norm(away)
+        camera = Camera(tuple(eye.tolist()), tuple(center.tolist()), fov)
+        ball = PlacedObject("sphere", tuple(center.tolist()), (1.0, 0.0, 0.0, 0.0), scale, GREY)
+        scene = SceneSpec(index, (camera,), (ball,), (), (0.1,) * 3, (0.5, 0.5), None)
+        truth = render(pack(spec, [scene]))
+        rays = pixel_directions(64, 64, fov)
+        squared = (rays**2).sum(axis=-1)
+        middle = 1.5 / squared  # where the ray, -z = 1, passes the centre at (0, 0, -1.5)
+        inside = scale**2 - (1.5**2 - middle**2 * squared)
+        shown = inside > (0.1 * scale) ** 2
+        depth = middle - np.sqrt(np.maximum(inside, 0) / squared)
+        assert shown.mean() > 0.5
+        wrong.append((abs(truth.depth[0] - depth)[shown] > 1e-5).sum())
+    assert wrong == [0] * 8
+
+
 @pytest.mark.parametrize("room", [GREY, None])
 @pytest.mark.parametrize("shape", ["cone", "sphere"])
 @pytest.mark.parametrize("z", [0.9, 0.5])
