@@ -236,21 +236,28 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
 )
 @click.option("--out", default=".", show_default=True, help="Folder to write to.")
 @click.option("--overwrite", is_flag=True, help="Replace existing files.")
-def export(file: str, items: list[int], form: str, out: str, overwrite: bool) -> None:
+@MESHES
+def export(
+    file: str, items: list[int], form: str, out: str, overwrite: bool, **meshes: Any
+) -> None:
     """Write single rooms for other tools."""
     from scenegen.export import export_paths, export_room
     from scenegen.new_file import check_writable
+    from scenegen.object_sources import file_objects
+    from scenegen.objects import built_in_shape
     from scenegen.preview import pick_rows
     from scenegen.scene_file import RoomsFile
 
     with RoomsFile(file) as rooms:
+        objects = file_objects(rooms.spec, **meshes) if form == "obj" else None
+        shape_of = objects.shape if objects else built_in_shape
         rows = pick_rows(len(rooms), items)
         paths = {row: export_paths(row, out, Path(file).stem, form) for row in rows}
         for some in paths.values():
             for path in some:
                 check_writable(path, overwrite)
         for row, some in paths.items():
-            export_room(rooms[row], some, form, overwrite)
+            export_room(rooms[row], some, form, overwrite, shape_of)
     for some in paths.values():
         click.echo("\n".join(map(str, some)))
 

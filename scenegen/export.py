@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 
 from scenegen.camera import transform_vectors
 from scenegen.new_file import written_beside
+from scenegen.objects import built_in_shape
 from scenegen.preview import srgb_bytes
 from scenegen.scene_file import Room
 from scenegen.shapes import scene_mesh
+from scenegen.solids import UnitShape
 
 Array = NDArray[Any]
+Writer = Callable[[Room, Path], None]
 FORMATS = ("exr", "png", "ply", "obj")
 PNG_DEPTH_UNIT = 1e-4  # scene units a step: 16 bits reach 6.5535
 
@@ -27,9 +30,21 @@ def export_paths(row: int, folder: str | Path, stem: str, form: str) -> list[Pat
     return [Path(folder) / f"{name}-{kind}.png" for kind in _PNG]
 
 
-def export_room(room: Room, paths: list[Path], form: str, overwrite: bool = False) -> None:
-    """Write one room to its `export_paths`. Raises OSError as `new_file.written_beside`."""
-    writers = list(_PNG.values()) if form == "png" else [_WRITERS[form]]
+def export_room(
+    room: Room,
+    paths: list[Path],
+    form: str,
+    overwrite: bool = False,
+    shape_of: Callable[[str], UnitShape] = built_in_shape,
+) -> None:
+    """Write one room to its `export_paths`. Raises OSError as `new_file.written_beside`.
+
+    Args:
+        shape_of: what objects look like, for "obj"; to be given where they are a folder's meshes.
+    """
+    obj: Writer = lambda room, path: write_mesh_obj(room, path, shape_of)  # noqa: E731
+    one = {"exr": write_exr, "ply": write_surfels_ply, "obj": obj}
+    writers = list(_PNG.values()) if form == "png" else [one[form]]
     for path, write in zip(paths, writers, strict=True):
         with written_beside(path, overwrite) as temporary:
             write(room, temporary)
@@ -97,9 +112,13 @@ def write_surfels_ply(room: Room, path: str | Path) -> None:
     Path(path).write_bytes("\n".join([*header, ""]).encode() + vertices.tobytes())
 
 
-def write_mesh_obj(room: Room, path: str | Path) -> None:
+def write_mesh_obj(
+    room: Room, path: str | Path, shape_of: Callable[[str], UnitShape] = built_in_shape
+) -> None:
     """Write room and objects as triangles in the world frame."""
-    text = scene_mesh(room.scene).export(file_type="obj", include_normals=False, header=None)
+    text = scene_mesh(room.scene, shape_of).export(
+        file_type="obj", include_normals=False, header=None
+    )
     Path(path).write_text(f"# scene of room {room.index}: world frame, y up, scene units\n{text}")
 
 
@@ -112,14 +131,9 @@ def _write_png16(path: Path, values: Array) -> None:
         writer.write(file, pixels.reshape(height, -1))
 
 
-_PNG: dict[str, Callable[[Room, Path], None]] = {
+_PNG: dict[str, Writer] = {
     "image": lambda room, path: _write_png16(path, np.clip(room.radiance, 0, 1) * 65535),
     "depth": lambda room, path: _write_png16(path, np.nan_to_num(room.depth) / PNG_DEPTH_UNIT),
     "normal": lambda room, path: _write_png16(path, (room.normal * 0.5 + 0.5) * 65535),
     "object_id": lambda room, path: _write_png16(path, room.object_id.astype(float) + 1),
-}
-_WRITERS: dict[str, Callable[[Room, Path], None]] = {
-    "exr": write_exr,
-    "ply": write_surfels_ply,
-    "obj": write_mesh_obj,
 }

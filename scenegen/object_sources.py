@@ -10,6 +10,7 @@ from scenegen.meshes.folders import ModelFolder, open_objects, open_shapenet
 from scenegen.meshes.store import MeshStore
 from scenegen.objects import Objects, mesh_objects
 from scenegen.presets import PRESETS
+from scenegen.records import check
 from scenegen.spec_checks import BUILT_IN
 from scenegen.specs import DatasetSpec
 
@@ -61,6 +62,8 @@ def object_source(
     """
     if shapenet_root and objects_root:
         raise SpecError("objects: found --shapenet-root and --objects-root, expected one of them")
+    if shapenet_root and up != "y":
+        raise SpecError(f"up: found {up!r}, expected 'y' with --shapenet-root, which is y up")
     root = shapenet_root or objects_root
     if shapes is not None and (classes is not None or root):
         raise SpecError(
@@ -98,7 +101,9 @@ def file_objects(
     root = objects_root if spec.source == "folder" else shapenet_root
     option = "--objects-root" if spec.source == "folder" else "--shapenet-root"
     if root is None:
-        raise SpecError(f"objects: they are meshes of a {spec.source} folder; name it by {option}")
+        raise SpecError(
+            f"objects: they are meshes ({spec.source}); name the folder that holds them by {option}"
+        )
     folder = _open(root, spec.source != "folder", spec.shapes, (), up, spec.object_split)
     if (folder.kind, folder.digest()) != (spec.source, spec.listing):
         raise SpecError(
@@ -122,6 +127,7 @@ def _open(
         return open_objects(root, some, up, split)
 
     if classes is not None:
+        check(len(set(classes)) == len(classes), "classes", classes, "each name once")
         return listed(classes)
     everything = listed(None)
     some = tuple(name for name in wanted if name in everything.classes)

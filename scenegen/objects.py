@@ -39,7 +39,7 @@ def objects_of(spec: DatasetSpec) -> Objects:
     """
     if spec.source not in ("shapes", "families"):
         raise SpecError(
-            f"objects: they are meshes of a {spec.source} folder; say where it lies with"
+            f"objects: they are meshes ({spec.source}); say where they lie with"
             f" --{'objects' if spec.source == 'folder' else 'shapenet'}-root"
         )
     return _built_in(spec.source, spec.shapes, spec.object_split)

@@ -246,3 +246,39 @@ def test_built_in_families_need_no_folder(run: Run, verdict: Any, options: str) 
     assert verdict("rooms.h5")[0] == 0
     assert run("info", "rooms.h5").exit_code == 0
     assert run("preview", "rooms.h5").exit_code == 0
+
+
+def test_meshes_are_exported_from_their_folder(run: Run, meshes: Path) -> None:
+    """All corners of a room's objects, at their place; without the folder it is asked for."""
+    render(run, "--objects-root", meshes, count=1)
+    export = ("export", "rooms.h5", "--items", 0, "--format")
+    told = ("--objects-root", meshes, "--cache-dir", "cache")
+    assert run(*export, "obj", *told).exit_code == 0
+    refused = run(*export, "obj", "--overwrite")
+    assert refused.exit_code == 2
+    assert "--objects-root" in refused.stderr
+    assert run(*export, "exr").exit_code == 0, "which needs no mesh"
+    scene = trimesh.load_mesh("rooms-000000.obj", process=False)
+    with h5py.File("rooms.h5") as file:
+        count = int(file["object/count"][0])
+        places = file["object/world_from_object"][0, :count]
+        scales = file["object/scale"][0, :count]
+    for place, scale in zip(places, scales, strict=True):
+        distance = np.linalg.norm(scene.vertices - place[:3, 3], axis=1)
+        assert np.isclose(distance, scale, rtol=1e-5).any(), "a corner on the bounding sphere"
+
+
+def test_built_in_objects_are_exported(run: Run) -> None:
+    render(run, "--classes", "mug,chair", count=1)
+    result = run("export", "rooms.h5", "--items", 0, "--format", "obj")
+    assert result.exit_code == 0, result.output
+    assert len(trimesh.load_mesh("rooms-000000.obj").faces) > 6
+
+
+def test_contradictions_about_folders_are_refused(run: Run, meshes: Path, shapenet: Path) -> None:
+    twice = run("render", "--n", 1, *SMALL, "--objects-root", meshes, "--classes", "mug,mug")
+    assert twice.exit_code == 2
+    assert "each name once" in twice.stderr
+    up = run("render", "--n", 1, *SMALL, "--shapenet-root", shapenet, "--up", "z")
+    assert up.exit_code == 2
+    assert "expected 'y' with --shapenet-root" in up.stderr

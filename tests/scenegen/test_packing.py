@@ -119,9 +119,9 @@ def test_models_are_known_by_class_and_number() -> None:
 
 def test_a_folders_models_need_the_folder() -> None:
     spec = replace(SPEC, source="folder", shapes=("mug",), listing="0" * 64)
-    with pytest.raises(SpecError, match=r"meshes of a folder.*--objects-root"):
+    with pytest.raises(SpecError, match=r"meshes \(folder\).*--objects-root"):
         pack(spec, [BARE])
-    with pytest.raises(SpecError, match=r"shapenet-v1 folder.*--shapenet-root"):
+    with pytest.raises(SpecError, match=r"meshes \(shapenet-v1\).*--shapenet-root"):
         pack(replace(spec, source="shapenet-v1"), [BARE])
 
 
