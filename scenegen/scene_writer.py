@@ -107,7 +107,8 @@ def create_rooms(
         OSError: the path, or the disk.
     """
     rows = count * len(spec.views)
-    check(1 <= rows <= MAX_COUNT, "n", count, f"1 or more, and at most {MAX_COUNT:,} images")
+    most = MAX_COUNT // len(spec.views)
+    check(1 <= count <= most, "n", count, f"from 1 to {most:,} scenes")
     with new_file(path, overwrite) as file:
         file.attrs.update(
             {

@@ -103,7 +103,7 @@ FOREIGN = {
     "other format": (attribute("format", "other"), "'other'", "pix2shape-bench/rooms"),
     "format is a number": (attribute("format", 7), "7", "pix2shape-bench/rooms"),
     "format is an array": (attribute("format", np.arange(3)), "pix2shape-bench/rooms"),
-    "newer": (attribute("format_version", "2.0"), "version 2.0", "reads 1.x"),
+    "newer": (attribute("format_version", "3.0"), "version 3.0", "reads 2.x"),
     "no version": (attribute_gone("format_version"), "version"),
     "version is a number": (attribute("format_version", 10.5), "version 10.5"),
     "no spec": (attribute_gone("spec"), "'spec' is missing"),
