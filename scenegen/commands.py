@@ -91,12 +91,18 @@ OBJECT_OPTIONS = (
     help="path: images by path tracing, with shadows and indirect light; slower [paper].",
 )
 @click.option("--shadows/--no-shadows", default=None, help="Whether objects cast shadows [no].")
-@click.option("--spp", type=int, help="Colour samples a pixel [1].")
+@click.option("--spp", type=int, help="Colour samples a pixel; for path 64, else [1].")
 @click.option("--fov", "fov_degrees", type=float, help="Field of view, degrees [28].")
 @click.option("--camera-radius", type=float, help="Distance of cameras, scene units [1.5].")
 @IMAGE_DTYPE
 @COMPRESSION
-@click.option("--batch", type=int, default=64, show_default=True, help="Images in one wavefront.")
+@click.option(
+    "--batch",
+    type=int,
+    default=64,
+    show_default=True,
+    help="Images in one wavefront; views of a scene stay together.",
+)
 @DEVICE
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 def render(
@@ -241,10 +247,11 @@ def export(
     file: str, items: list[int], form: str, out: str, overwrite: bool, **meshes: Any
 ) -> None:
     """Write single rooms for other tools."""
+    from scenegen.errors import SpecError
     from scenegen.export import export_paths, export_room
     from scenegen.new_file import check_writable
     from scenegen.object_sources import file_objects
-    from scenegen.objects import built_in_shape
+    from scenegen.objects import built_in_shape, changed_meshes
     from scenegen.preview import pick_rows
     from scenegen.scene_file import RoomsFile
 
@@ -257,6 +264,12 @@ def export(
             for path in some:
                 check_writable(path, overwrite)
         for row, some in paths.items():
+            changed = changed_meshes(objects, rooms.scene(row)) if objects else []
+            if changed:
+                raise SpecError(
+                    f"{file}: row {row} was made from other files than the folder holds now:"
+                    f" {', '.join(changed)}"
+                )
             export_room(rooms[row], some, form, overwrite, shape_of)
     for some in paths.values():
         click.echo("\n".join(map(str, some)))

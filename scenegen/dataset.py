@@ -41,7 +41,7 @@ def make_dataset(
 
     Args:
         batch: images in one wavefront; bounds memory, never changes a byte of a row.
-        device, compression: as in `backend.DEVICES` and `scene_writer.COMPRESSIONS`.
+        device, compression: as in `backend.DEVICES` and `row_file.COMPRESSIONS`.
         command: what to record as the file's creation command.
         objects: what the scenes are made of; None for `objects_of(spec)`.
         progress: is told, now and then, how many more rows were written.
@@ -53,9 +53,12 @@ def make_dataset(
     """
     if not 1 <= batch <= MAX_BATCH:
         raise SpecError(f"batch: found {batch}, expected from 1 to {MAX_BATCH}")
-    if batch * spec.height * spec.width > MAX_RAYS:
+    if max(batch, len(spec.views)) * spec.height * spec.width > MAX_RAYS:
         most = MAX_RAYS // (spec.height * spec.width)
-        raise SpecError(f"batch: found {batch}, expected at most {most} images of this size")
+        raise SpecError(
+            f"batch: found {batch} images and {len(spec.views)} views of a scene, expected at most"
+            f" {most} of this size"
+        )
     check_writable(Path(path), overwrite)
     variant = select_variant(device)
     objects = objects or objects_of(spec)

@@ -39,7 +39,8 @@ FIELDS = (
         "image",
         "linear radiance, times `scale`",
         "pixels: row 0 on top",
-        "RGB of the shading equation; stored value times `scale` is radiance (no gamma)",
+        "RGB of the shading equation, or of path tracing (`spec`); stored value times `scale` is"
+        " radiance (no gamma)",
         True,
     ),
     Field(

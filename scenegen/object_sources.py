@@ -65,6 +65,8 @@ def object_source(
     if shapenet_root and up != "y":
         raise SpecError(f"up: found {up!r}, expected 'y' with --shapenet-root, which is y up")
     root = shapenet_root or objects_root
+    if root is None and up != "y":
+        raise SpecError(f"up: found {up!r} without a folder of meshes, expected --objects-root")
     if shapes is not None and (classes is not None or root):
         raise SpecError(
             "objects: found --shapes beside --classes or a folder of meshes, expected one of them"
@@ -97,6 +99,8 @@ def file_objects(
         MeshFolderError: a folder without such models.
     """
     if spec.source in BUILT_IN:
+        if shapenet_root or objects_root or up != "y":
+            raise SpecError("objects: found options on meshes, but the file's objects are built in")
         return None
     root = objects_root if spec.source == "folder" else shapenet_root
     option = "--objects-root" if spec.source == "folder" else "--shapenet-root"

@@ -8,9 +8,10 @@ import numpy as np
 
 from scenegen.errors import SpecError
 from scenegen.families.members import MEMBERS, member_shape
+from scenegen.meshes.errors import BadMeshError
 from scenegen.meshes.folders import object_split
 from scenegen.meshes.store import MeshStore
-from scenegen.scenes import SHAPE_NAMES
+from scenegen.scenes import SHAPE_NAMES, SceneSpec
 from scenegen.shapes import unit_shape
 from scenegen.solids import UnitShape
 from scenegen.specs import DatasetSpec
@@ -23,7 +24,8 @@ class Objects:
     Attributes:
         models: by class, names as in `scenes.PlacedObject.shape`.
         shape: the unit shape of such a name. Raises BadMeshError where its file cannot be used.
-        digest: of the file that the shape was made from; empty for what the program makes.
+        digest: of the file that the shape was made from and of how it is cleaned; empty for what
+            the program makes.
     """
 
     models: Mapping[str, Sequence[str]]
@@ -51,12 +53,25 @@ def mesh_objects(store: MeshStore) -> Objects:
     return Objects(models, store.shape, store.digest)
 
 
+def changed_meshes(objects: Objects, scene: SceneSpec) -> list[str]:
+    """Return which of a scene's models are no longer made from the file they were made from."""
+    wrong = []
+    for item in scene.objects:
+        try:
+            same = objects.digest(item.shape) == item.mesh
+        except BadMeshError:
+            same = False
+        if not same:
+            wrong.append(item.shape)
+    return wrong
+
+
 def built_in_shape(name: str) -> UnitShape:
     """Return a basic shape, or a member of a built-in family. Raises SpecError for another name."""
     if name in SHAPE_NAMES:
         return unit_shape(name)
     family, _, member = name.partition("/")
-    if not member.isdecimal():
+    if not member.isdecimal() or len(member) > 4:
         raise SpecError(f"object: found {name!r}, expected a basic shape, or class/number")
     return member_shape(family, int(member))
 

@@ -27,7 +27,7 @@ from scenegen.truth import encode_image
 Array = NDArray[Any]
 dr: Any = drjit  # their stubs are not exact enough to be of use here
 mi: Any = mitsuba
-MAX_DEPTH = 8  # vertices of a path, camera and light among them
+MAX_DEPTH = 8  # segments of a path: 2 are direct light
 RAYS_AT_ONCE = 2**21
 LEAST_WEIGHT = 1e-3  # of a light among those that samples choose from
 

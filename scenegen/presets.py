@@ -76,7 +76,11 @@ def preset_spec(preset: str, **settings: Any) -> DatasetSpec:
     if len(chosen.get("views", ())) > 1 and "object_radius" not in settings:
         low, high = chosen.get("object_radius", DatasetSpec.object_radius)
         chosen["object_radius"] = (VIEWS_SHRINK * low, VIEWS_SHRINK * high)
-    if chosen.get("shading") == "path":
+    path = chosen.get("shading") == "path"
+    check(not path or "shadows" not in settings, "shadows", "with shading 'path'", "one of the two")
+    glossy = chosen.get("specular", (0, 0))[1] > 0
+    check("shininess" not in settings or glossy, "shininess", "no specular", "both or neither")
+    if path:
         chosen.setdefault("spp", PATH_SAMPLES)
     if "reflectance" in settings:
         chosen.setdefault("room_reflectance", settings["reflectance"])

@@ -99,7 +99,8 @@ def _caption(room: Room) -> str:
     shapes = ", ".join(item.shape for item in room.scene.objects) or "empty"
     known = room.depth[np.isfinite(room.depth)]
     span = f"depth {known.min():.2f}-{known.max():.2f}" if known.size else "nothing in view"
-    return f"#{room.index}   {span}   {shapes}"
+    turned = f"   {room.view_angle_degrees:g}°" if len(room.scene.cameras) > 1 else ""
+    return f"#{room.index}{turned}   {span}   {shapes}"
 
 
 def _fitted(text: str, font: Any, width: int) -> str:

@@ -28,6 +28,7 @@ class Room:
 
     index: int
     view_index: int
+    view_angle_degrees: float
     image: Array
     depth: Array
     normal: Array
@@ -94,6 +95,7 @@ class RoomsFile:
         return Room(
             index=row,
             view_index=int(self.read("view_index", row)),
+            view_angle_degrees=float(self.read("view_angle_degrees", row)),
             image=self.read("image", row),
             depth=self.read("depth", row),
             normal=self.read("normal", row),

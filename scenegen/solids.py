@@ -17,7 +17,7 @@ class UnitShape:
     """A shape of bounding radius 1 about its origin.
 
     Attributes:
-        name: as in `specs.SHAPE_NAMES`.
+        name: as in `scenes.SHAPE_NAMES`.
         triangles: corners, (F, 3, 3), counter-clockwise seen from outside.
         normals: unit normals at those corners, (F, 3, 3).
         hull_points, hull_discs, rounding: a convex body that contains the shape, for placement:

@@ -17,7 +17,7 @@ FOLDERS = ("shapenet-v1", "shapenet-v2", "folder")
 SPLITS = ("all", "train", "val", "test")
 SHADINGS = ("paper", "path")
 MAX_OBJECTS = 100  # object ids are stored as int8
-MAX_CLASSES = 30_000  # classes are stored as int16
+MAX_CLASSES = 4000  # their names are an attribute, of which HDF5 allows 64 kB
 MAX_LIGHTS = 16
 MAX_PIXELS = 4096 * 4096
 MAX_VIEWS = 64
@@ -68,7 +68,8 @@ def _check_objects(spec: "DatasetSpec") -> None:
     what = "shapes" if spec.source == "shapes" else "classes"
     known = BUILT_IN.get(spec.source)
     some = f"some of {', '.join(known)}" if known else "names of classes"
-    check(0 < len(spec.shapes) <= MAX_CLASSES, what, len(spec.shapes) or "none", some)
+    check(len(spec.shapes) > 0, what, "none", some)
+    check(len(spec.shapes) <= MAX_CLASSES, what, len(spec.shapes), f"at most {MAX_CLASSES:,}")
     for name in spec.shapes:
         ok = name in known if known else name != "" and "/" not in name
         check(ok, what, repr(name), some)

@@ -67,7 +67,7 @@ class DatasetSpec:
     shadows: bool = False
     spp: int = 1
     image_dtype: str = "uint8"
-    min_visible_pixels: int = 50
+    min_visible_pixels: int = 49
     allow_cropped: bool = False
     fov_degrees: float = 28.0
     camera_radius: float = 1.5

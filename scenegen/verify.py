@@ -13,7 +13,7 @@ from scenegen.backend import select_variant
 from scenegen.camera import pixel_directions, transform_points, transform_vectors
 from scenegen.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.meshes.errors import BadMeshError
-from scenegen.objects import Objects, objects_of
+from scenegen.objects import Objects, changed_meshes, objects_of
 from scenegen.packing import SceneBatch, pack
 from scenegen.renderer import render
 from scenegen.sampling import MAX_ATTEMPTS, sample_scene
@@ -114,6 +114,9 @@ def _row_problems(rooms: RoomsFile, i: int, objects: Objects) -> Iterable[tuple[
         return
     with np.errstate(all="ignore"):  # a damaged number may overflow, and is found all the same
         yield from (("description", p) for p in _description_problems(rooms, room, batch))
+        changed = changed_meshes(objects, room.scene)
+        if changed:
+            yield "description", f"made from other files than the folder's: {', '.join(changed)}"
         yield from (("depth", p) for p in _depth_problems(room))
         yield from (("normal", p) for p in _normal_problems(room))
         yield from (("object_id", p) for p in _object_problems(rooms, room))
@@ -158,7 +161,9 @@ def _description_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> It
             yield f"{name} differs from the scene's description"
     unused = rooms.spec.object_slots - len(room.scene.objects)
     models = [item.shape for item in room.scene.objects] + [""] * unused
-    if [name.decode() for name in rooms.read("object/model", room.index)] != models:
+    if [
+        name.decode("utf-8", "replace") for name in rooms.read("object/model", room.index)
+    ] != models:
         yield "object/model differs from the scene's description"
     classes = [rooms.spec.shapes.index(item.name) for item in room.scene.objects]
     if rooms.read("object/shape", room.index).tolist() != classes + [-1] * unused:

@@ -183,7 +183,7 @@ def test_a_model_that_changed_since_is_found(
     code, checks, output = verdict("rooms.h5", "--objects-root", meshes, "--cache-dir", "cache")
     assert code == 1, output
     failed = {name for name, word in checks.items() if word == "FAIL"}
-    assert failed == {"drawn again from the seed", "rendered again"}
+    assert failed == {"description", "drawn again from the seed", "rendered again"}
 
 
 def test_splits_of_a_folder_are_disjoint(run: Run, tmp_path: Path) -> None:
@@ -282,3 +282,42 @@ def test_contradictions_about_folders_are_refused(run: Run, meshes: Path, shapen
     up = run("render", "--n", 1, *SMALL, "--shapenet-root", shapenet, "--up", "z")
     assert up.exit_code == 2
     assert "expected 'y' with --shapenet-root" in up.stderr
+
+
+def test_a_folder_whose_files_have_changed_is_noticed(run: Run, meshes: Path) -> None:
+    """By its names alone it would be the same; the room would be exported with another shape."""
+    render(run, "--objects-root", meshes, "--classes", "bowl", count=3)
+    told = ("--objects-root", meshes, "--cache-dir", "cache")
+    trimesh.creation.icosphere(2).export(meshes / "bowl" / "ball.ply")
+    trimesh.creation.icosphere(1).export(meshes / "bowl" / "cone.off")
+    exported = run("export", "rooms.h5", "--items", 0, "--format", "obj", *told)
+    assert exported.exit_code == 2
+    assert "row 0 was made from other files than the folder holds now: bowl/" in exported.stderr
+    assert not Path("rooms-000000.obj").exists()
+    verified = run("verify", "rooms.h5", "--items", 0, *told)
+    assert verified.exit_code == 1
+    assert "made from other files than the folder's" in verified.stdout
+
+
+@pytest.mark.parametrize(
+    ("options", "found"),
+    [
+        (("--up", "z"), "without a folder of meshes"),
+        (("--shading", "path", "--no-shadows"), "shadows: found with shading 'path'"),
+        (("--shininess", 32), "shininess: found no specular"),
+    ],
+)
+def test_options_that_would_do_nothing_are_refused(
+    run: Run, options: tuple[object, ...], found: str
+) -> None:
+    result = run("render", "--n", 1, "--size", 24, *options)
+    assert result.exit_code == 2
+    assert found in result.stderr
+    assert not Path("rooms.h5").exists()
+
+
+def test_a_file_of_built_in_objects_needs_no_folder(run: Run, meshes: Path) -> None:
+    assert run("render", "--n", 1, "--size", 24).exit_code == 0
+    result = run("verify", "rooms.h5", "--objects-root", meshes)
+    assert result.exit_code == 2
+    assert "objects are built in" in result.stderr

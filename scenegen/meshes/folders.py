@@ -127,9 +127,9 @@ def open_objects(
 
 def _version(root: Path) -> str | None:
     """Return the kind of ShapeNet by the first model found in either place."""
-    for synset in folders(root):
+    for synset in sorted(folders(root)):
         if is_synset(synset):
-            for model_id in folders(root / synset):
+            for model_id in sorted(folders(root / synset)):
                 for kind, inside in _INSIDE.items():
                     if (root / synset / model_id / inside).is_file():
                         return kind

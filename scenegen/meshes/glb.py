@@ -43,9 +43,11 @@ def read_glb(data: bytes) -> tuple[Array, Array]:
             if (mesh, i) not in known:
                 known[mesh, i] = _primitive(document, buffers, one)
             points, triangles = known[mesh, i]
-            count += max(len(triangles), len(points) // 3)
+            count += max(1, len(triangles), len(points) // 3)  # an empty one costs time, too
             if count > MOST_FACES:
                 raise BadMeshError(f"has more than {MOST_FACES} faces; simplify it")
+            if not len(points):
+                continue
             vertices.append(points @ matrix[:3, :3].T + matrix[:3, 3])
             faces.append(triangles + first)
             first += len(points)

@@ -75,11 +75,13 @@ def make_listing(
     """
     if split not in SPLITS:
         raise MeshFolderError(f"object split: found {split!r}, expected one of {', '.join(SPLITS)}")
+    on_disk = {_valid(name): name for name in known}  # what was asked for may be what was stored
+    asked = None if asked is None else [on_disk.get(name, name) for name in asked]
     unknown = [name for name in asked or () if name not in known]
     if unknown or (asked is not None and not asked):
         raise MeshFolderError(
             f"{root}: found no class {', '.join(unknown) or '(none was named)'}; "
-            f"there are {', '.join(known)}"
+            f"there are {', '.join(on_disk)}"
         )
     models, others = {}, 0
     for name in dict.fromkeys(known if asked is None else asked):
