@@ -12,13 +12,15 @@ demo: $(VENV)/.runtime
 	$(BIN)/scenegen preview demo/rooms.h5 --out demo/rooms.png
 	$(BIN)/scenegen verify demo/rooms.h5
 	$(BIN)/scenegen info demo/rooms.h5
+	$(BIN)/scenegen render --n 4 --preset shapenet --views 0,35,80 --out demo/objects.h5 --overwrite
+	$(BIN)/scenegen preview demo/objects.h5 --out demo/objects.png
 	$(BIN)/iqtt make-split --out demo/iqtt --overwrite
 	$(BIN)/iqtt audit demo/iqtt --json demo/audit.json --overwrite
 	$(BIN)/iqtt show demo/iqtt/iqtt-test.h5 --answers --out demo/questions.png
 	$(BIN)/bench baseline empty-room --data demo/rooms.h5 --out demo/empty-room.h5 --overwrite
 	$(BIN)/bench score demo/empty-room.h5 --html demo/report.html --overwrite
 	@echo
-	@echo "Look at $(CURDIR)/demo: rooms.png, questions.png, report.html"
+	@echo "Look at $(CURDIR)/demo: rooms.png, objects.png, questions.png, report.html"
 
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -q -n $(WORKERS) -m "not slow"

@@ -55,10 +55,8 @@ def make_dataset(
         raise SpecError(f"batch: found {batch}, expected from 1 to {MAX_BATCH}")
     if max(batch, len(spec.views)) * spec.height * spec.width > MAX_RAYS:
         most = MAX_RAYS // (spec.height * spec.width)
-        raise SpecError(
-            f"batch: found {batch} images and {len(spec.views)} views of a scene, expected at most"
-            f" {most} of this size"
-        )
+        found = f"{batch}, with {len(spec.views)} views of a scene"
+        raise SpecError(f"batch: found {found}, expected at most {most} images of this size")
     check_writable(Path(path), overwrite)
     variant = select_variant(device)
     objects = objects or objects_of(spec)
