@@ -8,7 +8,7 @@ from scenegen.command_line import PackageCommands
 @click.group(cls=PackageCommands, packages=("scenegen",))
 @click.version_option(package_name="pix2shape-bench")
 def scenegen() -> None:
-    """Rooms holding basic shapes, rendered with exact ground truth."""
+    """Rooms holding objects, rendered with exact ground truth."""
 
 
 @click.group(cls=PackageCommands, packages=("iqtt",))

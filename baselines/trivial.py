@@ -93,6 +93,11 @@ def _mean_depth(rooms: RoomsFile, train: str | Path) -> Array:
     with RoomsFile(train) as training:
         if training.fingerprint == rooms.fingerprint:
             raise SpecError(f"train: {train} holds the test file's own rooms; render others")
+        if training.spec.seed == rooms.spec.seed:
+            raise SpecError(
+                f"train: {train} has the test file's seed, {rooms.spec.seed}: its cameras and"
+                f" places are the same, whatever the preset; render with another --seed"
+            )
         sizes = [(one.spec.height, one.spec.width) for one in (training, rooms)]
         if sizes[0] != sizes[1]:
             raise SpecError(f"train: found images of {sizes[0]}, the test file's are {sizes[1]}")

@@ -48,11 +48,14 @@ def score(
     from metrics.runs import Settings
     from metrics.scoring import count_rows
     from metrics.scoring import score as score_files
+    from scenegen.errors import SpecError
     from scenegen.new_file import check_writable, written_beside
 
-    for path in (json_path, csv_path, html_path):
-        if path:
-            check_writable(Path(path), overwrite)
+    outputs = [Path(path) for path in (json_path, csv_path, html_path) if path]
+    for path in outputs:
+        check_writable(path, overwrite)
+    if len({path.resolve() for path in outputs}) < len(outputs):
+        raise SpecError(f"outputs: found {', '.join(map(str, outputs))}, expected different files")
     with _progress(count_rows(submissions[0]), "image") as advance:
         found = score_files(submissions, truth, Settings(**settings), advance)
     click.echo(report.markdown_report(found) if markdown else report.table(found))

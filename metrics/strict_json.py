@@ -158,7 +158,10 @@ def read_json(path: Path) -> Node:
         raise root.error("a regular file", "something else")
     if status.st_size > MOST_BYTES:
         raise root.error(f"at most {MOST_BYTES}", f"{status.st_size} bytes")
-    return parse_json(path.read_bytes(), path)
+    data = path.read_bytes()
+    if data.startswith(b"\x89HDF"):
+        raise root.error("JSON, as `bench score --json` writes it", "an HDF5 file")
+    return parse_json(data, path)
 
 
 def parse_json(data: bytes, path: Path) -> Node:

@@ -56,7 +56,9 @@ OBJECT_OPTIONS = (
 )
 @MESHES
 @click.option(
-    "--object-radius", type=Range(float), help="Bounding radius, scene units [0.11-0.22]."
+    "--object-radius",
+    type=Range(float),
+    help="Bounding radius, scene units; a quarter less with several views [0.11-0.22].",
 )
 @click.option(
     "--pose",
@@ -257,6 +259,7 @@ def export(
 
     with RoomsFile(file) as rooms:
         objects = file_objects(rooms.spec, **meshes) if form == "obj" else None
+        Path(out).mkdir(parents=True, exist_ok=True)
         shape_of = objects.shape if objects else built_in_shape
         rows = pick_rows(len(rooms), items)
         paths = {row: export_paths(row, out, Path(file).stem, form) for row in rows}

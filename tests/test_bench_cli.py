@@ -184,3 +184,11 @@ def test_scoring_starts_in_under_a_second(folder):
         )  # fmt: skip
         times.append(time.perf_counter() - start)
     assert min(times) < 1.0
+
+
+def test_outputs_of_one_name_are_refused_before_anything_is_written(truths, folder, check_refusal):
+    bench("baseline", "empty-room", "--data", truths.rooms, "--out", "p.h5")
+    result = bench("score", "p.h5", "--json", "same", "--csv", "./same")
+    words = ("outputs: found same, same", "expected different files")
+    check_refusal(result.exit_code, result.stdout, result.stderr, words)
+    assert not (folder / "same").exists()

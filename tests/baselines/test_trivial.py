@@ -82,3 +82,13 @@ def test_chance_is_a_third_and_the_seed_decides(tmp_path):
     assert (answers[0] != answers[2]).any()
     found = score([path]).metrics["iqtt_accuracy"]
     assert found.low < 1 / 3 < found.high
+
+
+def test_training_rooms_of_the_same_seed_are_refused(make_rooms, rooms_path, tmp_path):
+    """Another preset, or shapes; but the same cameras and places."""
+    with RoomsFile(rooms_path) as rooms:
+        seed = rooms.spec.seed
+    train = make_rooms(tmp_path / "alike.h5", 5, seed=seed, random_reflectance=True)
+    with pytest.raises(SpecError, match=f"has the test file's seed, {seed}: .*another --seed"):
+        write_room_baseline("constant", rooms_path, tmp_path / "c.h5", train=train)
+    assert not (tmp_path / "c.h5").exists()

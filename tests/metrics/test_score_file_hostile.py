@@ -181,7 +181,7 @@ TEXTS = {
     "deep": (b"[" * 100_000, "found JSON that is nested too deeply"),
     "deep objects": (b'{"a":' * 100_000, "found JSON that is nested too deeply"),
     "many digits": (b'{"format": ' + b"9" * 10_000 + b"}", "found no JSON (Exceeds the limit"),
-    "HDF5": (b"\x89HDF\r\n\x1a\n" + bytes(100), "found bytes that are not UTF-8"),
+    "HDF5": (b"\x89HDF\r\n\x1a\n" + bytes(100), "found an HDF5 file, expected JSON"),
 }
 
 
