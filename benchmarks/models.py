@@ -17,8 +17,8 @@ MESHES = 60  # models of 20,480 faces, in three classes
 NOTES = (
     "MiB: peak memory of the process. The first run of a folder reads and cleans its meshes, the\n"
     "second finds them in the cache. Plain Mitsuba has its meshes in memory, writes no file and\n"
-    "makes no ids; the faster of two ways to load them counts. The stage alone renders scenes that\n"
-    "were sampled before; their models are kept from a first pass over them."
+    "makes no ids; the faster of two ways to load them counts. The stage alone renders scenes\n"
+    "that were sampled before; their models are kept from a first pass over them."
 )
 
 

@@ -259,10 +259,11 @@ def export(
 
     with RoomsFile(file) as rooms:
         objects = file_objects(rooms.spec, **meshes) if form == "obj" else None
-        Path(out).mkdir(parents=True, exist_ok=True)
         shape_of = objects.shape if objects else built_in_shape
         rows = pick_rows(len(rooms), items)
         paths = {row: export_paths(row, out, Path(file).stem, form) for row in rows}
+        if not Path(out).exists():
+            Path(out).mkdir()
         for some in paths.values():
             for path in some:
                 check_writable(path, overwrite)

@@ -59,7 +59,7 @@ def test_preview_of_contradictions(refuses, rooms_path):
         ("--items", "8", "items: found 8", "0 to 7"),
         ("--items", "5-2", "--items", "5-2"),
         ("--items", "-1", "--items", "'-1'"),
-        ("--out", "none", "none: ", "folder does not exist"),
+        ("--out", "none/deep", "none", "o such file"),
         ("--out", "text", "text: ", "not a folder"),
         ("--out", "/proc", "/proc"),
     ],
@@ -70,6 +70,13 @@ def test_export(refuses, rooms_path, folder, form, case):
     arguments = ("export", rooms_path, "--items", "0", "--format", form)
     line = refuses(*arguments, option, value, words=tuple(words))
     assert "/." not in line, "the user's name for it, not ours"
+
+
+@FORMATS
+def test_export_makes_its_folder(run, rooms_path, folder, form):
+    out = ("--out", "exports")
+    assert run("export", rooms_path, "--items", "1", "--format", form, *out).exit_code == 0
+    assert any((folder / "exports").iterdir())
 
 
 @FORMATS
