@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.object_sources import file_objects
-from scenegen.objects import Objects, objects_of
+from scenegen.objects import Objects
 from scenegen.scene_file import RoomsFile
 from scenegen.scenes import SceneSpec
 from scenegen.specs import DatasetSpec
@@ -22,7 +22,7 @@ def read_scenes(rooms: str, count: int) -> tuple[DatasetSpec, list[SceneSpec]]:
 
 def read_objects(spec: DatasetSpec, root: str) -> Objects:
     """Return what the scenes are made of: built in, or the meshes of a folder."""
-    return file_objects(spec, objects_root=root or None) or objects_of(spec)
+    return file_objects(spec, objects_root=root or None)
 
 
 def read_depth(rooms: str, count: int) -> Array:

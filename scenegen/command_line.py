@@ -189,19 +189,23 @@ SEED = click.option(
 )
 
 
+UP = click.option(
+    "--up",
+    type=click.Choice(["y", "z"]),
+    default="y",
+    show_default=True,
+    help="Which axis points up in a folder of meshes; in ShapeNet's it is y.",
+)
+CACHE_DIR = click.option("--cache-dir", help="Where cleaned meshes are kept [the user's cache].")
+
+
 def MESHES(command: Any) -> Any:  # noqa: N802
     """Add the options that say which meshes objects are made of."""
     options = (
-        click.option("--shapenet-root", help="Folder of ShapeNetCore v1 or v2, for --classes."),
+        click.option("--shapenet-root", help="Folder of ShapeNetCore v1 or v2."),
         click.option("--objects-root", help="Folder of meshes, a sub-folder for each class."),
-        click.option(
-            "--up",
-            type=click.Choice(["y", "z"]),
-            default="y",
-            show_default=True,
-            help="Which axis points up in the meshes of --objects-root.",
-        ),
-        click.option("--cache-dir", help="Where cleaned meshes are kept [the user's cache]."),
+        UP,
+        CACHE_DIR,
     )
     for option in reversed(options):
         command = option(command)

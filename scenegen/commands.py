@@ -253,14 +253,20 @@ def export(
     from scenegen.export import export_paths, export_room
     from scenegen.new_file import check_writable
     from scenegen.object_sources import file_objects
-    from scenegen.objects import built_in_shape, changed_meshes
+    from scenegen.objects import changed_meshes
     from scenegen.preview import pick_rows
     from scenegen.scene_file import RoomsFile
 
     with RoomsFile(file) as rooms:
         objects = file_objects(rooms.spec, **meshes) if form == "obj" else None
-        shape_of = objects.shape if objects else built_in_shape
         rows = pick_rows(len(rooms), items)
+        for row in rows:
+            changed = changed_meshes(objects, rooms.scene(row)) if objects else []
+            if changed:
+                raise SpecError(
+                    f"{file}: row {row} was made from other files than the folder holds now:"
+                    f" {', '.join(changed)}"
+                )
         paths = {row: export_paths(row, out, Path(file).stem, form) for row in rows}
         if not Path(out).exists():
             Path(out).mkdir()
@@ -268,13 +274,7 @@ def export(
             for path in some:
                 check_writable(path, overwrite)
         for row, some in paths.items():
-            changed = changed_meshes(objects, rooms.scene(row)) if objects else []
-            if changed:
-                raise SpecError(
-                    f"{file}: row {row} was made from other files than the folder holds now:"
-                    f" {', '.join(changed)}"
-                )
-            export_room(rooms[row], some, form, overwrite, shape_of)
+            export_room(rooms[row], some, form, overwrite, objects)
     for some in paths.values():
         click.echo("\n".join(map(str, some)))
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from scenegen.camera import transform_vectors
 from scenegen.new_file import written_beside
-from scenegen.objects import built_in_shape
+from scenegen.objects import Objects, built_in_shape
 from scenegen.preview import srgb_bytes
 from scenegen.scene_file import Room
 from scenegen.shapes import scene_mesh
@@ -35,13 +35,14 @@ def export_room(
     paths: list[Path],
     form: str,
     overwrite: bool = False,
-    shape_of: Callable[[str], UnitShape] = built_in_shape,
+    objects: Objects | None = None,
 ) -> None:
     """Write one room to its `export_paths`. Raises OSError as `new_file.written_beside`.
 
     Args:
-        shape_of: what objects look like, for "obj"; to be given where they are a folder's meshes.
+        objects: what the scene is made of, for "obj"; None where that is built in.
     """
+    shape_of = objects.shape if objects else built_in_shape
     obj: Writer = lambda room, path: write_mesh_obj(room, path, shape_of)  # noqa: E731
     one = {"exr": write_exr, "ply": write_surfels_ply, "obj": obj}
     writers = list(_PNG.values()) if form == "png" else [one[form]]

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from scenegen.command_line import CACHE_DIR, UP, Names
+
 if TYPE_CHECKING:
     from scenegen.meshes.check import ModelCheck
     from scenegen.meshes.folders import ModelFolder
@@ -14,15 +16,9 @@ if TYPE_CHECKING:
 
 @click.command("check-objects")
 @click.argument("folder")
-@click.option(
-    "--up",
-    type=click.Choice(["y", "z"]),
-    default="y",
-    show_default=True,
-    help="Axis that points up in the files; ShapeNet's is y.",
-)
-@click.option("--classes", help="Classes to try, such as bowl,mug [default: all].")
-@click.option("--cache-dir", help="Where cleaned models are kept [default: the user's cache].")
+@UP
+@click.option("--classes", type=Names(), help="Classes to try, such as bowl,mug [default: all].")
+@CACHE_DIR
 @click.option("--json", "json_path", help="File to write all records to.")
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 @click.option(
@@ -33,7 +29,7 @@ def check_objects(
     ctx: click.Context,
     folder: str,
     up: str,
-    classes: str | None,
+    classes: tuple[str, ...] | None,
     cache_dir: str | None,
     json_path: str | None,
     overwrite: bool,
@@ -52,8 +48,7 @@ def check_objects(
 
     if json_path:
         check_writable(Path(json_path), overwrite)
-    names = None if classes is None else [part.strip() for part in classes.split(",")]
-    found = open_models(folder, names, up)
+    found = open_models(folder, classes, up)
     cache = Path(cache_dir) if cache_dir else default_cache_dir()
     total = sum(map(len, found.models.values()))
     with tqdm(total=total, unit="model", disable=None, leave=False, smoothing=0.1) as bar:

@@ -8,7 +8,7 @@ from scenegen.errors import SpecError
 from scenegen.meshes.cache import default_cache_dir
 from scenegen.meshes.folders import ModelFolder, open_objects, open_shapenet
 from scenegen.meshes.store import MeshStore
-from scenegen.objects import Objects, mesh_objects
+from scenegen.objects import Objects, mesh_objects, objects_of
 from scenegen.presets import PRESETS
 from scenegen.records import check
 from scenegen.spec_checks import BUILT_IN
@@ -91,23 +91,18 @@ def file_objects(
     objects_root: str | None = None,
     up: str = "y",
     cache_dir: str | None = None,
-) -> Objects | None:
-    """Return the models that a file's scenes are made of; None where they are built in.
+) -> Objects:
+    """Return the models that a file's scenes are made of.
 
     Raises:
         SpecError: they are meshes, and no folder is told, or one that holds others.
         MeshFolderError: a folder without such models.
     """
-    if spec.source in BUILT_IN:
-        if shapenet_root or objects_root or up != "y":
-            raise SpecError("objects: found options on meshes, but the file's objects are built in")
-        return None
+    if spec.source in BUILT_IN and (shapenet_root or objects_root or up != "y"):
+        raise SpecError("objects: found options on meshes, but the file's objects are built in")
     root = objects_root if spec.source == "folder" else shapenet_root
-    option = "--objects-root" if spec.source == "folder" else "--shapenet-root"
     if root is None:
-        raise SpecError(
-            f"objects: they are meshes ({spec.source}); name the folder that holds them by {option}"
-        )
+        return objects_of(spec)
     folder = _open(root, spec.source != "folder", spec.shapes, (), up, spec.object_split)
     if (folder.kind, folder.digest()) != (spec.source, spec.listing):
         raise SpecError(

@@ -23,6 +23,7 @@ from scenegen.reference import sample_positions
 from scenegen.seeding import Purpose, item_seed
 from scenegen.shapes import room_mesh
 from scenegen.truth import encode_image
+from scenegen.unit_scene import triangle_mesh
 
 Array = NDArray[Any]
 dr: Any = drjit  # their stubs are not exact enough to be of use here
@@ -82,7 +83,7 @@ def _scene(batch: SceneBatch, b: int) -> Any:
     }
     if batch.has_room[b]:
         corners = np.asarray(room_mesh().triangles)
-        contents["room"] = _mesh("room", corners, None, _bsdf(batch, b, 0))
+        contents["room"] = triangle_mesh("room", corners, bsdf=_bsdf(batch, b, 0))
     for k in range(int(batch.object_count[b])):
         shape = batch.shape_of(batch.names[batch.shape[b, k]])
         placed, bsdf = batch.world_from_object[b, k], _bsdf(batch, b, k + 1)
@@ -96,7 +97,7 @@ def _scene(batch: SceneBatch, b: int) -> Any:
             continue
         triangles = shape.triangles @ placed[:3, :3].T + placed[:3, 3]
         normals = shape.normals @ (placed[:3, :3] / batch.object_scale[b, k]).T
-        contents[f"object{k}"] = _mesh(f"object{k}", triangles, normals, bsdf)
+        contents[f"object{k}"] = triangle_mesh(f"object{k}", triangles, normals, bsdf)
     k_l, k_q = batch.attenuation[b].tolist()
     for j in range(int(batch.light_count[b])):
         distance = float(np.linalg.norm(batch.light_position[b, j] - batch.spec.camera_target))
@@ -118,20 +119,6 @@ def _bsdf(batch: SceneBatch, b: int, object_id: int) -> Any:
         return phong_bsdf(reflectance, specular, shininess)
     matte = {"type": "diffuse", "reflectance": _rgb(reflectance)}
     return mi.load_dict({"type": "twosided", "bsdf": matte})
-
-
-def _mesh(name: str, triangles: Array, normals: Array | None, bsdf: Any) -> Any:
-    count = 3 * len(triangles)
-    properties = mi.Properties()
-    properties["bsdf"] = bsdf
-    mesh = mi.Mesh(name, count, len(triangles), properties, has_vertex_normals=normals is not None)
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = triangles.astype(np.float32).ravel()
-    parameters["faces"] = np.arange(count, dtype=np.uint32)
-    if normals is not None:
-        parameters["vertex_normals"] = normals.astype(np.float32).ravel()
-    parameters.update()
-    return mesh
 
 
 def _rgb(color: Array) -> dict[str, Any]:

@@ -93,17 +93,14 @@ def parts(batch: SceneBatch) -> list[SceneBatch]:
     """
     if batch.spec.source == "shapes":
         return [batch]
-    starts, seen, faces = [0], set[int](), 0
+    faces = np.array([face_count(batch.shape_of, name) for name in batch.names])
+    starts, seen = [0], set[int]()
     for row, shapes in enumerate(batch.shape):
-        new = set(shapes[shapes >= 0].tolist()) - seen
-        more = sum(face_count(batch.shape_of, batch.names[i]) for i in new)
-        if row > starts[-1] and (faces + more > MOST_FACES or len(seen | new) > MOST_MODELS):
+        seen |= set(shapes[shapes >= 0].tolist())
+        many = len(seen) > MOST_MODELS or faces[list(seen)].sum() > MOST_FACES
+        if many and row > starts[-1]:
             starts.append(row)
-            seen, faces = set(), 0
-            new = set(shapes[shapes >= 0].tolist())
-            more = sum(face_count(batch.shape_of, batch.names[i]) for i in new)
-        seen |= new
-        faces += more
+            seen = set(shapes[shapes >= 0].tolist())
     ends = [*starts[1:], len(batch)]
     return [batch.rows(start, end) for start, end in zip(starts, ends, strict=True)]
 

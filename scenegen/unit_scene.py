@@ -80,12 +80,23 @@ def mitsuba_shape(shape: UnitShape, place: Array) -> Any:
     """Return the unit shape, moved to `place`, as Mitsuba geometry of the variant in force."""
     if shape.is_sphere:
         return {"type": "sphere", "center": place.tolist(), "radius": 1.0}
-    count = len(shape.triangles)
-    mesh = mi.Mesh(shape.name, vertex_count=3 * count, face_count=count)
+    return triangle_mesh(shape.name, overlapping(shape.triangles) + place)
+
+
+def triangle_mesh(
+    name: str, triangles: Array, normals: Array | None = None, bsdf: Any = None
+) -> Any:
+    """Return triangles (F, 3, 3), with normals at their corners or flat, as Mitsuba's mesh."""
+    count = 3 * len(triangles)
+    properties = mi.Properties()
+    if bsdf is not None:
+        properties["bsdf"] = bsdf
+    mesh = mi.Mesh(name, count, len(triangles), properties, has_vertex_normals=normals is not None)
     parameters = mi.traverse(mesh)
-    corners = overlapping(shape.triangles) + place
-    parameters["vertex_positions"] = corners.astype(np.float32).ravel()
-    parameters["faces"] = np.arange(3 * count, dtype=np.uint32)
+    parameters["vertex_positions"] = triangles.astype(np.float32).ravel()
+    parameters["faces"] = np.arange(count, dtype=np.uint32)
+    if normals is not None:
+        parameters["vertex_normals"] = normals.astype(np.float32).ravel()
     parameters.update()
     return mesh
 

@@ -137,7 +137,7 @@ def _description_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> It
     if room.view_index != room.index - first or len(room.scene.cameras) != views:
         yield f"view_index or the number of cameras is not that of the {views} views"
         return
-    if rooms.read("scene", room.index) != rooms.read("scene", first):
+    if room.view_index and rooms.read("scene", room.index) != rooms.read("scene", first):
         yield "the scene's description differs from that of its first view"
     stored = {
         "camera/world_from_camera": batch.world_from_camera,

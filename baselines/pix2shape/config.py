@@ -5,11 +5,17 @@ from typing import Any
 
 from baselines.pix2shape.networks import NetworkSpec
 from scenegen.errors import SpecError
-from scenegen.records import changed_settings, check, from_json, to_json
+from scenegen.records import check, from_json, normalise, to_json
 
+PAPER_NETWORKS = NetworkSpec()
 CONFIGS: dict[str, dict[str, Any]] = {
     "paper": {},
-    "compact": {"size": 64, "width": 0.25, "batch": 16, "iterations": 20_000, "critic_steps": 1},
+    "compact": {
+        "networks": NetworkSpec(size=64, width=0.25),
+        "batch": 16,
+        "iterations": 20_000,
+        "critic_steps": 1,
+    },
 }
 
 
@@ -18,7 +24,7 @@ class ModelConfig:
     """The paper's model; the defaults are its numbers.
 
     Attributes:
-        size, width, z_scene, z_view, camera, classes: as in `networks.NetworkSpec`.
+        networks: what they look like.
         depth_middle, depth_reach: the decoder gives depths of depth_middle (1 +- depth_reach),
             scene units; known from the camera, not from depth maps.
         iterations, batch: of training; Adam with `learning_rate` and `betas`.
@@ -28,12 +34,7 @@ class ModelConfig:
         seed: of weights and of every random choice of training.
     """
 
-    size: int = 128
-    width: float = 1.0
-    z_scene: int = 128
-    z_view: int = 0
-    camera: bool = True
-    classes: int = 0
+    networks: NetworkSpec = PAPER_NETWORKS
     depth_middle: float = 1.65
     depth_reach: float = 0.55
     iterations: int = 60_000
@@ -50,24 +51,13 @@ class ModelConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        sizes = (32, 64, 128, 256)
-        check(self.size in sizes, "size", self.size, f"one of {', '.join(map(str, sizes))}")
-        check(0.01 <= self.width <= 4, "width", self.width, "from 0.01 to 4")
-        check(self.z_scene >= 1, "z scene", self.z_scene, "1 or more")
-        check(self.z_view >= 0, "z view", self.z_view, "0 or more")
+        normalise(self)
         check(0 < self.depth_reach < 1, "depth reach", self.depth_reach, "between 0 and 1")
         check(self.depth_middle > 0, "depth middle", self.depth_middle, "a positive number")
         check(self.iterations >= 1, "iterations", self.iterations, "1 or more")
         check(self.batch >= 2, "batch", self.batch, "2 or more")
         check(self.critic_steps >= 1, "critic steps", self.critic_steps, "1 or more")
         check(self.learning_rate > 0, "learning rate", self.learning_rate, "a positive number")
-
-    @property
-    def networks(self) -> NetworkSpec:
-        """What the networks look like."""
-        return NetworkSpec(
-            self.size, self.width, self.z_scene, self.z_view, self.camera, self.classes
-        )
 
     def to_json(self) -> str:
         """Return the configuration as one line of JSON with sorted keys."""
@@ -84,8 +74,3 @@ def model_config(name: str, **settings: Any) -> ModelConfig:
     if name not in CONFIGS:
         raise SpecError(f"config: found {name!r}, expected one of {', '.join(CONFIGS)}")
     return ModelConfig(**{**CONFIGS[name], **settings})
-
-
-def changed(config: ModelConfig) -> dict[str, Any]:
-    """Return the settings that differ from the paper's."""
-    return changed_settings(config)

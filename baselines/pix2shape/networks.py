@@ -10,6 +10,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from scenegen.records import check, normalise
+
+SIZES = (32, 64, 128, 256)  # pixels a side
 SLOPE = 0.2  # of the leaky ReLUs
 ENCODER_CHANNELS = (85, 170, 340, 680, 1360)  # of 64, 32, 16, 8, 4 pixels, at 128x128
 DECODER_CHANNELS = (1344, 627, 336, 168, 84)  # of 4, 8, 16, 32, 64 pixels, at 128x128
@@ -22,7 +25,7 @@ class NetworkSpec:
     """What the networks look like.
 
     Attributes:
-        size: pixels a side, a power of two from 32 on.
+        size: pixels a side, one of SIZES.
         width: multiplies the tables' channels; 1 is the paper's.
         z_scene, z_view: dimensions of the latent code; z_view is 0 where the camera is known.
         camera: whether the networks are conditioned on the camera's position.
@@ -35,6 +38,14 @@ class NetworkSpec:
     z_view: int = 0
     camera: bool = True
     classes: int = 0
+
+    def __post_init__(self) -> None:
+        normalise(self)
+        check(self.size in SIZES, "size", self.size, f"one of {', '.join(map(str, SIZES))}")
+        check(0.01 <= self.width <= 4, "width", self.width, "from 0.01 to 4")
+        check(self.z_scene >= 1, "z scene", self.z_scene, "1 or more")
+        check(self.z_view >= 0, "z view", self.z_view, "0 or more")
+        check(self.classes >= 0, "classes", self.classes, "0 or more")
 
     @property
     def z(self) -> int:

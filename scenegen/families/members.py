@@ -9,6 +9,7 @@ from scenegen.errors import SpecError
 from scenegen.families import bags, bottles, cans, caps, chairs, lamps, tables, vessels
 from scenegen.families.assembly import assemble
 from scenegen.families.surfaces import Part
+from scenegen.scenes import FAMILY_NAMES
 from scenegen.solids import UnitShape
 
 MEMBERS = 1000  # of each class
@@ -26,7 +27,6 @@ _BUILDERS: dict[str, Callable[[np.random.Generator], list[Part]]] = {
 }
 _PLACE = {name: place for place, name in enumerate(_BUILDERS)}
 _ENTROPY = 0x5E1F_0B7E  # never changes: it is part of every member's seed
-FAMILY_NAMES = tuple(sorted(_BUILDERS))
 
 
 @lru_cache(maxsize=256)

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from scenegen.meshes.disk import SUFFIXES
 from scenegen.meshes.errors import MeshFolderError
-
-SPLITS = ("all", "train", "val", "test")
+from scenegen.spec_checks import SPLITS
 
 
 @dataclass(frozen=True)

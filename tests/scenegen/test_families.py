@@ -16,7 +16,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from scenegen.errors import SpecError
-from scenegen.families.members import FAMILY_NAMES, MEMBERS, member_shape
+from scenegen.families import members
+from scenegen.families.members import MEMBERS, member_shape
+from scenegen.scenes import FAMILY_NAMES
 from scenegen.solids import UnitShape
 
 Array = NDArray[np.float64]
@@ -82,6 +84,7 @@ def pieces(shape: UnitShape) -> list[Array]:
 def test_classes_are_named_in_order() -> None:
     assert tuple(sorted(FAMILY_NAMES)) == FAMILY_NAMES
     assert len(FAMILY_NAMES) == 9
+    assert set(FAMILY_NAMES) == set(members._BUILDERS)
     assert MEMBERS >= 1000
 
 
