@@ -26,6 +26,10 @@ class Purpose(IntEnum):
     MODELS = 10
     MATERIALS = 11
     PATHS = 12
+    ORDER = 13
+    TRAINING = 14
+    WEIGHTS = 15
+    PICTURES = 16
 
 
 def item_rng(seed: int, index: int, purpose: Purpose, attempt: int = 0) -> np.random.Generator:

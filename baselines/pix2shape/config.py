@@ -27,9 +27,12 @@ class ModelConfig:
         networks: what they look like.
         depth_middle, depth_reach: the decoder gives depths of depth_middle (1 +- depth_reach),
             scene units; known from the camera, not from depth maps.
+        opacity: whether the decoder also tells which rays meet nothing.
         iterations, batch: of training; Adam with `learning_rate` and `betas`.
+        decay: whether the learning rate falls to nothing over the second half.
         critic_steps: of the critic, for each of the others.
-        adversarial, reconstruction, code_reconstruction, mutual_information, questions, depth:
+        adversarial, reconstruction, code_reconstruction, other_views, mutual_information,
+        questions, depth:
             weights of the losses; 0 switches one off. `depth` is the ablation's supervision.
         seed: of weights and of every random choice of training.
     """
@@ -37,14 +40,17 @@ class ModelConfig:
     networks: NetworkSpec = PAPER_NETWORKS
     depth_middle: float = 1.65
     depth_reach: float = 0.55
+    opacity: bool = False
     iterations: int = 60_000
     batch: int = 6
     learning_rate: float = 1e-4
     betas: tuple[float, float] = (0.5, 0.9)
+    decay: bool = False
     critic_steps: int = 5
     adversarial: float = 1.0
     reconstruction: float = 1.0
     code_reconstruction: float = 1.0
+    other_views: float = 0.0
     mutual_information: float = 0.0
     questions: float = 0.0
     depth: float = 0.0
@@ -58,6 +64,16 @@ class ModelConfig:
         check(self.batch >= 2, "batch", self.batch, "2 or more")
         check(self.critic_steps >= 1, "critic steps", self.critic_steps, "1 or more")
         check(self.learning_rate > 0, "learning rate", self.learning_rate, "a positive number")
+
+    @property
+    def has_critic(self) -> bool:
+        """Whether anything is trained against encoder and decoder."""
+        return bool(self.adversarial or self.mutual_information)
+
+    @property
+    def batches_per_iteration(self) -> int:
+        """Batches that one iteration takes: one for each step of the critic, at least one."""
+        return self.critic_steps if self.has_critic else 1
 
     def to_json(self) -> str:
         """Return the configuration as one line of JSON with sorted keys."""

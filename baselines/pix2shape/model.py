@@ -17,10 +17,12 @@ class Views:
     Attributes:
         condition: the camera's position, world, and the one-hot class: (B, spec.condition).
         scene: what their images are shaded with.
+        background: radiance where there is no surface, (B, 3); None where there always is one.
     """
 
     condition: Tensor
     scene: Scene
+    background: Tensor | None = None
 
 
 class Pix2Shape(nn.Module):
@@ -31,7 +33,7 @@ class Pix2Shape(nn.Module):
         self.config = config
         spec = config.networks
         self.encoder = Encoder(spec)
-        self.decoder = Decoder(spec)
+        self.decoder = Decoder(spec, outputs=2 if config.opacity else 1)
         self.critic = Critic(spec)
         self.statistics = Statistics(spec)
 
@@ -39,11 +41,28 @@ class Pix2Shape(nn.Module):
         """Return the codes of images of linear radiance: (B, 3, S, S) -> (B, z)."""
         return self.encoder(image, views.condition)
 
+    def surfels(self, code: Tensor, condition: Tensor) -> tuple[Tensor, Tensor | None]:
+        """Return depth maps, scene units, and opacities within 0..1: (B, z) -> two (B, S, S).
+
+        The opacity is None for a model of closed rooms, where every ray meets a surface.
+        """
+        raw = self.decoder(code, condition).float()
+        depth = self.config.depth_middle * (1 + self.config.depth_reach * torch.tanh(raw[:, 0]))
+        return depth, torch.sigmoid(raw[:, 1]) if self.config.opacity else None
+
     def decode(self, code: Tensor, views: Views) -> Tensor:
         """Return the depth maps of codes seen from views: (B, z) -> (B, S, S), scene units."""
-        raw = self.decoder(code, views.condition)[:, 0]
-        return self.config.depth_middle * (1 + self.config.depth_reach * torch.tanh(raw))
+        return self.surfels(code, views.condition)[0]
 
     def image(self, code: Tensor, views: Views) -> Tensor:
         """Return the rendered images of codes: (B, z) -> (B, 3, S, S)."""
-        return render(self.decode(code, views), views.scene)
+        return shaded(*self.surfels(code, views.condition), views)
+
+
+def shaded(depth: Tensor, opacity: Tensor | None, views: Views) -> Tensor:
+    """Return the images of surfels in front of the views' background: (B, 3, S, S)."""
+    image = render(depth, views.scene)
+    if opacity is None or views.background is None:
+        return image
+    behind = views.background[..., None, None]
+    return behind + opacity[:, None] * (image - behind)

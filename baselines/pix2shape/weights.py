@@ -1,0 +1,143 @@
+"""Weights and checkpoints: tensors as safetensors, the configuration as JSON beside them.
+
+Reading either runs no code from it.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor
+
+from baselines.pix2shape.config import ModelConfig
+from baselines.pix2shape.model import Pix2Shape
+from scenegen.errors import FileFormatError, SpecError
+from scenegen.new_file import written_beside
+from scenegen.records import from_json
+
+FORMAT_VERSION = 1
+LARGEST_JSON = 1_000_000  # bytes
+
+
+@dataclass(frozen=True)
+class Card:
+    """What is told beside weights.
+
+    Attributes:
+        config: of the model.
+        iteration: how far it was trained.
+        data: what it was trained on, the file's spec as JSON.
+        classes: names of the labels, in order, of a conditional model.
+        seconds: of training.
+    """
+
+    config: ModelConfig
+    iteration: int = 0
+    data: str = ""
+    classes: tuple[str, ...] = ()
+    seconds: float = 0.0
+    format_version: int = FORMAT_VERSION
+
+
+def save_weights(
+    path: str | Path, model: Pix2Shape, card: Card, dtype: torch.dtype = torch.float16
+) -> None:
+    """Write what prediction needs, encoder and decoder, and the card beside; replaces both.
+
+    Args:
+        path: ends in .safetensors; the card gets the same name with .json.
+        dtype: of the stored numbers.
+    """
+    tensors = {
+        name: value.to(dtype) if value.is_floating_point() else value
+        for name, value in model.state_dict().items()
+        if name.split(".")[0] in ("encoder", "decoder")
+    }
+    save_tensors(path, tensors, {})
+    save_card(path, card)
+
+
+def save_tensors(path: str | Path, tensors: Mapping[str, Tensor], notes: dict[str, str]) -> None:
+    """Write tensors; the file appears, or is replaced, when it is complete."""
+    kept = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
+    with written_beside(path, overwrite=True) as temporary:
+        save_file(kept, temporary, metadata=notes or None)
+
+
+def save_card(path: str | Path, card: Card) -> None:
+    """Write the JSON beside weights, or replace it."""
+    text = json.dumps(card, default=vars, indent=1, sort_keys=True)
+    with written_beside(Path(path).with_suffix(".json"), overwrite=True) as temporary:
+        temporary.write_text(text + "\n")
+
+
+def load_card(path: str | Path) -> Card:
+    """Read the JSON beside weights. Raises OSError, FileFormatError."""
+    beside = Path(path).with_suffix(".json")
+    if beside.stat().st_size > LARGEST_JSON:
+        raise FileFormatError(f"{beside}: over {LARGEST_JSON} bytes, expected a configuration")
+    try:
+        card = from_json(Card, beside.read_bytes(), "card")
+    except SpecError as error:
+        raise FileFormatError(f"{beside}: {error}") from error
+    if card.format_version != FORMAT_VERSION:
+        raise FileFormatError(
+            f"{beside}: format version {card.format_version}, this release reads {FORMAT_VERSION}"
+        )
+    return card
+
+
+def load_tensors(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
+    """Read tensors and notes. Raises OSError, FileFormatError."""
+    path = Path(path)
+    with path.open("rb"):  # so that a missing file or a folder is told as Python tells it
+        pass
+    try:
+        with safe_open(path, "pt") as file:
+            return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118
+    except SafetensorError as error:
+        raise FileFormatError(f"{path}: not a safetensors file, or damaged: {error}") from error
+
+
+def load_model(path: str | Path) -> tuple[Pix2Shape, Card]:
+    """Read weights and their card: the model in evaluation mode.
+
+    Raises:
+        OSError: no such file.
+        FileFormatError: damaged, not of the card's configuration, or not finite.
+    """
+    card = load_card(path)
+    tensors, _ = load_tensors(path)
+    model = Pix2Shape(card.config)
+    load_into(model, tensors, path, ("encoder", "decoder"))
+    return model.eval(), card
+
+
+def load_into(
+    model: Pix2Shape,
+    tensors: Mapping[str, Tensor],
+    path: str | Path,
+    parts: tuple[str, ...] = ("encoder", "decoder", "critic", "statistics"),
+) -> None:
+    """Set the model's parts to stored tensors. Raises FileFormatError unless all fit."""
+    own: dict[str, Any] = model.state_dict()
+    wanted = {name: value for name, value in own.items() if name.split(".")[0] in parts}
+    missing, unknown = sorted(wanted.keys() - tensors), sorted(tensors.keys() - own)
+    if missing or unknown:
+        what = f"{missing[0]} is missing" if missing else f"{unknown[0]} is not expected"
+        raise FileFormatError(f"{path}: weights of another configuration: {what}")
+    for name, value in wanted.items():
+        found = tensors[name]
+        if found.shape != value.shape:
+            raise FileFormatError(
+                f"{path}: weights of another configuration: {name} has shape"
+                f" {tuple(found.shape)}, expected {tuple(value.shape)}"
+            )
+        if not torch.isfinite(found).all():
+            raise FileFormatError(f"{path}: {name} is not finite")
+        value.copy_(found)
