@@ -49,7 +49,7 @@ def sample_scene(
         index=index,
         cameras=cameras,
         objects=tuple(item for item, _ in placed),
-        lights=_sample_lights(spec, index),
+        lights=sample_lights(spec, index),
         ambient=spec.ambient,
         attenuation=spec.attenuation,
         room_reflectance=spec.room_reflectance,
@@ -113,7 +113,7 @@ def sample_cameras(spec: DatasetSpec, index: int) -> tuple[Camera, ...]:
     return tuple(cameras)
 
 
-def _sample_lights(spec: DatasetSpec, index: int) -> tuple[Light, ...]:
+def sample_lights(spec: DatasetSpec, index: int) -> tuple[Light, ...]:
     """Lights share the level equally; each colour has a random hue and its largest channel 1."""
     rng = item_rng(spec.seed, index, Purpose.LIGHTS)
     count = int(rng.integers(spec.lights[0], spec.lights[1] + 1))

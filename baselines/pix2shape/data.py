@@ -5,7 +5,7 @@ Only the ablation's depth supervision reads depth maps.
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from torch import Tensor
 from torch.utils.data import Dataset, Sampler
 
 from baselines.pix2shape.config import ModelConfig
-from baselines.pix2shape.model import Views
+from baselines.pix2shape.model import Views, mapped
 from baselines.pix2shape.surfels import Scene
 from scenegen.errors import SpecError
 from scenegen.scene_file import RoomsDataset, RoomsFile
@@ -42,18 +42,7 @@ class Batch:
 
     def to(self, device: torch.device) -> "Batch":
         """Return the batch on another device."""
-        return _moved(self, device)
-
-
-def _moved(record: Any, device: torch.device) -> Any:
-    moved: dict[str, Any] = {}
-    for field in fields(record):
-        value = getattr(record, field.name)
-        if isinstance(value, Tensor):
-            moved[field.name] = value.to(device, non_blocking=True)
-        elif isinstance(value, Views | Scene):
-            moved[field.name] = _moved(value, device)
-    return replace(record, **moved)
+        return mapped(self, lambda values: values.to(device, non_blocking=True))
 
 
 def reduced(image: Array, size: int) -> Array:

@@ -83,11 +83,11 @@ def question_loss(codes: Tensor, answers: Tensor) -> Tensor:
         codes: z_scene of reference and three answers, (Q, 4, n).
         answers: which of the three is right, (Q,) integers.
     """
-    squared = ((codes[:, 1:] - codes[:, :1]) ** 2).sum(dim=2)  # (Q, 3)
+    squared = squared_distances(codes)
     right = squared.gather(1, answers[:, None]).squeeze(1)
     return (0.5 * right - 0.5 * (squared.sum(dim=1) - right)).mean()
 
 
-def answer_questions(codes: Tensor) -> Tensor:
-    """Return the nearest answer to the reference by L2 distance of z_scene: (Q, 4, n) -> (Q,)."""
-    return ((codes[:, 1:] - codes[:, :1]) ** 2).sum(dim=2).argmin(dim=1)
+def squared_distances(codes: Tensor) -> Tensor:
+    """Return the answers' squared distances from the reference: (Q, 4, n) -> (Q, 3)."""
+    return ((codes[:, 1:] - codes[:, :1]) ** 2).sum(dim=2)

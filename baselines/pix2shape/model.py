@@ -1,6 +1,8 @@
 """The model: networks and surfel renderer together."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any, TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -8,6 +10,20 @@ from torch import Tensor, nn
 from baselines.pix2shape.config import ModelConfig
 from baselines.pix2shape.networks import Critic, Decoder, Encoder, Statistics
 from baselines.pix2shape.surfels import Scene, render
+
+T = TypeVar("T")
+
+
+def mapped(record: T, function: Callable[[Tensor], Tensor]) -> T:
+    """Return a dataclass with every tensor, those of nested ones too, put through a function."""
+    changed: dict[str, Any] = {}
+    for field in fields(record):  # type: ignore[arg-type]
+        value = getattr(record, field.name)
+        if isinstance(value, Tensor):
+            changed[field.name] = function(value)
+        elif is_dataclass(value):
+            changed[field.name] = mapped(value, function)
+    return replace(record, **changed)  # type: ignore[type-var]
 
 
 @dataclass(frozen=True, eq=False)

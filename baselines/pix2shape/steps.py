@@ -4,8 +4,7 @@ Pix2Shape (IJCV 2020), Algorithm 1 and equations "rec_loss" and "app-loss". A lo
 is neither computed nor named among the numbers.
 """
 
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -19,8 +18,7 @@ from baselines.pix2shape.losses import (
     question_loss,
     reconstruction_loss,
 )
-from baselines.pix2shape.model import Pix2Shape, shaded
-from baselines.pix2shape.surfels import Scene
+from baselines.pix2shape.model import Pix2Shape, mapped, shaded
 
 Numbers = dict[str, Tensor]
 
@@ -41,7 +39,7 @@ class Noise:
 
     def to(self, device: torch.device) -> "Noise":
         """Return the noise on another device."""
-        return Noise(self.code.to(device), self.share.to(device), self.order.to(device))
+        return mapped(self, lambda values: values.to(device))
 
 
 def draw(batch: int, z: int, seed: int) -> Noise:
@@ -108,7 +106,7 @@ def generator_step(
             found = model.encode(made, views)
             losses["code_reconstruction"] = reconstruction_loss(noise.code, found)
     if config.other_views:
-        others = _reordered(views, noise.order)
+        others = mapped(views, lambda values: values[noise.order])
         elsewhere = model.encode(model.image(code, others), others)
         losses["other_views"] = reconstruction_loss(code, elsewhere)
     if config.mutual_information:
@@ -127,15 +125,3 @@ def _halves(model: Pix2Shape, code: Tensor) -> tuple[Tensor, Tensor]:
     """Return z_scene and z_view of codes."""
     spec = model.config.networks
     return code[:, : spec.z_scene], code[:, spec.z_scene :]
-
-
-def _reordered(record: Any, order: Tensor) -> Any:
-    """Return views, or their scene, with the batch in another order."""
-    changed: dict[str, Any] = {}
-    for field in fields(record):
-        value = getattr(record, field.name)
-        if isinstance(value, Tensor):
-            changed[field.name] = value[order]
-        elif isinstance(value, Scene):
-            changed[field.name] = _reordered(value, order)
-    return replace(record, **changed)

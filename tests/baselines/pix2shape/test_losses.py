@@ -6,13 +6,13 @@ import pytest
 
 torch = pytest.importorskip("torch")
 from baselines.pix2shape.losses import (  # noqa: E402
-    answer_questions,
     critic_loss,
     generator_loss,
     gradient_penalty,
     mutual_information,
     question_loss,
     reconstruction_loss,
+    squared_distances,
 )
 from baselines.pix2shape.networks import NetworkSpec, Statistics  # noqa: E402
 
@@ -97,4 +97,4 @@ def test_question_loss_and_answers_by_hand() -> None:
     answers = torch.tensor([0, 1])
     by_hand = [0.5 * 1 - 0.5 * (4 + 9), 0.5 * 0 - 0.5 * (9 + 1)]
     assert float(question_loss(codes, answers)) == pytest.approx(sum(by_hand) / 2)
-    assert answer_questions(codes).tolist() == [0, 1]
+    assert squared_distances(codes).tolist() == [[1, 4, 9], [9, 0, 1]]

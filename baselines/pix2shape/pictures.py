@@ -1,0 +1,94 @@
+"""Pictures that a person looks at: sheets of images, depths and normals; turning views as a GIF."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from PIL import Image
+from torch import Tensor
+
+from baselines.pix2shape.data import Batch
+from baselines.pix2shape.model import Pix2Shape, Views, shaded
+from baselines.pix2shape.surfels import normals_from_depth
+from scenegen.errors import SpecError
+from scenegen.new_file import written_beside
+from scenegen.preview import BACKGROUND, GAP, SMALLEST_TILE, depth_bytes, save_picture, srgb_bytes
+
+Array = NDArray[Any]
+Tiles = list[NDArray[np.uint8]]  # (H, W, 3) each
+FRAME_SECONDS = 0.08
+
+
+@torch.no_grad()
+def drawn(model: Pix2Shape, code: Tensor, views: Views) -> tuple[Tiles, Tiles, Tiles]:
+    """Return images, depths (near is dark) and normals (xyz as rgb) of codes seen from views."""
+    depth, opacity = model.surfels(code, views.condition)
+    image = shaded(depth, opacity, views)
+    normals = normals_from_depth(depth, views.scene.fov_y_degrees)
+    if opacity is not None:
+        depth = torch.where(opacity > 0.5, depth, torch.nan)
+        normals = normals * (opacity > 0.5)[:, None]
+    return image_tiles(image), [depth_bytes(z.cpu().numpy()) for z in depth], _normal_tiles(normals)
+
+
+def image_tiles(radiance: Tensor) -> Tiles:
+    """Return images of linear radiance, (B, 3, H, W), as the eye sees them."""
+    return [srgb_bytes(np.moveaxis(image.cpu().numpy(), 0, -1)) for image in radiance]
+
+
+def _normal_tiles(normals: Tensor) -> Tiles:
+    values = np.moveaxis(normals.cpu().numpy(), 1, -1)
+    return list(np.rint(np.clip(values * 0.5 + 0.5, 0, 1) * 255).astype(np.uint8))
+
+
+def sheet(rows: Sequence[Tiles]) -> Image.Image:
+    """Return a sheet of tiles, one line a row; small tiles are enlarged by a whole factor."""
+    side = rows[0][0].shape[0]
+    side *= -(-SMALLEST_TILE // side) if side < SMALLEST_TILE else 1
+    columns, step = max(map(len, rows)), side + GAP
+    picture = Image.new("RGB", (columns * step + GAP, len(rows) * step + GAP), BACKGROUND)
+    for y, row in enumerate(rows):
+        for x, pixels in enumerate(row):
+            tile = Image.fromarray(pixels).resize((side, side), Image.Resampling.NEAREST)
+            picture.paste(tile, (GAP + x * step, GAP + y * step))
+    return picture
+
+
+def training_sheet(model: Pix2Shape, batch: Batch, noise: Tensor, columns: int = 8) -> Image.Image:
+    """Return what training is watched by: inputs, their reconstructions, and samples of the prior.
+
+    Lines: input; reconstruction, its depth, its normals; samples, their depths.
+    """
+    learning = model.training
+    model.eval()
+    with torch.no_grad():
+        code = model.encode(batch.image, batch.views)
+    again, made = drawn(model, code, batch.views), drawn(model, noise, batch.views)
+    model.train(learning)
+    rows = [image_tiles(batch.image), *again, *made[:2]]
+    return sheet([row[:columns] for row in rows])
+
+
+def save_pictures(frames: Sequence[Image.Image], path: str | Path) -> None:
+    """Write one picture, or several as an animation that goes there and back.
+
+    Raises SpecError for an ending that does not suit, OSError for the path.
+    """
+    path = Path(path)
+    if len(frames) == 1:
+        save_picture(frames[0], path)
+        return
+    if path.suffix.lower() not in (".gif", ".webp"):
+        raise SpecError(f"out: found {path.name!r}, expected an animation's name such as turn.gif")
+    turn = [*frames, *frames[-2:0:-1]]
+    with written_beside(path, overwrite=True) as temporary:
+        turn[0].save(
+            temporary,
+            save_all=True,
+            append_images=turn[1:],
+            duration=round(FRAME_SECONDS * 1000),
+            loop=0,
+        )

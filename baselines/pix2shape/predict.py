@@ -1,0 +1,134 @@
+"""Predictions of a trained model, written as any submission is; no truth is read but cameras."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.nn import functional
+
+from baselines.pix2shape.data import channels_first, check_reducible
+from baselines.pix2shape.losses import squared_distances
+from baselines.pix2shape.model import Pix2Shape
+from baselines.pix2shape.surfels import normals_from_depth
+from iqtt.question_file import open_questions
+from metrics.prediction_writer import RoomPredictionWriter, write_answers
+from scenegen.errors import SpecError
+from scenegen.scene_file import RoomsFile
+from scenegen.truth import decode_image
+
+Array = NDArray[Any]
+BATCH = 64  # images at a time
+METHOD = "pix2shape"
+
+
+@torch.inference_mode()
+def predict_rooms(
+    model: Pix2Shape,
+    data: str | Path,
+    out: str | Path,
+    *,
+    run: str = "",
+    overwrite: bool = False,
+    progress: Callable[[int], Any] = lambda done: None,
+) -> None:
+    """Write depth and normals of every view of a rooms file, each scene from its input view alone.
+
+    One pass of the encoder for each scene (view 0), one of the decoder for each of its views.
+
+    Raises SpecError where the model is not one for such files; OSError, FileFormatError.
+    """
+    spec = model.config.networks
+    if not spec.camera or spec.classes:
+        what = "classes, which are part of the truth" if spec.classes else "no camera"
+        raise SpecError(f"weights: a model of {what}, expected one conditioned on the camera alone")
+    with RoomsFile(data) as rooms:
+        size = rooms.spec.height
+        check_reducible(data, size, rooms.spec.width, spec.size)
+        place = rooms.read("camera/world_from_camera", slice(None))[:, :3, 3]
+        condition = torch.from_numpy(place.astype(np.float32))
+        scene, view = rooms.read("scene_index", slice(None)), rooms.read("view_index", slice(None))
+        inputs = np.flatnonzero(view == 0)
+        of_scene = {int(scene[row]): k for k, row in enumerate(inputs)}
+        codes = torch.cat(list(_codes(model, rooms, inputs, condition)))
+        own = torch.tensor([of_scene[int(number)] for number in scene])
+        with RoomPredictionWriter(out, data, method=METHOD, run=run, overwrite=overwrite) as file:
+            for rows in _batches(len(rooms)):
+                device = next(model.parameters()).device
+                depth, _ = model.surfels(codes[own[rows]].to(device), condition[rows].to(device))
+                depth, normal = enlarged(depth, rooms.spec.fov_y_degrees, size)
+                for row, z, n in zip(rows, depth.cpu(), normal.cpu(), strict=True):
+                    file.add(int(row), z.numpy(), np.moveaxis(n.numpy(), 0, -1))
+                progress(len(rows))
+
+
+@torch.inference_mode()
+def answer_file(
+    model: Pix2Shape,
+    data: str | Path,
+    out: str | Path,
+    *,
+    part: str | None = None,
+    run: str = "",
+    overwrite: bool = False,
+    progress: Callable[[int], Any] = lambda done: None,
+) -> None:
+    """Write answers to the questions of a file: the answer whose z_scene is nearest.
+
+    Raises SpecError where the model is not one for questions; else as `iqtt.QuestionsFile`.
+    """
+    spec = model.config.networks
+    if spec.condition:
+        raise SpecError("weights: a model that must be told the camera, expected one for questions")
+    device = next(model.parameters()).device
+    with open_questions(data, part) as questions:
+        check_reducible(data, questions.height, questions.width, spec.size)
+        scores = []
+        for rows in _batches(len(questions), BATCH // 4):
+            images = [
+                channels_first(image, spec.size)
+                for row in rows
+                for image in decode_image(questions.read("questions", int(row)))
+            ]
+            image = torch.from_numpy(np.stack(images)).to(device)
+            codes = model.encoder(image, image.new_empty(len(image), 0))[:, : spec.z_scene]
+            distance = squared_distances(codes.view(len(rows), 4, -1)).sqrt()
+            scores.append(-distance.cpu().double().numpy())
+            progress(len(rows))
+    write_answers(
+        out, data, method=METHOD, scores=np.concatenate(scores), run=run, overwrite=overwrite
+    )
+
+
+def enlarged(depth: Tensor, fov_y_degrees: float, size: int) -> tuple[Tensor, Tensor]:
+    """Return depth, (B, size, size), and normals, (B, 3, size, size), of smaller depth maps.
+
+    Inverse depth is what is interpolated: planes stay planes.
+    """
+    normals = normals_from_depth(depth, fov_y_degrees)
+    if depth.shape[1] == size:
+        return depth, normals
+    inverse = functional.interpolate(1 / depth[:, None], size=size, mode="bilinear")[:, 0]
+    normals = functional.interpolate(normals, size=size, mode="bilinear")
+    return 1 / inverse, functional.normalize(normals, dim=1)
+
+
+def _codes(
+    model: Pix2Shape, rooms: RoomsFile, inputs: Array, condition: Tensor
+) -> Iterator[Tensor]:
+    device = next(model.parameters()).device
+    for chosen in _batches(len(inputs)):
+        rows = inputs[chosen]
+        images = [
+            channels_first(decode_image(rooms.read("image", int(row))), model.config.networks.size)
+            for row in rows
+        ]
+        image = torch.from_numpy(np.stack(images)).to(device)
+        yield model.encoder(image, condition[rows].to(device)).cpu()
+
+
+def _batches(count: int, size: int = BATCH) -> Iterator[Array]:
+    return (np.arange(first, min(first + size, count)) for first in range(0, count, size))
