@@ -21,3 +21,9 @@ def iqtt() -> None:
 @click.version_option(package_name="pix2shape-bench")
 def bench() -> None:
     """Scores for the predictions of any model, which meets us through one file."""
+
+
+@click.group(cls=PackageCommands, packages=("baselines.pix2shape",))
+@click.version_option(package_name="pix2shape-bench")
+def pix2shape() -> None:
+    """The reference model: train it, predict, and look at what it learned."""

@@ -19,6 +19,7 @@ from baselines.pix2shape.config import ModelConfig
 from baselines.pix2shape.model import Views, mapped
 from baselines.pix2shape.surfels import Scene
 from scenegen.errors import SpecError
+from scenegen.row_file import open_file
 from scenegen.scene_file import RoomsDataset, RoomsFile
 from scenegen.seeding import Purpose, item_rng
 from scenegen.truth import decode_image
@@ -49,6 +50,12 @@ def reduced(image: Array, size: int) -> Array:
     """Return the means of square blocks: (H, W, ...) -> (S, S, ...)."""
     block = image.shape[0] // size
     return image.reshape(size, block, size, block, *image.shape[2:]).mean(axis=(1, 3))
+
+
+def is_question_file(path: str | Path) -> bool:
+    """Tell files of questions from all others. Raises OSError, FileFormatError."""
+    with open_file(path, "rooms or question file") as file:
+        return any(name in file for name in ("questions", "labeled", "unlabeled"))
 
 
 def check_reducible(where: object, height: int, width: int, size: int) -> None:

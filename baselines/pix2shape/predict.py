@@ -10,19 +10,57 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from baselines.pix2shape.data import channels_first, check_reducible
+from baselines.pix2shape.bundled import open_weights
+from baselines.pix2shape.data import channels_first, check_reducible, is_question_file
 from baselines.pix2shape.losses import squared_distances
 from baselines.pix2shape.model import Pix2Shape
 from baselines.pix2shape.surfels import normals_from_depth
 from iqtt.question_file import open_questions
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from scenegen.errors import SpecError
+from scenegen.new_file import check_writable
 from scenegen.scene_file import RoomsFile
 from scenegen.truth import decode_image
 
 Array = NDArray[Any]
 BATCH = 64  # images at a time
 METHOD = "pix2shape"
+Progress = Callable[[int, int], Any]  # rows done, rows in all
+
+
+def predict_file(
+    weights: str | Path,
+    data: str | Path,
+    out: str | Path,
+    *,
+    device: str = "auto",
+    part: str | None = None,
+    run: str = "",
+    overwrite: bool = False,
+    progress: Progress = lambda done, total: None,
+) -> None:
+    """Write the submission of some weights, to rooms or to questions.
+
+    Args:
+        weights: a path, or a name of bundled ones.
+        device: "auto", "cpu" or "cuda".
+
+    Raises as `load_model`, `predict_rooms` and `answer_file`.
+    """
+    model, _ = open_weights(weights)
+    model.to(chosen_device(device))
+    check_writable(Path(out), overwrite)
+    if is_question_file(data):
+        answer_file(model, data, out, part=part, run=run, overwrite=overwrite, progress=progress)
+    else:
+        predict_rooms(model, data, out, run=run, overwrite=overwrite, progress=progress)
+
+
+def chosen_device(name: str) -> torch.device:
+    """Return a device by name; "auto" is a GPU where there is one. Raises SpecError."""
+    if name == "cuda" and not torch.cuda.is_available():
+        raise SpecError("device: found no GPU that this torch can use; say --device cpu")
+    return torch.device("cuda" if name != "cpu" and torch.cuda.is_available() else "cpu")
 
 
 @torch.inference_mode()
@@ -33,7 +71,7 @@ def predict_rooms(
     *,
     run: str = "",
     overwrite: bool = False,
-    progress: Callable[[int], Any] = lambda done: None,
+    progress: Progress = lambda done, total: None,
 ) -> None:
     """Write depth and normals of every view of a rooms file, each scene from its input view alone.
 
@@ -62,7 +100,7 @@ def predict_rooms(
                 depth, normal = enlarged(depth, rooms.spec.fov_y_degrees, size)
                 for row, z, n in zip(rows, depth.cpu(), normal.cpu(), strict=True):
                     file.add(int(row), z.numpy(), np.moveaxis(n.numpy(), 0, -1))
-                progress(len(rows))
+                progress(len(rows), len(rooms))
 
 
 @torch.inference_mode()
@@ -74,7 +112,7 @@ def answer_file(
     part: str | None = None,
     run: str = "",
     overwrite: bool = False,
-    progress: Callable[[int], Any] = lambda done: None,
+    progress: Progress = lambda done, total: None,
 ) -> None:
     """Write answers to the questions of a file: the answer whose z_scene is nearest.
 
@@ -97,7 +135,7 @@ def answer_file(
             codes = model.encoder(image, image.new_empty(len(image), 0))[:, : spec.z_scene]
             distance = squared_distances(codes.view(len(rows), 4, -1)).sqrt()
             scores.append(-distance.cpu().double().numpy())
-            progress(len(rows))
+            progress(len(rows), len(questions))
     write_answers(
         out, data, method=METHOD, scores=np.concatenate(scores), run=run, overwrite=overwrite
     )

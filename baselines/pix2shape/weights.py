@@ -11,7 +11,7 @@ from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor
 
 from baselines.pix2shape.config import ModelConfig
@@ -32,6 +32,8 @@ class Card:
         config: of the model.
         iteration: how far it was trained.
         data: what it was trained on, the file's spec as JSON.
+        fingerprint: of that file.
+        labels: how many answers it was given, of questions.
         classes: names of the labels, in order, of a conditional model.
         seconds: of training.
     """
@@ -39,6 +41,8 @@ class Card:
     config: ModelConfig
     iteration: int = 0
     data: str = ""
+    fingerprint: str = ""
+    labels: int = 0
     classes: tuple[str, ...] = ()
     seconds: float = 0.0
     format_version: int = FORMAT_VERSION
@@ -66,7 +70,7 @@ def save_tensors(path: str | Path, tensors: Mapping[str, Tensor], notes: dict[st
     """Write tensors; the file appears, or is replaced, when it is complete."""
     kept = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
     with written_beside(path, overwrite=True) as temporary:
-        save_file(kept, temporary, metadata=notes or None)
+        temporary.write_bytes(save(kept, metadata=notes or None))
 
 
 def save_card(path: str | Path, card: Card) -> None:

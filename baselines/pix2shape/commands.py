@@ -1,0 +1,214 @@
+"""`pix2shape ...`: parse, one library call, print. Heavy imports happen inside the commands."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import click
+
+from scenegen.command_line import Items
+
+WEIGHTS = click.option(
+    "--weights",
+    default="shapes",
+    show_default=True,
+    help="A .safetensors file with its .json beside, or the name of bundled weights.",
+)
+DATA = click.option("--data", required=True, help="Rooms, or questions.")
+OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+DEVICE = click.option(
+    "--device",
+    type=click.Choice(["auto", "cpu", "cuda"]),
+    default="auto",
+    show_default=True,
+    help="auto: a GPU where there is one.",
+)
+
+
+class Setting(click.ParamType):  # type: ignore[type-arg]
+    """`name=value`, the value as JSON."""
+
+    name = "NAME=VALUE"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse."""
+        import json
+
+        name, _, text = str(value).partition("=")
+        try:
+            return name.strip(), json.loads(text)
+        except ValueError:
+            self.fail(f"found {value!r}, expected a number, such as batch=8", param, ctx)
+
+
+@click.command()
+@click.option("--data", required=True, help="Rooms, or iqtt-train.h5, to train on.")
+@click.option("--out", required=True, help="Folder of the run.")
+@click.option(
+    "--config",
+    type=click.Choice(["compact", "paper"]),
+    help="compact: two hours on two cores; paper: the paper's.  [compact]",
+)
+@click.option(
+    "--set", "settings", type=Setting(), multiple=True, help="Change one setting of the config."
+)
+@click.option("--seed", type=click.IntRange(0), help="Of weights and every random choice.  [0]")
+@click.option("--labels", type=click.IntRange(0), default=0, help="Answers to learn from.  [0]")
+@click.option("--conditional", is_flag=True, help="Tell the networks the class of the one object.")
+@click.option("--resume", is_flag=True, help="Go on from the folder's checkpoint.")
+@click.option("--workers", type=click.IntRange(0), default=1, show_default=True)
+@click.option("--every", type=click.IntRange(1), default=500, show_default=True)
+@DEVICE
+@click.option("--devices", type=click.IntRange(1), default=1, show_default=True)
+@click.option("--precision", type=click.Choice(["32", "bf16"]), default="32", show_default=True)
+def train(
+    data: str,
+    out: str,
+    config: str | None,
+    settings: tuple[tuple[str, Any], ...],
+    seed: int | None,
+    labels: int,
+    conditional: bool,
+    resume: bool,
+    workers: int,
+    every: int,
+    device: str,
+    devices: int,
+    precision: str,
+) -> None:
+    """Train the model; `tensorboard --logdir OUT/logs` shows how it goes, OUT/pictures.png too."""
+    from tqdm import tqdm
+
+    from baselines.pix2shape.config import model_config
+    from baselines.pix2shape.runs import Machine, train_run
+
+    chosen = dict(settings) | ({} if seed is None else {"seed": seed})
+    if resume and (config or chosen):
+        raise click.UsageError("--resume goes on with the run's own --config, --set and --seed")
+    accelerator = "gpu" if device == "cuda" else device
+    machine = Machine(
+        accelerator,
+        devices,
+        f"{precision}-true" if precision == "32" else "bf16-mixed",
+        workers,
+        every,
+    )
+    with tqdm(unit="it", disable=None, leave=False) as bar:
+
+        def show(state: Any, losses: dict[str, float]) -> None:
+            if bar.total is None:
+                bar.reset(state.model.config.iterations)
+                bar.update(state.iteration - 1)
+                bar.initial = state.iteration - 1
+            bar.set_postfix({name: f"{value:.3g}" for name, value in losses.items()}, refresh=False)
+            bar.update(1)
+
+        weights = train_run(
+            out,
+            data,
+            None if resume else model_config(config or "compact", **chosen),
+            machine,
+            labels=labels,
+            conditional=conditional,
+            progress=show,
+        )
+    click.echo(f"{weights}: trained on {data}; now `pix2shape predict --weights {weights} ...`")
+
+
+@click.command()
+@WEIGHTS
+@DATA
+@click.option("--out", default="predictions.h5", show_default=True, help="Submission to write.")
+@click.option("--part", type=click.Choice(["labeled", "unlabeled"]), help="Of iqtt-train.h5.")
+@click.option("--run", default="", help="Name of this run among several of the method.")
+@DEVICE
+@OVERWRITE
+def predict(
+    weights: str, data: str, out: str, part: str | None, run: str, device: str, overwrite: bool
+) -> None:
+    """Predict every view of each room from its input view alone, or answer questions."""
+    from baselines.pix2shape.predict import predict_file
+
+    with _bar("row") as bar:
+        predict_file(
+            weights, data, out, part=part, run=run, device=device, overwrite=overwrite, progress=bar
+        )
+    click.echo(f"{out}: {weights} on {data}; score it with `bench score {out}`")
+
+
+@click.command()
+@WEIGHTS
+@click.option("--out", default="samples.png", show_default=True, help="Picture to write.")
+@click.option("--n", "count", type=click.IntRange(1, 256), default=16, show_default=True)
+@click.option("--class", "label", help="Of a conditional model; without, each in turn.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+def sample(weights: str, out: str, count: int, label: str | None, seed: int) -> None:
+    """Draw scenes that never were: lines of images, depths and normals."""
+    from baselines.pix2shape.bundled import open_weights
+    from baselines.pix2shape.explore import sample_sheet
+    from baselines.pix2shape.pictures import save_pictures
+
+    model, card = open_weights(weights)
+    save_pictures([sample_sheet(model, card, count, seed, label)], out)
+    click.echo(f"{out}: {count} samples")
+
+
+@click.command()
+@WEIGHTS
+@DATA
+@click.option("--items", type=Items(), default="0,1", show_default=True, help="Two rows.")
+@click.option("--steps", type=click.IntRange(2, 64), default=8, show_default=True)
+@click.option("--out", default="interpolation.png", show_default=True, help="Picture to write.")
+def interpolate(weights: str, data: str, items: list[int], steps: int, out: str) -> None:
+    """Go from one image's scene to another's, seen from the first one's camera."""
+    from baselines.pix2shape.bundled import open_weights
+    from baselines.pix2shape.data import RoomImages
+    from baselines.pix2shape.explore import interpolation_sheet
+    from baselines.pix2shape.pictures import save_pictures
+
+    model, card = open_weights(weights)
+    if len(items) != 2:
+        raise click.UsageError(f"--items: found {len(items)} rows, expected two such as 0,1")
+    rooms = RoomImages(data, card.config)
+    save_pictures([interpolation_sheet(model, rooms, items[0], items[1], steps)], out)
+    click.echo(f"{out}: from row {items[0]} to row {items[1]} of {data}")
+
+
+@click.command()
+@WEIGHTS
+@DATA
+@click.option("--items", type=Items(), default="0-5", show_default=True, help="Rows to turn.")
+@click.option("--degrees", type=click.FloatRange(0, 90), default=80, show_default=True)
+@click.option("--frames", type=click.IntRange(2, 200), default=33, show_default=True)
+@click.option("--out", default="rotation.gif", show_default=True, help="GIF or WebP to write.")
+def rotate(
+    weights: str, data: str, items: list[int], degrees: float, frames: int, out: str
+) -> None:
+    """Turn the camera around scenes that were seen from one side."""
+    from baselines.pix2shape.bundled import open_weights
+    from baselines.pix2shape.data import RoomImages
+    from baselines.pix2shape.explore import rotation_frames
+    from baselines.pix2shape.pictures import save_pictures
+
+    model, card = open_weights(weights)
+    rooms = RoomImages(data, card.config)
+    angles = [degrees * i / (frames - 1) for i in range(frames)]
+    save_pictures(rotation_frames(model, rooms, card, items, angles), out)
+    click.echo(f"{out}: {len(items)} scenes turned by {degrees:g} degrees")
+
+
+@contextmanager
+def _bar(unit: str) -> Iterator[Callable[[int, int], Any]]:
+    """Show progress: the total is told with each step."""
+    from tqdm import tqdm
+
+    with tqdm(unit=unit, disable=None, leave=False) as bar:
+
+        def show(done: int, total: int) -> None:
+            bar.total = total
+            bar.update(done)
+
+        yield show
+
+
+COMMANDS = (train, predict, sample, interpolate, rotate)

@@ -1,0 +1,178 @@
+"""A training run: a folder with checkpoints, TensorBoard's logs, a picture, and the weights."""
+
+import errno
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from lightning_fabric import Fabric
+from torch.utils.tensorboard import SummaryWriter
+
+from baselines.pix2shape.config import ModelConfig
+from baselines.pix2shape.data import Batch, RoomImages, is_question_file
+from baselines.pix2shape.pictures import training_sheet
+from baselines.pix2shape.question_data import QuestionImages, for_questions
+from baselines.pix2shape.steps import draw
+from baselines.pix2shape.training import (
+    CHECKPOINT,
+    Source,
+    State,
+    load_state,
+    new_state,
+    save_state,
+    train,
+)
+from baselines.pix2shape.weights import Card, save_weights
+from iqtt.question_file import open_questions
+from scenegen.errors import SpecError
+from scenegen.preview import save_picture
+from scenegen.records import check
+from scenegen.scene_file import RoomsFile
+
+WEIGHTS, PICTURE, LOGS = "weights.safetensors", "pictures.png", "logs"
+LOG_EVERY = 20  # iterations
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Where training happens; what it gives is the same, to rounding.
+
+    Attributes:
+        accelerator, devices, precision: Lightning Fabric's.
+        workers: processes that read.
+        every: iterations between checkpoints, and pictures.
+    """
+
+    accelerator: str = "auto"
+    devices: int = 1
+    precision: str = "32-true"
+    workers: int = 1
+    every: int = 500
+
+
+def train_run(
+    folder: str | Path,
+    data: str | Path,
+    config: ModelConfig | None,
+    machine: Machine,
+    *,
+    labels: int = 0,
+    conditional: bool = False,
+    progress: Callable[[State, dict[str, float]], Any] = lambda state, losses: None,
+) -> Path:
+    """Train a model, from the start or from the folder's checkpoint; return the weights' path.
+
+    Args:
+        config: None to go on from the checkpoint.
+        labels: answers that training on questions may use.
+        conditional: whether the networks are told the class of the only object.
+        progress: called after every iteration.
+
+    Raises SpecError where folder, configuration and data do not go together; TrainingError;
+    FileFormatError, OSError.
+    """
+    folder = Path(folder)
+    if config is None:
+        state, card = load_state(folder)
+        _check_same(card, data, labels)
+    else:
+        if (folder / CHECKPOINT).exists():
+            raise FileExistsError(
+                errno.EEXIST,
+                "holds a checkpoint; say --resume, or name another folder",
+                str(folder),
+            )
+        card = _new_card(config, data, labels, conditional)
+        state = new_state(card.config)
+        folder.mkdir(parents=True, exist_ok=True)
+    fabric = Fabric(
+        accelerator=machine.accelerator,
+        devices=machine.devices,
+        strategy="ddp" if machine.devices > 1 else "auto",
+        precision=machine.precision,  # type: ignore[arg-type]
+    )
+    fabric.launch()
+    source, labelled = _sources(data, card.config, labels)
+    logs = SummaryWriter(str(folder / LOGS)) if fabric.is_global_zero else None
+    try:
+        for losses, batch in train(
+            state, source, fabric, labelled=labelled, labels=labels, workers=machine.workers
+        ):
+            if not fabric.is_global_zero or logs is None:
+                continue
+            progress(state, losses)
+            done = state.iteration == card.config.iterations
+            if state.iteration % LOG_EVERY == 0 or done:
+                for name, value in losses.items():
+                    logs.add_scalar(name, value, state.iteration)
+            if state.iteration % machine.every == 0 or done:
+                card = replace(card, iteration=state.iteration, seconds=round(state.seconds, 1))
+                save_state(folder, state, card)
+                _picture(folder, logs, state, batch)
+    finally:
+        if logs is not None:
+            logs.close()
+    if fabric.is_global_zero:
+        save_weights(folder / WEIGHTS, state.model, card)
+    fabric.barrier()
+    return folder / WEIGHTS
+
+
+def _picture(folder: Path, logs: SummaryWriter, state: State, batch: Batch) -> None:
+    noise = draw(len(batch.image), state.model.config.networks.z, 0).to(batch.image.device)
+    picture = training_sheet(state.model, batch, noise.code)
+    save_picture(picture, folder / PICTURE)
+    logs.add_image("pictures", np.asarray(picture), state.iteration, dataformats="HWC")
+
+
+def _sources(
+    data: str | Path, config: ModelConfig, labels: int
+) -> tuple[Source, QuestionImages | None]:
+    if config.networks.camera:
+        return RoomImages(data, config), None
+    labelled = QuestionImages(data, "labeled", config) if labels else None
+    return QuestionImages(data, "unlabeled", config), labelled
+
+
+def _new_card(config: ModelConfig, data: str | Path, labels: int, conditional: bool) -> Card:
+    """Return the configuration as the data wants it, and what the data is."""
+    if is_question_file(data):
+        if conditional:
+            raise SpecError(f"{data}: questions have no classes to condition on")
+        config = for_questions(config, data, "unlabeled")
+        config = replace(config, questions=config.questions if labels else 0.0)
+        with open_questions(data, "unlabeled") as questions:
+            assert questions.spec is not None, "for_questions has refused such files"
+            spec, mark = questions.spec.to_json(), questions.fingerprint
+        if labels:
+            with open_questions(data, "labeled") as questions:
+                check(labels <= len(questions), "labels", labels, f"at most {len(questions)}")
+        return Card(config, data=spec, fingerprint=str(mark), labels=labels)
+    check(labels == 0, "labels", labels, "0 for rooms, which ask no questions")
+    classes: tuple[str, ...] = ()
+    with RoomsFile(data) as rooms:
+        spec, mark = rooms.spec.to_json(), rooms.fingerprint
+        if conditional:
+            one = rooms.spec.objects == (1, 1)
+            check(one, "conditional", f"objects {rooms.spec.objects}", "one object in every room")
+            classes = tuple(rooms.spec.shapes)
+    config = replace(
+        config,
+        networks=replace(config.networks, classes=len(classes)),
+        mutual_information=0.0,
+        questions=0.0,
+    )
+    return Card(config, data=spec, fingerprint=mark, classes=classes)
+
+
+def _check_same(card: Card, data: str | Path, labels: int) -> None:
+    """Refuse to go on with other data."""
+    found = _new_card(card.config, data, labels, bool(card.classes))
+    if found.fingerprint != card.fingerprint:
+        raise SpecError(
+            f"{data}: fingerprint {found.fingerprint[:12]}, the run was trained on"
+            f" {card.fingerprint[:12]}; resume with the same data"
+        )
+    check(labels == card.labels, "labels", labels, f"{card.labels}, as the run began")
