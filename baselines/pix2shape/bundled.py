@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+from baselines.pix2shape.data import is_question_file
 from baselines.pix2shape.model import Pix2Shape
 from baselines.pix2shape.weights import Card, load_model
 from scenegen.errors import SpecError
+from scenegen.scene_file import RoomsFile
 
 FOLDER = Path(__file__).with_name("bundled_weights")
 
@@ -12,6 +14,22 @@ FOLDER = Path(__file__).with_name("bundled_weights")
 def names() -> list[str]:
     """Return the names of the bundled weights."""
     return sorted(path.stem for path in FOLDER.glob("*.safetensors"))
+
+
+def suited(data: str | Path) -> str:
+    """Return the name of the bundled weights that were trained on the most similar data.
+
+    Raises as `RoomsFile`, and SpecError where none are.
+    """
+    if is_question_file(data):
+        name = "iqtt"
+    else:
+        with RoomsFile(data) as rooms:
+            single = "-single" if rooms.spec.objects[1] == 1 else ""
+            name = f"shapes{single}" if rooms.spec.source == "shapes" else "shapenet"
+    if name not in names():
+        raise SpecError(f"weights: none are bundled for {data}; train some with pix2shape train")
+    return name
 
 
 def open_weights(weights: str | Path) -> tuple[Pix2Shape, Card]:

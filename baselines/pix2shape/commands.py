@@ -1,12 +1,15 @@
 """`pix2shape ...`: parse, one library call, print. Heavy imports happen inside the commands."""
 
+import importlib.util
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import click
 
-from scenegen.command_line import Items
+from scenegen.command_line import Items, UserError
+
+PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
 
 WEIGHTS = click.option(
     "--weights",
@@ -77,6 +80,7 @@ def train(
     precision: str,
 ) -> None:
     """Train the model; `tensorboard --logdir OUT/logs` shows how it goes, OUT/pictures.png too."""
+    needs_torch()
     from tqdm import tqdm
 
     from baselines.pix2shape.config import model_config
@@ -127,9 +131,10 @@ def predict(
     weights: str, data: str, out: str, part: str | None, run: str, device: str, overwrite: bool
 ) -> None:
     """Predict every view of each room from its input view alone, or answer questions."""
+    needs_torch()
     from baselines.pix2shape.predict import predict_file
 
-    with _bar("row") as bar:
+    with show_progress("row") as bar:
         predict_file(
             weights, data, out, part=part, run=run, device=device, overwrite=overwrite, progress=bar
         )
@@ -144,6 +149,7 @@ def predict(
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 def sample(weights: str, out: str, count: int, label: str | None, seed: int) -> None:
     """Draw scenes that never were: lines of images, depths and normals."""
+    needs_torch()
     from baselines.pix2shape.bundled import open_weights
     from baselines.pix2shape.explore import sample_sheet
     from baselines.pix2shape.pictures import save_pictures
@@ -161,6 +167,7 @@ def sample(weights: str, out: str, count: int, label: str | None, seed: int) -> 
 @click.option("--out", default="interpolation.png", show_default=True, help="Picture to write.")
 def interpolate(weights: str, data: str, items: list[int], steps: int, out: str) -> None:
     """Go from one image's scene to another's, seen from the first one's camera."""
+    needs_torch()
     from baselines.pix2shape.bundled import open_weights
     from baselines.pix2shape.data import RoomImages
     from baselines.pix2shape.explore import interpolation_sheet
@@ -185,6 +192,7 @@ def rotate(
     weights: str, data: str, items: list[int], degrees: float, frames: int, out: str
 ) -> None:
     """Turn the camera around scenes that were seen from one side."""
+    needs_torch()
     from baselines.pix2shape.bundled import open_weights
     from baselines.pix2shape.data import RoomImages
     from baselines.pix2shape.explore import rotation_frames
@@ -197,9 +205,18 @@ def rotate(
     click.echo(f"{out}: {len(items)} scenes turned by {degrees:g} degrees")
 
 
+def needs_torch() -> None:
+    """Raise UserError where the optional packages are missing."""
+    missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
+    if missing:
+        raise UserError(
+            f"pix2shape needs {', '.join(missing)}: pip install 'pix2shape-bench[model]'"
+        )
+
+
 @contextmanager
-def _bar(unit: str) -> Iterator[Callable[[int, int], Any]]:
-    """Show progress: the total is told with each step."""
+def show_progress(unit: str) -> Iterator[Callable[[int, int], Any]]:
+    """Show a bar whose total is told with each step."""
     from tqdm import tqdm
 
     with tqdm(unit=unit, disable=None, leave=False) as bar:

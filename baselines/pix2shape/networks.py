@@ -17,6 +17,7 @@ SLOPE = 0.2  # of the leaky ReLUs
 ENCODER_CHANNELS = (85, 170, 340, 680, 1360)  # of 64, 32, 16, 8, 4 pixels, at 128x128
 DECODER_CHANNELS = (1344, 627, 336, 168, 84)  # of 4, 8, 16, 32, 64 pixels, at 128x128
 STATISTICS_CHANNELS = (256, 512)
+FLAT = 0.1  # of the decoder's last weights: begins with smooth surfaces, as noise hides shading
 CAMERA = 3  # numbers that tell a view: the camera's position
 
 
@@ -145,6 +146,8 @@ class Decoder(nn.Module):
             ConditionalNorm(b, spec.condition if i % 2 == 0 else 0) for i, b in enumerate(widths)
         )
         self.last = nn.ConvTranspose2d(widths[-1], outputs, 4, 2, 1)
+        with torch.no_grad():
+            self.last.weight.mul_(FLAT)
         self.activation = nn.LeakyReLU(SLOPE)
 
     def forward(self, code: Tensor, condition: Tensor) -> Tensor:
