@@ -1,4 +1,4 @@
-"""Shared fixtures: tiny rooms files, damaged copies, and the commands as a user sees them."""
+"""Shared fixtures: tiny files, damaged copies, folders of meshes, and the commands as users see."""
 
 import re
 import shutil
@@ -56,6 +56,44 @@ def damaged(rooms_path: Path, tmp_path: Path) -> Callable[[Edit], Path]:
         return path
 
     return damage
+
+
+@pytest.fixture(scope="session")
+def truths(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Return the truths that submissions predict, `submissions.Truths`; no test changes them."""
+    from submissions import make_truths
+
+    return make_truths(tmp_path_factory.mktemp("truths"))
+
+
+@pytest.fixture
+def meshes(tmp_path: Path) -> Path:
+    """Return a folder of three mugs, one of them broken, and two bowls."""
+    import trimesh
+
+    root = tmp_path / "meshes"
+    for name in ("mug", "bowl"):
+        (root / name).mkdir(parents=True)
+    trimesh.creation.box((1, 2, 1)).export(root / "mug" / "tall.obj")
+    trimesh.creation.cylinder(1, 2).export(root / "mug" / "round.stl")
+    (root / "mug" / "broken.obj").write_text("v 1 2 3\nv 4 5 6\n")
+    trimesh.creation.icosphere(1).export(root / "bowl" / "ball.ply")
+    trimesh.creation.cone(1, 1).export(root / "bowl" / "cone.off")
+    return root
+
+
+@pytest.fixture
+def shapenet(tmp_path: Path) -> Path:
+    """Return a folder laid out as ShapeNetCore version 2, with mugs and bowls."""
+    import trimesh
+
+    root = tmp_path / "shapenet"
+    for synset in ("03797390", "02880940"):
+        for i in range(3):
+            path = root / synset / f"model{i}" / "models" / "model_normalized.obj"
+            path.parent.mkdir(parents=True)
+            trimesh.creation.box((1, 1 + i, 1)).export(path)
+    return root
 
 
 @pytest.fixture

@@ -2,20 +2,18 @@
 
 import json
 import os
-import runpy
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
+from broken import CASES
 from click.testing import CliRunner
 
 import cli
 
 ROOT = Path(__file__).parents[1]
-CORPUS = runpy.run_path(str(ROOT / "tests/metrics/broken.py"), run_name="broken_corpus")
-CASES = CORPUS["CASES"]
 
 
 def bench(*arguments):
@@ -23,11 +21,6 @@ def bench(*arguments):
     if result.exception is not None and not isinstance(result.exception, SystemExit):
         raise AssertionError(f"a traceback: {result.exception!r}") from result.exception
     return result
-
-
-@pytest.fixture(scope="module")
-def truths(tmp_path_factory):
-    return CORPUS["make_truths"](tmp_path_factory.mktemp("bench"))
 
 
 @pytest.fixture
@@ -43,8 +36,8 @@ def test_the_corpus_is_large():
 
 @pytest.mark.parametrize("case", CASES, ids=str)
 def test_a_broken_submission_is_one_clear_line(case, truths, folder, check_refusal):
-    path = case.build(folder, truths.of(case))
-    options = [] if case.names_truth else ["--truth", truths.of(case)]
+    path = case.build(folder, truths.of(case.task))
+    options = [] if case.names_truth else ["--truth", truths.of(case.task)]
     result = bench("score", path, *options, "--json", "x.json")
     if case.stage == "hint":
         assert result.exit_code == 0, result.output

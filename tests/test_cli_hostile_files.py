@@ -8,6 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from h5_edits import attribute, damaged_chunk, gone, grouped, replaced
 
 READERS = {
     "info": (),
@@ -53,40 +54,6 @@ def test_truncated(refuses, tmp_path, command, rooms_path, part):
     ask(refuses, command, tmp_path / "x.h5", "HDF5")
 
 
-def without(name):
-    def edit(file):
-        del file[name]
-
-    return edit
-
-
-def replaced(name, make):
-    """Put something else where a dataset was."""
-
-    def edit(file):
-        values = file[name][:]
-        del file[name]
-        file[name] = make(values)
-
-    return edit
-
-
-def grouped(name):
-    def edit(file):
-        del file[name]
-        file.create_group(name)
-
-    return edit
-
-
-def attribute(name, value):
-    return lambda file: file.attrs.update({name: value})
-
-
-def attribute_gone(name):
-    return lambda file: file.attrs.pop(name)
-
-
 def emptied(file):
     """No rows at all, consistently."""
     names = []
@@ -104,11 +71,11 @@ FOREIGN = {
     "format is a number": (attribute("format", 7), "7", "pix2shape-bench/rooms"),
     "format is an array": (attribute("format", np.arange(3)), "pix2shape-bench/rooms"),
     "newer": (attribute("format_version", "3.0"), "version 3.0", "reads 2.x"),
-    "no version": (attribute_gone("format_version"), "version"),
+    "no version": (gone("format_version"), "version"),
     "version is a number": (attribute("format_version", 10.5), "version 10.5"),
-    "no spec": (attribute_gone("spec"), "'spec' is missing"),
-    "no fingerprint": (attribute_gone("fingerprint"), "'fingerprint' is missing"),
-    "no writer": (attribute_gone("writer"), "'writer' is missing"),
+    "no spec": (gone("spec"), "'spec' is missing"),
+    "no fingerprint": (gone("fingerprint"), "'fingerprint' is missing"),
+    "no writer": (gone("writer"), "'writer' is missing"),
     "spec is garbage": (attribute("spec", "garbage"), "spec"),
     "spec is bytes": (attribute("spec", np.void(b"\xff\xfe")), "spec"),
     "spec is a list": (attribute("spec", "[]"), "spec", "found list"),
@@ -123,12 +90,12 @@ FOREIGN = {
     "spec with a scalar": (attribute("spec", '{"objects":3}'), "spec"),
     "spec of another size": (attribute("spec", "{}"), "image", "(8, 32, 32, 3)", "128"),
     "count": (attribute("count", 99), "8 rows", "99"),
-    "no count": (attribute_gone("count"), "count"),
+    "no count": (gone("count"), "count"),
     "no rows": (emptied, "0"),
-    "no image": (without("image"), "'image' is missing"),
-    "no depth": (without("depth"), "'depth' is missing"),
-    "no lights": (without("light"), "'light/count' is missing"),
-    "no scene": (without("scene"), "'scene' is missing"),
+    "no image": (gone("image"), "'image' is missing"),
+    "no depth": (gone("depth"), "'depth' is missing"),
+    "no lights": (gone("light"), "'light/count' is missing"),
+    "no scene": (gone("scene"), "'scene' is missing"),
     "depth is a group": (grouped("depth"), "depth"),
     "image is a group": (grouped("image"), "image"),
     "image is one number": (replaced("image", lambda v: 3), "image"),
@@ -157,12 +124,7 @@ def test_plain_hdf5_of_someone_else(refuses, tmp_path):
 @pytest.mark.parametrize("name", ["image", "depth", "normal", "object_id"])
 @pytest.mark.parametrize("command", ["info", "preview", "export"])
 def test_a_damaged_chunk(refuses, damaged, command, name):
-    def edit(file):
-        at = (0, *(0,) * (file[name].ndim - 1))
-        _, data = file[name].id.read_direct_chunk(at)
-        file[name].id.write_direct_chunk(at, data[:20] + b"\x55" * (len(data) - 20))
-
-    ask(refuses, command, damaged(edit), name, "row 0")
+    ask(refuses, command, damaged(damaged_chunk(name, 0)), name, "row 0")
 
 
 @pytest.mark.parametrize("text", ["{", "null", b"\xff\xfe", '{"index":0}', "[" * 9000])

@@ -1,11 +1,18 @@
-"""Rooms for the metric tests: exact depth images without a renderer."""
+"""Rooms for the metric tests: exact depth images without a renderer, and what hints say of some."""
 
 from collections.abc import Callable
+from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import settings
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from metrics.hints import room_hints
+from metrics.prediction_file import open_predictions
+from scenegen.camera import pixel_directions
+from scenegen.scene_file import RoomsFile
 
 FOV_Y_DEGREES = 20.0
 Depth = NDArray[np.float64]
@@ -73,3 +80,51 @@ def make_room_depth(seed: int, size: int) -> Depth:
 def room_depth() -> Callable[[int, int], Depth]:
     """Depth of a room, by seed and image size."""
     return make_room_depth
+
+
+@pytest.fixture(scope="session")
+def hint_truth(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """16 rooms, higher than wide, with more pixels than hints look at."""
+    path = tmp_path_factory.mktemp("hints") / "rooms.h5"
+    return make_rooms(path, 16, height=80, width=68, seed=11, min_visible_pixels=20)
+
+
+@pytest.fixture(scope="session")
+def room_arrays(hint_truth: Path) -> tuple[Depth, ...]:
+    """Depth (N, H, W), normals (N, H, W, 3), rotations (N, 3, 3), lengths of rays (H, W)."""
+    with h5py.File(hint_truth) as file:
+        depth, normal = file["depth"][()].astype("f8"), file["normal"][()].astype("f8")
+        rotation = file["camera/world_from_camera"][:, :3, :3]
+        fov = file["camera/fov_y_degrees"][0]
+    made = depth, normal, rotation, np.linalg.norm(pixel_directions(80, 68, fov), axis=-1)
+    for array in made:
+        array.flags.writeable = False
+    return made
+
+
+@pytest.fixture
+def hints(hint_truth: Path, tmp_path: Path) -> Callable[..., list[str]]:
+    """What hints say to predictions, written without any check."""
+
+    def told(
+        depth: Depth,
+        normal: Depth | None = None,
+        rows: ArrayLike | None = None,
+        alignment: str = "none",
+        truth: Path = hint_truth,
+    ) -> list[str]:
+        path = tmp_path / "predictions.h5"
+        with RoomsFile(truth) as rooms:
+            with h5py.File(path, "w") as file:
+                file.attrs.update(
+                    format="pix2shape-bench/predictions", format_version="1.0", task="rooms",
+                    method="m", truth_fingerprint=rooms.fingerprint, alignment=alignment,
+                )  # fmt: skip
+                file["row"] = np.arange(len(depth)) if rows is None else rows
+                file["depth"] = depth
+                if normal is not None:
+                    file["normal"] = normal
+            with open_predictions(path) as found:
+                return [f"{one.dataset}: {one.got}" for one in room_hints(found, rooms)]
+
+    return told

@@ -1,7 +1,6 @@
-"""Submissions as a stranger writes them with plain h5py or JSON, and where their truth is found."""
+"""Submissions as a stranger writes them with plain h5py."""
 
 import hashlib
-import json
 import subprocess
 import sys
 from pathlib import Path
@@ -9,24 +8,18 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from broken import as_json, damaged_chunk, edited, good_answers, good_rooms, make_truths, put
+from h5_edits import damaged_chunk, put
+from submissions import edited, good_answers, good_rooms
 
 from metrics.matching import match_problems, size_problems
 from metrics.prediction_file import (
-    QuestionPredictions,
     RoomPredictions,
-    find_truth,
     open_predictions,
 )
 from scenegen.errors import FileFormatError
 from scenegen.scene_file import RoomsFile
 
 ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture(scope="module")
-def truths(tmp_path_factory):
-    return make_truths(tmp_path_factory.mktemp("truths"))
 
 
 @pytest.fixture
@@ -109,7 +102,7 @@ def test_texts_of_any_kind(by_hand):
 
 
 def test_opening_reads_no_pixels(truths, tmp_path):
-    path = edited(damaged_chunk("depth"))(tmp_path, truths.rooms)
+    path = edited(damaged_chunk("depth", 3))(tmp_path, truths.rooms)
     with open_predictions(path) as found:
         assert np.isfinite(found.depth(2)).all()
         with pytest.raises(FileFormatError, match="depth, row 3: cannot be read") as error:
@@ -162,154 +155,6 @@ def test_the_first_of_many_problems_is_told(truths, tmp_path):
     )
     with pytest.raises(FileFormatError, match=r"method.* \(and 1 more problems\)$"):
         open_predictions(path)
-
-
-# ---- answers ----
-
-
-def test_answers_and_scores(truths, tmp_path):
-    with open_predictions(good_answers(tmp_path, truths.iqtt)) as found:
-        assert isinstance(found, QuestionPredictions)
-        assert found.task == "iqtt"
-        assert found.rows.tolist() == list(range(6))
-        assert found.answers.dtype == np.int64
-        assert found.answers.tolist() == [0, 1, 2, 2, 1, 0]
-        assert found.scores.dtype == np.float64
-        assert found.scores.argmax(axis=1).tolist() == found.answers.tolist()
-
-
-def test_answers_from_scores_abstain_where_tied(truths, tmp_path):
-    def edit(file):
-        del file["answer"]
-        file["scores"][1] = [2.0, 5.0, 5.0]
-        file["scores"][2] = [0.0, 0.0, 0.0]
-
-    with open_predictions(edited(edit, good_answers)(tmp_path, truths.iqtt)) as found:
-        assert found.answers.tolist() == [0, -1, -1, 2, 1, 0]
-
-
-def test_answers_alone(truths, tmp_path):
-    def edit(file):
-        del file["scores"]
-        file["answer"][0] = -1
-        file["question"][...] = [5, 4, 3, 2, 1, 0]
-
-    with open_predictions(edited(edit, good_answers)(tmp_path, truths.iqtt)) as found:
-        assert found.answers.tolist() == [-1, 1, 2, 2, 1, 0]
-        assert found.rows.tolist() == [5, 4, 3, 2, 1, 0]
-        assert found.scores is None
-
-
-@pytest.mark.parametrize("count", [3, 65_536, 70_001])
-def test_scores_are_read_in_blocks(count, tmp_path):
-    rng = np.random.default_rng(count)
-    scores = rng.random((count, 3))
-    path = tmp_path / "many.h5"
-    with h5py.File(path, "w") as file:
-        file.attrs.update(
-            format="pix2shape-bench/predictions", format_version="1.0", task="iqtt",
-            method="m", truth_fingerprint="",
-        )  # fmt: skip
-        file["question"], file["scores"] = np.arange(count), scores
-    with open_predictions(path) as found:
-        assert np.array_equal(found.answers, scores.argmax(axis=1))
-        assert found.truth_fingerprint is None
-    with h5py.File(path, "r+") as file:
-        file["scores"][count - 1, 1] = np.nan
-    with pytest.raises(FileFormatError, match=rf"scores: NaN.*ids {count - 1}\)"):
-        open_predictions(path)
-
-
-@pytest.mark.parametrize(
-    ("content", "rows", "answers", "method", "run"),
-    [
-        ([0, 1, 2, -1], [0, 1, 2, 3], [0, 1, 2, -1], "answers", ""),
-        ({"3": 1, "0": -1}, [3, 0], [1, -1], "answers", ""),
-        ({"answers": [2, 2]}, [0, 1], [2, 2], "answers", ""),
-        ({"answers": {"1": 0}, "method": "大", "run": "4"}, [1], [0], "大", "4"),
-        ({"method": "m", "notes": "x", "answers": [0]}, [0], [0], "m", ""),
-    ],
-)
-def test_json(tmp_path, content, rows, answers, method, run):
-    path = as_json(content)(tmp_path, None)
-    with open_predictions(path) as found:
-        assert isinstance(found, QuestionPredictions)
-        assert (found.rows.tolist(), found.answers.tolist()) == (rows, answers)
-        assert (found.method, found.run) == (method, run)
-        assert found.truth_fingerprint is None
-        assert found.scores is None
-        assert found.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-@pytest.mark.parametrize("start", ["", "\ufeff", " \n\t"])
-@pytest.mark.parametrize("name", ["answers.json", "answers", "answers.h5"])
-def test_json_under_any_name(tmp_path, name, start):
-    path = tmp_path / name
-    path.write_text(start + json.dumps([0, 1]), encoding="utf-8")
-    with open_predictions(path) as found:
-        assert found.answers.tolist() == [0, 1]
-
-
-def test_hdf5_under_the_name_of_json(truths, tmp_path):
-    path = good_answers(tmp_path, truths.iqtt).rename(tmp_path / "answers.json")
-    with open_predictions(path) as found:
-        assert found.method == "guess"
-
-
-# ---- the truth ----
-
-
-def test_truth_beside_the_submission_comes_first(truths, tmp_path, monkeypatch):
-    (tmp_path / "here").mkdir()
-    monkeypatch.chdir(tmp_path)
-    path = good_rooms(tmp_path / "here", truths.rooms)
-    with h5py.File(path, "r+") as file:
-        file.attrs["truth_path"] = "data/rooms.h5"
-    with open_predictions("here/predictions.h5") as found:
-        places = [Path("here/data/rooms.h5"), Path("data/rooms.h5")]
-        for place in (*places[::-1], None):
-            if place is not None:
-                place.parent.mkdir()
-                place.touch()
-                assert find_truth(found) == place
-        for place in places:
-            place.unlink()
-        with pytest.raises(FileFormatError) as error:
-            find_truth(found)
-        assert all(str(place) in str(error.value) for place in places)
-        assert "--truth" in str(error.value)
-
-
-def test_truth_as_given(truths, tmp_path):
-    with open_predictions(good_rooms(tmp_path, truths.rooms)) as found:
-        assert find_truth(found) == truths.rooms
-        assert find_truth(found, truths.iqtt) == truths.iqtt
-        with pytest.raises(FileFormatError, match=r"truth not found: looked for .*none\.h5$"):
-            find_truth(found, tmp_path / "none.h5")
-        with pytest.raises(FileFormatError, match="truth not found"):
-            find_truth(found, tmp_path)
-
-
-def test_answers_beside_the_test_file_are_the_truth(truths, tmp_path):
-    with open_predictions(good_answers(tmp_path, truths.iqtt)) as found:
-        expected = truths.iqtt.with_name("iqtt-test-answers.h5")
-        assert find_truth(found) == expected
-        assert find_truth(found, truths.iqtt) == expected
-        assert find_truth(found, expected) == expected
-        val = truths.iqtt.with_name("iqtt-val.h5")
-        assert find_truth(found, val) == val
-
-
-@pytest.mark.parametrize("path", ["x" * 5000, "~/rooms.h5", ".", "/"])
-def test_a_strange_path_is_not_found(truths, tmp_path, path):
-    def edit(file):
-        file.attrs["truth_path"] = path
-
-    with (
-        open_predictions(edited(edit)(tmp_path, truths.rooms)) as found,
-        pytest.raises(FileFormatError, match="truth not found"),
-    ):
-        find_truth(found)
 
 
 def test_reading_loads_little(truths, tmp_path):

@@ -1,6 +1,5 @@
-"""The writer: what it writes, and that it writes nothing invalid."""
+"""The writer of rooms: what it writes, and that it writes nothing invalid."""
 
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,28 +7,15 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from broken import make_truths
 
-from iqtt.question_file import AnswersFile
 from metrics.prediction_file import open_predictions
-from metrics.prediction_layout import ATTRIBUTES, DATASETS
-from metrics.prediction_writer import (
-    PredictionError,
-    RoomPredictionWriter,
-    describe_format,
-    write_answers,
-)
+from metrics.prediction_writer import PredictionError, RoomPredictionWriter
 from metrics.validation import validate
 from scenegen.errors import FileFormatError, SceneGenError
 from scenegen.scene_file import RoomsFile
 
 SIZE = (32, 32)
 ROOT = Path(__file__).parents[2]
-
-
-@pytest.fixture(scope="module")
-def truths(tmp_path_factory):
-    return make_truths(tmp_path_factory.mktemp("truths"))
 
 
 @pytest.fixture
@@ -298,106 +284,6 @@ def test_memory_stays_flat(writer):
         kept = tracemalloc.get_traced_memory()[0] - before
         tracemalloc.stop()
     assert kept < 7 * 32 * 32 * 4
-
-
-# ---- answers ----
-
-
-@pytest.mark.parametrize("name", ["iqtt-test.h5", "iqtt-test-answers.h5", "iqtt-val.h5"])
-def test_answers(truths, tmp_path, name):
-    file = truths.iqtt.with_name(name)
-    scores = noise(3, 6, 3)
-    answer = scores.argmax(axis=1).tolist()
-    path = tmp_path / "answers.h5"
-    write_answers(path, file, method="m", run="1", notes="n", answer=answer, scores=scores)
-    assert validate(path) == []
-    with open_predictions(path) as found, AnswersFile(truths.iqtt.with_name(
-        "iqtt-val.h5" if "val" in name else "iqtt-test-answers.h5"
-    )) as truth:  # fmt: skip
-        assert found.rows.tolist() == list(range(6))
-        assert found.answers.tolist() == answer
-        assert np.array_equal(found.scores, scores)
-        assert (found.method, found.run, found.notes) == ("m", "1", "n")
-        assert found.truth_path == str(file)
-        assert found.truth_fingerprint == truth.fingerprint
-    with h5py.File(path) as stored:
-        assert set(stored) == {"question", "answer", "scores"}
-        assert all(stored[n].attrs["meaning"] and stored[n].attrs["unit"] for n in stored)
-
-
-def test_answers_to_a_file_as_released(truths, tmp_path):
-    """It has no fingerprint, so that only the number of questions is held against it."""
-    file = tmp_path / "iqtt-val.h5"
-    with h5py.File(truths.iqtt.with_name("iqtt-val.h5")) as ours, h5py.File(file, "w") as released:
-        released["questions"], released["answers"] = ours["questions"][()], ours["answers"][()]
-    write_answers(tmp_path / "a.h5", file, method="m", answer=[0, 1, 2, -1, 0, 1])
-    with open_predictions(tmp_path / "a.h5") as found:
-        assert found.truth_fingerprint is None
-        assert found.answers.tolist() == [0, 1, 2, -1, 0, 1]
-    assert validate(tmp_path / "a.h5") == []
-
-
-EYE = np.eye(3)[[0, 1, 2, 0, 1, 2]]
-
-
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({}, ["neither answer nor scores"]),
-        ({"answer": [0, 1, 2]}, ["shape (3,)", "shape (6,)"]),
-        ({"answer": [0.0] * 6}, ["float64", "integers"]),
-        ({"answer": [True] * 6}, ["bool", "integers"]),
-        ({"answer": [0, 1, 2, 3, 0, 1]}, ["such as 3", "ids 3)"]),
-        ({"answer": [0, 1, 2, 0, -2, 1]}, ["such as -2", "ids 4)"]),
-        ({"answer": np.array([0, 1, 2, 0, 255, 1], "u1")}, ["such as 255"]),
-        ({"scores": np.zeros((6, 4))}, ["(6, 4)", "(6, 3)"]),
-        ({"scores": np.zeros((6, 3), int)}, ["int64", "floats"]),
-        ({"scores": EYE * [1, 1, np.nan]}, ["scores", "NaN", "ids 0, 1, 2"]),
-        ({"scores": EYE, "answer": [0, 1, 2, 0, 1, 1]}, ["other than scores say", "ids 5)"]),
-        ({"scores": 0 * EYE, "answer": [0] * 6}, ["other than scores say", "at 6 questions"]),
-    ],
-)
-def test_answers_refused(truths, tmp_path, given, words):
-    with pytest.raises(PredictionError) as error:
-        write_answers(tmp_path / "answers.h5", truths.iqtt, method="m", **given)
-    line = str(error.value)
-    assert [word for word in words if word not in line] == [], line
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_answers_to_a_training_file(truths, tmp_path):
-    with pytest.raises(SceneGenError, match="labeled or unlabeled"):
-        write_answers(tmp_path / "a.h5", truths.iqtt.with_name("iqtt-train.h5"), method="m",
-                      answer=[0])  # fmt: skip
-
-
-def test_answers_to_no_questions(tmp_path):
-    with h5py.File(tmp_path / "iqtt-val.h5", "w") as file:
-        file["questions"] = np.zeros((0, 4, 32, 32, 3), "u1")
-    with pytest.raises(PredictionError, match="found no questions"):
-        write_answers(tmp_path / "a.h5", tmp_path / "iqtt-val.h5", method="m", answer=[])
-
-
-def test_answers_keep_an_existing_file(truths, tmp_path):
-    (tmp_path / "a.h5").write_text("precious")
-    given = {"method": "m", "answer": [0] * 6}
-    with pytest.raises(FileExistsError):
-        write_answers(tmp_path / "a.h5", truths.iqtt, **given)
-    write_answers(tmp_path / "a.h5", truths.iqtt, overwrite=True, **given)
-    assert validate(tmp_path / "a.h5") == []
-
-
-def test_the_description_names_everything():
-    text = describe_format()
-    lines = text.splitlines()
-    for thing in (*ATTRIBUTES, *DATASETS):
-        assert any(re.match(rf"  {thing.name} ", line) for line in lines), thing.name
-        assert thing.meaning in text
-    for dataset in DATASETS:
-        assert dataset.shown_shape in text
-    assert "pix2shape-bench/predictions" in text
-    assert all("none, median_scale, scale, scale_shift" not in line or "alignment" in line
-               for line in lines)  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["submit.py", "submit_iqtt.py"])

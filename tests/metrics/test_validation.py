@@ -6,7 +6,9 @@ import tracemalloc
 import h5py
 import numpy as np
 import pytest
-from broken import CASES, damaged_chunk, edited, good_answers, good_rooms, make_truths, put
+from broken import CASES
+from h5_edits import damaged_chunk, put
+from submissions import edited, good_answers, good_rooms
 
 from metrics.matching import match_problems, size_problems
 from metrics.prediction_file import find_truth, open_predictions
@@ -17,11 +19,6 @@ from scenegen.scene_file import RoomsFile
 BYTES = 64 * 2**20
 SECONDS = 60.0  # what hangs takes longer; a busy machine does not
 NO_FILE = Problem("file", "present", "", "")
-
-
-@pytest.fixture(scope="module")
-def truths(tmp_path_factory):
-    return make_truths(tmp_path_factory.mktemp("truths"))
 
 
 def lines_of(problems):
@@ -40,8 +37,8 @@ def test_the_corpus_is_large_and_names_are_unique():
 
 @pytest.mark.parametrize("case", CASES, ids=str)
 def test_validate_tells(case, truths, tmp_path):
-    path = case.build(tmp_path, truths.of(case))
-    given = None if case.names_truth else truths.of(case)
+    path = case.build(tmp_path, truths.of(case.task))
+    given = None if case.names_truth else truths.of(case.task)
     before = time.perf_counter()
     tracemalloc.start()
     try:
@@ -65,8 +62,8 @@ def test_validate_tells(case, truths, tmp_path):
 @pytest.mark.parametrize("case", CASES, ids=str)
 def test_opening_and_matching_refuse(case, truths, tmp_path):
     """What needs no pixels is refused before any is read, by the first problem alone."""
-    path = case.build(tmp_path, truths.of(case))
-    given = None if case.names_truth else truths.of(case)
+    path = case.build(tmp_path, truths.of(case.task))
+    given = None if case.names_truth else truths.of(case.task)
     if case.stage == "open":
         with pytest.raises((SceneGenError, OSError)) as error:
             open_predictions(path)
@@ -168,7 +165,7 @@ def test_only_the_first_few_ids_are_told(truths, tmp_path):
 
 def test_a_damaged_row_does_not_hide_the_others(truths, tmp_path):
     def spoil(file):
-        damaged_chunk("depth")(file)
+        damaged_chunk("depth", 3)(file)
         file["depth"][6, 0, 0] = np.nan
 
     problems = validate(edited(spoil)(tmp_path, truths.rooms))

@@ -1,7 +1,8 @@
-"""What stands against the code under test: another ray caster, another proof of disjointness."""
+"""What stands against the code under test, another ray caster for one; and a folder of models."""
 
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -80,6 +81,22 @@ def scenes_of() -> Callable[..., list[Any]]:
         return found
 
     return scenes
+
+
+@pytest.fixture(scope="session")
+def model_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder of nine models in two classes; no test changes it."""
+    import trimesh
+
+    root = tmp_path_factory.mktemp("models")
+    for name in ("block", "round"):
+        (root / name).mkdir()
+    rng = np.random.default_rng(0)
+    for i in range(5):
+        trimesh.creation.box(rng.uniform(0.5, 1, 3)).export(root / "block" / f"{i}.obj")
+    for i in range(4):
+        trimesh.creation.torus(1, 0.2 + 0.1 * i).export(root / "round" / f"{i}.stl")
+    return root
 
 
 @pytest.fixture(scope="session")

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from known_meshes import SPHERE
 
 from scenegen.meshes.errors import BadMeshError
 from scenegen.meshes.read import parse_mesh
-
-SPHERE = trimesh.creation.icosphere(subdivisions=2, radius=3.0)
 
 
 def glb(document: dict[str, Any], binary: bytes = b"") -> bytes:

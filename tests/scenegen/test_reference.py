@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from other_engines import cast_whole_scene
 from scipy.ndimage import grey_dilation, grey_erosion
-from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from scenegen.camera import Camera, pixel_directions
 from scenegen.packing import pack
 from scenegen.reference import Cast, render_reference, sample_positions
 from scenegen.renderer import render
 from scenegen.scenes import SHAPE_NAMES, PlacedObject, SceneSpec
-from scenegen.shapes import scene_mesh, unit_shape
 from scenegen.specs import DatasetSpec
 from scenegen.truth import GroundTruth
 
@@ -32,28 +31,9 @@ def near_silhouettes(object_id: Array) -> Array:
     return np.stack(changes)
 
 
-def cast_whole_scene(scene: SceneSpec, height: int, width: int) -> tuple[Array, Array, Array]:
-    """Depth, object id and camera-frame face normal by one other ray caster on one mesh."""
-    camera = scene.cameras[0]
-    matrix = camera.world_from_camera
-    rays = pixel_directions(height, width, camera.fov_y_degrees).reshape(-1, 3) @ matrix[:3, :3].T
-    mesh = scene_mesh(scene)
-    points, hit, faces = RayMeshIntersector(mesh).intersects_location(
-        np.broadcast_to(matrix[:3, 3], rays.shape), rays, multiple_hits=False
-    )
-    depth, object_id = np.full(len(rays), np.nan), np.full(len(rays), -1)
-    normal = np.zeros_like(rays)
-    sizes = [6, *(len(unit_shape(item.shape).triangles) for item in scene.objects)]
-    depth[hit] = (matrix[:3, 3] - points) @ matrix[:3, 2]
-    object_id[hit] = np.repeat(np.arange(len(sizes)), sizes)[faces]
-    normal[hit] = mesh.face_normals[faces] @ matrix[:3, :3]
-    shape = (height, width)
-    return depth.reshape(shape), object_id.reshape(shape), normal.reshape(*shape, 3)
-
-
 def check_against_whole_scenes(spec: DatasetSpec, scenes: list[SceneSpec]) -> None:
     truth = render(pack(spec, scenes))
-    cast = [cast_whole_scene(scene, spec.height, spec.width) for scene in scenes]
+    cast = [cast_whole_scene(scene, spec) for scene in scenes]
     depth, object_id, normal = (np.stack(part) for part in zip(*cast, strict=True))
     off = ~(abs(truth.depth - depth) <= 1e-4)
     assert off.mean() <= 1e-3
@@ -112,7 +92,7 @@ def test_normals_face_the_viewer_inside_open_shapes_too(embree_cast: Cast) -> No
     truth = render(batch)
     rays = pixel_directions(256, 256, camera.fov_y_degrees)
     assert (truth.normal[0] * rays).sum(axis=-1).max() < 1e-6
-    faces = cast_whole_scene(scene, 256, 256)[2]
+    faces = cast_whole_scene(scene, spec)[2]
     inside = ((faces * rays).sum(axis=-1) > 0) & ~near_silhouettes(truth.object_id)[0]
     assert inside.sum() > 100
     expected = render_reference(batch, embree_cast).normal[0]

@@ -1,14 +1,10 @@
 """Which way an image is made, and that the slow way makes the same image."""
 
-import pickle
-import subprocess
-import sys
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from other_engines import render_elsewhere
 
 from scenegen import renderer
 from scenegen.packing import SceneBatch, pack
@@ -22,20 +18,6 @@ TINY = DatasetSpec(
     min_visible_pixels=0, shapes=("sphere", "cone", "teapot", "prism"),
 )  # fmt: skip
 
-SCALAR = """
-import pickle, sys
-from scenegen import renderer
-from scenegen.packing import pack
-from scenegen.truth import GroundTruth
-renderer.select_variant = lambda device: "scalar_rgb"
-spec, scenes = pickle.load(sys.stdin.buffer)
-truth = renderer.render(pack(spec, scenes))
-import mitsuba
-assert mitsuba.variant() == "scalar_rgb"
-assert "scenegen.wavefront" not in sys.modules
-pickle.dump(truth, sys.stdout.buffer)
-"""
-
 
 @pytest.fixture(scope="module")
 def scenes(scenes_of: Callable[..., list[SceneSpec]]) -> list[SceneSpec]:
@@ -44,16 +26,7 @@ def scenes(scenes_of: Callable[..., list[SceneSpec]]) -> list[SceneSpec]:
 
 def test_the_scalar_fallback_agrees_with_the_wavefront(scenes: list[SceneSpec]) -> None:
     """In a process of its own, where no vectorised variant is ever loaded."""
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", SCALAR],
-        input=pickle.dumps((TINY, scenes)),
-        capture_output=True,
-        check=False,
-        cwd=Path(renderer.__file__).parents[1],
-        timeout=120,
-    )
-    assert done.returncode == 0, done.stderr.decode()
-    slow: GroundTruth = pickle.loads(done.stdout)
+    slow = render_elsewhere(TINY, scenes, scalar=True)
     fast = render(pack(TINY, scenes))
     for name in vars(fast):
         ours, theirs = getattr(fast, name), getattr(slow, name)
@@ -95,17 +68,6 @@ def test_the_cpu_is_what_auto_means_here(scenes: list[SceneSpec]) -> None:
 
 
 def test_another_process_gives_the_same_bits(scenes: list[SceneSpec]) -> None:
-    code = SCALAR.replace('renderer.select_variant = lambda device: "scalar_rgb"\n', "")
-    code = code.replace('assert mitsuba.variant() == "scalar_rgb"\n', "")
-    code = code.replace('assert "scenegen.wavefront" not in sys.modules\n', "")
-    done: Any = subprocess.run(
-        [sys.executable, "-c", code],
-        input=pickle.dumps((TINY, scenes)),
-        capture_output=True,
-        check=True,
-        cwd=Path(renderer.__file__).parents[1],
-        timeout=120,
-    )
-    there, here = pickle.loads(done.stdout), render(pack(TINY, scenes))
+    there, here = render_elsewhere(TINY, scenes), render(pack(TINY, scenes))
     for name in vars(here):
         np.testing.assert_array_equal(getattr(there, name), getattr(here, name))

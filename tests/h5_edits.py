@@ -1,0 +1,91 @@
+"""Edits of HDF5 files: each makes a function that changes an open file, to spoil a good one."""
+
+
+def attribute(name, value):
+    return lambda file: file.attrs.update({name: value})
+
+
+def gone(*names):
+    def edit(file):
+        for name in names:
+            if name in file:
+                del file[name]
+            else:
+                del file.attrs[name]
+
+    return edit
+
+
+def replaced(name, make):
+    """Another dataset in place of one, made from its values."""
+
+    def edit(file):
+        values = file[name][()]
+        del file[name]
+        file[name] = make(values)
+
+    return edit
+
+
+def values(name, change):
+    """Other values in the same dataset."""
+
+    def edit(file):
+        file[name][...] = change(file[name][()].copy())
+
+    return edit
+
+
+def put(name, at, value):
+    """One other value."""
+
+    def change(array):
+        array[at] = value
+        return array
+
+    return values(name, change)
+
+
+def in_all(*edits):
+    def edit(file):
+        for one in edits:
+            one(file)
+
+    return edit
+
+
+def claims(name, shape, dtype="f4", **options):
+    """A dataset that says it is large, and holds nothing."""
+
+    def edit(file):
+        del file[name]
+        file.create_dataset(name, shape, dtype, **options)
+
+    return edit
+
+
+def grouped(name):
+    def edit(file):
+        del file[name]
+        file.create_group(name)
+
+    return edit
+
+
+def linked(name, link):
+    def edit(file):
+        del file[name]
+        file[name] = link
+
+    return edit
+
+
+def damaged_chunk(name, row):
+    """Bytes of a row's chunk, but for the first few, spoiled."""
+
+    def edit(file):
+        at = (row, *(0,) * (file[name].ndim - 1))
+        _, data = file[name].id.read_direct_chunk(at)
+        file[name].id.write_direct_chunk(at, data[:20] + b"\x55" * (len(data) - 20))
+
+    return edit
