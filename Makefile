@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 WORKERS ?= 2
 
-.PHONY: demo test test-all check bench clean
+.PHONY: demo demo-model test test-all check bench clean
 
 demo: $(VENV)/.runtime
 	mkdir -p demo
@@ -17,10 +17,24 @@ demo: $(VENV)/.runtime
 	$(BIN)/iqtt make-split --out demo/iqtt --overwrite
 	$(BIN)/iqtt audit demo/iqtt --json demo/audit.json --overwrite
 	$(BIN)/iqtt show demo/iqtt/iqtt-test.h5 --answers --out demo/questions.png
+	$(BIN)/scenegen render --n 64 --seed 1 --out demo/train.h5 --overwrite
+	$(BIN)/bench baseline constant --train demo/train.h5 --data demo/rooms.h5 --out demo/constant.h5 --overwrite
+	$(BIN)/bench baseline mean-depth --train demo/train.h5 --data demo/rooms.h5 --out demo/mean-depth.h5 --overwrite
 	$(BIN)/bench baseline empty-room --data demo/rooms.h5 --out demo/empty-room.h5 --overwrite
-	$(BIN)/bench score demo/empty-room.h5 --html demo/report.html --overwrite
+	for name in constant mean-depth; do $(BIN)/bench score demo/$$name.h5 --json demo/$$name.json --overwrite > /dev/null || exit 1; done
+	$(BIN)/bench score demo/empty-room.h5 --json demo/empty-room.json --html demo/report.html --overwrite
+	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/empty-room.json
 	@echo
 	@echo "Look at $(CURDIR)/demo: rooms.png, objects.png, questions.png, report.html"
+
+demo-model: demo $(VENV)/.model
+	$(BIN)/bench baseline pix2shape --data demo/rooms.h5 --out demo/pix2shape.h5 --overwrite
+	$(BIN)/bench score demo/pix2shape.h5 --json demo/pix2shape.json --html demo/pix2shape.html --overwrite
+	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/empty-room.json demo/pix2shape.json
+	$(BIN)/pix2shape rotate --data demo/rooms.h5 --out demo/rotation.gif
+	$(BIN)/pix2shape sample --out demo/samples.png
+	@echo
+	@echo "Look at $(CURDIR)/demo: pix2shape.html, rotation.gif, samples.png"
 
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -q -n $(WORKERS) -m "not slow"
@@ -39,6 +53,7 @@ bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.models
 	$(BIN)/python -m benchmarks.questions
 	$(BIN)/python -m benchmarks.nearest
+	$(BIN)/python -m benchmarks.surfels
 
 clean:
 	rm -rf $(VENV) demo build dist *.egg-info
@@ -51,10 +66,14 @@ $(VENV)/.runtime: $(BIN)/python pyproject.toml constraints.txt
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e .
 	touch $@
 
+$(VENV)/.model: $(BIN)/python pyproject.toml constraints.txt
+	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[model]'
+	touch $@ $(VENV)/.runtime
+
 $(VENV)/.test: $(BIN)/python pyproject.toml constraints.txt
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[test]'
-	touch $@ $(VENV)/.runtime
+	touch $@ $(VENV)/.runtime $(VENV)/.model
 
 $(VENV)/.dev: $(BIN)/python pyproject.toml constraints.txt
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[dev]'
-	touch $@ $(VENV)/.runtime $(VENV)/.test
+	touch $@ $(VENV)/.runtime $(VENV)/.model $(VENV)/.test

@@ -11,10 +11,16 @@ PAPER_NETWORKS = NetworkSpec()
 CONFIGS: dict[str, dict[str, Any]] = {
     "paper": {},
     "compact": {
-        "networks": NetworkSpec(size=64, width=0.25),
+        "networks": NetworkSpec(size=64, width=0.125),
         "batch": 16,
-        "iterations": 20_000,
+        "iterations": 24_000,
+        "learning_rate": 5e-4,
+        "betas": (0.9, 0.99),
+        "decay": True,
         "critic_steps": 1,
+        "adversarial": 0.0,
+        "code_reconstruction": 0.0,
+        "other_views": 3.0,
     },
 }
 
@@ -28,7 +34,7 @@ class ModelConfig:
         depth_middle, depth_reach: the decoder gives depths of depth_middle (1 +- depth_reach),
             scene units; known from the camera, not from depth maps.
         opacity: whether the decoder also tells which rays meet nothing.
-        iterations, batch: of training; Adam with `learning_rate` and `betas`.
+        iterations, batch: of training, in images; Adam with `learning_rate` and `betas`.
         decay: whether the learning rate falls to nothing over the second half.
         critic_steps: of the critic, for each of the others.
         adversarial, reconstruction, code_reconstruction, other_views, mutual_information,
@@ -38,8 +44,8 @@ class ModelConfig:
     """
 
     networks: NetworkSpec = PAPER_NETWORKS
-    depth_middle: float = 1.65
-    depth_reach: float = 0.55
+    depth_middle: float = 1.5
+    depth_reach: float = 0.4
     opacity: bool = False
     iterations: int = 60_000
     batch: int = 6
@@ -51,8 +57,8 @@ class ModelConfig:
     reconstruction: float = 1.0
     code_reconstruction: float = 1.0
     other_views: float = 0.0
-    mutual_information: float = 0.0
-    questions: float = 0.0
+    mutual_information: float = 1.0
+    questions: float = 1.0
     depth: float = 0.0
     seed: int = 0
 
@@ -74,6 +80,11 @@ class ModelConfig:
     def batches_per_iteration(self) -> int:
         """Batches that one iteration takes: one for each step of the critic, at least one."""
         return self.critic_steps if self.has_critic else 1
+
+    @property
+    def question_batch(self) -> int:
+        """Questions whose images fill a batch, four each."""
+        return -(-self.batch // 4)
 
     def to_json(self) -> str:
         """Return the configuration as one line of JSON with sorted keys."""

@@ -50,10 +50,9 @@ def gradient_penalty(
 
 
 def reconstruction_loss(values: Tensor, again: Tensor) -> Tensor:
-    """Return E ||a - b||_2 / sqrt(n): the paper's norm, per number so that sizes compare."""
-    difference = (values - again).flatten(1)
-    scale = math.sqrt(difference.shape[1])
-    return torch.sqrt((difference**2).sum(dim=1) + 1e-12).mean() / scale
+    """Return E ||a - b||_2, the norm over all numbers of an image or code: two (B, ...)."""
+    squared = ((values - again).flatten(1) ** 2).sum(dim=1)
+    return torch.sqrt(squared + 1e-12).mean()
 
 
 def mutual_information(

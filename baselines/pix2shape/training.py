@@ -182,7 +182,7 @@ def _loaded(
 
 def _batches(source: Source, fabric: Fabric, state: State, workers: int) -> Iterator[Batch]:
     config = state.model.config
-    size = config.batch // 4 if isinstance(source, QuestionImages) else config.batch
+    size = config.question_batch if isinstance(source, QuestionImages) else config.batch
     first = state.iteration * config.batches_per_iteration
     for items in _loaded(source, len(source), size, first, config.seed, fabric, workers):
         yield source.as_batch(items).to(fabric.device)
@@ -192,7 +192,7 @@ def _questions(
     source: QuestionImages, labels: int, fabric: Fabric, state: State
 ) -> Iterator[tuple[Batch, Tensor]]:
     config = state.model.config
-    size = config.batch // 4
+    size = config.question_batch
     for items in _loaded(source, labels, size, state.iteration, config.seed, fabric, 0):
         yield source.as_batch(items).to(fabric.device), items["answer"].to(fabric.device)
 

@@ -50,10 +50,9 @@ def test_penalty_is_taken_between_the_two_and_has_gradients() -> None:
     assert float(weight.grad) == pytest.approx(20 * (6 - 1) * 6, rel=1e-5)
 
 
-def test_reconstruction_is_a_norm_per_number() -> None:
-    assert float(reconstruction_loss(torch.zeros(2, 3, 4), torch.full((2, 3, 4), 0.5))) == (
-        pytest.approx(0.5)
-    )
+def test_reconstruction_is_the_norm_of_all_numbers_and_the_mean_of_images() -> None:
+    again = torch.stack([torch.full((3, 4), 0.5), torch.full((3, 4), 1.5)])
+    assert float(reconstruction_loss(torch.zeros(2, 3, 4), again)) == pytest.approx(math.sqrt(12))
     same = torch.rand(2, 8, requires_grad=True)
     reconstruction_loss(same, same.detach()).backward()
     assert torch.isfinite(same.grad).all(), "also where nothing differs"
