@@ -30,7 +30,7 @@ ROW = 8  # tiles side by side
 def sample_sheet(
     model: Pix2Shape, card: Card, count: int, seed: int, label: str | None = None
 ) -> Image.Image:
-    """Draw codes from the prior, seen by cameras and lights as of the training data.
+    """Draw codes from the model's prior, seen by cameras and lights as of the training data.
 
     Lines of images, depths and normals.
 
@@ -51,7 +51,7 @@ def sample_sheet(
     noise = torch.randn(
         count, model.config.networks.z, generator=torch.Generator().manual_seed(seed)
     )
-    tiles = drawn(model, noise, views)
+    tiles = drawn(model, model.prior(noise), views)
     lines = [line[i : i + ROW] for i in range(0, count, ROW) for line in tiles]
     return sheet(lines)
 

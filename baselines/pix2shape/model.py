@@ -41,8 +41,35 @@ class Views:
     background: Tensor | None = None
 
 
+class Prior(nn.Module):
+    """The distribution of codes, normal; standard normal until it is fitted."""
+
+    mean: Tensor
+    factor: Tensor
+
+    def __init__(self, z: int) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.zeros(z))
+        self.register_buffer("factor", torch.eye(z))
+
+    def forward(self, noise: Tensor) -> Tensor:
+        """Turn standard normal numbers into codes: (B, z) -> (B, z)."""
+        return self.mean + noise @ self.factor.T
+
+    def fit(self, codes: Tensor) -> None:
+        """Take mean and covariance of codes, (N, z).
+
+        Where no critic ties the codes to the prior, samples are drawn so (Ghosh et al. 2020, "From
+        Variational to Deterministic Autoencoders").
+        """
+        centred = (codes - codes.mean(dim=0)).double()
+        variance, axes = torch.linalg.eigh(centred.T @ centred / max(len(codes) - 1, 1))
+        self.mean.copy_(codes.mean(dim=0))
+        self.factor.copy_(axes * variance.clamp(min=0).sqrt())
+
+
 class Pix2Shape(nn.Module):
-    """Encoder, decoder, critic and statistics network of one configuration."""
+    """Encoder, decoder, critic, statistics network and prior of one configuration."""
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
@@ -52,6 +79,7 @@ class Pix2Shape(nn.Module):
         self.decoder = Decoder(spec, outputs=2 if config.opacity else 1)
         self.critic = Critic(spec)
         self.statistics = Statistics(spec)
+        self.prior = Prior(spec.z)
 
     def encode(self, image: Tensor, views: Views) -> Tensor:
         """Return the codes of images of linear radiance: (B, 3, S, S) -> (B, z)."""

@@ -57,16 +57,19 @@ def sheet(rows: Sequence[Tiles]) -> Image.Image:
     return picture
 
 
+@torch.no_grad()
 def training_sheet(model: Pix2Shape, batch: Batch, noise: Tensor, columns: int = 8) -> Image.Image:
-    """Return what training is watched by: inputs, their reconstructions, and samples of the prior.
+    """Return what training is watched by.
 
-    Lines: input; reconstruction, its depth, its normals; samples, their depths.
+    Lines: input; reconstruction, its depth, its normals; samples of the prior, their depths. Where
+    no critic ties codes to the prior, the last two lines show the inputs' codes as the next
+    input's camera sees them.
     """
     learning = model.training
     model.eval()
-    with torch.no_grad():
-        code = model.encode(batch.image, batch.views)
-    again, made = drawn(model, code, batch.views), drawn(model, noise, batch.views)
+    code = model.encode(batch.image, batch.views)
+    again = drawn(model, code, batch.views)
+    made = drawn(model, noise if model.config.adversarial else code.roll(1, 0), batch.views)
     model.train(learning)
     rows = [image_tiles(batch.image), *again, *made[:2]]
     return sheet([row[:columns] for row in rows])

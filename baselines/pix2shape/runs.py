@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from lightning_fabric import Fabric
+from torch.utils.data import DataLoader
 from torch.utils.tensorboard import SummaryWriter
 
 from baselines.pix2shape.config import ModelConfig
 from baselines.pix2shape.data import Batch, RoomImages, is_question_file
+from baselines.pix2shape.model import Pix2Shape
 from baselines.pix2shape.pictures import training_sheet
 from baselines.pix2shape.question_data import QuestionImages, for_questions
 from baselines.pix2shape.steps import draw
@@ -33,6 +36,7 @@ from scenegen.scene_file import RoomsFile
 
 WEIGHTS, PICTURE, LOGS = "weights.safetensors", "pictures.png", "logs"
 LOG_EVERY = 20  # iterations
+PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and so many at once
 
 
 @dataclass(frozen=True)
@@ -115,9 +119,21 @@ def train_run(
         if logs is not None:
             logs.close()
     if fabric.is_global_zero:
+        if not card.config.adversarial:
+            fit_prior(state.model, source)
         save_weights(folder / WEIGHTS, state.model, card)
     fabric.barrier()
     return folder / WEIGHTS
+
+
+@torch.no_grad()
+def fit_prior(model: Pix2Shape, source: Source) -> None:
+    """Give the prior the distribution of codes of the first images."""
+    device = next(model.parameters()).device
+    loader = DataLoader(source, batch_size=BATCH, sampler=range(min(len(source), PRIOR_ITEMS)))
+    model.eval()
+    batches = (source.as_batch(items).to(device) for items in loader)
+    model.prior.fit(torch.cat([model.encode(batch.image, batch.views) for batch in batches]))
 
 
 def _picture(folder: Path, logs: SummaryWriter, state: State, batch: Batch) -> None:

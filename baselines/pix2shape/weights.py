@@ -21,6 +21,8 @@ from scenegen.new_file import written_beside
 from scenegen.records import from_json
 
 FORMAT_VERSION = 1
+KEPT = ("encoder", "decoder", "prior")
+PARTS = (*KEPT, "critic", "statistics")
 LARGEST_JSON = 1_000_000  # bytes
 
 
@@ -51,7 +53,7 @@ class Card:
 def save_weights(
     path: str | Path, model: Pix2Shape, card: Card, dtype: torch.dtype = torch.float16
 ) -> None:
-    """Write what prediction needs, encoder and decoder, and the card beside; replaces both.
+    """Write what prediction and sampling need, and the card beside; replaces both.
 
     Args:
         path: ends in .safetensors; the card gets the same name with .json.
@@ -60,7 +62,7 @@ def save_weights(
     tensors = {
         name: value.to(dtype) if value.is_floating_point() else value
         for name, value in model.state_dict().items()
-        if name.split(".")[0] in ("encoder", "decoder")
+        if name.split(".")[0] in KEPT
     }
     save_tensors(path, tensors, {})
     save_card(path, card)
@@ -118,7 +120,7 @@ def load_model(path: str | Path) -> tuple[Pix2Shape, Card]:
     card = load_card(path)
     tensors, _ = load_tensors(path)
     model = Pix2Shape(card.config)
-    load_into(model, tensors, path, ("encoder", "decoder"))
+    load_into(model, tensors, path, KEPT)
     return model.eval(), card
 
 
@@ -126,7 +128,7 @@ def load_into(
     model: Pix2Shape,
     tensors: Mapping[str, Tensor],
     path: str | Path,
-    parts: tuple[str, ...] = ("encoder", "decoder", "critic", "statistics"),
+    parts: tuple[str, ...] = PARTS,
 ) -> None:
     """Set the model's parts to stored tensors. Raises FileFormatError unless all fit."""
     own: dict[str, Any] = model.state_dict()
