@@ -120,8 +120,7 @@ def refusal(code: int, out: str, err: str, words: tuple[str, ...] = ()) -> str:
     assert out == ""
     lines = [line for line in err.splitlines() if line.strip()]
     if lines[0].startswith("Usage: "):
-        assert lines[1].startswith("Try '")
-        lines = lines[2:]
+        lines = lines[[line[:5] for line in lines].index("Try '") + 1 :]  # long usage is wrapped
     assert len(lines) == 1, err
     assert lines[0].startswith("Error: ")
     assert [word for word in words if word not in lines[0]] == [], lines[0]

@@ -1,5 +1,6 @@
 """Who may import whom, and what a start-up must not load."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -8,7 +9,11 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-HEAVY = ("mitsuba", "drjit", "numpy", "h5py", "trimesh", "scipy", "PIL", "OpenEXR", "tqdm", "torch")
+HEAVY = (
+    "mitsuba", "drjit", "numpy", "h5py", "trimesh", "scipy", "PIL", "OpenEXR", "tqdm", "torch",
+    "lightning_fabric", "safetensors", "tensorboard",
+)  # fmt: skip
+PIX2SHAPE = ("train", "predict", "sample", "interpolate", "rotate")
 CHECK = f"""
 import sys
 {{code}}
@@ -34,7 +39,7 @@ def heavy_after(code, cwd):
     return done.stdout.split()
 
 
-@pytest.mark.parametrize("package", ["scenegen", "iqtt", "metrics", "cli"])
+@pytest.mark.parametrize("package", ["scenegen", "iqtt", "metrics", "baselines.pix2shape", "cli"])
 def test_importing_a_package_loads_nothing_heavy(package, tmp_path):
     assert heavy_after(f"import {package}", tmp_path) == []
 
@@ -49,6 +54,11 @@ def test_importing_a_package_loads_nothing_heavy(package, tmp_path):
         ("scenegen", ["render", "--n", "x"]),
         ("iqtt", ["--help"]),
         ("bench", ["--help"]),
+        ("bench", ["baseline", "--help"]),
+        ("pix2shape", ["--help"]),
+        ("pix2shape", ["--version"]),
+        *(("pix2shape", [name, "--help"]) for name in PIX2SHAPE),
+        ("pix2shape", ["train", "--data", "x", "--out", "x", "--set", "batch"]),
     ],
 )
 def test_help_loads_nothing_heavy(group, arguments, tmp_path):
@@ -60,6 +70,13 @@ def test_reading_a_file_loads_no_renderer(rooms_path, tmp_path):
     assert heavy_after(code, tmp_path) == ["h5py", "numpy"]
     code = f"import scenegen; scenegen.RoomsDataset({str(rooms_path)!r})[0]"
     assert heavy_after(code, tmp_path) == ["h5py", "numpy"]
+
+
+def test_trivial_baselines_load_no_torch(rooms_path, tmp_path):
+    baseline = ["baseline", "empty-room", "--data", str(rooms_path)]
+    loaded = heavy_after(QUIETLY.format(group="bench", arguments=baseline), tmp_path)
+    assert (tmp_path / "predictions.h5").exists()
+    assert set(loaded) <= {"h5py", "numpy", "scipy", "tqdm"}
 
 
 def test_this_check_can_fail(tmp_path):
@@ -91,15 +108,17 @@ def test_contracts_between_packages():
 
 
 def test_contracts_can_break(tmp_path):
-    """In a copy where a low module imports a high one, and where camera imports mitsuba."""
+    """In a copy where a low module imports a high one, and camera mitsuba and torch."""
     pytest.importorskip("importlinter")
-    for name in ("scenegen", "iqtt", "metrics"):
+    for name in ("scenegen", "iqtt", "metrics", "baselines"):
         shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("cli.py", "pyproject.toml"):
         (tmp_path / name).write_text((ROOT / name).read_text())
     with (tmp_path / "scenegen" / "camera.py").open("a") as file:
-        file.write("\nimport mitsuba\nfrom scenegen import dataset\n")
+        file.write("\nimport mitsuba, torch\nfrom scenegen import dataset\n")
     done = lint(tmp_path)
     assert done.returncode == 1
-    assert " 2 broken" in done.stdout
+    for title in ("Inside scenegen, from", "Only the renderer knows", "torch stays in the"):
+        assert re.search(rf"^{title}.* BROKEN$", done.stdout, re.MULTILINE), title
     assert "scenegen.camera -> mitsuba" in done.stdout
+    assert "Nothing imports the command line KEPT" in done.stdout

@@ -38,7 +38,6 @@ def open_weights(weights: str | Path) -> tuple[Pix2Shape, Card]:
     if text in names():
         return load_model(FOLDER / f"{text}.safetensors")
     if Path(text).suffix != ".safetensors":
-        raise SpecError(
-            f"weights: found {text!r}, expected a .safetensors file or one of {', '.join(names())}"
-        )
+        known = ", ".join(names()) or "the bundled ones, of which this installation has none"
+        raise SpecError(f"weights: found {text!r}, expected a .safetensors file or one of {known}")
     return load_model(text)

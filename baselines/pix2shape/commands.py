@@ -84,11 +84,13 @@ def train(
     from tqdm import tqdm
 
     from baselines.pix2shape.config import model_config
+    from baselines.pix2shape.predict import chosen_device
     from baselines.pix2shape.runs import Machine, train_run
 
     chosen = dict(settings) | ({} if seed is None else {"seed": seed})
     if resume and (config or chosen):
         raise click.UsageError("--resume goes on with the run's own --config, --set and --seed")
+    chosen_device(device)
     accelerator = "gpu" if device == "cuda" else device
     machine = Machine(
         accelerator,
@@ -123,21 +125,16 @@ def train(
 @WEIGHTS
 @DATA
 @click.option("--out", default="predictions.h5", show_default=True, help="Submission to write.")
-@click.option("--part", type=click.Choice(["labeled", "unlabeled"]), help="Of iqtt-train.h5.")
 @click.option("--run", default="", help="Name of this run among several of the method.")
 @DEVICE
 @OVERWRITE
-def predict(
-    weights: str, data: str, out: str, part: str | None, run: str, device: str, overwrite: bool
-) -> None:
+def predict(weights: str, data: str, out: str, run: str, device: str, overwrite: bool) -> None:
     """Predict every view of each room from its input view alone, or answer questions."""
     needs_torch()
     from baselines.pix2shape.predict import predict_file
 
     with show_progress("row") as bar:
-        predict_file(
-            weights, data, out, part=part, run=run, device=device, overwrite=overwrite, progress=bar
-        )
+        predict_file(weights, data, out, run=run, device=device, overwrite=overwrite, progress=bar)
     click.echo(f"{out}: {weights} on {data}; score it with `bench score {out}`")
 
 
@@ -172,11 +169,13 @@ def interpolate(weights: str, data: str, items: list[int], steps: int, out: str)
     from baselines.pix2shape.data import RoomImages
     from baselines.pix2shape.explore import interpolation_sheet
     from baselines.pix2shape.pictures import save_pictures
+    from scenegen.preview import pick_rows
 
     model, card = open_weights(weights)
     if len(items) != 2:
         raise click.UsageError(f"--items: found {len(items)} rows, expected two such as 0,1")
     rooms = RoomImages(data, card.config)
+    items = pick_rows(len(rooms), items)
     save_pictures([interpolation_sheet(model, rooms, items[0], items[1], steps)], out)
     click.echo(f"{out}: from row {items[0]} to row {items[1]} of {data}")
 
@@ -185,24 +184,24 @@ def interpolate(weights: str, data: str, items: list[int], steps: int, out: str)
 @WEIGHTS
 @DATA
 @click.option("--items", type=Items(), default="0-5", show_default=True, help="Rows to turn.")
-@click.option("--degrees", type=click.FloatRange(0, 90), default=80, show_default=True)
+@click.option("--degrees", type=click.IntRange(0, 90), default=80, show_default=True)
 @click.option("--frames", type=click.IntRange(2, 200), default=33, show_default=True)
 @click.option("--out", default="rotation.gif", show_default=True, help="GIF or WebP to write.")
-def rotate(
-    weights: str, data: str, items: list[int], degrees: float, frames: int, out: str
-) -> None:
+def rotate(weights: str, data: str, items: list[int], degrees: int, frames: int, out: str) -> None:
     """Turn the camera around scenes that were seen from one side."""
     needs_torch()
     from baselines.pix2shape.bundled import open_weights
     from baselines.pix2shape.data import RoomImages
     from baselines.pix2shape.explore import rotation_frames
     from baselines.pix2shape.pictures import save_pictures
+    from scenegen.preview import pick_rows
 
     model, card = open_weights(weights)
     rooms = RoomImages(data, card.config)
+    items = pick_rows(len(rooms), items)
     angles = [degrees * i / (frames - 1) for i in range(frames)]
-    save_pictures(rotation_frames(model, rooms, card, items, angles), out)
-    click.echo(f"{out}: {len(items)} scenes turned by {degrees:g} degrees")
+    save_pictures(rotation_frames(model, rooms, items, angles), out)
+    click.echo(f"{out}: {len(items)} scenes turned by {degrees} degrees")
 
 
 def needs_torch() -> None:

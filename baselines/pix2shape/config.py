@@ -1,11 +1,12 @@
 """What a model is and how it is trained, as frozen data; JSON both ways."""
 
+import json
 from dataclasses import dataclass
 from typing import Any
 
 from baselines.pix2shape.networks import NetworkSpec
 from scenegen.errors import SpecError
-from scenegen.records import check, from_json, normalise, to_json
+from scenegen.records import LARGEST, check, from_json, normalise, to_json
 
 PAPER_NETWORKS = NetworkSpec()
 CONFIGS: dict[str, dict[str, Any]] = {
@@ -23,6 +24,17 @@ CONFIGS: dict[str, dict[str, Any]] = {
         "other_views": 3.0,
     },
 }
+
+
+LOSSES = (
+    "adversarial",
+    "reconstruction",
+    "code_reconstruction",
+    "other_views",
+    "mutual_information",
+    "questions",
+    "depth",
+)
 
 
 @dataclass(frozen=True)
@@ -70,11 +82,22 @@ class ModelConfig:
         check(self.batch >= 2, "batch", self.batch, "2 or more")
         check(self.critic_steps >= 1, "critic steps", self.critic_steps, "1 or more")
         check(self.learning_rate > 0, "learning rate", self.learning_rate, "a positive number")
+        in_range = len(self.betas) == 2 and all(0 <= beta < 1 for beta in self.betas)
+        check(in_range, "betas", self.betas, "two numbers from 0 to below 1")
+        check(self.seed >= 0, "seed", self.seed, "0 or more")
+        for name in LOSSES:
+            weight = getattr(self, name)
+            check(0 <= weight < LARGEST, name.replace("_", " "), weight, "0 or a positive number")
 
     @property
     def has_critic(self) -> bool:
         """Whether anything is trained against encoder and decoder."""
-        return bool(self.adversarial or self.mutual_information)
+        return bool(self.adversarial or self.disentangles)
+
+    @property
+    def disentangles(self) -> bool:
+        """Whether mutual information is minimised: where a part of the code tells the view."""
+        return bool(self.mutual_information and self.networks.z_view)
 
     @property
     def batches_per_iteration(self) -> int:
@@ -97,7 +120,18 @@ class ModelConfig:
 
 
 def model_config(name: str, **settings: Any) -> ModelConfig:
-    """Return a named configuration with other settings on top. Raises SpecError."""
+    """Return a named configuration with other settings on top.
+
+    Args:
+        settings: values as JSON has them, by name; those of the networks as "networks.width".
+
+    Raises SpecError for names and values that are none.
+    """
     if name not in CONFIGS:
         raise SpecError(f"config: found {name!r}, expected one of {', '.join(CONFIGS)}")
-    return ModelConfig(**{**CONFIGS[name], **settings})
+    record = json.loads(ModelConfig(**CONFIGS[name]).to_json())
+    for setting, value in settings.items():
+        group, dot, rest = setting.rpartition(".")
+        place = record[group] if dot and isinstance(record.get(group), dict) else record
+        place[rest if place is not record else setting] = value
+    return ModelConfig.from_json(json.dumps(record, default=vars))

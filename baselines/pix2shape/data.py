@@ -78,7 +78,7 @@ class RoomImages(Dataset[dict[str, Any]]):
         spec = config.networks
         with RoomsFile(path) as rooms:
             check_reducible(path, rooms.spec.height, rooms.spec.width, spec.size)
-            self.fov_y_degrees = rooms.spec.fov_y_degrees
+            self.spec = rooms.spec
             self.world_from_camera = rooms.read("camera/world_from_camera", slice(None))
             self.light_position = rooms.read("light/position", slice(None))
             self.light_color = rooms.read("light/color", slice(None))
@@ -91,10 +91,12 @@ class RoomImages(Dataset[dict[str, Any]]):
             raise SpecError(
                 f"{path}: {len(self.classes)} classes, the networks were made for {spec.classes}"
             )
+        if spec.classes and self.spec.objects != (1, 1):
+            raise SpecError(f"{path}: expected one object in every room, whose class is told")
         wanted = ("image", "depth") if config.depth else ("image",)
         self._images = RoomsDataset(path, wanted)
         self.fingerprint = self._images.fingerprint
-        self._spec = spec
+        self._networks = spec
 
     @staticmethod
     def _uniform_reflectance(path: str | Path, rooms: RoomsFile) -> Array:
@@ -115,22 +117,22 @@ class RoomImages(Dataset[dict[str, Any]]):
     def __getitem__(self, row: int) -> dict[str, Any]:
         """Return one image and what its views need, as float32 arrays."""
         stored = self._images[row]
-        item = {"image": channels_first(decode_image(stored["image"]), self._spec.size)}
+        item = {"image": channels_first(decode_image(stored["image"]), self._networks.size)}
         item |= self.view(row)
         if "depth" in stored:
-            item["depth"] = reduced(stored["depth"], self._spec.size).astype(np.float32)
+            item["depth"] = reduced(stored["depth"], self._networks.size).astype(np.float32)
         return item
 
     def as_batch(self, items: dict[str, Tensor]) -> Batch:
         """Put collated items together."""
-        return as_batch(items, self.fov_y_degrees)
+        return as_batch(items, self.spec.fov_y_degrees)
 
-    def view(self, row: int) -> dict[str, Any]:
-        """Return what is known of a row's camera and lights, without its image."""
-        pose = self.world_from_camera[row]
-        condition = [pose[:3, 3]] if self._spec.camera else []
-        if self._spec.classes:
-            condition.append(np.eye(self._spec.classes)[self.label[row]])
+    def view(self, row: int, world_from_camera: Array | None = None) -> dict[str, Any]:
+        """Return what is known of a row without its image, or as another camera would see it."""
+        pose = self.world_from_camera[row] if world_from_camera is None else world_from_camera
+        condition = [pose[:3, 3]] if self._networks.camera else []
+        if self._networks.classes:
+            condition.append(np.eye(self._networks.classes)[self.label[row]])
         known = {
             "condition": np.concatenate([np.empty(0), *condition]),
             "light_position": (self.light_position[row] - pose[:3, 3]) @ pose[:3, :3],
@@ -149,9 +151,13 @@ def channels_first(radiance: Array, size: int) -> Array:
 
 def as_batch(items: dict[str, Tensor], fov_y_degrees: float) -> Batch:
     """Put the collated fields of items together."""
+    return Batch(items["image"], as_views(items, fov_y_degrees), items.get("depth"))
+
+
+def as_views(items: dict[str, Tensor], fov_y_degrees: float) -> Views:
+    """Put the collated fields of views together."""
     known = {f.name: items[f.name] for f in fields(Scene) if f.name in items}
-    views = Views(items["condition"], Scene(fov_y_degrees, **known), items.get("background"))
-    return Batch(items["image"], views, items.get("depth"))
+    return Views(items["condition"], Scene(fov_y_degrees, **known), items.get("background"))
 
 
 class Draws(Sampler[list[int]]):

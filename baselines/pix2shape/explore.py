@@ -12,7 +12,8 @@ from PIL import Image
 from torch import Tensor
 from torch.utils.data import default_collate
 
-from baselines.pix2shape.data import RoomImages
+from baselines.pix2shape.config import ModelConfig
+from baselines.pix2shape.data import RoomImages, as_views
 from baselines.pix2shape.model import Pix2Shape, Views, mapped
 from baselines.pix2shape.pictures import drawn, image_tiles, sheet
 from baselines.pix2shape.surfels import Scene
@@ -40,9 +41,9 @@ def sample_sheet(
     Raises SpecError for a label where there are none, or that is unknown; a model of questions.
     """
     spec = replace(rooms_spec(card), seed=seed)
-    known = ", ".join(card.classes) or "none: the model is not conditioned on classes"
+    known = f"one of {', '.join(card.classes)}" if card.classes else "none: it knows no classes"
     if label is not None and label not in card.classes:
-        raise SpecError(f"class: found {label!r}, expected one of {known}")
+        raise SpecError(f"class: found {label!r}, expected {known}")
     one_hot = np.zeros((count, len(card.classes)))
     for i in range(count if card.classes else 0):
         one_hot[i, i % len(card.classes) if label is None else card.classes.index(label)] = 1
@@ -63,6 +64,7 @@ def interpolation_sheet(
 
     The first and the last tile of the first line are the two images themselves.
     """
+    _check_camera(model.config)
     batch = rooms.as_batch(default_collate([rooms[first], rooms[last]]))
     with torch.no_grad():
         code = model.encode(batch.image, batch.views)
@@ -75,25 +77,25 @@ def interpolation_sheet(
 
 
 def rotation_frames(
-    model: Pix2Shape, rooms: RoomImages, card: Card, rows: Sequence[int], degrees: Sequence[float]
+    model: Pix2Shape, rooms: RoomImages, rows: Sequence[int], degrees: Sequence[float]
 ) -> list[Image.Image]:
     """Turn the camera about the vertical axis through its target, away from the images' views.
 
     The turn goes to the side that stays farther within the room's open octant. A frame for each
     angle: lines of input images, images, depths and normals.
-
-    Args:
-        card: for the cameras' target.
     """
-    spec = rooms_spec(card)
+    _check_camera(model.config)
     batch = rooms.as_batch(default_collate([rooms[row] for row in rows]))
     with torch.no_grad():
         code = model.encode(batch.image, batch.views)
     given, frames = image_tiles(batch.image), []
-    one_hot = batch.views.condition[:, 3:].numpy()
     for angle in degrees:
-        cameras = [turned(rooms.world_from_camera[row], spec, angle) for row in rows]
-        views = known_views(spec, cameras, [_lights(rooms, row) for row in rows], one_hot)
+        poses = [turned(rooms.world_from_camera[row], rooms.spec, angle) for row in rows]
+        known = [
+            rooms.view(row, camera.world_from_camera)
+            for row, camera in zip(rows, poses, strict=True)
+        ]
+        views = as_views(default_collate(known), rooms.spec.fov_y_degrees)
         frames.append(sheet([given, *drawn(model, code, views)]))
     return frames
 
@@ -138,14 +140,13 @@ def known_views(
 
 def rooms_spec(card: Card) -> DatasetSpec:
     """Return the request that the training rooms answer. Raises SpecError for other models."""
-    if not card.config.networks.camera:
-        raise SpecError("weights: a model of questions, expected one of rooms")
+    _check_camera(card.config)
     return DatasetSpec.from_json(card.data)
 
 
-def _lights(rooms: RoomImages, row: int) -> list[Light]:
-    pairs = zip(rooms.light_position[row], rooms.light_color[row], strict=True)
-    return [Light(tuple(place), tuple(color)) for place, color in pairs]
+def _check_camera(config: ModelConfig) -> None:
+    if not config.networks.camera:
+        raise SpecError("weights: a model of questions, expected one of rooms")
 
 
 def _tensor(values: Array) -> Tensor:

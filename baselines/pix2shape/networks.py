@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from scenegen.records import check, normalise
 
 SIZES = (32, 64, 128, 256)  # pixels a side
+MOST = 4096  # numbers of a code, and classes
 SLOPE = 0.2  # of the leaky ReLUs
 ENCODER_CHANNELS = (85, 170, 340, 680, 1360)  # of 64, 32, 16, 8, 4 pixels, at 128x128
 DECODER_CHANNELS = (1344, 627, 336, 168, 84)  # of 4, 8, 16, 32, 64 pixels, at 128x128
@@ -31,6 +32,8 @@ class NetworkSpec:
         z_scene, z_view: dimensions of the latent code; z_view is 0 where the camera is known.
         camera: whether the networks are conditioned on the camera's position.
         classes: number of class labels they are conditioned on; 0 for none.
+        standardised: whether codes have mean 0 and variance 1, by batch normalisation; for where no
+            critic sees to it.
     """
 
     size: int = 128
@@ -39,14 +42,15 @@ class NetworkSpec:
     z_view: int = 0
     camera: bool = True
     classes: int = 0
+    standardised: bool = False
 
     def __post_init__(self) -> None:
         normalise(self)
         check(self.size in SIZES, "size", self.size, f"one of {', '.join(map(str, SIZES))}")
         check(0.01 <= self.width <= 4, "width", self.width, "from 0.01 to 4")
-        check(self.z_scene >= 1, "z scene", self.z_scene, "1 or more")
-        check(self.z_view >= 0, "z view", self.z_view, "0 or more")
-        check(self.classes >= 0, "classes", self.classes, "0 or more")
+        check(1 <= self.z_scene <= MOST, "z scene", self.z_scene, f"1 to {MOST}")
+        check(0 <= self.z_view <= MOST, "z view", self.z_view, f"0 to {MOST}")
+        check(0 <= self.classes <= MOST, "classes", self.classes, f"0 to {MOST}")
 
     @property
     def z(self) -> int:
@@ -117,6 +121,7 @@ class Encoder(nn.Module):
         )
         self.norms = nn.ModuleList(ConditionalNorm(b, spec.condition) for b in widths[:-1])
         self.last = nn.Conv2d(widths[-1], spec.z, 4)
+        self.standard = nn.BatchNorm1d(spec.z, affine=False) if spec.standardised else nn.Identity()
         self.activation = nn.LeakyReLU(SLOPE)
 
     def forward(self, image: Tensor, condition: Tensor) -> Tensor:
@@ -127,7 +132,7 @@ class Encoder(nn.Module):
             if i < len(self.norms):
                 values = self.norms[i](values, condition)
             values = self.activation(values)
-        return self.last(values).flatten(1)
+        return self.standard(self.last(values).flatten(1))
 
 
 class Decoder(nn.Module):
@@ -155,7 +160,8 @@ class Decoder(nn.Module):
         values = torch.cat([code, condition], dim=1)[..., None, None]
         for layer, norm in zip(self.layers, self.norms, strict=True):
             values = self.activation(norm(layer(values), condition))
-        return self.last(values)
+        with torch.autocast(values.device.type, enabled=False):  # half a depth's bits are noise
+            return self.last(values.float() if values.dtype == torch.bfloat16 else values)
 
 
 class Critic(nn.Module):

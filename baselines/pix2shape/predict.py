@@ -14,8 +14,8 @@ from baselines.pix2shape.bundled import open_weights
 from baselines.pix2shape.data import channels_first, check_reducible, is_question_file
 from baselines.pix2shape.losses import squared_distances
 from baselines.pix2shape.model import Pix2Shape
-from baselines.pix2shape.surfels import normals_from_depth
-from iqtt.question_file import open_questions
+from baselines.pix2shape.surfels import extrapolated, normals_from_depth
+from iqtt.question_file import open_questions, parts
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from scenegen.errors import SpecError
 from scenegen.new_file import check_writable
@@ -34,7 +34,6 @@ def predict_file(
     out: str | Path,
     *,
     device: str = "auto",
-    part: str | None = None,
     run: str = "",
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
@@ -51,7 +50,7 @@ def predict_file(
     model.to(chosen_device(device))
     check_writable(Path(out), overwrite)
     if is_question_file(data):
-        answer_file(model, data, out, part=part, run=run, overwrite=overwrite, progress=progress)
+        answer_file(model, data, out, run=run, overwrite=overwrite, progress=progress)
     else:
         predict_rooms(model, data, out, run=run, overwrite=overwrite, progress=progress)
 
@@ -109,7 +108,6 @@ def answer_file(
     data: str | Path,
     out: str | Path,
     *,
-    part: str | None = None,
     run: str = "",
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
@@ -121,8 +119,12 @@ def answer_file(
     spec = model.config.networks
     if spec.condition:
         raise SpecError("weights: a model that must be told the camera, expected one for questions")
+    if len(parts(data)) > 1:
+        raise SpecError(
+            f"{data}: training questions, expected those to be answered, such as iqtt-test.h5"
+        )
     device = next(model.parameters()).device
-    with open_questions(data, part) as questions:
+    with open_questions(data) as questions:
         check_reducible(data, questions.height, questions.width, spec.size)
         scores = []
         for rows in _batches(len(questions), BATCH // 4):
@@ -147,11 +149,17 @@ def enlarged(depth: Tensor, fov_y_degrees: float, size: int) -> tuple[Tensor, Te
     Inverse depth is what is interpolated: planes stay planes.
     """
     normals = normals_from_depth(depth, fov_y_degrees)
-    if depth.shape[1] == size:
+    factor = size // depth.shape[1]
+    if factor == 1:
         return depth, normals
-    inverse = functional.interpolate(1 / depth[:, None], size=size, mode="bilinear")[:, 0]
-    normals = functional.interpolate(normals, size=size, mode="bilinear")
-    return 1 / inverse, functional.normalize(normals, dim=1)
+    # The outer pixels' centres lie within the image: continue to its border, and cut that off.
+    wide = functional.interpolate(
+        extrapolated(1 / depth)[:, None], scale_factor=factor, mode="bilinear"
+    )
+    inverse = wide[:, 0, factor:-factor, factor:-factor]
+    least = 0.5 / depth.amax(dim=(1, 2), keepdim=True)  # a surface may end beyond the last centre
+    normals = functional.interpolate(normals, scale_factor=factor, mode="bilinear")
+    return 1 / torch.maximum(inverse, least), functional.normalize(normals, dim=1)
 
 
 def _codes(

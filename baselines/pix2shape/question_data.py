@@ -26,6 +26,8 @@ class QuestionImages(Dataset[dict[str, Any]]):
     def __init__(self, path: str | Path, part: str | None, config: ModelConfig) -> None:
         """Check the file. Raises as `QuestionsFile`, and SpecError where lights are not told."""
         self._size = config.networks.size
+        if config.networks.condition:
+            raise SpecError("networks: told camera or class, expected neither, as for questions")
         with open_questions(path, part) as questions:
             check_reducible(path, questions.height, questions.width, self._size)
             if questions.spec is None or not questions.has_truth or not len(questions):
@@ -77,7 +79,8 @@ def for_questions(config: ModelConfig, path: str | Path, part: str | None) -> Mo
     """Return a configuration for the images of a question file.
 
     As the paper has it: no camera, the code's last ten dimensions for the view. The depths that the
-    decoder gives are those of the sphere that the camera frames.
+    decoder gives are those of the sphere that the camera frames. Where no critic ties codes to the
+    prior they are standardised, or L_theta would drive them apart without end.
     """
     with open_questions(path, part) as questions:
         if questions.spec is None:
@@ -87,8 +90,16 @@ def for_questions(config: ModelConfig, path: str | Path, part: str | None) -> Mo
     spec = config.networks
     return replace(
         config,
-        networks=replace(spec, camera=False, classes=0, z_scene=spec.z - Z_VIEW, z_view=Z_VIEW),
+        networks=replace(
+            spec,
+            camera=False,
+            classes=0,
+            z_scene=spec.z - Z_VIEW,
+            z_view=Z_VIEW,
+            standardised=spec.standardised or not config.adversarial,
+        ),
         depth_middle=distance,
         depth_reach=min(0.9, radius / distance),
         opacity=True,
+        other_views=0.0,
     )

@@ -17,16 +17,9 @@ from baselines.pix2shape.data import Batch, RoomImages, is_question_file
 from baselines.pix2shape.model import Pix2Shape
 from baselines.pix2shape.pictures import training_sheet
 from baselines.pix2shape.question_data import QuestionImages, for_questions
+from baselines.pix2shape.state import CHECKPOINT, State, load_state, new_state, save_state
 from baselines.pix2shape.steps import draw
-from baselines.pix2shape.training import (
-    CHECKPOINT,
-    Source,
-    State,
-    load_state,
-    new_state,
-    save_state,
-    train,
-)
+from baselines.pix2shape.training import Source, train
 from baselines.pix2shape.weights import Card, save_weights
 from iqtt.question_file import open_questions
 from scenegen.errors import SpecError
@@ -90,7 +83,6 @@ def train_run(
             )
         card = _new_card(config, data, labels, conditional)
         state = new_state(card.config)
-        folder.mkdir(parents=True, exist_ok=True)
     fabric = Fabric(
         accelerator=machine.accelerator,
         devices=machine.devices,
@@ -99,6 +91,7 @@ def train_run(
     )
     fabric.launch()
     source, labelled = _sources(data, card.config, labels)
+    folder.mkdir(parents=True, exist_ok=True)
     logs = SummaryWriter(str(folder / LOGS)) if fabric.is_global_zero else None
     try:
         for losses, batch in train(
@@ -157,6 +150,7 @@ def _new_card(config: ModelConfig, data: str | Path, labels: int, conditional: b
     if is_question_file(data):
         if conditional:
             raise SpecError(f"{data}: questions have no classes to condition on")
+        check(config.depth == 0, "depth", config.depth, "0 for questions, which have no depth maps")
         config = for_questions(config, data, "unlabeled")
         config = replace(config, questions=config.questions if labels else 0.0)
         with open_questions(data, "unlabeled") as questions:
@@ -164,7 +158,7 @@ def _new_card(config: ModelConfig, data: str | Path, labels: int, conditional: b
             spec, mark = questions.spec.to_json(), questions.fingerprint
         if labels:
             with open_questions(data, "labeled") as questions:
-                check(labels <= len(questions), "labels", labels, f"at most {len(questions)}")
+                check(0 < labels <= len(questions), "labels", labels, f"0 to {len(questions)}")
         return Card(config, data=spec, fingerprint=str(mark), labels=labels)
     check(labels == 0, "labels", labels, "0 for rooms, which ask no questions")
     classes: tuple[str, ...] = ()

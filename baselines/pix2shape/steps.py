@@ -70,7 +70,7 @@ def critic_step(model: Pix2Shape, batch: Batch, noise: Noise) -> tuple[Tensor, N
         penalty = gradient_penalty(critic, (batch.image, code), (made, noise.code), noise.share)
         numbers["distance"], numbers["penalty"] = -loss, penalty
         total = total + loss + penalty
-    if config.mutual_information:
+    if config.disentangles:
         total = total - mutual_information(model.statistics, *_halves(model, code), noise.order)
     return total, numbers
 
@@ -109,7 +109,7 @@ def generator_step(
         others = mapped(views, lambda values: values[noise.order])
         elsewhere = model.encode(model.image(code, others), others)
         losses["other_views"] = reconstruction_loss(code, elsewhere)
-    if config.mutual_information:
+    if config.disentangles:
         losses["mutual_information"] = mutual_information(
             model.statistics, *_halves(model, code), noise.order
         )

@@ -68,7 +68,7 @@ def normals_from_depth(depth: Tensor, fov_y_degrees: float) -> Tensor:
     """
     x, y = pixel_rays(depth.shape[1], depth.shape[2], fov_y_degrees, depth)
     pixel = x[0, 1] - x[0, 0]
-    inverse = _extrapolated(1 / depth)
+    inverse = extrapolated(1 / depth)
     rows = inverse[:, :-2] + inverse[:, 1:-1] + inverse[:, 2:]  # sums over three neighbours
     columns = inverse[:, :, :-2] + inverse[:, :, 1:-1] + inverse[:, :, 2:]
     slope_x = (rows[:, :, 2:] - rows[:, :, :-2]) / (6 * pixel)
@@ -79,7 +79,7 @@ def normals_from_depth(depth: Tensor, fov_y_degrees: float) -> Tensor:
     return functional.normalize(normals, dim=1)
 
 
-def _extrapolated(values: Tensor) -> Tensor:
+def extrapolated(values: Tensor) -> Tensor:
     """Add a border of one pixel, each continuing the line through the two next to it."""
     first, last = 2 * values[:, :1] - values[:, 1:2], 2 * values[:, -1:] - values[:, -2:-1]
     values = torch.cat([first, values, last], dim=1)

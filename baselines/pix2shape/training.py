@@ -7,110 +7,28 @@ it had never stopped: weights, optimisers and the number of the iteration are al
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import torch
 from lightning_fabric import Fabric
 from torch import Tensor, nn
 from torch.optim import Adam
-from torch.utils.data import DataLoader
+from torch.utils.data import DataLoader, Dataset, default_collate
 
 from baselines.pix2shape.config import ModelConfig
 from baselines.pix2shape.data import Batch, Draws, RoomImages
-from baselines.pix2shape.model import Pix2Shape
 from baselines.pix2shape.question_data import QuestionImages
+from baselines.pix2shape.state import State
 from baselines.pix2shape.steps import Noise, critic_step, draw, generator_step
-from baselines.pix2shape.weights import (
-    Card,
-    load_card,
-    load_into,
-    load_tensors,
-    save_card,
-    save_tensors,
-)
-from scenegen.errors import FileFormatError, SceneGenError
+from scenegen.errors import SceneGenError, SpecError
+from scenegen.records import check
 from scenegen.seeding import Purpose, item_seed
 
 Source = RoomImages | QuestionImages
-CHECKPOINT = "checkpoint.safetensors"
 
 
 class TrainingError(SceneGenError):
     """Training cannot go on."""
-
-
-@dataclass(eq=False)
-class State:
-    """All that training changes."""
-
-    model: Pix2Shape
-    generator: Adam
-    critic: Adam
-    iteration: int = 0
-    seconds: float = 0.0
-
-
-def new_state(config: ModelConfig) -> State:
-    """Return an untrained model and its optimisers; the weights are those of the seed."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(item_seed(config.seed, 0, Purpose.WEIGHTS))
-        model = Pix2Shape(config)
-    return _with_optimisers(model)
-
-
-def _with_optimisers(model: Pix2Shape) -> State:
-    config = model.config
-    groups = ((model.encoder, model.decoder), (model.critic, model.statistics))
-    first, second = (
-        Adam(_parameters(*group), lr=config.learning_rate, betas=config.betas) for group in groups
-    )
-    return State(model, first, second)
-
-
-def _parameters(*modules: nn.Module) -> list[nn.Parameter]:
-    return [parameter for module in modules for parameter in module.parameters()]
-
-
-def save_state(folder: Path, state: State, card: Card) -> None:
-    """Write the folder's checkpoint; the one before is there until this one is complete."""
-    tensors = {f"model.{name}": value for name, value in state.model.state_dict().items()}
-    for kind, optimiser in (("generator", state.generator), ("critic", state.critic)):
-        for index, values in optimiser.state_dict()["state"].items():
-            tensors |= {f"{kind}.{index}.{name}": value for name, value in values.items()}
-    notes = {"iteration": str(state.iteration), "seconds": f"{state.seconds:.3f}"}
-    save_card(folder / CHECKPOINT, card)
-    save_tensors(folder / CHECKPOINT, tensors, notes)
-
-
-def load_state(folder: Path) -> tuple[State, Card]:
-    """Read a folder's checkpoint. Raises OSError, FileFormatError."""
-    path = folder / CHECKPOINT
-    card = load_card(path)
-    tensors, notes = load_tensors(path)
-    model = Pix2Shape(card.config)
-    own = {k.removeprefix("model."): v for k, v in tensors.items() if k.startswith("model.")}
-    load_into(model, own, path)
-    state = _with_optimisers(model)
-    try:
-        for kind, optimiser in (("generator", state.generator), ("critic", state.critic)):
-            groups = optimiser.state_dict()["param_groups"]
-            optimiser.load_state_dict({"state": _moments(tensors, kind), "param_groups": groups})
-        state.iteration, state.seconds = int(notes["iteration"]), float(notes["seconds"])
-    except (KeyError, ValueError) as error:
-        raise FileFormatError(f"{path}: not a checkpoint of this release: {error!r}") from error
-    return state, card
-
-
-def _moments(tensors: dict[str, Tensor], kind: str) -> dict[int, dict[str, Tensor]]:
-    found: dict[int, dict[str, Tensor]] = {}
-    for name, value in tensors.items():
-        group, _, rest = name.partition(".")
-        if group == kind:
-            index, _, field = rest.partition(".")
-            found.setdefault(int(index), {})[field] = value
-    return found
 
 
 def train(
@@ -132,10 +50,17 @@ def train(
         labelled: questions whose first `labels` answers may be used.
         workers: processes that read.
 
-    Raises TrainingError where a loss or a gradient is not finite; the state is then the last good.
+    Raises:
+        TrainingError: a loss or a gradient is not finite. The weights are those of before the step,
+            but not the batch statistics: go on from a checkpoint.
+        SpecError: no loss is switched on, there are not so many labels, or more processes than
+            images in a batch.
     """
     config, model = state.model.config, state.model
+    _check_request(config, labelled, labels, fabric.world_size)
     fabric.to_device(model)
+    for optimiser in (state.generator, state.critic):  # moves the moments to the weights' device
+        optimiser.load_state_dict(optimiser.state_dict())
     batches = _batches(source, fabric, state, workers)
     asked: Iterator[tuple[Batch, Tensor]] = iter(())
     if labelled is not None and labels:
@@ -154,10 +79,50 @@ def train(
                 _update(fabric, state, state.critic, loss, numbers, losses)
         with fabric.autocast(), _frozen(model.critic, model.statistics):
             loss, numbers = generator_step(model, batch, noise, next(asked, None))
-            _update(fabric, state, state.generator, loss, numbers, losses)
+        _update(fabric, state, state.generator, loss, numbers, losses)
         state.iteration += 1
         state.seconds = time.monotonic() - began
         yield losses, batch
+
+
+def _check_request(
+    config: ModelConfig, labelled: QuestionImages | None, labels: int, processes: int
+) -> None:
+    smallest = config.question_batch if config.opacity else config.batch
+    check(
+        processes <= smallest,
+        "devices",
+        processes,
+        f"at most {smallest}, an image of each batch each",
+    )
+    if labels:
+        count = len(labelled) if labelled is not None and labelled.has_answers else 0
+        check(labels <= count, "labels", labels, f"at most {count}, the answers that are told")
+    asked = config.questions if labels else 0.0
+    weights = (config.adversarial, config.reconstruction, config.code_reconstruction)
+    if not any((*weights, config.other_views, config.depth, asked)):
+        raise SpecError("losses: found every weight at 0, expected one above")
+
+
+class _Told(Dataset[Any]):
+    """A source whose errors are items: else a worker's would come as its whole traceback."""
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+
+    def __len__(self) -> int:
+        return len(self._source)
+
+    def __getitem__(self, row: int) -> Any:
+        try:
+            return self._source[row]
+        except (SceneGenError, OSError) as error:
+            return error
+
+
+def _collated(items: list[Any]) -> Any:
+    errors = [item for item in items if isinstance(item, Exception)]
+    return errors[0] if errors else default_collate(items)
 
 
 def _loaded(
@@ -172,12 +137,16 @@ def _loaded(
     """Read batch after batch from a number on, for ever; of each, this process's share."""
     share = slice(fabric.global_rank, None, fabric.world_size)
     loader = DataLoader(
-        source,
+        _Told(source),
         batch_sampler=Draws(rows, size, seed, first, share),
         num_workers=workers,
+        collate_fn=_collated,
         pin_memory=fabric.device.type == "cuda",
     )
-    return iter(loader)
+    for items in loader:
+        if isinstance(items, Exception):
+            raise items
+        yield items
 
 
 def _batches(source: Source, fabric: Fabric, state: State, workers: int) -> Iterator[Batch]:
@@ -227,11 +196,12 @@ def _update(
         for gradient in gradients:
             gradient.copy_(cast(Tensor, fabric.all_reduce(gradient, reduce_op="mean")))
     losses |= {name: float(value.detach()) for name, value in numbers.items()}
-    if not torch.isfinite(torch.nn.utils.get_total_norm(gradients)):
+    sound = torch.isfinite(loss.detach()) & torch.isfinite(torch.nn.utils.get_total_norm(gradients))
+    if cast(Tensor, fabric.all_reduce(sound.float(), reduce_op="mean")) != 1:
         told = ", ".join(f"{name} {value:.3g}" for name, value in losses.items())
         raise TrainingError(
-            f"iteration {state.iteration}: gradients are not finite ({told}); the checkpoint is of"
-            " before: go on from it with a smaller learning rate or other weights of the losses"
+            f"iteration {state.iteration}: loss or gradients are not finite ({told}); go on from"
+            " the checkpoint, with a smaller learning rate or other weights of the losses"
         )
     optimiser.step()
 

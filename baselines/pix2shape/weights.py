@@ -18,7 +18,7 @@ from baselines.pix2shape.config import ModelConfig
 from baselines.pix2shape.model import Pix2Shape
 from scenegen.errors import FileFormatError, SpecError
 from scenegen.new_file import written_beside
-from scenegen.records import from_json
+from scenegen.records import check, from_json, normalise
 
 FORMAT_VERSION = 1
 KEPT = ("encoder", "decoder", "prior")
@@ -49,6 +49,15 @@ class Card:
     seconds: float = 0.0
     format_version: int = FORMAT_VERSION
 
+    def __post_init__(self) -> None:
+        normalise(self)
+        check(
+            self.format_version == FORMAT_VERSION,
+            "format version",
+            self.format_version,
+            str(FORMAT_VERSION),
+        )
+
 
 def save_weights(
     path: str | Path, model: Pix2Shape, card: Card, dtype: torch.dtype = torch.float16
@@ -64,6 +73,9 @@ def save_weights(
         for name, value in model.state_dict().items()
         if name.split(".")[0] in KEPT
     }
+    beyond = [name for name, value in tensors.items() if not torch.isfinite(value).all()]
+    if beyond:
+        raise SpecError(f"{path}: {beyond[0]} is beyond the range of {dtype}")
     save_tensors(path, tensors, {})
     save_card(path, card)
 
@@ -87,15 +99,21 @@ def load_card(path: str | Path) -> Card:
     beside = Path(path).with_suffix(".json")
     if beside.stat().st_size > LARGEST_JSON:
         raise FileFormatError(f"{beside}: over {LARGEST_JSON} bytes, expected a configuration")
+    text = beside.read_bytes()
     try:
-        card = from_json(Card, beside.read_bytes(), "card")
+        return from_json(Card, text, "card")
     except SpecError as error:
-        raise FileFormatError(f"{beside}: {error}") from error
-    if card.format_version != FORMAT_VERSION:
-        raise FileFormatError(
-            f"{beside}: format version {card.format_version}, this release reads {FORMAT_VERSION}"
-        )
-    return card
+        raise FileFormatError(f"{beside}: {_other_version(text) or error}") from error
+
+
+def _other_version(text: bytes) -> str | None:
+    """Say so where a card is of another version: its fields may have other names."""
+    try:
+        version = json.loads(text)["format_version"]
+    except (ValueError, RecursionError, KeyError, TypeError):
+        return None
+    told = f"format version {version!r:.20}, this release reads {FORMAT_VERSION}"
+    return told if version != FORMAT_VERSION else None
 
 
 def load_tensors(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
@@ -144,6 +162,9 @@ def load_into(
                 f"{path}: weights of another configuration: {name} has shape"
                 f" {tuple(found.shape)}, expected {tuple(value.shape)}"
             )
-        if not torch.isfinite(found).all():
-            raise FileFormatError(f"{path}: {name} is not finite")
+        kinds = [(v.is_floating_point(), v.is_complex()) for v in (found, value)]
+        if kinds[0] != kinds[1] or (found.element_size() == 1 and value.element_size() > 1):
+            raise FileFormatError(f"{path}: {name} is {found.dtype}, expected {value.dtype}")
         value.copy_(found)
+        if not torch.isfinite(value).all():
+            raise FileFormatError(f"{path}: {name} is not finite")

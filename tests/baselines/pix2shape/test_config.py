@@ -33,7 +33,7 @@ def test_the_paper_and_compact() -> None:
     assert (paper.iterations, paper.batch, paper.critic_steps) == (60_000, 6, 5)
     assert paper.networks == NetworkSpec()
     compact = model_config("compact", seed=3)
-    assert (compact.networks.size, compact.networks.width, compact.seed) == (64, 0.25, 3)
+    assert (compact.networks.size, compact.networks.width, compact.seed) == (64, 0.125, 3)
 
 
 @pytest.mark.parametrize("name", CONFIGS)

@@ -1,0 +1,175 @@
+"""Sheets and animations: what stands where, files that other programs read, nothing disturbed."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from pix2shape_models import made, tiny
+
+from scenegen.errors import SpecError
+from scenegen.preview import srgb_bytes
+
+torch = pytest.importorskip("torch")
+from torch.utils.data import default_collate  # noqa: E402
+
+from baselines.pix2shape.data import Batch, RoomImages  # noqa: E402
+from baselines.pix2shape.pictures import (  # noqa: E402
+    drawn,
+    image_tiles,
+    save_pictures,
+    sheet,
+    training_sheet,
+)
+from baselines.pix2shape.surfels import normals_from_depth  # noqa: E402
+
+GAP, TILE = 6, 128
+PAPER = (250, 250, 250)
+
+
+@pytest.fixture
+def batch(rooms_path: Path) -> Batch:
+    source = RoomImages(rooms_path, tiny())
+    return source.as_batch(default_collate([source[row] for row in range(5)]))
+
+
+def noise(side: int, seed: int) -> Any:
+    return np.random.default_rng(seed).integers(0, 255, (side, side, 3), "u1")
+
+
+def frame(shade: int) -> Image.Image:
+    """Return a picture with a bar whose place tells which frame it is."""
+    values = np.full((40, 60, 3), 200, np.uint8)
+    values[:, shade : shade + 4] = 10
+    return Image.fromarray(values)
+
+
+@pytest.mark.parametrize(
+    ("side", "factor"), [(32, 4), (64, 2), (100, 2), (127, 2), (128, 1), (256, 1)]
+)
+def test_tiles_stand_in_lines_and_small_ones_are_enlarged(side, factor):
+    rows = [[noise(side, 0), noise(side, 1), noise(side, 2)], [noise(side, 3)]]
+    picture = np.asarray(sheet(rows))
+    large = side * factor
+    assert large >= TILE
+    assert picture.shape == (2 * (large + GAP) + GAP, 3 * (large + GAP) + GAP, 3)
+    left = np.full(picture.shape, PAPER)
+    for y, row in enumerate(rows):
+        for x, pixels in enumerate(row):
+            whole = pixels.repeat(factor, axis=0).repeat(factor, axis=1)
+            top, start = GAP + y * (large + GAP), GAP + x * (large + GAP)
+            left[top : top + large, start : start + large] = whole
+    assert (picture == left).all()
+
+
+def test_images_depths_and_normals_of_codes(batch):
+    model = made(tiny())
+    code = torch.randn(5, 128, generator=torch.Generator().manual_seed(0))
+    images, depths, normals = drawn(model, code, batch.views)
+    with torch.no_grad():
+        depth = model.decode(code, batch.views)
+        radiance = model.image(code, batch.views)
+    facing = normals_from_depth(depth, batch.views.scene.fov_y_degrees)
+    for i in range(5):
+        assert (images[i] == srgb_bytes(radiance[i].permute(1, 2, 0).numpy())).all()
+        near, far = depth[i].argmin(), depth[i].argmax()
+        assert depths[i].shape == (32, 32, 3)
+        assert (depths[i].reshape(-1, 3)[near] == 0).all()
+        assert (depths[i].reshape(-1, 3)[far] == 255).all()
+        again = torch.from_numpy(normals[i]) / 127.5 - 1
+        torch.testing.assert_close(again.permute(2, 0, 1), facing[i], atol=0.005, rtol=0)
+    assert (images[0] == image_tiles(radiance[:1])[0]).all()
+
+
+def test_nothing_is_drawn_where_rays_meet_nothing(batch):
+    model = made(tiny(opacity=True))
+    code = torch.randn(5, 128, generator=torch.Generator().manual_seed(0))
+    with torch.no_grad():
+        raw = model.decoder(code, batch.views.condition)[:, 1]
+        model.decoder.last.bias[1] -= raw.median()
+        opacity = model.surfels(code, batch.views.condition)[1]
+    away = (opacity < 0.5).numpy()
+    assert 0.05 < away.mean() < 0.95
+    _, depths, normals = drawn(model, code, batch.views)
+    assert (np.array(depths)[away] == 0).all()
+    assert (np.array(normals)[away] == 128).all()
+    assert (np.array(normals)[~away] != 128).any()
+
+
+@pytest.mark.parametrize("count", [2, 3, 6])
+@pytest.mark.parametrize("name", ["turn.gif", "turn.GIF", "turn.webp"])
+def test_an_animation_goes_there_and_back(tmp_path, name, count):
+    save_pictures([frame(8 * k) for k in range(count)], tmp_path / name)
+    there = list(range(count))
+    with Image.open(tmp_path / name) as found:
+        assert found.n_frames == 2 * count - 2
+        assert (found.info["loop"], found.size) == (0, (60, 40))
+        for place, k in enumerate(there + there[-2:0:-1]):
+            found.seek(place)
+            shown = np.asarray(found.convert("RGB")).astype(int)
+            assert np.abs(shown - np.asarray(frame(8 * k)).astype(int)).mean() < 4, place
+            assert found.info["duration"] == 80
+
+
+def test_one_picture_is_a_picture(tmp_path):
+    save_pictures([frame(3)], tmp_path / "one.png")
+    with Image.open(tmp_path / "one.png") as found:
+        assert (np.asarray(found) == np.asarray(frame(3))).all()
+    save_pictures([frame(9)], tmp_path / "one.png")
+    with Image.open(tmp_path / "one.png") as found:
+        assert (np.asarray(found) == np.asarray(frame(9))).all(), "replaced"
+
+
+@pytest.mark.parametrize(
+    ("count", "name", "words"),
+    [
+        (3, "turn.png", "out: found 'turn.png', expected an animation's name such as turn.gif"),
+        (3, "turn", "out: found 'turn', expected an animation's name"),
+        (3, "turn.gif.h5", "out: found 'turn.gif.h5', expected an animation's name"),
+        (1, "one.gif", "out: found 'one.gif', expected a picture's name such as sheet.png"),
+        (1, "one", "out: found 'one', expected a picture's name"),
+    ],
+)
+def test_endings_that_do_not_suit_are_refused(tmp_path, count, name, words):
+    with pytest.raises(SpecError, match=words):
+        save_pictures([frame(k) for k in range(count)], tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_folder_that_is_not_there_is_told(tmp_path, count):
+    name = "x.png" if count == 1 else "x.gif"
+    with pytest.raises(FileNotFoundError, match="the folder does not exist"):
+        save_pictures([frame(k) for k in range(count)], tmp_path / "none" / name)
+
+
+@pytest.mark.parametrize("learning", [True, False])
+def test_watching_training_does_not_disturb_it(batch, learning):
+    model = made(tiny()).train(learning)
+    before = {name: value.clone() for name, value in model.state_dict().items()}
+    torch.manual_seed(1)
+    state = torch.get_rng_state()
+    training_sheet(model, batch, torch.zeros(5, 128))
+    assert torch.equal(torch.get_rng_state(), state)
+    assert all(module.training == learning for module in model.modules())
+    assert [n for n, value in model.state_dict().items() if not torch.equal(value, before[n])] == []
+    assert all(p.grad is None for p in model.parameters())
+
+
+@pytest.mark.parametrize("adversarial", [0.0, 1.0])
+def test_what_training_is_watched_by(batch, adversarial):
+    """Six lines; running statistics, not the batch's, so an image looks the same in any company."""
+    model = made(tiny(adversarial=adversarial)).train()
+    codes = torch.randn(5, 128, generator=torch.Generator().manual_seed(0))
+    found = training_sheet(model, batch, codes, columns=3)
+    model.eval()
+    with torch.no_grad():
+        own = model.encode(batch.image, batch.views)
+    other = codes if adversarial else own.roll(1, 0)
+    lines = [image_tiles(batch.image), *drawn(model, own, batch.views)]
+    lines += drawn(model, other, batch.views)[:2]
+    expected = sheet([line[:3] for line in lines])
+    assert found.size == expected.size == (3 * (TILE + GAP) + GAP, 6 * (TILE + GAP) + GAP)
+    assert found.tobytes() == expected.tobytes()
+    assert training_sheet(model, batch, codes).size[0] == 5 * (TILE + GAP) + GAP

@@ -1,0 +1,201 @@
+"""One step: the losses that are asked for, their weighted sum, and gradients where they belong."""
+
+import itertools
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+torch = pytest.importorskip("torch")
+from baselines.pix2shape.config import ModelConfig  # noqa: E402
+from baselines.pix2shape.data import Batch  # noqa: E402
+from baselines.pix2shape.losses import (  # noqa: E402
+    mutual_information,
+    question_loss,
+    reconstruction_loss,
+)
+from baselines.pix2shape.model import Pix2Shape, Views  # noqa: E402
+from baselines.pix2shape.networks import NetworkSpec  # noqa: E402
+from baselines.pix2shape.steps import critic_step, draw, generator_step  # noqa: E402
+from baselines.pix2shape.surfels import Scene  # noqa: E402
+
+NETWORKS = NetworkSpec(size=32, width=0.05, z_scene=6, z_view=2)
+LOSSES = (
+    "adversarial", "reconstruction", "code_reconstruction", "other_views", "mutual_information",
+    "questions", "depth",
+)  # fmt: skip
+NEEDED = {"adversarial": {"critic"}, "mutual_information": {"statistics"}}
+
+
+def only(**weights: float) -> ModelConfig:
+    return ModelConfig(networks=NETWORKS, **{**dict.fromkeys(LOSSES, 0.0), **weights})
+
+
+def model_of(config: ModelConfig) -> Pix2Shape:
+    torch.manual_seed(0)
+    return Pix2Shape(config)
+
+
+def some_batch(size: int = 8, seed: int = 1) -> Batch:
+    source = torch.Generator().manual_seed(seed)
+
+    def rand(*shape: int) -> Any:
+        return torch.rand(size, *shape, generator=source)
+
+    scene = Scene(28.0, 2 * rand(2, 3), rand(2, 3), rand(3), 0.2 + rand(2), 0.2 + rand(3))
+    return Batch(rand(3, 32, 32), Views(rand(3), scene), 1 + rand(32, 32))
+
+
+def labelled() -> tuple[Batch, Any]:
+    return some_batch(8, seed=2), torch.tensor([2, 0])
+
+
+def step(config: ModelConfig, batch: Batch | None = None) -> tuple[Any, dict[str, Any]]:
+    return generator_step(model_of(config), batch or some_batch(), draw(8, 8, 3), labelled())
+
+
+@pytest.mark.parametrize("name", LOSSES)
+def test_one_loss_is_computed_alone(name):
+    """With the networks that it needs, and no other."""
+    model = model_of(only(**{name: 0.5}))
+    for network in {"critic", "statistics"} - NEEDED.get(name, set()):
+        getattr(model, network).register_forward_hook(lambda *_: pytest.fail("not needed"))
+    total, losses = generator_step(model, some_batch(), draw(8, 8, 3), labelled())
+    assert set(losses) == {name}
+    assert total.item() == pytest.approx(0.5 * losses[name].item())
+    assert total.item() != 0
+
+
+def test_the_total_is_the_weighted_sum():
+    """Whichever are on: each has the value that it has alone."""
+    weights = {name: 0.3 + 0.1 * place for place, name in enumerate(LOSSES)}
+    alone = {name: step(only(**{name: 1.0}))[1][name].item() for name in LOSSES}
+    subsets = itertools.chain(itertools.combinations(LOSSES, 2), [(), LOSSES])
+    for chosen in subsets:
+        total, losses = step(only(**{name: weights[name] for name in chosen}))
+        assert set(losses) == set(chosen)
+        found = {name: value.item() for name, value in losses.items()}
+        assert found == pytest.approx({name: alone[name] for name in chosen}, rel=1e-4, abs=1e-6)
+        expected = sum(weights[name] * value for name, value in found.items())
+        assert total.item() == pytest.approx(expected, rel=1e-5, abs=1e-7)
+
+
+def test_what_is_not_there_is_not_named():
+    config = only(reconstruction=1.0, depth=1.0, questions=1.0)
+    batch = replace(some_batch(), depth=None)
+    losses = generator_step(model_of(config), batch, draw(8, 8, 3))[1]
+    assert set(losses) == {"reconstruction"}
+
+
+@pytest.mark.parametrize(
+    ("weights", "learn"),
+    [
+        ({"adversarial": 1.0}, {"critic"}),
+        ({"mutual_information": 1.0}, {"statistics"}),
+        ({"adversarial": 1.0, "mutual_information": 0.1}, {"critic", "statistics"}),
+    ],
+)
+def test_the_critics_step_teaches_critic_and_statistics_alone(weights, learn):
+    model = model_of(only(**weights, reconstruction=1.0))
+    total, numbers = critic_step(model, some_batch(), draw(8, 8, 3))
+    total.backward()
+    for name in ("encoder", "decoder", "critic", "statistics"):
+        gradients = [parameter.grad for parameter in getattr(model, name).parameters()]
+        if name not in learn:
+            assert all(gradient is None for gradient in gradients), name
+        else:
+            assert any(gradient is not None and gradient.any() for gradient in gradients), name
+    assert set(numbers) == ({"distance", "penalty"} if "adversarial" in weights else set())
+
+
+def test_the_critics_total_is_penalty_less_distance_less_information():
+    """So that its step raises the other two, which the generator's step lowers."""
+    batch, noise = some_batch(), draw(8, 8, 3)
+    model = model_of(only(adversarial=1.0, mutual_information=0.1))
+    total, numbers = critic_step(model, batch, noise)
+    code = model.encode(batch.image, batch.views)
+    information = mutual_information(model.statistics, code[:, :6], code[:, 6:], noise.order)
+    expected = numbers["penalty"] - numbers["distance"] - information
+    assert total.item() == pytest.approx(expected.item(), rel=1e-5)
+    losses = generator_step(model, batch, noise)[1]
+    assert losses["adversarial"].item() == pytest.approx(numbers["distance"].item(), rel=1e-5)
+    assert losses["mutual_information"].item() == pytest.approx(information.item(), rel=1e-5)
+
+
+def test_depth_supervision_ignores_what_is_not_known():
+    model, batch = model_of(only(depth=1.0)), some_batch()
+    batch.depth[0, :5] = math.nan
+    batch.depth[3] = math.nan
+    total, losses = generator_step(model, batch, draw(8, 8, 3))
+    found = model.decode(model.encode(batch.image, batch.views), batch.views)
+    expected = (found - batch.depth).square().nanmean()
+    assert losses["depth"].item() == pytest.approx(expected.item(), rel=1e-5)
+    total.backward()
+    for network in (model.encoder, model.decoder):
+        assert all(torch.isfinite(p.grad).all() for p in network.parameters())
+    batch.depth[:] = math.nan
+    total, _ = generator_step(model, batch, draw(8, 8, 3))
+    model.zero_grad()
+    total.backward()
+    assert total.item() == 0
+    assert not any(p.grad.any() for p in model.decoder.parameters())
+
+
+def test_questions_teach_the_scenes_part_of_the_code():
+    model = model_of(only(questions=2.0))
+    images, answers = labelled()
+    total, losses = generator_step(model, some_batch(), draw(8, 8, 3), (images, answers))
+    total.backward()
+    gradient = model.encoder.last.bias.grad  # cancels: the loss is of differences
+    weight = model.encoder.last.weight.grad.flatten(1).abs().sum(dim=1)
+    assert gradient.abs().max() < 1e-5
+    assert (weight[:6] > 1e-4).all()
+    assert not weight[6:].any()
+    codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
+    assert losses["questions"].item() == pytest.approx(question_loss(codes, answers).item())
+
+
+class Known(Pix2Shape):
+    """Encoder and decoder that undo each other exactly, given the same camera."""
+
+    def image(self, code: Any, views: Views) -> Any:
+        self.rendered = views
+        return (code + views.condition)[..., None, None].expand(-1, -1, 32, 32)
+
+    def encode(self, image: Any, views: Views) -> Any:
+        return image.mean(dim=(2, 3)) - views.condition
+
+
+class Blind(Known):
+    """The decoder forgets the camera, so that codes come back wrong by the other's position."""
+
+    def image(self, code: Any, views: Views) -> Any:
+        return code[..., None, None].expand(-1, -1, 32, 32)
+
+
+def test_other_views_lose_what_the_other_camera_changes():
+    config = replace(only(other_views=1.0), networks=NetworkSpec(size=32, width=0.05, z_scene=3))
+    batch, noise = some_batch(), draw(8, 3, 3)
+    known = Known(config)
+    assert generator_step(known, batch, noise)[1]["other_views"] < 1e-5
+    order, scene = noise.order, batch.views.scene
+    assert (order != torch.arange(8)).any()
+    assert torch.equal(known.rendered.condition, batch.views.condition[order])
+    for name in ("light_position", "light_color", "ambient", "attenuation", "reflectance"):
+        assert torch.equal(getattr(known.rendered.scene, name), getattr(scene, name)[order]), name
+    lost = generator_step(Blind(config), batch, noise)[1]["other_views"]
+    expected = reconstruction_loss(batch.views.condition, torch.zeros(8, 3))
+    assert lost.item() == pytest.approx(expected.item(), rel=1e-5)
+
+
+def test_noise_is_the_seeds():
+    state = torch.get_rng_state()
+    one, again, other = draw(9, 4, 7), draw(9, 4, 7), draw(9, 4, 8)
+    assert torch.equal(torch.get_rng_state(), state), "no other random numbers are touched"
+    assert (one.code.shape, one.share.shape) == ((9, 4), (9,))
+    assert sorted(one.order.tolist()) == list(range(9))
+    assert 0 <= one.share.min() <= one.share.max() <= 1
+    for name in ("code", "share", "order"):
+        assert torch.equal(getattr(one, name), getattr(again, name))
+        assert not torch.equal(getattr(one, name), getattr(other, name))
