@@ -14,7 +14,7 @@ CONFIGS: dict[str, dict[str, Any]] = {
     "compact": {
         "networks": NetworkSpec(size=64, width=0.125),
         "batch": 16,
-        "iterations": 24_000,
+        "iterations": 12_000,
         "learning_rate": 5e-4,
         "betas": (0.9, 0.99),
         "decay": True,
@@ -22,6 +22,7 @@ CONFIGS: dict[str, dict[str, Any]] = {
         "adversarial": 0.0,
         "code_reconstruction": 0.0,
         "other_views": 3.0,
+        "questions": 0.1,
     },
 }
 
