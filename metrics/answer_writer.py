@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from metrics.answers import ABSTAINED, CANDIDATES, answers_from_scores
 from metrics.prediction_checks import agreement_problems, answer_problems, score_problems
 from metrics.prediction_layout import ID_NAMES
-from metrics.prediction_parts import checked_floats, checked_texts, write_columns
+from metrics.prediction_parts import check_elsewhere, checked_floats, checked_texts, write_columns
 from metrics.problems import PredictionError
 from scenegen.row_file import and_more, new_file
 
@@ -44,6 +44,7 @@ def write_answers(
     texts = checked_texts(
         "iqtt", {"method": method, "run": run, "notes": notes, "truth_path": str(questions_file)}
     )
+    check_elsewhere(path, questions_file)
     count, fingerprint = _questions(questions_file)
     if count == 0:
         raise PredictionError(f"{questions_file}: found no questions, expected at least one")

@@ -1,6 +1,8 @@
 """Parts of a submission, checked and written: texts, arrays, and datasets that fit into memory."""
 
+import os
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import h5py
@@ -19,6 +21,12 @@ from metrics.problems import PredictionError
 from scenegen.row_file import writer_name
 
 Array = NDArray[Any]
+
+
+def check_elsewhere(path: str | Path, truth: str | Path) -> None:
+    """Raise PredictionError where a submission would replace what it is about."""
+    if os.path.exists(path) and os.path.exists(truth) and os.path.samefile(path, truth):
+        raise PredictionError(f"{path}: is the file that is predicted; write to another one")
 
 
 def checked_texts(task: str, given: Mapping[str, str]) -> dict[str, str]:

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from metrics.answer_writer import write_answers
 from metrics.depth import Alignment
 from metrics.prediction_layout import datasets, describe_format
-from metrics.prediction_parts import checked_floats, checked_texts, write_columns
+from metrics.prediction_parts import check_elsewhere, checked_floats, checked_texts, write_columns
 from metrics.problems import PredictionError, first_ids
 from metrics.row_rules import EXPECTED, GOT, depth_faults, faces_away, normal_faults
 from scenegen.row_file import Table, new_file
@@ -67,6 +67,7 @@ class RoomPredictionWriter:
         """
         given = {"method": method, "run": run, "alignment": alignment, "notes": notes}
         self._texts = checked_texts("rooms", {**given, "truth_path": str(truth)})
+        check_elsewhere(path, truth)
         self._path, self._truth_path = Path(path), Path(truth)
         self._overwrite, self._allow_partial = overwrite, allow_partial
         self._context: AbstractContextManager[None] | None = None

@@ -135,13 +135,18 @@ def pick_rows(
     return chosen
 
 
+def check_picture_name(path: Path) -> None:
+    """Raise SpecError for an ending that names no picture format."""
+    if path.suffix.lower() not in (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff"):
+        raise SpecError(f"out: found {path.name!r}, expected a picture's name such as sheet.png")
+
+
 def save_picture(picture: Image.Image, path: str | Path) -> None:
     """Write a picture under a temporary name, then rename it.
 
     Raises SpecError for an ending that names no picture format, OSError for the path.
     """
     path = Path(path)
-    if path.suffix.lower() not in (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff"):
-        raise SpecError(f"out: found {path.name!r}, expected a picture's name such as sheet.png")
+    check_picture_name(path)
     with written_beside(path, overwrite=True) as temporary:
         picture.save(temporary)

@@ -88,36 +88,35 @@ def train(
     from baselines.pix2shape.runs import Machine, train_run
 
     chosen = dict(settings) | ({} if seed is None else {"seed": seed})
-    if resume and (config or chosen):
-        raise click.UsageError("--resume goes on with the run's own --config, --set and --seed")
+    if resume and (config or chosen or labels or conditional):
+        raise click.UsageError("--resume goes on with the run's own settings; leave the others out")
     chosen_device(device)
     accelerator = "gpu" if device == "cuda" else device
-    machine = Machine(
-        accelerator,
-        devices,
-        f"{precision}-true" if precision == "32" else "bf16-mixed",
-        workers,
-        every,
+    numbers = {"32": "32-true", "bf16": "bf16-mixed"}[precision]
+    bars: list[Any] = []
+
+    def show(state: Any, losses: dict[str, float]) -> None:
+        last = state.model.config.iterations
+        if not bars:
+            bars.append(tqdm(total=last, initial=state.iteration - 1, unit="it", disable=None))
+        told = {name: f"{value:.3g}" for name, value in losses.items()}
+        bars[0].set_postfix(told, refresh=False)
+        bars[0].update(1)
+        if bars[0].disable and state.iteration % every == 0:  # not a terminal: a log
+            losses_told = ", ".join(f"{name} {value}" for name, value in told.items())
+            click.echo(f"{state.iteration} of {last}, {state.seconds:.0f} s: {losses_told}")
+
+    weights = train_run(
+        out,
+        data,
+        None if resume else model_config(config or "compact", **chosen),
+        Machine(accelerator, devices, numbers, workers, every),
+        labels=labels,
+        conditional=conditional,
+        progress=show,
     )
-    with tqdm(unit="it", disable=None, leave=False) as bar:
-
-        def show(state: Any, losses: dict[str, float]) -> None:
-            if bar.total is None:
-                bar.reset(state.model.config.iterations)
-                bar.update(state.iteration - 1)
-                bar.initial = state.iteration - 1
-            bar.set_postfix({name: f"{value:.3g}" for name, value in losses.items()}, refresh=False)
-            bar.update(1)
-
-        weights = train_run(
-            out,
-            data,
-            None if resume else model_config(config or "compact", **chosen),
-            machine,
-            labels=labels,
-            conditional=conditional,
-            progress=show,
-        )
+    for bar in bars:
+        bar.close()
     click.echo(f"{weights}: trained on {data}; now `pix2shape predict --weights {weights} ...`")
 
 
@@ -149,8 +148,9 @@ def sample(weights: str, out: str, count: int, label: str | None, seed: int) -> 
     needs_torch()
     from baselines.pix2shape.bundled import open_weights
     from baselines.pix2shape.explore import sample_sheet
-    from baselines.pix2shape.pictures import save_pictures
+    from baselines.pix2shape.pictures import check_picture, save_pictures
 
+    check_picture(out)
     model, card = open_weights(weights)
     save_pictures([sample_sheet(model, card, count, seed, label)], out)
     click.echo(f"{out}: {count} samples")
@@ -166,15 +166,15 @@ def interpolate(weights: str, data: str, items: list[int], steps: int, out: str)
     """Go from one image's scene to another's, seen from the first one's camera."""
     needs_torch()
     from baselines.pix2shape.bundled import open_weights
-    from baselines.pix2shape.data import RoomImages
-    from baselines.pix2shape.explore import interpolation_sheet
-    from baselines.pix2shape.pictures import save_pictures
+    from baselines.pix2shape.explore import interpolation_sheet, known_rooms
+    from baselines.pix2shape.pictures import check_picture, save_pictures
     from scenegen.preview import pick_rows
 
+    check_picture(out)
     model, card = open_weights(weights)
     if len(items) != 2:
         raise click.UsageError(f"--items: found {len(items)} rows, expected two such as 0,1")
-    rooms = RoomImages(data, card.config)
+    rooms = known_rooms(data, card)
     items = pick_rows(len(rooms), items)
     save_pictures([interpolation_sheet(model, rooms, items[0], items[1], steps)], out)
     click.echo(f"{out}: from row {items[0]} to row {items[1]} of {data}")
@@ -191,13 +191,13 @@ def rotate(weights: str, data: str, items: list[int], degrees: int, frames: int,
     """Turn the camera around scenes that were seen from one side."""
     needs_torch()
     from baselines.pix2shape.bundled import open_weights
-    from baselines.pix2shape.data import RoomImages
-    from baselines.pix2shape.explore import rotation_frames
-    from baselines.pix2shape.pictures import save_pictures
+    from baselines.pix2shape.explore import known_rooms, rotation_frames
+    from baselines.pix2shape.pictures import check_picture, save_pictures
     from scenegen.preview import pick_rows
 
+    check_picture(out, animated=True)
     model, card = open_weights(weights)
-    rooms = RoomImages(data, card.config)
+    rooms = known_rooms(data, card)
     items = pick_rows(len(rooms), items)
     angles = [degrees * i / (frames - 1) for i in range(frames)]
     save_pictures(rotation_frames(model, rooms, items, angles), out)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,17 @@ from scenegen.specs import DatasetSpec
 
 Array = NDArray[Any]
 ROW = 8  # tiles side by side
+
+
+def known_rooms(data: str | Path, card: Card) -> RoomImages:
+    """Open rooms whose images a model shall see. Raises as `RoomImages`, SpecError."""
+    _check_camera(card.config)
+    rooms = RoomImages(data, card.config)
+    if card.classes and rooms.classes != card.classes:
+        raise SpecError(
+            f"{data}: classes {', '.join(rooms.classes)}, the model knows {', '.join(card.classes)}"
+        )
+    return rooms
 
 
 def sample_sheet(

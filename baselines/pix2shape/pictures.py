@@ -14,8 +14,16 @@ from baselines.pix2shape.data import Batch
 from baselines.pix2shape.model import Pix2Shape, Views, shaded
 from baselines.pix2shape.surfels import normals_from_depth
 from scenegen.errors import SpecError
-from scenegen.new_file import written_beside
-from scenegen.preview import BACKGROUND, GAP, SMALLEST_TILE, depth_bytes, save_picture, srgb_bytes
+from scenegen.new_file import check_writable, written_beside
+from scenegen.preview import (
+    BACKGROUND,
+    GAP,
+    SMALLEST_TILE,
+    check_picture_name,
+    depth_bytes,
+    save_picture,
+    srgb_bytes,
+)
 
 Array = NDArray[Any]
 Tiles = list[NDArray[np.uint8]]  # (H, W, 3) each
@@ -75,17 +83,25 @@ def training_sheet(model: Pix2Shape, batch: Batch, noise: Tensor, columns: int =
     return sheet([row[:columns] for row in rows])
 
 
+def check_picture(path: str | Path, animated: bool = False) -> None:
+    """Raise before drawing what `save_pictures` would raise after it."""
+    path = Path(path)
+    if not animated:
+        check_picture_name(path)
+    elif path.suffix.lower() not in (".gif", ".webp"):
+        raise SpecError(f"out: found {path.name!r}, expected an animation's name such as turn.gif")
+    check_writable(path, overwrite=True)
+
+
 def save_pictures(frames: Sequence[Image.Image], path: str | Path) -> None:
     """Write one picture, or several as an animation that goes there and back.
 
     Raises SpecError for an ending that does not suit, OSError for the path.
     """
-    path = Path(path)
+    check_picture(path, len(frames) > 1)
     if len(frames) == 1:
         save_picture(frames[0], path)
         return
-    if path.suffix.lower() not in (".gif", ".webp"):
-        raise SpecError(f"out: found {path.name!r}, expected an animation's name such as turn.gif")
     turn = [*frames, *frames[-2:0:-1]]
     with written_beside(path, overwrite=True) as temporary:
         turn[0].save(

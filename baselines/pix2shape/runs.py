@@ -62,7 +62,7 @@ def train_run(
     """Train a model, from the start or from the folder's checkpoint; return the weights' path.
 
     Args:
-        config: None to go on from the checkpoint.
+        config: None to go on from the checkpoint, with its labels and classes.
         labels: answers that training on questions may use.
         conditional: whether the networks are told the class of the only object.
         progress: called after every iteration.
@@ -73,7 +73,8 @@ def train_run(
     folder = Path(folder)
     if config is None:
         state, card = load_state(folder)
-        _check_same(card, data, labels)
+        labels = card.labels
+        _check_same(card, data)
     else:
         if (folder / CHECKPOINT).exists():
             raise FileExistsError(
@@ -177,12 +178,16 @@ def _new_card(config: ModelConfig, data: str | Path, labels: int, conditional: b
     return Card(config, data=spec, fingerprint=mark, classes=classes)
 
 
-def _check_same(card: Card, data: str | Path, labels: int) -> None:
+def _check_same(card: Card, data: str | Path) -> None:
     """Refuse to go on with other data."""
-    found = _new_card(card.config, data, labels, bool(card.classes))
-    if found.fingerprint != card.fingerprint:
+    if is_question_file(data):
+        with open_questions(data, "unlabeled") as questions:
+            found = str(questions.fingerprint)
+    else:
+        with RoomsFile(data) as rooms:
+            found = rooms.fingerprint
+    if found != card.fingerprint:
         raise SpecError(
-            f"{data}: fingerprint {found.fingerprint[:12]}, the run was trained on"
-            f" {card.fingerprint[:12]}; resume with the same data"
+            f"{data}: fingerprint {found[:12]}, the run was trained on {card.fingerprint[:12]};"
+            " resume with the same data"
         )
-    check(labels == card.labels, "labels", labels, f"{card.labels}, as the run began")

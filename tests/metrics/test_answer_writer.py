@@ -1,12 +1,15 @@
 """The writer of answers: what it writes, and that it writes nothing invalid."""
 
+import shutil
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
 
 from iqtt.question_file import AnswersFile
 from metrics.prediction_file import open_predictions
-from metrics.prediction_writer import PredictionError, write_answers
+from metrics.prediction_writer import PredictionError, RoomPredictionWriter, write_answers
 from metrics.validation import validate
 from scenegen.errors import SceneGenError
 
@@ -93,3 +96,19 @@ def test_answers_keep_an_existing_file(truths, tmp_path):
         write_answers(tmp_path / "a.h5", truths.iqtt, **given)
     write_answers(tmp_path / "a.h5", truths.iqtt, overwrite=True, **given)
     assert validate(tmp_path / "a.h5") == []
+
+
+def test_a_submission_never_replaces_what_it_is_about(truths, tmp_path):
+    """Not under another name of the file either."""
+    for task in ("rooms", "iqtt"):
+        truth = shutil.copy(truths.of(task), tmp_path / f"{task}.h5")
+        before = Path(truth).read_bytes()
+        link = tmp_path / f"{task}-link.h5"
+        link.symlink_to(truth)
+        for path in (truth, link):
+            with pytest.raises(PredictionError, match="is the file that is pred"):  # noqa: PT012
+                if task == "iqtt":
+                    write_answers(path, truth, method="m", answer=[0] * 6, overwrite=True)
+                else:
+                    RoomPredictionWriter(path, truth, method="m", overwrite=True)
+        assert Path(truth).read_bytes() == before
