@@ -1,0 +1,38 @@
+"""The bundled weights: small enough to ship, and what they predict is rooms."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+from baselines.pix2shape.bundled import FOLDER, names, open_weights, suited  # noqa: E402
+from baselines.pix2shape.predict import predict_rooms  # noqa: E402
+from metrics.prediction_file import open_predictions  # noqa: E402
+from scenegen.dataset import make_dataset  # noqa: E402
+from scenegen.presets import preset_spec  # noqa: E402
+from scenegen.scene_file import RoomsFile  # noqa: E402
+
+LARGEST = 25_000_000  # bytes in all
+
+
+def test_they_are_small_and_each_has_its_card() -> None:
+    assert sum(path.stat().st_size for path in FOLDER.iterdir()) <= LARGEST
+    for name in names():
+        _, card = open_weights(name)
+        assert card.iteration == card.config.iterations
+        assert card.config.depth == 0, "they learned without depth maps"
+
+
+@pytest.mark.parametrize("name", names())
+def test_they_predict_rooms(name: str, tmp_path: Path) -> None:
+    """Far better than one depth everywhere, which the mean of all depths is the best of."""
+    data, out = tmp_path / "rooms.h5", tmp_path / "predictions.h5"
+    make_dataset(data, preset_spec(name, seed=77, views=(0.0, 55.0)), 4)
+    assert suited(data) == name
+    predict_rooms(open_weights(name)[0], data, out)
+    with RoomsFile(data) as rooms, open_predictions(out) as predictions:
+        truth = rooms.read("depth", slice(None))
+        depth = np.stack([predictions.depth(row) for row in range(len(rooms))])
+    error, constant = ((depth - truth) ** 2).mean(), truth.var()
+    assert error < 0.7 * constant, (error, constant)
