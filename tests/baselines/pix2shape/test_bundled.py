@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 pytest.importorskip("torch")
-from baselines.pix2shape.bundled import FOLDER, names, open_weights, suited  # noqa: E402
-from baselines.pix2shape.predict import predict_rooms  # noqa: E402
-from metrics.prediction_file import open_predictions  # noqa: E402
-from scenegen.dataset import make_dataset  # noqa: E402
-from scenegen.presets import preset_spec  # noqa: E402
-from scenegen.scene_file import RoomsFile  # noqa: E402
+from baselines.pix2shape.bundled import FOLDER, names, open_weights, suited
+from baselines.pix2shape.predict import predict_rooms
+from metrics.prediction_file import open_predictions
+from scenegen.dataset import make_dataset
+from scenegen.presets import preset_spec
+from scenegen.scene_file import RoomsFile
 
 LARGEST = 25_000_000  # bytes in all
 
