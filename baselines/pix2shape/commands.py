@@ -13,9 +13,8 @@ PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
 
 WEIGHTS = click.option(
     "--weights",
-    default="shapes",
-    show_default=True,
-    help="A .safetensors file with its .json beside, or the name of bundled weights.",
+    help="A .safetensors file with its .json beside, or the name of bundled weights."
+    "  [those that suit the data]",
 )
 DATA = click.option("--data", required=True, help="Rooms, or questions.")
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace an existing file.")
@@ -90,8 +89,7 @@ def train(
     chosen = dict(settings) | ({} if seed is None else {"seed": seed})
     if resume and (config or chosen or labels or conditional):
         raise click.UsageError("--resume goes on with the run's own settings; leave the others out")
-    chosen_device(device)
-    accelerator = "gpu" if device == "cuda" else device
+    accelerator = "gpu" if chosen_device(device, devices).type == "cuda" else "cpu"
     numbers = {"32": "32-true", "bf16": "bf16-mixed"}[precision]
     bars: list[Any] = []
 
@@ -117,7 +115,8 @@ def train(
     )
     for bar in bars:
         bar.close()
-    click.echo(f"{weights}: trained on {data}; now `pix2shape predict --weights {weights} ...`")
+    if weights is not None:  # the first of several processes
+        click.echo(f"{weights}: trained on {data}; now `pix2shape predict --weights {weights} ...`")
 
 
 @click.command()
@@ -130,7 +129,10 @@ def train(
 def predict(weights: str, data: str, out: str, run: str, device: str, overwrite: bool) -> None:
     """Predict every view of each room from its input view alone, or answer questions."""
     needs_torch()
+    from baselines.pix2shape.bundled import suited
     from baselines.pix2shape.predict import predict_file
+
+    weights = weights or suited(data)
 
     with show_progress("row") as bar:
         predict_file(weights, data, out, run=run, device=device, overwrite=overwrite, progress=bar)
@@ -138,7 +140,12 @@ def predict(weights: str, data: str, out: str, run: str, device: str, overwrite:
 
 
 @click.command()
-@WEIGHTS
+@click.option(
+    "--weights",
+    default="shapes",
+    show_default=True,
+    help="A .safetensors file with its .json beside, or the name of bundled weights.",
+)
 @click.option("--out", default="samples.png", show_default=True, help="Picture to write.")
 @click.option("--n", "count", type=click.IntRange(1, 256), default=16, show_default=True)
 @click.option("--class", "label", help="Of a conditional model; without, each in turn.")
@@ -162,16 +169,16 @@ def sample(weights: str, out: str, count: int, label: str | None, seed: int) -> 
 @click.option("--items", type=Items(), default="0,1", show_default=True, help="Two rows.")
 @click.option("--steps", type=click.IntRange(2, 64), default=8, show_default=True)
 @click.option("--out", default="interpolation.png", show_default=True, help="Picture to write.")
-def interpolate(weights: str, data: str, items: list[int], steps: int, out: str) -> None:
+def interpolate(weights: str | None, data: str, items: list[int], steps: int, out: str) -> None:
     """Go from one image's scene to another's, seen from the first one's camera."""
     needs_torch()
-    from baselines.pix2shape.bundled import open_weights
+    from baselines.pix2shape.bundled import open_weights, suited
     from baselines.pix2shape.explore import interpolation_sheet, known_rooms
     from baselines.pix2shape.pictures import check_picture, save_pictures
     from scenegen.preview import pick_rows
 
     check_picture(out)
-    model, card = open_weights(weights)
+    model, card = open_weights(weights or suited(data))
     if len(items) != 2:
         raise click.UsageError(f"--items: found {len(items)} rows, expected two such as 0,1")
     rooms = known_rooms(data, card)
@@ -190,13 +197,13 @@ def interpolate(weights: str, data: str, items: list[int], steps: int, out: str)
 def rotate(weights: str, data: str, items: list[int], degrees: int, frames: int, out: str) -> None:
     """Turn the camera around scenes that were seen from one side."""
     needs_torch()
-    from baselines.pix2shape.bundled import open_weights
+    from baselines.pix2shape.bundled import open_weights, suited
     from baselines.pix2shape.explore import known_rooms, rotation_frames
     from baselines.pix2shape.pictures import check_picture, save_pictures
     from scenegen.preview import pick_rows
 
     check_picture(out, animated=True)
-    model, card = open_weights(weights)
+    model, card = open_weights(weights or suited(data))
     rooms = known_rooms(data, card)
     items = pick_rows(len(rooms), items)
     angles = [degrees * i / (frames - 1) for i in range(frames)]

@@ -120,7 +120,7 @@ class ModelConfig:
         return from_json(cls, text, "model configuration")
 
 
-def model_config(name: str, **settings: Any) -> ModelConfig:
+def model_config(name: str, /, **settings: Any) -> ModelConfig:
     """Return a named configuration with other settings on top.
 
     Args:

@@ -23,6 +23,7 @@ from scenegen.camera import Camera
 from scenegen.errors import SpecError
 from scenegen.sampling import sample_cameras, sample_lights
 from scenegen.scenes import Light
+from scenegen.seeding import Purpose, item_seed
 from scenegen.specs import DatasetSpec
 
 Array = NDArray[Any]
@@ -32,7 +33,7 @@ ROW = 8  # tiles side by side
 def known_rooms(data: str | Path, card: Card) -> RoomImages:
     """Open rooms whose images a model shall see. Raises as `RoomImages`, SpecError."""
     _check_camera(card.config)
-    rooms = RoomImages(data, card.config)
+    rooms = RoomImages(data, replace(card.config, depth=0.0))
     if card.classes and rooms.classes != card.classes:
         raise SpecError(
             f"{data}: classes {', '.join(rooms.classes)}, the model knows {', '.join(card.classes)}"
@@ -61,9 +62,8 @@ def sample_sheet(
         one_hot[i, i % len(card.classes) if label is None else card.classes.index(label)] = 1
     cameras = [sample_cameras(replace(spec, views=(0.0,)), i)[0] for i in range(count)]
     views = known_views(spec, cameras, [sample_lights(spec, i) for i in range(count)], one_hot)
-    noise = torch.randn(
-        count, model.config.networks.z, generator=torch.Generator().manual_seed(seed)
-    )
+    source = torch.Generator().manual_seed(item_seed(seed, 0, Purpose.PICTURES))
+    noise = torch.randn(count, model.config.networks.z, generator=source)
     tiles = drawn(model, model.prior(noise), views)
     lines = [line[i : i + ROW] for i in range(0, count, ROW) for line in tiles]
     return sheet(lines)

@@ -105,7 +105,8 @@ class Pix2Shape(nn.Module):
 
 def shaded(depth: Tensor, opacity: Tensor | None, views: Views) -> Tensor:
     """Return the images of surfels in front of the views' background: (B, 3, S, S)."""
-    image = render(depth, views.scene)
+    with torch.autocast(depth.device.type, enabled=False):  # differences of near numbers
+        image = render(depth, views.scene)
     if opacity is None or views.background is None:
         return image
     behind = views.background[..., None, None]

@@ -109,6 +109,11 @@ def _planes(condition: Tensor, like: Tensor) -> Tensor:
     return condition[..., None, None].expand(-1, -1, *like.shape[2:])
 
 
+def _full(values: Tensor) -> Tensor:
+    """Return bfloat16 as float32: losses are differences of what is nearly equal."""
+    return values.float() if values.dtype == torch.bfloat16 else values
+
+
 class Encoder(nn.Module):
     """Image and camera -> latent code. Table "Pix2Shape encoder architecture"."""
 
@@ -132,7 +137,7 @@ class Encoder(nn.Module):
             if i < len(self.norms):
                 values = self.norms[i](values, condition)
             values = self.activation(values)
-        return self.standard(self.last(values).flatten(1))
+        return self.standard(_full(self.last(values).flatten(1)))
 
 
 class Decoder(nn.Module):
@@ -161,7 +166,7 @@ class Decoder(nn.Module):
         for layer, norm in zip(self.layers, self.norms, strict=True):
             values = self.activation(norm(layer(values), condition))
         with torch.autocast(values.device.type, enabled=False):  # half a depth's bits are noise
-            return self.last(values.float() if values.dtype == torch.bfloat16 else values)
+            return self.last(_full(values))
 
 
 class Critic(nn.Module):
@@ -185,7 +190,7 @@ class Critic(nn.Module):
             if i == len(self.layers) - 1:
                 values = torch.cat([values, _planes(code, values)], dim=1)
             values = self.activation(layer(values))
-        return self.last(values).flatten()
+        return _full(self.last(values).flatten())
 
 
 class Statistics(nn.Module):
@@ -201,4 +206,4 @@ class Statistics(nn.Module):
 
     def forward(self, z_scene: Tensor, z_view: Tensor) -> Tensor:
         """(B, z_scene), (B, z_view) -> (B,)."""
-        return self.layers(torch.cat([z_scene, z_view], dim=1)).flatten()
+        return _full(self.layers(torch.cat([z_scene, z_view], dim=1)).flatten())

@@ -19,6 +19,7 @@ from iqtt.question_file import open_questions, parts
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from scenegen.errors import SpecError
 from scenegen.new_file import check_writable
+from scenegen.records import check
 from scenegen.scene_file import RoomsFile
 from scenegen.truth import decode_image
 
@@ -55,10 +56,12 @@ def predict_file(
         predict_rooms(model, data, out, run=run, overwrite=overwrite, progress=progress)
 
 
-def chosen_device(name: str) -> torch.device:
+def chosen_device(name: str, count: int = 1) -> torch.device:
     """Return a device by name; "auto" is a GPU where there is one. Raises SpecError."""
     if name == "cuda" and not torch.cuda.is_available():
         raise SpecError("device: found no GPU that this torch can use; say --device cpu")
+    if name != "cpu" and torch.cuda.is_available():
+        check(count <= torch.cuda.device_count(), "devices", count, str(torch.cuda.device_count()))
     return torch.device("cuda" if name != "cpu" and torch.cuda.is_available() else "cpu")
 
 

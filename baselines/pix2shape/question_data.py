@@ -10,8 +10,9 @@ from torch.utils.data import Dataset
 
 from baselines.pix2shape.config import ModelConfig
 from baselines.pix2shape.data import Batch, as_batch, channels_first, check_reducible
-from iqtt.question_file import QuestionsDataset, open_questions
+from iqtt.question_file import QuestionsDataset, open_questions, parts
 from scenegen.errors import SpecError
+from scenegen.records import check
 from scenegen.truth import decode_image
 
 Z_VIEW = 10  # dimensions of the code that tell the view, of the paper's 128
@@ -79,9 +80,17 @@ def for_questions(config: ModelConfig, path: str | Path, part: str | None) -> Mo
     """Return a configuration for the images of a question file.
 
     As the paper has it: no camera, the code's last ten dimensions for the view. The depths that the
-    decoder gives are those of the sphere that the camera frames. Where no critic ties codes to the
-    prior they are standardised, or L_theta would drive them apart without end.
+    decoder gives are those of the sphere that the camera frames. Codes are standardised, or L_theta
+    would drive them apart without end, a critic or not.
+
+    Raises SpecError for a released file, and one that is not for training.
     """
+    if len(parts(path)) < 2:
+        raise SpecError(f"{path}: expected training questions, such as iqtt-train.h5")
+    least = Z_VIEW + 1
+    check(
+        config.networks.z >= least, "z scene", config.networks.z, f"{least} or more, for questions"
+    )
     with open_questions(path, part) as questions:
         if questions.spec is None:
             raise SpecError(f"{path}: a released file, expected one of iqtt make-split")
@@ -96,7 +105,7 @@ def for_questions(config: ModelConfig, path: str | Path, part: str | None) -> Mo
             classes=0,
             z_scene=spec.z - Z_VIEW,
             z_view=Z_VIEW,
-            standardised=spec.standardised or not config.adversarial,
+            standardised=True,
         ),
         depth_middle=distance,
         depth_reach=min(0.9, radius / distance),

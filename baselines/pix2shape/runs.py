@@ -58,8 +58,10 @@ def train_run(
     labels: int = 0,
     conditional: bool = False,
     progress: Callable[[State, dict[str, float]], Any] = lambda state, losses: None,
-) -> Path:
-    """Train a model, from the start or from the folder's checkpoint; return the weights' path.
+) -> Path | None:
+    """Train a model, from the start or from the folder's checkpoint.
+
+    Return the weights' path; None on all processes but the first.
 
     Args:
         config: None to go on from the checkpoint, with its labels and classes.
@@ -93,7 +95,11 @@ def train_run(
     fabric.launch()
     source, labelled = _sources(data, card.config, labels)
     folder.mkdir(parents=True, exist_ok=True)
-    logs = SummaryWriter(str(folder / LOGS)) if fabric.is_global_zero else None
+    logs = (
+        SummaryWriter(str(folder / LOGS), purge_step=state.iteration + 1)
+        if fabric.is_global_zero
+        else None
+    )
     try:
         for losses, batch in train(
             state, source, fabric, labelled=labelled, labels=labels, workers=machine.workers
@@ -109,15 +115,20 @@ def train_run(
                 card = replace(card, iteration=state.iteration, seconds=round(state.seconds, 1))
                 save_state(folder, state, card)
                 _picture(folder, logs, state, batch)
+                _save_weights(folder, state.model, card, source)
     finally:
         if logs is not None:
             logs.close()
-    if fabric.is_global_zero:
-        if not card.config.adversarial:
-            fit_prior(state.model, source)
-        save_weights(folder / WEIGHTS, state.model, card)
+    if fabric.is_global_zero and not (folder / WEIGHTS).exists():
+        _save_weights(folder, state.model, card, source)
     fabric.barrier()
-    return folder / WEIGHTS
+    return folder / WEIGHTS if fabric.is_global_zero else None
+
+
+def _save_weights(folder: Path, model: Pix2Shape, card: Card, source: Source) -> None:
+    if not card.config.adversarial:
+        fit_prior(model, source)
+    save_weights(folder / WEIGHTS, model, card)
 
 
 @torch.no_grad()
@@ -125,9 +136,11 @@ def fit_prior(model: Pix2Shape, source: Source) -> None:
     """Give the prior the distribution of codes of the first images."""
     device = next(model.parameters()).device
     loader = DataLoader(source, batch_size=BATCH, sampler=range(min(len(source), PRIOR_ITEMS)))
+    learning = model.training
     model.eval()
     batches = (source.as_batch(items).to(device) for items in loader)
     model.prior.fit(torch.cat([model.encode(batch.image, batch.views) for batch in batches]))
+    model.train(learning)
 
 
 def _picture(folder: Path, logs: SummaryWriter, state: State, batch: Batch) -> None:
@@ -156,11 +169,10 @@ def _new_card(config: ModelConfig, data: str | Path, labels: int, conditional: b
         config = replace(config, questions=config.questions if labels else 0.0)
         with open_questions(data, "unlabeled") as questions:
             assert questions.spec is not None, "for_questions has refused such files"
-            spec, mark = questions.spec.to_json(), questions.fingerprint
-        if labels:
-            with open_questions(data, "labeled") as questions:
-                check(0 < labels <= len(questions), "labels", labels, f"0 to {len(questions)}")
-        return Card(config, data=spec, fingerprint=str(mark), labels=labels)
+            spec = questions.spec.to_json()
+        with open_questions(data, "labeled") as questions:
+            check(0 <= labels <= len(questions), "labels", labels, f"0 to {len(questions)}")
+        return Card(config, data=spec, fingerprint=_fingerprint(data, labels), labels=labels)
     check(labels == 0, "labels", labels, "0 for rooms, which ask no questions")
     classes: tuple[str, ...] = ()
     with RoomsFile(data) as rooms:
@@ -169,23 +181,33 @@ def _new_card(config: ModelConfig, data: str | Path, labels: int, conditional: b
             one = rooms.spec.objects == (1, 1)
             check(one, "conditional", f"objects {rooms.spec.objects}", "one object in every room")
             classes = tuple(rooms.spec.shapes)
+    networks = config.networks
+    check(networks.camera, "camera", networks.camera, "true: rooms are seen by known cameras")
+    check(networks.classes == 0, "classes", networks.classes, "0; --conditional tells them")
     config = replace(
         config,
-        networks=replace(config.networks, classes=len(classes)),
+        networks=replace(networks, classes=len(classes)),
         mutual_information=0.0,
         questions=0.0,
     )
     return Card(config, data=spec, fingerprint=mark, classes=classes)
 
 
+def _fingerprint(data: str | Path, labels: int) -> str:
+    """Return that of rooms, or of the parts of a question file that are used."""
+    if not is_question_file(data):
+        with RoomsFile(data) as rooms:
+            return rooms.fingerprint
+    found = []
+    for part in ("unlabeled", "labeled") if labels else ("unlabeled",):
+        with open_questions(data, part) as questions:
+            found.append(str(questions.fingerprint))
+    return " ".join(found)
+
+
 def _check_same(card: Card, data: str | Path) -> None:
     """Refuse to go on with other data."""
-    if is_question_file(data):
-        with open_questions(data, "unlabeled") as questions:
-            found = str(questions.fingerprint)
-    else:
-        with RoomsFile(data) as rooms:
-            found = rooms.fingerprint
+    found = _fingerprint(data, card.labels)
     if found != card.fingerprint:
         raise SpecError(
             f"{data}: fingerprint {found[:12]}, the run was trained on {card.fingerprint[:12]};"

@@ -1,5 +1,6 @@
 """The state of training, and its checkpoint: weights, optimisers, the number of the iteration."""
 
+import errno
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -73,12 +74,12 @@ def save_state(folder: Path, state: State, card: Card) -> None:
 def load_state(folder: Path) -> tuple[State, Card]:
     """Read a folder's checkpoint. Raises OSError, FileFormatError."""
     path = folder / CHECKPOINT
+    if not path.is_file():
+        raise FileNotFoundError(errno.ENOENT, "holds no checkpoint to resume", str(folder))
     card = load_card(path)
     tensors, notes = load_tensors(path)
-    model = Pix2Shape(card.config)
     own = {k.removeprefix("model."): v for k, v in tensors.items() if k.startswith("model.")}
-    load_into(model, own, path)
-    state = _with_optimisers(model)
+    state = _with_optimisers(load_into(card, own, path))
     try:
         state.iteration, state.seconds = int(notes["iteration"]), float(notes["seconds"])
         _check(0 <= state.iteration <= card.config.iterations, f"iteration {state.iteration}")

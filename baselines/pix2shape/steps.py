@@ -4,7 +4,7 @@ Pix2Shape (IJCV 2020), Algorithm 1 and equations "rec_loss" and "app-loss". A lo
 is neither computed nor named among the numbers.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -19,6 +19,7 @@ from baselines.pix2shape.losses import (
     reconstruction_loss,
 )
 from baselines.pix2shape.model import Pix2Shape, mapped, shaded
+from baselines.pix2shape.networks import CAMERA
 
 Numbers = dict[str, Tensor]
 
@@ -107,6 +108,10 @@ def generator_step(
             losses["code_reconstruction"] = reconstruction_loss(noise.code, found)
     if config.other_views:
         others = mapped(views, lambda values: values[noise.order])
+        classes = views.condition[:, CAMERA:]  # which are the code's own
+        others = replace(
+            others, condition=torch.cat([others.condition[:, :CAMERA], classes], dim=1)
+        )
         elsewhere = model.encode(model.image(code, others), others)
         losses["other_views"] = reconstruction_loss(code, elsewhere)
     if config.disentangles:

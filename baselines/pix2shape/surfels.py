@@ -59,7 +59,7 @@ def normals_from_depth(depth: Tensor, fov_y_degrees: float) -> Tensor:
     """Return the normals of the planes fitted to each surfel and its 8 neighbours, (B, 3, H, W).
 
     Unit, n_z > 0 (the paper's equation "normal_estimation"). A plane n . P = c seen in perspective
-    has an inverse depth that is affine over the image, 1 / depth = -(n . ray) / c; so the fit is
+    has an inverse depth that is affine over the image, 1 / depth = (n . ray) / c; so the fit is
     linear least squares there, which is two convolutions, and exact on planes. At the border the
     missing neighbours are extrapolated.
 

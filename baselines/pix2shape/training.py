@@ -89,12 +89,9 @@ def _check_request(
     config: ModelConfig, labelled: QuestionImages | None, labels: int, processes: int
 ) -> None:
     smallest = config.question_batch if config.opacity else config.batch
-    check(
-        processes <= smallest,
-        "devices",
-        processes,
-        f"at most {smallest}, an image of each batch each",
-    )
+    if processes > 1:
+        even = smallest % processes == 0 and smallest >= 2 * processes
+        check(even, "devices", processes, f"a number that shares {smallest} items, 2 or more each")
     if labels:
         count = len(labelled) if labelled is not None and labelled.has_answers else 0
         check(labels <= count, "labels", labels, f"at most {count}, the answers that are told")

@@ -73,9 +73,9 @@ def save_weights(
         for name, value in model.state_dict().items()
         if name.split(".")[0] in KEPT
     }
-    beyond = [name for name, value in tensors.items() if not torch.isfinite(value).all()]
-    if beyond:
-        raise SpecError(f"{path}: {beyond[0]} is beyond the range of {dtype}")
+    if not all(torch.isfinite(value).all() for value in tensors.values()):
+        own = model.state_dict()  # beyond half precision's range
+        tensors = {name: own[name] for name in tensors}
     save_tensors(path, tensors, {})
     save_card(path, card)
 
@@ -137,19 +137,20 @@ def load_model(path: str | Path) -> tuple[Pix2Shape, Card]:
     """
     card = load_card(path)
     tensors, _ = load_tensors(path)
-    model = Pix2Shape(card.config)
-    load_into(model, tensors, path, KEPT)
-    return model.eval(), card
+    if any(name.startswith("model.") for name in tensors):
+        raise FileFormatError(f"{path}: a checkpoint; name the weights beside it")
+    return load_into(card, tensors, path, KEPT).eval(), card
 
 
 def load_into(
-    model: Pix2Shape,
-    tensors: Mapping[str, Tensor],
-    path: str | Path,
-    parts: tuple[str, ...] = PARTS,
-) -> None:
-    """Set the model's parts to stored tensors. Raises FileFormatError unless all fit."""
-    own: dict[str, Any] = model.state_dict()
+    card: Card, tensors: Mapping[str, Tensor], path: str | Path, parts: tuple[str, ...] = PARTS
+) -> Pix2Shape:
+    """Return the card's model with stored tensors. Raises FileFormatError unless all parts fit.
+
+    Shapes are compared before anything is allocated.
+    """
+    with torch.device("meta"):
+        own: dict[str, Any] = Pix2Shape(card.config).state_dict()
     wanted = {name: value for name, value in own.items() if name.split(".")[0] in parts}
     missing, unknown = sorted(wanted.keys() - tensors), sorted(tensors.keys() - own)
     if missing or unknown:
@@ -165,6 +166,11 @@ def load_into(
         kinds = [(v.is_floating_point(), v.is_complex()) for v in (found, value)]
         if kinds[0] != kinds[1] or (found.element_size() == 1 and value.element_size() > 1):
             raise FileFormatError(f"{path}: {name} is {found.dtype}, expected {value.dtype}")
-        value.copy_(found)
-        if not torch.isfinite(value).all():
-            raise FileFormatError(f"{path}: {name} is not finite")
+        cast = found.to(value.dtype)
+        if not torch.isfinite(cast).all() or (name.endswith("running_var") and (cast < 0).any()):
+            raise FileFormatError(f"{path}: {name} is not finite, or a variance below 0")
+    model = Pix2Shape(card.config)
+    for name, value in model.state_dict().items():
+        if name in wanted:
+            value.copy_(tensors[name])
+    return model

@@ -5,6 +5,8 @@ import itertools
 import pytest
 
 torch = pytest.importorskip("torch")
+from baselines.pix2shape.config import ModelConfig  # noqa: E402
+from baselines.pix2shape.model import Pix2Shape, Views, shaded  # noqa: E402
 from baselines.pix2shape.networks import (  # noqa: E402
     DECODER_CHANNELS,
     ENCODER_CHANNELS,
@@ -15,6 +17,7 @@ from baselines.pix2shape.networks import (  # noqa: E402
     NetworkSpec,
     Statistics,
 )
+from baselines.pix2shape.surfels import Scene  # noqa: E402
 
 SMALL = NetworkSpec(size=32, width=0.05)
 
@@ -108,3 +111,26 @@ def test_critic_scores_depend_on_their_own_item_only() -> None:
     together = critic(image, code, camera)
     alone = torch.cat([critic(image[[i]], code[[i]], camera[[i]]) for i in range(4)])
     torch.testing.assert_close(together, alone)
+
+
+def test_bfloat16_reaches_neither_renderer_nor_losses() -> None:
+    """An image is the same under autocast, to the bit; codes and scores are full."""
+    config = ModelConfig(networks=NetworkSpec(size=32, width=0.05))
+    model = Pix2Shape(config).eval()
+    count = 3
+    scene = Scene(
+        28.0,
+        torch.rand(count, 2, 3) + torch.tensor([0.0, 0.0, 1.5]),
+        torch.rand(count, 2, 3),
+        torch.rand(count, 3),
+        torch.rand(count, 2) + 0.2,
+        torch.rand(count, 3),
+    )
+    views = Views(torch.rand(count, 3), scene)
+    depth = 1.5 + 0.1 * torch.rand(count, 32, 32)
+    plain = shaded(depth, None, views)
+    with torch.autocast("cpu", torch.bfloat16):
+        assert torch.equal(shaded(depth, None, views), plain)
+        code = model.encode(plain, views)
+        score = model.critic(plain, code, views.condition)
+        assert {code.dtype, score.dtype, model.image(code, views).dtype} == {torch.float32}

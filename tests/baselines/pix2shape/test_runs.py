@@ -107,7 +107,7 @@ def test_a_killed_run_goes_on_as_if_it_had_not_been(last, rooms_path, folder, un
     """From the checkpoint of iteration 2, whatever came after it."""
     with pytest.raises(Killed):
         train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(last))
-    assert names(folder) == {name for name in FILES if not name.startswith("weights")}
+    assert names(folder) == FILES
     state, card = load_state(folder)
     assert state.iteration == card.iteration == 2
     steps: list[int] = []
@@ -189,7 +189,7 @@ def test_questions_and_their_labels(train_questions, folder, labels):
         ("questions", {"conditional": True}, "questions have no classes to condition on"),
         ("questions", {"labels": 4}, "labels: found 4, expected 0 to 3"),
         ("questions", {"labels": -1}, "labels: found -1, expected 0 to 3"),
-        ("test", {}, "part: found unlabeled, expected none"),
+        ("test", {}, "expected training questions, such as iqtt-train.h5"),
         ("nothing", {}, "no such file"),
         ("large", {}, "images of 32x32, expected squares of a multiple of 64 pixels"),
     ],

@@ -1,5 +1,6 @@
 """Weights and cards: the same again, and whatever else lies there told in one line."""
 
+import copy
 import json
 import os
 import resource
@@ -244,3 +245,37 @@ def test_a_write_that_fails_leaves_what_was_there(path, kind, model):
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert {p.name: p.read_bytes() for p in path.parent.iterdir()} == before
     assert str(path.with_suffix(".json") if kind == "card" else path) in str(error.value)
+
+
+def test_a_card_of_a_huge_model_allocates_nothing(path):
+    """3.4e9 parameters, each number within its range: refused by the shapes alone."""
+    card = json.loads(path.with_suffix(".json").read_text())
+    card["config"]["networks"].update(size=256, width=4.0, z_scene=4096, z_view=4096)
+    path.with_suffix(".json").write_text(json.dumps(card))
+    refused(path, "weights of another configuration")
+
+
+def test_a_checkpoint_is_told_from_weights(path):
+    save_file({f"model.{name}": value for name, value in load_file(path).items()}, path)
+    refused(path, "a checkpoint; name the weights beside it")
+
+
+def test_classes_of_card_and_networks_must_agree(path):
+    card = json.loads(path.with_suffix(".json").read_text())
+    card["classes"] = ["mug", "bowl", "hat", "lamp"]
+    path.with_suffix(".json").write_text(json.dumps(card))
+    refused(path, "classes: found 4, expected", named=path.with_suffix(".json"))
+
+
+def test_a_variance_below_zero(path):
+    name = "decoder.norms.0.norm.running_var"
+    save_file({**load_file(path), name: -torch.ones_like(load_file(path)[name])}, path)
+    refused(path, name)
+
+
+def test_beyond_half_precision_all_is_kept_in_full(model, tmp_path):
+    large = copy.deepcopy(model)
+    large.decoder.last.bias.data.fill_(1e5)
+    save_weights(tmp_path / "w.safetensors", large, Card(large.config))
+    again, _ = load_model(tmp_path / "w.safetensors")
+    assert float(again.decoder.last.bias.detach()[0]) == 1e5
