@@ -51,12 +51,10 @@ class Card:
 
     def __post_init__(self) -> None:
         normalise(self)
-        check(
-            self.format_version == FORMAT_VERSION,
-            "format version",
-            self.format_version,
-            str(FORMAT_VERSION),
-        )
+        version, known = self.format_version, self.config.networks.classes
+        check(version == FORMAT_VERSION, "format version", version, str(FORMAT_VERSION))
+        told = len(self.classes)
+        check(told == known, "classes", told, f"{known}, as the networks have")
 
 
 def save_weights(
