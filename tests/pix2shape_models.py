@@ -50,7 +50,8 @@ def written(path: Path, config: Any, **card: Any) -> Path:
     """Write the weights of such a model."""
     from baselines.pix2shape.weights import Card, save_weights
 
-    save_weights(path, made(config), Card(config, **card))
+    names = tuple(f"class {i}" for i in range(config.networks.classes))
+    save_weights(path, made(config), Card(config, **{"classes": names, **card}))
     return path
 
 
