@@ -49,7 +49,7 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     "--config",
     type=click.Choice(["compact", "paper"]),
-    help="compact: two hours on two cores; paper: the paper's.  [compact]",
+    help="compact: an hour on two cores; paper: the paper's.  [compact]",
 )
 @click.option(
     "--set", "settings", type=Setting(), multiple=True, help="Change one setting of the config."

@@ -34,7 +34,7 @@ PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and so many 
 
 @dataclass(frozen=True)
 class Machine:
-    """Where training happens; what it gives is the same, to rounding.
+    """Where training happens; one process gives the same anywhere, to rounding.
 
     Attributes:
         accelerator, devices, precision: Lightning Fabric's.
