@@ -126,14 +126,15 @@ def train(
 @click.option("--run", default="", help="Name of this run among several of the method.")
 @DEVICE
 @OVERWRITE
-def predict(weights: str, data: str, out: str, run: str, device: str, overwrite: bool) -> None:
+def predict(
+    weights: str | None, data: str, out: str, run: str, device: str, overwrite: bool
+) -> None:
     """Predict every view of each room from its input view alone, or answer questions."""
     needs_torch()
     from baselines.pix2shape.bundled import suited
     from baselines.pix2shape.predict import predict_file
 
     weights = weights or suited(data)
-
     with show_progress("row") as bar:
         predict_file(weights, data, out, run=run, device=device, overwrite=overwrite, progress=bar)
     click.echo(f"{out}: {weights} on {data}; score it with `bench score {out}`")
@@ -194,7 +195,9 @@ def interpolate(weights: str | None, data: str, items: list[int], steps: int, ou
 @click.option("--degrees", type=click.IntRange(0, 90), default=80, show_default=True)
 @click.option("--frames", type=click.IntRange(2, 200), default=33, show_default=True)
 @click.option("--out", default="rotation.gif", show_default=True, help="GIF or WebP to write.")
-def rotate(weights: str, data: str, items: list[int], degrees: int, frames: int, out: str) -> None:
+def rotate(
+    weights: str | None, data: str, items: list[int], degrees: int, frames: int, out: str
+) -> None:
     """Turn the camera around scenes that were seen from one side."""
     needs_torch()
     from baselines.pix2shape.bundled import open_weights, suited

@@ -94,10 +94,6 @@ class Pix2Shape(nn.Module):
         depth = self.config.depth_middle * (1 + self.config.depth_reach * torch.tanh(raw[:, 0]))
         return depth, torch.sigmoid(raw[:, 1]) if self.config.opacity else None
 
-    def decode(self, code: Tensor, views: Views) -> Tensor:
-        """Return the depth maps of codes seen from views: (B, z) -> (B, S, S), scene units."""
-        return self.surfels(code, views.condition)[0]
-
     def image(self, code: Tensor, views: Views) -> Tensor:
         """Return the rendered images of codes: (B, z) -> (B, 3, S, S)."""
         return shaded(*self.surfels(code, views.condition), views)

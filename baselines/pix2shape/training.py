@@ -53,11 +53,11 @@ def train(
     Raises:
         TrainingError: a loss or a gradient is not finite. The weights are those of before the step,
             but not the batch statistics: go on from a checkpoint.
-        SpecError: no loss is switched on, there are not so many labels, or more processes than
-            images in a batch.
+        SpecError: no loss is switched on, there are not so many labels, or the processes cannot
+            share a batch evenly.
     """
     config, model = state.model.config, state.model
-    _check_request(config, labelled, labels, fabric.world_size)
+    _check_request(config, _batch_size(config, source), labelled, labels, fabric.world_size)
     fabric.to_device(model)
     for optimiser in (state.generator, state.critic):  # moves the moments to the weights' device
         optimiser.load_state_dict(optimiser.state_dict())
@@ -86,12 +86,15 @@ def train(
 
 
 def _check_request(
-    config: ModelConfig, labelled: QuestionImages | None, labels: int, processes: int
+    config: ModelConfig,
+    size: int,
+    labelled: QuestionImages | None,
+    labels: int,
+    processes: int,
 ) -> None:
-    smallest = config.question_batch if config.opacity else config.batch
     if processes > 1:
-        even = smallest % processes == 0 and smallest >= 2 * processes
-        check(even, "devices", processes, f"a number that shares {smallest} items, 2 or more each")
+        even = size % processes == 0 and size >= 2 * processes
+        check(even, "devices", processes, f"a number that shares {size} items, 2 or more each")
     if labels:
         count = len(labelled) if labelled is not None and labelled.has_answers else 0
         check(labels <= count, "labels", labels, f"at most {count}, the answers that are told")
@@ -99,6 +102,11 @@ def _check_request(
     weights = (config.adversarial, config.reconstruction, config.code_reconstruction)
     if not any((*weights, config.other_views, config.depth, asked)):
         raise SpecError("losses: found every weight at 0, expected one above")
+
+
+def _batch_size(config: ModelConfig, source: Source) -> int:
+    """Items of a batch: images of rooms, or questions."""
+    return config.question_batch if isinstance(source, QuestionImages) else config.batch
 
 
 class _Told(Dataset[Any]):
@@ -148,7 +156,7 @@ def _loaded(
 
 def _batches(source: Source, fabric: Fabric, state: State, workers: int) -> Iterator[Batch]:
     config = state.model.config
-    size = config.question_batch if isinstance(source, QuestionImages) else config.batch
+    size = _batch_size(config, source)
     first = state.iteration * config.batches_per_iteration
     for items in _loaded(source, len(source), size, first, config.seed, fabric, workers):
         yield source.as_batch(items).to(fabric.device)
@@ -158,7 +166,7 @@ def _questions(
     source: QuestionImages, labels: int, fabric: Fabric, state: State
 ) -> Iterator[tuple[Batch, Tensor]]:
     config = state.model.config
-    size = config.question_batch
+    size = _batch_size(config, source)
     for items in _loaded(source, labels, size, state.iteration, config.seed, fabric, 0):
         yield source.as_batch(items).to(fabric.device), items["answer"].to(fabric.device)
 

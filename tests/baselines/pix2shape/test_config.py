@@ -76,7 +76,7 @@ def test_depth_stays_within_its_reach_whatever_the_code() -> None:
     config = replace(TINY, depth_middle=2.0, depth_reach=0.25)
     model, views = Pix2Shape(config), some_views(3)
     torch.nn.init.normal_(model.decoder.last.weight, std=9.0)
-    depth = model.decode(9 * torch.randn(3, 128), views).detach()
+    depth = model.surfels(9 * torch.randn(3, 128), views.condition)[0].detach()
     assert depth.shape == (3, 32, 32)
     assert 1.5 <= float(depth.min()) < 1.6
     assert 2.4 < float(depth.max()) <= 2.5
@@ -89,7 +89,7 @@ def test_image_to_code_to_image() -> None:
     assert code.shape == (2, 128)
     model.eval()
     image = model.image(code, views)
-    torch.testing.assert_close(image, render(model.decode(code, views), views.scene))
+    torch.testing.assert_close(image, render(model.surfels(code, views.condition)[0], views.scene))
     image.mean().backward()
     for network in (model.encoder, model.decoder):
         assert all(p.grad is not None for p in network.parameters())

@@ -68,7 +68,7 @@ def test_images_depths_and_normals_of_codes(batch):
     code = torch.randn(5, 128, generator=torch.Generator().manual_seed(0))
     images, depths, normals = drawn(model, code, batch.views)
     with torch.no_grad():
-        depth = model.decode(code, batch.views)
+        depth, _ = model.surfels(code, batch.views.condition)
         radiance = model.image(code, batch.views)
     facing = normals_from_depth(depth, batch.views.scene.fov_y_degrees)
     for i in range(5):
