@@ -167,3 +167,13 @@ def verdict(run: Callable[..., Result]) -> Callable[..., tuple[int, dict[str, st
 def contents(folder: Path) -> dict[str, int]:
     """Return names and sizes of all that lies in a folder."""
     return {str(path): path.lstat().st_size for path in folder.rglob("*")}
+
+
+@pytest.fixture(scope="session")
+def pix2shape_files(truths: Any, make_rooms: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder of rooms, questions and weights that no test changes."""
+    pytest.importorskip("torch")
+    from pix2shape_commands import prepare
+
+    folder = tmp_path_factory.mktemp("pix2shape")
+    return prepare(folder, Path(truths.rooms), Path(truths.iqtt), make_rooms)

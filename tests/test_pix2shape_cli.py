@@ -11,7 +11,7 @@ from typing import Any
 
 import h5py
 import pytest
-from pix2shape_commands import bench, invoke, linked, pix2shape, prepare, train
+from pix2shape_commands import bench, invoke, linked, pix2shape, train
 
 import cli
 from baselines.pix2shape.commands import PACKAGES
@@ -19,20 +19,11 @@ from baselines.pix2shape.commands import PACKAGES
 COMMANDS = ("train", "predict", "sample", "interpolate", "rotate")
 
 
-@pytest.fixture(scope="session")
-def prepared(truths: Any, make_rooms: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder of files and weights that no test changes."""
-    pytest.importorskip("torch")
-    return prepare(
-        tmp_path_factory.mktemp("pix2shape"), Path(truths.rooms), Path(truths.iqtt), make_rooms
-    )
-
-
 @pytest.fixture
-def folder(prepared: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(pix2shape_files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Work in a folder that holds links to those files."""
     monkeypatch.chdir(tmp_path)
-    return linked(prepared, tmp_path)
+    return linked(pix2shape_files, tmp_path)
 
 
 def test_train_predict_score(folder):

@@ -1,11 +1,10 @@
 """Mistakes that a user of the reference model's commands makes: one line each, and nothing left."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 from h5_edits import damaged_chunk
-from pix2shape_commands import bench, files_in, linked, pix2shape, prepare, train
+from pix2shape_commands import bench, files_in, linked, pix2shape, train
 from pix2shape_models import edited
 
 torch = pytest.importorskip("torch")
@@ -15,20 +14,11 @@ ROOMS, LARGE = "--data rooms.h5", "--data large.h5 --out run --workers 0"
 WITH = "--weights rooms.safetensors"
 
 
-@pytest.fixture(scope="session")
-def prepared(truths: Any, make_rooms: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder of files and weights that no test changes."""
-    pytest.importorskip("torch")
-    return prepare(
-        tmp_path_factory.mktemp("pix2shape"), Path(truths.rooms), Path(truths.iqtt), make_rooms
-    )
-
-
 @pytest.fixture
-def folder(prepared: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(pix2shape_files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Work in a folder that holds links to those files."""
     monkeypatch.chdir(tmp_path)
-    return linked(prepared, tmp_path)
+    return linked(pix2shape_files, tmp_path)
 
 
 @pytest.mark.parametrize(
