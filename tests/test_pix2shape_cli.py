@@ -27,7 +27,7 @@ def folder(pix2shape_files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_train_predict_score(folder):
-    small = [f"--set={one}" for one in ("iterations=2", "batch=2", "other_views=0")]
+    small = [f"--set={one}" for one in ("iterations=2", "batch=2", "consistency=0")]
     made = train(*small, "--seed", 5)
     assert made.exit_code == 0, made.output
     assert made.stdout.startswith(

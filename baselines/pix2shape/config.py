@@ -14,14 +14,15 @@ CONFIGS: dict[str, dict[str, Any]] = {
     "compact": {
         "networks": NetworkSpec(size=64, width=0.125),
         "batch": 16,
-        "iterations": 12_000,
-        "learning_rate": 5e-4,
+        "iterations": 20_000,
+        "learning_rate": 1e-3,
         "betas": (0.9, 0.99),
         "decay": True,
         "critic_steps": 1,
         "adversarial": 0.0,
         "code_reconstruction": 0.0,
-        "other_views": 3.0,
+        "absolute_differences": True,
+        "consistency": 30.0,
         "questions": 0.1,
     },
 }
@@ -31,7 +32,7 @@ LOSSES = (
     "adversarial",
     "reconstruction",
     "code_reconstruction",
-    "other_views",
+    "consistency",
     "mutual_information",
     "questions",
     "depth",
@@ -50,7 +51,8 @@ class ModelConfig:
         iterations, batch: of training, in images; Adam with `learning_rate` and `betas`.
         decay: whether the learning rate falls to nothing over the second half.
         critic_steps: of the critic, for each of the others.
-        adversarial, reconstruction, code_reconstruction, other_views, mutual_information,
+        absolute_differences: whether images are compared by them, instead of by the paper's norm.
+        adversarial, reconstruction, code_reconstruction, consistency, mutual_information,
         questions, depth:
             weights of the losses; 0 switches one off. `depth` is the ablation's supervision.
         seed: of weights and of every random choice of training.
@@ -66,10 +68,11 @@ class ModelConfig:
     betas: tuple[float, float] = (0.5, 0.9)
     decay: bool = False
     critic_steps: int = 5
+    absolute_differences: bool = False
     adversarial: float = 1.0
     reconstruction: float = 1.0
     code_reconstruction: float = 1.0
-    other_views: float = 0.0
+    consistency: float = 0.0
     mutual_information: float = 1.0
     questions: float = 1.0
     depth: float = 0.0

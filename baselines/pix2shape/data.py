@@ -140,6 +140,7 @@ class RoomImages(Dataset[dict[str, Any]]):
             "ambient": self.ambient[row],
             "attenuation": self.attenuation[row],
             "reflectance": self.reflectance[row],
+            "world_from_camera": pose,
         }
         return {name: np.float32(value) for name, value in known.items()}
 
@@ -157,7 +158,8 @@ def as_batch(items: dict[str, Tensor], fov_y_degrees: float) -> Batch:
 def as_views(items: dict[str, Tensor], fov_y_degrees: float) -> Views:
     """Put the collated fields of views together."""
     known = {f.name: items[f.name] for f in fields(Scene) if f.name in items}
-    return Views(items["condition"], Scene(fov_y_degrees, **known), items.get("background"))
+    scene = Scene(fov_y_degrees, **known)
+    return Views(items["condition"], scene, items.get("background"), items.get("world_from_camera"))
 
 
 class Draws(Sampler[list[int]]):

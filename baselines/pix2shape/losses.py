@@ -9,7 +9,12 @@ from collections.abc import Callable
 
 import torch
 from torch import Tensor
+from torch.nn import functional
 
+from baselines.pix2shape.surfels import back_project
+
+HIDDEN = 0.1  # scene units behind another surface at which a surfel counts as hidden by it
+NEAR = 0.05  # scene units; what is nearer to a camera, or behind it, is taken to be there
 PENALTY = 10.0  # lambda of the gradient penalty
 
 
@@ -53,6 +58,44 @@ def reconstruction_loss(values: Tensor, again: Tensor) -> Tensor:
     """Return E ||a - b||_2, the norm over all numbers of an image or code: two (B, ...)."""
     squared = ((values - again).flatten(1) ** 2).sum(dim=1)
     return torch.sqrt(squared + 1e-12).mean()
+
+
+def absolute_loss(values: Tensor, again: Tensor) -> Tensor:
+    """Return E ||a - b||_1 / sqrt(n) of two (B, ...) of n numbers each.
+
+    As large as the norm where all numbers are equally wrong, and less ruled by the few that are
+    most: pixels at outlines, which belong to two surfaces.
+    """
+    differences = (values - again).flatten(1)
+    return differences.abs().mean() * math.sqrt(differences.shape[1])
+
+
+def disagreement(
+    depth: Tensor, other_depth: Tensor, other_from_camera: Tensor, fov_y_degrees: float
+) -> Tensor:
+    """Return how far surfels of one view lie from those of another, a mean over those it sees.
+
+    Of each surfel, the difference between its depth in the other camera and what that camera sees
+    in its place; surfels out of the other's sight, or behind what it sees by more than HIDDEN, are
+    left out. As in learning depth from video (Zhou et al. 2017; Bian et al. 2019), with surfels of
+    one code in place of two images' depth maps.
+
+    Args:
+        depth, other_depth: (B, S, S), scene units.
+        other_from_camera: (B, 4, 4).
+    """
+    points = back_project(depth, fov_y_degrees).flatten(2)
+    points = other_from_camera[:, :3, :3] @ points + other_from_camera[:, :3, 3:]
+    its_depth = (-points[:, 2]).clamp(min=NEAR)
+    edge = math.tan(math.radians(fov_y_degrees) / 2)
+    place = torch.stack([points[:, 0], -points[:, 1]], dim=2) / (edge * its_depth)[..., None]
+    inverse = functional.grid_sample(  # which is affine on planes
+        1 / other_depth[:, None], place[:, None], padding_mode="border", align_corners=False
+    )
+    behind = its_depth - 1 / inverse[:, 0, 0]
+    between_centres = (place.abs() < 1 - 1 / depth.shape[1]).all(dim=2)
+    counted = between_centres & (behind < HIDDEN)
+    return (behind.abs() * counted).sum() / counted.sum().clamp(min=1)
 
 
 def mutual_information(

@@ -34,11 +34,13 @@ class Views:
         condition: the camera's position, world, and the one-hot class: (B, spec.condition).
         scene: what their images are shaded with.
         background: radiance where there is no surface, (B, 3); None where there always is one.
+        world_from_camera: (B, 4, 4); None where views are not compared with each other.
     """
 
     condition: Tensor
     scene: Scene
     background: Tensor | None = None
+    world_from_camera: Tensor | None = None
 
 
 class Prior(nn.Module):

@@ -110,5 +110,5 @@ def for_questions(config: ModelConfig, path: str | Path, part: str | None) -> Mo
         depth_middle=distance,
         depth_reach=min(0.9, radius / distance),
         opacity=True,
-        other_views=0.0,
+        consistency=0.0,
     )

@@ -11,7 +11,9 @@ from torch import Tensor
 
 from baselines.pix2shape.data import Batch
 from baselines.pix2shape.losses import (
+    absolute_loss,
     critic_loss,
+    disagreement,
     generator_loss,
     gradient_penalty,
     mutual_information,
@@ -87,11 +89,12 @@ def generator_step(
     config, views = model.config, batch.views
     code = model.encode(batch.image, views)
     losses: Numbers = {}
-    if config.reconstruction or config.depth:
+    if config.reconstruction or config.depth or config.consistency:
         depth, opacity = model.surfels(code, views.condition)
         if config.reconstruction:
             again = shaded(depth, opacity, views)
-            losses["reconstruction"] = reconstruction_loss(batch.image, again)
+            compared = absolute_loss if config.absolute_differences else reconstruction_loss
+            losses["reconstruction"] = compared(batch.image, again)
         if config.depth and batch.depth is not None:
             known = torch.isfinite(batch.depth)
             wrong = torch.where(known, depth - torch.where(known, batch.depth, 0), 0)
@@ -106,14 +109,23 @@ def generator_step(
         if config.code_reconstruction:
             found = model.encode(made, views)
             losses["code_reconstruction"] = reconstruction_loss(noise.code, found)
-    if config.other_views:
+    if config.consistency:
         others = mapped(views, lambda values: values[noise.order])
         classes = views.condition[:, CAMERA:]  # which are the code's own
         others = replace(
             others, condition=torch.cat([others.condition[:, :CAMERA], classes], dim=1)
         )
-        elsewhere = model.encode(model.image(code, others), others)
-        losses["other_views"] = reconstruction_loss(code, elsewhere)
+        elsewhere, _ = model.surfels(code, others.condition)
+        own, other = views.world_from_camera, others.world_from_camera
+        assert own is not None
+        assert other is not None
+        other_from_own = torch.linalg.solve(other, own)
+        own_from_other = torch.linalg.inv(other_from_own)
+        fov = views.scene.fov_y_degrees
+        losses["consistency"] = (
+            disagreement(depth, elsewhere, other_from_own, fov)
+            + disagreement(elsewhere, depth, own_from_other, fov)
+        ) / 2
     if config.disentangles:
         losses["mutual_information"] = mutual_information(
             model.statistics, *_halves(model, code), noise.order

@@ -100,7 +100,7 @@ def _check_request(
         check(labels <= count, "labels", labels, f"at most {count}, the answers that are told")
     asked = config.questions if labels else 0.0
     weights = (config.adversarial, config.reconstruction, config.code_reconstruction)
-    if not any((*weights, config.other_views, config.depth, asked)):
+    if not any((*weights, config.consistency, config.depth, asked)):
         raise SpecError("losses: found every weight at 0, expected one above")
 
 

@@ -6,7 +6,9 @@ import pytest
 
 torch = pytest.importorskip("torch")
 from baselines.pix2shape.losses import (  # noqa: E402
+    absolute_loss,
     critic_loss,
+    disagreement,
     generator_loss,
     gradient_penalty,
     mutual_information,
@@ -97,3 +99,70 @@ def test_question_loss_and_answers_by_hand() -> None:
     by_hand = [0.5 * 1 - 0.5 * (4 + 9), 0.5 * 0 - 0.5 * (9 + 1)]
     assert float(question_loss(codes, answers)) == pytest.approx(sum(by_hand) / 2)
     assert squared_distances(codes).tolist() == [[1, 4, 9], [9, 0, 1]]
+
+
+def test_absolute_differences_are_as_large_as_the_norm_where_all_are_equal() -> None:
+    values = torch.zeros(2, 3, 4, 4)
+    again = torch.full((2, 3, 4, 4), -0.5)
+    assert float(absolute_loss(values, again)) == pytest.approx(0.5 * math.sqrt(48))
+    assert float(reconstruction_loss(values, again)) == pytest.approx(0.5 * math.sqrt(48))
+    again[:, 0] = 1.0
+    assert float(absolute_loss(values, again)) == pytest.approx((2 * 0.5 + 1) / 3 * math.sqrt(48))
+
+
+FOV = 60.0
+
+
+def ahead(z: float, x: float = 0.0) -> torch.Tensor:
+    """Return other_from_camera of a camera moved by z along -z and by x along x, not turned."""
+    other_from_camera = torch.eye(4)[None].clone()
+    other_from_camera[0, :3, 3] = torch.tensor([-x, 0.0, z])
+    return other_from_camera
+
+
+def tilted(slope: float, constant: float) -> torch.Tensor:
+    """Return depth (1, 16, 16) of the plane z = slope x - constant, camera frame."""
+    x = (torch.arange(16) + 0.5 - 8) / 8 * math.tan(math.radians(FOV) / 2)
+    return (constant / (1 + slope * x)).expand(1, 16, 16)
+
+
+def test_views_of_one_plane_agree() -> None:
+    """z = s x - c from a camera at x = d and 1 ahead: z' + -1 = s (x' + d) - c."""
+    for slope, aside in ((0.0, 0.0), (0.5, 0.0), (0.5, 0.1), (-0.4, -0.2)):
+        own, other = tilted(slope, 3.0), tilted(slope, 2.0 - slope * aside)
+        assert float(disagreement(own, other, ahead(1.0, aside), FOV)) < 1e-6
+        assert float(disagreement(own, 1.02 * other, ahead(1.0, aside), FOV)) > 0.02
+
+
+def test_disagreement_is_the_distance_in_front_and_just_behind() -> None:
+    own = torch.full((1, 16, 16), 3.0, requires_grad=True)
+    for other in (2.5, 2.95, 3.05, 4.0):
+        seen = torch.full((1, 16, 16), other, requires_grad=True)
+        found = disagreement(own, seen, torch.eye(4)[None], FOV)
+        expected = abs(3 - other) if other > 2.9 else 0.0  # hidden from the other camera
+        assert float(found.detach()) == pytest.approx(expected, abs=1e-6)
+        slopes = torch.autograd.grad(found, [own, seen], allow_unused=True)
+        for slope, sign in zip(slopes, (1, -1), strict=True):
+            assert slope is not None
+            side = 0 if other < 2.9 else math.copysign(1, 3 - other)
+            assert float(slope.sum()) == pytest.approx(sign * side, abs=1e-5)
+
+
+def test_only_surfels_in_the_others_sight_count() -> None:
+    """The left half is wrong by 0.05; a camera moved to the right by the image's width at 3."""
+    own = torch.full((1, 16, 16), 3.0)
+    own[:, :, :8] = 2.95
+    width = 2 * 3 * math.tan(math.radians(FOV) / 2)
+    other = torch.full((1, 16, 16), 3.0)
+    assert float(disagreement(own, other, torch.eye(4)[None], FOV)) == pytest.approx(0.025)
+    assert float(disagreement(own, other, ahead(0.0, width / 2), FOV)) < 1e-6
+    for elsewhere in (ahead(0.0, 2 * width), ahead(10.0)):  # past it, and beyond it
+        assert float(disagreement(own, other, elsewhere, FOV)) == 0
+
+
+def test_disagreement_takes_each_image_with_its_own_camera() -> None:
+    own = torch.stack([torch.full((16, 16), 3.0), torch.full((16, 16), 3.0)])
+    other = torch.stack([torch.full((16, 16), 2.0), torch.full((16, 16), 2.5)])
+    poses = torch.cat([ahead(1.0), ahead(0.5)])
+    assert float(disagreement(own, other, poses, FOV)) < 1e-6
+    assert float(disagreement(own, other.flip(0), poses, FOV)) > 0.2

@@ -11,6 +11,7 @@ torch = pytest.importorskip("torch")
 from baselines.pix2shape.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.data import Batch  # noqa: E402
 from baselines.pix2shape.losses import (  # noqa: E402
+    absolute_loss,
     mutual_information,
     question_loss,
     reconstruction_loss,
@@ -18,11 +19,11 @@ from baselines.pix2shape.losses import (  # noqa: E402
 from baselines.pix2shape.model import Pix2Shape, Views  # noqa: E402
 from baselines.pix2shape.networks import NetworkSpec  # noqa: E402
 from baselines.pix2shape.steps import critic_step, draw, generator_step  # noqa: E402
-from baselines.pix2shape.surfels import Scene  # noqa: E402
+from baselines.pix2shape.surfels import Scene, pixel_rays  # noqa: E402
 
 NETWORKS = NetworkSpec(size=32, width=0.05, z_scene=6, z_view=2)
 LOSSES = (
-    "adversarial", "reconstruction", "code_reconstruction", "other_views", "mutual_information",
+    "adversarial", "reconstruction", "code_reconstruction", "consistency", "mutual_information",
     "questions", "depth",
 )  # fmt: skip
 NEEDED = {"adversarial": {"critic"}, "mutual_information": {"statistics"}}
@@ -44,7 +45,8 @@ def some_batch(size: int = 8, seed: int = 1) -> Batch:
         return torch.rand(size, *shape, generator=source)
 
     scene = Scene(28.0, 2 * rand(2, 3), rand(2, 3), rand(3), 0.2 + rand(2), 0.2 + rand(3))
-    return Batch(rand(3, 32, 32), Views(rand(3), scene), 1 + rand(32, 32))
+    pose = torch.eye(4).repeat(size, 1, 1)
+    return Batch(rand(3, 32, 32), Views(rand(3), scene, world_from_camera=pose), 1 + rand(32, 32))
 
 
 def labelled() -> tuple[Batch, Any]:
@@ -156,37 +158,54 @@ def test_questions_teach_the_scenes_part_of_the_code():
     assert losses["questions"].item() == pytest.approx(question_loss(codes, answers).item())
 
 
-class Known(Pix2Shape):
-    """Encoder and decoder that undo each other exactly, given the same camera."""
+class Sphere(Pix2Shape):
+    """Whatever the code, the inside of a sphere around the origin, told from the camera's place."""
 
-    def image(self, code: Any, views: Views) -> Any:
-        self.rendered = views
-        return (code + views.condition)[..., None, None].expand(-1, -1, 32, 32)
+    radius = 2.0
 
-    def encode(self, image: Any, views: Views) -> Any:
-        return image.mean(dim=(2, 3)) - views.condition
-
-
-class Blind(Known):
-    """The decoder forgets the camera, so that codes come back wrong by the other's position."""
-
-    def image(self, code: Any, views: Views) -> Any:
-        return code[..., None, None].expand(-1, -1, 32, 32)
+    def surfels(self, code: Any, condition: Any) -> Any:
+        self.seen = [*getattr(self, "seen", []), condition]
+        turn = facing_the_origin(condition)[:, :3, :3]
+        x, y = pixel_rays(32, 32, 28.0, condition)
+        rays = torch.stack([x + 0 * y, y + 0 * x, -1 + 0 * x * y])
+        along = torch.einsum("bij,jhw->bihw", turn, rays)
+        b = torch.einsum("bihw,bi->bhw", along, condition)
+        a, c = (along**2).sum(dim=1), (condition**2).sum(dim=1)[:, None, None] - self.radius**2
+        return (-b + torch.sqrt(b**2 - a * c)) / a, None
 
 
-def test_other_views_lose_what_the_other_camera_changes():
-    config = replace(only(other_views=1.0), networks=NetworkSpec(size=32, width=0.05, z_scene=3))
+def facing_the_origin(place: Any) -> Any:
+    """Return cameras at places (B, 3), upright, that look at the origin: world_from_camera."""
+    back = torch.nn.functional.normalize(place, dim=1)
+    right = torch.linalg.cross(torch.tensor([[0.0, 0.0, 1.0]]).expand_as(back), back)
+    right = torch.nn.functional.normalize(right, dim=1)
+    pose = torch.eye(4).repeat(len(place), 1, 1)
+    pose[:, :3] = torch.stack([right, torch.linalg.cross(back, right), back, place], dim=2)
+    return pose
+
+
+def test_consistency_loses_what_two_cameras_disagree_on():
+    config = replace(only(consistency=1.0), networks=NetworkSpec(size=32, width=0.05, z_scene=3))
     batch, noise = some_batch(), draw(8, 3, 3)
-    known = Known(config)
-    assert generator_step(known, batch, noise)[1]["other_views"] < 1e-5
-    order, scene = noise.order, batch.views.scene
-    assert (order != torch.arange(8)).any()
-    assert torch.equal(known.rendered.condition, batch.views.condition[order])
-    for name in ("light_position", "light_color", "ambient", "attenuation", "reflectance"):
-        assert torch.equal(getattr(known.rendered.scene, name), getattr(scene, name)[order]), name
-    lost = generator_step(Blind(config), batch, noise)[1]["other_views"]
-    expected = reconstruction_loss(batch.views.condition, torch.zeros(8, 3))
-    assert lost.item() == pytest.approx(expected.item(), rel=1e-5)
+    place = 0.5 + batch.views.condition
+    views = replace(batch.views, condition=place, world_from_camera=facing_the_origin(place))
+    batch, sphere = replace(batch, views=views), Sphere(config)
+    assert generator_step(sphere, batch, noise)[1]["consistency"] < 1e-3
+    assert torch.equal(sphere.seen[0], place)
+    assert torch.equal(sphere.seen[1], place[noise.order])
+    wrong = views.world_from_camera.clone()
+    wrong[:, 2, 3] += torch.linspace(0, 0.1, 8)  # each camera elsewhere than the decoder thinks
+    batch = replace(batch, views=replace(views, world_from_camera=wrong))
+    assert generator_step(sphere, batch, noise)[1]["consistency"] > 5e-3
+
+
+def test_images_are_compared_by_the_norm_or_by_absolute_differences():
+    batch = some_batch()
+    for absolute, expected in ((False, reconstruction_loss), (True, absolute_loss)):
+        model = model_of(replace(only(reconstruction=1.0), absolute_differences=absolute))
+        found = generator_step(model, batch, draw(8, 8, 3))[1]["reconstruction"]
+        again = model.image(model.encode(batch.image, batch.views), batch.views)
+        assert found.item() == pytest.approx(expected(batch.image, again).item(), rel=1e-5)
 
 
 def test_noise_is_the_seeds():

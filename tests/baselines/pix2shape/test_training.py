@@ -79,7 +79,7 @@ def test_a_stop_in_the_middle_changes_nothing(case, rooms_path, train_path, fabr
     config, how = replace(TINY, decay=True), {}
     broken_how = {"workers": 2} if case == "workers" else {}
     if case == "critic steps":
-        config = replace(config, critic_steps=2, other_views=0.1)
+        config = replace(config, critic_steps=2, consistency=0.1)
     source = RoomImages(rooms_path, config)
     if case == "questions":
         config = replace(config, questions=0.1, mutual_information=0.1, batch=12)
