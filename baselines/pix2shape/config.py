@@ -24,6 +24,8 @@ CONFIGS: dict[str, dict[str, Any]] = {
         "absolute_differences": True,
         "consistency": 30.0,
         "questions": 0.1,
+        "contrast": 10.0,
+        "question_batch": 32,
     },
 }
 
@@ -35,6 +37,7 @@ LOSSES = (
     "consistency",
     "mutual_information",
     "questions",
+    "contrast",
     "depth",
 )
 
@@ -50,10 +53,11 @@ class ModelConfig:
         opacity: whether the decoder also tells which rays meet nothing.
         iterations, batch: of training, in images; Adam with `learning_rate` and `betas`.
         decay: whether the learning rate falls to nothing over the second half.
+        question_batch: questions whose codes are compared, of those that one iteration takes.
         critic_steps: of the critic, for each of the others.
         absolute_differences: whether images are compared by them, instead of by the paper's norm.
         adversarial, reconstruction, code_reconstruction, consistency, mutual_information,
-        questions, depth:
+        questions, contrast, depth:
             weights of the losses; 0 switches one off. `depth` is the ablation's supervision.
         seed: of weights and of every random choice of training.
     """
@@ -64,6 +68,7 @@ class ModelConfig:
     opacity: bool = False
     iterations: int = 60_000
     batch: int = 6
+    question_batch: int = 2
     learning_rate: float = 1e-4
     betas: tuple[float, float] = (0.5, 0.9)
     decay: bool = False
@@ -75,6 +80,7 @@ class ModelConfig:
     consistency: float = 0.0
     mutual_information: float = 1.0
     questions: float = 1.0
+    contrast: float = 0.0
     depth: float = 0.0
     seed: int = 0
 
@@ -84,6 +90,7 @@ class ModelConfig:
         check(self.depth_middle > 0, "depth middle", self.depth_middle, "a positive number")
         check(self.iterations >= 1, "iterations", self.iterations, "1 or more")
         check(self.batch >= 2, "batch", self.batch, "2 or more")
+        check(self.question_batch >= 2, "question batch", self.question_batch, "2 or more")
         check(self.critic_steps >= 1, "critic steps", self.critic_steps, "1 or more")
         check(self.learning_rate > 0, "learning rate", self.learning_rate, "a positive number")
         in_range = len(self.betas) == 2 and all(0 <= beta < 1 for beta in self.betas)
@@ -109,7 +116,7 @@ class ModelConfig:
         return self.critic_steps if self.has_critic else 1
 
     @property
-    def question_batch(self) -> int:
+    def questions_per_batch(self) -> int:
         """Questions whose images fill a batch, four each."""
         return -(-self.batch // 4)
 

@@ -15,6 +15,7 @@ from baselines.pix2shape.surfels import back_project
 
 HIDDEN = 0.1  # scene units behind another surface at which a surfel counts as hidden by it
 NEAR = 0.05  # scene units; what is nearer to a camera, or behind it, is taken to be there
+TEMPERATURE = 0.2  # of mean squared differences of standardised numbers; they are about 2 apart
 PENALTY = 10.0  # lambda of the gradient penalty
 
 
@@ -128,6 +129,29 @@ def question_loss(codes: Tensor, answers: Tensor) -> Tensor:
     squared = squared_distances(codes)
     right = squared.gather(1, answers[:, None]).squeeze(1)
     return (0.5 * right - 0.5 * (squared.sum(dim=1) - right)).mean()
+
+
+def contrast_loss(codes: Tensor, answers: Tensor) -> Tensor:
+    """Return how badly a question's answers are told from those of the other questions, nats.
+
+    One of a question's three answers shows the reference's shape, and hardly any of another
+    question's does: so of all answers of a batch, one of its own three is to be the reference's
+    nearest. That needs no label; where the right answer is known, it alone counts as the own
+    (Miech et al. 2020, MIL-NCE, "End-to-End Learning of Visual Representations").
+
+    Args:
+        codes: z_scene of reference and three answers, standardised, (Q, 4, n).
+        answers: which of the three is right, (Q,) integers; -1 where that is not known.
+    """
+    count, _, n = codes.shape
+    everyone = codes[:, 1:].reshape(-1, n)
+    squared = (codes[:, 0, None] - everyone).square().mean(dim=2)
+    likeness = -squared / TEMPERATURE  # (Q, 3 Q)
+    place = torch.arange(3 * count, device=codes.device)
+    own = place // 3 == torch.arange(count, device=codes.device)[:, None]
+    own &= (answers[:, None] < 0) | (place % 3 == answers[:, None])
+    nearest = torch.logsumexp(likeness.masked_fill(~own, -torch.inf), dim=1)
+    return (torch.logsumexp(likeness, dim=1) - nearest).mean()
 
 
 def squared_distances(codes: Tensor) -> Tensor:

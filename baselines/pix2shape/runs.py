@@ -189,6 +189,7 @@ def _new_card(config: ModelConfig, data: str | Path, labels: int, conditional: b
         networks=replace(networks, classes=len(classes)),
         mutual_information=0.0,
         questions=0.0,
+        contrast=0.0,
     )
     return Card(config, data=spec, fingerprint=mark, classes=classes)
 

@@ -12,6 +12,7 @@ from torch import Tensor
 from baselines.pix2shape.data import Batch
 from baselines.pix2shape.losses import (
     absolute_loss,
+    contrast_loss,
     critic_loss,
     disagreement,
     generator_loss,
@@ -79,12 +80,13 @@ def critic_step(model: Pix2Shape, batch: Batch, noise: Noise) -> tuple[Tensor, N
 
 
 def generator_step(
-    model: Pix2Shape, batch: Batch, noise: Noise, labelled: tuple[Batch, Tensor] | None = None
+    model: Pix2Shape, batch: Batch, noise: Noise, asked: tuple[Batch, Tensor] | None = None
 ) -> tuple[Tensor, Numbers]:
     """Return what encoder and decoder minimise, and its parts by name.
 
     Args:
-        labelled: images of labelled questions, four after four, and which answers are right, (Q,).
+        asked: images of questions, four after four, and which answers are right, (Q,); -1 where
+            that is not known.
     """
     config, views = model.config, batch.views
     code = model.encode(batch.image, views)
@@ -130,10 +132,14 @@ def generator_step(
         losses["mutual_information"] = mutual_information(
             model.statistics, *_halves(model, code), noise.order
         )
-    if config.questions and labelled is not None:
-        images, answers = labelled
-        codes = _halves(model, model.encode(images.image, images.views))[0]
-        losses["questions"] = question_loss(codes.view(-1, 4, codes.shape[1]), answers)
+    if asked is not None:
+        images, answers = asked
+        scene = _halves(model, model.encode(images.image, images.views))[0]
+        codes, known = scene.view(-1, 4, scene.shape[1]), answers >= 0
+        if config.questions and known.any():
+            losses["questions"] = question_loss(codes[known], answers[known])
+        if config.contrast:
+            losses["contrast"] = contrast_loss(codes, answers)
     total = sum((getattr(config, name) * loss for name, loss in losses.items()), code.new_zeros(()))
     return total, losses
 

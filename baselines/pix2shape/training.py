@@ -57,14 +57,12 @@ def train(
             share a batch evenly.
     """
     config, model = state.model.config, state.model
-    _check_request(config, _batch_size(config, source), labelled, labels, fabric.world_size)
+    _check_request(config, source, labelled, labels, fabric.world_size)
     fabric.to_device(model)
     for optimiser in (state.generator, state.critic):  # moves the moments to the weights' device
         optimiser.load_state_dict(optimiser.state_dict())
     batches = _batches(source, fabric, state, workers)
-    asked: Iterator[tuple[Batch, Tensor]] = iter(())
-    if labelled is not None and labels:
-        asked = _questions(labelled, labels, fabric, state)
+    asked = _questions(source, labelled if labels else None, labels, fabric, state, workers)
     model.train()
     began = time.monotonic() - state.seconds
     while state.iteration < config.iterations:
@@ -87,26 +85,37 @@ def train(
 
 def _check_request(
     config: ModelConfig,
-    size: int,
+    source: Source,
     labelled: QuestionImages | None,
     labels: int,
     processes: int,
 ) -> None:
-    if processes > 1:
+    sizes = _asked_sizes(config, source, labels)
+    for size in (_batch_size(config, source), *(size for size in sizes if size)):
         even = size % processes == 0 and size >= 2 * processes
-        check(even, "devices", processes, f"a number that shares {size} items, 2 or more each")
+        what = f"a number that shares {size} items, 2 or more each"
+        check(processes == 1 or even, "devices", processes, what)
     if labels:
         count = len(labelled) if labelled is not None and labelled.has_answers else 0
         check(labels <= count, "labels", labels, f"at most {count}, the answers that are told")
-    asked = config.questions if labels else 0.0
     weights = (config.adversarial, config.reconstruction, config.code_reconstruction)
-    if not any((*weights, config.consistency, config.depth, asked)):
+    if not any((*weights, config.consistency, config.depth, *sizes)):
         raise SpecError("losses: found every weight at 0, expected one above")
 
 
 def _batch_size(config: ModelConfig, source: Source) -> int:
     """Items of a batch: images of rooms, or questions."""
-    return config.question_batch if isinstance(source, QuestionImages) else config.batch
+    return config.questions_per_batch if isinstance(source, QuestionImages) else config.batch
+
+
+def _asked_sizes(config: ModelConfig, source: Source, labels: int) -> tuple[int, int]:
+    """How many questions with a label, and without, have their codes compared each iteration."""
+    if not isinstance(source, QuestionImages) or not (config.contrast or config.questions):
+        return 0, 0
+    if not config.contrast:
+        return (config.question_batch if labels else 0), 0
+    told = max(2, config.question_batch // 4) if labels else 0
+    return told, max(0, config.question_batch - told)
 
 
 class _Told(Dataset[Any]):
@@ -163,12 +172,26 @@ def _batches(source: Source, fabric: Fabric, state: State, workers: int) -> Iter
 
 
 def _questions(
-    source: QuestionImages, labels: int, fabric: Fabric, state: State
+    source: Source,
+    labelled: QuestionImages | None,
+    labels: int,
+    fabric: Fabric,
+    state: State,
+    workers: int,
 ) -> Iterator[tuple[Batch, Tensor]]:
+    """Yield questions whose codes are compared: the labelled ones first, -1 where no answer is."""
     config = state.model.config
-    size = _batch_size(config, source)
-    for items in _loaded(source, labels, size, state.iteration, config.seed, fabric, 0):
-        yield source.as_batch(items).to(fabric.device), items["answer"].to(fabric.device)
+    told, untold = _asked_sizes(config, source, labels)
+    where = state.iteration, config.seed, fabric
+    streams = []
+    if labelled is not None and told:
+        streams.append(_loaded(labelled, labels, told, *where, 0))
+    if untold:
+        streams.append(_loaded(source, len(source), untold, *where, workers))
+    for parts in zip(*streams, strict=False):
+        answers = [part.pop("answer", torch.full((len(part["image"]),), -1)) for part in parts]
+        items = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
+        yield source.as_batch(items).to(fabric.device), torch.cat(answers).to(fabric.device)
 
 
 @contextmanager

@@ -7,6 +7,7 @@ import pytest
 torch = pytest.importorskip("torch")
 from baselines.pix2shape.losses import (  # noqa: E402
     absolute_loss,
+    contrast_loss,
     critic_loss,
     disagreement,
     generator_loss,
@@ -166,3 +167,28 @@ def test_disagreement_takes_each_image_with_its_own_camera() -> None:
     poses = torch.cat([ahead(1.0), ahead(0.5)])
     assert float(disagreement(own, other, poses, FOV)) < 1e-6
     assert float(disagreement(own, other.flip(0), poses, FOV)) > 0.2
+
+
+def test_contrast_of_one_answer_against_the_others() -> None:
+    """Two questions in one dimension, references at 0 and 1; likeness is -5 (difference)^2."""
+    codes = torch.tensor([[0.0, 0.2, 1.0, 2.0], [1.0, 0.0, 3.0, 1.0]])[..., None]
+    terms = [[0.04, 1.0, 4.0, 0.0, 9.0, 1.0], [0.64, 0.0, 1.0, 1.0, 4.0, 0.0]]
+    weights = [[math.exp(-5 * term) for term in row] for row in terms]
+    unknown = [sum(weights[0][:3]) / sum(weights[0]), sum(weights[1][3:]) / sum(weights[1])]
+    known = [weights[0][1] / sum(weights[0]), weights[1][5] / sum(weights[1])]
+    for answers, shares in (
+        ([-1, -1], unknown), ([1, 2], known), ([-1, 2], [unknown[0], known[1]]),
+    ):  # fmt: skip
+        found = float(contrast_loss(codes, torch.tensor(answers)))
+        assert found == pytest.approx(-sum(map(math.log, shares)) / 2, rel=1e-5)
+
+
+def test_contrast_falls_to_nothing_where_one_own_answer_is_the_references_code() -> None:
+    source = torch.Generator().manual_seed(0)
+    codes = torch.randn(6, 4, 50, generator=source)
+    chance = float(contrast_loss(codes, torch.full((6,), -1)))
+    assert chance == pytest.approx(math.log(6), abs=1.0)
+    codes[:, 2] = codes[:, 0]
+    assert float(contrast_loss(codes, torch.full((6,), -1))) < 0.05
+    assert float(contrast_loss(codes, torch.full((6,), 1))) < 0.05
+    assert float(contrast_loss(codes, torch.full((6,), 0))) > 3

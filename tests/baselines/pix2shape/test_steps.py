@@ -12,6 +12,7 @@ from baselines.pix2shape.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.data import Batch  # noqa: E402
 from baselines.pix2shape.losses import (  # noqa: E402
     absolute_loss,
+    contrast_loss,
     mutual_information,
     question_loss,
     reconstruction_loss,
@@ -24,7 +25,7 @@ from baselines.pix2shape.surfels import Scene, pixel_rays  # noqa: E402
 NETWORKS = NetworkSpec(size=32, width=0.05, z_scene=6, z_view=2)
 LOSSES = (
     "adversarial", "reconstruction", "code_reconstruction", "consistency", "mutual_information",
-    "questions", "depth",
+    "questions", "contrast", "depth",
 )  # fmt: skip
 NEEDED = {"adversarial": {"critic"}, "mutual_information": {"statistics"}}
 
@@ -156,6 +157,21 @@ def test_questions_teach_the_scenes_part_of_the_code():
     assert not weight[6:].any()
     codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
     assert losses["questions"].item() == pytest.approx(question_loss(codes, answers).item())
+
+
+def test_questions_of_unknown_answers_are_contrasted_alone():
+    model = model_of(only(questions=1.0, contrast=1.0))
+    images, _ = labelled()
+    codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
+    for answers in ([-1, -1], [-1, 1], [2, 0]):
+        told = torch.tensor(answers)
+        losses = generator_step(model, some_batch(), draw(8, 8, 3), (images, told))[1]
+        assert losses["contrast"].item() == pytest.approx(contrast_loss(codes, told).item())
+        known = told >= 0
+        assert ("questions" in losses) == bool(known.any())
+        if known.any():
+            expected = question_loss(codes[known], told[known]).item()
+            assert losses["questions"].item() == pytest.approx(expected)
 
 
 class Sphere(Pix2Shape):

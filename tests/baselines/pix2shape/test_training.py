@@ -137,6 +137,35 @@ def test_only_the_labels_that_are_told_are_used(train_path, fabric, monkeypatch)
     assert not any("questions" in one for one in losses)
 
 
+def test_a_quarter_of_the_contrasted_questions_is_labelled(train_path, fabric, monkeypatch):
+    plain = replace(TINY, questions=1.0, contrast=1.0, batch=8, question_batch=8)
+    config = for_questions(plain, train_path, "labeled")
+    source = QuestionImages(train_path, "unlabeled", config)
+    labelled = QuestionImages(train_path, "labeled", config)
+    step, asked = training.generator_step, []
+
+    def spy(model: Any, batch: Any, noise: Any, questions: Any) -> Any:
+        asked.append(questions)
+        return step(model, batch, noise, questions)
+
+    monkeypatch.setattr(training, "generator_step", spy)
+    told = {
+        labelled[row]["image"].tobytes(): labelled[row]["answer"] for row in range(len(labelled))
+    }
+    for labels, known in ((3, 2), (0, 0)):
+        asked.clear()
+        losses = run(new_state(config), source, fabric, labelled=labelled, labels=labels)
+        assert all(("questions" in one) == (labels > 0) and "contrast" in one for one in losses)
+        for images, answers in asked:
+            assert images.image.shape == (32, 3, 32, 32)
+            assert (answers >= 0).tolist() == [True] * known + [False] * (8 - known)
+            rows = images.image.view(8, -1)[:known].numpy()
+            assert [told[row.tobytes()] for row in rows] == answers[:known].tolist()
+        assert len({images.image.numpy().tobytes() for images, _ in asked}) == len(asked)
+    assert run(new_state(replace(config, contrast=0.0)), source, fabric)
+    assert asked[-1] is None, "nothing is compared without a label"
+
+
 def test_the_generators_step_leaves_the_critic_alone(rooms_path, fabric, monkeypatch):
     config = replace(TINY, mutual_information=0.1, networks=replace(TINY.networks, z_view=2))
     state, before = new_state(config), {}
