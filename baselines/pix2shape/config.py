@@ -14,7 +14,7 @@ CONFIGS: dict[str, dict[str, Any]] = {
     "compact": {
         "networks": NetworkSpec(size=64, width=0.125),
         "batch": 16,
-        "iterations": 20_000,
+        "iterations": 12_000,
         "learning_rate": 1e-3,
         "betas": (0.9, 0.99),
         "decay": True,
@@ -23,7 +23,7 @@ CONFIGS: dict[str, dict[str, Any]] = {
         "code_reconstruction": 0.0,
         "absolute_differences": True,
         "consistency": 30.0,
-        "questions": 0.1,
+        "questions": 0.01,
         "contrast": 10.0,
         "question_batch": 32,
     },
@@ -53,9 +53,9 @@ class ModelConfig:
         opacity: whether the decoder also tells which rays meet nothing.
         iterations, batch: of training, in images; Adam with `learning_rate` and `betas`.
         decay: whether the learning rate falls to nothing over the second half.
-        question_batch: questions whose codes are compared, of those that one iteration takes.
+        question_batch: questions whose codes L_theta and `contrast` compare in each iteration.
         critic_steps: of the critic, for each of the others.
-        absolute_differences: whether images are compared by them, instead of by the paper's norm.
+        absolute_differences: whether images are compared by these, not by the paper's norm.
         adversarial, reconstruction, code_reconstruction, consistency, mutual_information,
         questions, contrast, depth:
             weights of the losses; 0 switches one off. `depth` is the ablation's supervision.
@@ -90,7 +90,9 @@ class ModelConfig:
         check(self.depth_middle > 0, "depth middle", self.depth_middle, "a positive number")
         check(self.iterations >= 1, "iterations", self.iterations, "1 or more")
         check(self.batch >= 2, "batch", self.batch, "2 or more")
-        check(self.question_batch >= 2, "question batch", self.question_batch, "2 or more")
+        least = 8 if self.contrast else 2  # of which two are labelled
+        asked = self.question_batch
+        check(asked >= least, "question batch", asked, f"{least} or more")
         check(self.critic_steps >= 1, "critic steps", self.critic_steps, "1 or more")
         check(self.learning_rate > 0, "learning rate", self.learning_rate, "a positive number")
         in_range = len(self.betas) == 2 and all(0 <= beta < 1 for beta in self.betas)
@@ -116,7 +118,7 @@ class ModelConfig:
         return self.critic_steps if self.has_critic else 1
 
     @property
-    def questions_per_batch(self) -> int:
+    def reconstructed_questions(self) -> int:
         """Questions whose images fill a batch, four each."""
         return -(-self.batch // 4)
 

@@ -1,7 +1,8 @@
-"""The losses of the paper, each a function of batches of tensors to a number.
+"""Losses, each a function of batches of tensors to a number: the paper's, and three of ours.
 
 Pix2Shape (IJCV 2020), sections "Bi-Directional Adversarial Training", "Unsupervised Training" and
-"Semi-supervised Training for Classification".
+"Semi-supervised Training for Classification". Ours are `absolute_loss`, `disagreement` and
+`contrast_loss`; docs/pix2shape.md says why.
 """
 
 import math
@@ -14,7 +15,7 @@ from torch.nn import functional
 from baselines.pix2shape.surfels import back_project
 
 HIDDEN = 0.1  # scene units behind another surface at which a surfel counts as hidden by it
-NEAR = 0.05  # scene units; what is nearer to a camera, or behind it, is taken to be there
+NEAR = 0.05  # scene units; what is nearer to the other camera, or behind it, does not count
 TEMPERATURE = 0.2  # of mean squared differences of standardised numbers; they are about 2 apart
 PENALTY = 10.0  # lambda of the gradient penalty
 
@@ -64,8 +65,8 @@ def reconstruction_loss(values: Tensor, again: Tensor) -> Tensor:
 def absolute_loss(values: Tensor, again: Tensor) -> Tensor:
     """Return E ||a - b||_1 / sqrt(n) of two (B, ...) of n numbers each.
 
-    As large as the norm where all numbers are equally wrong, and less ruled by the few that are
-    most: pixels at outlines, which belong to two surfaces.
+    As large as the norm where all numbers are equally wrong, and less dominated by the few that
+    are most wrong: pixels at outlines, which belong to two surfaces.
     """
     differences = (values - again).flatten(1)
     return differences.abs().mean() * math.sqrt(differences.shape[1])
@@ -85,17 +86,18 @@ def disagreement(
         depth, other_depth: (B, S, S), scene units.
         other_from_camera: (B, 4, 4).
     """
-    points = back_project(depth, fov_y_degrees).flatten(2)
-    points = other_from_camera[:, :3, :3] @ points + other_from_camera[:, :3, 3:]
-    its_depth = (-points[:, 2]).clamp(min=NEAR)
-    edge = math.tan(math.radians(fov_y_degrees) / 2)
-    place = torch.stack([points[:, 0], -points[:, 1]], dim=2) / (edge * its_depth)[..., None]
-    inverse = functional.grid_sample(  # which is affine on planes
-        1 / other_depth[:, None], place[:, None], padding_mode="border", align_corners=False
-    )
+    with torch.autocast(depth.device.type, enabled=False):  # differences of near numbers
+        points = back_project(depth, fov_y_degrees).flatten(2)
+        points = other_from_camera[:, :3, :3] @ points + other_from_camera[:, :3, 3:]
+        its_depth = -points[:, 2]
+        edge = math.tan(math.radians(fov_y_degrees) / 2) * its_depth.clamp(min=NEAR)
+        place = torch.stack([points[:, 0], -points[:, 1]], dim=2) / edge[..., None]
+        inverse = functional.grid_sample(  # which is affine on planes
+            1 / other_depth[:, None], place[:, None], padding_mode="border", align_corners=False
+        )
     behind = its_depth - 1 / inverse[:, 0, 0]
     between_centres = (place.abs() < 1 - 1 / depth.shape[1]).all(dim=2)
-    counted = between_centres & (behind < HIDDEN)
+    counted = between_centres & (its_depth > NEAR) & (behind < HIDDEN)
     return (behind.abs() * counted).sum() / counted.sum().clamp(min=1)
 
 

@@ -1,10 +1,10 @@
-"""What critic and generator minimise on one batch: the paper's losses put together.
+"""What critic and generator minimise on one batch: the losses put together.
 
 Pix2Shape (IJCV 2020), Algorithm 1 and equations "rec_loss" and "app-loss". A loss whose weight is 0
 is neither computed nor named among the numbers.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -112,21 +112,14 @@ def generator_step(
             found = model.encode(made, views)
             losses["code_reconstruction"] = reconstruction_loss(noise.code, found)
     if config.consistency:
-        others = mapped(views, lambda values: values[noise.order])
-        classes = views.condition[:, CAMERA:]  # which are the code's own
-        others = replace(
-            others, condition=torch.cat([others.condition[:, :CAMERA], classes], dim=1)
-        )
-        elsewhere, _ = model.surfels(code, others.condition)
-        own, other = views.world_from_camera, others.world_from_camera
-        assert own is not None
-        assert other is not None
-        other_from_own = torch.linalg.solve(other, own)
-        own_from_other = torch.linalg.inv(other_from_own)
-        fov = views.scene.fov_y_degrees
+        pose, fov = views.world_from_camera, views.scene.fov_y_degrees
+        assert pose is not None, "for_questions switches it off"
+        others = pose[noise.order]
+        camera, classes = views.condition[noise.order, :CAMERA], views.condition[:, CAMERA:]
+        elsewhere, _ = model.surfels(code, torch.cat([camera, classes], dim=1))
         losses["consistency"] = (
-            disagreement(depth, elsewhere, other_from_own, fov)
-            + disagreement(elsewhere, depth, own_from_other, fov)
+            disagreement(depth, elsewhere, torch.linalg.solve(others, pose), fov)
+            + disagreement(elsewhere, depth, torch.linalg.solve(pose, others), fov)
         ) / 2
     if config.disentangles:
         losses["mutual_information"] = mutual_information(

@@ -48,7 +48,7 @@ def train(
         source: of the images.
         fabric: launched; where several processes train, each takes its share of every batch.
         labelled: questions whose first `labels` answers may be used.
-        workers: processes that read.
+        workers: processes that read; as many again for contrasted questions.
 
     Raises:
         TrainingError: a loss or a gradient is not finite. The weights are those of before the step,
@@ -62,7 +62,7 @@ def train(
     for optimiser in (state.generator, state.critic):  # moves the moments to the weights' device
         optimiser.load_state_dict(optimiser.state_dict())
     batches = _batches(source, fabric, state, workers)
-    asked = _questions(source, labelled if labels else None, labels, fabric, state, workers)
+    asked = _questions(source, labelled, labels, fabric, state, workers)
     model.train()
     began = time.monotonic() - state.seconds
     while state.iteration < config.iterations:
@@ -90,6 +90,9 @@ def _check_request(
     labels: int,
     processes: int,
 ) -> None:
+    questions = isinstance(source, QuestionImages)
+    if questions and config.consistency:
+        raise SpecError("consistency: expected 0 for questions, whose cameras are not told")
     sizes = _asked_sizes(config, source, labels)
     for size in (_batch_size(config, source), *(size for size in sizes if size)):
         even = size % processes == 0 and size >= 2 * processes
@@ -105,7 +108,7 @@ def _check_request(
 
 def _batch_size(config: ModelConfig, source: Source) -> int:
     """Items of a batch: images of rooms, or questions."""
-    return config.questions_per_batch if isinstance(source, QuestionImages) else config.batch
+    return config.reconstructed_questions if isinstance(source, QuestionImages) else config.batch
 
 
 def _asked_sizes(config: ModelConfig, source: Source, labels: int) -> tuple[int, int]:
@@ -114,8 +117,8 @@ def _asked_sizes(config: ModelConfig, source: Source, labels: int) -> tuple[int,
         return 0, 0
     if not config.contrast:
         return (config.question_batch if labels else 0), 0
-    told = max(2, config.question_batch // 4) if labels else 0
-    return told, max(0, config.question_batch - told)
+    labelled = min(labels, config.question_batch // 4)
+    return labelled, config.question_batch - labelled
 
 
 class _Told(Dataset[Any]):
@@ -181,17 +184,19 @@ def _questions(
 ) -> Iterator[tuple[Batch, Tensor]]:
     """Yield questions whose codes are compared: the labelled ones first, -1 where no answer is."""
     config = state.model.config
-    told, untold = _asked_sizes(config, source, labels)
+    with_label, without = _asked_sizes(config, source, labels)
     where = state.iteration, config.seed, fabric
     streams = []
-    if labelled is not None and told:
-        streams.append(_loaded(labelled, labels, told, *where, 0))
-    if untold:
-        streams.append(_loaded(source, len(source), untold, *where, workers))
+    if labelled is not None and with_label:
+        streams.append(_loaded(labelled, labels, with_label, *where, 0))
+    if without:
+        unknown = _loaded(source, len(source), without, *where, workers)
+        streams.append(
+            {**items, "answer": torch.full((len(items["image"]),), -1)} for items in unknown
+        )
     for parts in zip(*streams, strict=False):
-        answers = [part.pop("answer", torch.full((len(part["image"]),), -1)) for part in parts]
         items = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
-        yield source.as_batch(items).to(fabric.device), torch.cat(answers).to(fabric.device)
+        yield source.as_batch(items).to(fabric.device), items["answer"].to(fabric.device)
 
 
 @contextmanager

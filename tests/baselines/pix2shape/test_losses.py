@@ -2,7 +2,9 @@
 
 import math
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 torch = pytest.importorskip("torch")
 from baselines.pix2shape.losses import (  # noqa: E402
@@ -157,16 +159,50 @@ def test_only_surfels_in_the_others_sight_count() -> None:
     other = torch.full((1, 16, 16), 3.0)
     assert float(disagreement(own, other, torch.eye(4)[None], FOV)) == pytest.approx(0.025)
     assert float(disagreement(own, other, ahead(0.0, width / 2), FOV)) < 1e-6
-    for elsewhere in (ahead(0.0, 2 * width), ahead(10.0)):  # past it, and beyond it
-        assert float(disagreement(own, other, elsewhere, FOV)) == 0
+    for size in (16, 64):
+        own, other = torch.full((1, size, size), 3.0), torch.full((1, size, size), 3.0)
+        for elsewhere in (ahead(0.0, 2 * width), ahead(10.0)):  # past it, and beyond it
+            assert float(disagreement(own, other, elsewhere, FOV)) == 0
 
 
 def test_disagreement_takes_each_image_with_its_own_camera() -> None:
-    own = torch.stack([torch.full((16, 16), 3.0), torch.full((16, 16), 3.0)])
-    other = torch.stack([torch.full((16, 16), 2.0), torch.full((16, 16), 2.5)])
+    own = torch.stack([torch.full((16, 16), 3.0), torch.full((16, 16), 4.0)])
+    other = torch.stack([torch.full((16, 16), 2.0), torch.full((16, 16), 3.5)])
     poses = torch.cat([ahead(1.0), ahead(0.5)])
     assert float(disagreement(own, other, poses, FOV)) < 1e-6
-    assert float(disagreement(own, other.flip(0), poses, FOV)) > 0.2
+    assert float(disagreement(own.flip(0), other, poses, FOV)) > 0.2
+    assert float(disagreement(own, other, poses.flip(0), FOV)) > 0.2
+
+
+def plane_depth(normal: np.ndarray, constant: float, pose: np.ndarray) -> torch.Tensor:
+    """Return the depth (1, 32, 32) of the plane normal . P = constant, seen from a camera."""
+    edge = math.tan(math.radians(FOV) / 2)
+    middle = (np.arange(32) + 0.5 - 16) / 16 * edge
+    rays = np.stack(np.broadcast_arrays(middle, -middle[:, None], -1.0), axis=-1)
+    return torch.tensor((constant - normal @ pose[:3, 3]) / (rays @ pose[:3, :3].T @ normal))[None]
+
+
+def test_any_plane_agrees_with_itself_under_any_two_cameras() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        poses = np.tile(np.eye(4), (2, 1, 1))
+        poses[:, :3, :3] = Rotation.from_rotvec(rng.normal(0, 0.15, (2, 3))).as_matrix()
+        poses[:, :3, 3] = rng.normal(0, 0.3, (2, 3))
+        normal = np.array([*rng.normal(0, 0.3, 2), 1.0])
+        own, other = (plane_depth(normal, -3.0, pose) for pose in poses)
+        other_from_own = torch.tensor(np.linalg.inv(poses[1]) @ poses[0])[None]
+        own.requires_grad_()
+        found = disagreement(own, other, other_from_own, FOV)
+        assert float(found.detach()) < 1e-12
+        assert torch.isfinite(torch.autograd.grad(found, own)[0]).all()
+        wrong = disagreement(own.detach(), other, torch.linalg.inv(other_from_own), FOV)
+        assert float(wrong) > 1e-2
+
+
+def test_disagreement_is_as_exact_where_networks_are_less() -> None:
+    own, other = tilted(0.5, 3.0), tilted(0.5, 2.0)
+    with torch.autocast("cpu", dtype=torch.bfloat16):
+        assert float(disagreement(own, other, ahead(1.0), FOV)) < 1e-6
 
 
 def test_contrast_of_one_answer_against_the_others() -> None:

@@ -13,6 +13,7 @@ from baselines.pix2shape.data import Batch  # noqa: E402
 from baselines.pix2shape.losses import (  # noqa: E402
     absolute_loss,
     contrast_loss,
+    disagreement,
     mutual_information,
     question_loss,
     reconstruction_loss,
@@ -31,7 +32,9 @@ NEEDED = {"adversarial": {"critic"}, "mutual_information": {"statistics"}}
 
 
 def only(**weights: float) -> ModelConfig:
-    return ModelConfig(networks=NETWORKS, **{**dict.fromkeys(LOSSES, 0.0), **weights})
+    return ModelConfig(
+        networks=NETWORKS, question_batch=8, **{**dict.fromkeys(LOSSES, 0.0), **weights}
+    )
 
 
 def model_of(config: ModelConfig) -> Pix2Shape:
@@ -212,7 +215,38 @@ def test_consistency_loses_what_two_cameras_disagree_on():
     wrong = views.world_from_camera.clone()
     wrong[:, 2, 3] += torch.linspace(0, 0.1, 8)  # each camera elsewhere than the decoder thinks
     batch = replace(batch, views=replace(views, world_from_camera=wrong))
-    assert generator_step(sphere, batch, noise)[1]["consistency"] > 5e-3
+    own, other = sphere.surfels(None, place)[0], sphere.surfels(None, place[noise.order])[0]
+    moved = torch.linalg.inv(wrong[noise.order]) @ wrong
+    there = disagreement(own, other, moved, 28.0)
+    back = disagreement(other, own, torch.linalg.inv(moved), 28.0)
+    assert abs(there - back) > 1e-4, "or one of them would do"
+    found = generator_step(sphere, batch, noise)[1]["consistency"]
+    assert found.item() == pytest.approx((there + back).item() / 2, rel=1e-2)
+    assert found > 5e-3
+
+
+def test_consistency_teaches_both_depths_with_the_codes_own_class():
+    networks = NetworkSpec(size=32, width=0.05, z_scene=3, classes=2)
+    model = model_of(replace(only(consistency=1.0), networks=networks))
+    batch, noise = some_batch(), draw(8, 3, 3)
+    place = 0.5 + batch.views.condition
+    classes = torch.eye(2)[torch.tensor([0, 1, 1, 0, 1, 0, 0, 1])]
+    condition = torch.cat([place, classes], dim=1)
+    views = replace(batch.views, condition=condition, world_from_camera=facing_the_origin(place))
+    made, surfels = [], model.surfels
+
+    def spy(code: Any, condition: Any) -> Any:
+        depth, opacity = surfels(code, condition)
+        depth.retain_grad()
+        made.append((condition, depth))
+        return depth, opacity
+
+    model.surfels = spy
+    generator_step(model, replace(batch, views=views), noise)[0].backward()
+    (_, own), (elsewhere, other) = made
+    assert torch.equal(elsewhere, torch.cat([place[noise.order], classes], dim=1))
+    assert own.grad.any()
+    assert other.grad.any()
 
 
 def test_images_are_compared_by_the_norm_or_by_absolute_differences():

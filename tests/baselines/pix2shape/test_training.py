@@ -15,6 +15,7 @@ import pytest
 
 from iqtt.specs import SplitSpec
 from iqtt.split import make_split
+from scenegen.errors import SpecError
 
 torch = pytest.importorskip("torch")
 from lightning_fabric import Fabric  # noqa: E402
@@ -82,7 +83,8 @@ def test_a_stop_in_the_middle_changes_nothing(case, rooms_path, train_path, fabr
         config = replace(config, critic_steps=2, consistency=0.1)
     source = RoomImages(rooms_path, config)
     if case == "questions":
-        config = replace(config, questions=0.1, mutual_information=0.1, batch=12)
+        more = {"questions": 0.1, "contrast": 1.0, "mutual_information": 0.1, "consistency": 1.0}
+        config = replace(config, **more, batch=12, question_batch=8)
         config = for_questions(config, train_path, "unlabeled")
         source = QuestionImages(train_path, "unlabeled", config)
         how = {"labelled": QuestionImages(train_path, "labeled", config), "labels": 4}
@@ -164,6 +166,22 @@ def test_a_quarter_of_the_contrasted_questions_is_labelled(train_path, fabric, m
         assert len({images.image.numpy().tobytes() for images, _ in asked}) == len(asked)
     assert run(new_state(replace(config, contrast=0.0)), source, fabric)
     assert asked[-1] is None, "nothing is compared without a label"
+
+
+def test_no_answer_is_looked_at_without_labels(train_path, fabric):
+    """Though the file of the images has them."""
+    plain = replace(TINY, questions=1.0, contrast=1.0, batch=8, question_batch=8)
+    config = for_questions(plain, train_path, "labeled")
+    labelled = QuestionImages(train_path, "labeled", config)
+    losses = run(new_state(config), labelled, fabric)
+    assert all("contrast" in one and "questions" not in one for one in losses)
+
+
+def test_views_of_questions_are_not_compared(train_path, fabric):
+    config = replace(for_questions(TINY, train_path, "labeled"), consistency=1.0)
+    source = QuestionImages(train_path, "unlabeled", config)
+    with pytest.raises(SpecError, match="consistency"):
+        run(new_state(config), source, fabric)
 
 
 def test_the_generators_step_leaves_the_critic_alone(rooms_path, fabric, monkeypatch):
