@@ -64,16 +64,16 @@ def save_weights(
 
     Args:
         path: ends in .safetensors; the card gets the same name with .json.
-        dtype: of the stored numbers.
+        dtype: of the stored numbers; tensors beyond its range keep their own.
     """
     tensors = {
         name: value.to(dtype) if value.is_floating_point() else value
         for name, value in model.state_dict().items()
         if name.split(".")[0] in KEPT
     }
-    if not all(torch.isfinite(value).all() for value in tensors.values()):
-        own = model.state_dict()  # beyond half precision's range
-        tensors = {name: own[name] for name in tensors}
+    for name, value in model.state_dict().items():
+        if name in tensors and not torch.isfinite(tensors[name]).all():
+            tensors[name] = value  # as it is where it is beyond half precision's range
     save_tensors(path, tensors, {})
     save_card(path, card)
 

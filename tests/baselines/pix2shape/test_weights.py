@@ -273,9 +273,12 @@ def test_a_variance_below_zero(path):
     refused(path, name)
 
 
-def test_beyond_half_precision_all_is_kept_in_full(model, tmp_path):
+def test_what_is_beyond_half_precision_is_kept_in_full(model, tmp_path):
     large = copy.deepcopy(model)
     large.decoder.last.bias.data.fill_(1e5)
     save_weights(tmp_path / "w.safetensors", large, CARD)
     again, _ = load_model(tmp_path / "w.safetensors")
     assert float(again.decoder.last.bias.detach()[0]) == 1e5
+    kept = load_file(tmp_path / "w.safetensors")
+    full = {name for name, value in kept.items() if value.dtype == torch.float32}
+    assert full == {"decoder.last.bias"}
