@@ -25,6 +25,7 @@ from scenegen.records import check
 from scenegen.seeding import Purpose, item_seed
 
 Source = RoomImages | QuestionImages
+LABELS_PER_PLACE = 100  # labels for each labelled question among the contrasted ones
 
 
 class TrainingError(SceneGenError):
@@ -117,7 +118,8 @@ def _asked_sizes(config: ModelConfig, source: Source, labels: int) -> tuple[int,
         return 0, 0
     if not config.contrast:
         return (config.question_batch if labels else 0), 0
-    labelled = min(labels, config.question_batch // 4)
+    few = -(-labels // LABELS_PER_PLACE)  # or few labels would be seen again and again
+    labelled = min(few, config.question_batch // 4)
     return labelled, config.question_batch - labelled
 
 

@@ -139,7 +139,7 @@ def test_only_the_labels_that_are_told_are_used(train_path, fabric, monkeypatch)
     assert not any("questions" in one for one in losses)
 
 
-def test_a_quarter_of_the_contrasted_questions_is_labelled(train_path, fabric, monkeypatch):
+def test_some_of_the_contrasted_questions_are_labelled(train_path, fabric, monkeypatch):
     plain = replace(TINY, questions=1.0, contrast=1.0, batch=8, question_batch=8)
     config = for_questions(plain, train_path, "labeled")
     source = QuestionImages(train_path, "unlabeled", config)
@@ -154,7 +154,7 @@ def test_a_quarter_of_the_contrasted_questions_is_labelled(train_path, fabric, m
     told = {
         labelled[row]["image"].tobytes(): labelled[row]["answer"] for row in range(len(labelled))
     }
-    for labels, known in ((3, 2), (0, 0)):
+    for labels, known in ((3, 1), (0, 0)):
         asked.clear()
         losses = run(new_state(config), source, fabric, labelled=labelled, labels=labels)
         assert all(("questions" in one) == (labels > 0) and "contrast" in one for one in losses)
@@ -166,6 +166,18 @@ def test_a_quarter_of_the_contrasted_questions_is_labelled(train_path, fabric, m
         assert len({images.image.numpy().tobytes() for images, _ in asked}) == len(asked)
     assert run(new_state(replace(config, contrast=0.0)), source, fabric)
     assert asked[-1] is None, "nothing is compared without a label"
+
+
+@pytest.mark.parametrize(
+    ("labels", "expected"), [(0, 0), (1, 1), (100, 1), (101, 2), (200, 2), (1000, 8), (9000, 8)]
+)
+def test_one_place_for_every_hundred_labels_up_to_a_quarter(labels, expected, train_path):
+    config = replace(TINY, questions=1.0, contrast=1.0, question_batch=32)
+    config = for_questions(config, train_path, "labeled")
+    source = QuestionImages(train_path, "labeled", config)
+    assert training._asked_sizes(config, source, labels) == (expected, 32 - expected)
+    plain = replace(config, contrast=0.0)
+    assert training._asked_sizes(plain, source, labels) == (32 if labels else 0, 0)
 
 
 def test_no_answer_is_looked_at_without_labels(train_path, fabric):
