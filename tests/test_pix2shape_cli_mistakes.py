@@ -163,7 +163,6 @@ def test_a_run_is_not_replaced(folder, check_refusal):
         (f"pix2shape --data nothing.h5 {WITH}", ("nothing.h5: no such file",)),
         (f"pix2shape {ROOMS} {WITH} --out rooms.h5", ("rooms.h5", "--overwrite")),
         ("pix2shape --data nothing.h5", ("nothing.h5: no such file",)),
-        ("pix2shape --data iqtt-test.h5", ("weights: none are bundled for iqtt-test.h5",)),
     ],
 )
 def test_a_mistake_with_the_baseline_is_one_line(line, words, folder, check_refusal):

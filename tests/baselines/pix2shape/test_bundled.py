@@ -1,13 +1,16 @@
-"""The bundled weights: small enough to ship, and what they predict is rooms."""
+"""The bundled weights: small enough to ship; they predict rooms, and answer beyond chance."""
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
 pytest.importorskip("torch")
 from baselines.pix2shape.bundled import FOLDER, names, open_weights, suited
-from baselines.pix2shape.predict import predict_rooms
+from baselines.pix2shape.predict import answer_file, predict_rooms
+from iqtt.specs import SplitSpec
+from iqtt.split import make_split
 from metrics.prediction_file import open_predictions
 from scenegen.dataset import make_dataset
 from scenegen.presets import preset_spec
@@ -24,7 +27,7 @@ def test_they_are_small_and_each_has_its_card() -> None:
         assert card.config.depth == 0, "they learned without depth maps"
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", sorted(set(names()) - {"iqtt"}))
 def test_they_predict_rooms(name: str, tmp_path: Path) -> None:
     """Better than one depth everywhere, of which the mean of all depths is the best."""
     data, out = tmp_path / "rooms.h5", tmp_path / "predictions.h5"
@@ -36,3 +39,15 @@ def test_they_predict_rooms(name: str, tmp_path: Path) -> None:
         depth = np.stack([predictions.depth(row) for row in range(len(rooms))])
     error, constant = ((depth - truth) ** 2).mean(), truth.var()
     assert error < 0.85 * constant, (error, constant)
+
+
+def test_they_answer_questions(tmp_path: Path) -> None:
+    """More than four standard errors above chance; some of the shapes may have been seen."""
+    spec = SplitSpec(seed=77, train=1, labeled=0, val=0, test=250, distractors="other")
+    make_split(tmp_path / "split", spec)
+    data, out = tmp_path / "split" / "iqtt-test.h5", tmp_path / "predictions.h5"
+    assert suited(data) == "iqtt"
+    answer_file(open_weights("iqtt")[0], data, out)
+    with h5py.File(tmp_path / "split" / "iqtt-test-answers.h5") as truth, h5py.File(out) as file:
+        right = file["scores"][:].argmax(axis=1) == truth["answers"][:]
+    assert right.mean() > 1 / 3 + 4 * np.sqrt(2 / 9 / 250), right.mean()
