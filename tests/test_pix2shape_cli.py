@@ -80,6 +80,19 @@ def test_questions(folder):
     assert "iqtt_accuracy" in bench("score", "predictions.h5").stdout
 
 
+def test_who_interrupts_is_told_how_to_go_on(folder, monkeypatch):
+    from baselines.pix2shape import runs
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runs, "train_run", interrupted)
+    result = train("--set=iterations=2")
+    assert result.exit_code == 1
+    assert "`--resume` goes on from run's last checkpoint" in result.stdout
+    assert "Aborted" in result.stderr
+
+
 def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
     from baselines.pix2shape import bundled
 

@@ -49,17 +49,29 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     "--config",
     type=click.Choice(["compact", "paper"]),
-    help="compact: an hour on two cores; paper: the paper's.  [compact]",
+    help="compact: 40 minutes on a CPU; paper: the paper's.  [compact]",
 )
 @click.option(
-    "--set", "settings", type=Setting(), multiple=True, help="Change one setting of the config."
+    "--set",
+    "settings",
+    type=Setting(),
+    multiple=True,
+    help="Change one setting, such as batch=8; weights.json lists all.",
 )
 @click.option("--seed", type=click.IntRange(0), help="Of weights and every random choice.  [0]")
 @click.option("--labels", type=click.IntRange(0), default=0, help="Answers to learn from.  [0]")
 @click.option("--conditional", is_flag=True, help="Tell the networks the class of the one object.")
 @click.option("--resume", is_flag=True, help="Go on from the folder's checkpoint.")
-@click.option("--workers", type=click.IntRange(0), default=1, show_default=True)
-@click.option("--every", type=click.IntRange(1), default=500, show_default=True)
+@click.option(
+    "--workers", type=click.IntRange(0), default=1, show_default=True, help="Processes that read."
+)
+@click.option(
+    "--every",
+    type=click.IntRange(1),
+    default=500,
+    show_default=True,
+    help="Iterations between checkpoints.",
+)
 @DEVICE
 @click.option("--devices", type=click.IntRange(1), default=1, show_default=True)
 @click.option("--precision", type=click.Choice(["32", "bf16"]), default="32", show_default=True)
@@ -88,7 +100,8 @@ def train(
 
     chosen = dict(settings) | ({} if seed is None else {"seed": seed})
     if resume and (config or chosen or labels or conditional):
-        raise click.UsageError("--resume goes on with the run's own settings; leave the others out")
+        own = "--config, --set, --seed, --labels and --conditional"
+        raise click.UsageError(f"--resume goes on with the run's own {own}; leave them out")
     accelerator = "gpu" if chosen_device(device, devices).type == "cuda" else "cpu"
     numbers = {"32": "32-true", "bf16": "bf16-mixed"}[precision]
     bars: list[Any] = []
@@ -104,17 +117,22 @@ def train(
             losses_told = ", ".join(f"{name} {value}" for name, value in told.items())
             click.echo(f"{state.iteration} of {last}, {state.seconds:.0f} s: {losses_told}")
 
-    weights = train_run(
-        out,
-        data,
-        None if resume else model_config(config or "compact", **chosen),
-        Machine(accelerator, devices, numbers, workers, every),
-        labels=labels,
-        conditional=conditional,
-        progress=show,
-    )
-    for bar in bars:
-        bar.close()
+    try:
+        weights = train_run(
+            out,
+            data,
+            None if resume else model_config(config or "compact", **chosen),
+            Machine(accelerator, devices, numbers, workers, every),
+            labels=labels,
+            conditional=conditional,
+            progress=show,
+        )
+    except KeyboardInterrupt:
+        click.echo(f"\nStopped; `--resume` goes on from {out}'s last checkpoint, if it got one.")
+        raise
+    finally:
+        for bar in bars:
+            bar.close()
     if weights is not None:  # the first of several processes
         click.echo(f"{weights}: trained on {data}; now `pix2shape predict --weights {weights} ...`")
 

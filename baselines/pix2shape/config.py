@@ -92,7 +92,8 @@ class ModelConfig:
         check(self.batch >= 2, "batch", self.batch, "2 or more")
         least = 8 if self.contrast else 2  # of which two are labelled
         asked = self.question_batch
-        check(asked >= least, "question batch", asked, f"{least} or more")
+        needed = f"{least} or more" + (", where contrast is on" if self.contrast else "")
+        check(asked >= least, "question batch", asked, needed)
         check(self.critic_steps >= 1, "critic steps", self.critic_steps, "1 or more")
         check(self.learning_rate > 0, "learning rate", self.learning_rate, "a positive number")
         in_range = len(self.betas) == 2 and all(0 <= beta < 1 for beta in self.betas)
