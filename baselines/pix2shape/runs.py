@@ -12,6 +12,7 @@ from lightning_fabric import Fabric
 from torch.utils.data import DataLoader
 from torch.utils.tensorboard import SummaryWriter
 
+from baselines.pix2shape.batches import Source
 from baselines.pix2shape.config import ModelConfig
 from baselines.pix2shape.data import Batch, RoomImages, is_question_file
 from baselines.pix2shape.model import Pix2Shape
@@ -19,7 +20,7 @@ from baselines.pix2shape.pictures import training_sheet
 from baselines.pix2shape.question_data import QuestionImages, for_questions
 from baselines.pix2shape.state import CHECKPOINT, State, load_state, new_state, save_state
 from baselines.pix2shape.steps import draw
-from baselines.pix2shape.training import Source, train
+from baselines.pix2shape.training import train
 from baselines.pix2shape.weights import Card, save_weights
 from iqtt.question_file import open_questions
 from scenegen.errors import SpecError

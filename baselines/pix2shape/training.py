@@ -7,25 +7,28 @@ it had never stopped: weights, optimisers and the number of the iteration are al
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, cast
+from typing import cast
 
 import torch
 from lightning_fabric import Fabric
 from torch import Tensor, nn
 from torch.optim import Adam
-from torch.utils.data import DataLoader, Dataset, default_collate
 
+from baselines.pix2shape.batches import (
+    Source,
+    batch_size,
+    image_batches,
+    question_batches,
+    question_sizes,
+)
 from baselines.pix2shape.config import ModelConfig
-from baselines.pix2shape.data import Batch, Draws, RoomImages
+from baselines.pix2shape.data import Batch
 from baselines.pix2shape.question_data import QuestionImages
 from baselines.pix2shape.state import State
 from baselines.pix2shape.steps import Noise, critic_step, draw, generator_step
 from scenegen.errors import SceneGenError, SpecError
 from scenegen.records import check
 from scenegen.seeding import Purpose, item_seed
-
-Source = RoomImages | QuestionImages
-LABELS_PER_PLACE = 100  # labels for each labelled question among the contrasted ones
 
 
 class TrainingError(SceneGenError):
@@ -62,8 +65,8 @@ def train(
     fabric.to_device(model)
     for optimiser in (state.generator, state.critic):  # moves the moments to the weights' device
         optimiser.load_state_dict(optimiser.state_dict())
-    batches = _batches(source, fabric, state, workers)
-    asked = _questions(source, labelled, labels, fabric, state, workers)
+    batches = image_batches(source, fabric, state, workers)
+    asked = question_batches(source, labelled, labels, fabric, state, workers)
     model.train()
     began = time.monotonic() - state.seconds
     while state.iteration < config.iterations:
@@ -94,8 +97,8 @@ def _check_request(
     questions = isinstance(source, QuestionImages)
     if questions and config.consistency:
         raise SpecError("consistency: expected 0 for questions, whose cameras are not told")
-    sizes = _asked_sizes(config, source, labels)
-    for size in (_batch_size(config, source), *(size for size in sizes if size)):
+    sizes = question_sizes(config, source, labels)
+    for size in (batch_size(config, source), *(size for size in sizes if size)):
         even = size % processes == 0 and size >= 2 * processes
         what = f"a number that shares {size} items, 2 or more each"
         check(processes == 1 or even, "devices", processes, what)
@@ -105,100 +108,6 @@ def _check_request(
     weights = (config.adversarial, config.reconstruction, config.code_reconstruction)
     if not any((*weights, config.consistency, config.depth, *sizes)):
         raise SpecError("losses: found every weight at 0, expected one above")
-
-
-def _batch_size(config: ModelConfig, source: Source) -> int:
-    """Items of a batch: images of rooms, or questions."""
-    return config.reconstructed_questions if isinstance(source, QuestionImages) else config.batch
-
-
-def _asked_sizes(config: ModelConfig, source: Source, labels: int) -> tuple[int, int]:
-    """How many questions with a label, and without, have their codes compared each iteration."""
-    if not isinstance(source, QuestionImages) or not (config.contrast or config.questions):
-        return 0, 0
-    if not config.contrast:
-        return (config.question_batch if labels else 0), 0
-    few = -(-labels // LABELS_PER_PLACE)  # or few labels would be seen again and again
-    labelled = min(few, config.question_batch // 4)
-    return labelled, config.question_batch - labelled
-
-
-class _Told(Dataset[Any]):
-    """A source whose errors are items: else a worker's would come as its whole traceback."""
-
-    def __init__(self, source: Source) -> None:
-        self._source = source
-
-    def __len__(self) -> int:
-        return len(self._source)
-
-    def __getitem__(self, row: int) -> Any:
-        try:
-            return self._source[row]
-        except (SceneGenError, OSError) as error:
-            return error
-
-
-def _collated(items: list[Any]) -> Any:
-    errors = [item for item in items if isinstance(item, Exception)]
-    return errors[0] if errors else default_collate(items)
-
-
-def _loaded(
-    source: Source,
-    rows: int,
-    size: int,
-    first: int,
-    seed: int,
-    fabric: Fabric,
-    workers: int,
-) -> Iterator[dict[str, Tensor]]:
-    """Read batch after batch from a number on, for ever; of each, this process's share."""
-    share = slice(fabric.global_rank, None, fabric.world_size)
-    loader = DataLoader(
-        _Told(source),
-        batch_sampler=Draws(rows, size, seed, first, share),
-        num_workers=workers,
-        collate_fn=_collated,
-        pin_memory=fabric.device.type == "cuda",
-    )
-    for items in loader:
-        if isinstance(items, Exception):
-            raise items
-        yield items
-
-
-def _batches(source: Source, fabric: Fabric, state: State, workers: int) -> Iterator[Batch]:
-    config = state.model.config
-    size = _batch_size(config, source)
-    first = state.iteration * config.batches_per_iteration
-    for items in _loaded(source, len(source), size, first, config.seed, fabric, workers):
-        yield source.as_batch(items).to(fabric.device)
-
-
-def _questions(
-    source: Source,
-    labelled: QuestionImages | None,
-    labels: int,
-    fabric: Fabric,
-    state: State,
-    workers: int,
-) -> Iterator[tuple[Batch, Tensor]]:
-    """Yield questions whose codes are compared: the labelled ones first, -1 where no answer is."""
-    config = state.model.config
-    with_label, without = _asked_sizes(config, source, labels)
-    where = state.iteration, config.seed, fabric
-    streams = []
-    if labelled is not None and with_label:
-        streams.append(_loaded(labelled, labels, with_label, *where, 0))
-    if without:
-        unknown = _loaded(source, len(source), without, *where, workers)
-        streams.append(
-            {**items, "answer": torch.full((len(items["image"]),), -1)} for items in unknown
-        )
-    for parts in zip(*streams, strict=False):
-        items = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
-        yield source.as_batch(items).to(fabric.device), items["answer"].to(fabric.device)
 
 
 @contextmanager

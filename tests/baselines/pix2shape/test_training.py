@@ -21,6 +21,7 @@ torch = pytest.importorskip("torch")
 from lightning_fabric import Fabric  # noqa: E402
 
 from baselines.pix2shape import training  # noqa: E402
+from baselines.pix2shape.batches import question_sizes  # noqa: E402
 from baselines.pix2shape.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.data import RoomImages  # noqa: E402
 from baselines.pix2shape.networks import NetworkSpec  # noqa: E402
@@ -175,9 +176,9 @@ def test_one_place_for_every_hundred_labels_up_to_a_quarter(labels, expected, tr
     config = replace(TINY, questions=1.0, contrast=1.0, question_batch=32)
     config = for_questions(config, train_path, "labeled")
     source = QuestionImages(train_path, "labeled", config)
-    assert training._asked_sizes(config, source, labels) == (expected, 32 - expected)
+    assert question_sizes(config, source, labels) == (expected, 32 - expected)
     plain = replace(config, contrast=0.0)
-    assert training._asked_sizes(plain, source, labels) == (32 if labels else 0, 0)
+    assert question_sizes(plain, source, labels) == (32 if labels else 0, 0)
 
 
 def test_no_answer_is_looked_at_without_labels(train_path, fabric):
