@@ -121,7 +121,8 @@ def test_the_class_is_one_hot_behind_the_camera(vessels_path, camera):
 
 
 def test_depth_is_read_only_for_supervision(views_path, tmp_path):
-    assert set(RoomImages(views_path, tiny())[0]) == KNOWN | {"image", "condition"}
+    item = RoomImages(views_path, tiny())[0]
+    assert set(item) == KNOWN | {"image", "condition", "world_from_camera"}
 
     def hole(file: h5py.File) -> None:
         file["depth"][1, 7, 10] = np.nan
