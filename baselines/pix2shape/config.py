@@ -90,7 +90,7 @@ class ModelConfig:
         check(self.depth_middle > 0, "depth middle", self.depth_middle, "a positive number")
         check(self.iterations >= 1, "iterations", self.iterations, "1 or more")
         check(self.batch >= 2, "batch", self.batch, "2 or more")
-        least = 8 if self.contrast else 2  # of which two are labelled
+        least = 8 if self.contrast else 2  # a quarter of them may be labelled
         asked = self.question_batch
         needed = f"{least} or more" + (", where contrast is on" if self.contrast else "")
         check(asked >= least, "question batch", asked, needed)
