@@ -34,7 +34,7 @@ def baseline(
     from tqdm import tqdm
 
     from baselines.trivial import write_chance, write_room_baseline
-    from scenegen.scene_file import RoomsFile
+    from scenegen.rooms.reader import RoomsFile
 
     if name == "chance":
         write_chance(data, out, seed, overwrite)
@@ -56,8 +56,8 @@ def _reference_model(
     if train is not None:
         raise click.UsageError("--train: pix2shape is trained already; see pix2shape train")
     needs_torch()
-    from baselines.pix2shape.bundled import suited
-    from baselines.pix2shape.predict import predict_file
+    from baselines.pix2shape.use.predict import predict_file
+    from baselines.pix2shape.weights.bundled import suited
 
     weights = weights or suited(data)
     with show_progress("row") as bar:

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.question_file import open_questions
+from iqtt.files.reader import open_questions
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from scenegen.camera import pixel_directions
-from scenegen.errors import SpecError
-from scenegen.scene_file import RoomsFile
-from scenegen.seeding import Purpose, item_rng
+from scenegen.common.errors import SpecError
+from scenegen.common.seeding import Purpose, item_rng
+from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 ROOM_BASELINES = ("constant", "mean-depth", "empty-room", "oracle")

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from benchmarks.scenes import read_depth, read_scenes
 from benchmarks.timing import repeat
-from scenegen.backend import select_variant
-from scenegen.kernel import Scenes, closest_hit
-from scenegen.packing import SceneBatch, pack, pixel_size
-from scenegen.shapes import unit_shape
-from scenegen.specs import DatasetSpec
-from scenegen.unit_scene import mitsuba_shape
-from scenegen.wavefront import _upload
+from scenegen.description.specs import DatasetSpec
+from scenegen.objects.shapes import unit_shape
+from scenegen.rendering.backend import select_variant
+from scenegen.rendering.kernel import Scenes, closest_hit
+from scenegen.rendering.packing import SceneBatch, pack, pixel_size
+from scenegen.rendering.unit_scene import mitsuba_shape
+from scenegen.rendering.wavefront import _upload
 
 Array = NDArray[Any]
 BATCHES = (64, 256)

@@ -83,7 +83,8 @@ def commands(folder: Path) -> Iterator[str]:
     yield f"bench baseline chance --data {answers}.h5 --out chance.h5"
     for name in ("constant", "mean-depth", "empty-room", "oracle", "pix2shape"):
         yield f"bench score {name}.h5 --json {name}.json --csv {name}.csv --markdown"
-    yield "bench score constant.h5 mean-depth.h5 --json runs.json"
+    yield "bench baseline constant --data truth.h5 --train truth.h5 --out constant-2.h5"
+    yield "bench score constant.h5 constant-2.h5 --json runs.json"
     for name in ("chance", "pix2shape-answers"):
         yield f"bench score {name}.h5 --truth {answers}-answers.h5 --json {name}.json"
     yield "bench compare constant.json mean-depth.json empty-room.json --json compare.json"
@@ -164,7 +165,10 @@ def write(out: str, tree: str, keep: str | None) -> None:
         make_models(folder / "models")
         for command in commands(folder):
             printed = run(Path(tree).resolve(), folder, command)
-            if command.startswith(("bench compare", "bench leaderboard")) or "--markdown" in command:
+            if (
+                command.startswith(("bench compare", "bench leaderboard"))
+                or "--markdown" in command
+            ):
                 found[f"$ {command}"] = digest(printed)
             print(command, flush=True)
         for path in sorted(folder.rglob("*")):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from trimesh.grouping import unique_rows
 
-from scenegen.solids import UnitShape
+from scenegen.objects.solids import UnitShape
 
 Array = NDArray[Any]
 COARSE_FROM = 1000  # triangles; shapes with fewer stay as they are

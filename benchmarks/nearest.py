@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.image_search import nearest_distances_on_image
-from metrics.points import NearestDistances, nearest_distances
+from metrics.measures.chamfer_hausdorff import NearestDistances, nearest_distances
+from metrics.measures.image_search import nearest_distances_on_image
 from scenegen.camera import back_project
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from benchmarks.timing import STARTED, repeat, seconds_of
 
 def machine() -> dict[str, Any]:
     """Return the versions that only the process that renders can tell."""
-    from scenegen.backend import find_llvm, llvm_version, select_variant
+    from scenegen.rendering.backend import find_llvm, llvm_version, select_variant
 
     names = ("mitsuba", "drjit", "numpy", "h5py", "isal")
     versions = {name: importlib.metadata.version(name) for name in names}
@@ -28,8 +28,8 @@ def end_to_end(rooms: str, count: int, repeats: int) -> dict[str, Any]:
     two file sizes give: (count - count / 4) rows in the difference of their times, so that what
     opening, filling and draining cost drops out.
     """
-    from scenegen.dataset import DEFAULT_BATCH, make_dataset
-    from scenegen.specs import DatasetSpec
+    from scenegen.description.specs import DatasetSpec
+    from scenegen.rooms.make import DEFAULT_BATCH, make_dataset
 
     def make(rows: int) -> float:
         Path(rooms).unlink(missing_ok=True)  # so that no file's disk pages burden the next one
@@ -55,9 +55,9 @@ def from_nothing(
     rooms: str, count: int, preset: str, root: str = "", **settings: Any
 ) -> dict[str, Any]:
     """Time make_dataset once, with no model in memory; imports and compilations come before."""
-    from scenegen.dataset import DEFAULT_BATCH, make_dataset
-    from scenegen.object_sources import object_source
-    from scenegen.presets import preset_spec
+    from scenegen.description.presets import preset_spec
+    from scenegen.objects.sources import object_source
+    from scenegen.rooms.make import DEFAULT_BATCH, make_dataset
 
     source = object_source(preset, objects_root=root or None)
     spec = preset_spec(preset, **source.settings, **settings)
@@ -96,9 +96,9 @@ def stage(rooms: str, count: int, repeats: int, root: str = "") -> dict[str, Any
     a batch is packed while the one before is cast.
     """
     from benchmarks.scenes import read_objects, read_scenes
-    from scenegen.dataset import DEFAULT_BATCH
-    from scenegen.packing import pack
-    from scenegen.renderer import launch
+    from scenegen.rendering.packing import pack
+    from scenegen.rendering.renderer import launch
+    from scenegen.rooms.make import DEFAULT_BATCH
 
     spec, scenes = read_scenes(rooms, count)
     objects = read_objects(spec, root)

@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 from benchmarks.meshes import Mesh, join, moved, unit_meshes
 from benchmarks.scenes import read_depth, read_objects, read_scenes
 from benchmarks.timing import repeat
-from scenegen.backend import select_variant
 from scenegen.camera import Camera, pixel_directions
-from scenegen.scenes import SceneSpec
-from scenegen.shapes import room_mesh, world_from_object
-from scenegen.specs import DatasetSpec
+from scenegen.description.scenes import SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.objects.shapes import room_mesh, world_from_object
+from scenegen.rendering.backend import select_variant
 
 Array = NDArray[Any]
 WAYS = ("files", "merged", "instances")

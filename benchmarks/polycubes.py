@@ -13,14 +13,14 @@ import numpy as np
 from benchmarks.meshes import Mesh
 from benchmarks.plain_mitsuba import mitsuba_mesh
 from benchmarks.timing import repeat, seconds_of
-from iqtt.questions import make_pools
+from iqtt.files.make import make_split
+from iqtt.questions.sampling import make_pools
+from iqtt.questions.specs import SplitSpec
+from iqtt.questions.views import Question, cube_centres, pack_questions
 from iqtt.render import render_questions
-from iqtt.specs import SplitSpec
-from iqtt.split import make_split
-from iqtt.views import Question, cube_centres, pack_questions
-from scenegen.backend import select_variant
-from scenegen.renderer import launch_fields
-from scenegen.shapes import unit_shape, welded
+from scenegen.objects.shapes import unit_shape, welded
+from scenegen.rendering.backend import select_variant
+from scenegen.rendering.renderer import launch_fields
 
 
 def end_to_end(questions: int, repeats: int, folder: str) -> dict[str, Any]:

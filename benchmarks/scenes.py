@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.object_sources import file_objects
-from scenegen.objects import Objects
-from scenegen.scene_file import RoomsFile
-from scenegen.scenes import SceneSpec
-from scenegen.specs import DatasetSpec
+from scenegen.description.scenes import SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.objects.catalogue import Objects
+from scenegen.objects.sources import file_objects
+from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 

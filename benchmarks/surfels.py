@@ -17,13 +17,13 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from baselines.pix2shape.surfels import Scene, back_project, render
+from baselines.pix2shape.network.surfels import Scene, back_project, render
 from benchmarks.timing import repeat
 from scenegen.camera import transform_points
-from scenegen.packing import pack
-from scenegen.presets import preset_spec
-from scenegen.renderer import render as render_rooms
-from scenegen.sampling import sample_scene
+from scenegen.description.presets import preset_spec
+from scenegen.rendering.packing import pack
+from scenegen.rendering.renderer import render as render_rooms
+from scenegen.sampling.scenes import sample_scene
 
 Render = Callable[[Tensor, Scene], Tensor]
 

@@ -9,7 +9,7 @@ import json
 import sys
 
 from benchmarks.timing import peak_mib
-from scenegen.backend import select_variant
+from scenegen.rendering.backend import select_variant
 
 
 def main() -> None:

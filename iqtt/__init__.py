@@ -11,23 +11,23 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from iqtt.question_file import (
+    from iqtt.files.make import make_split
+    from iqtt.files.reader import (
         QuestionRecord,
         QuestionsDataset,
         QuestionsFile,
         open_questions,
     )
-    from iqtt.specs import SplitSpec, preset_spec
-    from iqtt.split import make_split
+    from iqtt.questions.specs import SplitSpec, preset_spec
 
 _HOME = {
-    "QuestionRecord": "question_file",
-    "QuestionsDataset": "question_file",
-    "QuestionsFile": "question_file",
-    "SplitSpec": "specs",
-    "make_split": "split",
-    "open_questions": "question_file",
-    "preset_spec": "specs",
+    "QuestionRecord": "files.reader",
+    "QuestionsDataset": "files.reader",
+    "QuestionsFile": "files.reader",
+    "SplitSpec": "questions.specs",
+    "make_split": "files.make",
+    "open_questions": "files.reader",
+    "preset_spec": "questions.specs",
 }
 
 __all__ = [

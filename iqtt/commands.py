@@ -7,7 +7,16 @@ from typing import Any
 
 import click
 
-from scenegen.command_line import COMPRESSION, DEVICE, IMAGE_DTYPE, SEED, SIZE, Color, Items, Range
+from scenegen.common.command_line import (
+    COMPRESSION,
+    DEVICE,
+    IMAGE_DTYPE,
+    SEED,
+    SIZE,
+    Color,
+    Items,
+    Range,
+)
 
 SHOWN = 8  # questions that `show` draws unless told which
 
@@ -83,8 +92,8 @@ def make_split(
     """
     from tqdm import tqdm
 
-    from iqtt import split
-    from iqtt.specs import preset_spec
+    from iqtt.files import make as split
+    from iqtt.questions.specs import preset_spec
 
     chosen = {name: value for name, value in settings.items() if value is not None}
     spec = preset_spec(preset, height=size[0], width=size[1], **chosen)
@@ -121,10 +130,10 @@ def make_split(
 @click.option("--answers", is_flag=True, help="Mark the right answers.")
 def show(file: str, out: str, items: list[int] | None, part: str | None, answers: bool) -> None:
     """Draw questions as a person would read them."""
-    from iqtt.question_file import answers_beside, open_questions, parts
-    from iqtt.show import save_sheet
-    from scenegen.errors import SpecError
-    from scenegen.preview import pick_rows
+    from iqtt.files.reader import answers_beside, open_questions, parts
+    from iqtt.files.show import save_sheet
+    from scenegen.common.errors import SpecError
+    from scenegen.rooms.preview import pick_rows
 
     chosen = part or parts(file)[0]
     beside = answers_beside(file) if answers else None
@@ -140,7 +149,7 @@ def show(file: str, out: str, items: list[int] | None, part: str | None, answers
 @click.argument("file")
 def info(file: str) -> None:
     """Say what is in a file: counts, shapes, distractors, spec, sizes, versions, fingerprints."""
-    from iqtt.info import describe
+    from iqtt.files.info import describe
 
     click.echo(describe(file))
 
@@ -171,9 +180,9 @@ def audit(
     """
     from tqdm import tqdm
 
-    from iqtt import audit as audits
-    from iqtt import audit_report
-    from scenegen.new_file import check_writable, written_beside
+    from iqtt.audit import audit as audits
+    from iqtt.audit import report as audit_report
+    from scenegen.common.new_file import check_writable, written_beside
 
     if json_path:
         check_writable(Path(json_path), overwrite)

@@ -7,12 +7,12 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iqtt.questions import Pools, answer_positions
-from iqtt.settle import Tally, settle
-from iqtt.specs import SplitSpec
-from iqtt.views import Question, pack_questions
-from scenegen.renderer import launch_fields
-from scenegen.truth import visible_pixels
+from iqtt.questions.sampling import Pools, answer_positions
+from iqtt.questions.settle import Tally, settle
+from iqtt.questions.specs import SplitSpec
+from iqtt.questions.views import Question, pack_questions
+from scenegen.rendering.ground_truth import visible_pixels
+from scenegen.rendering.renderer import launch_fields
 
 Array = NDArray[Any]
 Fetch = Callable[[], dict[str, Array]]

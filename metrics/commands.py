@@ -44,12 +44,12 @@ def score(
     **settings: Any,
 ) -> None:
     """Score a submission, or several runs of one method, and print a table."""
-    from metrics import report
-    from metrics.runs import Settings
-    from metrics.scoring import count_rows
-    from metrics.scoring import score as score_files
-    from scenegen.errors import SpecError
-    from scenegen.new_file import check_writable, written_beside
+    from metrics.report import text as report
+    from metrics.scoring.runs import Settings
+    from metrics.scoring.scoring import count_rows
+    from metrics.scoring.scoring import score as score_files
+    from scenegen.common.errors import SpecError
+    from scenegen.common.new_file import check_writable, written_beside
 
     outputs = [Path(path) for path in (json_path, csv_path, html_path) if path]
     for path in outputs:
@@ -66,7 +66,7 @@ def score(
     if csv_path:
         report.write_csv(found, csv_path, overwrite)
     if html_path:
-        from metrics.html_report import html_report
+        from metrics.report.page import html_report
 
         page = html_report(found, Path(found.meta.truth_path), [Path(p) for p in submissions])
         with written_beside(html_path, overwrite) as temporary:
@@ -81,7 +81,7 @@ def validate(ctx: click.Context, submission: str, truth: str | None) -> None:
     """Say everything that is wrong with a submission, and what it looks like; exits with 2 if it
     cannot be scored.
     """
-    from metrics.validation import validate as problems_of
+    from metrics.submissions.validation import validate as problems_of
 
     problems = problems_of(submission, truth)
     for problem in problems:
@@ -110,10 +110,10 @@ def compare(
     overwrite: bool,
 ) -> None:
     """Compare methods with the first, item by item: differences, tests, and what could show."""
-    from metrics import compare_report
-    from metrics.compare import compare as compare_files
+    from metrics.comparison import report as compare_report
+    from metrics.comparison.compare import compare as compare_files
     from metrics.score_file import read_scores
-    from scenegen.new_file import check_writable, written_beside
+    from scenegen.common.new_file import check_writable, written_beside
 
     if json_path:
         check_writable(Path(json_path), overwrite)
@@ -152,10 +152,10 @@ def leaderboard(
     overwrite: bool,
 ) -> None:
     """Put score files into tables, beside what the paper reported on its own data."""
-    from metrics import leaderboard_text
-    from metrics.leaderboard import leaderboard as rank
+    from metrics.leaderboard import text as leaderboard_text
+    from metrics.leaderboard.leaderboard import leaderboard as rank
     from metrics.score_file import read_scores
-    from scenegen.new_file import written_beside
+    from scenegen.common.new_file import written_beside
 
     board = rank([read_scores(path) for path in scores], metrics or None, paper=paper)
     text: str = getattr(leaderboard_text, f"to_{form}")(board)
@@ -170,7 +170,7 @@ def leaderboard(
 @click.command("describe-format")
 def describe_format() -> None:
     """Print the format of submissions, and how to write one."""
-    from metrics.prediction_layout import describe_format as text
+    from metrics.submissions.layout import describe_format as text
 
     click.echo(text())
 

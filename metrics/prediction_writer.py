@@ -17,14 +17,14 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.answer_writer import write_answers
-from metrics.depth import Alignment
-from metrics.prediction_layout import datasets, describe_format
-from metrics.prediction_parts import check_elsewhere, checked_floats, checked_texts, write_columns
-from metrics.problems import PredictionError, first_ids
-from metrics.row_rules import EXPECTED, GOT, depth_faults, faces_away, normal_faults
-from scenegen.row_file import Table, new_file
-from scenegen.scene_file import RoomsFile
+from metrics.measures.depth import Alignment
+from metrics.submissions.answer_writer import write_answers
+from metrics.submissions.layout import datasets, describe_format
+from metrics.submissions.parts import check_elsewhere, checked_floats, checked_texts, write_columns
+from metrics.submissions.problems import PredictionError, first_ids
+from metrics.submissions.row_rules import EXPECTED, GOT, depth_faults, faces_away, normal_faults
+from scenegen.common.row_file import Table, new_file
+from scenegen.rooms.reader import RoomsFile
 
 __all__ = ["PredictionError", "RoomPredictionWriter", "describe_format", "write_answers"]
 
@@ -56,7 +56,7 @@ class RoomPredictionWriter:
             path: to write.
             truth: the rooms file that is predicted, recorded as given.
             method, run: who predicts; runs of one method are averaged.
-            alignment: what the method cannot know, as in `metrics.depth.align`.
+            alignment: what the method cannot know, as in `metrics.measures.depth.align`.
             notes: anything else.
             overwrite: whether an existing file may be replaced.
             allow_partial: whether rows may be missing; scores of such a file are not comparable.

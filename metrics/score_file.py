@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from metrics.metric_names import in_order
-from metrics.score_parser import FORMAT_NAME, FORMAT_VERSION, parse_scores
-from metrics.score_records import (
+from metrics.scoring.metric_names import in_order
+from metrics.scoring.parser import FORMAT_NAME, FORMAT_VERSION, parse_scores
+from metrics.scoring.records import (
     GROUPINGS,
     ID_COLUMNS,
     OPTIONAL_COLUMNS,
@@ -24,8 +24,8 @@ from metrics.score_records import (
     Submission,
     score,
 )
-from metrics.strict_json import JsonError, parse_json, read_json
-from scenegen.new_file import written_beside
+from metrics.submissions.strict_json import JsonError, parse_json, read_json
+from scenegen.common.new_file import written_beside
 
 __all__ = [
     "FORMAT_NAME",

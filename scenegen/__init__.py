@@ -12,25 +12,25 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scenegen.camera import Camera, back_project
-    from scenegen.dataset import make_dataset
-    from scenegen.errors import SceneGenError
-    from scenegen.scene_file import Room, RoomsDataset, RoomsFile, open_rooms
-    from scenegen.scenes import SceneSpec
-    from scenegen.shading import shade
-    from scenegen.specs import DatasetSpec
+    from scenegen.common.errors import SceneGenError
+    from scenegen.description.scenes import SceneSpec
+    from scenegen.description.specs import DatasetSpec
+    from scenegen.rendering.shading import shade
+    from scenegen.rooms.make import make_dataset
+    from scenegen.rooms.reader import Room, RoomsDataset, RoomsFile, open_rooms
 
 _HOME = {
     "Camera": "camera",
-    "DatasetSpec": "specs",
-    "Room": "scene_file",
-    "RoomsDataset": "scene_file",
-    "RoomsFile": "scene_file",
-    "SceneGenError": "errors",
-    "SceneSpec": "scenes",
+    "DatasetSpec": "description.specs",
+    "Room": "rooms.reader",
+    "RoomsDataset": "rooms.reader",
+    "RoomsFile": "rooms.reader",
+    "SceneGenError": "common.errors",
+    "SceneSpec": "description.scenes",
     "back_project": "camera",
-    "make_dataset": "dataset",
-    "open_rooms": "scene_file",
-    "shade": "shading",
+    "make_dataset": "rooms.make",
+    "open_rooms": "rooms.reader",
+    "shade": "rendering.shading",
 }
 
 __all__ = [

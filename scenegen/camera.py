@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.errors import SpecError
-from scenegen.records import check
+from scenegen.common.errors import SpecError
+from scenegen.common.records import check
 
 Vector3 = tuple[float, float, float]
 Array = NDArray[Any]

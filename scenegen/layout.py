@@ -6,8 +6,8 @@
 from dataclasses import dataclass
 from typing import Any
 
-from scenegen.row_file import Column
-from scenegen.specs import DatasetSpec
+from scenegen.common.row_file import Column
+from scenegen.description.specs import DatasetSpec
 
 FORMAT_NAME = "pix2shape-bench/rooms"
 FORMAT_VERSION = "2.0"

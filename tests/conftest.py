@@ -18,8 +18,8 @@ Edit = Callable[[h5py.File], Any]
 @pytest.fixture(scope="session")
 def make_rooms() -> Callable[..., Path]:
     """Write a tiny file of rooms; settings override those of TINY, `how` goes to make_dataset."""
-    from scenegen.dataset import make_dataset
-    from scenegen.specs import DatasetSpec
+    from scenegen.description.specs import DatasetSpec
+    from scenegen.rooms.make import make_dataset
 
     def make(
         path: Path, count: int = 6, how: dict[str, Any] | None = None, **settings: Any

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from scenegen.command_line import Items, UserError
+from scenegen.common.command_line import Items, UserError
 
 PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
 
@@ -94,9 +94,9 @@ def train(
     needs_torch()
     from tqdm import tqdm
 
-    from baselines.pix2shape.config import model_config
-    from baselines.pix2shape.predict import chosen_device
-    from baselines.pix2shape.runs import Machine, train_run
+    from baselines.pix2shape.network.config import model_config
+    from baselines.pix2shape.training.runs import Machine, train_run
+    from baselines.pix2shape.use.predict import chosen_device
 
     chosen = dict(settings) | ({} if seed is None else {"seed": seed})
     if resume and (config or chosen or labels or conditional):
@@ -149,8 +149,8 @@ def predict(
 ) -> None:
     """Predict every view of each room from its input view alone, or answer questions."""
     needs_torch()
-    from baselines.pix2shape.bundled import suited
-    from baselines.pix2shape.predict import predict_file
+    from baselines.pix2shape.use.predict import predict_file
+    from baselines.pix2shape.weights.bundled import suited
 
     weights = weights or suited(data)
     with show_progress("row") as bar:
@@ -172,9 +172,9 @@ def predict(
 def sample(weights: str, out: str, count: int, label: str | None, seed: int) -> None:
     """Draw scenes that never were: lines of images, depths and normals."""
     needs_torch()
-    from baselines.pix2shape.bundled import open_weights
-    from baselines.pix2shape.explore import sample_sheet
     from baselines.pix2shape.pictures import check_picture, save_pictures
+    from baselines.pix2shape.use.explore import sample_sheet
+    from baselines.pix2shape.weights.bundled import open_weights
 
     check_picture(out)
     model, card = open_weights(weights)
@@ -191,10 +191,10 @@ def sample(weights: str, out: str, count: int, label: str | None, seed: int) -> 
 def interpolate(weights: str | None, data: str, items: list[int], steps: int, out: str) -> None:
     """Go from one image's scene to another's, seen from the first one's camera."""
     needs_torch()
-    from baselines.pix2shape.bundled import open_weights, suited
-    from baselines.pix2shape.explore import interpolation_sheet, known_rooms
     from baselines.pix2shape.pictures import check_picture, save_pictures
-    from scenegen.preview import pick_rows
+    from baselines.pix2shape.use.explore import interpolation_sheet, known_rooms
+    from baselines.pix2shape.weights.bundled import open_weights, suited
+    from scenegen.rooms.preview import pick_rows
 
     check_picture(out)
     model, card = open_weights(weights or suited(data))
@@ -218,10 +218,10 @@ def rotate(
 ) -> None:
     """Turn the camera around scenes that were seen from one side."""
     needs_torch()
-    from baselines.pix2shape.bundled import open_weights, suited
-    from baselines.pix2shape.explore import known_rooms, rotation_frames
     from baselines.pix2shape.pictures import check_picture, save_pictures
-    from scenegen.preview import pick_rows
+    from baselines.pix2shape.use.explore import known_rooms, rotation_frames
+    from baselines.pix2shape.weights.bundled import open_weights, suited
+    from scenegen.rooms.preview import pick_rows
 
     check_picture(out, animated=True)
     model, card = open_weights(weights or suited(data))

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from PIL import Image
 from torch import Tensor
 
-from baselines.pix2shape.data import Batch
-from baselines.pix2shape.model import Pix2Shape, Views, shaded
-from baselines.pix2shape.surfels import normals_from_depth
-from scenegen.errors import SpecError
-from scenegen.new_file import check_writable, written_beside
-from scenegen.preview import (
+from baselines.pix2shape.data.rooms import Batch
+from baselines.pix2shape.network.model import Pix2Shape, Views, shaded
+from baselines.pix2shape.network.surfels import normals_from_depth
+from scenegen.common.errors import SpecError
+from scenegen.common.new_file import check_writable, written_beside
+from scenegen.rooms.preview import (
     BACKGROUND,
     GAP,
     SMALLEST_TILE,

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from baselines.trivial import empty_room, write_chance, write_room_baseline
-from iqtt.specs import SplitSpec
-from iqtt.split import make_split
-from metrics.scoring import score
-from scenegen.errors import SpecError
-from scenegen.scene_file import RoomsFile
+from iqtt.files.make import make_split
+from iqtt.questions.specs import SplitSpec
+from metrics.scoring.scoring import score
+from scenegen.common.errors import SpecError
+from scenegen.rooms.reader import RoomsFile
 
 
 def test_an_empty_room_is_the_truth_wherever_no_object_is(rooms_path):

@@ -15,8 +15,8 @@ Edit = Callable[[h5py.File], Any]
 @pytest.fixture(scope="session")
 def split_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the files of a split that no test changes: 6 + 6, 6 and 6 questions, with depth."""
-    from iqtt.specs import SplitSpec
-    from iqtt.split import make_split
+    from iqtt.files.make import make_split
+    from iqtt.questions.specs import SplitSpec
 
     spec = SplitSpec(
         seed=5,
@@ -53,7 +53,7 @@ def damaged(split_folder: Path, tmp_path: Path) -> Callable[..., Path]:
 @pytest.fixture
 def failing(split_folder: Path, tmp_path: Path) -> Callable[..., set[str]]:
     """Let `edit` at a file in a copy of the split; return the audit's proofs that then fail."""
-    from iqtt.audit import audit
+    from iqtt.audit.audit import audit
 
     def fail(edit: Edit, name: str = "iqtt-val.h5") -> set[str]:
         folder = tmp_path / "split"

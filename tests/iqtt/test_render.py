@@ -9,17 +9,17 @@ import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from iqtt import render as module
-from iqtt import settle as settle_module
-from iqtt.polycube import box_centre
-from iqtt.questions import Pools, make_pools
+from iqtt.questions import settle as settle_module
+from iqtt.questions.sampling import Pools, make_pools
+from iqtt.questions.settle import Tally
+from iqtt.questions.specs import SplitSpec
+from iqtt.questions.views import pack_questions
 from iqtt.render import Rendered, groups, render_question, render_questions
-from iqtt.settle import Tally
-from iqtt.specs import SplitSpec
-from iqtt.views import pack_questions
+from iqtt.shapes.polycube import box_centre
 from scenegen.camera import pixel_directions
-from scenegen.renderer import launch_fields
-from scenegen.shading import shade
-from scenegen.truth import decode_image, encode_image
+from scenegen.rendering.ground_truth import decode_image, encode_image
+from scenegen.rendering.renderer import launch_fields
+from scenegen.rendering.shading import shade
 
 SPEC = SplitSpec(
     seed=9, train=12, labeled=5, val=4, test=3, cubes=(5, 7), height=40, width=56,
@@ -118,7 +118,7 @@ def test_images_are_what_another_ray_caster_and_the_shading_equation_give(name):
 def test_the_fallback_without_llvm_gives_the_same_images(monkeypatch):
     one = rendered(FLOAT, "val")[3]
     assert len(set(one.question.light_count.tolist())) > 1
-    monkeypatch.setattr("scenegen.renderer.select_variant", lambda device: "scalar_rgb")
+    monkeypatch.setattr("scenegen.rendering.renderer.select_variant", lambda device: "scalar_rgb")
     slow = launch_fields(pack_questions(FLOAT, [one.question]), ("image", "depth"))()
     same = np.isclose(slow["depth"], one.depth, atol=1e-4, rtol=0, equal_nan=True)
     assert same.mean() > 0.997

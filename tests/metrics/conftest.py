@@ -9,10 +9,10 @@ import pytest
 from hypothesis import settings
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.hints import room_hints
-from metrics.prediction_file import open_predictions
+from metrics.submissions.hints.hints import room_hints
+from metrics.submissions.reader import open_predictions
 from scenegen.camera import pixel_directions
-from scenegen.scene_file import RoomsFile
+from scenegen.rooms.reader import RoomsFile
 
 FOV_Y_DEGREES = 20.0
 Depth = NDArray[np.float64]

@@ -8,11 +8,11 @@ import h5py
 import numpy as np
 import pytest
 
-from metrics.prediction_file import open_predictions
 from metrics.prediction_writer import PredictionError, RoomPredictionWriter
-from metrics.validation import validate
-from scenegen.errors import FileFormatError, SceneGenError
-from scenegen.scene_file import RoomsFile
+from metrics.submissions.reader import open_predictions
+from metrics.submissions.validation import validate
+from scenegen.common.errors import FileFormatError, SceneGenError
+from scenegen.rooms.reader import RoomsFile
 
 SIZE = (32, 32)
 ROOT = Path(__file__).parents[2]

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from metrics.answers import iqtt_accuracy
+from metrics.measures.answers import iqtt_accuracy
+from metrics.measures.statistics import Estimate, cluster_bootstrap
 from metrics.score_file import JsonError, Score, read_scores, score, to_json, write_scores
-from metrics.statistics import Estimate, cluster_bootstrap
-from scenegen.errors import SceneGenError
+from scenegen.common.errors import SceneGenError
 
 
 def test_what_is_written_reads_back_to_the_same_bits(tmp_path):

@@ -48,7 +48,7 @@ def gap_between() -> Callable[[Array, Array], float]:
 @pytest.fixture(scope="session")
 def unit_corners() -> Callable[[str], Array]:
     """Corners of a unit shape's mesh, each once."""
-    from scenegen.shapes import unit_shape, welded
+    from scenegen.objects.shapes import unit_shape, welded
 
     return cache(lambda name: np.asarray(welded(unit_shape(name)).vertices))
 
@@ -69,7 +69,7 @@ def world_corners(unit_corners: Callable[[str], Array]) -> Callable[[Any], Array
 @pytest.fixture(scope="session")
 def scenes_of() -> Callable[..., list[Any]]:
     """The first so many scenes of a request whose first proposal finds room."""
-    from scenegen.sampling import sample_scene
+    from scenegen.sampling.scenes import sample_scene
 
     def scenes(spec: Any, count: int) -> list[Any]:
         found: list[Any] = []
@@ -106,8 +106,8 @@ def embree_cast() -> Callable[[str, Array, Array], tuple[Array, Array]]:
     from trimesh.ray.ray_pyembree import RayMeshIntersector
     from trimesh.triangles import points_to_barycentric
 
-    from scenegen.reference import face_viewer, smooth_normals
-    from scenegen.shapes import unit_shape
+    from scenegen.objects.shapes import unit_shape
+    from scenegen.rendering.reference import face_viewer, smooth_normals
 
     @cache
     def intersector(name: str) -> Any:
@@ -149,7 +149,7 @@ def embree_cast() -> Callable[[str, Array, Array], tuple[Array, Array]]:
 @pytest.fixture(scope="session")
 def variant() -> str:
     """Put the fast variant in force; before that, no test may import Mitsuba or Dr.Jit."""
-    from scenegen.backend import select_variant
+    from scenegen.rendering.backend import select_variant
 
     chosen = select_variant("auto")
     import mitsuba as mi

@@ -15,7 +15,7 @@ from scenegen.camera import (
     transform_points,
     transform_vectors,
 )
-from scenegen.errors import SpecError
+from scenegen.common.errors import SpecError
 
 COORDINATE = st.floats(-9.0, 9.0)
 POINT = st.tuples(COORDINATE, COORDINATE, COORDINATE)

@@ -8,13 +8,14 @@ import pytest
 from PIL import Image
 from pix2shape_models import made, tiny
 
-from scenegen.errors import SpecError
-from scenegen.preview import srgb_bytes
+from scenegen.common.errors import SpecError
+from scenegen.rooms.preview import srgb_bytes
 
 torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
-from baselines.pix2shape.data import Batch, RoomImages  # noqa: E402
+from baselines.pix2shape.data.rooms import Batch, RoomImages  # noqa: E402
+from baselines.pix2shape.network.surfels import normals_from_depth  # noqa: E402
 from baselines.pix2shape.pictures import (  # noqa: E402
     drawn,
     image_tiles,
@@ -22,7 +23,6 @@ from baselines.pix2shape.pictures import (  # noqa: E402
     sheet,
     training_sheet,
 )
-from baselines.pix2shape.surfels import normals_from_depth  # noqa: E402
 
 GAP, TILE = 6, 128
 PAPER = (250, 250, 250)

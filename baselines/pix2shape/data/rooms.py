@@ -1,0 +1,192 @@
+"""Our files as batches for the networks: linear radiance, cameras and lights; no ground truth.
+
+Only the ablation's depth supervision reads depth maps.
+"""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.utils.data import Dataset, Sampler
+
+from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.network.model import Views, mapped
+from baselines.pix2shape.network.surfels import Scene
+from scenegen.common.errors import SpecError
+from scenegen.common.row_file import open_file
+from scenegen.common.seeding import Purpose, item_rng
+from scenegen.rendering.ground_truth import decode_image
+from scenegen.rooms.reader import RoomsDataset, RoomsFile
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Images and what is known of them.
+
+    Attributes:
+        image: linear radiance, (B, 3, S, S).
+        views: cameras, classes and lights.
+        depth: planar, (B, S, S), NaN where nothing; None but where supervision asks for it.
+    """
+
+    image: Tensor
+    views: Views
+    depth: Tensor | None = None
+
+    def to(self, device: torch.device) -> "Batch":
+        """Return the batch on another device."""
+        return mapped(self, lambda values: values.to(device, non_blocking=True))
+
+
+def reduced(image: Array, size: int) -> Array:
+    """Return the means of square blocks: (H, W, ...) -> (S, S, ...)."""
+    block = image.shape[0] // size
+    return image.reshape(size, block, size, block, *image.shape[2:]).mean(axis=(1, 3))
+
+
+def is_question_file(path: str | Path) -> bool:
+    """Tell files of questions from all others. Raises OSError, FileFormatError."""
+    with open_file(path, "rooms or question file") as file:
+        return any(name in file for name in ("questions", "labeled", "unlabeled"))
+
+
+def check_reducible(where: object, height: int, width: int, size: int) -> None:
+    """Raise SpecError unless images of a size can be reduced to size x size."""
+    if height != width or height % size:
+        raise SpecError(
+            f"{where}: images of {height}x{width}, expected squares of a multiple of {size} pixels,"
+            f" the size that the networks take"
+        )
+
+
+class RoomImages(Dataset[dict[str, Any]]):
+    """The images of a rooms file; every row is an item of its own, whichever scene it shows.
+
+    What is small (cameras, lights) is read at once, images when asked for, by any process.
+    """
+
+    def __init__(self, path: str | Path, config: ModelConfig) -> None:
+        """Read and check. Raises as `RoomsFile`, and SpecError where the model cannot take it."""
+        spec = config.networks
+        with RoomsFile(path) as rooms:
+            check_reducible(path, rooms.spec.height, rooms.spec.width, spec.size)
+            self.spec = rooms.spec
+            self.world_from_camera = rooms.read("camera/world_from_camera", slice(None))
+            self.light_position = rooms.read("light/position", slice(None))
+            self.light_color = rooms.read("light/color", slice(None))
+            self.ambient = rooms.read("light/ambient", slice(None))
+            self.attenuation = rooms.read("light/attenuation", slice(None))
+            self.reflectance = self._uniform_reflectance(path, rooms)
+            self.classes: tuple[str, ...] = tuple(rooms.spec.shapes)
+            self.label = rooms.read("object/shape", slice(None))[:, 0]
+        if spec.classes and spec.classes != len(self.classes):
+            raise SpecError(
+                f"{path}: {len(self.classes)} classes, the networks were made for {spec.classes}"
+            )
+        if spec.classes and self.spec.objects != (1, 1):
+            raise SpecError(f"{path}: expected one object in every room, whose class is told")
+        wanted = ("image", "depth") if config.depth else ("image",)
+        self._images = RoomsDataset(path, wanted)
+        self.fingerprint = self._images.fingerprint
+        self._networks = spec
+
+    @staticmethod
+    def _uniform_reflectance(path: str | Path, rooms: RoomsFile) -> Array:
+        """Return each image's one reflectance, (N, 3); known to the model, as in the paper."""
+        every = rooms.read("material/reflectance", slice(None))
+        used = np.arange(every.shape[1]) <= rooms.read("object/count", slice(None))[:, None]
+        shiny = rooms.read("material/specular", slice(None)).any()
+        if shiny or ((every != every[:, :1]).any(axis=2) & used).any():
+            raise SpecError(
+                f"{path}: rooms of several materials, expected one matte reflectance an image:"
+                f" the model is told the material, and several would tell it the shapes"
+            )
+        return every[:, 0]
+
+    def __len__(self) -> int:
+        return len(self.ambient)
+
+    def __getitem__(self, row: int) -> dict[str, Any]:
+        """Return one image and what its views need, as float32 arrays."""
+        stored = self._images[row]
+        item = {"image": channels_first(decode_image(stored["image"]), self._networks.size)}
+        item |= self.view(row)
+        if "depth" in stored:
+            item["depth"] = reduced(stored["depth"], self._networks.size).astype(np.float32)
+        return item
+
+    def as_batch(self, items: dict[str, Tensor]) -> Batch:
+        """Put collated items together."""
+        return as_batch(items, self.spec.fov_y_degrees)
+
+    def view(self, row: int, world_from_camera: Array | None = None) -> dict[str, Any]:
+        """Return what is known of a row without its image, or as another camera would see it."""
+        pose = self.world_from_camera[row] if world_from_camera is None else world_from_camera
+        condition = [pose[:3, 3]] if self._networks.camera else []
+        if self._networks.classes:
+            condition.append(np.eye(self._networks.classes)[self.label[row]])
+        known = {
+            "condition": np.concatenate([np.empty(0), *condition]),
+            "light_position": (self.light_position[row] - pose[:3, 3]) @ pose[:3, :3],
+            "light_color": self.light_color[row],
+            "ambient": self.ambient[row],
+            "attenuation": self.attenuation[row],
+            "reflectance": self.reflectance[row],
+            "world_from_camera": pose,
+        }
+        return {name: np.float32(value) for name, value in known.items()}
+
+
+def channels_first(radiance: Array, size: int) -> Array:
+    """Return an image as the networks take it: (H, W, 3) -> (3, S, S) float32."""
+    return np.ascontiguousarray(np.moveaxis(reduced(radiance, size), -1, 0), dtype=np.float32)
+
+
+def as_batch(items: dict[str, Tensor], fov_y_degrees: float) -> Batch:
+    """Put the collated fields of items together."""
+    return Batch(items["image"], as_views(items, fov_y_degrees), items.get("depth"))
+
+
+def as_views(items: dict[str, Tensor], fov_y_degrees: float) -> Views:
+    """Put the collated fields of views together."""
+    known = {f.name: items[f.name] for f in fields(Scene) if f.name in items}
+    scene = Scene(fov_y_degrees, **known)
+    return Views(items["condition"], scene, items.get("background"), items.get("world_from_camera"))
+
+
+class Draws(Sampler[list[int]]):
+    """Rows of batch after batch, from one batch on to another: all rows in a new order each epoch.
+
+    What a batch holds depends on its number alone, so training goes on where it was stopped.
+    """
+
+    def __init__(
+        self, rows: int, batch: int, seed: int, first: int = 0, share: slice = slice(None)
+    ) -> None:
+        """Count through `rows`.
+
+        Args:
+            first: number of the batch to begin with; they never end.
+            share: which of every batch's rows, where several processes train.
+        """
+        self._rows, self._batch, self._seed = rows, batch, seed
+        self._first, self._share = first, share
+
+    def __iter__(self) -> Iterator[list[int]]:
+        epoch, order = -1, np.empty(0, int)
+        for number in itertools.count(self._first):
+            rows: list[int] = []
+            for place in range(number * self._batch, (number + 1) * self._batch):
+                if place // self._rows != epoch:
+                    epoch = place // self._rows
+                    order = item_rng(self._seed, epoch, Purpose.ORDER).permutation(self._rows)
+                rows.append(int(order[place % self._rows]))
+            yield rows[self._share]

@@ -1,0 +1,111 @@
+"""The model: networks and surfel renderer together."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any, TypeVar
+
+import torch
+from torch import Tensor, nn
+
+from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.network.networks import Critic, Decoder, Encoder, Statistics
+from baselines.pix2shape.network.surfels import Scene, render
+
+T = TypeVar("T")
+
+
+def mapped(record: T, function: Callable[[Tensor], Tensor]) -> T:
+    """Return a dataclass with every tensor, those of nested ones too, put through a function."""
+    changed: dict[str, Any] = {}
+    for field in fields(record):  # type: ignore[arg-type]
+        value = getattr(record, field.name)
+        if isinstance(value, Tensor):
+            changed[field.name] = function(value)
+        elif is_dataclass(value):
+            changed[field.name] = mapped(value, function)
+    return replace(record, **changed)  # type: ignore[type-var]
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """A batch of views as the networks see them.
+
+    Attributes:
+        condition: the camera's position, world, and the one-hot class: (B, spec.condition).
+        scene: what their images are shaded with.
+        background: radiance where there is no surface, (B, 3); None where there always is one.
+        world_from_camera: (B, 4, 4); None where views are not compared with each other.
+    """
+
+    condition: Tensor
+    scene: Scene
+    background: Tensor | None = None
+    world_from_camera: Tensor | None = None
+
+
+class Prior(nn.Module):
+    """The distribution of codes, normal; standard normal until it is fitted."""
+
+    mean: Tensor
+    factor: Tensor
+
+    def __init__(self, z: int) -> None:
+        super().__init__()
+        self.register_buffer("mean", torch.zeros(z))
+        self.register_buffer("factor", torch.eye(z))
+
+    def forward(self, noise: Tensor) -> Tensor:
+        """Turn standard normal numbers into codes: (B, z) -> (B, z)."""
+        return self.mean + noise @ self.factor.T
+
+    def fit(self, codes: Tensor) -> None:
+        """Take mean and covariance of codes, (N, z).
+
+        Where no critic ties the codes to the prior, samples are drawn so (Ghosh et al. 2020, "From
+        Variational to Deterministic Autoencoders").
+        """
+        centred = (codes - codes.mean(dim=0)).double()
+        variance, axes = torch.linalg.eigh(centred.T @ centred / max(len(codes) - 1, 1))
+        self.mean.copy_(codes.mean(dim=0))
+        self.factor.copy_(axes * variance.clamp(min=0).sqrt())
+
+
+class Pix2Shape(nn.Module):
+    """Encoder, decoder, critic, statistics network and prior of one configuration."""
+
+    def __init__(self, config: ModelConfig) -> None:
+        super().__init__()
+        self.config = config
+        spec = config.networks
+        self.encoder = Encoder(spec)
+        self.decoder = Decoder(spec, outputs=2 if config.opacity else 1)
+        self.critic = Critic(spec)
+        self.statistics = Statistics(spec)
+        self.prior = Prior(spec.z)
+
+    def encode(self, image: Tensor, views: Views) -> Tensor:
+        """Return the codes of images of linear radiance: (B, 3, S, S) -> (B, z)."""
+        return self.encoder(image, views.condition)
+
+    def surfels(self, code: Tensor, condition: Tensor) -> tuple[Tensor, Tensor | None]:
+        """Return depth maps, scene units, and opacities within 0..1: (B, z) -> two (B, S, S).
+
+        The opacity is None for a model of closed rooms, where every ray meets a surface.
+        """
+        raw = self.decoder(code, condition).float()
+        depth = self.config.depth_middle * (1 + self.config.depth_reach * torch.tanh(raw[:, 0]))
+        return depth, torch.sigmoid(raw[:, 1]) if self.config.opacity else None
+
+    def image(self, code: Tensor, views: Views) -> Tensor:
+        """Return the rendered images of codes: (B, z) -> (B, 3, S, S)."""
+        return shaded(*self.surfels(code, views.condition), views)
+
+
+def shaded(depth: Tensor, opacity: Tensor | None, views: Views) -> Tensor:
+    """Return the images of surfels in front of the views' background: (B, 3, S, S)."""
+    with torch.autocast(depth.device.type, enabled=False):  # differences of near numbers
+        image = render(depth, views.scene)
+    if opacity is None or views.background is None:
+        return image
+    behind = views.background[..., None, None]
+    return behind + opacity[:, None] * (image - behind)

@@ -1,0 +1,209 @@
+"""Encoder, decoder, critic and statistics network, by the paper's architecture tables.
+
+Pix2Shape (IJCV 2020), appendix "Architecture". Channels are the tables', times a width multiplier.
+Where a table leaves something open or cannot be meant, docs/pix2shape.md says what is done here.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from scenegen.common.records import check, normalise
+
+SIZES = (32, 64, 128, 256)  # pixels a side
+MOST = 4096  # numbers of a code, and classes
+SLOPE = 0.2  # of the leaky ReLUs
+ENCODER_CHANNELS = (85, 170, 340, 680, 1360)  # of 64, 32, 16, 8, 4 pixels, at 128x128
+DECODER_CHANNELS = (1344, 627, 336, 168, 84)  # of 4, 8, 16, 32, 64 pixels, at 128x128
+STATISTICS_CHANNELS = (256, 512)
+FLAT = 0.1  # of the decoder's last weights: begins with smooth surfaces, as noise hides shading
+CAMERA = 3  # numbers that tell a view: the camera's position
+
+
+@dataclass(frozen=True)
+class NetworkSpec:
+    """What the networks look like.
+
+    Attributes:
+        size: pixels a side, one of SIZES.
+        width: multiplies the tables' channels; 1 is the paper's.
+        z_scene, z_view: dimensions of the latent code; z_view is 0 where the camera is known.
+        camera: whether the networks are conditioned on the camera's position.
+        classes: number of class labels they are conditioned on; 0 for none.
+        standardised: whether codes have mean 0 and variance 1, by batch normalisation; for where no
+            critic sees to it.
+    """
+
+    size: int = 128
+    width: float = 1.0
+    z_scene: int = 128
+    z_view: int = 0
+    camera: bool = True
+    classes: int = 0
+    standardised: bool = False
+
+    def __post_init__(self) -> None:
+        normalise(self)
+        check(self.size in SIZES, "size", self.size, f"one of {', '.join(map(str, SIZES))}")
+        check(0.01 <= self.width <= 4, "width", self.width, "from 0.01 to 4")
+        check(1 <= self.z_scene <= MOST, "z scene", self.z_scene, f"1 to {MOST}")
+        check(0 <= self.z_view <= MOST, "z view", self.z_view, f"0 to {MOST}")
+        check(0 <= self.classes <= MOST, "classes", self.classes, f"0 to {MOST}")
+
+    @property
+    def z(self) -> int:
+        """Dimensions of the whole code."""
+        return self.z_scene + self.z_view
+
+    @property
+    def condition(self) -> int:
+        """Numbers that condition the networks."""
+        return CAMERA * self.camera + self.classes
+
+    def channels(self, table: tuple[int, ...]) -> list[int]:
+        """Return a table's channels, from the fewest pixels on for the decoder's.
+
+        Above 128 pixels layers of half the channels are added at the large end, below 128 they are
+        left out there.
+        """
+        falling = table[0] > table[-1]
+        found = sorted(table)
+        layers = self.size.bit_length() - 3  # strides of two from size to 4 pixels
+        while len(found) < layers:
+            found.insert(0, max(1, found[0] // 2))
+        found = found[len(found) - layers :]
+        wide = [max(4, round(self.width * channels)) for channels in found]
+        return wide[::-1] if falling else wide
+
+
+class ConditionalNorm(nn.Module):
+    """Batch normalisation whose scale and shift are learned functions of a condition.
+
+    Dumoulin et al. (2016) and Perez et al. (2017), as the paper cites them. Without a condition, an
+    ordinary batch normalisation.
+    """
+
+    def __init__(self, channels: int, condition: int, hidden: int = 64) -> None:
+        super().__init__()
+        self.norm = nn.BatchNorm2d(channels, affine=condition == 0)
+        self.affine: nn.Module | None = None
+        if condition:
+            last = nn.Linear(hidden, 2 * channels)
+            nn.init.zeros_(last.weight)
+            nn.init.zeros_(last.bias)
+            self.affine = nn.Sequential(nn.Linear(condition, hidden), nn.LeakyReLU(SLOPE), last)
+
+    def forward(self, values: Tensor, condition: Tensor) -> Tensor:
+        """Normalise (B, C, H, W) under a condition (B, D)."""
+        values = self.norm(values)
+        if self.affine is None:
+            return values
+        scale, shift = self.affine(condition)[..., None, None].chunk(2, dim=1)
+        return values * (1 + scale) + shift
+
+
+def _planes(condition: Tensor, like: Tensor) -> Tensor:
+    """Repeat a condition (B, D) over the pixels of an image batch."""
+    return condition[..., None, None].expand(-1, -1, *like.shape[2:])
+
+
+def _full(values: Tensor) -> Tensor:
+    """Return bfloat16 as float32: losses are differences of what is nearly equal."""
+    return values.float() if values.dtype == torch.bfloat16 else values
+
+
+class Encoder(nn.Module):
+    """Image and camera -> latent code. Table "Pix2Shape encoder architecture"."""
+
+    def __init__(self, spec: NetworkSpec) -> None:
+        super().__init__()
+        widths = spec.channels(ENCODER_CHANNELS)
+        before = [3 + spec.condition, *widths[:-1]]
+        self.layers = nn.ModuleList(
+            nn.Conv2d(a, b, 4, 2, 1) for a, b in zip(before, widths, strict=True)
+        )
+        self.norms = nn.ModuleList(ConditionalNorm(b, spec.condition) for b in widths[:-1])
+        self.last = nn.Conv2d(widths[-1], spec.z, 4)
+        self.standard = nn.BatchNorm1d(spec.z, affine=False) if spec.standardised else nn.Identity()
+        self.activation = nn.LeakyReLU(SLOPE)
+
+    def forward(self, image: Tensor, condition: Tensor) -> Tensor:
+        """(B, 3, S, S), (B, D) -> (B, z)."""
+        values = torch.cat([image, _planes(condition, image)], dim=1)
+        for i, layer in enumerate(self.layers):
+            values = layer(values)
+            if i < len(self.norms):
+                values = self.norms[i](values, condition)
+            values = self.activation(values)
+        return self.standard(_full(self.last(values).flatten(1)))
+
+
+class Decoder(nn.Module):
+    """Latent code and camera -> one number per pixel. Table "Pix2Shape decoder architecture".
+
+    Normalisation is conditional in alternate layers, the first among them.
+    """
+
+    def __init__(self, spec: NetworkSpec, outputs: int = 1) -> None:
+        super().__init__()
+        widths = spec.channels(DECODER_CHANNELS)
+        first = nn.ConvTranspose2d(spec.z + spec.condition, widths[0], 4)
+        others = [nn.ConvTranspose2d(a, b, 4, 2, 1) for a, b in itertools.pairwise(widths)]
+        self.layers = nn.ModuleList([first, *others])
+        self.norms = nn.ModuleList(
+            ConditionalNorm(b, spec.condition if i % 2 == 0 else 0) for i, b in enumerate(widths)
+        )
+        self.last = nn.ConvTranspose2d(widths[-1], outputs, 4, 2, 1)
+        with torch.no_grad():
+            self.last.weight.mul_(FLAT)
+        self.activation = nn.LeakyReLU(SLOPE)
+
+    def forward(self, code: Tensor, condition: Tensor) -> Tensor:
+        """(B, z), (B, D) -> (B, outputs, S, S)."""
+        values = torch.cat([code, condition], dim=1)[..., None, None]
+        for layer, norm in zip(self.layers, self.norms, strict=True):
+            values = self.activation(norm(layer(values), condition))
+        with torch.autocast(values.device.type, enabled=False):  # half a depth's bits are noise
+            return self.last(_full(values))
+
+
+class Critic(nn.Module):
+    """Image, latent code and camera -> score. Table "Pix2Shape critic architecture"."""
+
+    def __init__(self, spec: NetworkSpec) -> None:
+        super().__init__()
+        widths = spec.channels(ENCODER_CHANNELS)
+        before = [3 + spec.condition, *widths[:-1]]
+        before[-1] += spec.z  # the code joins the last strided layer
+        self.layers = nn.ModuleList(
+            nn.Conv2d(a, b, 4, 2, 1) for a, b in zip(before, widths, strict=True)
+        )
+        self.last = nn.Conv2d(widths[-1], 1, 4)
+        self.activation = nn.LeakyReLU(SLOPE)
+
+    def forward(self, image: Tensor, code: Tensor, condition: Tensor) -> Tensor:
+        """(B, 3, S, S), (B, z), (B, D) -> (B,)."""
+        values = torch.cat([image, _planes(condition, image)], dim=1)
+        for i, layer in enumerate(self.layers):
+            if i == len(self.layers) - 1:
+                values = torch.cat([values, _planes(code, values)], dim=1)
+            values = self.activation(layer(values))
+        return _full(self.last(values).flatten())
+
+
+class Statistics(nn.Module):
+    """MINE's statistics network T(z_scene, z_view). Table "statistics network architecture"."""
+
+    def __init__(self, spec: NetworkSpec) -> None:
+        super().__init__()
+        first, second = STATISTICS_CHANNELS
+        self.layers = nn.Sequential(
+            nn.Linear(spec.z, first), nn.ELU(), nn.Linear(first, second), nn.ELU(),
+            nn.Linear(second, 1),
+        )  # fmt: skip
+
+    def forward(self, z_scene: Tensor, z_view: Tensor) -> Tensor:
+        """(B, z_scene), (B, z_view) -> (B,)."""
+        return _full(self.layers(torch.cat([z_scene, z_view], dim=1)).flatten())

@@ -1,0 +1,116 @@
+"""What training reads: batch after batch, each derived from its number alone.
+
+So training goes on where it was stopped, and every process takes its share.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import torch
+from lightning_fabric import Fabric
+from torch import Tensor
+from torch.utils.data import DataLoader, Dataset, default_collate
+
+from baselines.pix2shape.data.questions import QuestionImages
+from baselines.pix2shape.data.rooms import Batch, Draws, RoomImages
+from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.training.state import State
+from scenegen.common.errors import SceneGenError
+
+Source = RoomImages | QuestionImages
+LABELS_PER_PLACE = 100  # labels for each labelled question among the contrasted ones
+
+
+def batch_size(config: ModelConfig, source: Source) -> int:
+    """Items of a batch: images of rooms, or questions."""
+    return config.reconstructed_questions if isinstance(source, QuestionImages) else config.batch
+
+
+def question_sizes(config: ModelConfig, source: Source, labels: int) -> tuple[int, int]:
+    """How many questions with a label, and without, have their codes compared each iteration."""
+    if not isinstance(source, QuestionImages) or not (config.contrast or config.questions):
+        return 0, 0
+    if not config.contrast:
+        return (config.question_batch if labels else 0), 0
+    few = -(-labels // LABELS_PER_PLACE)  # or few labels would be seen again and again
+    labelled = min(few, config.question_batch // 4)
+    return labelled, config.question_batch - labelled
+
+
+class _Told(Dataset[Any]):
+    """A source whose errors are items: else a worker's would come as its whole traceback."""
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+
+    def __len__(self) -> int:
+        return len(self._source)
+
+    def __getitem__(self, row: int) -> Any:
+        try:
+            return self._source[row]
+        except (SceneGenError, OSError) as error:
+            return error
+
+
+def _collated(items: list[Any]) -> Any:
+    errors = [item for item in items if isinstance(item, Exception)]
+    return errors[0] if errors else default_collate(items)
+
+
+def _loaded(
+    source: Source,
+    rows: int,
+    size: int,
+    first: int,
+    seed: int,
+    fabric: Fabric,
+    workers: int,
+) -> Iterator[dict[str, Tensor]]:
+    """Read batch after batch from a number on, for ever; of each, this process's share."""
+    share = slice(fabric.global_rank, None, fabric.world_size)
+    loader = DataLoader(
+        _Told(source),
+        batch_sampler=Draws(rows, size, seed, first, share),
+        num_workers=workers,
+        collate_fn=_collated,
+        pin_memory=fabric.device.type == "cuda",
+    )
+    for items in loader:
+        if isinstance(items, Exception):
+            raise items
+        yield items
+
+
+def image_batches(source: Source, fabric: Fabric, state: State, workers: int) -> Iterator[Batch]:
+    """Yield the images of batch after batch, from the state's on."""
+    config = state.model.config
+    size = batch_size(config, source)
+    first = state.iteration * config.batches_per_iteration
+    for items in _loaded(source, len(source), size, first, config.seed, fabric, workers):
+        yield source.as_batch(items).to(fabric.device)
+
+
+def question_batches(
+    source: Source,
+    labelled: QuestionImages | None,
+    labels: int,
+    fabric: Fabric,
+    state: State,
+    workers: int,
+) -> Iterator[tuple[Batch, Tensor]]:
+    """Yield questions whose codes are compared: the labelled ones first, -1 where no answer is."""
+    config = state.model.config
+    with_label, without = question_sizes(config, source, labels)
+    where = state.iteration, config.seed, fabric
+    streams = []
+    if labelled is not None and with_label:
+        streams.append(_loaded(labelled, labels, with_label, *where, 0))
+    if without:
+        unknown = _loaded(source, len(source), without, *where, workers)
+        streams.append(
+            {**items, "answer": torch.full((len(items["image"]),), -1)} for items in unknown
+        )
+    for parts in zip(*streams, strict=False):
+        items = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
+        yield source.as_batch(items).to(fabric.device), items["answer"].to(fabric.device)

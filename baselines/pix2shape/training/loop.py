@@ -1,0 +1,165 @@
+"""The training loop: Pix2Shape (IJCV 2020), Algorithm 1, on any of Lightning Fabric's devices.
+
+Everything random in iteration i derives from (seed, i), so that training goes on after a kill as if
+it had never stopped: weights, optimisers and the number of the iteration are all there is to keep.
+"""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import cast
+
+import torch
+from lightning_fabric import Fabric
+from torch import Tensor, nn
+from torch.optim import Adam
+
+from baselines.pix2shape.data.questions import QuestionImages
+from baselines.pix2shape.data.rooms import Batch
+from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.training.batches import (
+    Source,
+    batch_size,
+    image_batches,
+    question_batches,
+    question_sizes,
+)
+from baselines.pix2shape.training.state import State
+from baselines.pix2shape.training.steps import Noise, critic_step, draw, generator_step
+from scenegen.common.errors import SceneGenError, SpecError
+from scenegen.common.records import check
+from scenegen.common.seeding import Purpose, item_seed
+
+
+class TrainingError(SceneGenError):
+    """Training cannot go on."""
+
+
+def train(
+    state: State,
+    source: Source,
+    fabric: Fabric,
+    *,
+    labelled: QuestionImages | None = None,
+    labels: int = 0,
+    workers: int = 0,
+) -> Iterator[tuple[dict[str, float], Batch]]:
+    """Train from the state's iteration to the configuration's last, changing the state.
+
+    Yields the losses by name and the last batch, after each iteration.
+
+    Args:
+        source: of the images.
+        fabric: launched; where several processes train, each takes its share of every batch.
+        labelled: questions whose first `labels` answers may be used.
+        workers: processes that read; as many again for contrasted questions.
+
+    Raises:
+        TrainingError: a loss or a gradient is not finite. The weights are those of before the step,
+            but not the batch statistics: go on from a checkpoint.
+        SpecError: no loss is switched on, there are not so many labels, or the processes cannot
+            share a batch evenly.
+    """
+    config, model = state.model.config, state.model
+    _check_request(config, source, labelled, labels, fabric.world_size)
+    fabric.to_device(model)
+    for optimiser in (state.generator, state.critic):  # moves the moments to the weights' device
+        optimiser.load_state_dict(optimiser.state_dict())
+    batches = image_batches(source, fabric, state, workers)
+    asked = question_batches(source, labelled, labels, fabric, state, workers)
+    model.train()
+    began = time.monotonic() - state.seconds
+    while state.iteration < config.iterations:
+        losses: dict[str, float] = {}
+        _set_rate(state)
+        for turn in range(config.batches_per_iteration):
+            batch = next(batches)
+            noise = _noise(state, batch, turn, fabric)
+            if config.has_critic:
+                with fabric.autocast():
+                    loss, numbers = critic_step(model, batch, noise)
+                _update(fabric, state, state.critic, loss, numbers, losses)
+        with fabric.autocast(), _frozen(model.critic, model.statistics):
+            loss, numbers = generator_step(model, batch, noise, next(asked, None))
+        _update(fabric, state, state.generator, loss, numbers, losses)
+        state.iteration += 1
+        state.seconds = time.monotonic() - began
+        yield losses, batch
+
+
+def _check_request(
+    config: ModelConfig,
+    source: Source,
+    labelled: QuestionImages | None,
+    labels: int,
+    processes: int,
+) -> None:
+    questions = isinstance(source, QuestionImages)
+    if questions and config.consistency:
+        raise SpecError("consistency: expected 0 for questions, whose cameras are not told")
+    sizes = question_sizes(config, source, labels)
+    for size in (batch_size(config, source), *(size for size in sizes if size)):
+        even = size % processes == 0 and size >= 2 * processes
+        what = f"a number that shares {size} items, 2 or more each"
+        check(processes == 1 or even, "devices", processes, what)
+    if labels:
+        count = len(labelled) if labelled is not None and labelled.has_answers else 0
+        check(labels <= count, "labels", labels, f"at most {count}, the answers that are told")
+    weights = (config.adversarial, config.reconstruction, config.code_reconstruction)
+    if not any((*weights, config.consistency, config.depth, *sizes)):
+        raise SpecError("losses: found every weight at 0, expected one above")
+
+
+@contextmanager
+def _frozen(*modules: nn.Module) -> Iterator[None]:
+    """Leave out the gradients of weights that are not to change."""
+    for module in modules:
+        module.requires_grad_(False)
+    try:
+        yield
+    finally:
+        for module in modules:
+            module.requires_grad_(True)
+
+
+def _update(
+    fabric: Fabric,
+    state: State,
+    optimiser: Adam,
+    loss: Tensor,
+    numbers: dict[str, Tensor],
+    losses: dict[str, float],
+) -> None:
+    """Take one step; nothing is changed where the loss or a gradient is not finite."""
+    optimiser.zero_grad()
+    fabric.backward(loss)
+    gradients = [
+        p.grad for group in optimiser.param_groups for p in group["params"] if p.grad is not None
+    ]
+    if fabric.world_size > 1:  # DDP forbids several and double backward passes
+        for gradient in gradients:
+            gradient.copy_(cast(Tensor, fabric.all_reduce(gradient, reduce_op="mean")))
+    losses |= {name: float(value.detach()) for name, value in numbers.items()}
+    sound = torch.isfinite(loss.detach()) & torch.isfinite(torch.nn.utils.get_total_norm(gradients))
+    if cast(Tensor, fabric.all_reduce(sound.float(), reduce_op="mean")) != 1:
+        told = ", ".join(f"{name} {value:.3g}" for name, value in losses.items())
+        raise TrainingError(
+            f"iteration {state.iteration}: loss or gradients are not finite ({told}); go on from"
+            " the checkpoint, with a smaller learning rate or other weights of the losses"
+        )
+    optimiser.step()
+
+
+def _set_rate(state: State) -> None:
+    config = state.model.config
+    left = 1 - state.iteration / config.iterations
+    for optimiser in (state.generator, state.critic):
+        for group in optimiser.param_groups:
+            group["lr"] = config.learning_rate * (min(1.0, 2 * left) if config.decay else 1.0)
+
+
+def _noise(state: State, batch: Batch, turn: int, fabric: Fabric) -> Noise:
+    config = state.model.config
+    number = state.iteration * config.batches_per_iteration + turn
+    seed = item_seed(config.seed, number, Purpose.TRAINING, fabric.global_rank)
+    return draw(len(batch.image), config.networks.z, seed).to(fabric.device)

@@ -1,0 +1,217 @@
+"""A training run: a folder with checkpoints, TensorBoard's logs, a picture, and the weights."""
+
+import errno
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from lightning_fabric import Fabric
+from torch.utils.data import DataLoader
+from torch.utils.tensorboard import SummaryWriter
+
+from baselines.pix2shape.data.questions import QuestionImages, for_questions
+from baselines.pix2shape.data.rooms import Batch, RoomImages, is_question_file
+from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.network.model import Pix2Shape
+from baselines.pix2shape.pictures import training_sheet
+from baselines.pix2shape.training.batches import Source
+from baselines.pix2shape.training.loop import train
+from baselines.pix2shape.training.state import CHECKPOINT, State, load_state, new_state, save_state
+from baselines.pix2shape.training.steps import draw
+from baselines.pix2shape.weights.weights import Card, save_weights
+from iqtt.files.reader import open_questions
+from scenegen.common.errors import SpecError
+from scenegen.common.records import check
+from scenegen.rooms.preview import save_picture
+from scenegen.rooms.reader import RoomsFile
+
+WEIGHTS, PICTURE, LOGS = "weights.safetensors", "pictures.png", "logs"
+LOG_EVERY = 20  # iterations
+PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and so many at once
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Where training happens; one process gives the same anywhere, to rounding.
+
+    Attributes:
+        accelerator, devices, precision: Lightning Fabric's.
+        workers: processes that read.
+        every: iterations between checkpoints, and pictures.
+    """
+
+    accelerator: str = "auto"
+    devices: int = 1
+    precision: str = "32-true"
+    workers: int = 1
+    every: int = 500
+
+
+def train_run(
+    folder: str | Path,
+    data: str | Path,
+    config: ModelConfig | None,
+    machine: Machine,
+    *,
+    labels: int = 0,
+    conditional: bool = False,
+    progress: Callable[[State, dict[str, float]], Any] = lambda state, losses: None,
+) -> Path | None:
+    """Train a model, from the start or from the folder's checkpoint.
+
+    Return the weights' path; None on all processes but the first.
+
+    Args:
+        config: None to go on from the checkpoint, with its labels and classes.
+        labels: answers that training on questions may use.
+        conditional: whether the networks are told the class of the only object.
+        progress: called after every iteration.
+
+    Raises SpecError where folder, configuration and data do not go together; TrainingError;
+    FileFormatError, OSError.
+    """
+    folder = Path(folder)
+    if config is None:
+        state, card = load_state(folder)
+        labels = card.labels
+        _check_same(card, data)
+    else:
+        if (folder / CHECKPOINT).exists():
+            raise FileExistsError(
+                errno.EEXIST,
+                "holds a checkpoint; say --resume, or name another folder",
+                str(folder),
+            )
+        card = _new_card(config, data, labels, conditional)
+        state = new_state(card.config)
+    fabric = Fabric(
+        accelerator=machine.accelerator,
+        devices=machine.devices,
+        strategy="ddp" if machine.devices > 1 else "auto",
+        precision=machine.precision,  # type: ignore[arg-type]
+    )
+    fabric.launch()
+    source, labelled = _sources(data, card.config, labels)
+    folder.mkdir(parents=True, exist_ok=True)
+    logs = (
+        SummaryWriter(str(folder / LOGS), purge_step=state.iteration + 1)
+        if fabric.is_global_zero
+        else None
+    )
+    try:
+        for losses, batch in train(
+            state, source, fabric, labelled=labelled, labels=labels, workers=machine.workers
+        ):
+            if not fabric.is_global_zero or logs is None:
+                continue
+            progress(state, losses)
+            done = state.iteration == card.config.iterations
+            if state.iteration % LOG_EVERY == 0 or done:
+                for name, value in losses.items():
+                    logs.add_scalar(name, value, state.iteration)
+            if state.iteration % machine.every == 0 or done:
+                card = replace(card, iteration=state.iteration, seconds=round(state.seconds, 1))
+                save_state(folder, state, card)
+                _picture(folder, logs, state, batch)
+                _save_weights(folder, state.model, card, source)
+    finally:
+        if logs is not None:
+            logs.close()
+    if fabric.is_global_zero and not (folder / WEIGHTS).exists():
+        _save_weights(folder, state.model, card, source)
+    fabric.barrier()
+    return folder / WEIGHTS if fabric.is_global_zero else None
+
+
+def _save_weights(folder: Path, model: Pix2Shape, card: Card, source: Source) -> None:
+    if not card.config.adversarial:
+        fit_prior(model, source)
+    save_weights(folder / WEIGHTS, model, card)
+
+
+@torch.no_grad()
+def fit_prior(model: Pix2Shape, source: Source) -> None:
+    """Give the prior the distribution of codes of the first images."""
+    device = next(model.parameters()).device
+    loader = DataLoader(source, batch_size=BATCH, sampler=range(min(len(source), PRIOR_ITEMS)))
+    learning = model.training
+    model.eval()
+    batches = (source.as_batch(items).to(device) for items in loader)
+    model.prior.fit(torch.cat([model.encode(batch.image, batch.views) for batch in batches]))
+    model.train(learning)
+
+
+def _picture(folder: Path, logs: SummaryWriter, state: State, batch: Batch) -> None:
+    noise = draw(len(batch.image), state.model.config.networks.z, 0).to(batch.image.device)
+    picture = training_sheet(state.model, batch, noise.code)
+    save_picture(picture, folder / PICTURE)
+    logs.add_image("pictures", np.asarray(picture), state.iteration, dataformats="HWC")
+
+
+def _sources(
+    data: str | Path, config: ModelConfig, labels: int
+) -> tuple[Source, QuestionImages | None]:
+    if config.networks.camera:
+        return RoomImages(data, config), None
+    labelled = QuestionImages(data, "labeled", config) if labels else None
+    return QuestionImages(data, "unlabeled", config), labelled
+
+
+def _new_card(config: ModelConfig, data: str | Path, labels: int, conditional: bool) -> Card:
+    """Return the configuration as the data wants it, and what the data is."""
+    if is_question_file(data):
+        if conditional:
+            raise SpecError(f"{data}: questions have no classes to condition on")
+        check(config.depth == 0, "depth", config.depth, "0 for questions, which have no depth maps")
+        config = for_questions(config, data, "unlabeled")
+        config = replace(config, questions=config.questions if labels else 0.0)
+        with open_questions(data, "unlabeled") as questions:
+            assert questions.spec is not None, "for_questions has refused such files"
+            spec = questions.spec.to_json()
+        with open_questions(data, "labeled") as questions:
+            check(0 <= labels <= len(questions), "labels", labels, f"0 to {len(questions)}")
+        return Card(config, data=spec, fingerprint=_fingerprint(data, labels), labels=labels)
+    check(labels == 0, "labels", labels, "0 for rooms, which ask no questions")
+    classes: tuple[str, ...] = ()
+    with RoomsFile(data) as rooms:
+        spec, mark = rooms.spec.to_json(), rooms.fingerprint
+        if conditional:
+            one = rooms.spec.objects == (1, 1)
+            check(one, "conditional", f"objects {rooms.spec.objects}", "one object in every room")
+            classes = tuple(rooms.spec.shapes)
+    networks = config.networks
+    check(networks.camera, "camera", networks.camera, "true: rooms are seen by known cameras")
+    check(networks.classes == 0, "classes", networks.classes, "0; --conditional tells them")
+    config = replace(
+        config,
+        networks=replace(networks, classes=len(classes)),
+        mutual_information=0.0,
+        questions=0.0,
+        contrast=0.0,
+    )
+    return Card(config, data=spec, fingerprint=mark, classes=classes)
+
+
+def _fingerprint(data: str | Path, labels: int) -> str:
+    """Return that of rooms, or of the parts of a question file that are used."""
+    if not is_question_file(data):
+        with RoomsFile(data) as rooms:
+            return rooms.fingerprint
+    found = []
+    for part in ("unlabeled", "labeled") if labels else ("unlabeled",):
+        with open_questions(data, part) as questions:
+            found.append(str(questions.fingerprint))
+    return " ".join(found)
+
+
+def _check_same(card: Card, data: str | Path) -> None:
+    """Refuse to go on with other data."""
+    found = _fingerprint(data, card.labels)
+    if found != card.fingerprint:
+        raise SpecError(
+            f"{data}: fingerprint {found[:12]}, the run was trained on {card.fingerprint[:12]};"
+            " resume with the same data"
+        )

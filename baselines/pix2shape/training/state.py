@@ -1,0 +1,120 @@
+"""The state of training, and its checkpoint: weights, optimisers, the number of the iteration."""
+
+import errno
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from torch import Tensor, nn
+from torch.optim import Adam
+
+from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.network.model import Pix2Shape
+from baselines.pix2shape.weights.weights import (
+    Card,
+    load_card,
+    load_into,
+    load_tensors,
+    save_card,
+    save_tensors,
+)
+from scenegen.common.errors import FileFormatError
+from scenegen.common.seeding import Purpose, item_seed
+
+CHECKPOINT = "checkpoint.safetensors"
+KINDS = ("generator", "critic")  # the two optimisers
+MOMENTS = ("exp_avg", "exp_avg_sq", "step")  # Adam's
+
+
+@dataclass(eq=False)
+class State:
+    """All that training changes."""
+
+    model: Pix2Shape
+    generator: Adam
+    critic: Adam
+    iteration: int = 0
+    seconds: float = 0.0
+
+
+def new_state(config: ModelConfig) -> State:
+    """Return an untrained model and its optimisers; the weights are those of the seed."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(item_seed(config.seed, 0, Purpose.WEIGHTS))
+        model = Pix2Shape(config)
+    return _with_optimisers(model)
+
+
+def _with_optimisers(model: Pix2Shape) -> State:
+    config = model.config
+    groups = ((model.encoder, model.decoder), (model.critic, model.statistics))
+    first, second = (
+        Adam(_parameters(*group), lr=config.learning_rate, betas=config.betas) for group in groups
+    )
+    return State(model, first, second)
+
+
+def _parameters(*modules: nn.Module) -> list[nn.Parameter]:
+    return [parameter for module in modules for parameter in module.parameters()]
+
+
+def save_state(folder: Path, state: State, card: Card) -> None:
+    """Write the folder's checkpoint; the one before is there until this one is complete."""
+    tensors = {f"model.{name}": value for name, value in state.model.state_dict().items()}
+    notes = {"iteration": str(state.iteration), "seconds": f"{state.seconds:.3f}"}
+    for kind, optimiser in (("generator", state.generator), ("critic", state.critic)):
+        moments = optimiser.state_dict()["state"]
+        notes[kind] = str(len(moments))  # of what has been trained: not all losses train all
+        for index, values in moments.items():
+            tensors |= {f"{kind}.{index}.{name}": value for name, value in values.items()}
+    save_card(folder / CHECKPOINT, card)
+    save_tensors(folder / CHECKPOINT, tensors, notes)
+
+
+def load_state(folder: Path) -> tuple[State, Card]:
+    """Read a folder's checkpoint. Raises OSError, FileFormatError."""
+    path = folder / CHECKPOINT
+    if not path.is_file():
+        raise FileNotFoundError(errno.ENOENT, "holds no checkpoint to resume", str(folder))
+    card = load_card(path)
+    tensors, notes = load_tensors(path)
+    own = {k.removeprefix("model."): v for k, v in tensors.items() if k.startswith("model.")}
+    state = _with_optimisers(load_into(card, own, path))
+    try:
+        state.iteration, state.seconds = int(notes["iteration"]), float(notes["seconds"])
+        _check(0 <= state.iteration <= card.config.iterations, f"iteration {state.iteration}")
+        for kind, optimiser in (("generator", state.generator), ("critic", state.critic)):
+            own = {k.removeprefix(f"{kind}."): v for k, v in tensors.items() if k.startswith(kind)}
+            _load_moments(optimiser, own, int(notes[kind]))
+        strange = [name for name in tensors if name.split(".")[0] not in ("model", *KINDS)]
+        _check(not strange, f"{', '.join(strange)} not expected")
+    except (KeyError, ValueError) as error:
+        raise FileFormatError(f"{path}: not a checkpoint of this release: {error}") from error
+    return state, card
+
+
+def _load_moments(optimiser: Adam, tensors: dict[str, Tensor], count: int) -> None:
+    """Set an optimiser's moments, those of `count` parameters.
+
+    Raises KeyError, ValueError where some are missing, unknown, of another shape or not finite.
+    """
+    parameters = optimiser.param_groups[0]["params"]
+    moments: dict[int, dict[str, Tensor]] = {}
+    for index in sorted({int(name.partition(".")[0]) for name in tensors}):
+        _check(index < len(parameters), f"moments of parameter {index}, not expected")
+        moments[index] = {}
+        for field in MOMENTS:
+            value = moments[index][field] = tensors[f"{index}.{field}"]
+            shape = () if field == "step" else tuple(parameters[index].shape)
+            found = f"{index}.{field}: {value.dtype}, shape {tuple(value.shape)}"
+            ok = tuple(value.shape) == shape and value.dtype.is_floating_point
+            _check(ok and bool(torch.isfinite(value).all()), f"{found}, not as its weights are")
+    _check(len(moments) == count, f"moments of {len(moments)} parameters, expected {count}")
+    _check(len(tensors) == count * len(MOMENTS), f"{len(tensors)} moments, not expected")
+    groups = optimiser.state_dict()["param_groups"]
+    optimiser.load_state_dict({"state": moments, "param_groups": groups})
+
+
+def _check(ok: bool, found: str) -> None:
+    if not ok:
+        raise ValueError(found)

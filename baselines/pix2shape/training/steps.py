@@ -1,0 +1,143 @@
+"""What critic and generator minimise on one batch: the losses put together.
+
+Pix2Shape (IJCV 2020), Algorithm 1 and equations "rec_loss" and "app-loss". A loss whose weight is 0
+is neither computed nor named among the numbers.
+"""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from baselines.pix2shape.data.rooms import Batch
+from baselines.pix2shape.network.model import Pix2Shape, mapped, shaded
+from baselines.pix2shape.network.networks import CAMERA
+from baselines.pix2shape.training.losses import (
+    absolute_loss,
+    contrast_loss,
+    critic_loss,
+    disagreement,
+    generator_loss,
+    gradient_penalty,
+    mutual_information,
+    question_loss,
+    reconstruction_loss,
+)
+
+Numbers = dict[str, Tensor]
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The random numbers of one step, B images.
+
+    Attributes:
+        code: of the prior, standard normal, (B, z).
+        share: of the real pair in each of the penalty's points, (B,), uniform.
+        order: a permutation of the batch, (B,).
+    """
+
+    code: Tensor
+    share: Tensor
+    order: Tensor
+
+    def to(self, device: torch.device) -> "Noise":
+        """Return the noise on another device."""
+        return mapped(self, lambda values: values.to(device))
+
+
+def draw(batch: int, z: int, seed: int) -> Noise:
+    """Return the noise of a seed; the same on every device."""
+    source = torch.Generator().manual_seed(seed)
+    return Noise(
+        torch.randn(batch, z, generator=source),
+        torch.rand(batch, generator=source),
+        torch.randperm(batch, generator=source),
+    )
+
+
+def critic_step(model: Pix2Shape, batch: Batch, noise: Noise) -> tuple[Tensor, Numbers]:
+    """Return what critic and statistics network minimise, and its parts by name."""
+    config, views = model.config, batch.views
+    numbers: Numbers = {}
+    with torch.no_grad():
+        code = model.encode(batch.image, views)
+    total = code.new_zeros(())
+    if config.adversarial:
+        with torch.no_grad():
+            made = model.image(noise.code, views)
+
+        def critic(image: Tensor, code: Tensor) -> Tensor:
+            return model.critic(image, code, views.condition)
+
+        loss = critic_loss(critic(batch.image, code), critic(made, noise.code))
+        penalty = gradient_penalty(critic, (batch.image, code), (made, noise.code), noise.share)
+        numbers["distance"], numbers["penalty"] = -loss, penalty
+        total = total + loss + penalty
+    if config.disentangles:
+        total = total - mutual_information(model.statistics, *_halves(model, code), noise.order)
+    return total, numbers
+
+
+def generator_step(
+    model: Pix2Shape, batch: Batch, noise: Noise, asked: tuple[Batch, Tensor] | None = None
+) -> tuple[Tensor, Numbers]:
+    """Return what encoder and decoder minimise, and its parts by name.
+
+    Args:
+        asked: images of questions, four after four, and which answers are right, (Q,); -1 where
+            that is not known.
+    """
+    config, views = model.config, batch.views
+    code = model.encode(batch.image, views)
+    losses: Numbers = {}
+    if config.reconstruction or config.depth or config.consistency:
+        depth, opacity = model.surfels(code, views.condition)
+        if config.reconstruction:
+            again = shaded(depth, opacity, views)
+            compared = absolute_loss if config.absolute_differences else reconstruction_loss
+            losses["reconstruction"] = compared(batch.image, again)
+        if config.depth and batch.depth is not None:
+            known = torch.isfinite(batch.depth)
+            wrong = torch.where(known, depth - torch.where(known, batch.depth, 0), 0)
+            losses["depth"] = (wrong**2).sum() / known.sum().clamp(min=1)
+    if config.adversarial or config.code_reconstruction:
+        made = model.image(noise.code, views)
+        if config.adversarial:
+            real = model.critic(batch.image, code, views.condition)
+            losses["adversarial"] = generator_loss(
+                real, model.critic(made, noise.code, views.condition)
+            )
+        if config.code_reconstruction:
+            found = model.encode(made, views)
+            losses["code_reconstruction"] = reconstruction_loss(noise.code, found)
+    if config.consistency:
+        pose, fov = views.world_from_camera, views.scene.fov_y_degrees
+        assert pose is not None, "for_questions switches it off"
+        others = pose[noise.order]
+        camera, classes = views.condition[noise.order, :CAMERA], views.condition[:, CAMERA:]
+        elsewhere, _ = model.surfels(code, torch.cat([camera, classes], dim=1))
+        losses["consistency"] = (
+            disagreement(depth, elsewhere, torch.linalg.solve(others, pose), fov)
+            + disagreement(elsewhere, depth, torch.linalg.solve(pose, others), fov)
+        ) / 2
+    if config.disentangles:
+        losses["mutual_information"] = mutual_information(
+            model.statistics, *_halves(model, code), noise.order
+        )
+    if asked is not None:
+        images, answers = asked
+        scene = _halves(model, model.encode(images.image, images.views))[0]
+        codes, known = scene.view(-1, 4, scene.shape[1]), answers >= 0
+        if config.questions and known.any():
+            losses["questions"] = question_loss(codes[known], answers[known])
+        if config.contrast:
+            losses["contrast"] = contrast_loss(codes, answers)
+    total = sum((getattr(config, name) * loss for name, loss in losses.items()), code.new_zeros(()))
+    return total, losses
+
+
+def _halves(model: Pix2Shape, code: Tensor) -> tuple[Tensor, Tensor]:
+    """Return z_scene and z_view of codes."""
+    spec = model.config.networks
+    return code[:, : spec.z_scene], code[:, spec.z_scene :]

@@ -1,0 +1,165 @@
+"""What a model has learned, as pictures: samples, the way between two images, unseen views."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from PIL import Image
+from torch import Tensor
+from torch.utils.data import default_collate
+
+from baselines.pix2shape.data.rooms import RoomImages, as_views
+from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.network.model import Pix2Shape, Views, mapped
+from baselines.pix2shape.network.surfels import Scene
+from baselines.pix2shape.pictures import drawn, image_tiles, sheet
+from baselines.pix2shape.weights.weights import Card
+from scenegen.camera import Camera
+from scenegen.common.errors import SpecError
+from scenegen.common.seeding import Purpose, item_seed
+from scenegen.description.scenes import Light
+from scenegen.description.specs import DatasetSpec
+from scenegen.sampling.scenes import sample_cameras, sample_lights
+
+Array = NDArray[Any]
+ROW = 8  # tiles side by side
+
+
+def known_rooms(data: str | Path, card: Card) -> RoomImages:
+    """Open rooms whose images a model shall see. Raises as `RoomImages`, SpecError."""
+    _check_camera(card.config)
+    rooms = RoomImages(data, replace(card.config, depth=0.0))
+    if card.classes and rooms.classes != card.classes:
+        raise SpecError(
+            f"{data}: classes {', '.join(rooms.classes)}, the model knows {', '.join(card.classes)}"
+        )
+    return rooms
+
+
+def sample_sheet(
+    model: Pix2Shape, card: Card, count: int, seed: int, label: str | None = None
+) -> Image.Image:
+    """Draw codes from the model's prior, seen by cameras and lights as of the training data.
+
+    Lines of images, depths and normals.
+
+    Args:
+        label: class, for a conditional model; None for each in turn.
+
+    Raises SpecError for a label where there are none, or that is unknown; a model of questions.
+    """
+    spec = replace(rooms_spec(card), seed=seed)
+    known = f"one of {', '.join(card.classes)}" if card.classes else "none: it knows no classes"
+    if label is not None and label not in card.classes:
+        raise SpecError(f"class: found {label!r}, expected {known}")
+    one_hot = np.zeros((count, len(card.classes)))
+    for i in range(count if card.classes else 0):
+        one_hot[i, i % len(card.classes) if label is None else card.classes.index(label)] = 1
+    cameras = [sample_cameras(replace(spec, views=(0.0,)), i)[0] for i in range(count)]
+    views = known_views(spec, cameras, [sample_lights(spec, i) for i in range(count)], one_hot)
+    source = torch.Generator().manual_seed(item_seed(seed, 0, Purpose.PICTURES))
+    noise = torch.randn(count, model.config.networks.z, generator=source)
+    tiles = drawn(model, model.prior(noise), views)
+    lines = [line[i : i + ROW] for i in range(0, count, ROW) for line in tiles]
+    return sheet(lines)
+
+
+def interpolation_sheet(
+    model: Pix2Shape, rooms: RoomImages, first: int, last: int, steps: int
+) -> Image.Image:
+    """Go from one image's code to another's in equal steps, all seen from the first one's camera.
+
+    The first and the last tile of the first line are the two images themselves.
+    """
+    _check_camera(model.config)
+    batch = rooms.as_batch(default_collate([rooms[first], rooms[last]]))
+    with torch.no_grad():
+        code = model.encode(batch.image, batch.views)
+    share = torch.linspace(0, 1, steps)[:, None]
+    views = mapped(batch.views, lambda values: values[:1].expand(steps, *values.shape[1:]))
+    images, depths, normals = drawn(model, (1 - share) * code[:1] + share * code[1:], views)
+    given = image_tiles(batch.image)
+    blank = np.full_like(given[0], 250)
+    return sheet([[given[0], *images, given[1]], [blank, *depths, blank], [blank, *normals, blank]])
+
+
+def rotation_frames(
+    model: Pix2Shape, rooms: RoomImages, rows: Sequence[int], degrees: Sequence[float]
+) -> list[Image.Image]:
+    """Turn the camera about the vertical axis through its target, away from the images' views.
+
+    The turn goes to the side that stays farther within the room's open octant. A frame for each
+    angle: lines of input images, images, depths and normals.
+    """
+    _check_camera(model.config)
+    batch = rooms.as_batch(default_collate([rooms[row] for row in rows]))
+    with torch.no_grad():
+        code = model.encode(batch.image, batch.views)
+    given, frames = image_tiles(batch.image), []
+    for angle in degrees:
+        poses = [turned(rooms.world_from_camera[row], rooms.spec, angle) for row in rows]
+        known = [
+            rooms.view(row, camera.world_from_camera)
+            for row, camera in zip(rows, poses, strict=True)
+        ]
+        views = as_views(default_collate(known), rooms.spec.fov_y_degrees)
+        frames.append(sheet([given, *drawn(model, code, views)]))
+    return frames
+
+
+def turned(world_from_camera: Array, spec: DatasetSpec, degrees: float) -> Camera:
+    """Return a camera that was turned about the vertical axis through the target."""
+    x, y, z = (float(v) for v in world_from_camera[:3, 3] - spec.camera_target)
+    azimuth = math.atan2(z, x)
+    sign = 1 if azimuth < math.pi / 4 else -1
+    azimuth += sign * math.radians(degrees)
+    radius = math.hypot(x, z)
+    offset = (radius * math.cos(azimuth), y, radius * math.sin(azimuth))
+    place = tuple(float(o + t) for o, t in zip(offset, spec.camera_target, strict=True))
+    return Camera((place[0], place[1], place[2]), spec.camera_target, spec.fov_y_degrees)
+
+
+def known_views(
+    spec: DatasetSpec,
+    cameras: Sequence[Camera],
+    lights: Sequence[Sequence[Light]],
+    one_hot: Array,
+) -> Views:
+    """Return what is known of views that were never rendered: cameras, lights, materials."""
+    most = max(1, *map(len, lights))
+    position, color = np.zeros((len(cameras), most, 3)), np.zeros((len(cameras), most, 3))
+    for i, (camera, own) in enumerate(zip(cameras, lights, strict=True)):
+        pose = camera.world_from_camera
+        for j, light in enumerate(own):
+            position[i, j] = (np.array(light.position) - pose[:3, 3]) @ pose[:3, :3]
+            color[i, j] = light.color
+    condition = np.concatenate([[c.position for c in cameras], one_hot], axis=1)
+    count = (len(cameras), 1)
+    known = (
+        position,
+        color,
+        np.tile(spec.ambient, count),
+        np.tile(spec.attenuation, count),
+        np.tile(spec.room_reflectance, count),
+    )
+    return Views(_tensor(condition), Scene(spec.fov_y_degrees, *map(_tensor, known)))
+
+
+def rooms_spec(card: Card) -> DatasetSpec:
+    """Return the request that the training rooms answer. Raises SpecError for other models."""
+    _check_camera(card.config)
+    return DatasetSpec.from_json(card.data)
+
+
+def _check_camera(config: ModelConfig) -> None:
+    if not config.networks.camera:
+        raise SpecError("weights: a model of questions, expected one of rooms")
+
+
+def _tensor(values: Array) -> Tensor:
+    return torch.from_numpy(np.asarray(values, np.float32))

@@ -1,0 +1,183 @@
+"""Predictions of a trained model, written as any submission is; no truth is read but cameras."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.nn import functional
+
+from baselines.pix2shape.data.rooms import channels_first, check_reducible, is_question_file
+from baselines.pix2shape.network.model import Pix2Shape
+from baselines.pix2shape.network.surfels import extrapolated, normals_from_depth
+from baselines.pix2shape.training.losses import squared_distances
+from baselines.pix2shape.weights.bundled import open_weights
+from iqtt.files.reader import open_questions, parts
+from metrics.prediction_writer import RoomPredictionWriter, write_answers
+from scenegen.common.errors import SpecError
+from scenegen.common.new_file import check_writable
+from scenegen.common.records import check
+from scenegen.rendering.ground_truth import decode_image
+from scenegen.rooms.reader import RoomsFile
+
+Array = NDArray[Any]
+BATCH = 64  # images at a time
+METHOD = "pix2shape"
+Progress = Callable[[int, int], Any]  # rows done, rows in all
+
+
+def predict_file(
+    weights: str | Path,
+    data: str | Path,
+    out: str | Path,
+    *,
+    device: str = "auto",
+    run: str = "",
+    overwrite: bool = False,
+    progress: Progress = lambda done, total: None,
+) -> None:
+    """Write the submission of some weights, to rooms or to questions.
+
+    Args:
+        weights: a path, or a name of bundled ones.
+        device: "auto", "cpu" or "cuda".
+
+    Raises as `load_model`, `predict_rooms` and `answer_file`.
+    """
+    model, _ = open_weights(weights)
+    model.to(chosen_device(device))
+    check_writable(Path(out), overwrite)
+    if is_question_file(data):
+        answer_file(model, data, out, run=run, overwrite=overwrite, progress=progress)
+    else:
+        predict_rooms(model, data, out, run=run, overwrite=overwrite, progress=progress)
+
+
+def chosen_device(name: str, count: int = 1) -> torch.device:
+    """Return a device by name; "auto" is a GPU where there is one. Raises SpecError."""
+    if name == "cuda" and not torch.cuda.is_available():
+        raise SpecError("device: found no GPU that this torch can use; say --device cpu")
+    if name != "cpu" and torch.cuda.is_available():
+        check(count <= torch.cuda.device_count(), "devices", count, str(torch.cuda.device_count()))
+    return torch.device("cuda" if name != "cpu" and torch.cuda.is_available() else "cpu")
+
+
+@torch.inference_mode()
+def predict_rooms(
+    model: Pix2Shape,
+    data: str | Path,
+    out: str | Path,
+    *,
+    run: str = "",
+    overwrite: bool = False,
+    progress: Progress = lambda done, total: None,
+) -> None:
+    """Write depth and normals of every view of a rooms file, each scene from its input view alone.
+
+    One pass of the encoder for each scene (view 0), one of the decoder for each of its views.
+
+    Raises SpecError where the model is not one for such files; OSError, FileFormatError.
+    """
+    spec = model.config.networks
+    if not spec.camera or spec.classes:
+        what = "classes, which are part of the truth" if spec.classes else "no camera"
+        raise SpecError(f"weights: a model of {what}, expected one conditioned on the camera alone")
+    with RoomsFile(data) as rooms:
+        size = rooms.spec.height
+        check_reducible(data, size, rooms.spec.width, spec.size)
+        place = rooms.read("camera/world_from_camera", slice(None))[:, :3, 3]
+        condition = torch.from_numpy(place.astype(np.float32))
+        scene, view = rooms.read("scene_index", slice(None)), rooms.read("view_index", slice(None))
+        inputs = np.flatnonzero(view == 0)
+        of_scene = {int(scene[row]): k for k, row in enumerate(inputs)}
+        codes = torch.cat(list(_codes(model, rooms, inputs, condition)))
+        own = torch.tensor([of_scene[int(number)] for number in scene])
+        with RoomPredictionWriter(out, data, method=METHOD, run=run, overwrite=overwrite) as file:
+            for rows in _batches(len(rooms)):
+                device = next(model.parameters()).device
+                depth, _ = model.surfels(codes[own[rows]].to(device), condition[rows].to(device))
+                depth, normal = enlarged(depth, rooms.spec.fov_y_degrees, size)
+                for row, z, n in zip(rows, depth.cpu(), normal.cpu(), strict=True):
+                    file.add(int(row), z.numpy(), np.moveaxis(n.numpy(), 0, -1))
+                progress(len(rows), len(rooms))
+
+
+@torch.inference_mode()
+def answer_file(
+    model: Pix2Shape,
+    data: str | Path,
+    out: str | Path,
+    *,
+    run: str = "",
+    overwrite: bool = False,
+    progress: Progress = lambda done, total: None,
+) -> None:
+    """Write answers to the questions of a file: the answer whose z_scene is nearest.
+
+    Raises SpecError where the model is not one for questions; else as `iqtt.QuestionsFile`.
+    """
+    spec = model.config.networks
+    if spec.condition:
+        raise SpecError("weights: a model that must be told the camera, expected one for questions")
+    if len(parts(data)) > 1:
+        raise SpecError(
+            f"{data}: training questions, expected those to be answered, such as iqtt-test.h5"
+        )
+    device = next(model.parameters()).device
+    with open_questions(data) as questions:
+        check_reducible(data, questions.height, questions.width, spec.size)
+        scores = []
+        for rows in _batches(len(questions), BATCH // 4):
+            images = [
+                channels_first(image, spec.size)
+                for row in rows
+                for image in decode_image(questions.read("questions", int(row)))
+            ]
+            image = torch.from_numpy(np.stack(images)).to(device)
+            codes = model.encoder(image, image.new_empty(len(image), 0))[:, : spec.z_scene]
+            distance = squared_distances(codes.view(len(rows), 4, -1)).sqrt()
+            scores.append(-distance.cpu().double().numpy())
+            progress(len(rows), len(questions))
+    write_answers(
+        out, data, method=METHOD, scores=np.concatenate(scores), run=run, overwrite=overwrite
+    )
+
+
+def enlarged(depth: Tensor, fov_y_degrees: float, size: int) -> tuple[Tensor, Tensor]:
+    """Return depth, (B, size, size), and normals, (B, 3, size, size), of smaller depth maps.
+
+    Inverse depth is what is interpolated: planes stay planes.
+    """
+    normals = normals_from_depth(depth, fov_y_degrees)
+    factor = size // depth.shape[1]
+    if factor == 1:
+        return depth, normals
+    # The outer pixels' centres lie within the image: continue to its border, and cut that off.
+    wide = functional.interpolate(
+        extrapolated(1 / depth)[:, None], scale_factor=factor, mode="bilinear"
+    )
+    inverse = wide[:, 0, factor:-factor, factor:-factor]
+    least = 0.5 / depth.amax(dim=(1, 2), keepdim=True)  # a surface may end beyond the last centre
+    normals = functional.interpolate(normals, scale_factor=factor, mode="bilinear")
+    return 1 / torch.maximum(inverse, least), functional.normalize(normals, dim=1)
+
+
+def _codes(
+    model: Pix2Shape, rooms: RoomsFile, inputs: Array, condition: Tensor
+) -> Iterator[Tensor]:
+    device = next(model.parameters()).device
+    for chosen in _batches(len(inputs)):
+        rows = inputs[chosen]
+        images = [
+            channels_first(decode_image(rooms.read("image", int(row))), model.config.networks.size)
+            for row in rows
+        ]
+        image = torch.from_numpy(np.stack(images)).to(device)
+        yield model.encoder(image, condition[rows].to(device)).cpu()
+
+
+def _batches(count: int, size: int = BATCH) -> Iterator[Array]:
+    return (np.arange(first, min(first + size, count)) for first in range(0, count, size))

@@ -1,0 +1,219 @@
+"""Is every question of some files right, and can it be answered without looking at shapes?"""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iqtt.audit import proofs, shape_proofs, view_proofs
+from iqtt.audit.image_statistics import Statistics
+from iqtt.audit.probes import Evidence, Probe, run_probes
+from iqtt.audit.proofs import Proof
+from iqtt.audit.shape_proofs import Shapes
+from iqtt.audit.shape_statistics import NAMES, answer_statistics
+from iqtt.audit.table import AuditTable, find_tables, read_table
+from scenegen.common.row_file import writer_name
+
+Array = NDArray[Any]
+FORMAT = {"format": "pix2shape-bench/iqtt-audit", "format_version": "1.0"}
+PROBED = 20_000  # questions whose images probes look at, by default
+CAST = 48  # questions whose images are cast again
+_BY_CUBES = (
+    *("shapes", "one right answer", "answers differ", "stored ids", "splits apart"),
+    *("rotations", "angles", "visibility", "cast again"),
+)
+
+
+@dataclass(frozen=True)
+class AuditedTable:
+    """A table that was looked at; split and fingerprint are None for a released file.
+
+    Attributes:
+        answers: "stored", "from the cubes", or "unknown".
+        probed: questions that probes looked at.
+    """
+
+    name: str
+    path: str
+    split: str | None
+    fingerprint: str | None
+    questions: int
+    answers: str
+    probed: int
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What was proved and measured."""
+
+    tables: tuple[AuditedTable, ...]
+    proofs: tuple[Proof, ...]
+    probes: tuple[Probe, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether no proof failed."""
+        return all(proof.status != "FAIL" for proof in self.proofs)
+
+    @property
+    def shortcuts(self) -> tuple[Probe, ...]:
+        """The probes that beat chance by what must not tell the right answer."""
+        return tuple(probe for probe in self.probes if probe.is_shortcut)
+
+    def to_json(self) -> str:
+        """Return all numbers as indented JSON."""
+        probes = [
+            {**asdict(p), "accuracy": p.accuracy, "is_shortcut": p.is_shortcut} for p in self.probes
+        ]
+        record = {
+            **FORMAT,
+            "writer": writer_name(),
+            "passed": self.passed,
+            "tables": [asdict(table) for table in self.tables],
+            "proofs": [asdict(proof) for proof in self.proofs],
+            "probes": probes,
+        }
+        return json.dumps(record, indent=2) + "\n"
+
+
+def question_count(paths: Sequence[str | Path]) -> int:
+    """Return how many questions `audit` will read. Raises as it does."""
+    return sum(source.count for source in find_tables(paths))
+
+
+def audit(
+    paths: Sequence[str | Path],
+    *,
+    probed: int = PROBED,
+    progress: Callable[[int], Any] = lambda done: None,
+) -> Audit:
+    """Prove what can be proved of question files, and try to answer them without looking.
+
+    Files of answers are found beside the files of questions. Images are read once, in chunks.
+
+    Args:
+        paths: question files, or folders of iqtt-*.h5.
+        probed: most questions whose images probes look at, spread evenly.
+        progress: is told how many more questions were read.
+
+    Raises:
+        OSError: no such file or folder, or a folder without question files.
+        FileFormatError: a file that is none of questions, or damaged.
+        SpecError: no paths.
+    """
+    sources = find_tables(paths)
+    measured = _spread([source.count if source.answered else 0 for source in sources], probed)
+    tables = [
+        read_table(source, rows, progress) for source, rows in zip(sources, measured, strict=True)
+    ]
+    told = [table for table in tables if table.truth]
+    shapes = dict(zip((t.name for t in told), shape_proofs.compare_shapes(told), strict=True))
+    right = [_right(table, shapes.get(table.name)) for table in tables]
+    found = _prove(tables, told, list(shapes.values()), right)
+    probes = run_probes(_evidence(tables, shapes, right))
+    return Audit(tuple(map(_audited, tables, right)), tuple(found), probes)
+
+
+def _spread(counts: Sequence[int], most: int) -> list[Array]:
+    """Choose rows of tables of so many rows, evenly: `most` in all, or all there are."""
+    total = sum(counts)
+    rows = np.unique(np.linspace(0, max(total - 1, 0), min(most, total)).astype(np.int64))
+    starts = np.cumsum([0, *counts])
+    return [
+        rows[(rows >= start) & (rows < start + count)] - start
+        for start, count in zip(starts, counts, strict=False)
+    ]
+
+
+def _right(table: AuditTable, shapes: Shapes | None) -> Array:
+    """Return where the right answers stand, as told or as found, (Q,); -1 where it is unknown."""
+    if table.answers is not None:
+        return table.answers.astype(np.int64)
+    return np.full(len(table), -1) if shapes is None else shapes.place
+
+
+def _prove(
+    tables: Sequence[AuditTable],
+    told: Sequence[AuditTable],
+    shapes: Sequence[Shapes],
+    right: Sequence[Array],
+) -> list[Proof]:
+    found = [
+        proofs.balance(tables, right),
+        proofs.values(tables),
+        proofs.framing(tables),
+        proofs.distinct_images(tables),
+        proofs.distinct_questions(tables),
+    ]
+    if not told:
+        return [Proof(name, "skipped", "no shape descriptions") for name in _BY_CUBES] + found
+    sample = _spread([len(table) for table in told], CAST)
+    by_cubes = [
+        shape_proofs.whole_shapes(told, shapes),
+        shape_proofs.one_right_answer(told, shapes),
+        shape_proofs.distractors_differ(told, shapes),
+        shape_proofs.stored_ids(told, shapes),
+        shape_proofs.splits_share_nothing(told, shapes),
+        view_proofs.rotations(told),
+        view_proofs.angles(told, shapes),
+        proofs.visibility(told),
+        view_proofs.cast_again(told, shapes, sample),
+    ]
+    untold = [table.name for table in tables if not table.truth]
+    note = f"; not told of {', '.join(untold)}" if untold else ""
+    return [replace(proof, detail=proof.detail + note) for proof in by_cubes] + found
+
+
+def _evidence(
+    tables: Sequence[AuditTable], shapes: Mapping[str, Shapes], right: Sequence[Array]
+) -> Evidence:
+    """Gather the questions that were measured and whose right answer is known."""
+    told = [table for table in tables if table.name in shapes]
+    numbers = answer_statistics(told, list(shapes.values())) if told else []
+    described = dict(zip(shapes, numbers, strict=True))
+    cubes, mirrored, places, kept = [], [], [], []
+    for table, place in zip(tables, right, strict=True):
+        rows = table.measured[place[table.measured] >= 0]
+        kept.append(np.isin(table.measured, rows))
+        places.append(place[rows])
+        unknown = np.full((len(table), 3, len(NAMES)), np.nan)
+        cubes.append(described.get(table.name, unknown)[rows])
+        mirrored.append(_mirror_images(shapes.get(table.name), place, rows))
+    joined = np.concatenate(cubes)
+    return Evidence(
+        statistics=Statistics.join([t.statistics for t in tables]).take(np.concatenate(kept)),
+        right=np.concatenate(places),
+        mirrored=np.concatenate(mirrored),
+        cubes={name: joined[:, :, i] for i, name in enumerate(NAMES)},
+        places=[place[place >= 0] for place in right],
+    )
+
+
+def _mirror_images(shapes: Shapes | None, place: Array, rows: Array) -> Array:
+    """Return which answers are the right ones' mirror images, of some rows; -1 for none."""
+    if shapes is None:
+        return np.full(len(rows), -1)
+    right = 1 + place[rows, None]
+    same_class = shapes.class_name[rows] == np.take_along_axis(
+        shapes.class_name[rows], right, axis=1
+    )
+    mirror = same_class & (
+        shapes.shape_name[rows] != np.take_along_axis(shapes.shape_name[rows], right, 1)
+    )
+    mirror &= shapes.whole[rows, None]
+    return np.where(mirror[:, 1:].any(axis=1), mirror[:, 1:].argmax(axis=1), -1)
+
+
+def _audited(table: AuditTable, right: Array) -> AuditedTable:
+    answers = (
+        "stored" if table.answers is not None else "from the cubes" if table.truth else "unknown"
+    )
+    known = int(np.count_nonzero(right[table.measured] >= 0))
+    source = table.source
+    return AuditedTable(
+        table.name, str(source.path), table.split, table.fingerprint, len(table), answers, known
+    )

@@ -1,0 +1,168 @@
+"""What an audit proves of answers and images, from what `iqtt.audit.table` read."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from iqtt.audit.table import AuditTable
+from iqtt.files.layout import NO_CUBE
+from scenegen.rendering.ground_truth import encode_image
+
+Array = NDArray[Any]
+SHOWN = 3  # questions named in a detail
+
+
+@dataclass(frozen=True)
+class Proof:
+    """One rule and whether all questions keep it; `detail` says what was looked at or found."""
+
+    name: str
+    status: Literal["ok", "FAIL", "skipped"]
+    detail: str
+
+
+def judge(
+    name: str,
+    rule: str,
+    tables: Sequence[AuditTable],
+    wrong: Sequence[ArrayLike],
+    found: Callable[[int, int], str],
+    looked: int | None = None,
+) -> Proof:
+    """Return the verdict on a rule for each question.
+
+    Args:
+        rule: what is expected.
+        wrong: for each table which questions break the rule, (Q,) bool.
+        found: says what was found in a (table, row) that does.
+        looked: how many questions were looked at, if not all.
+    """
+    total = f"{sum(map(len, tables)):,}"
+    total = total if looked is None else f"{looked:,} of {total}"
+    broken = [(t, row) for t, mask in enumerate(wrong) for row in np.flatnonzero(mask).tolist()]
+    if not broken:
+        return Proof(name, "ok", f"{rule} ({total} questions)")
+    named = [f"{tables[t].name} row {row}: {found(t, row)}" for t, row in broken[:SHOWN]]
+    more = f" and {len(broken) - SHOWN:,} more" if len(broken) > SHOWN else ""
+    text = "; ".join(named) + more
+    return Proof(
+        name, "FAIL", f"{text}; expected: {rule} ({len(broken):,} of {total} questions fail)"
+    )
+
+
+def balance(tables: Sequence[AuditTable], right: Sequence[Array]) -> Proof:
+    """Whether the right answer stands at each place equally often, in every table.
+
+    Args:
+        right: its place in each question, (Q,); -1 where it is not known.
+    """
+    counts = [np.bincount(places[places >= 0], minlength=3) for places in right]
+    known = [i for i in range(len(tables)) if counts[i].sum()]
+    shown = [f"{tables[i].name}: {'/'.join(map(str, counts[i]))}" for i in known]
+    uneven = [text for i, text in zip(known, shown, strict=True) if np.ptp(counts[i]) > 1]
+    if not known:
+        return Proof("answer places", "skipped", "no answers")
+    if uneven:
+        detail = f"{'; '.join(uneven)} at places 0/1/2; expected: counts differ by at most 1"
+        return Proof("answer places", "FAIL", detail)
+    return Proof("answer places", "ok", "balanced: " + "; ".join(shown))
+
+
+def values(tables: Sequence[AuditTable]) -> Proof:
+    """Whether all pixel values are finite and within 0..1."""
+    return judge(
+        "pixel values",
+        "finite and within 0 to 1",
+        tables,
+        [table.unfit.any(axis=1) for table in tables],
+        lambda t, row: f"{tables[t].unfit[row].max()} values of an image are not",
+    )
+
+
+def framing(tables: Sequence[AuditTable]) -> Proof:
+    """Whether the shapes leave each image's border free."""
+    for table in tables:
+        if table.spec is None or not len(table):
+            continue
+        expected = encode_image(np.array(table.spec.background), table.image_dtype)
+        # Rounding a half up or down is up to the renderer.
+        step = 1 if table.image_dtype == "uint8" else 1e-3
+        if np.abs(table.background.astype(float) - expected).max() > step:
+            detail = f"{table.name}: the border's commonest colour is {table.background.tolist()}"
+            return Proof("framing", "FAIL", f"{detail}; expected: {expected.tolist()} as specified")
+    guessed = any(table.spec is None for table in tables)
+    note = "; background taken to be the border's commonest colour" if guessed else ""
+    return judge(
+        "framing",
+        f"no pixel of a shape on the border of an image{note}",
+        tables,
+        [table.on_border.any(axis=1) for table in tables],
+        lambda t, row: f"{tables[t].on_border[row].max()} pixels of an image's border",
+    )
+
+
+def visibility(tables: Sequence[AuditTable]) -> Proof:
+    """Whether every cube shows, by the counts stored, and these allow for each silhouette."""
+    told = [table for table in tables if table.truth]
+    if not told:
+        return Proof("visibility", "skipped", "no shape descriptions")
+    shown = [table.truth["visible_pixels"].astype(np.int64) for table in told]
+    used = [(table.truth["cubes"] != NO_CUBE).any(axis=3) for table in told]
+    least = [np.where(u, s, 2**31).min(axis=2) for u, s in zip(used, shown, strict=True)]
+    # A surface may have the background's colour, so a silhouette may be too small, never too large.
+    total = [np.where(u, s, 0).sum(axis=2) for u, s in zip(used, shown, strict=True)]
+    needed = [table.spec.min_cube_pixels if table.spec else 0 for table in told]
+    return judge(
+        "visibility",
+        f"every cube shows {max(needed)} pixels or more; no silhouette exceeds its cubes'",
+        told,
+        [
+            ((least[t] < needed[t]) | (told[t].silhouette > total[t])).any(axis=1)
+            for t in range(len(told))
+        ],
+        lambda t, row: (
+            f"a cube shows {least[t][row].min()} pixels, silhouettes {told[t].silhouette[row]}"
+            f" of cubes {total[t][row]}"
+        ),
+    )
+
+
+def distinct_images(tables: Sequence[AuditTable]) -> Proof:
+    """Whether no image is stored twice, in all tables together."""
+    first = _first_copies(np.concatenate([table.digests.reshape(-1) for table in tables]))
+    return _no_copies(tables, "distinct images", "no image stored twice", first.reshape(-1, 4))
+
+
+def distinct_questions(tables: Sequence[AuditTable]) -> Proof:
+    """Whether no question is asked twice, its answers perhaps in another order."""
+    words = np.concatenate([table.digests for table in tables]).view(np.uint64).reshape(-1, 4, 2)
+    # A sum of hashes does not know their order.
+    keys = np.concatenate([words[:, 0], words[:, 1:].sum(axis=1, dtype=np.uint64)], axis=1)
+    first = _first_copies(keys.view("V32").reshape(-1))
+    return _no_copies(tables, "distinct questions", "no question asked twice", first[:, None])
+
+
+def _first_copies(keys: Array) -> Array:
+    """Return where each key is met first, (N,)."""
+    _, first, copy = np.unique(keys, return_index=True, return_inverse=True)
+    return np.asarray(first[copy])
+
+
+def _no_copies(tables: Sequence[AuditTable], name: str, rule: str, first: Array) -> Proof:
+    """Judge whether each of all tables' items is its own first copy; items: (all Q, per Q)."""
+    number = np.arange(first.size).reshape(first.shape)
+    starts = np.cumsum([0, *map(len, tables)])
+
+    def found(t: int, row: int) -> str:
+        copies = first[starts[t] + row]
+        item = int(np.flatnonzero(copies != number[starts[t] + row])[0])
+        question, of = divmod(int(copies[item]), first.shape[1])
+        where = int(np.searchsorted(starts, question, side="right")) - 1
+        whose = f"{tables[where].name} row {question - starts[where]}"
+        return f"image {item} is image {of} of {whose}" if first.shape[1] > 1 else f"as {whose}"
+
+    repeats = np.split((first != number).any(axis=1), starts[1:-1])
+    return judge(name, rule, tables, repeats, found)

@@ -1,0 +1,106 @@
+"""An audit for people: as aligned text, and as Markdown."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from iqtt.audit.audit import Audit
+from iqtt.audit.probes import ERROR_RATE, LIGHT, MIRRORED, OUTLINE, WITHOUT, Probe
+
+_BLOCKS = (
+    (WITHOUT, "answers alone", ("largest", "smallest", "most typical", "odd one out")),
+    (WITHOUT, "answers alone, learned and cross-validated", ("learned",)),
+    (WITHOUT, "where right answers stand, cross-validated", ("commonest", "after the last")),
+    (LIGHT, "next to the reference, by light", ("nearest", "farthest")),
+    (
+        MIRRORED,
+        "the right answer or its mirror image, next to the reference",
+        ("nearest", "farthest"),
+    ),
+    (OUTLINE, "next to the reference, by outline", ("nearest", "farthest")),
+)
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Probes of one kind: a row for each statistic, a column for each rule."""
+
+    title: str
+    rules: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def table(audit: Audit) -> str:
+    """Return what was proved and measured as lines, columns aligned."""
+    files = [(t.name, f"{t.questions:,} questions", t.split or "released") for t in audit.tables]
+    lines = [*_aligned(files), ""]
+    lines += _aligned([(p.status, p.name, p.detail) for p in audit.proofs])
+    for block in _blocks(audit.probes):
+        lines += ["", block.title]
+        lines += ["  " + line for line in _aligned([("", *block.rules), *block.rows])]
+    return "\n".join([*lines, "", _conclusion(audit)])
+
+
+def markdown(audit: Audit) -> str:
+    """Return the same as Markdown tables."""
+    files = [(t.name, f"{t.questions:,}", f"{t.probed:,}") for t in audit.tables]
+    lines = _piped([("table", "questions", "probed"), *files])
+    lines += [
+        "",
+        *_piped([("", "proof", "found"), *((p.status, p.name, p.detail) for p in audit.proofs)]),
+    ]
+    for block in _blocks(audit.probes):
+        lines += ["", f"{block.title[0].upper()}{block.title[1:]}:", ""]
+        lines += _piped([("", *block.rules), *block.rows])
+    return "\n".join([*lines, "", _conclusion(audit)])
+
+
+def _blocks(probes: Sequence[Probe]) -> Iterator[_Block]:
+    for sees, title, rules in _BLOCKS:
+        found = {(p.statistic, p.rule): p for p in probes if p.sees == sees and p.rule in rules}
+        if not found:
+            continue
+        names = dict.fromkeys(name for name, _ in found)
+        rows = [(name, *(_cell(found.get((name, rule))) for rule in rules)) for name in names]
+        chance = next(iter(found.values())).chance
+        counts = sorted({p.n for p in found.values()})
+        may = "sees some shape, so may beat" if sees == OUTLINE else "must not beat"
+        asked = " to ".join(f"{n:,}" for n in dict.fromkeys((counts[0], counts[-1])))
+        full = f"{title}: {may} chance, {100 * chance:.1f}% ({asked} questions)"
+        yield _Block(full, rules, tuple(rows))
+
+
+def _cell(probe: Probe | None) -> str:
+    if probe is None:
+        return "-"
+    share = f"{100 * probe.accuracy:.1f} [{100 * probe.low:.1f}, {100 * probe.high:.1f}]"
+    return share + (" *" if probe.beats_chance else "")
+
+
+def _conclusion(audit: Audit) -> str:
+    failed = [proof.name for proof in audit.proofs if proof.status == "FAIL"]
+    lines = [f"FAILED: {', '.join(failed)}." if failed else "No proof failed."]
+    if audit.probes:
+        tried = sum(probe.sees != OUTLINE for probe in audit.probes)
+        found = [f"{p.statistic}, {p.rule} ({p.sees})" for p in audit.shortcuts]
+        verdict = f"{len(found)} did: {'; '.join(found)}" if found else "none did"
+        lines.append(
+            "Percent right with 95% Wilson intervals; * beats chance at the"
+            f" {100 * ERROR_RATE:g}% level, corrected for the number of probes (Holm)."
+            f" Of {tried} probes that must not beat chance, {verdict}."
+        )
+    else:
+        lines.append("No probes: no right answers are known.")
+    return "\n".join(lines)
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def _piped(rows: Sequence[Sequence[str]]) -> list[str]:
+    head, *rest = ["| " + " | ".join(row) + " |" for row in rows]
+    return [head, "| " + " | ".join("---" for _ in rows[0]) + " |", *rest]

@@ -1,0 +1,215 @@
+"""What an audit proves of shapes and views, recomputed from the stored cubes and rotations.
+
+Nothing here is shared with the generator: congruence is `iqtt.shapes.congruence`, names are
+`iqtt.shapes.names`, and turns are found by search.
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iqtt.audit.proofs import Proof, judge
+from iqtt.audit.table import AuditTable
+from iqtt.files.layout import NO_CUBE
+from iqtt.shapes.congruence import congruent_rows
+from iqtt.shapes.names import name_shapes, row_keys
+
+Array = NDArray[Any]
+MOST_CUBES = 64  # more than any file stores; keeps names of shapes of unlike sizes apart
+ORTHONORMAL = 1e-6  # how far a rotation times its transpose may be off 1
+DEGREES = 1e-3  # how far a stored angle may be off
+_CHUNK = 8192  # questions at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """What the cubes of a table say, Q questions.
+
+    Attributes:
+        whole: whether a question's shapes are in one piece, of as many cubes each, (Q,) bool; the
+            rest is told of these questions alone.
+        count: cubes of each of its shapes, (Q,).
+        right: which answers are congruent to the reference, (Q, 3) bool.
+        shape_name, class_name: numbers for the four shapes, (Q, 4): equal for the same shape;
+            equal for it and its mirror image; unlike for others, in all tables together. -1 unless
+            `whole`.
+    """
+
+    whole: Array
+    count: Array
+    right: Array
+    shape_name: Array
+    class_name: Array
+
+    @property
+    def place(self) -> Array:
+        """Where the only right answer stands, (Q,); -1 unless there is exactly one."""
+        return np.where(self.right.sum(axis=1) == 1, self.right.argmax(axis=1), -1)
+
+
+def compare_shapes(tables: Sequence[AuditTable]) -> list[Shapes]:
+    """Find which of the tables' shapes are the same; each table tells its truth."""
+    results = []
+    for table in tables:
+        cubes = table.truth["cubes"]
+        whole, count = _whole(cubes)
+        right = np.zeros((len(table), 3), np.bool_)
+        for n in np.unique(count[whole]).tolist():
+            rows = np.flatnonzero(whole & (count == n))
+            for k in range(3):
+                right[rows, k] = congruent_rows(cubes[rows, 0, :n], cubes[rows, 1 + k, :n])
+        nameless = np.full((2, len(table), 4), -1)
+        results.append(Shapes(whole, count, right, *nameless))
+    sizes = {n for s in results for n in np.unique(s.count[s.whole]).tolist()}
+    for n in sorted(sizes):
+        chosen = [np.flatnonzero(s.whole & (s.count == n)) for s in results]
+        alike = [t.truth["cubes"][r, :, :n] for t, r in zip(tables, chosen, strict=True)]
+        names = name_shapes(np.concatenate(alike).reshape(-1, n, 3))
+        ends = np.cumsum([len(rows) for rows in chosen])[:-1]
+        shape, mirrored = (np.split(v.reshape(-1, 4) * MOST_CUBES + n, ends) for v in names)
+        for i, one in enumerate(results):
+            one.shape_name[chosen[i]], one.class_name[chosen[i]] = shape[i], mirrored[i]
+    return results
+
+
+def _whole(cubes: Array) -> tuple[Array, Array]:
+    """Return `Shapes.whole` and `Shapes.count` of stored cubes, (Q, 4, most, 3)."""
+    used = (cubes != NO_CUBE).all(axis=3)
+    count = used.sum(axis=2)
+    whole = (used == (np.arange(cubes.shape[2]) < count[..., None])).all(axis=(1, 2))
+    whole &= (used == (cubes != NO_CUBE).any(axis=3)).all(axis=(1, 2))
+    whole &= (count == count[:, :1]).all(axis=1) & (count[:, 0] > 0)
+    for start in range(0, len(cubes), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        wide, both = cubes[part].astype(np.int16), used[part, :, :, None] & used[part, :, None]
+        apart = np.abs(wide[:, :, :, None] - wide[:, :, None]).sum(axis=4)
+        differ = np.count_nonzero(both & (apart == 0), axis=(2, 3)) == count[part]
+        # Unused rows reach the first cube, so that only the used ones decide.
+        reaches = (both & (apart <= 1)).astype(np.float32)
+        for _ in range(cubes.shape[2].bit_length()):
+            reaches = np.minimum(reaches @ reaches, 1)
+        joined = (reaches[:, :, 0] > 0) | ~used[part]
+        whole[part] &= differ.all(axis=1) & joined.all(axis=(1, 2))
+    return whole, count[:, 0]
+
+
+def whole_shapes(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
+    """Whether the cubes are what they should be: else the other proofs have nothing to go by."""
+    ranges = [table.spec.cubes if table.spec else (1, MOST_CUBES) for table in tables]
+    wrong = [
+        ~(s.whole & (s.count >= low) & (s.count <= high))
+        for s, (low, high) in zip(shapes, ranges, strict=True)
+    ]
+    return judge(
+        "shapes",
+        "in one piece, all four of a question of as many cubes, and as many as specified",
+        tables,
+        wrong,
+        lambda t, row: (
+            f"{shapes[t].count[row]} cubes" if shapes[t].whole[row] else "its cubes are no shapes"
+        ),
+    )
+
+
+def one_right_answer(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
+    """Whether exactly one answer is congruent to the reference: the one that the file names."""
+    wrong = []
+    for table, found in zip(tables, shapes, strict=True):
+        named = table.truth["distractor_kind"] == -1
+        bad = (named != found.right).any(axis=1) | (found.place < 0)
+        wrong.append(bad if table.answers is None else bad | (table.answers != found.place))
+
+    def found_instead(t: int, row: int) -> str:
+        congruent = np.flatnonzero(shapes[t].right[row]).tolist()
+        answers = tables[t].answers
+        told = "" if answers is None else f", answer {answers[row]}"
+        kinds = tables[t].truth["distractor_kind"][row].tolist()
+        return f"congruent to the reference: {congruent or 'none'}{told}, kinds {kinds}"
+
+    rule = "exactly one answer congruent to the reference, the one that is told"
+    return judge("one right answer", rule, tables, wrong, found_instead)
+
+
+def distractors_differ(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
+    """Whether no two answers of a question show the same shape."""
+    pairs = list(itertools.combinations((1, 2, 3), 2))
+    same = [
+        np.stack([(s.shape_name[:, a] == s.shape_name[:, b]) & s.whole for a, b in pairs], axis=1)
+        for s in shapes
+    ]
+    return judge(
+        "answers differ",
+        "no two answers congruent to each other",
+        tables,
+        [mask.any(axis=1) for mask in same],
+        lambda t, row: f"images {pairs[int(same[t][row].argmax())]} show the same shape",
+    )
+
+
+def stored_ids(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
+    """Whether the stored ids are equal just where the shapes are, and where their classes are."""
+    wrong = [np.zeros(len(table), np.bool_) for table in tables]
+    whole = np.concatenate([s.whole for s in shapes])
+    ends = np.cumsum([len(table) for table in tables])[:-1]
+    for stored, names in (("shape_id", "shape_name"), ("class_id", "class_name")):
+        ids = np.concatenate([table.truth[stored] for table in tables])[whole]
+        own = np.concatenate([getattr(s, names) for s in shapes])[whole].reshape(-1)
+        keys = row_keys(ids.reshape(own.size, ids.shape[2]))
+        _, given = np.unique(keys, return_inverse=True)
+        bad = np.zeros(len(whole), np.bool_)
+        clash = _not_one_to_one(given, own) | _not_one_to_one(own, given)
+        bad[whole] = clash.reshape(-1, 4).any(axis=1)
+        wrong = [a | b for a, b in zip(wrong, np.split(bad, ends), strict=True)]
+    rule = "shape_id and class_id equal just where the cubes say so"
+    return judge("stored ids", rule, tables, wrong, lambda t, row: "its ids are not")
+
+
+def _not_one_to_one(a: Array, b: Array) -> Array:
+    """Return which items of a carry more than one value of b with their own value, (N,) bool."""
+    order = np.lexsort((b, a))
+    joins = (a[order][1:] == a[order][:-1]) & (b[order][1:] != b[order][:-1])
+    bad = np.unique(a[order][1:][joins])
+    return np.asarray(np.isin(a, bad))
+
+
+def splits_share_nothing(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
+    """Whether no shape, nor its mirror image, is in two splits."""
+    names = [table.split or "" for table in tables]
+    splits = sorted(set(names))
+    if len(splits) < 2:
+        return Proof("splits apart", "skipped", f"one split alone: {', '.join(splits)}")
+    owned = {
+        split: np.unique(
+            np.concatenate(
+                [
+                    s.class_name[s.whole].reshape(-1)
+                    for s, n in zip(shapes, names, strict=True)
+                    if n == split
+                ]
+            )
+        )
+        for split in splits
+    }
+    every, times = np.unique(np.concatenate(list(owned.values())), return_counts=True)
+    shared = every[times > 1]
+    rule = "no shape, nor its mirror image, in two splits"
+    number = ", ".join(f"{split} {len(owned[split]):,}" for split in splits)
+    return judge(
+        "splits apart",
+        f"{rule} (classes: {number})",
+        tables,
+        [np.isin(s.class_name, shared).any(axis=1) & s.whole for s in shapes],
+        lambda t, row: (
+            f"its shape is in {_elsewhere(owned, shapes[t].class_name[row], names[t])} too"
+        ),
+    )
+
+
+def _elsewhere(owned: dict[str, Array], classes: Array, split: str) -> str:
+    return " and ".join(
+        name for name, own in owned.items() if name != split and np.isin(classes, own).any()
+    )

@@ -1,0 +1,209 @@
+"""What an audit reads of one table of questions: its images once, in chunks; the rest whole."""
+
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iqtt.audit.image_statistics import Statistics, measure, silhouettes
+from iqtt.files.reader import QuestionsFile, answers_beside, open_questions, parts
+from iqtt.questions.specs import SplitSpec
+from scenegen.common.records import check
+
+Array = NDArray[Any]
+CHUNK_PIXELS = 2**20  # of the questions in memory at once
+TRUTH = (
+    "cubes",
+    "shape_id",
+    "class_id",
+    "world_from_shape",
+    "distractor_kind",
+    "angle_degrees",
+    "visible_pixels",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """Where a table of questions lies.
+
+    Attributes:
+        name: short, and unlike those of the other tables: "iqtt-train.h5 labeled".
+        part: "labeled" or "unlabeled" of a training file, else "".
+        answers: the file with the answers, where they lie apart.
+        answered: whether right answers are told, or the shapes to find them.
+        count: questions.
+    """
+
+    name: str
+    path: Path
+    part: str
+    answers: Path | None
+    answered: bool
+    count: int
+
+    @contextmanager
+    def open(self) -> Iterator[QuestionsFile]:
+        """Open the table. Raises OSError, FileFormatError as `QuestionsFile`."""
+        with open_questions(self.path, self.part, self.answers) as questions:
+            yield questions
+
+
+@dataclass(frozen=True, eq=False)
+class AuditTable:
+    """A table of Q questions, all but its pixels.
+
+    Attributes:
+        spec, split, fingerprint: None for a released file.
+        answers: which of the three is right, (Q,); None where it is not told.
+        truth: the datasets `TRUTH` by name, (Q, ...) each; empty where shapes are not told.
+        background: the commonest colour of the images' borders, as stored, (3,).
+        digests: hashes of the images, (Q, 4) void.
+        silhouette: pixels of each image that are not background, (Q, 4).
+        on_border: those of them on the image's border, (Q, 4).
+        unfit: values of each image that are not finite, or off the range 0..1, (Q, 4).
+        measured: rows that `statistics` are of.
+    """
+
+    source: Source
+    spec: SplitSpec | None
+    split: str | None
+    fingerprint: str | None
+    image_dtype: str
+    answers: Array | None
+    truth: dict[str, Array]
+    background: Array
+    digests: Array
+    silhouette: Array
+    on_border: Array
+    unfit: Array
+    measured: Array
+    statistics: Statistics
+
+    @property
+    def name(self) -> str:
+        """Of the source."""
+        return self.source.name
+
+    def __len__(self) -> int:
+        return self.source.count
+
+
+def find_tables(paths: Sequence[str | Path]) -> list[Source]:
+    """Find the tables of question files, and in folders of every iqtt-*.h5.
+
+    A file of answers stands for the file of questions beside it.
+
+    Raises:
+        OSError: no such file or folder, or a folder without question files.
+        FileFormatError: not a question file.
+        SpecError: no paths.
+    """
+    check(len(paths) > 0, "paths", "none", "question files, or folders of them")
+    files: dict[Path, Path] = {}
+    for path in map(Path, paths):
+        found = sorted(path.glob("iqtt-*.h5")) if path.is_dir() else [path]
+        if not found:
+            raise FileNotFoundError(2, "holds no iqtt-*.h5", str(path))
+        for file in found:
+            asked = file.with_name(file.stem.removesuffix("-answers") + file.suffix)
+            chosen = asked if asked.is_file() else file
+            files.setdefault(chosen.resolve(), chosen)
+    names = [path.name for path in files.values()]
+    sources = []
+    for path in files.values():
+        shown = path.name if names.count(path.name) == 1 else str(path)
+        for part in parts(path):
+            beside = answers_beside(path)
+            with open_questions(path, part, beside) as questions:
+                name = f"{shown} {part}".rstrip()
+                answered = questions.has_answers or questions.has_truth
+                sources.append(Source(name, path, part, beside, answered, len(questions)))
+    return sources
+
+
+def read_table(
+    source: Source, measured: Array, progress: Callable[[int], Any] = lambda done: None
+) -> AuditTable:
+    """Read a table.
+
+    Args:
+        measured: rows to take statistics of, rising.
+        progress: is told how many more questions were read.
+
+    Raises OSError, FileFormatError as `QuestionsFile` and its `read`.
+    """
+    with source.open() as questions:
+        everything = slice(0, source.count)
+        names = TRUTH if questions.has_truth else ()
+        chunk = max(1, CHUNK_PIXELS // (4 * questions.height * questions.width))
+        first = questions.read("questions", slice(0, min(chunk, source.count)))
+        background = _border_color(first)
+        scans = []
+        for start in range(0, source.count, chunk):
+            rows = slice(start, min(start + chunk, source.count))
+            images = questions.read("questions", rows)
+            wanted = measured[(measured >= rows.start) & (measured < rows.stop)] - start
+            scans.append(_scan(images, background, wanted))
+            progress(len(images))
+        scans = scans or [_scan(first, background, measured)]
+        digests, silhouette, on_border, unfit, statistics = zip(*scans, strict=True)
+        return AuditTable(
+            source,
+            questions.spec,
+            questions.split,
+            questions.fingerprint,
+            questions.image_dtype,
+            questions.read("answers", everything) if questions.has_answers else None,
+            {name: questions.read(name, everything) for name in names},
+            background,
+            np.concatenate(digests),
+            np.concatenate(silhouette),
+            np.concatenate(on_border),
+            np.concatenate(unfit),
+            measured,
+            Statistics.join(statistics),
+        )
+
+
+def _border(pixels: Array) -> Array:
+    """Return the pixels on the border of images, (Q, 4, H, W, ...) to (Q, 4, B, ...)."""
+    sides = (pixels[:, :, 0], pixels[:, :, -1], pixels[:, :, 1:-1, 0], pixels[:, :, 1:-1, -1])
+    return np.concatenate(sides, axis=2)
+
+
+def _border_color(images: Array) -> Array:
+    """Return the commonest colour on the images' borders, (3,); zero where there is no image."""
+    colors = _border(images).reshape(-1, 3)
+    if not len(colors):
+        return np.zeros(3, images.dtype)
+    distinct, counts = np.unique(colors, axis=0, return_counts=True)
+    return np.asarray(distinct[counts.argmax()])
+
+
+def _scan(
+    images: Array, background: Array, wanted: Array
+) -> tuple[Array, Array, Array, Array, Statistics]:
+    shown = silhouettes(images, background)
+    digests = [
+        hashlib.blake2b(image.tobytes(), digest_size=16).digest()
+        for image in images.reshape(-1, *images.shape[2:])
+    ]
+    if images.dtype == np.uint8:
+        unfit = np.zeros(images.shape[:2], np.int64)
+    else:
+        with np.errstate(invalid="ignore"):
+            fit = (images >= 0) & (images <= 1)  # NaN is not
+        unfit = np.count_nonzero(~fit, axis=(2, 3, 4))
+    return (
+        np.array(digests, "V16").reshape(images.shape[:2]),
+        np.count_nonzero(shown, axis=(2, 3)),
+        np.count_nonzero(_border(shown), axis=2),
+        unfit,
+        measure(images[wanted], shown[wanted]),
+    )

@@ -1,0 +1,193 @@
+"""What an audit proves of views: how far they turn, and that images show what the file says.
+
+Nothing here is shared with the generator: turns are found by search, and rays cast in numpy.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iqtt.audit.proofs import Proof, judge
+from iqtt.audit.shape_proofs import Shapes
+from iqtt.audit.table import AuditTable
+from iqtt.files.reader import QuestionsFile
+from iqtt.questions.specs import SplitSpec
+from iqtt.shapes.names import cube_codes, whole_turns
+from scenegen.camera import pixel_directions
+from scenegen.rendering.ground_truth import decode_image
+from scenegen.rendering.shading import shade
+
+Array = NDArray[Any]
+ORTHONORMAL = 1e-6  # how far a rotation times its transpose may be off 1
+STORED_DEGREES = 1e-3  # how far a stored angle may be off
+LEAST_DEGREES = 1e-6  # how far below the least an angle may be, by rounding
+GRAZING = 1e-3  # cube edges; rays that pass an edge so near may see either side
+RADIANCE = {"uint8": 0.51 / 255, "float16": 1e-3, "float32": 1e-4}  # how far a pixel may be off
+
+
+def rotations(tables: Sequence[AuditTable]) -> Proof:
+    """Whether each stored rotation is one: orthonormal and proper."""
+    wrong = []
+    for table in tables:
+        matrices = table.truth["world_from_shape"]
+        with np.errstate(all="ignore"):
+            off = np.abs(matrices @ matrices.swapaxes(2, 3) - np.eye(3)).max(axis=(2, 3))
+            good = (off < ORTHONORMAL) & (np.linalg.det(matrices) > 0)
+        wrong.append(~good.all(axis=1))
+    rule = "orthonormal and proper"
+    return judge("rotations", rule, tables, wrong, lambda t, row: "one is no rotation")
+
+
+def angles(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
+    """Whether the right answer is turned far enough away from the reference, and as far as told."""
+    least = [table.spec.min_angle_degrees if table.spec else 0.0 for table in tables]
+    found = [_angles(table, s) for table, s in zip(tables, shapes, strict=True)]
+    wrong = []
+    for table, s, angle, low in zip(tables, shapes, found, least, strict=True):
+        told = np.abs(angle - table.truth["angle_degrees"]) <= STORED_DEGREES
+        wrong.append((s.place >= 0) & ~(told & (angle >= low - LEAST_DEGREES)))
+    return judge(
+        "angles",
+        f"right answers turned by {max(least):g} degrees or more, and as far as told",
+        tables,
+        wrong,
+        lambda t, row: (
+            f"turned by {found[t][row]:.4f} degrees,"
+            f" {tables[t].truth['angle_degrees'][row]:.4f} stored"
+        ),
+    )
+
+
+def _angles(table: AuditTable, shapes: Shapes) -> Array:
+    """Return the least rotation from the reference's view to the right answer's, degrees, (Q,).
+
+    Infinite where there is not one right answer.
+    """
+    result = np.full(len(table), np.inf)
+    for n in np.unique(shapes.count[shapes.place >= 0]).tolist():
+        rows = np.flatnonzero((shapes.place >= 0) & (shapes.count == n))
+        place = 1 + shapes.place[rows]
+        cubes = table.truth["cubes"][..., :n, :].astype(np.int64)
+        views = table.truth["world_from_shape"]
+        reference, target = cubes[rows, 0], cube_codes(cubes[rows, place])
+        for turn in whole_turns():
+            # The turned reference is the right answer's shape as stored: so it was turned by
+            # the answer's rotation, after this turn, and back by its own.
+            fits = (cube_codes(reference @ turn.T) == target).all(axis=1)
+            some = rows[fits]
+            between = views[some, place[fits]] @ turn @ views[some, 0].swapaxes(1, 2)
+            far = np.linalg.norm(between - np.eye(3), axis=(1, 2)) / (2 * math.sqrt(2))
+            angle = np.degrees(2 * np.arcsin(np.minimum(far, 1)))
+            result[some] = np.fmin(result[some], angle)
+    return result
+
+
+def cast_again(
+    tables: Sequence[AuditTable], shapes: Sequence[Shapes], sample: Sequence[Array]
+) -> Proof:
+    """Whether some images are what rays cast at the stored cubes under the stored lights see.
+
+    Args:
+        sample: for each table the rows to look at, rising.
+    """
+    problems: list[dict[int, str]] = []
+    for table, one, rows in zip(tables, shapes, sample, strict=True):
+        problems.append({})
+        with table.source.open() as questions:
+            for row in rows[one.whole[rows]].tolist():
+                problem = _difference(questions, row, int(one.count[row]))
+                if problem:
+                    problems[-1][row] = problem
+    return judge(
+        "cast again",
+        "images and visible pixels are what the stored cubes and lights give",
+        tables,
+        [np.isin(np.arange(len(t)), list(p)) for t, p in zip(tables, problems, strict=True)],
+        lambda t, row: problems[t][row],
+        sum(map(len, sample)),
+    )
+
+
+def _difference(questions: QuestionsFile, row: int, count: int) -> str:
+    """Say how a question's images differ from what its description gives; "" if they do not."""
+    spec = questions.spec
+    if spec is None:
+        return ""
+    names = ("questions", "cubes", "world_from_shape", "visible_pixels", "light_count")
+    images, cubes, views, visible, lights = (questions.read(name, row) for name in names)
+    light_position, light_color = (
+        questions.read(name, row) for name in ("light_position", "light_color")
+    )
+    for k in range(4):
+        used = slice(0, int(lights[k]))
+        hit, radiance, sure = _cast(
+            spec, cubes[k, :count], views[k], light_position[k, used], light_color[k, used]
+        )
+        shown = np.bincount(hit[hit >= 0], minlength=count)
+        unsure = np.count_nonzero(~sure)
+        if np.abs(shown - visible[k, :count]).max() > unsure:
+            return f"image {k} shows {shown.tolist()} pixels of its cubes, not {visible[k, :count]}"
+        expected = np.clip(radiance, 0, 1)
+        off = np.abs(decode_image(images[k]).clip(0, 1) - expected).max(axis=2)
+        wrong = np.count_nonzero(sure & ~(off <= RADIANCE[questions.image_dtype]))
+        if wrong:
+            return f"image {k} has {wrong} pixels of other colours"
+    return ""
+
+
+def _cast(
+    spec: SplitSpec, cubes: Array, view: Array, light_position: Array, light_color: Array
+) -> tuple[Array, Array, Array]:
+    """Cast a ray through the middle of each pixel.
+
+    Args:
+        cubes: (n, 3); view: world from shape, (3, 3); lights: (L, 3) each.
+
+    Returns which cube each sees, -1 for none, (H, W); the radiance, (H, W, 3); and where no edge
+    is so near that rounding may decide, (H, W).
+    """
+    height, width = spec.height, spec.width
+    world_from_camera = spec.camera.world_from_camera
+    rays = pixel_directions(height, width, spec.camera.fov_y_degrees).reshape(-1, 3)
+    rays = rays @ world_from_camera[:3, :3].T @ view  # in the shape's frame, as all from here on
+    eye = world_from_camera[:3, 3] @ view
+    low = cubes - (cubes.min(axis=0) + cubes.max(axis=0) + 1) / 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        a, b = ((low + corner - eye) / rays[:, None] for corner in (0, 1))
+    enter, leave = np.minimum(a, b), np.maximum(a, b)
+    first, last = enter.max(axis=2), leave.min(axis=2)
+    depth = np.where(first <= last, first, np.inf)
+    cube = depth.argmin(axis=1)
+    every = np.arange(len(rays))
+    nearest = depth[every, cube]
+    hit = np.isfinite(nearest)
+    # Unsure: grazing the edge of any cube not behind, or another cube just as near.
+    clear = GRAZING / spec.camera_distance
+    close = (np.abs(last - first) < GRAZING) & (
+        np.minimum(first, last) < nearest[:, None] + GRAZING
+    )
+    sure = ~close.any(axis=1)
+    sure &= np.count_nonzero(depth < nearest[:, None] + clear, axis=1) <= 1
+    faces = enter[every, cube]
+    sure &= ~hit | (np.count_nonzero(faces > nearest[:, None] - clear, axis=1) <= 1)
+    axis = faces.argmax(axis=1)
+    normals = -np.sign(rays[every, axis])[:, None] * np.eye(3)[axis]
+    points = eye + np.where(hit, nearest, 0)[:, None] * rays
+    radiance = shade(
+        points,
+        normals,
+        np.array(spec.reflectance),
+        light_position @ view,
+        light_color,
+        np.array(spec.ambient),
+        np.array((0.0, 1.0)),
+    )
+    radiance[~hit] = spec.background
+    return (
+        np.where(hit, cube, -1).reshape(height, width),
+        radiance.reshape(height, width, 3),
+        sure.reshape(height, width),
+    )

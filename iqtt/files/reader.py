@@ -1,0 +1,234 @@
+"""Read question files, ours and the released 3D-IQTT v2: typed records, and a map-style dataset."""
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from iqtt.files.layout import question_columns
+from iqtt.files.tables import TableFile, read_root, table_parts
+from iqtt.files.truth import QuestionTruth
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.row_file import checking, open_file
+from scenegen.description.checks import IMAGE_DTYPES
+from scenegen.rendering.ground_truth import decode_image
+
+Array = NDArray[Any]
+TOLERANCE = 0.01  # by which images of released files may leave 0..1
+
+
+@dataclass(frozen=True, eq=False)
+class QuestionRecord:
+    """One question.
+
+    Attributes:
+        index: its row.
+        images: the reference, then three answers, (4, H, W, 3), as stored.
+        answer: which of the three shows the reference's shape, 0 to 2; None where it is not told.
+        truth: shapes, views and lights; None where they are not told.
+    """
+
+    index: int
+    images: Array
+    answer: int | None
+    truth: QuestionTruth | None
+
+    @property
+    def radiance(self) -> Array:
+        """Linear RGB radiance, (4, H, W, 3) float32."""
+        return decode_image(self.images)
+
+
+def open_questions(
+    path: str | Path, part: str | None = None, answers: str | Path | None = None
+) -> "QuestionsFile":
+    """Open a question file for reading; raises as `QuestionsFile` does."""
+    return QuestionsFile(path, part, answers)
+
+
+def open_answers(path: str | Path, part: str | None = None) -> "AnswersFile":
+    """Open a file for its answers, whether it holds images or not; raises as `AnswersFile` does."""
+    return AnswersFile(path, part)
+
+
+def parts(path: str | Path) -> tuple[str, ...]:
+    """Return the tables of a file: "labeled" and "unlabeled", or "" for one at the root.
+
+    Raises OSError, FileFormatError as `QuestionsFile`.
+    """
+    with open_file(path, "question file") as file, checking(file):
+        read_root(Path(path), dict(file.attrs))
+        return table_parts(file, Path(path), QuestionsFile.CONTENT)
+
+
+def answers_beside(path: str | Path) -> Path | None:
+    """Return where the answers of a test file lie: iqtt-test-answers.h5 beside iqtt-test.h5."""
+    path = Path(path)
+    beside = path.with_name(f"{path.stem}-answers{path.suffix}")
+    return beside if beside.is_file() else None
+
+
+class AnswersFile(TableFile):
+    """An open file that holds answers, and what is known of the questions, images or not."""
+
+    CONTENT = "answers"
+
+    def _open_content(self) -> int:
+        return self._take_answers()
+
+
+class QuestionsFile(TableFile):
+    """An open question file: a sequence of `QuestionRecord`s.
+
+    Attributes:
+        height, width: of an image, pixels.
+        image_dtype: "uint8", "float16" or "float32".
+    """
+
+    CONTENT = "questions"
+
+    def __init__(
+        self, path: str | Path, part: str | None = None, answers: str | Path | None = None
+    ) -> None:
+        """Open a question file and check the layout of one of its tables.
+
+        Args:
+            path: ours, or a released one; both may be read without the other's groups.
+            part: "labeled" or "unlabeled" of a training file.
+            answers: a file such as iqtt-test-answers.h5, for a file that holds no answers.
+
+        Raises:
+            OSError: no such file, or a folder.
+            FileFormatError: not HDF5, not a question file, of a newer format, or damaged; or the
+                answers belong to another file.
+            SpecError: `part` is not given where there are two, or names none of them; `answers`
+                are given where the file has its own.
+        """
+        super().__init__(path, part)
+        self._beside: AnswersFile | None = None
+        if answers is not None:
+            try:
+                self._join(answers)
+            except BaseException:
+                self.close()
+                raise
+
+    def __getitem__(self, index: int) -> QuestionRecord:
+        """Read one row; negative indices count from the end. Raises IndexError, FileFormatError."""
+        row = range(len(self))[index]
+        return QuestionRecord(
+            index=row,
+            images=self.read("questions", row),
+            answer=int(self.read("answers", row)) if self.has_answers else None,
+            truth=self.truth(row),
+        )
+
+    def __iter__(self) -> Iterator[QuestionRecord]:
+        return (self[i] for i in range(len(self)))
+
+    def close(self) -> None:
+        """Close the file, and that of its answers; idempotent."""
+        super().close()
+        if self._beside is not None:
+            self._beside.close()
+
+    def _open_content(self) -> int:
+        images = self._datasets["questions"] = self._dataset("questions")
+        shape: tuple[int, ...] = images.shape or ()
+        kind = str(images.dtype.name)
+        kinds: tuple[str, ...] = IMAGE_DTYPES
+        expected = "(Q, 4, H, W, 3)"
+        good = len(shape) == 5 and shape[1] == 4 and shape[4] == 3 and min(shape[2:4]) > 0
+        if self.spec is not None:
+            (column,) = question_columns(self.spec)
+            expected, kinds = f"(Q, {', '.join(map(str, column.shape))})", (column.dtype,)
+            good = shape[1:] == column.shape
+        if not good:
+            raise FileFormatError(f"{self.path}: questions: shape {shape}, expected {expected}")
+        if kind not in kinds:
+            raise FileFormatError(
+                f"{self.path}: questions: type {kind}, expected {' or '.join(kinds)}"
+            )
+        self.height, self.width = shape[2:4]
+        self.image_dtype = kind
+        if self.spec is None and kind != "uint8" and shape[0]:
+            self._check_range()
+        if f"{self.part}/answers" in self._file:
+            self._take_answers(shape[0])
+        return shape[0]
+
+    def _check_range(self) -> None:
+        """Refuse files that count from 0 to 255 in floating point; one row tells."""
+        first = self.read("questions", 0)
+        low, high = first.min(), first.max()
+        if not (low >= -TOLERANCE and high <= 1 + TOLERANCE):  # so NaN is refused too
+            raise self._wrong("questions", 0, f"values from {low:g} to {high:g}, expected 0 to 1")
+
+    def _join(self, answers: str | Path) -> None:
+        """Take in answers and truth of another file, if they are those of this one."""
+        if self.has_answers:
+            raise SpecError(f"answers: found {answers}, expected none: {self.path} has its own")
+        self._beside = beside = AnswersFile(answers, self.part)
+        if (len(beside), beside.fingerprint) != (len(self), self.fingerprint):
+            raise FileFormatError(
+                f"{answers}: answers of another file: found {_identity(beside)},"
+                f" expected {_identity(self)}, as in {self.path}"
+            )
+        self._datasets |= beside._datasets
+        self._stored |= beside._stored
+        self.kind_names = beside.kind_names
+
+
+class QuestionsDataset:
+    """A map-style dataset (`__len__`, `__getitem__` -> dict of arrays) for any training loop.
+
+    `torch.utils.data.DataLoader` takes it as it is, with any number of workers: it pickles as its
+    path, and every process opens the file for itself when it first reads.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        part: str | None = None,
+        fields: Sequence[str] | None = None,
+        answers: str | Path | None = None,
+    ) -> None:
+        """Check the file once.
+
+        Args:
+            path, part, answers: as for `QuestionsFile`.
+            fields: of an item: "questions", "answers", or a dataset of the truth such as "cubes";
+                by default the questions, and the answers where there are any.
+
+        Raises as `QuestionsFile`, and SpecError for an unknown field.
+        """
+        self._where = (Path(path), part, answers)
+        with QuestionsFile(*self._where) as file:
+            default = ("questions", "answers") if file.has_answers else ("questions",)
+            self.fields = default if fields is None else tuple(fields)
+            for name in self.fields:
+                file.check_field(name)
+            self._length, self.spec, self.fingerprint = len(file), file.spec, file.fingerprint
+        self._open: tuple[int, QuestionsFile] | None = None
+
+    def __len__(self) -> int:
+        return self._length
+
+    def __getitem__(self, index: int) -> dict[str, Any]:
+        """Return the fields of one row, by name; image values are as stored."""
+        row = range(self._length)[index]
+        if self._open is None or self._open[0] != os.getpid():
+            self._open = (os.getpid(), QuestionsFile(*self._where))
+        file = self._open[1]
+        return {name: file.read(name, row) for name in self.fields}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_open": None}
+
+
+def _identity(file: TableFile) -> str:
+    mark = f"fingerprint {file.fingerprint[:12]}" if file.fingerprint else "no fingerprint"
+    return f"{len(file)} questions, {mark}"

@@ -1,0 +1,114 @@
+"""Sheets of questions, as a person would be asked them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from iqtt.files.reader import QuestionRecord
+from scenegen.rooms.preview import BACKGROUND, FAINT, INK, save_picture, srgb_bytes
+
+Array = NDArray[Any]
+LABELS = ("", "A", "B", "C")
+SMALLEST_TILE, LARGEST_TILE = 128, 256  # other images are scaled by a whole factor
+FRAME = 4  # around the right answer
+GAP = 10  # between answers
+WIDE_GAP = 34  # between reference and answers; the divider stands in its middle
+MARGIN = 16  # around a question
+LABEL_HEIGHT = 22
+RIGHT = (0, 128, 94)  # Okabe and Ito's green, darker
+LINE = (190, 190, 190)
+MANY = 4  # more questions than so many stand in two columns
+
+
+def question_sheet(records: Sequence[QuestionRecord], show_answers: bool) -> Image.Image:
+    """Return a sheet with a row for each question: the reference, then answers A, B and C.
+
+    Args:
+        records: one or more questions with images of one size.
+        show_answers: frame the right answer, and say how each was made, where that is known.
+    """
+    pictures = [[_tile(image) for image in np.nan_to_num(record.radiance)] for record in records]
+    width, height = _slot(pictures[0][0])
+    cell = (
+        4 * width + WIDE_GAP + 2 * GAP + 2 * MARGIN,
+        height + LABEL_HEIGHT + MARGIN + 2 * FRAME,
+    )
+    columns = 2 if len(records) > MANY else 1
+    lines = -(-len(records) // columns)
+    sheet = Image.new("RGB", (columns * cell[0], lines * cell[1] + MARGIN), BACKGROUND)
+    for i, (record, tiles) in enumerate(zip(records, pictures, strict=True)):
+        corner = i % columns * cell[0] + MARGIN, i // columns * cell[1] + MARGIN
+        _draw_question(sheet, corner, record, tiles, show_answers)
+    return sheet
+
+
+def save_sheet(records: Sequence[QuestionRecord], show_answers: bool, path: str | Path) -> None:
+    """Write a sheet; the ending of `path` names the format. Raises as `save_picture`."""
+    save_picture(question_sheet(records, show_answers), path)
+
+
+def _draw_question(
+    sheet: Image.Image,
+    corner: tuple[int, int],
+    record: QuestionRecord,
+    tiles: Sequence[Image.Image],
+    show_answers: bool,
+) -> None:
+    draw = ImageDraw.Draw(sheet)
+    font, strong = ImageFont.load_default(size=12), ImageFont.load_default(size=14)
+    (left, top), (width, height) = corner, _slot(tiles[0])
+    answer = _right_answer(record) if show_answers else None
+    below = top + height + FRAME + 4
+    for k, tile in enumerate(tiles):
+        slot = left + k * (width + GAP) + (k > 0) * (WIDE_GAP - GAP)
+        x, right = slot + (width - tile.width) // 2, answer is not None and k == answer + 1
+        by = FRAME if right else 1
+        box = (x - by, top - by, x + tile.width + by - 1, top + height + by - 1)
+        draw.rectangle(box, fill=RIGHT if right else LINE)
+        sheet.paste(tile, (x, top))
+        letter, note = LABELS[k], ""
+        if k == 0:
+            note = f"question {record.index}"
+        elif show_answers:
+            note = _note(record, k - 1, right)
+        start = slot + (width - strong.getlength(letter) - font.getlength(note)) / 2
+        draw.text((start, below - 2), letter, fill=RIGHT if right else INK, font=strong)
+        start += strong.getlength(letter)
+        draw.text((start, below), note, fill=RIGHT if right else FAINT, font=font)
+    x = left + width + WIDE_GAP // 2
+    draw.line((x, top, x, top + height), fill=LINE)
+
+
+def _right_answer(record: QuestionRecord) -> int | None:
+    """Return which answer is right, by the answers or else by the truth."""
+    if record.answer is None and record.truth is not None and None in record.truth.distractor_kind:
+        return record.truth.distractor_kind.index(None)
+    return record.answer
+
+
+def _note(record: QuestionRecord, k: int, right: bool) -> str:
+    """Say of answer k whether it is right, and how it was made."""
+    if right:
+        return "   right" + (f", turned {record.truth.angle_degrees:.0f}°" if record.truth else "")
+    kind = record.truth.distractor_kind[k] if record.truth else None
+    return f"   {kind}" if kind else ""
+
+
+def _slot(tile: Image.Image) -> tuple[int, int]:
+    """Return width and height of a tile's place, wide enough for the text below it."""
+    return max(tile.width, SMALLEST_TILE), tile.height
+
+
+def _tile(radiance: Array) -> Image.Image:
+    picture = Image.fromarray(srgb_bytes(radiance))
+    longest = max(picture.size)
+    if longest > LARGEST_TILE:
+        return picture.reduce(-(-longest // LARGEST_TILE))
+    factor = -(-SMALLEST_TILE // longest)
+    return picture.resize(
+        (picture.width * factor, picture.height * factor), Image.Resampling.NEAREST
+    )

@@ -1,0 +1,246 @@
+"""Do two methods differ? Paired comparison of score files over the same images or questions.
+
+Each file is compared with the first one. All pairs would ask more questions than people do ("is
+mine better than these?"), and the correction for their number would hide differences that are
+there. Whoever wants another reference puts it first.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.comparison.pairing import ComparisonError, column, common_rows, require_same_test
+from metrics.comparison.statistics import (
+    SIGN_FLIPS,
+    holm,
+    mcnemar_exact,
+    paired_bootstrap,
+    sign_flip_test,
+    smallest_detectable_difference,
+    smallest_significant_fraction,
+)
+from metrics.measures.statistics import RESAMPLES, cluster_means
+from metrics.report.table_text import distinct, plain
+from metrics.scoring.metric_names import metric
+from metrics.scoring.records import ScoreFile
+
+Array = NDArray[np.float64]
+ALPHA, POWER, CONFIDENCE = 0.05, 0.8, 0.95
+MCNEMAR, SIGN_FLIP = "exact McNemar", "sign flips"
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One score of a method against that of the reference.
+
+    Attributes:
+        metric: name of the score.
+        method: as listed in `Comparison.methods`.
+        value, reference_value: means over the rows that are compared, in the score's unit.
+        difference: value - reference_value.
+        low, high: its 95% interval, not corrected for the number of comparisons; None for a single
+            scene or question.
+        test: "exact McNemar" or "sign flips".
+        p_value: two-sided.
+        p_holm: corrected for all comparisons of the family.
+        wins, losses, ties: scenes (or questions) in which the method is better, worse, the same.
+        smallest: the least difference that this test set would have shown in 80% of cases, given
+            how the differences spread; None where it could show none, or nothing spreads.
+    """
+
+    metric: str
+    method: str
+    value: float
+    reference_value: float
+    difference: float
+    low: float | None
+    high: float | None
+    test: str
+    p_value: float
+    p_holm: float
+    wins: int
+    losses: int
+    ties: int
+    smallest: float | None
+
+    @property
+    def verdict(self) -> str:
+        """Whether a difference is shown at 5% after correction: "better", "worse", "not shown"."""
+        if self.p_holm > ALPHA or self.difference == 0.0:
+            return "not shown"
+        higher = metric(self.metric).higher_is_better
+        return "better" if (self.difference > 0.0) == higher else "worse"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Methods against the first of them.
+
+    Attributes:
+        task: "rooms" or "iqtt".
+        truth_fingerprint: of their test set.
+        reference: name of the first file's method.
+        methods: names of the others, told apart.
+        items, clusters: images and scenes compared; both the questions for questions.
+        differences: by metric, then by method.
+        comparable: False where a file says that it is not, and was compared all the same.
+        notes: for a person.
+        seed, resamples: of intervals and random sign flips.
+    """
+
+    task: str
+    truth_fingerprint: str
+    reference: str
+    methods: tuple[str, ...]
+    items: int
+    clusters: int
+    differences: tuple[Difference, ...]
+    comparable: bool
+    notes: tuple[str, ...]
+    seed: int
+    resamples: int
+
+
+def compare(
+    files: Sequence[ScoreFile],
+    metrics: Sequence[str] | None = None,
+    *,
+    seed: int = 0,
+    resamples: int = RESAMPLES,
+    allow_incomparable: bool = False,
+) -> Comparison:
+    """Compare the scores of each file with those of the first.
+
+    Args:
+        files: two or more, of one test set.
+        metrics: names; else `metric_names.HEADLINE` of the task. All of them times all later files
+            are the family that Holm's correction goes by, so name what you mean to ask.
+        seed: of the bootstrap and of random sign flips.
+        resamples: of the bootstrap.
+        allow_incomparable: compare files that say that they are not comparable, over the rows that
+            all of them hold.
+
+    Raises ComparisonError where the files do not belong together, and UnknownMetricError.
+    """
+    names = require_same_test(files, metrics, allow_incomparable)
+    orders = common_rows(files)
+    clusters = files[0].clusters[orders[0]]
+    labels = distinct([f.method for f in files], [f.path.stem if f.path else "" for f in files])
+    pairs = [(name, i) for name in names for i in range(1, len(files))]
+    found = []
+    for name, i in pairs:
+        a, b = (column(files[k], name, orders[k]) for k in (i, 0))
+        exact = files[0].task == "iqtt" and files[i].runs == files[0].runs == 1
+        pair = _Pair(name, a, b, clusters, exact)
+        found.append(_difference(pair, labels[i], len(pairs), seed, resamples))
+    count = len(np.unique(clusters))
+    adjusted = holm([difference.p_value for difference in found])
+    return Comparison(
+        task=files[0].task,
+        truth_fingerprint=files[0].meta.truth_fingerprint,
+        reference=labels[0],
+        methods=tuple(labels[1:]),
+        items=len(clusters),
+        clusters=count,
+        differences=tuple(
+            replace(d, p_holm=float(p)) for d, p in zip(found, adjusted, strict=True)
+        ),
+        comparable=all(file.comparable for file in files),
+        notes=tuple(_notes(files, labels, len(clusters), count)),
+        seed=seed,
+        resamples=resamples,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """A method's values (N,) of a score beside the reference's, and the clusters they lie in."""
+
+    metric: str
+    a: Array
+    b: Array
+    clusters: NDArray[np.int64]
+    exact: bool
+
+
+def _difference(pair: _Pair, method: str, family: int, seed: int, resamples: int) -> Difference:
+    estimate = paired_bootstrap(pair.a, pair.b, pair.clusters, seed, resamples, CONFIDENCE)
+    means, reference_means = (cluster_means(v, pair.clusters) for v in (pair.a, pair.b))
+    apart = cluster_means(pair.a - pair.b, pair.clusters)
+    better = apart if metric(pair.metric).higher_is_better else -apart
+    if pair.exact:
+        p_value = mcnemar_exact(pair.a == 1.0, pair.b == 1.0).p_value
+    else:
+        p_value = sign_flip_test(apart, seed)
+    single = math.isnan(estimate.low)
+    return Difference(
+        metric=pair.metric,
+        method=method,
+        value=float(means.mean()),
+        reference_value=float(reference_means.mean()),
+        difference=estimate.value,
+        low=None if single else estimate.low,
+        high=None if single else estimate.high,
+        test=MCNEMAR if pair.exact else SIGN_FLIP,
+        p_value=p_value,
+        p_holm=p_value,
+        wins=int(np.count_nonzero(better > 0.0)),
+        losses=int(np.count_nonzero(better < 0.0)),
+        ties=int(np.count_nonzero(better == 0.0)),
+        smallest=_smallest(apart, pair.exact, ALPHA / family),
+    )
+
+
+def _smallest(apart: Array, exact: bool, alpha: float) -> float | None:
+    """The least difference found with 80% power at alpha, the strictest level of Holm's steps.
+
+    Above what the test needs to be able to say anything at all; None where that is out of reach.
+    """
+    count = len(apart)
+    if count < 2:
+        return None
+    smallest = smallest_detectable_difference(apart, alpha, POWER)
+    if exact:
+        smallest = max(smallest, smallest_significant_fraction(count, alpha))
+        return smallest if smallest <= 1.0 else None
+    return smallest if smallest > 0.0 and least_p_value(count) <= alpha else None
+
+
+def least_p_value(clusters: int) -> float:
+    """The least p-value that the sign-flip test of so many scenes can give."""
+    return max(2.0 ** (1 - clusters), 1.0 / (SIGN_FLIPS + 1))
+
+
+def _notes(
+    files: Sequence[ScoreFile], labels: Sequence[str], items: int, clusters: int
+) -> Iterator[str]:
+    seen: dict[str, str] = {}
+    for file, label in zip(files, labels, strict=True):
+        if not file.comparable:
+            why = "; ".join(map(plain, file.meta.warnings))
+            yield f"{label} says that it is not comparable{': ' if why else ''}{why}"
+        if file.runs > 1:
+            yield (
+                f"{label}: means over {file.runs} training runs; the tests ask whether these runs"
+                " differ, not whether other runs would"
+            )
+        if file.alignment != "none":
+            how = metric(f"rmse_after_{file.alignment}").title.partition(", ")[2]
+            yield f"{label} claims its depth only when {how}; scores of points are never aligned"
+        for submission in file.meta.submissions:
+            if seen.setdefault(submission.sha256, label) != label:
+                yield f"{label} and {seen[submission.sha256]} were scored from the same submission"
+    if not all(file.comparable for file in files):
+        unit = "rows" if files[0].task == "rooms" else "questions"
+        yield f"compared over the {items} {unit} that all of the files score"
+    if files[0].task == "rooms" and least_p_value(clusters) > ALPHA:
+        yield (
+            f"{clusters} scenes cannot show any difference: the least possible p-value is"
+            f" {least_p_value(clusters):.3g}"
+        )
+
+
+__all__ = ["Comparison", "ComparisonError", "Difference", "compare", "least_p_value"]

@@ -1,0 +1,129 @@
+"""A comparison for people, as aligned text and as Markdown; and as JSON."""
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+
+from metrics.comparison.compare import ALPHA, CONFIDENCE, POWER, SIGN_FLIP, Comparison, Difference
+from metrics.report.table_text import aligned, markdown, number, piped
+from metrics.scoring.metric_names import metric
+
+FORMAT_NAME = "pix2shape-bench/comparison"
+FORMAT_VERSION = "1.0"
+_HEAD = (
+    "method",
+    "score",
+    "difference",
+    "better/worse/same",
+    "p",
+    "p (Holm)",
+    "least shown",
+    "verdict",
+)
+
+
+def table(comparison: Comparison) -> str:
+    """Lines for a terminal: for each score the reference, then the others against it."""
+    lines = [_title(comparison, str)]
+    for name, rows in _blocks(comparison, str):
+        lines += ["", _heading(name), *("  " + line for line in aligned([_HEAD, *rows]))]
+    return "\n".join([*lines, "", *_legend(comparison), *(f"note: {n}" for n in comparison.notes)])
+
+
+def markdown_report(comparison: Comparison) -> str:
+    """The same as Markdown."""
+    lines = [_title(comparison, markdown)]
+    for name, rows in _blocks(comparison, markdown):
+        lines += ["", f"**{markdown(_heading(name))}**", "", *piped([_HEAD, *rows])]
+    notes = [f"- {markdown(note)}" for note in comparison.notes]
+    return "\n".join([*lines, "", *_legend(comparison), *([""] if notes else []), *notes])
+
+
+def to_json(comparison: Comparison) -> str:
+    """The same as JSON; keys are the attributes of `Comparison` and `Difference`."""
+    content = {
+        "format": FORMAT_NAME,
+        "format_version": FORMAT_VERSION,
+        **asdict(comparison),
+        "confidence": CONFIDENCE,
+        "alpha": ALPHA,
+        "power": POWER,
+        "family": len(comparison.differences),
+    }
+    content["differences"] = [
+        {**asdict(d), "unit": metric(d.metric).unit, "verdict": d.verdict}
+        for d in comparison.differences
+    ]
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _title(comparison: Comparison, escape: Callable[[str], str]) -> str:
+    if comparison.task == "rooms":
+        size = f"{comparison.items:,} images of {comparison.clusters:,} scenes"
+    else:
+        size = f"{comparison.items:,} questions"
+    stamp = "" if comparison.comparable else " NOT COMPARABLE, compared all the same."
+    fingerprint = escape(comparison.truth_fingerprint[:12])
+    return f"Against {escape(comparison.reference)}, over {size} (truth {fingerprint}).{stamp}"
+
+
+def _heading(name: str) -> str:
+    known = metric(name)
+    return f"{name} ({known.unit}, {known.direction})"
+
+
+def _blocks(
+    comparison: Comparison, escape: Callable[[str], str]
+) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
+    """For each score its name and its rows, the reference first."""
+    for name in dict.fromkeys(d.metric for d in comparison.differences):
+        found = [d for d in comparison.differences if d.metric == name]
+        reference = (escape(comparison.reference), number(found[0].reference_value))
+        rows = [(*reference, *("" for _ in _HEAD[2:]))]
+        yield name, rows + [_row(difference, escape) for difference in found]
+
+
+def _row(d: Difference, escape: Callable[[str], str]) -> tuple[str, ...]:
+    interval = ""
+    if d.low is not None and d.high is not None:
+        like = d.difference or max(abs(d.low), abs(d.high))
+        ends = f"{_signed(d.low, like)}, {_signed(d.high, like)}"
+        interval = escape(f" [{ends}]")
+    return (
+        escape(d.method),
+        number(d.value),
+        _signed(d.difference, d.difference) + interval,
+        f"{d.wins}/{d.losses}/{d.ties}",
+        _probability(d.p_value),
+        _probability(d.p_holm),
+        "none" if d.smallest is None else number(d.smallest),
+        d.verdict,
+    )
+
+
+def _signed(value: float, like: float) -> str:
+    return ("+" if value > 0.0 else "") + number(value, like)
+
+
+def _probability(p: float) -> str:
+    return f"{p:.4f}" if p >= 0.0001 else "<0.0001"
+
+
+def _legend(comparison: Comparison) -> list[str]:
+    first = comparison.differences[0]
+    clusters = "scenes" if comparison.task == "rooms" else "questions"
+    if first.test == SIGN_FLIP:
+        test = f"sign flips of the mean difference of each {clusters[:-1]}"
+    else:
+        test = "exact McNemar test"
+    if len({d.test for d in comparison.differences}) > 1:
+        test = "exact McNemar test; sign flips for means over several runs"
+    family = len(comparison.differences)
+    many = f"{family} comparisons" if family > 1 else "1 comparison"
+    return [
+        f"difference: method - reference, paired, with its {CONFIDENCE:.0%} bootstrap interval over"
+        f" {clusters} (not corrected).",
+        f"better/worse/same: {clusters}. p: {test}, two-sided; Holm: corrected for {many}.",
+        f"least shown: what this test set would show in {POWER:.0%} of cases after the correction,"
+        " as the differences spread here; none: no difference, or none can be told.",
+    ]

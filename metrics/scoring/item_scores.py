@@ -1,0 +1,116 @@
+"""All scores of one image: predicted depth and normals against the truth's."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.measures.chamfer_hausdorff import chamfer, nearest_distances, point_scores
+from metrics.measures.checks import LARGEST_MAGNITUDE
+from metrics.measures.depth import Alignment, compare_depth, depth_scores
+from metrics.measures.image_search import nearest_distances_on_image
+from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_depth
+from scenegen.camera import back_project, pixel_directions
+
+Array = NDArray[Any]
+NonFinite = Literal["error", "penalise"]
+F_SCORE_THRESHOLDS = (0.01, 0.02, 0.05)  # scene units: edges of the room
+ALIGNMENTS: tuple[Alignment, ...] = ("none", "scale", "scale_shift")
+
+
+@dataclass(frozen=True, eq=False)
+class TrueView:
+    """What is true of one image.
+
+    Attributes:
+        depth: planar, (H, W), scene units; the scored pixels are those where it is finite.
+        normal: (H, W, 3), camera frame, unit, facing the viewer.
+        object_id: (H, W).
+        fov_y_degrees: vertical field of view.
+    """
+
+    depth: Array
+    normal: Array
+    object_id: Array
+    fov_y_degrees: float
+
+    @property
+    def mask(self) -> Array:
+        """The scored pixels, (H, W) bool."""
+        return np.isfinite(self.depth)
+
+
+def score_view(
+    depth: Array,
+    normal: Array | None,
+    truth: TrueView,
+    *,
+    alignments: Sequence[Alignment] = ALIGNMENTS,
+    non_finite: NonFinite = "error",
+) -> dict[str, float]:
+    """Return every score of one image by name.
+
+    Surfels are back-projected from depth, in the camera frame, as Pix2Shape does (section "Scene
+    Reconstruction"). Names and units are those of `metric_names`.
+
+    Args:
+        depth: predicted planar depth, (H, W), scene units.
+        normal: predicted normals, (H, W, 3), camera frame; None where the method gives none.
+        truth: what it is compared with.
+        alignments: after which the scores of depth are given as well; points are never aligned.
+        non_finite: what becomes of values that are not finite at a scored pixel. "penalise" scores
+            them at the worst: depth as 0 (at the camera), a normal as opposite to the true one.
+
+    Raises NonFiniteError with the count and the first pixel, unless they are penalised, and
+    ValueError on other shapes than the truth's.
+    """
+    mask = truth.mask
+    if non_finite == "penalise":
+        depth = np.where(_finite(depth) | ~mask, depth, 0.0)
+        if normal is not None:
+            good = _finite(normal).all(axis=-1) & np.any(normal != 0, axis=-1)
+            normal = np.where((good | ~mask)[..., None], normal, -truth.normal)
+    nearest = nearest_distances_on_image(depth, truth.depth, truth.fov_y_degrees, mask)
+    scores = point_scores(nearest, F_SCORE_THRESHOLDS)
+    pair = compare_depth(depth, truth.depth, mask)
+    for alignment in alignments:
+        scores |= depth_scores(pair, alignment)
+    if normal is not None:
+        scores |= normal_scores(angular_errors_degrees(normal, truth.normal, mask))
+    # Both derived alike, so that a perfect depth is perfect at creases, too, where planes blend.
+    derived, _ = normals_from_depth(depth, truth.fov_y_degrees, mask)
+    true_derived, on_surface = normals_from_depth(truth.depth, truth.fov_y_degrees, mask)
+    angles = angular_errors_degrees(derived, true_derived, on_surface)
+    return scores | {f"derived_{name}": value for name, value in normal_scores(angles).items()}
+
+
+def chamfer_floor(truth: TrueView) -> float:
+    """The Chamfer distance of the true surface to itself, seen at the corners between pixels.
+
+    What remains between two samples of one surface at this resolution: a method whose surfels lie
+    on the true surface, but not on the truth's rays, scores about this. A corner counts where its
+    four pixels show one object; its depth is the plane's through them, for which 1 / depth is
+    linear across the image. Scene units; NaN where no corner counts.
+    """
+    ids, mask = truth.object_id, truth.mask
+    quads = [(slice(i, ids.shape[0] - 1 + i), slice(j, ids.shape[1] - 1 + j)) for i, j in _QUAD]
+    whole = np.logical_and.reduce([mask[q] & (ids[q] == ids[quads[0]]) for q in quads])
+    if not whole.any():
+        return float("nan")
+    depth = np.where(mask, truth.depth, 1.0).astype(np.float64)
+    corner_depth = 4.0 / np.sum([1.0 / depth[q] for q in quads], axis=0)
+    height, width = ids.shape
+    rays = pixel_directions(height, width, truth.fov_y_degrees)
+    between = np.sum([rays[q] for q in quads], axis=0) / 4.0
+    corners = (corner_depth[..., None] * between)[whole]
+    centres = back_project(truth.depth, truth.fov_y_degrees)[mask]
+    return chamfer(nearest_distances(corners, centres))
+
+
+_QUAD = ((0, 0), (0, 1), (1, 0), (1, 1))
+
+
+def _finite(values: Array) -> Array:
+    return np.asarray(np.abs(values) <= LARGEST_MAGNITUDE)

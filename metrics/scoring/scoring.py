@@ -1,0 +1,78 @@
+"""Submissions -> scores with intervals: the whole of `bench score` but for its printing."""
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from metrics.scoring.questions import score_questions
+from metrics.scoring.records import ScoreFile
+from metrics.scoring.room_rows import ScoringError
+from metrics.scoring.rooms import score_rooms
+from metrics.scoring.runs import Progress, Settings
+from metrics.submissions.reader import (
+    QuestionPredictions,
+    RoomPredictions,
+    find_truth,
+    open_predictions,
+)
+
+
+def score(
+    paths: Sequence[str | Path],
+    truth: str | Path | None = None,
+    settings: Settings | None = None,
+    progress: Progress = lambda done: None,
+) -> ScoreFile:
+    """Score one submission, or several runs of one method, against the truth.
+
+    Views are averaged within a scene, then scenes; several runs are averaged within each item, and
+    `std` is the standard deviation over runs (with n - 1). Intervals resample whole scenes; those
+    of IQTT accuracy are Wilson's for a single run, and resample questions for several.
+
+    Args:
+        paths: submissions of one method, task and alignment.
+        truth: where the truth lies, unless the submissions say so.
+        settings: None for the defaults.
+        progress: is told how many more rows were scored.
+
+    Raises:
+        OSError: a file that is not there.
+        FileFormatError: a file that is none of ours, or broken.
+        ScoringError: the wrong truth, rows that are missing or unknown, values that are not finite.
+    """
+    settings = settings or Settings()
+    with ExitStack() as stack:
+        files = []
+        for path in paths:
+            files.append(open_predictions(path))
+            stack.callback(files[-1].close)
+        _check_alike(files)
+        truth_path = find_truth(files[0], truth)
+        rooms = [file for file in files if isinstance(file, RoomPredictions)]
+        if rooms:
+            return score_rooms(rooms, truth_path, settings, progress)
+        answers = [file for file in files if isinstance(file, QuestionPredictions)]
+        return score_questions(answers, truth_path, settings, progress)
+
+
+def count_rows(path: str | Path) -> int:
+    """Return how many rows a submission answers. Raises as `open_predictions`."""
+    with open_predictions(path) as predictions:
+        return len(predictions)
+
+
+def _check_alike(files: Sequence[RoomPredictions | QuestionPredictions]) -> None:
+    """Raise ScoringError unless the files are runs of one method on one task."""
+    first = files[0]
+    seen: dict[str, Path] = {}
+    for file in files:
+        for name in ("task", "method", "alignment"):
+            ours, theirs = (getattr(one, name, None) for one in (first, file))
+            if ours != theirs:
+                raise ScoringError(
+                    f"{file.path}: {name} {theirs!r}, but {first.path} has {ours!r}: only runs of"
+                    f" one method are averaged; score others by themselves, then `bench compare`"
+                )
+        if file.sha256 in seen:
+            raise ScoringError(f"{file.path}: the same bytes as {seen[file.sha256]}")
+        seen[file.sha256] = file.path

@@ -1,0 +1,170 @@
+"""Known mistakes in depth: another quantity, another scale, another orientation of the image."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.submissions.hints.samples import Sample
+from metrics.submissions.problems import HINT, Problem
+
+Array = NDArray[Any]
+Remedy = Callable[[Sample], Array]
+BETTER = 0.5  # to which part a remedy must bring the error
+SHARE = 0.6  # of the images in which it must
+CORRELATED = 0.6
+SWAPPED = 0.8
+SAME_SCALE = 1.5  # factors within which scales are taken for the same
+FEWEST = 3  # images that can share a scale
+OTHER_UNIT = 10.0
+UNITS = {1000.0: "millimetres for metres", 100.0: "centimetres for metres"}
+
+
+def depth_hints(samples: Sequence[Sample], alignment: str) -> list[Problem]:
+    """Hints on depth from sampled images; `alignment` is what the submission claims."""
+    with np.errstate(all="ignore"):  # whatever comes out not finite satisfies no rule
+        usable = [_Image.of(sample) for sample in samples]
+        images = [image for image in usable if image is not None]
+        if not images:
+            return []
+        found = [_swapped(images) or _shape(images), _scale(images, alignment)]
+    expected = "planar depth, -z in the camera frame, scene units, row 0 on top"
+    return [Problem("depth", HINT, expected, text) for text in found if text]
+
+
+@dataclass(frozen=True, eq=False)
+class _Image:
+    """The pixels of a sample that can be compared.
+
+    Attributes:
+        predicted, true: depth, (N,).
+        spread: median distance of the truth from its own median: what a constant would score.
+        scale: median of predicted / true.
+    """
+
+    sample: Sample
+    predicted: Array
+    true: Array
+    spread: float
+    scale: float
+
+    @staticmethod
+    def of(sample: Sample) -> "_Image | None":
+        """The pixels of a sample; None of a flat truth, which tells nothing."""
+        predicted, true = sample.depth[sample.mask], sample.true_depth[sample.mask]
+        spread = _error(true, np.median(true))
+        scale = float(np.median(predicted / true))
+        return _Image(sample, predicted, true, spread, scale) if spread > 0.0 else None
+
+    def correlation(self, quantity: Array) -> float:
+        """Of the prediction with a quantity (N,); 0 where either is constant."""
+        a, b = _centred(self.predicted), _centred(quantity)
+        below = float(np.sqrt((a * a).sum() * (b * b).sum()))
+        return float((a * b).sum()) / below if below > 0.0 else 0.0
+
+
+def _swapped(images: Sequence[_Image]) -> str | None:
+    """Near and far the wrong way round: disparity, or z itself."""
+    if np.mean([image.correlation(1.0 / image.true) >= SWAPPED for image in images]) < SHARE:
+        return None
+    if np.mean([np.median(image.predicted) < 0.0 for image in images]) > SHARE:
+        return "looks like z in the camera frame, which is negative in front of it"
+    return "looks like disparity (1/depth): large where the truth is near"
+
+
+def _shape(images: Sequence[_Image]) -> str | None:
+    """The remedy that explains the predictions, whatever their scale, if there is one."""
+    rivals = _simple_errors(images)
+    best, found = np.inf, None
+    for text, remedy in _REMEDIES.items():
+        mended = [_mended(image.sample, remedy) for image in images]
+        scale = np.median(np.concatenate([m / i.true for m, i in zip(mended, images, strict=True)]))
+        errors = np.array([_error(m / scale, i.true) for m, i in zip(mended, images, strict=True)])
+        spreads = np.array([image.spread for image in images])
+        good = (errors <= BETTER * rivals) & (errors <= BETTER * spreads)
+        error = float(np.median(errors / spreads))
+        if good.mean() >= SHARE and error < best and rivals.any():
+            best, found = error, text
+    return found
+
+
+def _mended(sample: Sample, remedy: Remedy) -> Array:
+    """The values (N,) that a remedy puts where both depths are finite; infinite for none."""
+    values = remedy(sample)[sample.mask]
+    return np.where(np.isfinite(values), values, np.inf)
+
+
+def _simple_errors(images: Sequence[_Image]) -> Array:
+    """For each image the least error as it is, and after the file's best scale, or line."""
+    predicted = np.concatenate([image.predicted for image in images])
+    true = np.concatenate([image.true for image in images])
+    scaled = predicted / np.median(predicted / true)
+    centred = _centred(predicted)
+    square = float((centred * centred).sum())
+    slope = float((centred * (true - true.mean())).sum()) / square if square > 0.0 else 0.0
+    line = slope * centred + true.mean()
+    ends = np.cumsum([len(image.true) for image in images])[:-1]
+    parts = [np.split(values, ends) for values in (predicted, scaled, line)]
+    return np.array(
+        [
+            np.nanmin([_error(values[k], image.true) for values in parts])
+            for k, image in enumerate(images)
+        ]
+    )
+
+
+def _scale(images: Sequence[_Image], alignment: str) -> str | None:
+    """Values within 0 to 1, or a factor that all images share; unless alignment takes it out."""
+    if alignment == "scale_shift":
+        return None
+    scales = np.array([image.scale for image in images])
+    scale = float(np.median(scales))
+    if not scale > 0.0 or 1.0 / SAME_SCALE <= scale <= SAME_SCALE:
+        return None
+    follows = np.mean([image.correlation(image.true) >= CORRELATED for image in images]) >= SHARE
+    low = min(float(image.predicted.min()) for image in images)
+    high = max(float(image.predicted.max()) for image in images)
+    normalised = low >= -1e-6 and 0.9 <= high <= 1.0 + 1e-6
+    if normalised and follows and (alignment == "none" or low < 0.1):
+        return "looks normalised to 0..1"
+    errors = [_error(image.predicted / scale, image.true) for image in images]
+    near = np.mean([e <= 1.2 * i.spread for e, i in zip(errors, images, strict=True)]) >= SHARE
+    alike = np.mean(np.abs(np.log(scales / scale)) <= 0.1) >= SHARE
+    same = alike and len(images) >= FEWEST
+    other_unit = near and not 1.0 / OTHER_UNIT < scale < OTHER_UNIT
+    if alignment != "none" or not (other_unit or (follows and same)):
+        return None
+    unit = next((u for f, u in UNITS.items() if f / 2.0 < scale < 2.0 * f), "another unit")
+    guess = f", as if {unit}" if other_unit else ""
+    rounded = float(f"{scale:.3g}")
+    return f"looks like another scale: {rounded:,g} times the truth{guess}"
+
+
+def _error(a: Array, b: Any) -> float:
+    return float(np.median(np.abs(a - b)))
+
+
+def _centred(values: Array) -> Array:
+    """Values (N,) about their mean, of a size whose squares neither vanish nor overflow."""
+    centred = values - values.mean()
+    size = float(np.abs(centred).max())
+    # What is left of a constant by rounding is no signal.
+    if not size > 1e-9 * float(np.abs(values).max()):
+        return np.zeros_like(values)
+    return np.asarray(centred / size)
+
+
+def _transposed(sample: Sample) -> Array:
+    square = sample.depth.shape[0] == sample.depth.shape[1]
+    return sample.depth.T if square else np.full_like(sample.depth, np.nan)
+
+
+_REMEDIES: dict[str, Remedy] = {
+    "looks like distance along the ray, not planar depth": lambda s: s.depth / s.stretch,
+    "looks upside down": lambda s: s.depth[::-1],
+    "looks mirrored, left for right": lambda s: s.depth[:, ::-1],
+    "looks turned by 180 degrees": lambda s: s.depth[::-1, ::-1],
+    "looks transposed, rows for columns": _transposed,
+}

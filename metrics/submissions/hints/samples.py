@@ -1,0 +1,83 @@
+"""A sample of predictions beside their truth, for the tests of `hints`."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.measures.checks import LARGEST_MAGNITUDE
+from metrics.submissions.reader import RoomPredictions
+from scenegen.camera import pixel_directions
+from scenegen.common.errors import FileFormatError
+from scenegen.rooms.reader import RoomsFile
+
+Array = NDArray[Any]
+ROWS = 24
+SIDE = 32  # about so many pixels of each side are looked at, at most twice as many
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Predicted and true pixels of one image, on a grid that mirrors onto itself.
+
+    Attributes:
+        depth: predicted planar depth, (h, w).
+        true_depth: scene units, (h, w).
+        mask: where both are finite, (h, w).
+        stretch: length of the ray at depth 1: distance along the ray is depth times this, (h, w).
+        normal: predicted, (h, w, 3); None where there are none.
+        true_normal: camera frame, (h, w, 3).
+        camera_from_world: rotation, (3, 3).
+    """
+
+    depth: Array
+    true_depth: Array
+    mask: Array
+    stretch: Array
+    normal: Array | None
+    true_normal: Array
+    camera_from_world: Array
+
+
+def sample_rooms(predictions: RoomPredictions, truth: RoomsFile) -> list[Sample]:
+    """Read some rows, spread evenly over a submission; those that can be used."""
+    entries = np.flatnonzero((predictions.rows >= 0) & (predictions.rows < len(truth)))
+    if len(entries) == 0:
+        return []
+    spread = np.linspace(0, len(entries) - 1, ROWS).astype(np.int64)
+    samples = (_sample(predictions, int(i), truth) for i in entries[np.unique(spread)])
+    return [sample for sample in samples if sample is not None]
+
+
+def mirrored_grid(count: int, about: int) -> Array:
+    """Indices (n,), `about` to twice as many, spread over range(count) and symmetric in it."""
+    if count <= 2 * about:
+        return np.arange(count)
+    first = np.floor(np.linspace(0, count - 1, about)).astype(np.int64)
+    return np.unique(np.concatenate([first, count - 1 - first]))
+
+
+def _sample(predictions: RoomPredictions, i: int, truth: RoomsFile) -> Sample | None:
+    row = int(predictions.rows[i])
+    try:
+        depth = predictions.depth(i)
+        normal = predictions.normal(i) if predictions.has_normals else None
+    except FileFormatError:
+        return None
+    height, width = depth.shape
+    grid = np.ix_(mirrored_grid(height, SIDE), mirrored_grid(width, SIDE))
+    fov = float(truth.read("camera/fov_y_degrees", row))
+    true_depth = truth.read("depth", row)[grid].astype(np.float64)
+    usable = np.isfinite(true_depth) & (np.abs(depth[grid]) <= LARGEST_MAGNITUDE)
+    if 2 * np.count_nonzero(usable) < usable.size:
+        return None
+    return Sample(
+        depth[grid],
+        true_depth,
+        usable,
+        np.linalg.norm(pixel_directions(height, width, fov)[grid], axis=-1),
+        None if normal is None else normal[grid],
+        truth.read("normal", row)[grid].astype(np.float64),
+        truth.read("camera/world_from_camera", row)[:3, :3].T,
+    )

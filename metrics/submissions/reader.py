@@ -1,0 +1,233 @@
+"""Read submissions: the one file through which any model meets the benchmark.
+
+The format is in `prediction_layout`, and `describe_format` prints it. Opening checks everything
+that needs no truth, but for the pixels, which are read one row at a time.
+"""
+
+import hashlib
+import os
+from functools import cached_property
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.submissions.answers_json import looks_like_json, read_answers
+from metrics.submissions.array_checks import Ids, Inspection, as_doubles, inspect
+from metrics.submissions.problems import Problem
+from metrics.submissions.texts import READ_ERRORS
+from scenegen.common.errors import FileFormatError
+from scenegen.common.row_file import and_more, checking, open_file, reason
+
+Array = NDArray[np.float64]
+BLOCK_BYTES = 1 << 20
+
+
+class Predictions:
+    """An open submission. Use it as a context manager, or close it.
+
+    Attributes:
+        path: where it lies.
+        task: "rooms" or "iqtt".
+        method, run, notes: what it says of itself; run and notes may be empty.
+        truth_fingerprint: of the truth that it answers; None where it does not say.
+        truth_path: where that lay when it was written; empty where it does not say.
+        rows: (M,) int64: which row of the truth, or which question, each entry answers; every one
+            at least 0 and there once.
+    """
+
+    task = ""
+
+    def __init__(
+        self, path: Path, texts: dict[str, str], rows: Ids, file: h5py.File | None = None
+    ) -> None:
+        self.path = path
+        self.method, self.run = texts.get("method", ""), texts.get("run", "")
+        self.notes, self.truth_path = texts.get("notes", ""), texts.get("truth_path", "")
+        self.truth_fingerprint = texts.get("truth_fingerprint") or None
+        self.rows = rows
+        self._file = file
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of the file, as hex."""
+        digest = hashlib.sha256()
+        with self.path.open("rb") as file:
+            while block := file.read(BLOCK_BYTES):
+                digest.update(block)
+        return digest.hexdigest()
+
+    def close(self) -> None:
+        """Close the file; idempotent."""
+        if self._file is not None:
+            self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+class RoomPredictions(Predictions):
+    """Predicted depth of rooms, and normals perhaps.
+
+    Attributes, besides those of `Predictions`:
+        height, width: of an image, pixels.
+        alignment: what the method says it cannot know: "none", "median_scale", "scale" or
+            "scale_shift", as in `metrics.measures.depth.align`.
+    """
+
+    task = "rooms"
+
+    def __init__(self, path: Path, found: Inspection, file: h5py.File) -> None:
+        """Take over an open file whose ids and depth are usable."""
+        assert found.ids is not None, "only usable files are opened"
+        super().__init__(path, found.texts, found.ids, file)
+        self.alignment = found.texts.get("alignment", "none")
+        self._datasets = found.found
+        self.height, self.width = (int(s) for s in self._datasets["depth"].shape[1:3])
+
+    @property
+    def has_normals(self) -> bool:
+        """Whether there are normals."""
+        return "normal" in self._datasets
+
+    def depth(self, index: int) -> Array:
+        """Predicted planar depth (H, W) of entry `index`, scene units, camera frame, as stored.
+
+        Values need not be finite. Raises FileFormatError where they are damaged.
+        """
+        return self._read("depth", index)
+
+    def normal(self, index: int) -> Array:
+        """Predicted normals (H, W, 3) of entry `index`, camera frame, as stored.
+
+        Raises FileFormatError where there are none, or they are damaged.
+        """
+        if not self.has_normals:
+            raise FileFormatError(f"{self.path}: normal: the submission has none")
+        return self._read("normal", index)
+
+    def _read(self, name: str, index: int) -> Array:
+        try:
+            return as_doubles(self._datasets[name][index])
+        except READ_ERRORS as error:
+            where = f"{self.path}: {name}, row {self.rows[index]}"
+            raise FileFormatError(f"{where}: cannot be read ({reason(error)})") from error
+
+
+class QuestionPredictions(Predictions):
+    """Answers to questions.
+
+    Attributes, besides those of `Predictions`:
+        answers: (M,) int64: 0, 1, 2, or -1 (abstained); those of the highest scores where only
+            scores are given (`metrics.measures.answers.answers_from_scores`).
+    """
+
+    task = "iqtt"
+
+    def __init__(
+        self,
+        path: Path,
+        texts: dict[str, str],
+        rows: Ids,
+        answers: Ids,
+        scores: h5py.Dataset | None = None,
+        file: h5py.File | None = None,
+    ) -> None:
+        """Take over an open file, or none."""
+        super().__init__(path, texts, rows, file)
+        self.answers, self._scores = answers, scores
+
+    @cached_property
+    def scores(self) -> Array | None:
+        """Scores (M, 3), finite; None where only answers are given. Raises FileFormatError."""
+        if self._scores is None:
+            return None
+        try:
+            return as_doubles(self._scores[()])
+        except READ_ERRORS as error:
+            text = f"{self.path}: scores: cannot be read ({reason(error)})"
+            raise FileFormatError(text) from error
+
+
+def open_predictions(path: str | Path) -> RoomPredictions | QuestionPredictions:
+    """Open a submission of either task, HDF5 or JSON, and check all that needs no truth.
+
+    Raises:
+        OSError: no such file, or a folder.
+        FileFormatError: not a submission, of a newer format, or broken; tells the first problem
+            and how many follow. `metrics.submissions.validation.validate` tells all.
+    """
+    opened, problems = inspect_predictions(path)
+    if opened is None or problems:
+        if opened is not None:
+            opened.close()
+        raise FileFormatError(f"{path}: {and_more([str(problem) for problem in problems])}")
+    return opened
+
+
+def inspect_predictions(
+    path: str | Path,
+) -> tuple[RoomPredictions | QuestionPredictions | None, list[Problem]]:
+    """Open what can be opened of a submission, and say everything that is wrong with it.
+
+    Raises:
+        OSError: no such file, or a folder.
+        FileFormatError: neither HDF5 nor JSON.
+    """
+    path = Path(path)
+    if looks_like_json(path):
+        texts, rows, answers, problems = read_answers(path)
+        return QuestionPredictions(path, texts, rows, answers) if len(rows) else None, problems
+    file = open_file(path, "submission")
+    with checking(file):
+        found = inspect(file)
+    opened: RoomPredictions | QuestionPredictions | None = None
+    if found.ids is not None and "depth" in found.found:
+        opened = RoomPredictions(path, found, file)
+    elif found.ids is not None and found.answers is not None:
+        scores = found.found.get("scores")
+        opened = QuestionPredictions(path, found.texts, found.ids, found.answers, scores, file)
+    if opened is None:
+        file.close()
+    return opened, found.problems
+
+
+def find_truth(predictions: Predictions, given: str | Path | None = None) -> Path:
+    """Return where the truth of a submission lies.
+
+    That is `given`, or the path recorded in the submission, taken from the submission's folder and
+    then from the working directory. Of a test file without answers it is the file of answers beside
+    it (iqtt-test-answers.h5). Whether it is the right truth, only its fingerprint tells.
+
+    Raises FileFormatError where nothing lies there; says where it looked.
+    """
+    if given is None and not predictions.truth_path:
+        raise FileFormatError(f"{predictions.path}: names no truth; give it with --truth")
+    recorded = Path(predictions.truth_path)
+    places = [predictions.path.parent / recorded, recorded] if given is None else [Path(given)]
+    for place in places:
+        if os.path.isfile(place):
+            return _with_answers(place) if predictions.task == "iqtt" else place
+    looked = " and ".join(dict.fromkeys(str(place) for place in places))
+    advice = "; give it with --truth" if given is None else ""
+    raise FileFormatError(f"{predictions.path}: truth not found: looked for {looked}{advice}")
+
+
+def _with_answers(path: Path) -> Path:
+    from iqtt.files.reader import answers_beside
+
+    return answers_beside(path) or path

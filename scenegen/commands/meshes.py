@@ -1,0 +1,95 @@
+"""The command that tries a folder of meshes. Heavy imports happen inside it."""
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from scenegen.common.command_line import CACHE_DIR, UP, Names
+
+if TYPE_CHECKING:
+    from scenegen.objects.meshes.check import ModelCheck
+    from scenegen.objects.meshes.folders import ModelFolder
+
+
+@click.command("check-objects")
+@click.argument("folder")
+@UP
+@click.option("--classes", type=Names(), help="Classes to try, such as bowl,mug [default: all].")
+@CACHE_DIR
+@click.option("--json", "json_path", help="File to write all records to.")
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+@click.option(
+    "--jobs", type=click.IntRange(1), default=1, show_default=True, help="Processes to use."
+)
+@click.pass_context
+def check_objects(
+    ctx: click.Context,
+    folder: str,
+    up: str,
+    classes: tuple[str, ...] | None,
+    cache_dir: str | None,
+    json_path: str | None,
+    overwrite: bool,
+    jobs: int,
+) -> None:
+    """Try every model of a folder, ShapeNet's or one with a sub-folder per class.
+
+    Prints counts per class and the reason of every refusal; exits with 1 if no model is usable.
+    """
+    from tqdm import tqdm
+
+    from scenegen.common.new_file import check_writable, written_beside
+    from scenegen.objects.meshes.cache import default_cache_dir
+    from scenegen.objects.meshes.check import check_models
+    from scenegen.objects.meshes.folders import open_models
+
+    if json_path:
+        check_writable(Path(json_path), overwrite)
+    found = open_models(folder, classes, up)
+    cache = Path(cache_dir) if cache_dir else default_cache_dir()
+    total = sum(map(len, found.models.values()))
+    with tqdm(total=total, unit="model", disable=None, leave=False, smoothing=0.1) as bar:
+        records = check_models(found, cache, jobs, bar.update)
+    for line in _table(found, records):
+        click.echo(line)
+    if json_path:
+        with written_beside(json_path, overwrite) as path:
+            path.write_text(_json(found, records), encoding="utf-8")
+    ctx.exit(0 if any(record.ok for record in records) else 1)
+
+
+def _table(folder: "ModelFolder", records: Sequence["ModelCheck"]) -> Iterator[str]:
+    by_name = {record.name: record for record in records}
+    groups = {name: [by_name[file.name] for file in folder.models[name]] for name in folder.classes}
+    width = max(len(name) for name in [*groups, "class", "total"])
+    yield f"{'class':{width}}  {'models':>7} {'ok':>7} {'mended':>7} {'refused':>7} {'faces':>10}"
+    for name, some in [*groups.items(), ("total", list(records))]:
+        ok = sum(record.ok for record in some)
+        mended = sum(record.was_mended for record in some)
+        faces = sum(record.faces for record in some)
+        yield (f"{name:{width}}  {len(some):7} {ok:7} {mended:7} {len(some) - ok:7} {faces:10}")
+    for record in records:
+        if not record.ok:
+            yield f"refused  {record.name}: {record.reason}"
+
+
+def _json(folder: "ModelFolder", records: Sequence["ModelCheck"]) -> str:
+    models = [
+        {
+            "name": record.name,
+            "ok": record.ok,
+            "reason": record.reason,
+            "faces": record.faces,
+            "mended": dict(record.mended),
+            "seconds": round(record.seconds, 4),
+        }
+        for record in records
+    ]
+    about = {"kind": folder.kind, "up": folder.up, "digest": folder.digest(), "models": models}
+    return json.dumps(about, indent=1, ensure_ascii=False) + "\n"
+
+
+COMMANDS = (check_objects,)

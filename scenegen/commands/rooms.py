@@ -1,0 +1,281 @@
+"""The `scenegen` commands: parse, one library call, print. Heavy imports happen inside them."""
+
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+
+from scenegen.common.command_line import (
+    COMPRESSION,
+    DEVICE,
+    IMAGE_DTYPE,
+    MESHES,
+    SEED,
+    Color,
+    Items,
+    Names,
+    Numbers,
+    Range,
+    Size,
+)
+
+NUMBERS = Numbers()
+
+OBJECT_OPTIONS = (
+    "shapes",
+    "classes",
+    "object_split",
+    "shapenet_root",
+    "objects_root",
+    "up",
+    "cache_dir",
+)
+
+
+@click.command()
+@click.option("--n", "count", type=int, required=True, help="Number of scenes.")
+@click.option("--out", default="rooms.h5", show_default=True, help="File to write.")
+@click.option(
+    "--preset",
+    default="shapes",
+    show_default=True,
+    help="Settings to begin with; `scenegen presets` lists them. What follows goes on top.",
+)
+@SEED
+@click.option("--size", type=Size(), help="Image size in pixels [128].")
+@click.option("--objects", type=Range(int), help="Objects a scene [1-3].")
+@click.option("--shapes", type=Names(), help="Basic shapes to draw from, such as box,sphere [all].")
+@click.option("--classes", type=Names(), help="Object classes to draw from, such as mug,bowl.")
+@click.option(
+    "--object-split",
+    type=click.Choice(["all", "train", "val", "test"]),
+    help="Which objects of a class to draw from [all].",
+)
+@MESHES
+@click.option(
+    "--object-radius",
+    type=Range(float),
+    help="Bounding radius, scene units; a quarter less with several views [0.11-0.22].",
+)
+@click.option(
+    "--pose",
+    type=click.Choice(["resting", "any"]),
+    help="How objects lie: as they would stay, or turned anyhow [resting].",
+)
+@click.option(
+    "--views",
+    type=NUMBERS,
+    help="Degrees about the vertical from the input view to each view, as 0,5,35,55,80 [0].",
+)
+@click.option("--min-visible-pixels", type=int, help="Least pixels of each object [0.3%].")
+@click.option("--allow-cropped", is_flag=True, default=None, help="Let the border cut objects.")
+@click.option("--reflectance", type=Color(), help="Of objects, and unless told of the room [0.8].")
+@click.option("--room-reflectance", type=Color(), help="Of floor and walls.")
+@click.option(
+    "--random-reflectance/--same-reflectance",
+    default=None,
+    help="A colour for every object [same].",
+)
+@click.option("--specular", type=Range(float), help="Phong's k_s of objects [0].")
+@click.option("--shininess", type=Range(float), help="Phong's exponent of objects [1].")
+@click.option("--lights", type=Range(int), help="Lights a scene [1-3].")
+@click.option("--light-saturation", type=float, help="How coloured, 0 (white) to 1 [0.7].")
+@click.option("--light-level", type=float, help="Radiance of white that faces all lights [0.95].")
+@click.option("--light-radius", type=float, help="Distance of lights, scene units [2.5].")
+@click.option("--ambient", type=Color(), help="Ambient light L_a [0.1].")
+@click.option("--attenuation", type=NUMBERS, help="k_l,k_q of the shading equation [0.5,0.5].")
+@click.option(
+    "--shading",
+    type=click.Choice(["paper", "path"]),
+    help="path: images by path tracing, with shadows and indirect light; slower [paper].",
+)
+@click.option("--shadows/--no-shadows", default=None, help="Whether objects cast shadows [no].")
+@click.option("--spp", type=int, help="Colour samples a pixel; for path 64, else [1].")
+@click.option("--fov", "fov_degrees", type=float, help="Field of view, degrees [28].")
+@click.option("--camera-radius", type=float, help="Distance of cameras, scene units [1.5].")
+@IMAGE_DTYPE
+@COMPRESSION
+@click.option(
+    "--batch",
+    type=int,
+    default=64,
+    show_default=True,
+    help="Images in one wavefront; views of a scene stay together.",
+)
+@DEVICE
+@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+def render(
+    count: int,
+    out: str,
+    preset: str,
+    size: tuple[int, int] | None,
+    batch: int,
+    device: str,
+    compression: str,
+    overwrite: bool,
+    **settings: Any,
+) -> None:
+    """Render rooms to an HDF5 file: image, depth, normals, object ids, cameras, lights, scenes."""
+    from tqdm import tqdm
+
+    from scenegen.description.presets import preset_spec
+    from scenegen.objects.sources import object_source
+    from scenegen.rooms.make import make_dataset
+
+    objects = {name: settings.pop(name) for name in OBJECT_OPTIONS}
+    chosen = {name: value for name, value in settings.items() if value is not None}
+    if size is not None:
+        chosen["height"], chosen["width"] = size
+    source = object_source(preset, **objects)
+    spec = preset_spec(preset, **chosen, **source.settings)
+    command = " ".join(["scenegen", *sys.argv[1:]])
+    images = count * len(spec.views)
+    started = time.perf_counter()
+    with tqdm(total=images, unit="img", disable=None, leave=False, smoothing=0.1) as bar:
+        make_dataset(
+            out,
+            spec,
+            count,
+            batch=batch,
+            device=device,
+            compression=compression,
+            overwrite=overwrite,
+            command=command,
+            objects=source.objects,
+            progress=bar.update,
+        )
+    seconds = time.perf_counter() - started
+    megabytes = Path(out).stat().st_size / 1e6
+    click.echo(f"{out}: {images} images, {megabytes:.1f} MB, {images / seconds:.0f} images/s")
+    for line in source.notes():
+        click.echo(line, err=True)
+
+
+@click.command()
+def presets() -> None:
+    """List the presets of `render`: the paper's data sets."""
+    from scenegen.description.presets import PRESETS
+
+    width = max(map(len, PRESETS))
+    for name, preset in PRESETS.items():
+        click.echo(f"{name:{width}}  {preset.meaning}")
+        options = (f"{key} {_shown(value)}" for key, value in preset.settings.items())
+        click.echo(f"{'':{width}}  {', '.join(options) or 'the defaults'}")
+
+
+def _shown(value: Any) -> str:
+    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
+
+
+@click.command()
+@click.argument("file")
+@click.option("--out", default="sheet.png", show_default=True, help="Picture to write.")
+@click.option("--items", type=Items(), help="Rows to show [default: the first 12].")
+@click.option(
+    "--random", "number", type=click.IntRange(1, 400), help="Show so many rows at random."
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Which ones --random picks.")
+def preview(file: str, out: str, items: list[int] | None, number: int | None, seed: int) -> None:
+    """Make a contact sheet: image, depth, normals, object ids, with labels."""
+    from scenegen.rooms.preview import contact_sheet, pick_rows, save_picture
+    from scenegen.rooms.reader import RoomsFile
+
+    with RoomsFile(file) as rooms:
+        rows = pick_rows(len(rooms), items, number, seed)
+        save_picture(contact_sheet([rooms[i] for i in rows]), out)
+    click.echo(f"{out}: {len(rows)} of {file}'s rooms")
+
+
+@click.command()
+@click.argument("file")
+def info(file: str) -> None:
+    """Say what is in a file: spec, counts, ranges, units, sizes, versions, fingerprint."""
+    from scenegen.rooms.info import describe
+
+    click.echo(describe(file))
+
+
+@click.command()
+@click.argument("file")
+@click.option(
+    "--items",
+    type=click.IntRange(0),
+    default=8,
+    show_default=True,
+    help="Rows to draw and render again.",
+)
+@MESHES
+@DEVICE
+@click.pass_context
+def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: Any) -> None:
+    """Check layout and values of every row, render some again; exits with 1 if a check fails."""
+    from tqdm import tqdm
+
+    from scenegen.objects.sources import file_objects
+    from scenegen.rooms.reader import RoomsFile
+    from scenegen.rooms.verify import verify_file
+
+    with RoomsFile(file) as rooms:
+        count = len(rooms)
+        objects = file_objects(rooms.spec, **meshes)
+    with tqdm(total=count, unit="img", disable=None, leave=False) as bar:
+        checks = verify_file(file, items, device, objects, bar.update)
+    for check in checks:
+        click.echo(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:26} {check.detail}")
+    failed = sum(not check.ok for check in checks)
+    click.echo(
+        f"{file}: {failed} of {len(checks)} checks failed" if failed else f"{file}: verified"
+    )
+    ctx.exit(1 if failed else 0)
+
+
+@click.command()
+@click.argument("file")
+@click.option("--items", type=Items(), required=True, help="Rows to export.")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["exr", "png", "ply", "obj"]),
+    required=True,
+    help="exr: all channels; png: 16 bits; ply: surfels; obj: the scene's mesh.",
+)
+@click.option("--out", default=".", show_default=True, help="Folder to write to.")
+@click.option("--overwrite", is_flag=True, help="Replace existing files.")
+@MESHES
+def export(
+    file: str, items: list[int], form: str, out: str, overwrite: bool, **meshes: Any
+) -> None:
+    """Write single rooms for other tools."""
+    from scenegen.common.errors import SpecError
+    from scenegen.common.new_file import check_writable
+    from scenegen.objects.catalogue import changed_meshes
+    from scenegen.objects.sources import file_objects
+    from scenegen.rooms.export import export_paths, export_room
+    from scenegen.rooms.preview import pick_rows
+    from scenegen.rooms.reader import RoomsFile
+
+    with RoomsFile(file) as rooms:
+        objects = file_objects(rooms.spec, **meshes) if form == "obj" else None
+        rows = pick_rows(len(rooms), items)
+        for row in rows:
+            changed = changed_meshes(objects, rooms.scene(row)) if objects else []
+            if changed:
+                raise SpecError(
+                    f"{file}: row {row} was made from other files than the folder holds now:"
+                    f" {', '.join(changed)}"
+                )
+        paths = {row: export_paths(row, out, Path(file).stem, form) for row in rows}
+        if not Path(out).exists():
+            Path(out).mkdir()
+        for some in paths.values():
+            for path in some:
+                check_writable(path, overwrite)
+        for row, some in paths.items():
+            export_room(rooms[row], some, form, overwrite, objects)
+    for some in paths.values():
+        click.echo("\n".join(map(str, some)))
+
+
+COMMANDS = (render, presets, preview, info, verify, export)

@@ -1,0 +1,230 @@
+"""HDF5 files that hold rows: written in order, compressed by us, renamed when complete; opened."""
+
+import errno
+import importlib.metadata
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from isal import isal_zlib
+from numpy.typing import NDArray
+
+from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
+from scenegen.common.new_file import written_beside
+
+Array = NDArray[Any]
+COMPRESSIONS = ("gzip", "lzf", "none")
+DEFLATE_LEVEL = 1
+CLOSING_SLACK = 8192  # bytes that HDF5 may need on top of what it says it needs
+BLOCK_ROWS = 1024  # rows of the small datasets that are kept and written together
+
+
+@dataclass(frozen=True)
+class Column:
+    """A dataset with one entry a row.
+
+    Attributes:
+        shape: of a row.
+        dtype: NumPy name, or "text" for UTF-8 strings.
+        own_chunk: whether each row is a compressed chunk of its own, as images are.
+        attributes: HDF5 attributes.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    dtype: str
+    own_chunk: bool = False
+    attributes: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Table:
+    """Columns of equal length in one HDF5 group, filled row by row.
+
+    The bytes written depend on the rows alone, not on when they come.
+    """
+
+    def __init__(
+        self, group: h5py.Group, columns: Sequence[Column], count: int, compression: str = "gzip"
+    ) -> None:
+        """Create the datasets. Raises SpecError for an unknown compression or a negative count."""
+        if compression not in COMPRESSIONS:
+            raise SpecError(
+                f"compression: found {compression!r}, expected one of {', '.join(COMPRESSIONS)}"
+            )
+        if count < 0:
+            raise SpecError(f"count: found {count}, expected 0 or more")
+        self.count, self.rows = count, 0
+        self._columns, self._compression = columns, compression
+        self._datasets = {column.name: self._create(group, column) for column in columns}
+        self._block: dict[str, list[Any]] = {c.name: [] for c in columns if not c.own_chunk}
+
+    def append(self, row: Mapping[str, Any]) -> None:
+        """Write the next row: one value for each column."""
+        for column in self._columns:
+            if column.own_chunk:
+                self._write_chunk(column.name, np.asarray(row[column.name]))
+            else:
+                self._block[column.name].append(row[column.name])
+        self.rows += 1
+        if self.rows % BLOCK_ROWS == 0 or self.rows == self.count:
+            self._flush()
+
+    def _create(self, group: h5py.Group, column: Column) -> h5py.Dataset:
+        text = column.dtype == "text"
+        options: dict[str, Any] = {}
+        if self.count:
+            chunk = 1 if column.own_chunk else min(self.count, BLOCK_ROWS)
+            options["chunks"] = (chunk, *column.shape)
+        if self.count and column.own_chunk and self._compression != "none":
+            options["compression"] = self._compression
+            options["shuffle"] = np.dtype(column.dtype).itemsize > 1
+            if self._compression == "gzip":
+                options["compression_opts"] = DEFLATE_LEVEL
+        dtype = h5py.string_dtype() if text else column.dtype
+        dataset = group.create_dataset(column.name, (self.count, *column.shape), dtype, **options)
+        dataset.attrs.update(column.attributes)
+        return dataset
+
+    def _write_chunk(self, name: str, values: Array) -> None:
+        dataset = self._datasets[name]
+        if self._compression == "lzf":
+            dataset[self.rows] = values
+            return
+        raw = np.ascontiguousarray(values, dataset.dtype)
+        if self._compression == "gzip":
+            payload = isal_zlib.compress(shuffle_bytes(raw), DEFLATE_LEVEL)
+        else:
+            payload = raw.tobytes()
+        dataset.id.write_direct_chunk((self.rows, *(0 for _ in raw.shape)), payload)
+
+    def _flush(self) -> None:
+        for name, rows in self._block.items():
+            if rows:
+                dataset = self._datasets[name]
+                text = h5py.check_string_dtype(dataset.dtype) is not None
+                values = np.array(rows, object) if text else np.stack(rows)
+                dataset[self.rows - len(rows) : self.rows] = values
+                rows.clear()
+
+
+@contextmanager
+def new_file(path: str | Path, overwrite: bool = False) -> Iterator[h5py.File]:
+    """Open an HDF5 file to write, under a temporary name as `written_beside` gives it."""
+    with written_beside(path, overwrite) as temporary:
+        file = h5py.File(temporary, "w", rdcc_nbytes=0)  # no chunk stays behind unwritten
+        try:
+            yield file
+            _check_room_to_close(file, temporary)
+            file.close()
+        except BaseException:
+            # The file is lost. If it is the disk that is full, emptying it first makes room for
+            # HDF5 to close in order; half closed, it would crash the process.
+            os.truncate(temporary, 0)
+            with suppress(Exception):
+                file.close()
+            raise
+
+
+def open_file(path: str | Path, kind: str) -> h5py.File:
+    """Open an HDF5 file to read; `kind` is what it should be, such as "rooms file".
+
+    Raises:
+        OSError: no such file, a folder, or no regular file.
+        FileFormatError: not HDF5, or cut off.
+    """
+    problems = (
+        (not os.path.exists(path), errno.ENOENT, "no such file"),
+        (os.path.isdir(path), errno.EISDIR, f"is a folder; name a {kind}"),
+        (not os.path.isfile(path), errno.EINVAL, "is not a regular file"),
+    )
+    for wrong, number, text in problems:
+        if wrong:
+            raise OSError(number, text, str(path))
+    try:
+        return h5py.File(path, "r")
+    except OSError as error:
+        raise FileFormatError(f"{path}: not a readable HDF5 file ({reason(error)})") from error
+
+
+@contextmanager
+def checking(file: h5py.File) -> Iterator[None]:
+    """Close a file in which something is found wrong.
+
+    What HDF5 raises on damaged files becomes a FileFormatError of one line.
+    """
+    path = file.filename
+    try:
+        yield
+    except SceneGenError:
+        file.close()
+        raise
+    except (OSError, RuntimeError, KeyError, TypeError, ValueError, MemoryError) as error:
+        file.close()
+        raise FileFormatError(f"{path}: damaged ({reason(error)})") from error
+
+
+def check_version(path: str | Path, attributes: Mapping[str, Any], version: str) -> None:
+    """Raise FileFormatError where a file's major format version is not that of `version`."""
+    found, major = str(attributes.get("format_version")), version.split(".", maxsplit=1)[0]
+    if found.split(".", maxsplit=1)[0] != major:
+        raise FileFormatError(
+            f"{path}: format version {found}, this program reads {major}.x;"
+            f" use the release that wrote it ({attributes.get('writer')})"
+        )
+
+
+def column_problems(group: h5py.Group, columns: Sequence[Column], count: int) -> list[str]:
+    """Say which columns are missing or have the wrong shape or type."""
+    problems = []
+    for column in columns:
+        dataset = group.get(column.name)
+        if not isinstance(dataset, h5py.Dataset):
+            problems.append(f"dataset {column.name!r} is missing")
+            continue
+        expected = (count, *column.shape)
+        if dataset.shape != expected:
+            problems.append(f"{column.name}: shape {dataset.shape}, expected {expected}")
+        if column.dtype != "text" and dataset.dtype != np.dtype(column.dtype):
+            problems.append(f"{column.name}: type {dataset.dtype}, expected {column.dtype}")
+        if column.dtype == "text" and h5py.check_string_dtype(dataset.dtype) is None:
+            problems.append(f"{column.name}: type {dataset.dtype}, expected strings")
+    return problems
+
+
+def reason(error: BaseException) -> str:
+    """Return what HDF5's error says in its innermost words, on one line."""
+    text = str(error.args[0]) if error.args else type(error).__name__
+    inside = text[text.find("(") + 1 : text.rfind(")")] if "(" in text else text
+    return inside.split("\n")[0]
+
+
+def and_more(problems: Sequence[str]) -> str:
+    """Return the first problem and how many follow it."""
+    more = f" (and {len(problems) - 1} more problems)" if len(problems) > 1 else ""
+    return problems[0] + more
+
+
+def _check_room_to_close(file: h5py.File, path: Path) -> None:
+    """Raise OSError where the disk has no room for what HDF5 still has to write."""
+    if not hasattr(os, "statvfs"):
+        return
+    disk, written = os.statvfs(path), os.stat(path).st_blocks * 512
+    if file.id.get_filesize() - written + CLOSING_SLACK > disk.f_bavail * disk.f_frsize:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+
+def writer_name() -> str:
+    """Return the release that writes, as files record it."""
+    return f"pix2shape-bench {importlib.metadata.version('pix2shape-bench')}"
+
+
+def shuffle_bytes(values: Array) -> Array:
+    """Do HDF5's shuffle filter: all first bytes of the elements, then all second ones, ..."""
+    size = values.dtype.itemsize
+    flat = values.reshape(-1).view(np.uint8)
+    return flat if size == 1 else np.ascontiguousarray(flat.reshape(-1, size).T)

@@ -1,0 +1,87 @@
+"""The paper's data sets as settings of `DatasetSpec`; `scenegen presets` lists them."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from scenegen.common.records import check
+from scenegen.description.specs import DatasetSpec
+
+VESSELS = ("bag", "bottle", "bowl", "can", "cap", "lamp", "mug")
+PAPER_VIEWS = (0.0, 5.0, 35.0, 55.0, 80.0)  # degrees; the paper's table of unseen views
+VISIBLE_SHARE = 0.003  # of the image's pixels, that every object shows by default
+VIEWS_SHRINK = 0.75  # of objects that show whole in several views
+PATH_SAMPLES = 64  # colour samples a pixel of a path tracer, by default
+
+
+@dataclass(frozen=True)
+class Preset:
+    """Settings under a name, and what they show."""
+
+    meaning: str
+    settings: dict[str, Any]
+
+
+PRESETS = {
+    "shapes": Preset("one to three basic shapes in a room", {}),
+    "shapes-single": Preset("one basic shape", {"objects": (1, 1)}),
+    "shapenet": Preset(
+        "two to four household objects",
+        {"source": "families", "shapes": VESSELS, "objects": (2, 4)},
+    ),
+    "shapenet-single": Preset(
+        "one household object, of a known class",
+        {"source": "families", "shapes": VESSELS, "objects": (1, 1), "object_radius": (0.16, 0.26)},
+    ),
+    "furniture-256": Preset(
+        "two or three thin-edged chairs and tables, 256x256",
+        {
+            "source": "families",
+            "shapes": ("chair", "table"),
+            "objects": (2, 3),
+            "object_radius": (0.13, 0.22),
+            "height": 256,
+            "width": 256,
+        },
+    ),
+    "specular": Preset(
+        "basic shapes with highlights, after Phong",
+        {"specular": (0.3, 0.8), "shininess": (8.0, 64.0), "reflectance": (0.5, 0.5, 0.5)},
+    ),
+    "two-tone": Preset(
+        "objects of one colour, the room of another",
+        {"reflectance": (0.85, 0.4, 0.3), "room_reflectance": (0.4, 0.6, 0.85)},
+    ),
+    "albedo": Preset("every object of a colour of its own", {"random_reflectance": True}),
+    "random-lights": Preset(
+        "one to five lights of any place and strong colours",
+        {"lights": (1, 5), "light_saturation": 1.0},
+    ),
+    "views": Preset("basic shapes seen from 0, 5, 35, 55 and 80 degrees", {"views": PAPER_VIEWS}),
+}
+
+
+def preset_spec(preset: str, **settings: Any) -> DatasetSpec:
+    """Return a preset with other settings on top.
+
+    Four that are not told follow others: `min_visible_pixels` is a share of the image, objects are
+    smaller where several views have to hold them, `spp` is PATH_SAMPLES for a path tracer, and
+    `room_reflectance` the objects' where only that is told.
+
+    Raises SpecError.
+    """
+    check(preset in PRESETS, "preset", preset, f"one of {', '.join(PRESETS)}")
+    chosen = {**PRESETS[preset].settings, **settings}
+    pixels = chosen.get("height", DatasetSpec.height) * chosen.get("width", DatasetSpec.width)
+    chosen.setdefault("min_visible_pixels", max(1, round(VISIBLE_SHARE * pixels)))
+    if len(chosen.get("views", ())) > 1 and "object_radius" not in settings:
+        low, high = chosen.get("object_radius", DatasetSpec.object_radius)
+        chosen["object_radius"] = (VIEWS_SHRINK * low, VIEWS_SHRINK * high)
+    path = chosen.get("shading") == "path"
+    check(not path or "shadows" not in settings, "shadows", "with shading 'path'", "one of the two")
+    glossy = chosen.get("specular", (0, 0))[1] > 0
+    check("shininess" not in settings or glossy, "shininess", "no specular", "both or neither")
+    if path:
+        chosen.setdefault("spp", PATH_SAMPLES)
+    if "reflectance" in settings:
+        chosen.setdefault("room_reflectance", settings["reflectance"])
+    return DatasetSpec(**chosen)

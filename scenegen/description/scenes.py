@@ -1,0 +1,106 @@
+"""Frozen description of one scene, JSON both ways: all that the renderer needs, nothing random.
+
+Lengths are in scene units (the room's edge), frames as in `camera.py`.
+"""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from scenegen.camera import Camera, Vector3
+from scenegen.common.records import check, from_json, to_json
+
+ShapeName = Literal[
+    "box",
+    "sphere",
+    "cone",
+    "torus",
+    "cylinder",
+    "teapot",
+    "capsule",
+    "pyramid",
+    "prism",
+    "tetrahedron",
+    "octahedron",
+    "dodecahedron",
+    "icosahedron",
+]
+SHAPE_NAMES: tuple[str, ...] = get_args(ShapeName)
+FAMILY_NAMES = ("bag", "bottle", "bowl", "can", "cap", "chair", "lamp", "mug", "table")
+
+
+@dataclass(frozen=True)
+class Light:
+    """A point light: its place in the world, and the RGB of L_j of the shading equation."""
+
+    position: Vector3
+    color: Vector3
+
+
+@dataclass(frozen=True)
+class PlacedObject:
+    """A unit shape at its place: p_world = position + scale * rotate(rotation, p_object).
+
+    Attributes:
+        shape: a basic shape's name, or class and model of an object, as in "mug/0412".
+        position: world, of the unit shape's origin.
+        rotation: unit quaternion (w, x, y, z).
+        scale: radius of the bounding sphere about `position`; unit shapes have radius 1.
+        reflectance: the RGB of rho, for diffuse reflection.
+        specular: k_s, for Phong's reflection of every colour alike.
+        shininess: Phong's exponent.
+        mesh: digest of the model's file, 16 hex digits; empty for what the program itself makes.
+    """
+
+    shape: str
+    position: Vector3
+    rotation: tuple[float, float, float, float]
+    scale: float
+    reflectance: Vector3
+    specular: float = 0.0
+    shininess: float = 1.0
+    mesh: str = ""
+
+    def __post_init__(self) -> None:
+        known = self.shape in SHAPE_NAMES or "/" in self.shape[1:-1]
+        check(known, "shape", repr(self.shape), f"class/model, or one of {SHAPE_NAMES}")
+        check(self.scale > 0, "scale", self.scale, "a positive number")
+        check(self.specular >= 0, "specular", self.specular, "0 or more")
+        check(self.shininess > 0, "shininess", self.shininess, "a positive number")
+        norm = sum(q * q for q in self.rotation)
+        check(abs(norm - 1) < 1e-6, "rotation", self.rotation, "a unit quaternion")
+
+    @property
+    def name(self) -> str:
+        """The basic shape's name, or the object's class."""
+        return self.shape.partition("/")[0]
+
+
+@dataclass(frozen=True)
+class SceneSpec:
+    """One scene in full.
+
+    `attenuation` is (k_l, k_q) of the shading equation; `room_reflectance` is None where there is
+    no room; `background` is the radiance of rays that meet nothing.
+    """
+
+    index: int
+    cameras: tuple[Camera, ...]
+    objects: tuple[PlacedObject, ...]
+    lights: tuple[Light, ...]
+    ambient: Vector3
+    attenuation: tuple[float, float]
+    room_reflectance: Vector3 | None
+    background: Vector3 = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        check(self.index >= 0, "index", self.index, "0 or more")
+        check(len(self.cameras) > 0, "cameras", "none", "at least one")
+
+    def to_json(self) -> str:
+        """Return the description as one line of JSON; floats keep every bit."""
+        return to_json(self)
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> "SceneSpec":
+        """Read what `to_json` wrote. Raises SpecError where the text is no scene description."""
+        return from_json(cls, text, "scene description")

@@ -1,0 +1,103 @@
+"""What the objects of a data set are: names of classes and models, and how they look."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from scenegen.common.errors import SpecError
+from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.objects.families.members import MEMBERS, member_shape
+from scenegen.objects.meshes.errors import BadMeshError
+from scenegen.objects.meshes.folders import object_split
+from scenegen.objects.meshes.store import MeshStore
+from scenegen.objects.shapes import unit_shape
+from scenegen.objects.solids import UnitShape
+
+
+@dataclass(frozen=True, eq=False)
+class Objects:
+    """What a data set's scenes are made of.
+
+    Attributes:
+        models: by class, names as in `scenes.PlacedObject.shape`.
+        shape: the unit shape of such a name. Raises BadMeshError where its file cannot be used.
+        digest: of the file that the shape was made from and of how it is cleaned; empty for what
+            the program makes.
+    """
+
+    models: Mapping[str, Sequence[str]]
+    shape: Callable[[str], UnitShape]
+    digest: Callable[[str], str]
+
+
+def objects_of(spec: DatasetSpec) -> Objects:
+    """Return the built-in objects that a request draws from.
+
+    Raises SpecError where they are meshes in a folder, of which the request does not know where
+    it lies.
+    """
+    if spec.source not in ("shapes", "families"):
+        raise SpecError(
+            f"objects: they are meshes ({spec.source}); say where they lie with"
+            f" --{'objects' if spec.source == 'folder' else 'shapenet'}-root"
+        )
+    return _built_in(spec.source, spec.shapes, spec.object_split)
+
+
+def mesh_objects(store: MeshStore) -> Objects:
+    """Return the objects of a folder of meshes."""
+    models = {name: [one.name for one in some] for name, some in store.folder.models.items()}
+    return Objects(models, store.shape, store.digest)
+
+
+def changed_meshes(objects: Objects, scene: SceneSpec) -> list[str]:
+    """Return which of a scene's models are no longer made from the file they were made from."""
+    wrong = []
+    for item in scene.objects:
+        try:
+            same = objects.digest(item.shape) == item.mesh
+        except BadMeshError:
+            same = False
+        if not same:
+            wrong.append(item.shape)
+    return wrong
+
+
+def built_in_shape(name: str) -> UnitShape:
+    """Return a basic shape, or a member of a built-in family. Raises SpecError for another name."""
+    if name in SHAPE_NAMES:
+        return unit_shape(name)
+    family, _, member = name.partition("/")
+    if not member.isdecimal() or len(member) > 4:
+        raise SpecError(f"object: found {name!r}, expected a basic shape, or class/number")
+    return member_shape(family, int(member))
+
+
+def outline(shape_of: Callable[[str], UnitShape], name: str) -> UnitShape:
+    """Return a unit shape without its triangles: what placement needs, small enough to be kept."""
+    return _known(shape_of, name)[0]
+
+
+def face_count(shape_of: Callable[[str], UnitShape], name: str) -> int:
+    """Return the number of a unit shape's triangles, also where these are not in memory."""
+    return _known(shape_of, name)[1]
+
+
+@lru_cache(maxsize=20_000)
+def _known(shape_of: Callable[[str], UnitShape], name: str) -> tuple[UnitShape, int]:
+    shape = shape_of(name)
+    nothing = np.zeros((0, 3, 3))
+    return replace(shape, triangles=nothing, normals=nothing), len(shape.triangles)
+
+
+@lru_cache(maxsize=16)
+def _built_in(source: str, names: tuple[str, ...], split: str) -> Objects:
+    models: dict[str, Sequence[str]] = {name: (name,) for name in names}
+    if source == "families":
+        for name in names:
+            members = (f"{name}/{i:04d}" for i in range(MEMBERS))
+            models[name] = [m for m in members if split in ("all", object_split(m))]
+    return Objects(models, built_in_shape, lambda name: "")

@@ -1,0 +1,46 @@
+"""Boxes with flat sides: upright, tapered or leaning."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from scenegen.objects.families.parts.profiles import Point
+from scenegen.objects.families.parts.surfaces import Part
+
+Corner = tuple[float, float, float]
+
+
+def box(
+    low: Corner,
+    high: Corner,
+    shift: Point = (0.0, 0.0),
+    taper: Point = (1.0, 1.0),
+) -> list[Corner]:
+    """Eight corners of an upright box; its top is moved by (x, z), its half sizes multiplied."""
+    x, z = (low[0] + high[0]) / 2, (low[2] + high[2]) / 2
+    half_x, half_z = (high[0] - low[0]) / 2, (high[2] - low[2]) / 2
+    corners = []
+    for y, (move_x, move_z), (a, b) in (
+        (low[1], (0.0, 0.0), (half_x, half_z)),
+        (high[1], shift, (half_x * taper[0], half_z * taper[1])),
+    ):
+        for sx, sz in ((-1, -1), (-1, 1), (1, 1), (1, -1)):
+            corners.append((x + move_x + sx * a, y, z + move_z + sz * b))
+    return corners
+
+
+_SIDES = np.array(
+    [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+)
+
+
+def boxes(corners: Sequence[Sequence[Corner]]) -> Part:
+    """Boxes with flat sides from `box` corners, as one part."""
+    points = np.array(corners)
+    quads = points[:, _SIDES].reshape(-1, 4, 3)
+    triangles = quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
+    face = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1])
+    face /= np.sqrt((face * face).sum(axis=1, keepdims=True))
+    normals = np.repeat(face[:, None], 6, axis=1).reshape(-1, 3, 3)
+    hull = points.reshape(-1, 3)
+    return Part(triangles, normals, hull, np.zeros(len(hull)))

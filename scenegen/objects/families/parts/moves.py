@@ -1,0 +1,56 @@
+"""Parts turned, shifted, or left out of the placement body."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.objects.families.parts.surfaces import Part
+
+Array = NDArray[Any]
+
+
+def moved(part: Part, offset: tuple[float, float, float], turn: Array | None = None) -> Part:
+    """Turn a part by a rotation (3, 3), if any, then shift it."""
+    shift = np.array(offset)
+    if turn is None:
+        return Part(part.triangles + shift, part.normals, part.hull_points + shift, part.hull_discs)
+    # A disc that tips over is held as a polygon about it.
+    flat = part.hull_discs > 0.0
+    discs = part.hull_discs[flat]
+    largest = discs.max(initial=0.0)
+    sides = 8 if largest < 0.2 else 12 if largest < 0.36 else 16 if largest < 0.7 else 24
+    angle = np.arange(sides) * (2 * np.pi / sides)
+    spokes = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1) / np.cos(np.pi / sides)
+    rims = (part.hull_points[flat][:, None] + discs[:, None, None] * spokes).reshape(-1, 3)
+    points = np.concatenate([part.hull_points[~flat], rims])
+    return Part(
+        _turned(part.triangles, turn) + shift,
+        _turned(part.normals, turn),
+        _turned(points, turn) + shift,
+        np.zeros(len(points)),
+    )
+
+
+def _turned(vectors: Array, turn: Array) -> Array:
+    """Rotate vectors (..., 3); sums in a fixed order, for a product's last bits are the BLAS's."""
+    x, y, z = (vectors[..., i : i + 1] * turn[:, i] for i in range(3))
+    return np.asarray(x + y + z)
+
+
+def turn_about_x(angle: float) -> Array:
+    """The rotation that takes y towards z by an angle, radians: (3, 3)."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+
+def turn_about_z(angle: float) -> Array:
+    """The rotation that takes x towards y by an angle, radians: (3, 3)."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def buried(part: Part) -> Part:
+    """A part that lies in the convex hull of the others, and adds nothing to the placement body."""
+    return Part(part.triangles, part.normals, np.empty((0, 3)), np.empty(0))

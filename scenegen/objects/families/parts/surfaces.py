@@ -1,0 +1,143 @@
+"""Closed parts with exact normals: lofted rounded rectangles, circles among them.
+
+Every part comes with the rows of a convex body that contains it: horizontal discs about points,
+as in `UnitShape`. Frame: y up.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.objects.families.parts.profiles import Curve, Point, hull_rows
+
+Array = NDArray[Any]
+SEGMENTS = 40  # around an axis, a multiple of 4
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A closed surface, wound counter-clockwise seen from outside.
+
+    Attributes:
+        triangles: corners, (F, 3, 3).
+        normals: of the smooth surface at those corners, (F, 3, 3), unit.
+        hull_points, hull_discs: the hull of horizontal discs about (V, 3), radii (V,), holds it.
+    """
+
+    triangles: Array
+    normals: Array
+    hull_points: Array
+    hull_discs: Array
+
+
+def loft(
+    profile: Curve,
+    *,
+    size: Point = (1.0, 1.0),
+    corner: float = 1.0,
+    base: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    at: Point | Sequence[Point] = (0.0, 0.0),
+    lean: Point | Sequence[Point] = (0.0, 0.0),
+    segments: int = SEGMENTS,
+    closed: bool = False,
+) -> Part:
+    """Stack horizontal rounded rectangles along a profile (r, y); ends off the axis get flat lids.
+
+    At (r, y) the half sizes are base[:2] + size * r and the corners' radius base[2] + corner * r,
+    between 0 and the half sizes. The defaults turn the profile about an axis.
+
+    Args:
+        at, lean: where the centre is, (x, z), at y = 0, and how it moves per unit of y. Several of
+            either (or both, as many) make as many copies, in one part.
+        closed: the profile ends where it begins (a ring); no lids.
+    """
+    rate = np.array([*size, corner])
+    points, tangents = profile
+    sizes = np.array(base) + points[:, :1] * rate  # half x, half z, corner radius: (m, 3)
+    rows = np.concatenate([sizes, points[:, 1:], tangents[:, :1] * rate, tangents[:, 1:]], axis=1)
+    is_round = base == (0.0, 0.0, 0.0) and size == (corner, corner)
+    centers, leans = np.broadcast_arrays(np.array(at, ndmin=2), np.array(lean, ndmin=2))
+
+    both_sides = np.concatenate([points, points * (-1.0, 1.0)])
+    discs = rows[[i for i in hull_rows(both_sides) if i < len(points)]]
+    inner = np.abs(discs[:, :2] - discs[:, 2:3]).max(axis=0) > 1e-12  # of one disc, two or four
+    signs = np.array(
+        [(x, z) for x in (1.0, -1.0)[: 1 + inner[0]] for z in (1.0, -1.0)[: 1 + inner[1]]]
+    )
+    hull = np.empty((len(centers), len(discs), len(signs), 3))
+    hull[..., ::2] = (centers[:, None] + leans[:, None] * discs[:, 3:4])[:, :, None]
+    hull[..., ::2] += signs * (discs[:, :2] - discs[:, 2:3])[:, None]
+    hull[..., 1] = discs[:, 3:4]
+    radii = np.broadcast_to(discs[:, 2:3], hull.shape[:-1])
+
+    if not closed:
+        rows = _with_lids(rows)
+    sizes, y, growth, rise = rows[:, :3], rows[:, 3:4], rows[:, 4:7], rows[:, 7:8]
+    outward, quadrant = outline(segments, is_round)
+    grid = np.empty((len(centers), len(rows), len(outward), 3))  # copies, rows, around, xyz
+    normals = np.empty(grid.shape)
+    grid[..., ::2] = (centers[:, None] + leans[:, None] * y)[:, :, None]
+    grid[..., ::2] += section(sizes, outward, quadrant)
+    grid[..., 1] = y
+    normals[..., ::2] = outward * rise[:, None]
+    normals[..., 1] = -(section(growth, outward, quadrant) * outward).sum(axis=-1)
+    normals[..., 1] -= (leans[:, None] * outward).sum(axis=-1)[:, None] * rise
+    return Part(*strips(grid, normals), hull.reshape(-1, 3), radii.reshape(-1))
+
+
+def _with_lids(rows: Array) -> Array:
+    """Add rows from the axis to the first row and from the last to the axis, where they are off."""
+    parts = [rows]
+    for end, way in ((rows[0], 1.0), (rows[-1], -1.0)):
+        if end[:2].max() > 0.0:
+            rim = np.concatenate([end[:4], way * end[:3], [0.0]])
+            axis = np.concatenate([0 * end[:3], rim[3:]])
+            parts = [np.stack([axis, rim]), *parts] if way > 0 else [*parts, np.stack([rim, axis])]
+    return np.concatenate(parts)
+
+
+def outline(segments: int, is_round: bool) -> tuple[Array, Array]:
+    """Directions of a rounded rectangle's corner arcs, and the quadrant of each: (n, 2) twice."""
+    quarter = segments // 4
+    steps = np.arange(quarter + (not is_round))
+    angle = np.add.outer(np.arange(4) * quarter, steps).ravel() * (2 * np.pi / segments)
+    outward = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    outward[np.abs(outward) < 1e-15] = 0.0
+    quadrant = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]], float)
+    return outward, np.repeat(quadrant, len(steps), axis=0)
+
+
+def section(sizes: Array, outward: Array, quadrant: Array) -> Array:
+    """Points of rounded rectangles (m, 3) in the plane, (m, n, 2); linear in the sizes."""
+    radius = sizes[:, None, 2:]
+    return np.asarray(quadrant * (sizes[:, None, :2] - radius) + outward * radius)
+
+
+def strips(grid: Array, normals: Array) -> tuple[Array, Array]:
+    """Triangles and unit normals between the rows of (copies, rows, around, 3), closed around.
+
+    Left out are strips of no width (creases repeat a row) and triangles that shrink to a line
+    (rows on an axis, arcs of radius 0). The copies are alike but for where they are.
+    """
+    copies, rows, count = grid.shape[:3]
+    first = grid[0]
+    low = np.flatnonzero(np.abs(first[1:] - first[:-1]).max(axis=(1, 2)) > 1e-12)[:, None]
+    around = np.arange(count)
+    after = np.roll(around, -1)
+    is_edge = np.abs(first[:, after] - first).max(axis=2) > 1e-12  # from each corner to the next
+    a, b, c, d = (at + np.zeros_like(low) for at in (around, around, after, after))
+    a, b, c, d = a + low * count, b + (low + 1) * count, c + (low + 1) * count, d + low * count
+    upper, lower = is_edge[low[:, 0] + 1], is_edge[low[:, 0]]
+    corners = np.concatenate(
+        [
+            np.stack([a[upper], b[upper], c[upper]], axis=1),
+            np.stack([a[lower], c[lower], d[lower]], axis=1),
+        ]
+    )
+    corners = (np.arange(copies)[:, None, None] * (rows * count) + corners).reshape(-1, 3)
+    length = np.sqrt((normals * normals).sum(axis=-1))
+    unit = normals / np.maximum(length, 1e-300)[..., None]
+    return grid.reshape(-1, 3)[corners], unit.reshape(-1, 3)[corners]

@@ -1,0 +1,181 @@
+"""Cleaned models on disk, one file each, named after the content that they were made from.
+
+Several processes may fill one folder: each writes under a name of its own, then renames. What
+cannot be read back whole is made again. A folder that cannot be written to costs time, not the run.
+"""
+
+import errno
+import hashlib
+import json
+import os
+import secrets
+import threading
+import warnings
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.objects.meshes.clean import clean_mesh
+from scenegen.objects.meshes.errors import BadMeshError
+from scenegen.objects.meshes.hull import hull_points
+from scenegen.objects.meshes.read import parse_mesh, read_bytes
+
+Array = NDArray[Any]
+CLEANING_VERSION = 1  # to be raised when the same file would give other triangles or hull points
+
+
+@dataclass(frozen=True, eq=False)
+class CachedModel:
+    """A model ready for use, or the reason why it is not.
+
+    Attributes:
+        vertices: (V, 3) float32.
+        faces: (F, 3) int32.
+        hull_points: (H, 3) float64.
+        mended: counts, as `CleanMesh.mended`.
+        refusal: why it cannot be used; the arrays are then empty.
+    """
+
+    vertices: Array
+    faces: Array
+    hull_points: Array
+    mended: Mapping[str, int]
+    refusal: str | None = None
+
+
+def default_cache_dir() -> Path:
+    """Return `pix2shape-bench/meshes` in the user's cache folder, XDG_CACHE_HOME if that is set."""
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    if not base.is_absolute():  # as the XDG specification has it
+        base = Path("~/.cache").expanduser()
+    return base / "pix2shape-bench" / "meshes"
+
+
+def content_hash(data: bytes, suffix: str, up: str) -> str:
+    """Return the SHA-256, as hex, over cleaning version, file type, up axis and file bytes."""
+    digest = hashlib.sha256(f"{CLEANING_VERSION} {suffix.lower()} {up}\n".encode())
+    digest.update(data)
+    return digest.hexdigest()
+
+
+class MeshCache:
+    """Cleaned models in a folder; without one, each is cleaned whenever it is asked for."""
+
+    def __init__(self, folder: str | Path | None) -> None:
+        self.folder = None if folder is None else Path(folder)
+        self._lock = threading.Lock()
+
+    def load(self, path: Path, up: str) -> tuple[str, CachedModel]:
+        """Return a file's content hash and its model, from the cache if it is there.
+
+        Raises:
+            BadMeshError: the file cannot be read, or cannot be used.
+        """
+        data = read_bytes(path)
+        digest = content_hash(data, path.suffix, up)
+        entry = self.folder / f"{digest}.npz" if self.folder else None
+        model = _read_entry(entry) if entry else None
+        if model is None:
+            model = make_model(data, path.suffix, up)
+            if entry:
+                self._write(entry, model)
+        if model.refusal is not None:
+            raise BadMeshError(model.refusal)
+        return digest, model
+
+    def try_out(self) -> None:
+        """Make the folder, so that the warning, if there is to be one, comes before the work."""
+        if self.folder is None:
+            return
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            if not os.access(self.folder, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        except OSError as error:
+            self._give_up(error)
+
+    def _write(self, entry: Path, model: CachedModel) -> None:
+        temporary = entry.with_name(f".{secrets.token_hex(8)}.partial")
+        about = {"mended": dict(model.mended), "refusal": model.refusal}
+        try:
+            entry.parent.mkdir(parents=True, exist_ok=True)
+            with temporary.open("xb") as file:
+                np.savez(
+                    file,
+                    vertices=model.vertices,
+                    faces=model.faces,
+                    hull_points=model.hull_points,
+                    about=np.frombuffer(json.dumps(about).encode(), np.uint8),
+                )
+            os.replace(temporary, entry)
+        except OSError as error:
+            self._give_up(error)
+        finally:
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
+
+    def _give_up(self, error: OSError) -> None:
+        with self._lock:
+            folder, self.folder = self.folder, None
+        if folder is not None:
+            warnings.warn(
+                f"{folder}: cleaned models cannot be kept there ({error.strerror}); "
+                "each process cleans them anew, choose another --cache-dir",
+                stacklevel=2,
+            )
+
+
+def make_model(data: bytes, suffix: str, up: str) -> CachedModel:
+    """Read and clean a file's bytes; what is wrong with them is told in the result.
+
+    Raises:
+        BadMeshError: for reasons that may not lie in the file, and are not to be remembered.
+    """
+    try:
+        mesh = clean_mesh(*parse_mesh(data, suffix), up)
+        return CachedModel(mesh.vertices, mesh.faces, hull_points(mesh.vertices), mesh.mended)
+    except BadMeshError as error:
+        none = np.empty((0, 3), np.float32)
+        return CachedModel(none, none.astype(np.int32), none.astype(np.float64), {}, str(error))
+    except MemoryError as error:
+        raise BadMeshError("needs more memory than there is; simplify it") from error
+    except Exception as error:  # one bad model must not stop a run of a million
+        raise BadMeshError(
+            f"cannot be cleaned ({type(error).__name__}: {error}); please report the file"
+        ) from error
+
+
+def _read_entry(entry: Path) -> CachedModel | None:
+    """Return what an entry holds; None if it is not there or not whole."""
+    try:
+        with entry.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            about = json.loads(arrays["about"].tobytes())
+            model = CachedModel(
+                arrays["vertices"],
+                arrays["faces"],
+                arrays["hull_points"],
+                about["mended"],
+                about["refusal"],
+            )
+    except Exception:  # whatever is wrong with it, it is made again
+        return None
+    return model if _is_whole(model) else None
+
+
+def _is_whole(model: CachedModel) -> bool:
+    kinds = (
+        (model.vertices, np.float32),
+        (model.faces, np.int32),
+        (model.hull_points, np.float64),
+    )
+    if any(a.ndim != 2 or a.shape[1] != 3 or a.dtype != kind for a, kind in kinds):
+        return False
+    if model.refusal is not None:
+        return isinstance(model.refusal, str)
+    some = all(len(a) for a, _ in kinds)
+    return bool(some and model.faces.min() >= 0 and model.faces.max() < len(model.vertices))

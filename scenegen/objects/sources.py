@@ -1,0 +1,133 @@
+"""From what a person says about objects to what the generator needs: settings, and the models."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from scenegen.common.errors import SpecError
+from scenegen.common.records import check
+from scenegen.description.checks import BUILT_IN
+from scenegen.description.presets import PRESETS
+from scenegen.description.specs import DatasetSpec
+from scenegen.objects.catalogue import Objects, mesh_objects, objects_of
+from scenegen.objects.meshes.cache import default_cache_dir
+from scenegen.objects.meshes.folders import ModelFolder, open_objects, open_shapenet
+from scenegen.objects.meshes.store import MeshStore
+
+NOTES_SHOWN = 5  # refused models told of after a run
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectSource:
+    """What `render` was told about objects.
+
+    Attributes:
+        settings: of the `DatasetSpec`.
+        objects: None where they are built in.
+        store: of meshes, if they come from a folder.
+    """
+
+    settings: dict[str, Any] = field(default_factory=dict)
+    objects: Objects | None = None
+    store: MeshStore | None = None
+
+    def notes(self) -> list[str]:
+        """Return lines on the models that were refused so far."""
+        problems = list(self.store.problems.items()) if self.store else []
+        lines = [f"note: {name} was passed over: {why}" for name, why in problems[:NOTES_SHOWN]]
+        if len(problems) > NOTES_SHOWN:
+            more = len(problems) - NOTES_SHOWN
+            lines.append(f"note: and {more} more; `scenegen check-objects` tells of all")
+        return lines
+
+
+def object_source(
+    preset: str,
+    *,
+    shapes: tuple[str, ...] | None = None,
+    classes: tuple[str, ...] | None = None,
+    object_split: str | None = None,
+    shapenet_root: str | None = None,
+    objects_root: str | None = None,
+    up: str = "y",
+    cache_dir: str | None = None,
+) -> ObjectSource:
+    """Return the settings on objects that go on top of a preset's, and the models.
+
+    Without `classes`, a folder gives those of the preset that it has, or else all that it has.
+
+    Raises:
+        SpecError: settings that contradict one another.
+        MeshFolderError: a folder without such models.
+    """
+    if shapenet_root and objects_root:
+        raise SpecError("objects: found --shapenet-root and --objects-root, expected one of them")
+    if shapenet_root and up != "y":
+        raise SpecError(f"up: found {up!r}, expected 'y' with --shapenet-root, which is y up")
+    root = shapenet_root or objects_root
+    if root is None and up != "y":
+        raise SpecError(f"up: found {up!r} without a folder of meshes, expected --objects-root")
+    if shapes is not None and (classes is not None or root):
+        raise SpecError(
+            "objects: found --shapes beside --classes or a folder of meshes, expected one of them"
+        )
+    split = {} if object_split is None else {"object_split": object_split}
+    if shapes is not None:
+        return ObjectSource({"source": "shapes", "shapes": shapes, **split})
+    if root is None:
+        families = {} if classes is None else {"source": "families", "shapes": classes}
+        return ObjectSource({**families, **split})
+    wanted = PRESETS[preset].settings.get("shapes", ()) if preset in PRESETS else ()
+    folder = _open(root, shapenet_root is not None, classes, wanted, up, object_split or "all")
+    store = MeshStore(folder, cache_dir or default_cache_dir())
+    settings = {"source": folder.kind, "shapes": folder.classes, "listing": folder.digest()}
+    return ObjectSource({**settings, **split}, mesh_objects(store), store)
+
+
+def file_objects(
+    spec: DatasetSpec,
+    *,
+    shapenet_root: str | None = None,
+    objects_root: str | None = None,
+    up: str = "y",
+    cache_dir: str | None = None,
+) -> Objects:
+    """Return the models that a file's scenes are made of.
+
+    Raises:
+        SpecError: they are meshes, and no folder is told, or one that holds others.
+        MeshFolderError: a folder without such models.
+    """
+    if spec.source in BUILT_IN and (shapenet_root or objects_root or up != "y"):
+        raise SpecError("objects: found options on meshes, but the file's objects are built in")
+    root = objects_root if spec.source == "folder" else shapenet_root
+    if root is None:
+        return objects_of(spec)
+    folder = _open(root, spec.source != "folder", spec.shapes, (), up, spec.object_split)
+    if (folder.kind, folder.digest()) != (spec.source, spec.listing):
+        raise SpecError(
+            f"{root}: holds other models than the file was made from ({folder.kind}, listing"
+            f" {folder.digest()[:12]}; the file's are {spec.source}, {spec.listing[:12]})"
+        )
+    return mesh_objects(MeshStore(folder, cache_dir or default_cache_dir()))
+
+
+def _open(
+    root: str | Path,
+    shapenet: bool,
+    classes: tuple[str, ...] | None,
+    wanted: tuple[str, ...],
+    up: str,
+    split: str,
+) -> ModelFolder:
+    def listed(some: tuple[str, ...] | None) -> ModelFolder:
+        if shapenet:
+            return open_shapenet(root, some, split)
+        return open_objects(root, some, up, split)
+
+    if classes is not None:
+        check(len(set(classes)) == len(classes), "classes", classes, "each name once")
+        return listed(classes)
+    everything = listed(None)
+    some = tuple(name for name in wanted if name in everything.classes)
+    return listed(some) if some else everything

@@ -1,0 +1,136 @@
+"""Which Mitsuba variant can render here, found without ever loading one that would abort.
+
+Dr.Jit needs LLVM to compile its wavefronts on CPUs. Old ones (14 and 15 do) abort the process when
+they meet an instruction they cannot select, so an LLVM is asked for its version before Dr.Jit is
+told of it. The wheel `karellen-llvm-core`, a dependency on Linux x86-64, brings one that works.
+"""
+
+import ctypes
+import ctypes.util
+import glob
+import importlib.metadata
+import os
+import re
+import sys
+import warnings
+from functools import lru_cache
+from pathlib import Path
+
+from scenegen.common.errors import BackendError
+
+LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
+LLVM_WHEEL = "karellen-llvm-core"
+OLDEST_LLVM = 16
+DEVICES = ("auto", "cpu", "cuda")
+HOW_TO_GET_LLVM = (
+    f"install LLVM {OLDEST_LLVM} or newer (on Linux x86-64: pip install {LLVM_WHEEL}) and, where it"
+    f" is not found by itself, set {LLVM_VARIABLE} to its libLLVM before drjit is imported"
+)
+
+
+class SlowFallbackWarning(UserWarning):
+    """Rendering goes on, but without the fast path."""
+
+
+def select_variant(device: str) -> str:
+    """Return the Mitsuba variant for a device and make its LLVM known to Dr.Jit.
+
+    "auto": llvm_ad_rgb, else scalar_rgb with a warning. "cpu": llvm_ad_rgb. "cuda": cuda_ad_rgb.
+    "auto" never picks the GPU: its bits differ from the CPU's.
+
+    Raises:
+        BackendError: the device is unknown, or cannot be used here.
+    """
+    if device not in DEVICES:
+        raise BackendError(f"device: found {device!r}, expected one of {', '.join(DEVICES)}")
+    if device == "cuda":
+        if not _cuda_driver():
+            raise BackendError("device cuda: no NVIDIA driver found here; use --device cpu")
+        return "cuda_ad_rgb"
+    library = _point_to_llvm()
+    if library:
+        return "llvm_ad_rgb"
+    if device == "cpu":
+        raise BackendError(f"device cpu: no usable LLVM found; {HOW_TO_GET_LLVM}")
+    _warn_once()
+    return "scalar_rgb"
+
+
+def llvm_version(library: str) -> int:
+    """Return an LLVM library's major version; 0 where it does not load or does not tell.
+
+    LLVMGetVersion came with LLVM 16, so whatever lacks it is too old.
+    """
+    try:
+        handle = ctypes.CDLL(library)
+        numbers = [ctypes.c_uint() for _ in range(3)]
+        handle.LLVMGetVersion(*(ctypes.byref(number) for number in numbers))
+    except (OSError, AttributeError):
+        return 0
+    return numbers[0].value
+
+
+def find_llvm() -> str | None:
+    """Return the first LLVM that works: the user's own choice, the wheel's, the system's."""
+    chosen = os.environ.get(LLVM_VARIABLE)
+    candidates = [chosen] if chosen else [*_wheel_libraries(), *_system_libraries()]
+    for library in candidates:
+        if library and llvm_version(library) >= OLDEST_LLVM:
+            return library
+    return None
+
+
+@lru_cache(maxsize=1)
+def _point_to_llvm() -> str | None:
+    if "drjit" in sys.modules:  # it looked for its LLVM when it was imported, and keeps to that
+        return _llvm_of_drjit()
+    library = find_llvm()
+    if library:
+        os.environ[LLVM_VARIABLE] = library
+    return library
+
+
+def _llvm_of_drjit() -> str | None:
+    """Return which LLVM an imported Dr.Jit uses, unless that is too old."""
+    version = sys.modules["drjit"].detail.llvm_version()
+    return f"LLVM {version[0]}" if version[0] >= OLDEST_LLVM else None
+
+
+def _wheel_libraries() -> list[str]:
+    try:
+        files = importlib.metadata.files(LLVM_WHEEL) or []
+    except importlib.metadata.PackageNotFoundError:
+        return []
+    found = [Path(str(f.locate())).resolve() for f in files if f.name.startswith("libLLVM.so")]
+    return sorted(str(path) for path in found if path.exists())
+
+
+def _system_libraries() -> list[str]:
+    """Where package managers put LLVM (Debian, Fedora, Homebrew), the newest first."""
+    named = ctypes.util.find_library("LLVM")
+    patterns = (
+        "/usr/lib/*/libLLVM*.so*",
+        "/usr/lib64/libLLVM*.so*",
+        "/usr/lib/llvm*/lib/libLLVM.so",
+    )
+    found = [path for pattern in patterns for path in glob.glob(pattern)]
+    brew = glob.glob("/opt/homebrew/opt/llvm*/lib/libLLVM.dylib")
+    newest = sorted(found + brew, key=lambda p: int((re.findall(r"[0-9]+", p) or ["0"])[-1]))
+    return ([named] if named else []) + newest[::-1]
+
+
+def _cuda_driver() -> bool:
+    try:
+        ctypes.CDLL("nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1")
+    except OSError:
+        return False
+    return True
+
+
+@lru_cache(maxsize=1)
+def _warn_once() -> None:
+    warnings.warn(
+        f"no usable LLVM found: rendering with scalar_rgb, many times slower; {HOW_TO_GET_LLVM}",
+        SlowFallbackWarning,
+        stacklevel=4,
+    )

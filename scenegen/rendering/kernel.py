@@ -1,0 +1,207 @@
+"""What happens along a ray, in Dr.Jit: nearest hit, normal, occlusion, shading.
+
+A ray visits the objects of its scene one after another. Where it enters an object's bounding
+sphere it is moved into the object's frame and cast at the unit scene, from where it enters to where
+it leaves, so that no other unit shape can be met. The room's three faces are planes and need no
+structure at all. Ray directions are not normalised: a camera ray has -z = 1 in the camera frame, so
+its parameter t is planar depth.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from scenegen.rendering.reference import SHADOW_OFFSET
+from scenegen.rendering.unit_scene import SPHERE
+
+
+@dataclass(frozen=True, eq=False)
+class Scenes:
+    """A batch on the device. Tables are flat floats, row after row.
+
+    Attributes:
+        unit: the Mitsuba scene of unit shapes.
+        grid: as in `UnitScene`; where it is not 0, `from_world` does not move to `place`.
+        slots, light_slots: K objects and L lights a scene at most.
+        count: objects in each scene, (B,).
+        has_room: whether the scene has its room, (B,).
+        background: radiance of rays that meet nothing, (B, 3).
+        spheres: bounding sphere of each object, (B K, 4): centre, radius (0 for an unused slot).
+        from_world: affine map into the unit scene, (B K, 12): three rows of (linear, offset).
+        place: where the object's unit shape lies in the unit scene, (B K, 3).
+        first_triangle: first row of `triangles` of the object's shape, or SPHERE, (B K).
+        triangles: face normal and corner normals, (F, 12).
+        reflectance: rho by object id, (B (1 + K), 3).
+        gloss: Phong's k_s and exponent by object id, (B (1 + K), 2); None where all is matte.
+        lights: ambient, k_l, k_q, then position and colour of each light, (B, 5 + 6 L).
+    """
+
+    unit: Any
+    grid: float
+    slots: int
+    light_slots: int
+    count: Any
+    has_room: Any
+    background: Any
+    spheres: Any
+    from_world: Any
+    place: Any
+    first_triangle: Any
+    triangles: Any
+    reflectance: Any
+    gloss: Any
+    lights: Any
+
+
+def gather_row(table: Any, row: Any, width: int) -> list[Any]:
+    """Return the `width` floats of each lane's row.
+
+    One by one: Dr.Jit's packet gathers are no faster here, and it chooses them by the address of
+    the data, so that the kernel would be compiled anew now and then.
+    """
+    return [dr.gather(mi.Float, table, row * width + i) for i in range(width)]
+
+
+@dr.syntax
+def closest_hit(scenes: Scenes, item: Any, o: Any, d: Any) -> Any:
+    """Return t, object id (0 room, -1 nothing), triangle and barycentrics of the nearest hit."""
+    walls = [dr.select(d[i] < 0, -o[i] / d[i], dr.inf) for i in range(3)]
+    t = dr.minimum(walls[0], dr.minimum(walls[1], walls[2]))
+    p = o + t * d
+    has_room = dr.gather(mi.Bool, scenes.has_room, item)
+    on_room = has_room & (t < dr.inf) & (p.x <= 1) & (p.y <= 1) & (p.z <= 1)
+    t = dr.select(on_room, t, dr.inf)
+    object_id = dr.select(on_room, mi.Int32(0), mi.Int32(-1))
+    triangle = mi.UInt32(0)
+    uv = mi.Point2f(0)
+    k = mi.UInt32(0)
+    count = dr.gather(mi.UInt32, scenes.count, item)
+    while dr.hint(k < count, exclude=[scenes]):
+        row = item * scenes.slots + k
+        near, far, meets = _bounding_interval(scenes, row, o, d)
+        near = dr.maximum(near, 0)
+        if dr.hint(meets & (near < t) & (near < far), exclude=[scenes]):
+            start, along = _to_unit_scene(scenes, row, o + near * d, d)
+            length = dr.norm(along)  # Mitsuba's sphere has holes for rays that are long
+            ray = mi.Ray3f(mi.Ray3f(start, along / length), (far - near) * length)
+            hit = scenes.unit.ray_intersect_preliminary(ray, coherent=False)
+            hit_t = near + hit.t / length
+            nearer = hit.is_valid() & (hit_t <= t)
+            t = dr.select(nearer, hit_t, t)
+            object_id = dr.select(nearer, mi.Int32(k) + 1, object_id)
+            triangle = dr.select(nearer, hit.prim_index, triangle)
+            uv = dr.select(nearer, hit.prim_uv, uv)
+        k += 1
+    return t, object_id, triangle, uv
+
+
+@dr.syntax
+def occluded(scenes: Scenes, item: Any, o: Any, d: Any, active: Any) -> Any:
+    """Return whether an object lies on the segment o + t d, 0 < t < 1."""
+    blocked = ~active
+    k = mi.UInt32(0)
+    count = dr.gather(mi.UInt32, scenes.count, item)
+    while dr.hint((k < count) & ~blocked, exclude=[scenes]):
+        row = item * scenes.slots + k
+        near, far, meets = _bounding_interval(scenes, row, o, d)
+        near = dr.maximum(near, 0)
+        far = dr.minimum(far, 1)
+        if dr.hint(meets & (near < far), exclude=[scenes]):
+            start, along = _to_unit_scene(scenes, row, o + near * d, d)
+            length = dr.norm(along)
+            ray = mi.Ray3f(mi.Ray3f(start, along / length), (far - near) * length)
+            blocked |= scenes.unit.ray_test(ray, coherent=False)
+        k += 1
+    return blocked & active
+
+
+@dr.syntax
+def normal_at(
+    scenes: Scenes, item: Any, p: Any, d: Any, object_id: Any, triangle: Any, uv: Any
+) -> Any:
+    """Return the unit world normal of a hit, facing the viewer; zero where nothing is hit."""
+    least = dr.minimum(dr.abs(p.x), dr.minimum(dr.abs(p.y), dr.abs(p.z)))
+    on_x = dr.abs(p.x) == least
+    on_y = ~on_x & (dr.abs(p.y) == least)
+    n = mi.Vector3f(mi.Float(on_x), mi.Float(on_y), mi.Float(~on_x & ~on_y))
+    if dr.hint(object_id > 0, exclude=[scenes]):
+        row = item * scenes.slots + mi.UInt32(object_id - 1)
+        first = dr.gather(mi.UInt32, scenes.first_triangle, row)
+        is_sphere = first == SPHERE
+        table = gather_row(scenes.triangles, dr.select(is_sphere, 0, first + triangle), 12)
+        place = gather_row(scenes.place, row, 3)
+        at, _ = _to_unit_scene(scenes, row, p, d)
+        out = mi.Vector3f(at) - mi.Vector3f(*place)
+        face = dr.select(is_sphere, out, mi.Vector3f(*table[:3]))
+        smooth = (
+            (1 - uv.x - uv.y) * mi.Vector3f(*table[3:6])
+            + uv.x * mi.Vector3f(*table[6:9])
+            + uv.y * mi.Vector3f(*table[9:])
+        )
+        n = dr.normalize(_to_world(scenes, row, dr.select(is_sphere, out, smooth)))
+        n = dr.select(dr.dot(_to_world(scenes, row, face), d) > 0, -n, n)
+        # A smooth normal may lean away just inside a silhouette: lay it across the ray.
+        away = dr.dot(n, d)
+        n = dr.select(away > 0, dr.normalize(n - away / dr.dot(d, d) * d), n)
+    return dr.select(object_id >= 0, n, mi.Vector3f(0))
+
+
+def radiance_at(
+    scenes: Scenes, item: Any, p: Any, d: Any, n: Any, object_id: Any, shadows: bool
+) -> Any:
+    """Return the shading equation at a hit (reference: `shading.shade`), else the background."""
+    record = gather_row(scenes.lights, item, 5 + 6 * scenes.light_slots)
+    row = item * (1 + scenes.slots) + mi.UInt32(dr.maximum(object_id, 0))
+    total, shine = mi.Vector3f(*record[:3]), mi.Vector3f(0)
+    if scenes.gloss is not None:
+        specular, shininess = gather_row(scenes.gloss, row, 2)
+        mirrored = dr.normalize(d - 2 * dr.dot(d, n) * n)  # where the viewer would see a mirror's
+    for j in range(scenes.light_slots):
+        light = record[5 + 6 * j : 11 + 6 * j]
+        to_light = mi.Vector3f(*light[:3]) - p
+        distance = dr.norm(to_light)
+        cosine = dr.maximum(dr.dot(n, to_light) / distance, 0)
+        falloff = (record[3] + record[4] * distance) * distance
+        amount = dr.select(distance > 0, cosine / falloff, 0)
+        if shadows:
+            start = p + SHADOW_OFFSET * n
+            amount = dr.select(occluded(scenes, item, start, to_light, cosine > 0), 0, amount)
+        total += amount * mi.Vector3f(*light[3:])
+        if scenes.gloss is not None:
+            toward = dr.maximum(dr.dot(mirrored, to_light) / distance, 0)
+            lobe = dr.select(amount > 0, specular * dr.power(toward, shininess) / falloff, 0)
+            shine += lobe * mi.Vector3f(*light[3:])
+    rho = mi.Vector3f(*gather_row(scenes.reflectance, row, 3))
+    background = mi.Vector3f(*gather_row(scenes.background, item, 3))
+    return dr.select(object_id >= 0, rho * total + shine, background)
+
+
+def _bounding_interval(scenes: Scenes, row: Any, o: Any, d: Any) -> tuple[Any, Any, Any]:
+    """Return ray parameters at the object's bounding sphere, and whether the ray meets it."""
+    x, y, z, radius = gather_row(scenes.spheres, row, 4)
+    to_center = mi.Vector3f(x, y, z) - o
+    squared = dr.dot(d, d)
+    middle = dr.dot(to_center, d) / squared
+    miss = to_center - middle * d
+    radius = radius * 1.0001  # so that rounding cannot cut a surface that touches the sphere
+    inside = radius * radius - dr.dot(miss, miss)
+    half = dr.sqrt(dr.maximum(inside, 0) / squared)
+    return middle - half, middle + half, inside > 0
+
+
+def _to_unit_scene(scenes: Scenes, row: Any, p: Any, d: Any) -> tuple[Any, Any]:
+    table = gather_row(scenes.from_world, row, 12)
+    linear = [mi.Vector3f(*table[i : i + 3]) for i in (0, 4, 8)]
+    point = mi.Point3f(*(dr.dot(linear[i], p) + table[4 * i + 3] for i in range(3)))
+    if scenes.grid:
+        place = mi.Point3f(*gather_row(scenes.place, row, 3))
+        point = dr.round(point / scenes.grid) * scenes.grid + place
+    return point, mi.Vector3f(*(dr.dot(linear[i], d) for i in range(3)))
+
+
+def _to_world(scenes: Scenes, row: Any, n: Any) -> Any:
+    """Turn a normal back, up to length: the map is a similarity, so by its transpose."""
+    table = gather_row(scenes.from_world, row, 12)
+    return sum((n[i] * mi.Vector3f(*table[4 * i : 4 * i + 3]) for i in range(3)), mi.Vector3f(0))

@@ -1,0 +1,125 @@
+"""Images by Mitsuba's path tracer: shadows and indirect light on the scenes of a batch.
+
+Only the colour is made here; the ground truth is the wavefront's, to the bit. A scene is traced by
+itself, sample by sample at the places of `reference.sample_positions`, and a pixel's samples are
+added in order, so that the same command gives the same bytes.
+
+A point light of the shading equation with colour L, k_l and k_q becomes one of intensity
+pi L D^2 / (k_l D + k_q D^2), D being its distance from the camera's target: there it is as bright.
+Ambient light becomes an environment of that radiance.
+"""
+
+import math
+from typing import Any
+
+import drjit
+import mitsuba
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.common.seeding import Purpose, item_seed
+from scenegen.objects.shapes import room_mesh
+from scenegen.rendering.ground_truth import encode_image
+from scenegen.rendering.packing import SceneBatch, pixel_size
+from scenegen.rendering.phong import phong_bsdf
+from scenegen.rendering.reference import sample_positions
+from scenegen.rendering.unit_scene import triangle_mesh
+
+Array = NDArray[Any]
+dr: Any = drjit  # their stubs are not exact enough to be of use here
+mi: Any = mitsuba
+MAX_DEPTH = 8  # segments of a path: 2 are direct light
+RAYS_AT_ONCE = 2**21
+LEAST_WEIGHT = 1e-3  # of a light among those that samples choose from
+
+
+def trace_images(batch: SceneBatch, variant: str) -> Array:
+    """Return the images of a batch, (B, H, W, 3), in the spec's image type."""
+    mi.set_variant(variant)
+    integrator = mi.load_dict({"type": "path", "max_depth": MAX_DEPTH, "hide_emitters": True})
+    images = [_trace_one(batch, b, integrator) for b in range(len(batch))]
+    return encode_image(np.stack(images), batch.spec.image_dtype)
+
+
+def _trace_one(batch: SceneBatch, b: int, integrator: Any) -> Array:
+    spec = batch.spec
+    scene = _scene(batch, b)
+    pixels = spec.height * spec.width
+    right, up, back, origin = (mi.Vector3f(*v) for v in batch.world_from_camera[b, :3].T.tolist())
+    size = float(pixel_size(batch.fov_y_degrees[b], spec.height))
+    seed = item_seed(spec.seed, int(batch.index[b]), Purpose.PATHS, int(batch.view[b]))
+    places = sample_positions(spec.spp)
+    total = np.zeros((pixels, 3))
+    at_once = max(1, RAYS_AT_ONCE // pixels)
+    for start in range(0, spec.spp, at_once):
+        some = places[start : start + at_once]
+        count = len(some)
+        # Multi-jittered samples are less noisy, but come in full rectangles only.
+        kind = "independent" if count % math.isqrt(count) else "multijitter"
+        sampler = mi.load_dict({"type": kind, "sample_count": count})
+        sampler.set_samples_per_wavefront(count)
+        sampler.seed((seed + start) % 2**32, pixels * count)
+        index = dr.arange(mi.UInt32, pixels * count)
+        pixel, sample = index // count, index % count
+        x = mi.Float(pixel % spec.width) + dr.gather(mi.Float, mi.Float(some[:, 0]), sample)
+        y = mi.Float(pixel // spec.width) + dr.gather(mi.Float, mi.Float(some[:, 1]), sample)
+        d = right * ((x - spec.width / 2) * size) + up * ((spec.height / 2 - y) * size) - back
+        ray = mi.RayDifferential3f(mi.Point3f(origin), dr.normalize(d))
+        radiance, valid, _ = integrator.sample(scene, sampler, ray)
+        radiance = dr.select(valid, radiance, mi.Color3f(*batch.background[b].tolist()))
+        values = np.asarray(dr.ravel(radiance), np.float64)
+        total += values.reshape(pixels, count, 3).sum(axis=1)
+    return (total / spec.spp).reshape(spec.height, spec.width, 3)
+
+
+def _scene(batch: SceneBatch, b: int) -> Any:
+    contents: dict[str, Any] = {
+        "type": "scene",
+        "ambient": {
+            "type": "constant",
+            "radiance": _rgb(batch.ambient[b]),
+            "sampling_weight": float(batch.ambient[b].mean()) + LEAST_WEIGHT,
+        },
+    }
+    if batch.has_room[b]:
+        corners = np.asarray(room_mesh().triangles)
+        contents["room"] = triangle_mesh("room", corners, bsdf=_bsdf(batch, b, 0))
+    for k in range(int(batch.object_count[b])):
+        shape = batch.shape_of(batch.names[batch.shape[b, k]])
+        placed, bsdf = batch.world_from_object[b, k], _bsdf(batch, b, k + 1)
+        if shape.is_sphere:
+            contents[f"object{k}"] = {
+                "type": "sphere",
+                "center": placed[:3, 3].tolist(),
+                "radius": float(batch.object_scale[b, k]),
+                "bsdf": bsdf,
+            }
+            continue
+        triangles = shape.triangles @ placed[:3, :3].T + placed[:3, 3]
+        normals = shape.normals @ (placed[:3, :3] / batch.object_scale[b, k]).T
+        contents[f"object{k}"] = triangle_mesh(f"object{k}", triangles, normals, bsdf)
+    k_l, k_q = batch.attenuation[b].tolist()
+    for j in range(int(batch.light_count[b])):
+        distance = float(np.linalg.norm(batch.light_position[b, j] - batch.spec.camera_target))
+        scale = np.pi * distance / (k_l + k_q * distance)
+        brightness = batch.light_color[b, j].mean() * scale / (np.pi * distance**2)
+        contents[f"light{j}"] = {
+            "type": "point",
+            "position": batch.light_position[b, j].tolist(),
+            "intensity": _rgb(batch.light_color[b, j] * scale),
+            "sampling_weight": float(brightness) + LEAST_WEIGHT,
+        }
+    return mi.load_dict(contents)
+
+
+def _bsdf(batch: SceneBatch, b: int, object_id: int) -> Any:
+    reflectance = batch.reflectance[b, object_id]
+    specular, shininess = batch.gloss[b, object_id].tolist()
+    if specular > 0:
+        return phong_bsdf(reflectance, specular, shininess)
+    matte = {"type": "diffuse", "reflectance": _rgb(reflectance)}
+    return mi.load_dict({"type": "twosided", "bsdf": matte})
+
+
+def _rgb(color: Array) -> dict[str, Any]:
+    return {"type": "rgb", "value": [float(c) for c in color]}

@@ -1,0 +1,142 @@
+"""Batches of scenes -> images with exact ground truth, on the best backend there is."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import fields
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.common.errors import BackendError
+from scenegen.objects.catalogue import face_count
+from scenegen.objects.solids import UnitShape
+from scenegen.rendering.backend import HOW_TO_GET_LLVM, select_variant
+from scenegen.rendering.ground_truth import GroundTruth
+from scenegen.rendering.packing import SceneBatch
+from scenegen.rendering.reference import face_viewer, render_reference, smooth_normals
+
+Array = NDArray[Any]
+MOST_FACES = 2_000_000  # of one scene's models
+MOST_MODELS = 2000  # of one scene; `model_scene` has room for some more
+
+
+def render(batch: SceneBatch, device: str = "auto") -> GroundTruth:
+    """Render a batch and wait for it. Raises BackendError where `device` cannot be used."""
+    return launch(batch, device)()
+
+
+def launch(batch: SceneBatch, device: str = "auto") -> Callable[[], GroundTruth]:
+    """Start to render a batch; the returned function waits for the pixels and returns them.
+
+    Between the two calls the caller's thread is free, except on the scalar fallback, which does
+    its work in the second.
+    """
+    fetch = launch_fields(batch, tuple(field.name for field in fields(GroundTruth)), device)
+    return lambda: GroundTruth(**fetch())
+
+
+def launch_fields(
+    batch: SceneBatch, names: Sequence[str], device: str = "auto"
+) -> Callable[[], dict[str, Array]]:
+    """As `launch`, for some fields of `GroundTruth` by name; the others cost nothing."""
+    variant = select_variant(device)
+    if batch.spec.shading == "path" and "image" in names:
+        return _with_traced_image(batch, names, variant, device)
+    if variant == "scalar_rgb":
+
+        def cast(name: str, origins: Array, directions: Array) -> tuple[Array, Array]:
+            return _scalar_cast(batch.shape_of(name), origins, directions)
+
+        def fetch() -> dict[str, Array]:
+            truth = render_reference(batch, cast)
+            return {name: getattr(truth, name) for name in names}
+
+        return fetch
+    from scenegen.rendering.wavefront import (
+        launch_wavefront,  # imports drjit, which no other path needs
+    )
+
+    first, *others = parts(batch)
+    fetch_first = launch_wavefront(first, variant, names)
+    if not others:
+        return fetch_first
+
+    def fetch_all() -> dict[str, Array]:
+        found = [fetch_first()]
+        found += [launch_wavefront(part, variant, names)() for part in others]
+        return {name: np.concatenate([one[name] for one in found]) for name in names}
+
+    return fetch_all
+
+
+def _with_traced_image(
+    batch: SceneBatch, names: Sequence[str], variant: str, device: str
+) -> Callable[[], dict[str, Array]]:
+    if variant == "scalar_rgb":
+        raise BackendError(f"shading path: needs the fast path; {HOW_TO_GET_LLVM}")
+    from scenegen.rendering.model_scene import forget_models  # imports drjit, as above
+    from scenegen.rendering.path_tracer import trace_images
+
+    fetch = launch_fields(batch, [name for name in names if name != "image"], device)
+
+    def fetch_all() -> dict[str, Array]:
+        found = fetch()
+        forget_models()  # Dr.Jit would trace every path through every one of them
+        return {**found, "image": trace_images(batch, variant)}
+
+    return fetch_all
+
+
+def parts(batch: SceneBatch) -> list[SceneBatch]:
+    """Cut a batch where its models together would have too many faces for one scene.
+
+    An image's bits do not depend on the rest of its batch, so nobody can tell.
+    """
+    if batch.spec.source == "shapes":
+        return [batch]
+    faces = np.array([face_count(batch.shape_of, name) for name in batch.names])
+    starts, seen = [0], set[int]()
+    for row, shapes in enumerate(batch.shape):
+        seen |= set(shapes[shapes >= 0].tolist())
+        many = len(seen) > MOST_MODELS or faces[list(seen)].sum() > MOST_FACES
+        if many and row > starts[-1]:
+            starts.append(row)
+            seen = set(shapes[shapes >= 0].tolist())
+    ends = [*starts[1:], len(batch)]
+    return [batch.rows(start, end) for start, end in zip(starts, ends, strict=True)]
+
+
+@lru_cache(maxsize=64)
+def _scalar_scene(shape: UnitShape) -> Any:
+    import mitsuba as mi
+
+    from scenegen.rendering.unit_scene import mitsuba_shape
+
+    mi.set_variant("scalar_rgb")
+    return mi.load_dict({"type": "scene", "shape": mitsuba_shape(shape, np.zeros(3))})
+
+
+def _scalar_cast(shape: UnitShape, origins: Array, directions: Array) -> tuple[Array, Array]:
+    """Cast rays one by one (a `reference.Cast`); slow, but there wherever Mitsuba is."""
+    import mitsuba as mi
+
+    mi.set_variant("scalar_rgb")
+    scene = _scalar_scene(shape)
+    t = np.full(len(origins), np.inf)
+    triangle, u, v = (
+        np.zeros(len(origins), np.int64),
+        np.zeros(len(origins)),
+        np.zeros(len(origins)),
+    )
+    for i, (origin, direction) in enumerate(
+        zip(origins.tolist(), directions.tolist(), strict=True)
+    ):
+        hit = scene.ray_intersect_preliminary(mi.Ray3f(origin, direction), False)
+        if hit.is_valid():
+            t[i], triangle[i] = hit.t, hit.prim_index
+            u[i], v[i] = hit.prim_uv
+    if not shape.is_sphere:
+        return t, smooth_normals(shape, triangle, u, v, directions)
+    points = origins + np.where(np.isfinite(t), t, 0.0)[:, None] * directions
+    return t, face_viewer(points / np.linalg.norm(points, axis=1, keepdims=True), directions)

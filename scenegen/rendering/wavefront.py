@@ -1,0 +1,148 @@
+"""One Dr.Jit wavefront for all pixels of a batch: upload, launch, fetch."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.rendering.blocks import Blocks, closest_block, upload_blocks
+from scenegen.rendering.kernel import Scenes, closest_hit, gather_row, normal_at, radiance_at
+from scenegen.rendering.model_scene import model_scene
+from scenegen.rendering.packing import SceneBatch, pixel_size
+from scenegen.rendering.reference import SAMPLE_STEPS
+from scenegen.rendering.unit_scene import unit_scene
+
+Array = NDArray[Any]
+LANES = 32  # rays of an image are padded to a multiple, so that no SIMD packet spans two images
+
+
+def launch_wavefront(
+    batch: SceneBatch, variant: str, fields: Sequence[str]
+) -> Callable[[], dict[str, Array]]:
+    """Start the kernel; the returned function waits for it and returns the pixels.
+
+    What only other fields need is not computed.
+    """
+    scenes, cameras = _upload(batch, variant)
+    blocks = upload_blocks(batch) if batch.blocks else None
+    everything = _trace(batch, scenes, cameras, blocks)
+    results = {name: everything[name] for name in fields}
+    dr.eval(*results.values())
+    spec, count = batch.spec, len(batch)
+
+    def pixels(name: str) -> Array:
+        channels = (3,) if name in ("image", "normal") else ()
+        rows = results[name].numpy().reshape(count, -1, *channels)[:, : spec.height * spec.width]
+        return np.ascontiguousarray(rows).reshape(count, spec.height, spec.width, *channels)
+
+    return lambda: {name: pixels(name) for name in fields}
+
+
+def _upload(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
+    """Return the scenes, and the cameras as (B, 13): 3x4 world_from_camera, pixel size."""
+    spec, count = batch.spec, len(batch)
+    if spec.source == "shapes":
+        unit = unit_scene(variant, batch.names)
+    else:
+        unit = model_scene(variant, batch.shape_of, batch.names)
+    mi.set_variant(variant)
+    shape = np.maximum(batch.shape, 0)
+    center = batch.world_from_object[..., :3, 3]
+    squared = np.where(batch.shape >= 0, batch.object_scale, 1.0)[..., None, None] ** 2
+    # The inverse of a similarity s R is its transpose over s squared.
+    linear = np.swapaxes(batch.world_from_object[..., :3, :3], -1, -2) / squared
+    place = unit.offset[shape]
+    offset = -np.einsum("bkij,bkj->bki", linear, center) + (0.0 if unit.grid else place)
+    per_light = np.concatenate([batch.light_position, batch.light_color], axis=-1)
+    lights = [batch.ambient, batch.attenuation, per_light.reshape(count, -1)]
+    pixel = pixel_size(batch.fov_y_degrees, spec.height)
+    camera = [batch.world_from_camera[:, :3].reshape(count, 12), pixel[:, None]]
+    scenes = Scenes(
+        unit=unit.scene,
+        grid=unit.grid,
+        slots=spec.object_slots,
+        light_slots=spec.light_slots,
+        count=mi.UInt32(batch.object_count),
+        has_room=mi.Bool(batch.has_room),
+        background=_table(batch.background),
+        spheres=_table(np.concatenate([center, batch.object_scale[..., None]], axis=-1)),
+        from_world=_table(np.concatenate([linear, offset[..., None]], axis=-1)),
+        place=_table(place),
+        first_triangle=mi.UInt32(unit.first_triangle[shape].ravel()),
+        triangles=unit.normals,
+        reflectance=_table(batch.reflectance),
+        gloss=_table(batch.gloss) if spec.specular[1] > 0 else None,
+        lights=_table(np.concatenate(lights, axis=1)),
+    )
+    return scenes, _table(np.concatenate(camera, axis=1))
+
+
+def _table(rows: Array) -> Any:
+    return mi.Float(rows.astype(np.float32).ravel())
+
+
+def _cast(kind: Any, values: Any) -> Any:
+    """Convert to one of Dr.Jit's computed types, which its stubs do not know to be callable."""
+    return kind(values)
+
+
+def _trace(
+    batch: SceneBatch, scenes: Scenes, cameras: Any, blocks: Blocks | None
+) -> dict[str, Any]:
+    """Return the fields of `truth.GroundTruth` for every ray, not yet evaluated."""
+    spec = batch.spec
+    height, width = spec.height, spec.width
+    rays = -(-height * width // LANES) * LANES
+    index = dr.arange(mi.UInt32, len(batch) * rays)
+    item = index // rays
+    pixel = dr.minimum(index - item * rays, height * width - 1)
+    row = pixel // width
+    column = pixel - row * width
+    camera = gather_row(cameras, item, 13)
+    right, up, back, origin = (mi.Vector3f(*camera[i:12:4]) for i in range(4))
+
+    def direction(x: Any, y: Any) -> Any:
+        """World direction through the image point (x, y), in pixels; its camera z is -1."""
+        return right * ((x - width / 2) * camera[12]) + up * ((height / 2 - y) * camera[12]) - back
+
+    def hit(d: Any) -> tuple[Any, Any, Any, Any]:
+        if blocks:
+            t, object_id, n = closest_block(blocks, item, origin, d)
+            return t, object_id, origin + dr.select(object_id >= 0, t, 0) * d, n
+        t, object_id, triangle, uv = closest_hit(scenes, item, origin, d)
+        p = origin + dr.select(object_id >= 0, t, 0) * d
+        return t, object_id, p, normal_at(scenes, item, p, d, object_id, triangle, uv)
+
+    d = direction(mi.Float(column) + 0.5, mi.Float(row) + 0.5)
+    t, object_id, p, n = hit(d)
+    image = radiance_at(scenes, item, p, d, n, object_id, spec.shadows)
+
+    def add_sample(sample: Any, total: Any) -> tuple[Any, Any]:
+        """Add the colour at one of `reference.sample_positions`, those besides the centre."""
+        mirrored = (sample & 1) == 1
+        x, y = (0.5 + mi.Float(sample // 2 + 1) * step for step in SAMPLE_STEPS)
+        x, y = (dr.select(mirrored, 1 - (f - dr.floor(f)), f - dr.floor(f)) for f in (x, y))
+        d = direction(mi.Float(column) + x, mi.Float(row) + y)
+        _, object_id, p, n = hit(d)
+        return sample + 1, total + radiance_at(scenes, item, p, d, n, object_id, spec.shadows)
+
+    if spec.spp > 1:
+        others = spec.spp // 2 * 2
+        state = (mi.UInt32(0), image if spec.spp % 2 else mi.Vector3f(0))
+        more = lambda sample, total: sample < others  # noqa: E731
+        _, total = dr.while_loop(state, more, add_sample, mode="symbolic")
+        image = total / spec.spp
+    if spec.image_dtype == "uint8":
+        image = _cast(dr.uint8_array_t(mi.Vector3f), dr.round(dr.clip(image, 0, 1) * 255))
+    elif spec.image_dtype == "float16":
+        image = _cast(dr.float16_array_t(mi.Vector3f), image)
+    normal = mi.Vector3f(dr.dot(n, right), dr.dot(n, up), dr.dot(n, back))
+    return {
+        "image": dr.ravel(image),
+        "depth": dr.select(object_id >= 0, t, dr.nan),
+        "normal": dr.ravel(normal),
+        "object_id": _cast(dr.int8_array_t(mi.Float), object_id),
+    }

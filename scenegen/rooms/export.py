@@ -1,0 +1,140 @@
+"""One item of a rooms file in the formats of other tools: EXR, PNG, PLY, OBJ."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import png
+from numpy.typing import NDArray
+
+from scenegen.camera import transform_vectors
+from scenegen.common.new_file import written_beside
+from scenegen.objects.catalogue import Objects, built_in_shape
+from scenegen.objects.shapes import scene_mesh
+from scenegen.objects.solids import UnitShape
+from scenegen.rooms.preview import srgb_bytes
+from scenegen.rooms.reader import Room
+
+Array = NDArray[Any]
+Writer = Callable[[Room, Path], None]
+FORMATS = ("exr", "png", "ply", "obj")
+PNG_DEPTH_UNIT = 1e-4  # scene units a step: 16 bits reach 6.5535
+
+
+def export_paths(row: int, folder: str | Path, stem: str, form: str) -> list[Path]:
+    """Return the files that one row becomes in a format (one of FORMATS)."""
+    name = f"{stem}-{row:06d}"
+    if form != "png":
+        return [Path(folder) / f"{name}.{form}"]
+    return [Path(folder) / f"{name}-{kind}.png" for kind in _PNG]
+
+
+def export_room(
+    room: Room,
+    paths: list[Path],
+    form: str,
+    overwrite: bool = False,
+    objects: Objects | None = None,
+) -> None:
+    """Write one room to its `export_paths`. Raises OSError as `new_file.written_beside`.
+
+    Args:
+        objects: what the scene is made of, for "obj"; None where that is built in.
+    """
+    shape_of = objects.shape if objects else built_in_shape
+    obj: Writer = lambda room, path: write_mesh_obj(room, path, shape_of)  # noqa: E731
+    one = {"exr": write_exr, "ply": write_surfels_ply, "obj": obj}
+    writers = list(_PNG.values()) if form == "png" else [one[form]]
+    for path, write in zip(paths, writers, strict=True):
+        with written_beside(path, overwrite) as temporary:
+            write(room, temporary)
+
+
+def write_exr(room: Room, path: str | Path) -> None:
+    """Write linear radiance R G B, planar depth Z, normal N.X N.Y N.Z and id, all float32.
+
+    Z is infinite where nothing is hit, as compositing tools expect; id is -1 there.
+    """
+    import OpenEXR
+
+    depth = np.where(np.isfinite(room.depth), room.depth, np.inf)
+    planes = {
+        "R": room.radiance[..., 0],
+        "G": room.radiance[..., 1],
+        "B": room.radiance[..., 2],
+        "Z": depth,
+        "N.X": room.normal[..., 0],
+        "N.Y": room.normal[..., 1],
+        "N.Z": room.normal[..., 2],
+        "id": room.object_id,
+    }
+    channels = {
+        name: OpenEXR.Channel(name, np.ascontiguousarray(plane, np.float32))
+        for name, plane in planes.items()
+    }
+    header = {
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "comments": "Z planar depth in scene units; N in the camera frame (x right, y up, -z view)",
+    }
+    OpenEXR.File(header, channels).write(str(path))
+
+
+def write_surfels_ply(room: Room, path: str | Path) -> None:
+    """Write the surfels in the world frame: position, normal, colour (sRGB), object id."""
+    hit = room.object_id >= 0
+    vertices = np.empty(
+        int(hit.sum()),
+        [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")]
+        + [(name, "u1") for name in ("red", "green", "blue")]
+        + [("object_id", "i1")],
+    )
+    points, normals = (
+        room.points_world[hit],
+        transform_vectors(room.world_from_camera, room.normal[hit]),
+    )
+    colors = srgb_bytes(room.radiance)[hit]
+    for i in range(3):
+        vertices["xyz"[i]], vertices["n" + "xyz"[i]] = points[:, i], normals[:, i]
+        vertices[("red", "green", "blue")[i]] = colors[:, i]
+    vertices["object_id"] = room.object_id[hit]
+    kinds = {"<f4": "float", "|u1": "uchar", "|i1": "char"}
+    fields = (vertices.dtype.fields or {}).items()
+    properties = [f"property {kinds[kind.str]} {name}" for name, (kind, *_) in fields]
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"comment surfels of room {room.index}: world frame, y up, scene units",
+        f"element vertex {len(vertices)}",
+        *properties,
+        "end_header",
+    ]
+    Path(path).write_bytes("\n".join([*header, ""]).encode() + vertices.tobytes())
+
+
+def write_mesh_obj(
+    room: Room, path: str | Path, shape_of: Callable[[str], UnitShape] = built_in_shape
+) -> None:
+    """Write room and objects as triangles in the world frame."""
+    text = scene_mesh(room.scene, shape_of).export(
+        file_type="obj", include_normals=False, header=None
+    )
+    Path(path).write_text(f"# scene of room {room.index}: world frame, y up, scene units\n{text}")
+
+
+def _write_png16(path: Path, values: Array) -> None:
+    """Write (H, W) or (H, W, 3) values, already scaled to 0..65535, as a 16-bit PNG."""
+    pixels = np.rint(np.clip(values, 0, 65535)).astype(np.uint16)
+    height, width = pixels.shape[:2]
+    writer = png.Writer(width, height, greyscale=pixels.ndim == 2, bitdepth=16)
+    with path.open("wb") as file:
+        writer.write(file, pixels.reshape(height, -1))
+
+
+_PNG: dict[str, Writer] = {
+    "image": lambda room, path: _write_png16(path, np.clip(room.radiance, 0, 1) * 65535),
+    "depth": lambda room, path: _write_png16(path, np.nan_to_num(room.depth) / PNG_DEPTH_UNIT),
+    "normal": lambda room, path: _write_png16(path, (room.normal * 0.5 + 0.5) * 65535),
+    "object_id": lambda room, path: _write_png16(path, room.object_id.astype(float) + 1),
+}

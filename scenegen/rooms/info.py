@@ -1,0 +1,84 @@
+"""What a rooms file holds, as text for a person."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.common.records import changed_settings
+from scenegen.layout import FIELDS
+from scenegen.rooms.reader import RoomsFile
+
+SAMPLED = 64  # rows read for the ranges
+
+
+def describe(path: str | Path) -> str:
+    """Return spec, counts, ranges, units, sizes, versions and fingerprint of a file, as lines.
+
+    Raises FileNotFoundError, FileFormatError as `RoomsFile`.
+    """
+    with RoomsFile(path) as rooms:
+        rows = np.unique(np.linspace(0, len(rooms) - 1, min(SAMPLED, len(rooms))).astype(int))
+        ranges, shapes = _ranges(rooms, rows)
+        attributes = rooms.attributes
+        lines = [
+            f"{path}: {len(rooms)} images of {rooms.spec.height}x{rooms.spec.width},"
+            f" {Path(path).stat().st_size / 1e6:.1f} MB",
+            "",
+            f"  format        {attributes['format']} {attributes['format_version']}",
+            f"  written by    {attributes['writer']}, {attributes.get('variant')}",
+            f"  command       {attributes.get('creation_command') or '-'}",
+            f"  fingerprint   {rooms.fingerprint}",
+            f"  conventions   {attributes.get('conventions')}",
+            "",
+            "  spec (* differs from the default)",
+        ]
+        lines += setting_lines(rooms.spec)
+        lines += ["", f"  ranges over {len(rows)} rows; shapes: {shapes}"]
+        lines += [f"    {name:10} {low:.4g} to {high:.4g}" for name, (low, high) in ranges.items()]
+        lines += ["", f"  {'dataset':27} {'row':14} {'unit':24} {'stored':>9} {'ratio':>6}"]
+        for field, (stored, raw) in zip(FIELDS, rooms.stored_bytes().values(), strict=True):
+            row = "(" + ", ".join(map(str, field.shape)) + ")"
+            unit = field.unit if len(field.unit) <= 24 else field.unit[:21] + "..."
+            ratio = f"{raw / stored:.1f}" if stored else "-"
+            lines.append(f"  {field.name:27} {row:14} {unit:24} {size_text(stored):>9} {ratio:>6}")
+    return "\n".join(lines)
+
+
+def setting_lines(spec: Any) -> list[str]:
+    """Return a line for each setting, a star before those that differ from the default."""
+    changed = changed_settings(spec)
+    lines = []
+    for name, value in vars(spec).items():
+        shown = ", ".join(map(str, value)) if isinstance(value, tuple) else value
+        star = "*" if name in changed and value is not None else " "
+        lines.append(f"  {star} {name:20} {'not told' if value is None else shown}")
+    return lines
+
+
+def _ranges(rooms: RoomsFile, rows: NDArray[np.int_]) -> tuple[dict[str, tuple[float, float]], str]:
+    low: dict[str, float] = {}
+    high: dict[str, float] = {}
+    counts: dict[str, int] = {}
+    for i in rows.tolist():
+        room = rooms[i]
+        for item in room.scene.objects:
+            counts[item.name] = counts.get(item.name, 0) + 1
+        values = {
+            "radiance": room.radiance,
+            "depth": room.depth[np.isfinite(room.depth)],
+            "n_z": room.normal[..., 2],
+            "object_id": room.object_id,
+        }
+        for name, array in values.items():
+            if array.size:
+                low[name] = min(low.get(name, np.inf), float(array.min()))
+                high[name] = max(high.get(name, -np.inf), float(array.max()))
+    shapes = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
+    return {name: (low[name], high[name]) for name in low}, shapes or "none"
+
+
+def size_text(count: int) -> str:
+    """Return a number of bytes in kB or MB."""
+    return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"

@@ -1,0 +1,181 @@
+"""Render a data set: propose, cast, check, write; overlapped, in flat memory."""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from scenegen.common.errors import SpecError
+from scenegen.common.new_file import check_writable
+from scenegen.description.scenes import SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.objects.catalogue import Objects, objects_of
+from scenegen.rendering.backend import select_variant
+from scenegen.rendering.ground_truth import GroundTruth, visible_pixels
+from scenegen.rendering.packing import pack
+from scenegen.rendering.renderer import launch
+from scenegen.rooms.writer import RenderedScene, create_rooms
+from scenegen.sampling.scenes import MAX_ATTEMPTS, refusal, sample_scene
+
+DEFAULT_BATCH = 64
+MAX_BATCH = 4096
+MAX_RAYS = 2**28  # of a wavefront; 8 GiB of pixels
+WINDOW = 4  # batches that may be in the making while the oldest item is still being retried
+
+
+def make_dataset(
+    path: str | Path,
+    spec: DatasetSpec,
+    count: int,
+    *,
+    batch: int = DEFAULT_BATCH,
+    device: str = "auto",
+    compression: str = "gzip",
+    overwrite: bool = False,
+    command: str = "",
+    objects: Objects | None = None,
+    progress: Callable[[int], Any] = lambda done: None,
+) -> None:
+    """Render scenes 0 .. count - 1 of `spec` to a rooms file, each with a row for each view.
+
+    Args:
+        batch: images in one wavefront; bounds memory, never changes a byte of a row.
+        device, compression: as in `backend.DEVICES` and `row_file.COMPRESSIONS`.
+        command: what to record as the file's creation command.
+        objects: what the scenes are made of; None for `objects_of(spec)`.
+        progress: is told, now and then, how many more rows were written.
+
+    Raises:
+        SpecError, BackendError: a setting.
+        PlacementError: no scene meets the request.
+        OSError: the path, or the disk.
+    """
+    if not 1 <= batch <= MAX_BATCH:
+        raise SpecError(f"batch: found {batch}, expected from 1 to {MAX_BATCH}")
+    if max(batch, len(spec.views)) * spec.height * spec.width > MAX_RAYS:
+        most = MAX_RAYS // (spec.height * spec.width)
+        found = f"{batch}, with {len(spec.views)} views of a scene"
+        raise SpecError(f"batch: found {found}, expected at most {most} images of this size")
+    check_writable(Path(path), overwrite)
+    variant = select_variant(device)
+    objects = objects or objects_of(spec)
+    views = range(len(spec.views))
+    attributes = {"creation_command": command, "variant": variant}
+    with (
+        create_rooms(
+            path,
+            spec,
+            count,
+            compression=compression,
+            overwrite=overwrite,
+            attributes=attributes,
+        ) as writer,
+        ThreadPoolExecutor(1) as pool,
+    ):
+        writing: deque[Future[int]] = deque()
+
+        def write(items: list[RenderedScene]) -> int:
+            writer.append(items, pack(spec, [item.scene for item in items], views, objects))
+            return len(items) * len(views)
+
+        for items in render_items(spec, range(count), batch, device, objects):
+            writing.append(pool.submit(write, items))
+            if len(writing) > 2:
+                progress(writing.popleft().result())
+        while writing:
+            progress(writing.popleft().result())
+
+
+def render_items(
+    spec: DatasetSpec,
+    indices: range,
+    batch: int,
+    device: str = "auto",
+    objects: Objects | None = None,
+) -> Iterator[list[RenderedScene]]:
+    """Yield accepted items in order, as they become complete.
+
+    While a batch is cast, the next one is proposed. An item whose objects do not all show enough
+    pixels is proposed again in the next batch; new items wait when the oldest falls far behind.
+    """
+    objects = objects or objects_of(spec)
+    views = range(len(spec.views))
+    batch = max(1, batch // len(views))  # scenes
+    next_in = 0
+    retries: deque[int] = deque()
+    attempts: dict[int, int] = {}
+    rendered: dict[int, int] = {}
+    finished: dict[int, RenderedScene] = {}
+    next_out = 0
+
+    def propose() -> list[SceneSpec]:
+        nonlocal next_in
+        scenes: list[SceneSpec] = []
+        while len(scenes) < batch:
+            if retries:
+                index = retries.popleft()
+            elif next_in < len(indices) and next_in - next_out < WINDOW * batch:
+                index = indices[next_in]
+                next_in += 1
+            else:
+                break
+            scenes.append(_next_proposal(spec, index, attempts, rendered, objects))
+        return scenes
+
+    scenes: list[SceneSpec] = []
+    pending: Callable[[], GroundTruth] | None = None
+    while True:
+        if pending is None:
+            scenes = propose()
+            if not scenes:
+                return
+            pending = launch(pack(spec, scenes, views, objects), device)
+        following = propose()
+        truth = pending()
+        pending = launch(pack(spec, following, views, objects), device) if following else None
+        for scene, shown in zip(scenes, _shown(spec, scenes, truth), strict=True):
+            if shown is None:
+                retries.append(scene.index)
+                rendered[scene.index] += 1
+            else:
+                finished[scene.index] = shown
+                attempts.pop(scene.index)
+                rendered.pop(scene.index)
+        scenes = following
+        ready = []
+        while next_out < len(indices) and indices[next_out] in finished:
+            ready.append(finished.pop(indices[next_out]))
+            next_out += 1
+        if ready:
+            yield ready
+
+
+def _shown(
+    spec: DatasetSpec, scenes: list[SceneSpec], truth: GroundTruth
+) -> Iterator[RenderedScene | None]:
+    """Yield each scene with its pixels, or None where an object shows too few in some view."""
+    visible = visible_pixels(truth.object_id, spec.object_slots)
+    views = len(spec.views)
+    for row, scene in enumerate(scenes):
+        images = slice(row * views, (row + 1) * views)
+        enough = visible[images, : len(scene.objects)] >= spec.min_visible_pixels
+        pixels = (truth.image, truth.depth, truth.normal, truth.object_id, visible)
+        yield RenderedScene(scene, *(values[images] for values in pixels)) if enough.all() else None
+
+
+def _next_proposal(
+    spec: DatasetSpec,
+    index: int,
+    attempts: dict[int, int],
+    rendered: dict[int, int],
+    objects: Objects,
+) -> SceneSpec:
+    """Return the item's next proposal that places all its objects."""
+    rendered.setdefault(index, 0)
+    for attempt in range(attempts.get(index, 0), MAX_ATTEMPTS):
+        scene = sample_scene(spec, index, attempt, objects)
+        if scene is not None:
+            attempts[index] = attempt + 1
+            return scene
+    raise refusal(spec, index, rendered[index], objects)

@@ -1,0 +1,152 @@
+"""Contact sheets: what a person looks at to trust a file of rooms."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from scenegen.common.errors import SpecError
+from scenegen.common.new_file import written_beside
+from scenegen.common.seeding import Purpose, item_rng
+from scenegen.rooms.reader import Room
+
+Array = NDArray[Any]
+DEFAULT_ROWS = 12
+MAX_ROWS = 400
+GAP = 6
+LABEL_HEIGHT = 18
+SMALLEST_TILE = 128  # smaller images are enlarged by a whole factor
+BACKGROUND, INK, FAINT = (250, 250, 250), (20, 20, 20), (110, 110, 110)
+NOTHING = (90, 0, 110)  # where a ray meets nothing
+PALETTE = np.array(  # object ids: the room grey, then Okabe and Ito's colours, again and again
+    [
+        (200, 200, 200),
+        (230, 159, 0),
+        (86, 180, 233),
+        (0, 158, 115),
+        (240, 228, 66),
+        (0, 114, 178),
+        (213, 94, 0),
+        (204, 121, 167),
+    ],
+    np.uint8,
+)
+TITLES = ("image", "depth, near is dark", "normal, xyz as rgb", "object id")
+
+
+def contact_sheet(rooms: Sequence[Room], columns: int = 2) -> Image.Image:
+    """Return a sheet with four labelled tiles for each room, `columns` rooms side by side."""
+    height, width = rooms[0].depth.shape
+    factor = -(-SMALLEST_TILE // width) if width < SMALLEST_TILE else 1
+    tile = (width * factor, height * factor)
+    cell = (4 * (tile[0] + GAP) + 2 * GAP, tile[1] + LABEL_HEIGHT + GAP)
+    columns = min(columns, len(rooms))
+    lines = -(-len(rooms) // columns)
+    sheet = Image.new(
+        "RGB", (columns * cell[0] + GAP, lines * cell[1] + LABEL_HEIGHT + GAP), BACKGROUND
+    )
+    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(size=12)
+    for column in range(columns):
+        for k, title in enumerate(TITLES):
+            left = GAP + column * cell[0] + k * (tile[0] + GAP)
+            draw.text((left, 3), title, fill=INK, font=font)
+    for i, room in enumerate(rooms):
+        left, top = GAP + i % columns * cell[0], LABEL_HEIGHT + i // columns * cell[1]
+        for k, pixels in enumerate(tiles(room)):
+            picture = Image.fromarray(pixels).resize(tile, Image.Resampling.NEAREST)
+            sheet.paste(picture, (left + k * (tile[0] + GAP), top))
+        text = _fitted(_caption(room), font, cell[0] - 3 * GAP)
+        draw.text((left, top + tile[1] + 2), text, fill=FAINT, font=font)
+    return sheet
+
+
+def tiles(room: Room) -> list[NDArray[np.uint8]]:
+    """Return the four pictures of a room, each (H, W, 3) uint8."""
+    nothing = room.object_id < 0
+    ids = np.where(room.object_id > 0, (room.object_id - 1) % (len(PALETTE) - 1) + 1, 0)
+    pictures = [
+        srgb_bytes(room.radiance),
+        depth_bytes(room.depth),
+        np.rint(np.clip(room.normal * 0.5 + 0.5, 0, 1) * 255).astype(np.uint8),
+        PALETTE[ids],
+    ]
+    for picture in pictures:
+        picture[nothing] = NOTHING
+    return pictures
+
+
+def srgb_bytes(radiance: Array) -> NDArray[np.uint8]:
+    """Encode linear radiance for the eye: sRGB (IEC 61966-2-1), 8 bits, clipped at 1."""
+    linear = np.clip(radiance, 0.0, 1.0)
+    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.asarray(np.rint(encoded * 255).astype(np.uint8))
+
+
+def depth_bytes(depth: Array) -> NDArray[np.uint8]:
+    """Stretch a depth map over black (nearest) to white (farthest), as the paper shows it."""
+    known = np.isfinite(depth)
+    if not known.any():
+        return np.zeros((*depth.shape, 3), np.uint8)
+    near, far = depth[known].min(), depth[known].max()
+    scaled = (np.where(known, depth, near) - near) / max(far - near, 1e-12)
+    return np.repeat(np.rint(scaled * 255).astype(np.uint8)[..., None], 3, axis=-1)
+
+
+def _caption(room: Room) -> str:
+    shapes = ", ".join(item.shape for item in room.scene.objects) or "empty"
+    known = room.depth[np.isfinite(room.depth)]
+    span = f"depth {known.min():.2f}-{known.max():.2f}" if known.size else "nothing in view"
+    turned = f"   {room.view_angle_degrees:g}°" if len(room.scene.cameras) > 1 else ""
+    return f"#{room.index}{turned}   {span}   {shapes}"
+
+
+def _fitted(text: str, font: Any, width: int) -> str:
+    """Shorten a text that is too long for its place."""
+    if font.getlength(text) <= width:
+        return text
+    while text and font.getlength(text + "...") > width:
+        text = text[:-1]
+    return text + "..."
+
+
+def pick_rows(
+    count: int, items: list[int] | None, number: int | None = None, seed: int = 0
+) -> list[int]:
+    """Return the rows to show: those named, or `number` at random, or the first 12.
+
+    Raises SpecError for a row beyond the file, and where both ways are asked for.
+    """
+    if items is not None and number is not None:
+        raise SpecError("items and random: found both, expected one of them")
+    if seed < 0:
+        raise SpecError(f"seed: found {seed}, expected 0 or more")
+    if number is not None:
+        rng = item_rng(seed, 0, Purpose.SELECTION)
+        return sorted(rng.choice(count, min(number, count), replace=False).tolist())
+    chosen = list(range(min(DEFAULT_ROWS, count))) if items is None else items
+    outside = [i for i in chosen if i >= count]
+    if outside:
+        raise SpecError(f"items: found {outside[0]}, expected rows from 0 to {count - 1}")
+    if not 0 < len(chosen) <= MAX_ROWS:
+        raise SpecError(f"items: found {len(chosen)} rows, expected from 1 to {MAX_ROWS}")
+    return chosen
+
+
+def check_picture_name(path: Path) -> None:
+    """Raise SpecError for an ending that names no picture format."""
+    if path.suffix.lower() not in (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff"):
+        raise SpecError(f"out: found {path.name!r}, expected a picture's name such as sheet.png")
+
+
+def save_picture(picture: Image.Image, path: str | Path) -> None:
+    """Write a picture under a temporary name, then rename it.
+
+    Raises SpecError for an ending that names no picture format, OSError for the path.
+    """
+    path = Path(path)
+    check_picture_name(path)
+    with written_beside(path, overwrite=True) as temporary:
+        picture.save(temporary)

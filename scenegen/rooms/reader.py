@@ -1,0 +1,238 @@
+"""Read a rooms file: typed records by index, and a map-style dataset for training loops."""
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.camera import back_project, transform_points
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.row_file import (
+    and_more,
+    check_version,
+    checking,
+    column_problems,
+    open_file,
+    reason,
+)
+from scenegen.description.scenes import SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.layout import FIELDS, FORMAT_NAME, FORMAT_VERSION, columns
+from scenegen.rendering.ground_truth import decode_image
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """One row of a rooms file; frames, units and shapes as in `layout.FIELDS`."""
+
+    index: int
+    view_index: int
+    view_angle_degrees: float
+    image: Array
+    depth: Array
+    normal: Array
+    object_id: Array
+    world_from_camera: Array
+    fov_y_degrees: float
+    scene: SceneSpec
+
+    @property
+    def radiance(self) -> Array:
+        """Linear RGB radiance, (H, W, 3) float32."""
+        return decode_image(self.image)
+
+    @property
+    def points(self) -> Array:
+        """Surfel positions in the camera frame, (H, W, 3), scene units; NaN where nothing."""
+        return back_project(self.depth, self.fov_y_degrees)
+
+    @property
+    def points_world(self) -> Array:
+        """Surfel positions in the world frame, (H, W, 3), scene units; NaN where nothing."""
+        return transform_points(self.world_from_camera, self.points)
+
+
+def open_rooms(path: str | Path) -> "RoomsFile":
+    """Open a rooms file for reading; raises as `RoomsFile` does."""
+    return RoomsFile(path)
+
+
+class RoomsFile:
+    """An open rooms file: a sequence of `Room`s. Use it as a context manager, or close it.
+
+    Attributes:
+        path: where it lies.
+        spec: the request that it answers.
+        fingerprint: SHA-256 of request and scenes (`specs.fingerprint`).
+        attributes: all root attributes.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        """Open and check the layout.
+
+        Raises:
+            FileNotFoundError: no such file.
+            FileFormatError: not HDF5, not a rooms file, of a newer format, or damaged.
+        """
+        self.path = Path(path)
+        self._file = open_file(path, "rooms file")
+        with checking(self._file):
+            self.attributes: dict[str, Any] = dict(self._file.attrs)
+            self.spec = self._check_root()
+            problems = layout_problems(self._file, self.spec)
+            if problems:
+                raise FileFormatError(f"{path}: {and_more(problems)}")
+        self.fingerprint = str(self.attributes["fingerprint"])
+        self._count = int(self._file["image"].shape[0])
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, index: int) -> Room:
+        """Read one row; negative indices count from the end. Raises IndexError, FileFormatError."""
+        row = range(len(self))[index]
+        return Room(
+            index=row,
+            view_index=int(self.read("view_index", row)),
+            view_angle_degrees=float(self.read("view_angle_degrees", row)),
+            image=self.read("image", row),
+            depth=self.read("depth", row),
+            normal=self.read("normal", row),
+            object_id=self.read("object_id", row),
+            world_from_camera=self.read("camera/world_from_camera", row),
+            fov_y_degrees=float(self.read("camera/fov_y_degrees", row)),
+            scene=self.scene(row),
+        )
+
+    def __iter__(self) -> Iterator[Room]:
+        return (self[i] for i in range(len(self)))
+
+    def scene(self, index: int) -> SceneSpec:
+        """Return the description of the scene that row `index` shows."""
+        try:
+            return SceneSpec.from_json(self.read("scene", index))
+        except SpecError as error:
+            raise FileFormatError(f"{self.path}: scene, row {index}: {error}") from error
+
+    def read(self, name: str, rows: int | slice) -> Any:
+        """Read rows of one dataset. Raises FileFormatError where they are damaged."""
+        try:
+            return self._file[name][rows]
+        except (OSError, KeyError, ValueError) as error:
+            where = f"{self.path}: {name}, row {rows}"
+            raise FileFormatError(f"{where}: cannot be read ({reason(error)})") from error
+
+    def problems(self) -> list[str]:
+        """Return what is wrong with the layout, the datasets' own descriptions included."""
+        return layout_problems(self._file, self.spec) + attribute_problems(self._file, self.spec)
+
+    def stored_bytes(self) -> dict[str, tuple[int, int]]:
+        """Return for each dataset its bytes on disk and in memory.
+
+        HDF5 keeps texts in heaps of which it tells no size; they get what the others leave.
+        """
+        sizes = {f.name: self._file[f.name].id.get_storage_size() for f in FIELDS}
+        memory = {f.name: self._file[f.name].nbytes for f in FIELDS}
+        texts = self.path.stat().st_size - sum(sizes.values()) + sizes["scene"]
+        sizes["scene"] = memory["scene"] = texts
+        memory["object/model"] = sizes["object/model"]
+        return {name: (sizes[name], memory[name]) for name in sizes}
+
+    def close(self) -> None:
+        """Close the file; idempotent."""
+        self._file.close()
+
+    def __enter__(self) -> "RoomsFile":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _check_root(self) -> DatasetSpec:
+        found = self.attributes.get("format")
+        if not isinstance(found, str) or found != FORMAT_NAME:
+            what = "no format attribute" if found is None else repr(found)
+            raise FileFormatError(
+                f"{self.path}: not a rooms file: found {what}, expected"
+                f" format {FORMAT_NAME!r} (written by scenegen render)"
+            )
+        check_version(self.path, self.attributes, FORMAT_VERSION)
+        for name in ("spec", "fingerprint", "writer"):
+            if name not in self.attributes:
+                raise FileFormatError(f"{self.path}: root attribute {name!r} is missing")
+        try:
+            return DatasetSpec.from_json(str(self.attributes["spec"]))
+        except SpecError as error:
+            raise FileFormatError(f"{self.path}: attribute 'spec': {error}") from error
+
+
+def layout_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
+    """Say what is missing or has the wrong shape or type."""
+    image = file.get("image")
+    count = image.shape[0] if isinstance(image, h5py.Dataset) and image.shape else 0
+    problems = column_problems(file, columns(spec), count)
+    told = file.attrs.get("count")
+    if not problems and (count == 0 or not np.array_equal(count, told)):
+        problems.append(f"found {count} rows, the attribute 'count' says {told}, expected over 0")
+    return problems
+
+
+def attribute_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
+    """Say which datasets describe themselves otherwise than `layout.columns` does."""
+    problems = []
+    for column in columns(spec):
+        for name, expected in column.attributes.items():
+            found = file[column.name].attrs.get(name)
+            if found is None or not np.array_equal(np.asarray(found), np.asarray(expected)):
+                problems.append(f"{column.name}: attribute {name} is {found!r:.60}")
+    return problems
+
+
+class RoomsDataset:
+    """A map-style dataset (`__len__`, `__getitem__` -> dict of arrays) for any training loop.
+
+    `torch.utils.data.DataLoader` takes it as it is, with any number of workers: it pickles as its
+    path, and every process opens the file for itself when it first reads.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        fields: Sequence[str] = ("image", "depth", "normal", "object_id"),
+    ) -> None:
+        """Check the file once. Raises as `RoomsFile`, and SpecError for an unknown field."""
+        known = [field.name for field in FIELDS if field.dtype != "text"]
+        for name in fields:
+            if name not in known:
+                raise SpecError(f"field: found {name!r}, expected some of {', '.join(known)}")
+        self.path, self.fields = Path(path), tuple(fields)
+        with RoomsFile(path) as rooms:
+            self._length, self.spec, self.fingerprint = len(rooms), rooms.spec, rooms.fingerprint
+        self._open: tuple[int, RoomsFile] | None = None
+
+    def __len__(self) -> int:
+        return self._length
+
+    def __getitem__(self, index: int) -> dict[str, Any]:
+        """Return the fields of one row, by name; image values are as stored."""
+        row = range(self._length)[index]
+        if self._open is None or self._open[0] != os.getpid():
+            self._open = (os.getpid(), RoomsFile(self.path))
+        rooms = self._open[1]
+        return {name: rooms.read(name, row) for name in self.fields}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_open": None}

@@ -1,0 +1,289 @@
+"""Is a rooms file what it says? Layout, invariants of every row, and rows rendered again."""
+
+import hashlib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.camera import pixel_directions, transform_points, transform_vectors
+from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
+from scenegen.objects.catalogue import Objects, changed_meshes, objects_of
+from scenegen.objects.meshes.errors import BadMeshError
+from scenegen.rendering.backend import select_variant
+from scenegen.rendering.ground_truth import visible_pixels
+from scenegen.rendering.packing import SceneBatch, pack
+from scenegen.rendering.renderer import render
+from scenegen.rendering.shading import shade
+from scenegen.rooms.reader import Room, RoomsFile
+from scenegen.sampling.scenes import MAX_ATTEMPTS, sample_scene
+
+Array = NDArray[Any]
+UNIT_TOLERANCE = 1e-5  # of a normal's length
+PLANE_TOLERANCE = 1e-5  # scene units, of a float32 depth
+RADIANCE_TOLERANCE = 1e-5  # of the shading equation in float32, where radiance is 1 or less
+LOBE_TOLERANCE = 4e-7  # of a highlight's radiance, times its exponent
+OTHER_BACKEND_TOLERANCE = 1e-4  # scene units, where another backend or release rendered the file
+SHOWN = 5  # row numbers named in a message
+
+
+@dataclass(frozen=True)
+class Check:
+    """One rule and whether the file keeps it; `detail` says what was looked at or found wrong."""
+
+    name: str
+    ok: bool
+    detail: str
+
+
+def verify_file(
+    path: str | Path,
+    items: int = 8,
+    device: str = "auto",
+    objects: Objects | None = None,
+    progress: Callable[[int], Any] = lambda done: None,
+) -> list[Check]:
+    """Check a file: every row's values, and `items` rows, spread evenly, rendered again.
+
+    Args:
+        objects: what its scenes are made of; None where that is built in.
+        progress: is told how many more rows were read.
+
+    Raises:
+        FileNotFoundError, FileFormatError: it cannot be opened as a rooms file.
+        SpecError: it shows meshes, and `objects` are not given.
+        BackendError: nothing can render here.
+    """
+    with RoomsFile(path) as rooms:
+        objects = objects or objects_of(rooms.spec)
+        broken: dict[str, list[str]] = {name: [] for name in _ROW_RULES}
+        digest = hashlib.sha256(rooms.spec.to_json().encode())
+        for i in range(len(rooms)):
+            if rooms.read("view_index", i) == 0:
+                digest.update(b"\n" + rooms.read("scene", i))
+            for name, problem in _row_problems(rooms, i, objects):
+                broken[name].append(f"row {i}: {problem}")
+            progress(1)
+        wrong = rooms.problems()
+        layout = f"{len(rooms)} rows, format {rooms.attributes['format_version']}"
+        checks = [Check("layout", not wrong, "; ".join(wrong[:SHOWN]) or layout)]
+        rules = dict(_ROW_RULES)
+        if rooms.spec.shading == "path":
+            rules["image"] = "finite and not negative"
+        elif rooms.spec.spp > 1 or rooms.spec.shadows:
+            rules["image"] = "finite, and no darker than ambient light alone"
+        checks += [_row_check(name, rules[name], broken[name], len(rooms)) for name in rules]
+        same = digest.hexdigest() == rooms.fingerprint
+        checks.append(Check("fingerprint", same, rooms.fingerprint if same else "does not match"))
+        rows = np.unique(np.linspace(0, len(rooms) - 1, min(items, len(rooms))).round().astype(int))
+        if len(rows):
+            checks.append(_sampled_again(rooms, rows, objects))
+            checks.append(_rendered_again(rooms, rows, device, objects))
+    return checks
+
+
+_PIXELS = ("image", "depth", "normal", "object_id")
+_ROW_RULES = {
+    "description": "the scene's JSON can be read and agrees with the arrays",
+    "depth": "finite and positive where something is hit, NaN elsewhere",
+    "normal": "unit and facing the viewer where something is hit, zero elsewhere",
+    "object_id": "from -1 to the object count; every object shows enough pixels",
+    "image": "finite, not negative, and the shading equation of the other values",
+}
+
+
+def _row_check(name: str, rule: str, problems: list[str], count: int) -> Check:
+    if not problems:
+        return Check(name, True, f"{rule} ({count} rows)")
+    more = f" and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
+    return Check(name, False, "; ".join(problems[:SHOWN]) + more)
+
+
+def _row_problems(rooms: RoomsFile, i: int, objects: Objects) -> Iterable[tuple[str, str]]:
+    try:
+        room = rooms[i]
+        batch = pack(rooms.spec, [room.scene], (room.view_index,), objects)
+    except (SceneGenError, IndexError) as error:
+        unreadable = [name for name in _PIXELS if not _can_read(rooms, name, i)]
+        yield from ((name, f"{name} cannot be read") for name in unreadable)
+        if not unreadable:
+            yield "description", str(error)
+        return
+    with np.errstate(all="ignore"):  # a damaged number may overflow, and is found all the same
+        yield from (("description", p) for p in _description_problems(rooms, room, batch))
+        changed = changed_meshes(objects, room.scene)
+        if changed:
+            yield "description", f"made from other files than the folder's: {', '.join(changed)}"
+        yield from (("depth", p) for p in _depth_problems(room))
+        yield from (("normal", p) for p in _normal_problems(room))
+        yield from (("object_id", p) for p in _object_problems(rooms, room))
+        yield from (("image", p) for p in _image_problems(rooms, room, batch))
+
+
+def _can_read(rooms: RoomsFile, name: str, row: int) -> bool:
+    try:
+        rooms.read(name, row)
+    except FileFormatError:
+        return False
+    return True
+
+
+def _description_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable[str]:
+    views = len(rooms.spec.views)
+    first = room.index - room.index % views
+    if room.view_index != room.index - first or len(room.scene.cameras) != views:
+        yield f"view_index or the number of cameras is not that of the {views} views"
+        return
+    if room.view_index and rooms.read("scene", room.index) != rooms.read("scene", first):
+        yield "the scene's description differs from that of its first view"
+    stored = {
+        "camera/world_from_camera": batch.world_from_camera,
+        "camera/fov_y_degrees": batch.fov_y_degrees,
+        "light/count": batch.light_count,
+        "light/position": batch.light_position,
+        "light/color": batch.light_color,
+        "light/ambient": batch.ambient,
+        "light/attenuation": batch.attenuation,
+        "material/reflectance": batch.reflectance,
+        "material/specular": batch.gloss[..., 0],
+        "material/shininess": batch.gloss[..., 1],
+        "object/count": batch.object_count,
+        "object/world_from_object": batch.world_from_object,
+        "object/scale": batch.object_scale,
+        "scene_index": np.array([room.scene.index]),
+        "view_angle_degrees": np.array(rooms.spec.views)[[room.view_index]],
+    }
+    for name, values in stored.items():
+        if not np.allclose(rooms.read(name, room.index), values[0], rtol=0, atol=1e-12):
+            yield f"{name} differs from the scene's description"
+    unused = rooms.spec.object_slots - len(room.scene.objects)
+    models = [item.shape for item in room.scene.objects] + [""] * unused
+    if [
+        name.decode("utf-8", "replace") for name in rooms.read("object/model", room.index)
+    ] != models:
+        yield "object/model differs from the scene's description"
+    classes = [rooms.spec.shapes.index(item.name) for item in room.scene.objects]
+    if rooms.read("object/shape", room.index).tolist() != classes + [-1] * unused:
+        yield "object/shape differs from the scene's description"
+
+
+def _depth_problems(room: Room) -> Iterable[str]:
+    hit = room.object_id >= 0
+    if not (np.isfinite(room.depth[hit]).all() and (room.depth[hit] > 0).all()):
+        yield "a hit pixel's depth is not a positive number"
+    if not np.isnan(room.depth[~hit]).all():
+        yield "a pixel without a hit has a depth"
+    walls = np.abs(room.points_world[room.object_id == 0])
+    if walls.size and not (walls.min(axis=1) < PLANE_TOLERANCE).all():
+        yield "a surfel of the room lies off floor and walls"
+
+
+def _normal_problems(room: Room) -> Iterable[str]:
+    hit = room.object_id >= 0
+    length = np.linalg.norm(room.normal.astype(np.float64), axis=-1)
+    if not (np.abs(length[hit] - 1) < UNIT_TOLERANCE).all():
+        yield f"a normal's length is off 1 by {np.nanmax(np.abs(length[hit] - 1)):.1e}"
+    if not (room.normal[~hit] == 0).all():
+        yield "a pixel without a hit has a normal"
+    rays = pixel_directions(room.depth.shape[0], room.depth.shape[1], room.fov_y_degrees)
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    if not ((room.normal * rays).sum(-1)[hit] < UNIT_TOLERANCE).all():
+        yield "a normal faces away from the viewer"
+
+
+def _object_problems(rooms: RoomsFile, room: Room) -> Iterable[str]:
+    count = len(room.scene.objects)
+    if room.object_id.min() < -1 or room.object_id.max() > count:
+        yield f"object ids {room.object_id.min()} to {room.object_id.max()}, {count} objects"
+    visible = visible_pixels(room.object_id[None], rooms.spec.object_slots)[0]
+    if not np.array_equal(visible, rooms.read("object/visible_pixels", room.index)):
+        yield "object/visible_pixels does not count them"
+    if (visible[:count] < rooms.spec.min_visible_pixels).any():
+        yield f"an object shows {visible[:count].min()} pixels"
+
+
+def _image_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable[str]:
+    radiance = room.radiance
+    if not np.isfinite(radiance).all() or (radiance < 0).any():
+        yield "a value is negative or not finite"
+        return
+    if rooms.spec.shading == "path":
+        return
+    if rooms.spec.spp > 1 or rooms.spec.shadows:
+        # Whatever the shadows, and whatever else a pixel sees: no darker than ambient light.
+        darkest = (batch.reflectance[0, : batch.object_count[0] + 1] * batch.ambient[0]).min(axis=0)
+        if (room.object_id >= 0).all() and (radiance < darkest - 0.5 / 255 - 1e-3).any():
+            yield "a pixel is darker than ambient light alone"
+        return
+    material = np.maximum(room.object_id, 0)
+    specular, shininess = batch.gloss[0, material, 0], batch.gloss[0, material, 1]
+    matte = (
+        transform_points(room.world_from_camera, np.nan_to_num(room.points)),
+        transform_vectors(room.world_from_camera, room.normal),
+        batch.reflectance[0, material],
+        batch.light_position[0, : batch.light_count[0]],
+        batch.light_color[0, : batch.light_count[0]],
+        batch.ambient[0],
+        batch.attenuation[0],
+    )
+    reference = shade(*matte)
+    tolerance = RADIANCE_TOLERANCE * np.maximum(reference, 1.0)
+    if rooms.spec.specular[1] > 0:
+        shine = shade(*matte, specular, shininess, room.world_from_camera[:3, 3]) - reference
+        tolerance += LOBE_TOLERANCE * shininess[..., None] * shine
+        reference += shine
+    reference[room.object_id < 0] = room.scene.background
+    step = {"uint8": 0.5 / 255, "float16": 2.0**-11, "float32": 0.0}[rooms.spec.image_dtype]
+    if rooms.spec.image_dtype == "uint8":
+        reference = reference.clip(0, 1)
+    off = np.abs(radiance - reference) - step * np.maximum(reference, 1.0) - tolerance
+    if (off > 0).any():
+        yield f"{int((off > 0).any(-1).sum())} pixels are not what the shading equation gives"
+
+
+def _sampled_again(rooms: RoomsFile, rows: Array, objects: Objects) -> Check:
+    """Whether the seed still gives the stored descriptions."""
+    wrong = []
+    for i in rows.tolist():
+        try:
+            stored = rooms.scene(i)
+            tries = (
+                sample_scene(rooms.spec, stored.index, k, objects) for k in range(MAX_ATTEMPTS)
+            )
+            same = any(scene == stored for scene in tries)
+        except (FileFormatError, SpecError):
+            same = False
+        if not same:
+            wrong.append(f"row {i}")
+    detail = ", ".join(wrong) + " cannot be drawn again" if wrong else f"{len(rows)} rows"
+    return Check("drawn again from the seed", not wrong, detail)
+
+
+def _rendered_again(rooms: RoomsFile, rows: Array, device: str, objects: Objects) -> Check:
+    """Whether the stored descriptions give the stored pixels: bit for bit on the same backend."""
+    variant = select_variant(device)
+    written_by = rooms.attributes.get("variant")
+    exact = variant == written_by
+    wrong = []
+    for i in rows.tolist():
+        try:
+            room = rooms[i]
+            with np.errstate(all="ignore"):
+                again = render(pack(rooms.spec, [room.scene], (room.view_index,), objects), device)
+        except (FileFormatError, SpecError, BadMeshError):
+            wrong.append(f"row {i} (cannot be read)")
+            continue
+        pairs = {name: (getattr(room, name), getattr(again, name)[0]) for name in _PIXELS}
+        if exact:
+            differs = [n for n, (a, b) in pairs.items() if not np.array_equal(a, b, equal_nan=True)]
+        else:
+            off = np.abs(pairs["depth"][0] - pairs["depth"][1]) > OTHER_BACKEND_TOLERANCE
+            differs = ["depth"] if off.mean() > 1e-3 else []
+        if differs:
+            wrong.append(f"row {i} ({', '.join(differs)})")
+    how = "bit for bit" if exact else f"to {OTHER_BACKEND_TOLERANCE} ({written_by}, here {variant})"
+    detail = "differ: " + ", ".join(wrong) if wrong else f"{len(rows)} rows, {how}"
+    return Check("rendered again", not wrong, detail)

@@ -1,0 +1,129 @@
+"""Write a rooms file."""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.common.records import check
+from scenegen.common.row_file import Table, new_file, writer_name
+from scenegen.description.scenes import SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.layout import FORMAT_NAME, FORMAT_VERSION, columns
+from scenegen.rendering.packing import SceneBatch
+
+Array = NDArray[Any]
+MAX_COUNT = 100_000_000
+CONVENTIONS = (
+    "world: right-handed, y up, room = unit box with floor y = 0 and walls x = 0, z = 0; camera:"
+    " x right, y up, looks along -z; pixels: row 0 on top, centres at +0.5; see docs/conventions.md"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class RenderedScene:
+    """An accepted item: its scene, and the pixels of its V views, as in `GroundTruth`."""
+
+    scene: SceneSpec
+    image: Array
+    depth: Array
+    normal: Array
+    object_id: Array
+    visible_pixels: Array
+
+
+class RoomsWriter:
+    """The rows of a rooms file in the making; `create_rooms` makes one."""
+
+    def __init__(self, file: h5py.File, spec: DatasetSpec, count: int, compression: str) -> None:
+        """Create the datasets of `count` scenes."""
+        self.classes, self.views = spec.shapes, spec.views
+        self.table = Table(file, columns(spec), count * len(spec.views), compression)
+        self.digest = hashlib.sha256(spec.to_json().encode())
+
+    def append(self, rooms: Sequence[RenderedScene], batch: SceneBatch) -> None:
+        """Write a row for each view of each scene; `batch` is they, packed."""
+        images = iter(range(len(batch)))
+        numbers = [self.classes.index(name.partition("/")[0]) for name in batch.names]
+        classes = np.array([*numbers, -1])  # the last one is that of unused slots
+        for room in rooms:
+            description = room.scene.to_json()
+            self.digest.update(b"\n" + description.encode())
+            models = [item.shape for item in room.scene.objects]
+            for view, i in zip(range(len(room.image)), images, strict=False):
+                shape = batch.shape[i]
+                self.table.append(
+                    {
+                        "image": room.image[view],
+                        "depth": room.depth[view],
+                        "normal": room.normal[view],
+                        "object_id": room.object_id[view],
+                        "scene_index": room.scene.index,
+                        "view_index": view,
+                        "view_angle_degrees": self.views[view],
+                        "camera/world_from_camera": batch.world_from_camera[i],
+                        "camera/fov_y_degrees": batch.fov_y_degrees[i],
+                        "light/count": batch.light_count[i],
+                        "light/position": batch.light_position[i],
+                        "light/color": batch.light_color[i],
+                        "light/ambient": batch.ambient[i],
+                        "light/attenuation": batch.attenuation[i],
+                        "material/reflectance": batch.reflectance[i],
+                        "material/specular": batch.gloss[i, :, 0],
+                        "material/shininess": batch.gloss[i, :, 1],
+                        "object/count": batch.object_count[i],
+                        "object/shape": classes[shape],
+                        "object/model": models + [""] * (len(shape) - len(models)),
+                        "object/world_from_object": batch.world_from_object[i],
+                        "object/scale": batch.object_scale[i],
+                        "object/visible_pixels": room.visible_pixels[view],
+                        "scene": description,
+                    }
+                )
+
+
+@contextmanager
+def create_rooms(
+    path: str | Path,
+    spec: DatasetSpec,
+    count: int,
+    *,
+    compression: str = "gzip",
+    overwrite: bool = False,
+    attributes: dict[str, str] | None = None,
+) -> Iterator[RoomsWriter]:
+    """Open a rooms file to write `count` scenes; it gets its name when the block ends well.
+
+    Its bytes depend on the rows alone, not on how they were handed over.
+
+    Raises:
+        SpecError: unknown compression, or a count below 1.
+        OSError: the path, or the disk.
+    """
+    rows = count * len(spec.views)
+    most = MAX_COUNT // len(spec.views)
+    check(1 <= count <= most, "n", count, f"from 1 to {most:,} scenes")
+    with new_file(path, overwrite) as file:
+        file.attrs.update(
+            {
+                "format": FORMAT_NAME,
+                "format_version": FORMAT_VERSION,
+                "writer": writer_name(),
+                "spec": spec.to_json(),
+                "count": rows,
+                "compression": compression,
+                "conventions": CONVENTIONS,
+                **(attributes or {}),
+            }
+        )
+        writer = RoomsWriter(file, spec, count, compression)
+        yield writer
+        if writer.table.rows != rows:
+            raise RuntimeError(f"{path}: got {writer.table.rows} of {rows} rows")
+        file.attrs["fingerprint"] = writer.digest.hexdigest()

@@ -1,0 +1,173 @@
+"""Questions as batches: images with their own lights, answers where they may be known."""
+
+import math
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from iqtt.files.make import make_split
+from iqtt.questions.specs import SplitSpec
+from scenegen.common.errors import SpecError
+
+torch = pytest.importorskip("torch")
+from torch.utils.data import default_collate  # noqa: E402
+
+from baselines.pix2shape.data.questions import QuestionImages, for_questions  # noqa: E402
+from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
+from baselines.pix2shape.network.networks import NetworkSpec  # noqa: E402
+from baselines.pix2shape.network.surfels import render  # noqa: E402
+
+SPEC = SplitSpec(
+    seed=5, train=7, labeled=4, val=2, test=1, cubes=(5, 7), lights=(1, 3), height=64, width=64,
+    min_cube_pixels=2, with_depth=True, image_dtype="float32", background=(0.9, 1.0, 0.8),
+)  # fmt: skip
+TINY = ModelConfig(networks=NetworkSpec(size=32, width=0.05, camera=False))
+TRUTH = {
+    "cube_count", "cubes", "shape_id", "class_id", "world_from_shape", "distractor_kind",
+    "angle_degrees", "visible_pixels", "depth",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a split of 3 + 4, 2 and 1 questions, 64x64."""
+    folder = tmp_path_factory.mktemp("questions") / "split"
+    make_split(folder, SPEC, command="tests")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def train_path(folder: Path) -> Path:
+    return folder / "iqtt-train.h5"
+
+
+def batch_of(source: QuestionImages) -> Any:
+    return source.as_batch(default_collate([source[row] for row in range(len(source))]))
+
+
+def test_items_are_the_four_images_and_batches_four_after_four(train_path):
+    source = QuestionImages(train_path, "unlabeled", TINY)
+    assert len(source) == 3
+    batch = batch_of(source)
+    with h5py.File(train_path) as file:
+        questions = file["unlabeled/questions"][:]
+        colors = file["truth/unlabeled/light_color"][:]
+    parts = [questions[:, :, i::2, j::2] for i in (0, 1) for j in (0, 1)]
+    means = np.moveaxis(sum(parts) / 4, -1, 2)
+    assert source[0]["image"].shape == (4, 3, 32, 32)
+    assert batch.image.shape == (12, 3, 32, 32)
+    assert batch.views.condition.shape == (12, 0)
+    for row in range(3):
+        assert all(v.dtype == np.float32 and len(v) == 4 for v in source[row].values())
+        np.testing.assert_allclose(source[row]["image"], means[row], rtol=1e-6)
+        for place in range(4):
+            np.testing.assert_allclose(batch.image[4 * row + place], means[row, place], rtol=1e-6)
+            light = batch.views.scene.light_color[4 * row + place]
+            np.testing.assert_allclose(light, colors[row, place], rtol=1e-6)
+
+
+def test_the_truth_shaded_with_what_is_told_is_the_image(train_path):
+    """Where the neighbours lie in one plane, so that normals of the depth map are exact."""
+    source = QuestionImages(train_path, "unlabeled", TINY)
+    batch = batch_of(source)
+    with h5py.File(train_path) as file:
+        depth = file["truth/unlabeled/depth"][:].reshape(12, 64, 64).astype(np.float64)
+        expected = file["unlabeled/questions"][:].reshape(12, 64, 64, 3)
+    behind = np.isnan(depth)
+    colors = np.broadcast_to(batch.views.background[:, None, None].numpy(), expected.shape)
+    np.testing.assert_allclose(expected[behind], colors[behind], rtol=1e-6)
+    image = render(torch.tensor(np.where(behind, 15, depth)).float(), batch.views.scene)
+    inverse = np.pad(1 / depth, ((0, 0), (1, 1), (1, 1)), constant_values=np.nan)
+    flat = np.ones_like(behind)
+    for i, j in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        ahead, back = np.roll(inverse, (i, j), (1, 2)), np.roll(inverse, (-i, -j), (1, 2))
+        flat &= (np.abs(ahead + back - 2 * inverse) < 3e-8)[:, 1:-1, 1:-1]
+    assert flat.sum() > 0.3 * (~behind).sum()
+    difference = np.abs(np.moveaxis(image.numpy(), 1, -1) - expected)[flat]
+    assert difference.max() < 2e-3
+    assert np.ptp(expected[flat], axis=0).min() > 0.1, "not the ambient light alone"
+
+
+def test_answers_are_those_of_the_labelled_part(train_path, folder):
+    labelled = QuestionImages(train_path, "labeled", TINY)
+    with h5py.File(train_path) as file:
+        answers = file["labeled/answers"][:].tolist()
+    assert [labelled[row]["answer"] for row in range(4)] == answers
+    assert labelled.has_answers
+    assert batch_of(labelled).image.shape == (16, 3, 32, 32), "the answer is no part of the batch"
+    unlabelled = QuestionImages(train_path, "unlabeled", TINY)
+    assert not unlabelled.has_answers
+    assert "answer" not in unlabelled[0]
+    assert QuestionImages(folder / "iqtt-val.h5", None, TINY).has_answers
+
+
+def test_shapes_and_rotations_are_never_read(train_path, tmp_path):
+    shutil.copy(train_path, tmp_path / "blank.h5")
+    with h5py.File(tmp_path / "blank.h5", "r+") as file:
+        truth = file["truth/labeled"]
+        assert set(truth) - TRUTH == {"light_count", "light_position", "light_color"}
+        for name in TRUTH | {"light_count"}:
+            truth[name][...] = 0
+    blank = QuestionImages(tmp_path / "blank.h5", "labeled", TINY)
+    told = QuestionImages(train_path, "labeled", TINY)
+    for row in range(4):
+        assert blank[row].keys() == told[row].keys()
+        assert all(np.array_equal(blank[row][name], told[row][name]) for name in told[row])
+
+
+@pytest.mark.parametrize(
+    ("name", "part", "words"),
+    [
+        ("iqtt-test.h5", None, r"iqtt-test\.h5: found 1 questions without lights"),
+        ("iqtt-train.h5", None, "part: found none, expected labeled or unlabeled"),
+        ("iqtt-val.h5", "labeled", "part: found labeled, expected none"),
+    ],
+)
+def test_files_without_lights_and_other_parts_are_refused(folder, name, part, words):
+    with pytest.raises(SpecError, match=words):
+        QuestionImages(folder / name, part, TINY)
+
+
+def test_released_files_are_refused(tmp_path):
+    path = tmp_path / "released.h5"
+    with h5py.File(path, "w") as file:
+        file["questions"] = np.zeros((3, 4, 64, 64, 3), np.float32)
+        file["answers"] = np.zeros(3, np.uint8)
+    with pytest.raises(SpecError, match=r"released\.h5: found 3 questions without lights"):
+        QuestionImages(path, None, TINY)
+    with pytest.raises(SpecError, match=r"released\.h5: expected training questions, such as"):
+        for_questions(TINY, path, None)
+
+
+def test_no_questions_and_odd_sizes_are_refused(tmp_path):
+    spec = replace(SPEC, train=1, labeled=0, val=0, test=0, height=48, width=64)
+    make_split(tmp_path / "split", spec)
+    path = tmp_path / "split" / "iqtt-train.h5"
+    with pytest.raises(SpecError, match=r"iqtt-train\.h5: images of 48x64, expected squares"):
+        QuestionImages(path, "unlabeled", TINY)
+    make_split(tmp_path / "split", replace(spec, height=32, width=32), overwrite=True)
+    with pytest.raises(SpecError, match=r"iqtt-train\.h5: found 0 questions with lights"):
+        QuestionImages(path, "labeled", TINY)
+
+
+def test_the_configuration_for_questions(train_path):
+    plain = replace(TINY, networks=replace(TINY.networks, classes=7), batch=12, seed=9, depth=0.0)
+    config = for_questions(plain, train_path, "unlabeled")
+    spec = config.networks
+    assert (spec.camera, spec.classes, spec.z_view, spec.z) == (False, 0, 10, plain.networks.z)
+    assert (spec.size, spec.width, config.batch, config.seed) == (32, 0.05, 12, 9)
+    assert config.opacity
+    assert config.depth_middle == pytest.approx(
+        1.02 * SPEC.max_radius / math.sin(math.radians(SPEC.fov_degrees) / 2)
+    )
+    assert config.depth_reach == pytest.approx(SPEC.max_radius / config.depth_middle)
+    with h5py.File(train_path) as file:
+        depth = file["truth/unlabeled/depth"][:] / config.depth_middle
+    assert 1 - config.depth_reach < np.nanmin(depth) < np.nanmax(depth) < 1 + config.depth_reach
+    with pytest.raises(SpecError, match="z scene: found 10, expected 11 or more"):
+        for_questions(replace(plain, networks=NetworkSpec(z_scene=10)), train_path, "labeled")

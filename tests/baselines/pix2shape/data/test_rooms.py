@@ -1,0 +1,225 @@
+"""Rooms as batches: what the file holds, as the networks take it, and no ground truth."""
+
+import shutil
+from collections.abc import Callable
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.description.presets import VESSELS
+from scenegen.rooms.reader import RoomsFile
+
+torch = pytest.importorskip("torch")
+from torch.utils.data import DataLoader, default_collate  # noqa: E402
+
+from baselines.pix2shape.data.rooms import Draws, RoomImages  # noqa: E402
+from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
+from baselines.pix2shape.network.networks import NetworkSpec  # noqa: E402
+from baselines.pix2shape.network.surfels import render  # noqa: E402
+
+KNOWN = {"light_position", "light_color", "ambient", "attenuation", "reflectance"}
+
+
+def tiny(classes: int = 0, camera: bool = True, **settings: Any) -> ModelConfig:
+    networks = NetworkSpec(size=32, width=0.05, classes=classes, camera=camera)
+    return ModelConfig(networks=networks, **settings)
+
+
+@pytest.fixture(scope="session")
+def views_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a file of 3 rooms seen twice, 64x64, float32."""
+    path = tmp_path_factory.mktemp("data") / "views.h5"
+    size = {"height": 64, "width": 64, "object_radius": (0.08, 0.16)}
+    look = {"attenuation": (0.2, 0.7), "ambient": (0.1, 0.2, 0.3), "light_saturation": 1.0}
+    look |= dict.fromkeys(("reflectance", "room_reflectance"), (0.8, 0.7, 0.6))
+    return make_rooms(path, 3, **size, **look, views=(0.0, 35.0), image_dtype="float32")
+
+
+@pytest.fixture(scope="session")
+def vessels_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a file of 5 rooms with one object of seven classes."""
+    path = tmp_path_factory.mktemp("data") / "vessels.h5"
+    return make_rooms(path, 5, source="families", shapes=VESSELS, objects=(1, 1))
+
+
+def edited(path: Path, to: Path, edit: Callable[[h5py.File], Any]) -> Path:
+    shutil.copy(path, to)
+    with h5py.File(to, "r+") as file:
+        edit(file)
+    return to
+
+
+def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    return one.keys() == other.keys() and all(np.array_equal(one[k], other[k]) for k in one)
+
+
+def test_images_are_means_of_blocks_of_linear_radiance(views_path, rooms_path):
+    source = RoomImages(views_path, tiny())
+    with RoomsFile(views_path) as rooms:
+        for row, room in enumerate(rooms):
+            image = source[row]["image"]
+            parts = [room.radiance[i::2, j::2] for i in (0, 1) for j in (0, 1)]
+            assert (image.shape, image.dtype) == ((3, 32, 32), np.float32)
+            np.testing.assert_allclose(image, np.moveaxis(sum(parts) / 4, -1, 0), rtol=1e-6)
+    eight_bits = RoomImages(rooms_path, tiny())[2]["image"]
+    with h5py.File(rooms_path) as file:
+        stored = np.moveaxis(file["image"][2], -1, 0)
+    np.testing.assert_allclose(255 * eight_bits, stored, rtol=1e-6)
+
+
+def test_the_truth_shaded_with_what_is_told_is_the_image(views_path):
+    """Lights, camera and material are those of the image: the renderer's own hits prove it."""
+    source = RoomImages(views_path, tiny())
+    batch = source.as_batch(default_collate([source[row] for row in range(len(source))]))
+    with h5py.File(views_path) as file:
+        depth, normal = torch.tensor(file["depth"][:]), torch.tensor(file["normal"][:])
+        expected = file["image"][:]
+    assert (batch.views.scene.light_color != 0).any(dim=2).sum(dim=1).unique().numel() > 1
+    image = render(depth, batch.views.scene, normal.permute(0, 3, 1, 2)).permute(0, 2, 3, 1)
+    np.testing.assert_allclose(image, expected, rtol=4e-5, atol=4e-5)
+
+
+def test_each_view_is_a_row_with_its_own_camera(views_path):
+    source = RoomImages(views_path, tiny())
+    with RoomsFile(views_path) as rooms:
+        poses = rooms.read("camera/world_from_camera", slice(None))
+        scenes, spec = rooms.read("scene_index", slice(None)), rooms.spec
+    assert len(source) == 6
+    assert scenes.tolist() == [0, 0, 1, 1, 2, 2]
+    found = np.stack([source[row]["condition"] for row in range(6)])
+    np.testing.assert_array_equal(found, poses[:, :3, 3].astype(np.float32))
+    np.testing.assert_allclose(np.linalg.norm(found - spec.camera_target, axis=1), 1.5, rtol=1e-5)
+    for first in (0, 2, 4):
+        one, other = source[first], source[first + 1]
+        assert np.array_equal(one["light_color"], other["light_color"])
+        for name in ("condition", "light_position", "image"):
+            assert not np.array_equal(one[name], other[name]), name
+
+
+@pytest.mark.parametrize("camera", [True, False])
+def test_the_class_is_one_hot_behind_the_camera(vessels_path, camera):
+    source = RoomImages(vessels_path, tiny(7, camera))
+    assert source.classes == VESSELS
+    with h5py.File(vessels_path) as file:
+        models = file["object/model"].asstr()[:, 0]
+        places = file["camera/world_from_camera"][:, :3, 3]
+    assert len({model.split("/")[0] for model in models}) > 1
+    for row, model in enumerate(models):
+        condition = source[row]["condition"]
+        assert condition.shape == (10 if camera else 7,)
+        if camera:
+            np.testing.assert_allclose(condition[:3], places[row], rtol=1e-6)
+        assert sorted(condition[-7:]) == [0] * 6 + [1]
+        assert VESSELS[int(condition[-7:].argmax())] == model.split("/")[0]
+
+
+def test_depth_is_read_only_for_supervision(views_path, tmp_path):
+    item = RoomImages(views_path, tiny())[0]
+    assert set(item) == KNOWN | {"image", "condition", "world_from_camera"}
+
+    def hole(file: h5py.File) -> None:
+        file["depth"][1, 7, 10] = np.nan
+
+    path = edited(views_path, tmp_path / "hole.h5", hole)
+    source = RoomImages(path, tiny(depth=1.0))
+    with h5py.File(path) as file:
+        parts = [file["depth"][1][i::2, j::2] for i in (0, 1) for j in (0, 1)]
+    item = source[1]
+    np.testing.assert_allclose(item["depth"], sum(parts) / 4, rtol=1e-6)
+    assert np.argwhere(np.isnan(item["depth"])).tolist() == [[3, 5]]
+    batch = source.as_batch(default_collate([source[0], item]))
+    assert batch.depth.shape == (2, 32, 32)
+    plain = RoomImages(path, tiny())
+    assert plain.as_batch(default_collate([plain[1]])).depth is None
+
+
+def test_nothing_of_the_truth_is_read(views_path, tmp_path):
+    def forget(file: h5py.File) -> None:
+        names = ("depth", "normal", "object_id", "object/shape", "object/world_from_object")
+        for name in (*names, "object/scale", "object/visible_pixels"):
+            file[name][...] = 0
+
+    path = edited(views_path, tmp_path / "blank.h5", forget)
+    for row in range(6):
+        assert same(RoomImages(path, tiny())[row], RoomImages(views_path, tiny())[row])
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"random_reflectance": True},
+        {"room_reflectance": (0.4, 0.6, 0.85)},
+        {"specular": (0.3, 0.8), "shininess": (8.0, 64.0)},
+    ],
+)
+def test_several_materials_are_refused(make_rooms, tmp_path, settings):
+    path = make_rooms(tmp_path / "many.h5", 3, **settings)
+    with pytest.raises(SpecError, match=r"many\.h5: rooms of several materials"):
+        RoomImages(path, tiny())
+
+
+@pytest.mark.parametrize(("height", "width"), [(96, 128), (50, 50), (16, 16)])
+def test_sizes_that_cannot_be_reduced_are_refused(make_rooms, tmp_path, height, width):
+    path = make_rooms(tmp_path / "odd.h5", 1, height=height, width=width, min_visible_pixels=1)
+    text = rf"odd\.h5: images of {height}x{width}, expected squares of a multiple of 32 pixels"
+    with pytest.raises(SpecError, match=text):
+        RoomImages(path, tiny())
+
+
+def test_other_classes_and_other_files_are_refused(vessels_path, tmp_path):
+    with pytest.raises(SpecError, match=r"vessels\.h5: 7 classes, the networks were made for 3"):
+        RoomImages(vessels_path, tiny(3))
+    with pytest.raises(FileNotFoundError, match=r"none\.h5"):
+        RoomImages(tmp_path / "none.h5", tiny())
+    (tmp_path / "text.h5").write_text("no rooms")
+    with pytest.raises(FileFormatError, match=r"text\.h5"):
+        RoomImages(tmp_path / "text.h5", tiny())
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_loader_with_workers(rooms_path):
+    source = RoomImages(rooms_path, tiny(depth=1.0))
+    source[0]  # open here, before the workers are forked
+    draws = Draws(len(source), 3, seed=4)
+    loader = DataLoader(source, batch_sampler=draws, num_workers=2)
+    for rows, items in islice(zip(draws, loader, strict=False), 4):
+        assert same(items, default_collate([source[row] for row in rows]))
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    rows=st.integers(1, 20),
+    batch=st.integers(1, 7),
+    seed=st.integers(0, 2**32),
+    first=st.integers(0, 30),
+)
+def test_a_batch_depends_on_its_number_alone(rows, batch, seed, first):
+    through = list(islice(Draws(rows, batch, seed), first + 3))
+    assert list(islice(Draws(rows, batch, seed, first), 3)) == through[first:]
+    drawn = [row for one in through for row in one]
+    assert len(drawn) == batch * (first + 3)
+    for epoch in range(len(drawn) // rows):
+        assert sorted(drawn[epoch * rows : (epoch + 1) * rows]) == list(range(rows))
+
+
+@pytest.mark.parametrize("world", [1, 2, 3])
+def test_processes_share_each_batch(world):
+    shares = [Draws(11, 5, 3, share=slice(rank, None, world)) for rank in range(world)]
+    for whole, *parts in islice(zip(Draws(11, 5, 3), *shares, strict=True), 9):
+        assert sorted(row for part in parts for row in part) == sorted(whole)
+        assert max(map(len, parts)) - min(map(len, parts)) <= 1
+
+
+def test_the_order_changes_with_epoch_and_seed():
+    def orders(seed: int) -> list[tuple[int, ...]]:
+        return [tuple(one) for one in islice(Draws(20, 20, seed), 5)]
+
+    assert orders(1) == orders(1)
+    assert len({*orders(1), *orders(2)}) == 10

@@ -1,0 +1,136 @@
+"""Networks: the tables' shapes and parameter counts, and what conditions them."""
+
+import itertools
+
+import pytest
+
+torch = pytest.importorskip("torch")
+from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
+from baselines.pix2shape.network.model import Pix2Shape, Views, shaded  # noqa: E402
+from baselines.pix2shape.network.networks import (  # noqa: E402
+    DECODER_CHANNELS,
+    ENCODER_CHANNELS,
+    ConditionalNorm,
+    Critic,
+    Decoder,
+    Encoder,
+    NetworkSpec,
+    Statistics,
+)
+from baselines.pix2shape.network.surfels import Scene  # noqa: E402
+
+SMALL = NetworkSpec(size=32, width=0.05)
+
+
+def count(module: torch.nn.Module) -> int:
+    return sum(p.numel() for p in module.parameters())
+
+
+def convolutions(channels: list[int]) -> int:
+    """Parameters of 4x4 convolutions between so many channels, biases included."""
+    return sum(16 * a * b + b for a, b in itertools.pairwise(channels))
+
+
+def conditional(channels: list[int], inputs: int) -> int:
+    return sum(64 * (inputs + 1) + 65 * 2 * c for c in channels)
+
+
+def test_the_papers_networks_have_the_tables_sizes() -> None:
+    spec = NetworkSpec()
+    assert (spec.z, spec.condition) == (128, 3)
+    encoder = convolutions([6, *ENCODER_CHANNELS, 128])
+    assert count(Encoder(spec)) == encoder + conditional([85, 170, 340, 680], 3)
+    plain = sum(2 * c for c in (627, 168))
+    decoder = sum(
+        16 * a * b + b
+        for a, b in zip([131, *DECODER_CHANNELS], [*DECODER_CHANNELS, 1], strict=True)
+    )
+    assert count(Decoder(spec)) == decoder + conditional([1344, 336, 84], 3) + plain
+    joined = convolutions([6, 85, 170, 340, 680]) + 16 * (680 + 128) * 1360 + 1360
+    assert count(Critic(spec)) == joined + 16 * 1360 + 1
+    assert count(Statistics(spec)) == 128 * 256 + 256 + 256 * 512 + 512 + 512 + 1
+
+
+def test_every_layer_has_the_output_size_of_its_table() -> None:
+    spec = NetworkSpec(width=0.02)
+    sizes: list[tuple[int, ...]] = []
+    encoder, decoder = Encoder(spec).eval(), Decoder(spec).eval()
+    for layer in (*encoder.layers, encoder.last, *decoder.layers, decoder.last):
+        layer.register_forward_hook(lambda _m, _i, out: sizes.append(tuple(out.shape[1:])))
+    image, camera = torch.rand(1, 3, 128, 128), torch.rand(1, 3)
+    decoder(encoder(image, camera), camera)
+    pixels = [64, 32, 16, 8, 4, 1, 4, 8, 16, 32, 64, 128]
+    assert [(h, w) for _, h, w in sizes] == [(p, p) for p in pixels]
+    assert sizes[5] == (128, 1, 1)
+    assert sizes[-1] == (1, 128, 128)
+
+
+@pytest.mark.parametrize("size", [32, 64, 128, 256])
+@pytest.mark.parametrize(("camera", "classes"), [(True, 0), (False, 0), (True, 7), (False, 3)])
+def test_all_sizes_and_conditions(size: int, camera: bool, classes: int) -> None:
+    spec = NetworkSpec(size=size, width=0.02, camera=camera, classes=classes, z_scene=20, z_view=4)
+    image, condition = torch.rand(2, 3, size, size), torch.rand(2, spec.condition)
+    code = Encoder(spec)(image, condition)
+    assert code.shape == (2, 24)
+    assert Decoder(spec)(code, condition).shape == (2, 1, size, size)
+    assert Critic(spec)(image, code, condition).shape == (2,)
+    assert Statistics(spec)(code[:, :20], code[:, 20:]).shape == (2,)
+
+
+def test_width_scales_channels() -> None:
+    assert NetworkSpec(width=0.5).channels(ENCODER_CHANNELS) == [42, 85, 170, 340, 680]
+    assert NetworkSpec().channels(DECODER_CHANNELS) == list(DECODER_CHANNELS)
+    assert NetworkSpec(size=256).channels(DECODER_CHANNELS) == [*DECODER_CHANNELS, 42]
+    assert NetworkSpec(size=64).channels(ENCODER_CHANNELS) == [170, 340, 680, 1360]
+
+
+def test_the_camera_matters_to_every_network() -> None:
+    torch.manual_seed(0)
+    image, code, camera = torch.rand(3, 3, 32, 32), torch.randn(3, 128), torch.rand(3, 3)
+    for make, inputs in ((Encoder, (image,)), (Decoder, (code,)), (Critic, (image, code))):
+        network = make(SMALL)
+        assert not torch.allclose(network(*inputs, camera), network(*inputs, camera + 1))
+
+
+def test_conditional_normalisation_normalises_and_then_follows_its_condition() -> None:
+    torch.manual_seed(0)
+    norm, values = ConditionalNorm(5, 3), 3 + 2 * torch.randn(64, 5, 4, 4)
+    out = norm(values, torch.rand(64, 3))
+    assert out.mean(dim=(0, 2, 3)).abs().max() < 1e-5, "scale 1 and shift 0 to begin with"
+    assert (out.std(dim=(0, 2, 3)) - 1).abs().max() < 1e-2
+    torch.nn.init.normal_(norm.affine[-1].weight)
+    first, second = torch.zeros(64, 3), torch.ones(64, 3)
+    assert not torch.allclose(norm(values, first), norm(values, second))
+
+
+def test_critic_scores_depend_on_their_own_item_only() -> None:
+    """No batch normalisation: the gradient penalty is each item's own."""
+    torch.manual_seed(0)
+    critic = Critic(SMALL)
+    image, code, camera = torch.rand(4, 3, 32, 32), torch.randn(4, 128), torch.rand(4, 3)
+    together = critic(image, code, camera)
+    alone = torch.cat([critic(image[[i]], code[[i]], camera[[i]]) for i in range(4)])
+    torch.testing.assert_close(together, alone)
+
+
+def test_bfloat16_reaches_neither_renderer_nor_losses() -> None:
+    """An image is the same under autocast, to the bit; codes and scores are full."""
+    config = ModelConfig(networks=NetworkSpec(size=32, width=0.05))
+    model = Pix2Shape(config).eval()
+    count = 3
+    scene = Scene(
+        28.0,
+        torch.rand(count, 2, 3) + torch.tensor([0.0, 0.0, 1.5]),
+        torch.rand(count, 2, 3),
+        torch.rand(count, 3),
+        torch.rand(count, 2) + 0.2,
+        torch.rand(count, 3),
+    )
+    views = Views(torch.rand(count, 3), scene)
+    depth = 1.5 + 0.1 * torch.rand(count, 32, 32)
+    plain = shaded(depth, None, views)
+    with torch.autocast("cpu", torch.bfloat16):
+        assert torch.equal(shaded(depth, None, views), plain)
+        code = model.encode(plain, views)
+        score = model.critic(plain, code, views.condition)
+        assert {code.dtype, score.dtype, model.image(code, views).dtype} == {torch.float32}

@@ -1,0 +1,174 @@
+"""Checkpoints refused when damaged; each step's own noise; several processes, one model."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from scenegen.common.errors import FileFormatError
+
+torch = pytest.importorskip("torch")
+from lightning_fabric import Fabric  # noqa: E402
+
+from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
+from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
+from baselines.pix2shape.network.networks import NetworkSpec  # noqa: E402
+from baselines.pix2shape.training import loop as training  # noqa: E402
+from baselines.pix2shape.training.loop import train  # noqa: E402
+from baselines.pix2shape.training.state import CHECKPOINT, load_state, new_state, save_state  # noqa: E402
+from baselines.pix2shape.weights.weights import Card, load_tensors, save_tensors  # noqa: E402
+
+TINY = ModelConfig(
+    networks=NetworkSpec(size=32, width=0.05, z_scene=24), iterations=3, batch=4, critic_steps=1,
+    mutual_information=0.0,
+)  # fmt: skip
+TWO = """
+import sys
+import torch
+from pathlib import Path
+from lightning_fabric import Fabric
+from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.data.rooms import RoomImages
+from baselines.pix2shape.training.state import new_state, save_state
+from baselines.pix2shape.training.loop import train
+from baselines.pix2shape.weights.weights import Card
+
+torch.set_num_threads(1)
+fabric = Fabric(accelerator="cpu", devices=2, strategy="ddp")
+fabric.launch()
+config = ModelConfig.from_json(sys.argv[1])
+state = new_state(config)
+for losses, batch in train(state, RoomImages(sys.argv[2], config), fabric):
+    assert len(batch.image) == config.batch // 2
+folder = Path(sys.argv[3]) / str(fabric.global_rank)
+folder.mkdir()
+save_state(folder, state, Card(config, state.iteration))
+"""
+Tensors = dict[str, Any]
+
+
+@pytest.fixture
+def folder(rooms_path: Path, tmp_path: Path) -> Path:
+    """Return a folder with the checkpoint of a tiny model, trained for three iterations."""
+    fabric = Fabric(accelerator="cpu", devices=1)
+    fabric.launch()
+    state = new_state(TINY)
+    for _ in train(state, RoomImages(rooms_path, TINY), fabric):
+        pass
+    save_state(tmp_path, state, Card(TINY, state.iteration))
+    return tmp_path
+
+
+def rewritten(folder: Path, edit: Callable[[Tensors, dict[str, str]], Any]) -> None:
+    tensors, notes = load_tensors(folder / CHECKPOINT)
+    edit(tensors, notes)
+    save_tensors(folder / CHECKPOINT, tensors, notes)
+
+
+def refused(folder: Path) -> str:
+    """Check that loading raises one line that begins with the file; return it."""
+    with pytest.raises(FileFormatError) as error:
+        load_state(folder)
+    line = str(error.value)
+    assert line.startswith(f"{folder / CHECKPOINT}: ")
+    assert "\n" not in line
+    return line
+
+
+def test_an_untrained_state_is_a_checkpoint_too(tmp_path):
+    state = new_state(TINY)
+    save_state(tmp_path, state, Card(TINY))
+    again, _ = load_state(tmp_path)
+    assert again.iteration == 0
+    for name, value in state.model.state_dict().items():
+        assert torch.equal(again.model.state_dict()[name], value), name
+    assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".safetensors"}
+
+
+def test_a_checkpoint_that_is_not_there(tmp_path):
+    with pytest.raises(FileNotFoundError, match="checkpoint"):
+        load_state(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (lambda t, n: n.clear(), "release: 'iteration'"),
+        (lambda t, n: n.update(iteration="three"), "invalid literal"),
+        (lambda t, n: n.update(seconds="long"), "could not convert"),
+        (lambda t, n: t.update({"critic.x.step": torch.ones(1)}), "invalid literal"),
+        (lambda t, n: t.pop("model.critic.last.bias"), "critic.last.bias is missing"),
+        (lambda t, n: t.update({"model.more": torch.ones(1)}), "more is not expected"),
+        (lambda t, n: t["model.decoder.last.bias"].fill_(torch.nan), "is not finite"),
+    ],
+)
+def test_damaged_checkpoints_are_refused(folder, edit, words):
+    rewritten(folder, edit)
+    assert words in refused(folder)
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda t, n: t.pop("generator.0.exp_avg"),
+        lambda t, n: [t.pop(name) for name in list(t) if name.startswith("critic.")],
+        lambda t, n: t.update({"generator.0.exp_avg": torch.zeros(3)}),
+        lambda t, n: t["generator.0.exp_avg"].fill_(torch.nan),
+        lambda t, n: t.update({"generator.9999.exp_avg": torch.zeros(3)}),
+        lambda t, n: t.update({"more": torch.zeros(3)}),
+        lambda t, n: n.update(iteration="-5"),
+    ],
+    ids=["missing", "one optimiser", "shape", "nan", "index", "extra", "negative"],
+)
+def test_damaged_moments_are_refused(folder, edit):
+    rewritten(folder, edit)
+    refused(folder)
+
+
+def test_every_step_has_noise_of_its_own(rooms_path, monkeypatch):
+    """Of each critic's batch, too; but the same wherever training began."""
+    fabric, seeds = Fabric(accelerator="cpu", devices=1), []
+    draw = training.draw
+    monkeypatch.setattr(training, "draw", lambda *a: (seeds.append(a[2]), draw(*a))[1])
+    config = replace(TINY, critic_steps=2, iterations=3)
+    for first in (0, 0, 1):
+        state = new_state(config)
+        state.iteration = first
+        for _ in train(state, RoomImages(rooms_path, config), fabric):
+            pass
+    assert len(set(seeds[:6])) == 6
+    assert seeds == [*seeds[:6], *seeds[:6], *seeds[2:6]]
+
+
+@pytest.mark.slow
+def test_two_processes_end_with_the_same_weights(rooms_path, tmp_path):
+    script = tmp_path / "two.py"
+    script.write_text(TWO)
+    config = replace(TINY, iterations=2)
+    command = [sys.executable, "-W", "ignore", script, config.to_json(), rooms_path, tmp_path]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[4])}
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=300, check=False, env=environment
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    (one, card), (other, _) = load_state(tmp_path / "0"), load_state(tmp_path / "1")
+    assert (card.config, one.iteration, other.iteration) == (config, 2, 2)
+    start = dict(new_state(config).model.named_parameters())
+    theirs = dict(other.model.named_parameters())
+    moved = 0
+    for name, value in one.model.named_parameters():
+        assert torch.equal(value, theirs[name]), name
+        moved += not torch.equal(value, start[name])
+    assert moved > 20
+    for kind in ("generator", "critic"):
+        states = [getattr(state, kind).state_dict()["state"] for state in (one, other)]
+        for index, values in states[0].items():
+            assert all(torch.equal(values[name], states[1][index][name]) for name in values)
+    statistics = dict(other.model.named_buffers())
+    different = [n for n, v in one.model.named_buffers() if not torch.equal(v, statistics[n])]
+    assert different, "each saw its own share"

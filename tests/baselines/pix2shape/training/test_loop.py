@@ -1,0 +1,295 @@
+"""Training: the same to the bit whenever it was stopped; it learns; it stops at nonsense."""
+
+import math
+import re
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from iqtt.files.make import make_split
+from iqtt.questions.specs import SplitSpec
+from scenegen.common.errors import SpecError
+
+torch = pytest.importorskip("torch")
+from lightning_fabric import Fabric  # noqa: E402
+
+from baselines.pix2shape.data.questions import QuestionImages, for_questions  # noqa: E402
+from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
+from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
+from baselines.pix2shape.network.networks import NetworkSpec  # noqa: E402
+from baselines.pix2shape.training import loop as training  # noqa: E402
+from baselines.pix2shape.training.batches import question_sizes  # noqa: E402
+from baselines.pix2shape.training.loop import TrainingError, train  # noqa: E402
+from baselines.pix2shape.training.state import State, load_state, new_state, save_state  # noqa: E402
+from baselines.pix2shape.weights.weights import Card  # noqa: E402
+
+TINY = ModelConfig(
+    networks=NetworkSpec(size=32, width=0.05, z_scene=24), iterations=6, batch=4, critic_steps=1,
+    mutual_information=0.0, questions=0.0,
+)  # fmt: skip
+PLAIN = replace(TINY, adversarial=0.0, code_reconstruction=0.0)
+Losses = list[dict[str, float]]
+
+
+@pytest.fixture(scope="session")
+def fabric() -> Fabric:
+    fabric = Fabric(accelerator="cpu", devices=1)
+    fabric.launch()
+    return fabric
+
+
+@pytest.fixture(scope="session")
+def train_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a file of 5 labelled questions and 4 others."""
+    folder = tmp_path_factory.mktemp("training") / "split"
+    spec = SplitSpec(
+        train=9, labeled=5, val=0, test=0, cubes=(5, 6), height=32, width=32, min_cube_pixels=1
+    )
+    make_split(folder, spec)
+    return folder / "iqtt-train.h5"
+
+
+def bits(state: State) -> dict[str, Any]:
+    """Return all that training changes, by name."""
+    found = {f"model.{name}": value.clone() for name, value in state.model.state_dict().items()}
+    for kind in ("generator", "critic"):
+        for index, values in getattr(state, kind).state_dict()["state"].items():
+            found |= {f"{kind}.{index}.{name}": value.clone() for name, value in values.items()}
+    return found
+
+
+def assert_same(one: dict[str, Any], other: dict[str, Any]) -> None:
+    assert one.keys() == other.keys()
+    assert [name for name in one if not torch.equal(one[name], other[name])] == []
+
+
+def run(state: State, source: Any, fabric: Fabric, steps: int | None = None, **how: Any) -> Losses:
+    return [losses for losses, _ in islice(train(state, source, fabric, **how), steps)]
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+@pytest.mark.parametrize("case", ["rooms", "critic steps", "workers", "questions"])
+def test_a_stop_in_the_middle_changes_nothing(case, rooms_path, train_path, fabric, tmp_path):
+    """Weights, moments and losses to the bit; nor do processes that read."""
+    config, how = replace(TINY, decay=True), {}
+    broken_how = {"workers": 2} if case == "workers" else {}
+    if case == "critic steps":
+        config = replace(config, critic_steps=2, consistency=0.1)
+    source = RoomImages(rooms_path, config)
+    if case == "questions":
+        more = {"questions": 0.1, "contrast": 1.0, "mutual_information": 0.1, "consistency": 1.0}
+        config = replace(config, **more, batch=12, question_batch=8)
+        config = for_questions(config, train_path, "unlabeled")
+        source = QuestionImages(train_path, "unlabeled", config)
+        how = {"labelled": QuestionImages(train_path, "labeled", config), "labels": 4}
+    unbroken = new_state(config)
+    expected = run(unbroken, source, fabric, **how)
+    assert unbroken.iteration == 6
+    assert [("questions" in one) for one in expected] == [case == "questions"] * 6
+    state = new_state(config)
+    losses = run(state, source, fabric, 4, **how, **broken_how)
+    save_state(tmp_path, state, Card(config, state.iteration))
+    again, card = load_state(tmp_path)
+    assert (card.config, again.iteration, again.seconds > 0) == (config, 4, True)
+    assert_same(bits(again), bits(state))
+    losses += run(again, source, fabric, **how, **broken_how)
+    assert losses == expected
+    assert_same(bits(again), bits(unbroken))
+
+
+def test_the_seed_decides_and_nothing_else(rooms_path, fabric):
+    found = []
+    for seed in (1, 1, 2):
+        torch.manual_seed(len(found))
+        before = torch.get_rng_state()
+        state = new_state(replace(TINY, seed=seed))
+        assert torch.equal(torch.get_rng_state(), before)
+        losses = run(state, RoomImages(rooms_path, TINY), fabric, 2)
+        found.append((losses, bits(state)))
+    assert found[0][0] == found[1][0]
+    assert_same(found[0][1], found[1][1])
+    assert not torch.equal(*(found[i][1]["model.decoder.last.weight"] for i in (0, 2)))
+
+
+def test_only_the_labels_that_are_told_are_used(train_path, fabric, monkeypatch):
+    config = for_questions(replace(TINY, questions=1.0, batch=8), train_path, "labeled")
+    source = QuestionImages(train_path, "unlabeled", config)
+    labelled = QuestionImages(train_path, "labeled", config)
+    read: set[int] = set()
+    item = QuestionImages.__getitem__
+
+    def spy(self: QuestionImages, row: int) -> dict[str, Any]:
+        if self is labelled:
+            read.add(row)
+        return item(self, row)
+
+    monkeypatch.setattr(QuestionImages, "__getitem__", spy)
+    losses = run(new_state(config), source, fabric, labelled=labelled, labels=3)
+    assert read == {0, 1, 2}
+    assert all("questions" in one for one in losses)
+    read.clear()
+    losses = run(new_state(config), source, fabric, labelled=labelled, labels=0)
+    assert read == set()
+    assert not any("questions" in one for one in losses)
+
+
+def test_some_of_the_contrasted_questions_are_labelled(train_path, fabric, monkeypatch):
+    plain = replace(TINY, questions=1.0, contrast=1.0, batch=8, question_batch=8)
+    config = for_questions(plain, train_path, "labeled")
+    source = QuestionImages(train_path, "unlabeled", config)
+    labelled = QuestionImages(train_path, "labeled", config)
+    step, asked = training.generator_step, []
+
+    def spy(model: Any, batch: Any, noise: Any, questions: Any) -> Any:
+        asked.append(questions)
+        return step(model, batch, noise, questions)
+
+    monkeypatch.setattr(training, "generator_step", spy)
+    told = {
+        labelled[row]["image"].tobytes(): labelled[row]["answer"] for row in range(len(labelled))
+    }
+    for labels, known in ((3, 1), (0, 0)):
+        asked.clear()
+        losses = run(new_state(config), source, fabric, labelled=labelled, labels=labels)
+        assert all(("questions" in one) == (labels > 0) and "contrast" in one for one in losses)
+        for images, answers in asked:
+            assert images.image.shape == (32, 3, 32, 32)
+            assert (answers >= 0).tolist() == [True] * known + [False] * (8 - known)
+            rows = images.image.view(8, -1)[:known].numpy()
+            assert [told[row.tobytes()] for row in rows] == answers[:known].tolist()
+        assert len({images.image.numpy().tobytes() for images, _ in asked}) == len(asked)
+    assert run(new_state(replace(config, contrast=0.0)), source, fabric)
+    assert asked[-1] is None, "nothing is compared without a label"
+
+
+@pytest.mark.parametrize(
+    ("labels", "expected"), [(0, 0), (1, 1), (100, 1), (101, 2), (200, 2), (1000, 8), (9000, 8)]
+)
+def test_one_place_for_every_hundred_labels_up_to_a_quarter(labels, expected, train_path):
+    config = replace(TINY, questions=1.0, contrast=1.0, question_batch=32)
+    config = for_questions(config, train_path, "labeled")
+    source = QuestionImages(train_path, "labeled", config)
+    assert question_sizes(config, source, labels) == (expected, 32 - expected)
+    plain = replace(config, contrast=0.0)
+    assert question_sizes(plain, source, labels) == (32 if labels else 0, 0)
+
+
+def test_no_answer_is_looked_at_without_labels(train_path, fabric):
+    """Though the file of the images has them."""
+    plain = replace(TINY, questions=1.0, contrast=1.0, batch=8, question_batch=8)
+    config = for_questions(plain, train_path, "labeled")
+    labelled = QuestionImages(train_path, "labeled", config)
+    losses = run(new_state(config), labelled, fabric)
+    assert all("contrast" in one and "questions" not in one for one in losses)
+
+
+def test_views_of_questions_are_not_compared(train_path, fabric):
+    config = replace(for_questions(TINY, train_path, "labeled"), consistency=1.0)
+    source = QuestionImages(train_path, "unlabeled", config)
+    with pytest.raises(SpecError, match="consistency"):
+        run(new_state(config), source, fabric)
+
+
+def test_the_generators_step_leaves_the_critic_alone(rooms_path, fabric, monkeypatch):
+    config = replace(TINY, mutual_information=0.1, networks=replace(TINY.networks, z_view=2))
+    state, before = new_state(config), {}
+    step = training.generator_step
+
+    def spy(model: Any, *rest: Any) -> Any:
+        before.update(bits(state))
+        return step(model, *rest)
+
+    monkeypatch.setattr(training, "generator_step", spy)
+    start = bits(state)
+    for _ in islice(train(state, RoomImages(rooms_path, config), fabric), 3):
+        for name, value in bits(state).items():
+            kind = name.removeprefix("model.").split(".")[0]
+            if kind in ("critic", "statistics"):
+                assert torch.equal(value, before[name]), name
+        for network in (state.model.critic, state.model.statistics):
+            assert all(p.requires_grad for p in network.parameters())
+        for kind in ("encoder", "decoder", "critic", "statistics"):
+            weight = next(n for n in start if n.startswith(f"model.{kind}.") and "weight" in n)
+            assert not torch.equal(start[weight], bits(state)[weight]), kind
+
+
+def test_it_learns(rooms_path, fabric):
+    config = replace(PLAIN, iterations=120, batch=8, learning_rate=3e-3)
+    config = replace(config, networks=NetworkSpec(size=32, width=0.1, z_scene=32))
+    losses = run(new_state(config), RoomImages(rooms_path, config), fabric)
+    found = [one["reconstruction"] for one in losses]
+    assert np.mean(found[-10:]) < 0.5 * found[0]
+
+
+@pytest.mark.parametrize("decay", [False, True])
+def test_the_learning_rate(rooms_path, fabric, decay):
+    config = replace(PLAIN, iterations=10, learning_rate=0.01, decay=decay)
+    state, rates = new_state(config), []
+    for _ in train(state, RoomImages(rooms_path, config), fabric):
+        rates += [group["lr"] for o in (state.generator, state.critic) for group in o.param_groups]
+    falling = [0.01] * 6 + [0.008, 0.006, 0.004, 0.002]
+    assert rates[::2] == pytest.approx(falling if decay else [0.01] * 10)
+    assert rates[::2] == rates[1::2]
+
+
+def poisoned(path: Path, to: Path, value: float) -> Path:
+    """Return a copy whose row 5 has one impossible pixel."""
+    shutil.copy(path, to)
+    with h5py.File(to, "r+") as file:
+        file["image"][5, 4, 4] = value
+    return to
+
+
+@pytest.fixture
+def float_rooms(make_rooms: Callable[..., Path], tmp_path: Path) -> Path:
+    """Return a file of 8 rooms with float32 images."""
+    return make_rooms(tmp_path / "rooms.h5", 8, image_dtype="float32")
+
+
+def stopped(state: State, source: RoomImages, fabric: Fabric) -> tuple[str, dict[str, Any]]:
+    """Train until it stops; return why, and the state after the last whole iteration."""
+    last = bits(state)
+    with pytest.raises(TrainingError) as error:  # noqa: PT012
+        for _ in train(state, source, fabric):
+            last = bits(state)
+    return str(error.value), last
+
+
+def is_statistic(name: str) -> bool:
+    return "running" in name or "tracked" in name
+
+
+@pytest.mark.parametrize("config", [TINY, PLAIN], ids=["all", "plain"])
+def test_an_image_that_is_not_finite_stops_it(float_rooms, tmp_path, fabric, config):
+    path = poisoned(float_rooms, tmp_path / "bad.h5", math.nan)
+    state = new_state(replace(config, batch=2))
+    text, last = stopped(state, RoomImages(path, state.model.config), fabric)
+    assert 0 < state.iteration < 4
+    assert text.startswith(f"iteration {state.iteration}: loss or gradients are not finite (")
+    assert "nan" in text
+    now = {name: value for name, value in bits(state).items() if not is_statistic(name)}
+    assert_same(now, {name: value for name, value in last.items() if not is_statistic(name)})
+
+
+def test_a_loss_that_is_not_finite_stops_it_though_its_gradient_is(float_rooms, tmp_path, fabric):
+    path = poisoned(float_rooms, tmp_path / "bad.h5", 1e30)  # its square is infinite, its slope 0
+    state = new_state(replace(PLAIN, batch=8))
+    assert "reconstruction inf" in stopped(state, RoomImages(path, PLAIN), fabric)[0]
+
+
+def test_a_gradient_that_is_not_finite_stops_it_though_the_loss_is(rooms_path, fabric):
+    state = new_state(PLAIN)
+    state.model.decoder.last.weight.data[0, 0, 0, 0] = math.inf
+    before = {name: value.clone() for name, value in state.model.named_parameters()}
+    text, _ = stopped(state, RoomImages(rooms_path, PLAIN), fabric)
+    assert re.match(
+        r"iteration 0: loss or gradients are not finite \(reconstruction [0-9.]+\)", text
+    )
+    assert_same(dict(state.model.named_parameters()), before)

@@ -1,0 +1,234 @@
+"""A run's folder: what is written, going on after a kill, and what does not go together."""
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from h5_edits import attribute
+from PIL import Image
+from pix2shape_models import edited, tiny
+
+from scenegen.common.errors import SceneGenError
+
+torch = pytest.importorskip("torch")
+from safetensors.torch import load_file  # noqa: E402
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator  # noqa: E402
+from torch.utils.data import default_collate  # noqa: E402
+
+from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
+from baselines.pix2shape.training import runs  # noqa: E402
+from baselines.pix2shape.training.runs import Machine, train_run  # noqa: E402
+from baselines.pix2shape.training.state import load_state  # noqa: E402
+from baselines.pix2shape.weights.weights import Card, load_card, load_model  # noqa: E402
+
+HERE = Machine("cpu", workers=0, every=2)
+CONFIG = tiny(seed=3)
+FILES = {
+    "checkpoint.json", "checkpoint.safetensors", "logs", "pictures.png", "weights.json",
+    "weights.safetensors",
+}  # fmt: skip
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / "deep" / "run"
+
+
+@pytest.fixture(scope="session")
+def unbroken(rooms_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a run of 4 iterations that no test changes."""
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    train_run(folder, rooms_path, CONFIG, HERE)
+    return folder
+
+
+def names(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def same(one: Path, other: Path) -> bool:
+    """Tell whether two files of tensors hold the same bits."""
+    found, expected = load_file(one), load_file(other)
+    assert found.keys() == expected.keys()
+    return all(torch.equal(found[name], expected[name]) for name in found)
+
+
+class Killed(Exception):
+    pass
+
+
+def killed_at(iteration: int) -> Callable[[Any, dict[str, float]], None]:
+    def progress(state: Any, losses: dict[str, float]) -> None:
+        if state.iteration == iteration:
+            raise Killed
+
+    return progress
+
+
+def test_what_a_run_leaves(rooms_path, folder):
+    steps: list[int] = []
+    weights = train_run(
+        folder, rooms_path, CONFIG, HERE, progress=lambda state, _: steps.append(state.iteration)
+    )
+    assert (weights, names(folder)) == (folder / "weights.safetensors", FILES)
+    assert steps == [1, 2, 3, 4]
+    model, card = load_model(weights)
+    with h5py.File(rooms_path) as file:
+        told = (str(file.attrs["fingerprint"]), str(file.attrs["spec"]))
+    assert (card.fingerprint, card.data) == told
+    assert (card.iteration, card.labels, card.classes, card.seconds > 0) == (4, 0, (), True)
+    off = {"mutual_information": 0.0, "questions": 0.0}
+    assert card.config == model.config == replace(CONFIG, **off)
+    state, again = load_state(folder)
+    assert again == card
+    for name, value in model.encoder.state_dict().items():
+        torch.testing.assert_close(
+            value, state.model.encoder.state_dict()[name], atol=1e-3, rtol=1e-3
+        )
+    with Image.open(folder / "pictures.png") as picture:
+        assert picture.size == (4 * 134 + 6, 6 * 134 + 6)
+
+
+def test_the_logs_tell_every_loss_and_picture(unbroken):
+    logs = EventAccumulator(str(unbroken / "logs")).Reload()
+    losses = {"distance", "penalty", "reconstruction", "adversarial", "code_reconstruction"}
+    assert set(logs.Tags()["scalars"]) == losses
+    assert [event.step for event in logs.Scalars("reconstruction")] == [4]
+    assert [event.step for event in logs.Images("pictures")] == [2, 4]
+
+
+@pytest.mark.parametrize("last", [3, 4])
+def test_a_killed_run_goes_on_as_if_it_had_not_been(last, rooms_path, folder, unbroken):
+    """From the checkpoint of iteration 2, whatever came after it."""
+    with pytest.raises(Killed):
+        train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(last))
+    assert names(folder) == FILES
+    state, card = load_state(folder)
+    assert state.iteration == card.iteration == 2
+    steps: list[int] = []
+    train_run(folder, rooms_path, None, HERE, progress=lambda s, _: steps.append(s.iteration))
+    assert steps == [3, 4]
+    for name in ("checkpoint.safetensors", "weights.safetensors"):
+        assert same(folder / name, unbroken / name), name
+    again = load_card(folder / "weights.safetensors")
+    assert again == replace(load_card(unbroken / "weights.safetensors"), seconds=again.seconds)
+
+
+def test_a_kill_before_the_first_checkpoint(rooms_path, folder, unbroken):
+    with pytest.raises(Killed):
+        train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(1))
+    with pytest.raises(FileNotFoundError, match="checkpoint"):
+        train_run(folder, rooms_path, None, HERE)
+    train_run(folder, rooms_path, CONFIG, HERE)
+    assert same(folder / "weights.safetensors", unbroken / "weights.safetensors")
+
+
+def test_a_finished_run_goes_no_further(rooms_path, folder, unbroken):
+    shutil.copytree(unbroken, folder)
+    (folder / "weights.safetensors").unlink()
+    train_run(folder, rooms_path, None, HERE, progress=lambda *_: pytest.fail("trained on"))
+    assert same(folder / "weights.safetensors", unbroken / "weights.safetensors")
+
+
+def test_a_run_is_not_replaced(rooms_path, folder, unbroken):
+    shutil.copytree(unbroken, folder)
+    with pytest.raises(FileExistsError, match="holds a checkpoint; say --resume"):
+        train_run(folder, rooms_path, CONFIG, HERE)
+    assert same(folder / "checkpoint.safetensors", unbroken / "checkpoint.safetensors")
+
+
+def test_it_goes_on_with_its_own_data(rooms_path, folder, unbroken):
+    shutil.copytree(unbroken, folder)
+    path = edited(rooms_path, folder.parent / "other.h5", attribute("fingerprint", "0" * 64))
+    with pytest.raises(SceneGenError, match="fingerprint 000000000000, the run was trained"):
+        train_run(folder, path, None, HERE)
+
+
+def test_classes_are_told(single_path, folder):
+    seen: list[dict[str, float]] = []
+    weights = train_run(
+        folder, single_path, CONFIG, HERE, conditional=True, progress=lambda _, n: seen.append(n)
+    )
+    model, card = load_model(weights)
+    assert card.classes == ("box", "sphere")
+    assert (model.config.networks.classes, model.config.networks.condition) == (2, 5)
+    assert all(np.isfinite(list(numbers.values())).all() for numbers in seen)
+    again, how = folder.with_name("again"), {"conditional": True, "progress": killed_at(3)}
+    with pytest.raises(Killed):
+        train_run(again, single_path, CONFIG, HERE, **how)
+    assert same(train_run(again, single_path, None, HERE), weights)
+    plain = train_run(folder.with_name("plain"), single_path, CONFIG, HERE)
+    assert load_card(plain).classes == ()
+
+
+@pytest.mark.parametrize("labels", [0, 2])
+def test_questions_and_their_labels(train_questions, folder, labels):
+    seen: list[dict[str, float]] = []
+    config = replace(CONFIG, iterations=2)
+    weights = train_run(
+        folder, train_questions, config, HERE, labels=labels, progress=lambda _, n: seen.append(n)
+    )
+    assert all(("questions" in numbers) == bool(labels) for numbers in seen)
+    assert all("mutual_information" in numbers for numbers in seen)
+    model, card = load_model(weights)
+    assert (card.labels, model.config.opacity) == (labels, True)
+    assert not model.config.networks.camera
+    assert same(train_run(folder, train_questions, None, HERE), weights), "with its own labels"
+
+
+@pytest.mark.parametrize(
+    ("data", "how", "words"),
+    [
+        ("rooms", {"labels": 1}, "labels: found 1, expected 0 for rooms, which ask no questions"),
+        ("rooms", {"conditional": True}, r"conditional: found objects \(1, 3\), expected one obj"),
+        ("questions", {"conditional": True}, "questions have no classes to condition on"),
+        ("questions", {"labels": 4}, "labels: found 4, expected 0 to 3"),
+        ("questions", {"labels": -1}, "labels: found -1, expected 0 to 3"),
+        ("test", {}, "expected training questions, such as iqtt-train.h5"),
+        ("nothing", {}, "no such file"),
+        ("large", {}, "images of 32x32, expected squares of a multiple of 64 pixels"),
+    ],
+)
+def test_what_does_not_go_together(data, how, words, truths, train_questions, folder):
+    paths = {"rooms": truths.rooms, "large": truths.rooms, "questions": train_questions}
+    path = {**paths, "test": truths.iqtt}.get(data, folder)
+    config = tiny(size=64) if data == "large" else CONFIG
+    with pytest.raises((SceneGenError, OSError), match=words) as error:
+        train_run(folder, path, config, HERE, **how)
+    assert "\n" not in str(error.value)
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize("adversarial", [0.0, 1.0])
+def test_the_prior_is_that_of_codes_where_no_critic_ties_them(rooms_path, folder, adversarial):
+    config = replace(CONFIG, adversarial=adversarial)
+    model, card = load_model(train_run(folder, rooms_path, config, HERE))
+    prior, source = model.prior, RoomImages(rooms_path, card.config)
+    if adversarial:
+        assert torch.equal(prior.mean, torch.zeros(128))
+        assert torch.equal(prior.factor, torch.eye(128))
+        return
+    batch = source.as_batch(default_collate([source[row] for row in range(len(source))]))
+    with torch.no_grad():
+        codes = model.encode(batch.image, batch.views)
+    spread, covariance = float(codes.std()), prior.factor @ prior.factor.T
+    torch.testing.assert_close(prior.mean, codes.mean(dim=0), atol=0.02 * spread, rtol=0)
+    torch.testing.assert_close(covariance, codes.T.cov(), atol=0.05 * spread**2, rtol=0)
+
+
+def test_a_picture_that_cannot_be_written_leaves_the_checkpoint(rooms_path, folder, monkeypatch):
+    def full(*_: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(runs, "save_picture", full)
+        with pytest.raises(OSError, match="No space"):
+            train_run(folder, rooms_path, CONFIG, HERE)
+    assert load_state(folder)[0].iteration == 2
+    card = train_run(folder, rooms_path, None, HERE).with_suffix(".json")
+    assert isinstance(load_card(card), Card)

@@ -1,0 +1,270 @@
+"""One step: the losses that are asked for, their weighted sum, and gradients where they belong."""
+
+import itertools
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+torch = pytest.importorskip("torch")
+from baselines.pix2shape.data.rooms import Batch  # noqa: E402
+from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
+from baselines.pix2shape.network.model import Pix2Shape, Views  # noqa: E402
+from baselines.pix2shape.network.networks import NetworkSpec  # noqa: E402
+from baselines.pix2shape.network.surfels import Scene, pixel_rays  # noqa: E402
+from baselines.pix2shape.training.losses import (  # noqa: E402
+    absolute_loss,
+    contrast_loss,
+    disagreement,
+    mutual_information,
+    question_loss,
+    reconstruction_loss,
+)
+from baselines.pix2shape.training.steps import critic_step, draw, generator_step  # noqa: E402
+
+NETWORKS = NetworkSpec(size=32, width=0.05, z_scene=6, z_view=2)
+LOSSES = (
+    "adversarial", "reconstruction", "code_reconstruction", "consistency", "mutual_information",
+    "questions", "contrast", "depth",
+)  # fmt: skip
+NEEDED = {"adversarial": {"critic"}, "mutual_information": {"statistics"}}
+
+
+def only(**weights: float) -> ModelConfig:
+    return ModelConfig(
+        networks=NETWORKS, question_batch=8, **{**dict.fromkeys(LOSSES, 0.0), **weights}
+    )
+
+
+def model_of(config: ModelConfig) -> Pix2Shape:
+    torch.manual_seed(0)
+    return Pix2Shape(config)
+
+
+def some_batch(size: int = 8, seed: int = 1) -> Batch:
+    source = torch.Generator().manual_seed(seed)
+
+    def rand(*shape: int) -> Any:
+        return torch.rand(size, *shape, generator=source)
+
+    scene = Scene(28.0, 2 * rand(2, 3), rand(2, 3), rand(3), 0.2 + rand(2), 0.2 + rand(3))
+    pose = torch.eye(4).repeat(size, 1, 1)
+    return Batch(rand(3, 32, 32), Views(rand(3), scene, world_from_camera=pose), 1 + rand(32, 32))
+
+
+def labelled() -> tuple[Batch, Any]:
+    return some_batch(8, seed=2), torch.tensor([2, 0])
+
+
+def step(config: ModelConfig, batch: Batch | None = None) -> tuple[Any, dict[str, Any]]:
+    return generator_step(model_of(config), batch or some_batch(), draw(8, 8, 3), labelled())
+
+
+@pytest.mark.parametrize("name", LOSSES)
+def test_one_loss_is_computed_alone(name):
+    """With the networks that it needs, and no other."""
+    model = model_of(only(**{name: 0.5}))
+    for network in {"critic", "statistics"} - NEEDED.get(name, set()):
+        getattr(model, network).register_forward_hook(lambda *_: pytest.fail("not needed"))
+    total, losses = generator_step(model, some_batch(), draw(8, 8, 3), labelled())
+    assert set(losses) == {name}
+    assert total.item() == pytest.approx(0.5 * losses[name].item())
+    assert total.item() != 0
+
+
+def test_the_total_is_the_weighted_sum():
+    """Whichever are on: each has the value that it has alone."""
+    weights = {name: 0.3 + 0.1 * place for place, name in enumerate(LOSSES)}
+    alone = {name: step(only(**{name: 1.0}))[1][name].item() for name in LOSSES}
+    subsets = itertools.chain(itertools.combinations(LOSSES, 2), [(), LOSSES])
+    for chosen in subsets:
+        total, losses = step(only(**{name: weights[name] for name in chosen}))
+        assert set(losses) == set(chosen)
+        found = {name: value.item() for name, value in losses.items()}
+        assert found == pytest.approx({name: alone[name] for name in chosen}, rel=1e-4, abs=1e-6)
+        expected = sum(weights[name] * value for name, value in found.items())
+        assert total.item() == pytest.approx(expected, rel=1e-5, abs=1e-7)
+
+
+def test_what_is_not_there_is_not_named():
+    config = only(reconstruction=1.0, depth=1.0, questions=1.0)
+    batch = replace(some_batch(), depth=None)
+    losses = generator_step(model_of(config), batch, draw(8, 8, 3))[1]
+    assert set(losses) == {"reconstruction"}
+
+
+@pytest.mark.parametrize(
+    ("weights", "learn"),
+    [
+        ({"adversarial": 1.0}, {"critic"}),
+        ({"mutual_information": 1.0}, {"statistics"}),
+        ({"adversarial": 1.0, "mutual_information": 0.1}, {"critic", "statistics"}),
+    ],
+)
+def test_the_critics_step_teaches_critic_and_statistics_alone(weights, learn):
+    model = model_of(only(**weights, reconstruction=1.0))
+    total, numbers = critic_step(model, some_batch(), draw(8, 8, 3))
+    total.backward()
+    for name in ("encoder", "decoder", "critic", "statistics"):
+        gradients = [parameter.grad for parameter in getattr(model, name).parameters()]
+        if name not in learn:
+            assert all(gradient is None for gradient in gradients), name
+        else:
+            assert any(gradient is not None and gradient.any() for gradient in gradients), name
+    assert set(numbers) == ({"distance", "penalty"} if "adversarial" in weights else set())
+
+
+def test_the_critics_total_is_penalty_less_distance_less_information():
+    """So that its step raises the other two, which the generator's step lowers."""
+    batch, noise = some_batch(), draw(8, 8, 3)
+    model = model_of(only(adversarial=1.0, mutual_information=0.1))
+    total, numbers = critic_step(model, batch, noise)
+    code = model.encode(batch.image, batch.views)
+    information = mutual_information(model.statistics, code[:, :6], code[:, 6:], noise.order)
+    expected = numbers["penalty"] - numbers["distance"] - information
+    assert total.item() == pytest.approx(expected.item(), rel=1e-5)
+    losses = generator_step(model, batch, noise)[1]
+    assert losses["adversarial"].item() == pytest.approx(numbers["distance"].item(), rel=1e-5)
+    assert losses["mutual_information"].item() == pytest.approx(information.item(), rel=1e-5)
+
+
+def test_depth_supervision_ignores_what_is_not_known():
+    model, batch = model_of(only(depth=1.0)), some_batch()
+    batch.depth[0, :5] = math.nan
+    batch.depth[3] = math.nan
+    total, losses = generator_step(model, batch, draw(8, 8, 3))
+    found = model.surfels(model.encode(batch.image, batch.views), batch.views.condition)[0]
+    expected = (found - batch.depth).square().nanmean()
+    assert losses["depth"].item() == pytest.approx(expected.item(), rel=1e-5)
+    total.backward()
+    for network in (model.encoder, model.decoder):
+        assert all(torch.isfinite(p.grad).all() for p in network.parameters())
+    batch.depth[:] = math.nan
+    total, _ = generator_step(model, batch, draw(8, 8, 3))
+    model.zero_grad()
+    total.backward()
+    assert total.item() == 0
+    assert not any(p.grad.any() for p in model.decoder.parameters())
+
+
+def test_questions_teach_the_scenes_part_of_the_code():
+    model = model_of(only(questions=2.0))
+    images, answers = labelled()
+    total, losses = generator_step(model, some_batch(), draw(8, 8, 3), (images, answers))
+    total.backward()
+    gradient = model.encoder.last.bias.grad  # cancels: the loss is of differences
+    weight = model.encoder.last.weight.grad.flatten(1).abs().sum(dim=1)
+    assert gradient.abs().max() < 1e-5
+    assert (weight[:6] > 1e-4).all()
+    assert not weight[6:].any()
+    codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
+    assert losses["questions"].item() == pytest.approx(question_loss(codes, answers).item())
+
+
+def test_questions_of_unknown_answers_are_contrasted_alone():
+    model = model_of(only(questions=1.0, contrast=1.0))
+    images, _ = labelled()
+    codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
+    for answers in ([-1, -1], [-1, 1], [2, 0]):
+        told = torch.tensor(answers)
+        losses = generator_step(model, some_batch(), draw(8, 8, 3), (images, told))[1]
+        assert losses["contrast"].item() == pytest.approx(contrast_loss(codes, told).item())
+        known = told >= 0
+        assert ("questions" in losses) == bool(known.any())
+        if known.any():
+            expected = question_loss(codes[known], told[known]).item()
+            assert losses["questions"].item() == pytest.approx(expected)
+
+
+class Sphere(Pix2Shape):
+    """Whatever the code, the inside of a sphere around the origin, told from the camera's place."""
+
+    radius = 2.0
+
+    def surfels(self, code: Any, condition: Any) -> Any:
+        self.seen = [*getattr(self, "seen", []), condition]
+        turn = facing_the_origin(condition)[:, :3, :3]
+        x, y = pixel_rays(32, 32, 28.0, condition)
+        rays = torch.stack([x + 0 * y, y + 0 * x, -1 + 0 * x * y])
+        along = torch.einsum("bij,jhw->bihw", turn, rays)
+        b = torch.einsum("bihw,bi->bhw", along, condition)
+        a, c = (along**2).sum(dim=1), (condition**2).sum(dim=1)[:, None, None] - self.radius**2
+        return (-b + torch.sqrt(b**2 - a * c)) / a, None
+
+
+def facing_the_origin(place: Any) -> Any:
+    """Return cameras at places (B, 3), upright, that look at the origin: world_from_camera."""
+    back = torch.nn.functional.normalize(place, dim=1)
+    right = torch.linalg.cross(torch.tensor([[0.0, 0.0, 1.0]]).expand_as(back), back)
+    right = torch.nn.functional.normalize(right, dim=1)
+    pose = torch.eye(4).repeat(len(place), 1, 1)
+    pose[:, :3] = torch.stack([right, torch.linalg.cross(back, right), back, place], dim=2)
+    return pose
+
+
+def test_consistency_loses_what_two_cameras_disagree_on():
+    config = replace(only(consistency=1.0), networks=NetworkSpec(size=32, width=0.05, z_scene=3))
+    batch, noise = some_batch(), draw(8, 3, 3)
+    place = 0.5 + batch.views.condition
+    views = replace(batch.views, condition=place, world_from_camera=facing_the_origin(place))
+    batch, sphere = replace(batch, views=views), Sphere(config)
+    assert generator_step(sphere, batch, noise)[1]["consistency"] < 1e-3
+    assert torch.equal(sphere.seen[0], place)
+    assert torch.equal(sphere.seen[1], place[noise.order])
+    wrong = views.world_from_camera.clone()
+    wrong[:, 2, 3] += torch.linspace(0, 0.1, 8)  # each camera elsewhere than the decoder thinks
+    batch = replace(batch, views=replace(views, world_from_camera=wrong))
+    own, other = sphere.surfels(None, place)[0], sphere.surfels(None, place[noise.order])[0]
+    moved = torch.linalg.inv(wrong[noise.order]) @ wrong
+    there = disagreement(own, other, moved, 28.0)
+    back = disagreement(other, own, torch.linalg.inv(moved), 28.0)
+    assert abs(there - back) > 1e-4, "or one of them would do"
+    found = generator_step(sphere, batch, noise)[1]["consistency"]
+    assert found.item() == pytest.approx((there + back).item() / 2, rel=1e-2)
+    assert found > 5e-3
+
+
+def test_consistency_teaches_both_depths_with_the_codes_own_class():
+    networks = NetworkSpec(size=32, width=0.05, z_scene=3, classes=2)
+    model = model_of(replace(only(consistency=1.0), networks=networks))
+    batch, noise = some_batch(), draw(8, 3, 3)
+    place = 0.5 + batch.views.condition
+    classes = torch.eye(2)[torch.tensor([0, 1, 1, 0, 1, 0, 0, 1])]
+    condition = torch.cat([place, classes], dim=1)
+    views = replace(batch.views, condition=condition, world_from_camera=facing_the_origin(place))
+    made, surfels = [], model.surfels
+
+    def spy(code: Any, condition: Any) -> Any:
+        depth, opacity = surfels(code, condition)
+        depth.retain_grad()
+        made.append((condition, depth))
+        return depth, opacity
+
+    model.surfels = spy
+    generator_step(model, replace(batch, views=views), noise)[0].backward()
+    (_, own), (elsewhere, other) = made
+    assert torch.equal(elsewhere, torch.cat([place[noise.order], classes], dim=1))
+    assert own.grad.any()
+    assert other.grad.any()
+
+
+def test_images_are_compared_by_the_norm_or_by_absolute_differences():
+    batch = some_batch()
+    for absolute, expected in ((False, reconstruction_loss), (True, absolute_loss)):
+        model = model_of(replace(only(reconstruction=1.0), absolute_differences=absolute))
+        found = generator_step(model, batch, draw(8, 8, 3))[1]["reconstruction"]
+        again = model.image(model.encode(batch.image, batch.views), batch.views)
+        assert found.item() == pytest.approx(expected(batch.image, again).item(), rel=1e-5)
+
+
+def test_noise_is_the_seeds():
+    state = torch.get_rng_state()
+    one, again, other = draw(9, 4, 7), draw(9, 4, 7), draw(9, 4, 8)
+    assert torch.equal(torch.get_rng_state(), state), "no other random numbers are touched"
+    assert (one.code.shape, one.share.shape) == ((9, 4), (9,))
+    assert sorted(one.order.tolist()) == list(range(9))
+    assert 0 <= one.share.min() <= one.share.max() <= 1
+    for name in ("code", "share", "order"):
+        assert torch.equal(getattr(one, name), getattr(again, name))
+        assert not torch.equal(getattr(one, name), getattr(other, name))

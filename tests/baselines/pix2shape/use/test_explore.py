@@ -1,0 +1,246 @@
+"""Samples, interpolations and rotations: the cameras, lights and codes that are shown."""
+
+import itertools
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from h5_edits import values
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pix2shape_models import edited, made, tiny
+
+from scenegen.camera import Camera
+from scenegen.common.errors import SpecError
+from scenegen.description.presets import PAPER_VIEWS
+from scenegen.description.specs import DatasetSpec
+from scenegen.rooms.reader import RoomsFile
+from scenegen.sampling.scenes import sample_cameras, sample_lights
+
+torch = pytest.importorskip("torch")
+from torch.utils.data import default_collate  # noqa: E402
+
+from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
+from baselines.pix2shape.network.surfels import render  # noqa: E402
+from baselines.pix2shape.pictures import drawn, image_tiles, sheet  # noqa: E402
+from baselines.pix2shape.use import explore  # noqa: E402
+from baselines.pix2shape.use.explore import (  # noqa: E402
+    interpolation_sheet,
+    known_views,
+    rotation_frames,
+    sample_sheet,
+    turned,
+)
+from baselines.pix2shape.weights.weights import Card  # noqa: E402
+
+SPEC = DatasetSpec(height=32, width=32)
+CLASSES = ("bag", "bowl", "mug")
+
+
+@pytest.fixture(scope="session")
+def model() -> Any:
+    return made(tiny())
+
+
+@pytest.fixture(scope="session")
+def conditional() -> Any:
+    return made(tiny(classes=3))
+
+
+def card_of(model: Any, **more: Any) -> Card:
+    return Card(model.config, data=SPEC.to_json(), **more)
+
+
+def reconstructions(model: Any, source: RoomImages, rows: list[int], seen_as: list[int]) -> Any:
+    """Return the tiles of rows' codes, seen from (and lit as) other rows."""
+    batch = source.as_batch(default_collate([source[row] for row in rows]))
+    views = source.as_batch(default_collate([source[row] for row in seen_as])).views
+    with torch.no_grad():
+        return drawn(model, model.encode(batch.image, batch.views), views)
+
+
+def pixels(picture: Any) -> np.ndarray:
+    return np.asarray(picture).astype(int)
+
+
+def test_turned_by_nothing_is_the_files_own_camera(several_path):
+    with RoomsFile(several_path) as rooms:
+        for row in range(len(rooms)):
+            pose = rooms.read("camera/world_from_camera", row)
+            camera = turned(pose, rooms.spec, 0)
+            np.testing.assert_allclose(camera.world_from_camera, pose, atol=1e-12)
+            assert camera.fov_y_degrees == rooms.read("camera/fov_y_degrees", row)
+
+
+def test_turned_by_the_files_angles_is_the_files_views():
+    """Views up to 80 degrees leave one side only; both sides come up."""
+    spec, sides = replace(SPEC, views=PAPER_VIEWS), []
+    for index in range(30):
+        cameras = sample_cameras(spec, index)
+        for camera, degrees in zip(cameras, PAPER_VIEWS, strict=True):
+            found = turned(cameras[0].world_from_camera, spec, degrees)
+            np.testing.assert_allclose(found.world_from_camera, camera.world_from_camera, atol=1e-9)
+        sides.append(cameras[0].position[0] > cameras[0].position[2])
+    assert 5 < sum(sides) < 25
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.floats(0, 90), st.floats(5, 85), st.floats(0, 1))
+def test_turned_cameras_stay_in_the_open_octant(azimuth, elevation, share):
+    """As long as a camera so near a side can turn; their height and distance stay."""
+    a, e = math.radians(azimuth), math.radians(elevation)
+    offset = 1.5 * np.array([math.cos(e) * math.cos(a), math.sin(e), math.cos(e) * math.sin(a)])
+    pose = Camera(tuple(offset + SPEC.camera_target), SPEC.camera_target, 50.0).world_from_camera
+    degrees = share * max(azimuth, 90 - azimuth)
+    camera = turned(pose, SPEC, degrees)
+    found = np.array(camera.position) - SPEC.camera_target
+    assert found.min() > -1e-9
+    assert found[1] == pytest.approx(offset[1])
+    assert np.linalg.norm(found) == pytest.approx(1.5)
+    angle = math.degrees(math.atan2(found[2], found[0])) - azimuth
+    assert abs(angle) == pytest.approx(degrees, abs=1e-6)
+
+
+def test_what_is_known_of_views_is_what_training_was_told(several_path):
+    source = RoomImages(several_path, tiny())
+    expected = source.as_batch(default_collate([source[row] for row in range(9)])).views
+    with RoomsFile(several_path) as rooms:
+        spec, depth = rooms.spec, torch.tensor(rooms.read("depth", slice(None)))
+    cameras = [camera for i in range(3) for camera in sample_cameras(spec, i)]
+    lights = [sample_lights(spec, row // 3) for row in range(9)]
+    assert len({len(own) for own in lights}) > 1
+    found = known_views(spec, cameras, lights, np.zeros((9, 0)))
+    assert found.scene.fov_y_degrees == expected.scene.fov_y_degrees
+    slots = found.scene.light_color.shape[1]
+    there = (found.scene.light_color != 0).any(dim=2)
+    assert there.sum(dim=1).tolist() == [len(own) for own in lights]
+    assert not expected.scene.light_color[:, slots:].any()
+    pairs = [(found.condition, expected.condition)]
+    pairs.append((found.scene.light_color, expected.scene.light_color[:, :slots]))
+    place = expected.scene.light_position[:, :slots]
+    pairs.append((found.scene.light_position[there], place[there]))
+    names = ("ambient", "attenuation", "reflectance")
+    pairs += [(getattr(found.scene, name), getattr(expected.scene, name)) for name in names]
+    for one, other in pairs:
+        torch.testing.assert_close(one, other, rtol=1e-6, atol=1e-6)
+    image = render(depth, found.scene)
+    torch.testing.assert_close(image, render(depth, expected.scene), rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("count", [1, 9])
+def test_samples_are_the_seeds(model, count):
+    card = card_of(model)
+    found = [sample_sheet(model, card, count, seed).tobytes() for seed in (4, 4, 5)]
+    torch.manual_seed(0)
+    assert found[0] == found[1] == sample_sheet(model, card, count, 4).tobytes()
+    assert found[0] != found[2]
+    assert sample_sheet(model, card, count, 4).size[1] == 6 + 3 * (1 + (count > 8)) * 134
+
+
+def test_samples_are_seen_as_training_images_were(conditional, monkeypatch):
+    seen: list[Any] = []
+    monkeypatch.setattr(explore, "drawn", lambda *given: seen.append(given) or drawn(*given))
+    conditional.prior.mean.fill_(7)
+    several = replace(SPEC, views=PAPER_VIEWS)  # of which samples need the first alone
+    card = Card(conditional.config, data=several.to_json(), classes=CLASSES)
+    try:
+        sample_sheet(conditional, card, 5, 6)
+    finally:
+        conditional.prior.mean.zero_()
+    ((_, code, views),) = seen
+    spec = replace(SPEC, seed=6, views=(0.0,))
+    places = [sample_cameras(spec, i)[0].position for i in range(5)]
+    np.testing.assert_allclose(views.condition[:, :3], places, rtol=1e-6)
+    colors = [np.sum([light.color for light in sample_lights(spec, i)], axis=0) for i in range(5)]
+    np.testing.assert_allclose(views.scene.light_color.sum(dim=1), colors, rtol=1e-5)
+    assert 6 < float(code.mean()) < 8, "codes are the prior's"
+    assert views.condition[:, 3:].argmax(dim=1).tolist() == [0, 1, 2, 0, 1], "each in turn"
+    sample_sheet(conditional, card, 5, 6, "bowl")
+    assert seen[1][2].condition[:, 3:].tolist() == [[0, 1, 0]] * 5
+    sample_sheet(conditional, card, 5, 7)
+    assert not torch.isclose(seen[2][1], seen[1][1]).any(), "codes are the seed's"
+
+
+@pytest.mark.parametrize(
+    ("classes", "label", "words"),
+    [
+        (3, "sofa", "class: found 'sofa', expected one of bag, bowl, mug"),
+        (0, "mug", "class: found 'mug', expected none: it knows no classes"),
+    ],
+)
+def test_labels_that_are_not_known_are_refused(classes, label, words, model, conditional):
+    chosen = conditional if classes else model
+    with pytest.raises(SpecError, match=words):
+        sample_sheet(chosen, card_of(chosen, classes=CLASSES[:classes]), 2, 0, label)
+
+
+def test_a_model_of_questions_is_refused(several_path):
+    model = made(tiny(camera=False))
+    card, source = Card(model.config, data="{}"), RoomImages(several_path, model.config)
+    words = "weights: a model of questions, expected one of rooms"
+    with pytest.raises(SpecError, match=words):
+        sample_sheet(model, card, 2, 0)
+    with pytest.raises(SpecError, match=words):
+        rotation_frames(model, source, [0], [0.0])
+    with pytest.raises(SpecError, match=words):
+        interpolation_sheet(model, source, 0, 1, 2)
+
+
+def test_an_interpolation_ends_in_the_two_reconstructions(model, several_path):
+    source = RoomImages(several_path, model.config)
+    found = pixels(interpolation_sheet(model, source, 3, 7, 5))
+    ends = reconstructions(model, source, [3, 7], [3, 3])
+    given = image_tiles(torch.from_numpy(np.stack([source[row]["image"] for row in (3, 7)])))
+    blank = np.full_like(given[0], 250)
+    frames = [given, [blank, blank], [blank, blank]]
+    first = pixels(sheet([[f[0], e[0]] for f, e in zip(frames, ends, strict=True)]))
+    last = pixels(sheet([[e[1], f[1]] for f, e in zip(frames, ends, strict=True)]))
+    assert np.abs(found[:, : first.shape[1]] - first).max() <= 2
+    assert np.abs(found[:, -last.shape[1] :] - last).max() <= 2
+    assert found.shape == (3 * 134 + 6, 7 * 134 + 6, 3)
+    steps = [found[:134, 6 + 134 * k : 134 * (k + 1)] for k in range(1, 6)]
+    assert all((one != other).any() for one, other in itertools.pairwise(steps))
+
+
+@pytest.mark.parametrize("rows", [[0], [1, 6, 4]])
+def test_a_rotation_begins_with_the_reconstructions(model, several_path, rows):
+    source = RoomImages(several_path, model.config)
+    frames = rotation_frames(model, source, rows, [0.0, 20.0])
+    given = image_tiles(torch.from_numpy(np.stack([source[row]["image"] for row in rows])))
+    expected = sheet([given, *reconstructions(model, source, rows, rows)])
+    assert np.abs(pixels(frames[0]) - pixels(expected)).max() <= 2
+    assert (pixels(frames[1])[:134] == pixels(expected)[:134]).all(), "the inputs stay"
+    assert (pixels(frames[1]) != pixels(expected)).any()
+
+
+def test_a_rotation_turns_to_the_files_other_views(model, several_path):
+    source = RoomImages(several_path, model.config)
+    frames = rotation_frames(model, source, [0, 3, 6], [35.0, 80.0])
+    given = image_tiles(torch.from_numpy(np.stack([source[row]["image"] for row in (0, 3, 6)])))
+    for k in (1, 2):
+        made_of = reconstructions(model, source, [0, 3, 6], [k, 3 + k, 6 + k])
+        assert np.abs(pixels(frames[k - 1]) - pixels(sheet([given, *made_of]))).max() <= 2
+
+
+@pytest.mark.parametrize("name", ["light/ambient", "light/attenuation", "material/reflectance"])
+def test_a_rotation_of_other_rooms_is_shaded_with_their_own(model, several_path, tmp_path, name):
+    """Whatever the rooms that the model was trained on were lit with."""
+    path = edited(several_path, tmp_path / "other.h5", values(name, lambda old: old * 0.5))
+    source = RoomImages(path, model.config)
+    (frame,) = rotation_frames(model, source, [0], [0.0])
+    expected = pixels(sheet([reconstructions(model, source, [0], [0])[0]]))
+    assert np.abs(pixels(frame)[140:268, 6:134] - expected[6:134, 6:134]).max() <= 2
+    usual = RoomImages(several_path, model.config)
+    other = pixels(sheet([reconstructions(model, usual, [0], [0])[0]]))
+    assert (other != expected).any()
+
+
+def test_a_rotation_tells_the_class(single_path):
+    model = made(tiny(classes=2))
+    source = RoomImages(single_path, model.config)
+    (frame,) = rotation_frames(model, source, [0, 1, 2, 3], [0.0])
+    given = image_tiles(torch.from_numpy(np.stack([source[row]["image"] for row in range(4)])))
+    expected = sheet([given, *reconstructions(model, source, [0, 1, 2, 3], [0, 1, 2, 3])])
+    assert np.abs(pixels(frame) - pixels(expected)).max() <= 2

@@ -1,0 +1,215 @@
+"""Predictions: each scene from its input view alone, nothing of the truth, and no half a file."""
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from h5_edits import damaged_chunk, put, values
+from pix2shape_models import edited, made, of_questions, reordered, tiny, told, written
+
+from metrics.scoring.scoring import score
+from metrics.submissions.validation import validate
+from scenegen.camera import pixel_directions
+from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
+from scenegen.rooms.reader import RoomsFile
+
+torch = pytest.importorskip("torch")
+from torch.utils.data import default_collate  # noqa: E402
+
+from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
+from baselines.pix2shape.network.surfels import normals_from_depth  # noqa: E402
+from baselines.pix2shape.use import predict  # noqa: E402
+from baselines.pix2shape.use.predict import enlarged, predict_file, predict_rooms  # noqa: E402
+
+Fields = dict[str, np.ndarray]
+TRUTH = (
+    "depth", "normal", "object_id", "object/shape", "object/world_from_object", "object/scale",
+    "object/visible_pixels", "object/count", "light/position", "light/color", "light/ambient",
+    "light/attenuation", "material/reflectance", "view_angle_degrees",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def model() -> Any:
+    return made(tiny())
+
+
+@pytest.fixture(autouse=True)
+def few_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither 8 nor 9 rows, nor 3 scenes, fill whole batches."""
+    monkeypatch.setattr(predict, "BATCH", 2)
+    monkeypatch.setattr(predict._batches, "__defaults__", (2,))
+
+
+def predicted(model: Any, path: Path, out: Path) -> Fields:
+    predict_rooms(model, path, out, overwrite=True)
+    with h5py.File(out) as file:
+        return {name: file[name][()] for name in ("row", "depth", "normal")}
+
+
+def same(one: Fields, other: Fields) -> bool:
+    return all(np.array_equal(one[name], other[name]) for name in one)
+
+
+@pytest.mark.parametrize("views", ["one", "several"])
+def test_a_submission_is_valid_and_scores(views, model, rooms_path, several_path, tmp_path):
+    path = rooms_path if views == "one" else several_path
+    done: list[tuple[int, int]] = []
+    predict_rooms(model, path, tmp_path / "p.h5", run="a", progress=lambda *step: done.append(step))
+    assert [p for p in validate(tmp_path / "p.h5") if not p.is_hint] == []
+    found = score([tmp_path / "p.h5"])
+    assert (found.method, found.meta.submissions[0].run) == ("pix2shape", "a")
+    for name in ("chamfer", "mse_depth", "normal_mean_degrees"):
+        assert np.isfinite(found.metrics[name].value), name
+    with RoomsFile(path) as rooms:
+        assert sum(step[0] for step in done) == len(rooms) == done[0][1]
+
+
+def test_each_row_is_the_input_views_code_seen_from_the_rows_camera(model, several_path, tmp_path):
+    found = predicted(model, several_path, tmp_path / "p.h5")
+    source = RoomImages(several_path, model.config)
+    with RoomsFile(several_path) as rooms:
+        fov = rooms.spec.fov_y_degrees
+        assert rooms.read("view_index", slice(None)).tolist() == [0, 1, 2] * 3
+    for row in range(9):
+        pair = source.as_batch(default_collate([source[row - row % 3], source[row]]))
+        with torch.no_grad():
+            code = model.encode(pair.image, pair.views)[:1]
+            depth = model.surfels(code, pair.views.condition[1:])[0]
+            depth, normal = enlarged(depth, fov, 64)
+        np.testing.assert_allclose(found["depth"][row], depth[0], rtol=1e-4)
+        np.testing.assert_allclose(found["normal"][row], normal[0].permute(1, 2, 0), atol=1e-3)
+    assert len({found["depth"][row].tobytes() for row in range(9)}) == 9
+
+
+def test_rows_may_come_in_any_order(model, several_path, tmp_path):
+    order = [4, 8, 0, 2, 3, 7, 1, 6, 5]
+    path = edited(several_path, tmp_path / "mixed.h5", reordered(order))
+    found = predicted(model, path, tmp_path / "p.h5")
+    expected = predicted(model, several_path, tmp_path / "q.h5")
+    assert found["row"].tolist() == list(range(9))
+    np.testing.assert_allclose(found["depth"], expected["depth"][order], rtol=1e-4)
+    np.testing.assert_allclose(found["normal"], expected["normal"][order], atol=1e-3)
+
+
+def test_other_views_are_not_looked_at(model, several_path, tmp_path):
+    def noise(rows: list[int]) -> Any:
+        values = np.random.default_rng(0).integers(0, 255, (len(rows), 64, 64, 3), "u1")
+        return put("image", rows, values)
+
+    expected = predicted(model, several_path, tmp_path / "p.h5")
+    path = edited(several_path, tmp_path / "others.h5", noise([1, 2, 4, 5, 7, 8]))
+    assert same(predicted(model, path, tmp_path / "q.h5"), expected)
+    path = edited(several_path, tmp_path / "input.h5", noise([3]))
+    found = predicted(model, path, tmp_path / "q.h5")
+    changed = [row for row in range(9) if (found["depth"][row] != expected["depth"][row]).any()]
+    assert changed == [3, 4, 5]
+
+
+def test_nothing_of_the_truth_is_read(model, several_path, tmp_path):
+    edits = [values(name, np.zeros_like) for name in TRUTH]
+    edits.append(values("scene", lambda old: np.full_like(old, b"{}")))
+    path = edited(several_path, tmp_path / "blank.h5", *edits)
+    expected = predicted(model, several_path, tmp_path / "p.h5")
+    assert same(predicted(model, path, tmp_path / "q.h5"), expected)
+    path = edited(
+        several_path, tmp_path / "camera.h5", put("camera/world_from_camera", 4, np.eye(4))
+    )
+    found = predicted(model, path, tmp_path / "q.h5")
+    assert not np.array_equal(found["depth"][4], expected["depth"][4]), "cameras are"
+
+
+def plane(size: int, fov: float = 50.0) -> tuple[Any, np.ndarray]:
+    """Return the depth of a slanted plane and its normal."""
+    normal = np.array([0.3, 0.5, 0.81]) / np.linalg.norm([0.3, 0.5, 0.81])
+    depth = -1.3 / (pixel_directions(size, size, fov) @ normal)
+    assert depth.min() > 0
+    return torch.tensor(depth, dtype=torch.float32)[None], normal
+
+
+@pytest.mark.parametrize("size", [32, 64, 96, 256])
+def test_planes_stay_planes_when_enlarged(size):
+    depth, normal = enlarged(plane(32)[0], 50.0, size)
+    expected, slant = plane(size)
+    np.testing.assert_allclose(depth, expected, rtol=2e-6)
+    np.testing.assert_allclose(normal[0].permute(1, 2, 0).numpy() - slant, 0, atol=1e-5)
+
+
+def test_depth_of_the_files_own_size_is_left_alone():
+    depth = 1 + torch.rand(2, 32, 32)
+    again, normal = enlarged(depth, 50.0, 32)
+    assert torch.equal(again, depth)
+    assert torch.equal(normal, normals_from_depth(depth, 50.0))
+
+
+def test_enlarged_depth_stays_near_what_was_predicted():
+    """At steps beside the border, too, where it is extrapolated."""
+    torch.manual_seed(0)
+    depth = torch.where(torch.rand(2, 32, 32) < 0.5, 0.2, 2.1)
+    large, normal = enlarged(depth, 50.0, 128)
+    assert 0.05 < float(large.min()) < float(large.max()) <= 2 * 2.1 + 1e-3
+    assert normal.isfinite().all()
+    np.testing.assert_allclose(normal.norm(dim=1), 1, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("classes", "weights: a model of classes, which are part of the truth, expected one"),
+        ("questions", "weights: a model of no camera, expected one conditioned on the camera"),
+        ("rooms", "weights: a model that must be told the camera, expected one for questions"),
+        ("large", "images of 32x32, expected squares of a multiple of 64 pixels"),
+        ("large questions", "images of 32x32, expected squares of a multiple of 64 pixels"),
+    ],
+)
+def test_models_that_do_not_suit_are_refused(kind, words, truths, train_questions, tmp_path):
+    configs = {
+        "classes": lambda: tiny(classes=2),
+        "large": lambda: tiny(size=64),
+        "questions": lambda: of_questions(train_questions),
+        "rooms": tiny,
+        "large questions": lambda: tiny(size=64, camera=False),
+    }
+    weights = written(tmp_path / "w.safetensors", configs[kind]())
+    data = truths.iqtt if kind in ("rooms", "large questions") else truths.rooms
+    with pytest.raises(SpecError, match=words) as error:
+        predict_file(weights, data, tmp_path / "p.h5")
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "p.h5").exists()
+
+
+def test_a_file_is_replaced_only_when_told(rooms_path, tmp_path, monkeypatch):
+    weights, out = written(tmp_path / "w.safetensors", tiny(), **told(rooms_path)), tmp_path / "p"
+    out.write_text("mine")
+    with monkeypatch.context() as patch:
+        patch.setattr(predict, "predict_rooms", lambda *_, **__: pytest.fail("found too late"))
+        with pytest.raises(FileExistsError, match="--overwrite"):
+            predict_file(weights, rooms_path, out)
+        with pytest.raises(FileNotFoundError, match="folder does not exist"):
+            predict_file(weights, rooms_path, tmp_path / "none" / "p.h5")
+    assert out.read_text() == "mine"
+    predict_file(weights, rooms_path, out, overwrite=True)
+    with h5py.File(out) as file:
+        assert file.attrs["method"] == "pix2shape"
+
+
+@pytest.mark.parametrize("name", ["image", "depth"])
+def test_a_file_that_cannot_be_read_on_leaves_what_was_there(name, model, rooms_path, tmp_path):
+    path = edited(rooms_path, tmp_path / "bad.h5", damaged_chunk(name, 5))
+    for before in (None, "mine"):
+        if before:
+            (tmp_path / "p.h5").write_text(before)
+        with pytest.raises(FileFormatError, match=rf"bad\.h5: {name}, row 5: cannot be read"):
+            predict_rooms(model, path, tmp_path / "p.h5", overwrite=True)
+        assert {p.name for p in tmp_path.iterdir()} == {"bad.h5"} | ({"p.h5"} if before else set())
+    assert (tmp_path / "p.h5").read_text() == "mine"
+
+
+def test_numbers_that_are_not_finite_are_not_written(make_rooms, model, tmp_path):
+    path = make_rooms(tmp_path / "float.h5", 3, image_dtype="float32")
+    path = edited(path, tmp_path / "bad.h5", put("image", (2, 3, 3), np.nan))
+    with pytest.raises(SceneGenError, match="row 2: depth: found NaN"):
+        predict_rooms(model, path, tmp_path / "p.h5")
+    assert not (tmp_path / "p.h5").exists()

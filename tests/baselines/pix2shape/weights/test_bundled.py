@@ -1,0 +1,53 @@
+"""The bundled weights: small enough to ship; they predict rooms, and answer beyond chance."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+from baselines.pix2shape.use.predict import answer_file, predict_rooms
+from baselines.pix2shape.weights.bundled import FOLDER, names, open_weights, suited
+from iqtt.files.make import make_split
+from iqtt.questions.specs import SplitSpec
+from metrics.submissions.reader import open_predictions
+from scenegen.description.presets import preset_spec
+from scenegen.rooms.make import make_dataset
+from scenegen.rooms.reader import RoomsFile
+
+LARGEST = 25_000_000  # bytes in all
+
+
+def test_they_are_small_and_each_has_its_card() -> None:
+    assert sum(path.stat().st_size for path in FOLDER.iterdir()) <= LARGEST
+    for name in names():
+        _, card = open_weights(name)
+        assert card.iteration == card.config.iterations
+        assert card.config.depth == 0, "they learned without depth maps"
+
+
+@pytest.mark.parametrize("name", sorted(set(names()) - {"iqtt"}))
+def test_they_predict_rooms(name: str, tmp_path: Path) -> None:
+    """Better than one depth everywhere, of which the mean of all depths is the best."""
+    data, out = tmp_path / "rooms.h5", tmp_path / "predictions.h5"
+    make_dataset(data, preset_spec(name, seed=77, views=(0.0, 55.0)), 4)
+    assert suited(data) == name
+    predict_rooms(open_weights(name)[0], data, out)
+    with RoomsFile(data) as rooms, open_predictions(out) as predictions:
+        truth = rooms.read("depth", slice(None))
+        depth = np.stack([predictions.depth(row) for row in range(len(rooms))])
+    error, constant = ((depth - truth) ** 2).mean(), truth.var()
+    assert error < 0.85 * constant, (error, constant)
+
+
+def test_they_answer_questions(tmp_path: Path) -> None:
+    """More than four standard errors above chance; some of the shapes may have been seen."""
+    spec = SplitSpec(seed=77, train=1, labeled=0, val=0, test=250, distractors="other")
+    make_split(tmp_path / "split", spec)
+    data, out = tmp_path / "split" / "iqtt-test.h5", tmp_path / "predictions.h5"
+    assert suited(data) == "iqtt"
+    answer_file(open_weights("iqtt")[0], data, out)
+    with h5py.File(tmp_path / "split" / "iqtt-test-answers.h5") as truth, h5py.File(out) as file:
+        right = file["scores"][:].argmax(axis=1) == truth["answers"][:]
+    assert right.mean() > 1 / 3 + 4 * np.sqrt(2 / 9 / 250), right.mean()

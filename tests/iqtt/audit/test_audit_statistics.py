@@ -1,0 +1,145 @@
+"""Tests of what the audit measures: by hand, and angles against the generator's."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from iqtt.audit.image_statistics import THUMBNAIL, Statistics, measure, silhouettes
+from iqtt.audit.shape_proofs import compare_shapes
+from iqtt.audit.shape_statistics import answer_statistics
+from iqtt.audit.view_proofs import angles
+from iqtt.files.layout import NO_CUBE
+from iqtt.questions.draws import draw_rotations, rotation_angle_degrees
+from iqtt.shapes.polycube import ROTATIONS, mirror, symmetries
+from iqtt.shapes.sampling import random_shapes
+
+WHITE = np.array([255, 255, 255], np.uint8)
+
+
+def rectangles() -> Any:
+    """One question of white images, (1, 4, 40, 60, 3) uint8: two rectangles, a step, nothing."""
+    images = np.full((1, 4, 40, 60, 3), 255, np.uint8)
+    images[0, 0, 10:20, 20:50] = (51, 102, 153)
+    images[0, 1, 30:34, 2:10, :2] = 0
+    images[0, 2, 5:25, 5:15] = 100
+    images[0, 2, 5:15, 15:25] = 200
+    return images
+
+
+def measured(images: Any) -> Statistics:
+    return measure(images, silhouettes(images, WHITE))
+
+
+def test_sizes_and_places() -> None:
+    found = measured(rectangles())
+    assert found.area[0] * 2400 == pytest.approx([300, 32, 300, 0])
+    assert found.extent[0] == pytest.approx([np.hypot(10, 30), np.hypot(4, 8), np.hypot(20, 20), 0])
+    assert found.offset[0] == pytest.approx([np.hypot(5, 5), np.hypot(12, 24), np.hypot(5, 15), 0])
+
+
+def test_light() -> None:
+    found = measured(rectangles())
+    assert found.brightness[0] == pytest.approx([0.4, 1 / 3, 400 / 3 / 255, 0], rel=1e-5)
+    assert found.mean_color[0, 0] == pytest.approx([0.2, 0.4, 0.6], rel=1e-5)
+    assert found.contrast[0] == pytest.approx(
+        [0, 0, np.std([100, 100, 200]) / 255, 0], rel=1e-6, abs=1e-6
+    )
+    assert found.image_brightness[0, 0] == pytest.approx(0.4 / 8 + 7 / 8, rel=1e-6)
+    assert found.colors[0, 2].max() == pytest.approx(2 / 3)
+    assert found.colors[0].sum(axis=1) == pytest.approx([1, 1, 1, 0])
+
+
+def test_spreads_of_a_rectangle_and_the_skew_of_a_step() -> None:
+    found = measured(rectangles())
+    along, across, third, fourth = found.moments[0, 0]
+    assert (along, across) == pytest.approx(
+        (np.sqrt((30**2 - 1) / 12) / 40, np.sqrt((10**2 - 1) / 12) / 40)
+    )
+    assert third == pytest.approx(0, abs=1e-4)
+    assert fourth == pytest.approx(0, abs=1e-4)
+    assert (found.moments[0, 2, 2:] > 0.01).all()
+
+
+def test_thumbnails_and_distances() -> None:
+    images = rectangles()
+    found = measured(images)
+    assert found.thumbnails.shape == (1, 4, THUMBNAIL**2)
+    assert found.thumbnails.mean(axis=2) == pytest.approx(found.image_brightness)
+    apart = images[0, 0].astype(float) - images[0, 2]
+    assert found.pixel_distance[0, 0, 2] == pytest.approx(np.sqrt((apart**2).mean()) / 255)
+
+
+def test_turning_and_mirroring_an_image_change_no_outline() -> None:
+    rng = np.random.default_rng(1)
+    images = np.full((2, 4, 32, 32, 3), 255, np.uint8)
+    images[:, :, 6:30, 3:20] = rng.integers(0, 2, (2, 4, 24, 17, 1)) * 255
+    before = measured(images)
+    for after in (images[:, :, :, ::-1], np.rot90(images, axes=(2, 3))):
+        found = measured(np.ascontiguousarray(after))
+        for name in ("area", "extent", "offset", "moments", "brightness", "contrast", "colors"):
+            assert getattr(found, name) == pytest.approx(getattr(before, name), abs=1e-6)
+
+
+def test_rounding_is_no_silhouette() -> None:
+    images = np.ones((1, 4, 16, 16, 3), np.float32)
+    images[0, 0, 3, 3] -= 1e-4
+    images[0, 1, 3, 3, 1] = 0.99
+    images[0, 2, 3, 3, 1] = np.nan
+    shown = silhouettes(images, np.ones(3, np.float32))
+    assert shown.sum(axis=(0, 2, 3)).tolist() == [0, 1, 1, 0]
+
+
+def table(cubes: Any, views: Any = None, **truth: Any) -> Any:
+    """What proofs look at, of the cubes of some questions, (Q, 4, n, 3)."""
+    padded = np.full((len(cubes), 4, 9, 3), NO_CUBE, np.int8)
+    padded[:, :, : cubes.shape[2]] = cubes
+    known = {"cubes": padded, "world_from_shape": views, **truth}
+    spec = SimpleNamespace(min_angle_degrees=0.0)
+
+    class Table(SimpleNamespace):
+        def __len__(self) -> int:
+            return len(cubes)
+
+    return Table(name="table", truth=known, spec=spec)
+
+
+def test_numbers_of_shapes() -> None:
+    rod = np.array([[x, 0, 0] for x in range(4)], np.int8)
+    square = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], np.int8)
+    ell = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0]], np.int8)
+    twist = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 1]], np.int8)
+    questions = [
+        [rod, rod, square, ell],
+        [twist, mirror(twist), twist, rod],
+        [ell, twist, ell, rod],
+    ]
+    tables = [table(np.array(questions[:2])), table(np.array(questions[2:]))]
+    first, second = answer_statistics(tables, compare_shapes(tables))
+    assert first[0].tolist() == [[3, 1.25, 2], [4, 0.5, 0], [3, 0.875, 1]]
+    # A mirror image is the same class; those of the question itself do not count.
+    assert first[1, :, 2].tolist() == [1, 1, 2]
+    assert second[0, :, 2].tolist() == [2, 1, 2]
+
+
+def test_angles_are_those_of_the_generator() -> None:
+    rng = np.random.default_rng(3)
+    rod = np.array([[[x, 0, 0] for x in range(5)]], np.int8)
+    shapes = np.concatenate([random_shapes(rng, 40, 5), rod.repeat(5, axis=0)])
+    others = np.roll(shapes, 5, axis=0)[:, None].repeat(2, axis=1)
+    views = draw_rotations(rng, (len(shapes), 4))
+    # The right answer's cubes are stored in another orientation than the reference's.
+    turn = ROTATIONS[rng.integers(24, size=len(shapes))].astype(int)
+    right = np.einsum("sij,snj->sni", turn, shapes)[:, None]
+    asked = np.concatenate([shapes[:, None], right, others], axis=1)
+    expected = [
+        rotation_angle_degrees(view[0], view[1] @ t, own)
+        for view, t, own in zip(views, turn, symmetries(shapes), strict=True)
+    ]
+    one = table(asked, views, angle_degrees=np.array(expected))
+    found = compare_shapes([one])
+    assert (found[0].place == 0).sum() >= 35
+    assert angles([one], found).status == "ok"
+    one.spec.min_angle_degrees = max(expected)
+    assert angles([one], found).status == "FAIL"

@@ -1,0 +1,191 @@
+"""Tests of the probes: they find planted leaks, and accuse no fair questions."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest
+
+from iqtt.audit import learned_probes
+from iqtt.audit.image_statistics import Statistics
+from iqtt.audit.probes import FAULTS, LIGHT, MIRRORED, OUTLINE, WITHOUT, Evidence, Probe, run_probes
+
+CUBES = ("contacts of cubes", "spread of cubes", "shape met elsewhere")
+SCALARS = ("area", "extent", "offset", "image_brightness", "brightness", "contrast")
+
+
+def fair(seed: int, count: int = 300, **changes: Any) -> Evidence:
+    """Questions of noise alone, whose right answers stand at balanced places."""
+    rng = np.random.default_rng(seed)
+    scalars = {name: rng.normal(1, 0.1, (count, 4)) for name in SCALARS}
+    pixel_distance = rng.random((count, 4, 4))
+    statistics = Statistics(
+        **scalars,
+        colors=rng.random((count, 4, 64)),
+        mean_color=rng.random((count, 4, 3)),
+        moments=rng.random((count, 4, 4)),
+        thumbnails=rng.random((count, 4, 256)).astype(np.float32),
+        pixel_distance=pixel_distance + pixel_distance.swapaxes(1, 2),
+    )
+    right = rng.permutation(np.arange(count) % 3)
+    mirrored = np.where(rng.random(count) < 0.5, (right + rng.integers(1, 3, count)) % 3, -1)
+    cubes = {name: rng.integers(0, 6, (count, 3)).astype(float) for name in CUBES}
+    return replace(Evidence(statistics, right, mirrored, cubes, [right]), **changes)
+
+
+def shortcuts(evidence: Evidence) -> set[tuple[str, str, str]]:
+    return {(p.statistic, p.rule, p.sees) for p in run_probes(evidence) if p.is_shortcut}
+
+
+def one(evidence: Evidence, statistic: str, rule: str, sees: str) -> Probe:
+    asked = (statistic, rule, sees)
+    (found,) = [p for p in run_probes(evidence) if (p.statistic, p.rule, p.sees) == asked]
+    return found
+
+
+def changed(evidence: Evidence, name: str, values: Any) -> Evidence:
+    return replace(evidence, statistics=replace(evidence.statistics, **{name: values}))
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out what is learned by forests."""
+    monkeypatch.setattr(learned_probes, "LEAST_QUESTIONS", 10**9)
+
+
+@pytest.mark.usefixtures("quick")
+def test_numbers_are_those_of_the_binomial_test() -> None:
+    found = one(fair(0), "shape's brightness", "nearest", LIGHT)
+    values = fair(0).statistics.brightness
+    nearest = np.abs(values[:, 1:] - values[:, :1]).argmin(axis=1)
+    test = binomtest(int((nearest == fair(0).right).sum()), 300, 1 / 3, alternative="greater")
+    assert (found.correct, found.n, found.chance) == (test.k, 300, 1 / 3)
+    assert found.p_value == test.pvalue
+    # Wilson 1927, as written there.
+    p, z, n = found.accuracy, 1.959963984540054, 300
+    half = z * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
+    middle = (p + z * z / (2 * n)) / (1 + z * z / n)
+    assert (found.low, found.high) == pytest.approx((middle - half, middle + half))
+
+
+def test_the_same_questions_give_the_same_numbers() -> None:
+    assert run_probes(fair(3, 90)) == run_probes(fair(3, 90))
+
+
+@pytest.mark.usefixtures("quick")
+def test_fair_questions_are_seldom_accused() -> None:
+    accused = [bool(shortcuts(fair(seed, 150))) for seed in range(60)]
+    # One in a hundred; more than four of sixty would happen once in two thousand runs.
+    assert sum(accused) <= 4
+
+
+def test_forests_learn_nothing_from_noise() -> None:
+    found = [p for seed in range(4) for p in run_probes(fair(seed)) if p.rule == "learned"]
+    assert len(found) == 12
+    correct, n = sum(p.correct for p in found), sum(p.n for p in found)
+    assert abs(correct / n - 1 / 3) < 4 * np.sqrt(2 / 9 / n)
+
+
+@pytest.mark.parametrize(
+    ("name", "title", "factor"),
+    [("brightness", "shape's brightness", 1.02), ("extent", "silhouette's extent", 0.95)],
+)
+@pytest.mark.usefixtures("quick")
+def test_right_answers_brighter_or_smaller(name: str, title: str, factor: float) -> None:
+    evidence = fair(1)
+    values = 1 + (getattr(evidence.statistics, name) - 1) * 0.3  # images alike to 3%
+    values[np.arange(300), 1 + evidence.right] *= factor
+    found = shortcuts(changed(evidence, name, values))
+    assert (title, "largest" if factor > 1 else "smallest", WITHOUT) in found
+
+
+@pytest.mark.usefixtures("quick")
+def test_light_that_goes_with_the_shape() -> None:
+    evidence = fair(2)
+    colors = evidence.statistics.colors.copy()
+    rows = np.arange(300)
+    colors[rows, 1 + evidence.right] += 0.3 * (colors[:, 0] - colors[rows, 1 + evidence.right])
+    assert ("shape's colours", "nearest", LIGHT) in shortcuts(changed(evidence, "colors", colors))
+
+
+@pytest.mark.usefixtures("quick")
+def test_mirror_images_of_another_size() -> None:
+    evidence = fair(4, 600)
+    rows = np.flatnonzero(evidence.mirrored >= 0)
+    area = np.ones((600, 4))
+    area[rows, 1 + evidence.mirrored[rows]] = 1.02
+    found = shortcuts(changed(evidence, "area", area))
+    assert ("silhouette's area", "nearest", MIRRORED) in found
+
+
+@pytest.mark.usefixtures("quick")
+def test_right_answers_like_the_reference_are_no_fault() -> None:
+    evidence = fair(5)
+    apart = evidence.statistics.pixel_distance.copy()
+    apart[np.arange(300), 0, 1 + evidence.right] *= 0.7
+    evidence = changed(evidence, "pixel_distance", apart)
+    assert one(evidence, "pixel distance", "nearest", OUTLINE).beats_chance
+    assert shortcuts(evidence) == set()
+
+
+@pytest.mark.parametrize(
+    ("places", "rule"),
+    [(np.arange(300) % 3, "after the last"), (np.arange(300) % 5 % 3 // 2, "commonest")],
+)
+@pytest.mark.usefixtures("quick")
+def test_places_that_can_be_foretold(places: Any, rule: str) -> None:
+    assert ("place", rule, WITHOUT) in shortcuts(fair(6, right=places, places=[places]))
+
+
+def test_places_are_learned_from_other_questions() -> None:
+    learned = learned_probes.places(np.array([1, 2, 1, 2, 1, 2]), np.array([0, 1, 2, 3, 4, 4]))
+    assert learned.tolist() == [0, 0, 0, 0, 2, 1]
+
+
+def test_what_only_a_forest_sees() -> None:
+    evidence = fair(7)
+    thumbnails = evidence.statistics.thumbnails.copy()
+    thumbnails[np.arange(300), 1 + evidence.right, :40] += 0.25  # a corner of the image
+    found = shortcuts(changed(evidence, "thumbnails", thumbnails))
+    assert found == {("low-resolution pixels", "learned", WITHOUT)}
+
+
+def test_shapes_that_are_right_more_often() -> None:
+    evidence = fair(8)
+    spread = evidence.cubes["spread of cubes"]
+    spread[np.arange(300), evidence.right] += 2
+    found = shortcuts(evidence)
+    assert ("spread of cubes", "largest", WITHOUT) in found
+    assert ("answers' cubes", "learned", WITHOUT) in found
+
+
+@pytest.mark.usefixtures("quick")
+def test_ties_are_no_answer() -> None:
+    evidence = fair(9, 3000)
+    found = one(
+        changed(evidence, "area", np.ones((3000, 4))), "silhouette's area", "largest", WITHOUT
+    )
+    assert found.low < 1 / 3 < found.high
+    every_first = changed(fair(9, 3000, right=np.zeros(3000, int)), "area", np.ones((3000, 4)))
+    assert one(every_first, "silhouette's area", "largest", WITHOUT).accuracy < 0.36
+
+
+def test_few_questions_or_none() -> None:
+    assert run_probes(fair(0, 0)) == ()
+    assert {p.n for p in run_probes(fair(0, 6)) if p.sees != MIRRORED} == {6}
+    told = fair(0, cubes={name: np.full((300, 3), np.nan) for name in CUBES})
+    assert not {p.statistic for p in run_probes(told)} & {*CUBES, "answers' cubes"}
+
+
+def test_scikit_learn_comes_when_it_is_needed() -> None:
+    code = (
+        "import iqtt.audit.audit, sys; sys.exit('sklearn' in sys.modules or 'scipy' in sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_kinds_of_sight() -> None:
+    assert set(FAULTS) == {WITHOUT, LIGHT, MIRRORED}

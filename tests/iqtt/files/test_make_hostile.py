@@ -1,0 +1,232 @@
+"""Splits of odd kinds; folders that cannot be written; runs that end early and leave nothing."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from iqtt.files import make as module
+from iqtt.files.make import FILES, make_split
+from iqtt.questions.specs import SplitSpec
+from iqtt.shapes.sampling import TooFewShapesError
+from scenegen.common.errors import PlacementError, SpecError
+
+TINY = SplitSpec(
+    seed=1, train=3, labeled=2, val=2, test=2, cubes=(6, 6), height=16, width=16, min_cube_pixels=0
+)
+
+
+def listing(folder: Path) -> dict[str, bytes | None]:
+    """All there is in a folder, hidden names too."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None
+        for path in folder.rglob("*")
+    }
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made") / "split"
+    make_split(folder, TINY)
+    return folder
+
+
+@pytest.fixture
+def old(made: Path, tmp_path: Path) -> Path:
+    """The folder of an older split."""
+    folder = tmp_path / "old"
+    folder.mkdir()
+    for name, raw in listing(made).items():
+        (folder / name).write_bytes(raw)
+    return folder
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"cubes": (16, 16), "shapes": "tree", "train": 1, "labeled": 0},
+        {"cubes": (12, 12), "distractors": "mirror", "test": 0},
+        {"height": 24, "width": 40, "min_angle_degrees": 90},
+        {"height": 40, "width": 24, "lights": (1, 4)},
+        {"max_radius": 10},
+        {"cubes": (5, 6), "max_radius": 2.2, "distractors": "other"},
+        {"cubes": (5, 5), "distractors": "other"},
+        {"seed": 2**63 - 1, "background": (0, 0, 0)},
+        {"labeled": 3, "val": 6},
+        {"labeled": 0},
+        {"train": 0, "labeled": 0, "val": 0, "test": 0},
+    ],
+)
+def test_odd_requests_are_answered_in_full(changed, tmp_path):
+    spec = replace(TINY, **changed)
+    done = []
+    make_split(tmp_path / "split", spec, batch=1, progress=done.append)
+    assert sum(done) == spec.train + spec.val + spec.test
+    sizes = {
+        "iqtt-train.h5": {"labeled/": spec.labeled, "unlabeled/": spec.train - spec.labeled},
+        "iqtt-val.h5": {"": spec.val},
+        "iqtt-test.h5": {"": spec.test},
+    }
+    for name, groups in sizes.items():
+        with h5py.File(tmp_path / "split" / name) as file:
+            for group, count in groups.items():
+                images = file[group + "questions"]
+                assert images.shape == (count, 4, spec.height, spec.width, 3)
+                raw = {image.tobytes() for image in images[:].reshape(-1, *images.shape[2:])}
+                assert len(raw) == 4 * count, "all images differ"
+                if f"{group}answers" in file:
+                    counts = np.bincount(file[f"{group}answers"][:], minlength=3)
+                    assert np.ptp(counts) <= 1
+
+
+@pytest.mark.parametrize("compression", ["none", "lzf", "gzip"])
+@pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
+def test_plain_h5py_reads_every_type_and_compression(compression, dtype, made, tmp_path):
+    spec = replace(TINY, image_dtype=dtype, with_depth=True)
+    make_split(tmp_path / "split", spec, compression=compression)
+    for name, path in (("iqtt-train.h5", "unlabeled/questions"), ("iqtt-val.h5", "questions")):
+        with h5py.File(made / name) as plain, h5py.File(tmp_path / "split" / name) as file:
+            images = file[path]
+            assert images.dtype == dtype
+            assert images.compression == (None if compression == "none" else compression)
+            assert images.attrs["scale"] == (1 / 255 if dtype == "uint8" else 1)
+            radiance = images[:] * images.attrs["scale"]
+            assert radiance.min() >= 0
+            assert radiance.max() == 1
+            assert abs(radiance - plain[path][:] / 255).max() < 0.6 / 255
+            truth = file["truth" if name == "iqtt-val.h5" else "truth/unlabeled"]
+            assert truth["depth"].attrs["unit"] == "cube edge"
+            surface = np.isfinite(truth["depth"][:])
+            assert (radiance[~surface] == 1).all()
+            middle = spec.camera_distance
+            assert (abs(truth["depth"][:][surface] - middle) < spec.max_radius).all()
+    with h5py.File(tmp_path / "split" / "iqtt-test.h5") as file:
+        assert list(file) == ["questions"]
+    with h5py.File(tmp_path / "split" / "iqtt-test-answers.h5") as file:
+        assert file["truth/depth"].shape == (2, 4, 16, 16)
+
+
+def test_an_older_split_is_replaced_only_on_request(old, tmp_path):
+    before = listing(tmp_path)
+    with pytest.raises(FileExistsError, match="exists already; say --overwrite to replace it"):
+        make_split(old, replace(TINY, seed=2))
+    assert listing(tmp_path) == before
+    (old / "iqtt-val.h5").unlink()
+    beside = set()
+    look = lambda _: beside.update(os.listdir(tmp_path))  # noqa: E731
+    make_split(old, replace(TINY, seed=2), overwrite=True, progress=look)
+    assert beside == {"old"}, "made inside, as another disk may be mounted there"
+    after = listing(tmp_path)
+    assert set(after) == set(before)
+    assert all(after[f"old/{name}"] != before[f"old/{name}"] for name in FILES)
+
+
+def test_a_linked_or_empty_folder_is_filled_where_it_is(old, tmp_path, monkeypatch):
+    (tmp_path / "link").symlink_to(old)
+    make_split(tmp_path / "link", replace(TINY, seed=2), overwrite=True)
+    assert (tmp_path / "link").is_symlink()
+    assert sorted(os.listdir(old)) == sorted(FILES)
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "empty")
+    make_split(".", replace(TINY, seed=2), overwrite=True)
+    assert listing(Path()) == listing(old)
+
+
+@pytest.mark.parametrize(
+    "stranger", ["notes.txt", "iqtt-test-predictions.h5", ".hidden", "iqtt-train.h5/"]
+)
+def test_a_folder_with_other_things_is_never_replaced(stranger, old, tmp_path):
+    if stranger.endswith("/"):
+        (old / stranger).unlink()
+        (old / stranger).mkdir()
+    else:
+        (old / stranger).write_text("mine")
+    before = listing(tmp_path)
+    with pytest.raises(FileExistsError) as error:
+        make_split(old, TINY, overwrite=True)
+    assert str(error.value.strerror) == f"holds other files too ({stranger.rstrip('/')})"
+    assert error.value.filename == str(old)
+    assert listing(tmp_path) == before
+
+
+def test_places_that_cannot_be_a_folder_are_refused_before_anything_is_made(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "make_pools", None)
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
+    before = listing(tmp_path)
+    for overwrite in (False, True):
+        for name, kind, text in (
+            ("file", NotADirectoryError, "is a file; name a folder"),
+            ("file/split", NotADirectoryError, "is not a folder"),
+            ("missing/split", FileNotFoundError, "the folder does not exist; create it first"),
+            ("nowhere", FileNotFoundError, "is a link to nothing"),
+        ):
+            with pytest.raises(kind, match=text):
+                make_split(tmp_path / name, TINY, overwrite=overwrite)
+    (tmp_path / "locked").mkdir()
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    for path in ("locked", "locked/split"):
+        with pytest.raises(PermissionError, match="cannot be written to") as error:
+            make_split(tmp_path / path, TINY, overwrite=True)
+        assert error.value.filename == str(tmp_path / "locked")
+    del before["file"]
+    assert set(listing(tmp_path)) == {*before, "file", "locked"}
+
+
+class StopError(Exception):
+    """What the test's progress bar raises."""
+
+
+@pytest.mark.parametrize("kind", [StopError, KeyboardInterrupt])
+@pytest.mark.parametrize("after", [1, 4, 7])
+def test_an_interrupted_run_leaves_all_as_it_was(kind, after, old, tmp_path):
+    done = []
+
+    def progress(count: int) -> None:
+        done.append(count)
+        if sum(done) >= after:
+            raise kind
+
+    before = listing(tmp_path)
+    for folder in (tmp_path / "new", old):
+        done.clear()
+        with pytest.raises(kind):
+            make_split(folder, replace(TINY, seed=2), batch=1, progress=progress, overwrite=True)
+        assert listing(tmp_path) == before
+
+
+def test_errors_on_the_way_leave_all_as_it_was(old, tmp_path, monkeypatch):
+    before = listing(tmp_path)
+    with pytest.raises(
+        SpecError, match="compression: found 'zip', expected one of gzip, lzf, none"
+    ):
+        make_split(tmp_path / "new", TINY, compression="zip")
+    with pytest.raises(
+        TooFewShapesError, match=r"shapes of 3-3 cubes within radius 3\.5 are too few"
+    ):
+        make_split(tmp_path / "new", replace(TINY, cubes=(3, 3)))
+    monkeypatch.setattr("iqtt.questions.settle.QUESTION_ATTEMPTS", 1)
+    monkeypatch.setattr("iqtt.questions.settle.VIEWS", 1)
+    with pytest.raises(PlacementError, match="train question 0: no view of 1 choices of shapes"):
+        make_split(old, replace(TINY, height=64, width=64, min_cube_pixels=15), overwrite=True)
+    monkeypatch.undo()
+
+    def full(file, path):
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr("scenegen.common.row_file._check_room_to_close", full)
+    with pytest.raises(OSError, match="No space left on device") as error:
+        make_split(tmp_path / "new", TINY)
+    assert error.value.filename == str(tmp_path / "new" / "iqtt-train.h5")
+    monkeypatch.undo()
+
+    def meanwhile(count: int) -> None:
+        (tmp_path / "new").mkdir(exist_ok=True)
+
+    with pytest.raises(FileExistsError, match="exists already"):
+        make_split(tmp_path / "new", TINY, progress=meanwhile)
+    (tmp_path / "new").rmdir()
+    assert listing(tmp_path) == before

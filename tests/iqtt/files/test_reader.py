@@ -1,0 +1,192 @@
+"""Question files read with the reading API, and beside it with plain h5py."""
+
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+
+from iqtt.files.layout import NO_CUBE
+from iqtt.files.reader import QuestionsFile, answers_beside, open_answers, open_questions, parts
+from iqtt.shapes.polycube import canonical, set_ids
+from scenegen.common.errors import SpecError
+
+TABLES = [  # of the tiny split: file, part, answers told, truth told
+    ("iqtt-train.h5", "labeled", True, True),
+    ("iqtt-train.h5", "unlabeled", False, True),
+    ("iqtt-val.h5", "", True, True),
+    ("iqtt-test.h5", "", False, False),
+]
+READ = """
+import sys
+from iqtt.files.reader import QuestionsDataset, open_questions
+with open_questions(sys.argv[1]) as file:
+    file[0].radiance, file[0].truth
+QuestionsDataset(sys.argv[1])[0]
+heavy = {"mitsuba", "drjit", "trimesh", "scipy", "PIL", "tqdm", "click", "torch"}
+print(sorted(heavy & set(sys.modules)))
+"""
+
+
+@pytest.mark.parametrize(("name", "part", "answered", "known"), TABLES)
+def test_records_are_what_the_file_holds(split_folder, name, part, answered, known):
+    with open_questions(split_folder / name, part) as questions, h5py.File(questions.path) as file:
+        raw = file[part or "/"]
+        assert len(questions) == 6
+        assert (questions.has_answers, questions.has_truth) == (answered, known)
+        assert questions.part == part
+        assert questions.split == name.split("-")[1].removesuffix(".h5")
+        assert questions.fingerprint == file.attrs["fingerprint" + ("_" + part if part else "")]
+        assert (questions.height, questions.width, questions.image_dtype) == (32, 32, "uint8")
+        assert questions.spec.seed is None
+        assert questions.attributes["writer"] == file.attrs["writer"]
+        for i, record in enumerate(questions):
+            assert record.index == i
+            np.testing.assert_array_equal(record.images, raw["questions"][i])
+            assert record.radiance.dtype == np.float32
+            np.testing.assert_allclose(record.radiance, record.images / 255, atol=1e-7)
+            assert record.answer == (raw["answers"][i] if answered else None)
+            assert (record.truth is not None) == known
+
+
+def test_truth_has_no_padding_and_agrees_with_the_images(split_folder):
+    with open_questions(split_folder / "iqtt-val.h5") as questions:
+        records = list(questions)
+        cubes, lights = questions.read("cubes", slice(0, 6)), questions.read("light_count", 3)
+        assert (cubes == NO_CUBE).any(), "some shapes are smaller than the largest"
+    assert len(records[3].truth.light_position) == len(records[3].truth.light_color) == 4
+    assert [len(one) for one in records[3].truth.light_color] == lights.tolist()
+    for record in records:
+        truth = record.truth
+        assert truth.cubes.dtype == np.int8
+        assert (truth.cubes != NO_CUBE).all()
+        assert truth.visible_pixels.shape == truth.cubes.shape[:2]
+        hit = np.isfinite(truth.depth)
+        assert truth.visible_pixels.sum(axis=1).tolist() == hit.sum(axis=(1, 2)).tolist()
+        assert (record.images[~hit] == 255).all(), "the background is white"
+        ids = [one.tobytes() for one in set_ids(canonical(truth.cubes))]
+        assert list(truth.shape_id) == ids
+        same = [k for k in range(3) if truth.shape_id[k + 1] == truth.shape_id[0]]
+        assert same == [record.answer] == [k for k, v in enumerate(truth.distractor_kind) if not v]
+        assert set(truth.distractor_kind) <= {None, "other", "near", "mirror"}
+        for k, kind in enumerate(truth.distractor_kind):
+            assert (kind == "mirror") <= (truth.class_id[k + 1] == truth.class_id[0])
+        turned = truth.world_from_shape @ truth.world_from_shape.transpose(0, 2, 1)
+        np.testing.assert_allclose(turned, np.tile(np.eye(3), (4, 1, 1)), atol=1e-12)
+        assert questions.spec.min_angle_degrees <= truth.angle_degrees <= 180
+
+
+def test_answers_of_another_file(split_folder, damaged, released):
+    path, answers = split_folder / "iqtt-test.h5", split_folder / "iqtt-test-answers.h5"
+    assert answers_beside(path) == answers_beside(str(path)) == answers
+    assert answers_beside(split_folder / "iqtt-val.h5") is None
+    with open_questions(path, answers=answers) as questions, h5py.File(answers) as file:
+        assert questions.has_answers
+        assert questions.has_truth
+        assert [record.answer for record in questions] == file["answers"][:].tolist()
+        kinds = [record.truth.distractor_kind.index(None) for record in questions]
+        assert kinds == file["answers"][:].tolist()
+        assert questions.read("cubes", 2).shape == (4, 7, 3)
+    with open_answers(answers) as known:
+        assert len(known) == 6
+        assert known.fingerprint == questions.fingerprint
+        assert known.truth(-1).distractor_kind == known.truth(5).distractor_kind
+        assert known.read("answers", slice(1, 4)).tolist() == [
+            known.read("answers", i) for i in (1, 2, 3)
+        ]
+    with open_answers(split_folder / "iqtt-train.h5") as known:
+        assert (known.part, len(known)) == ("labeled", 6)
+    plain = released("iqtt-test.h5", {"": (4, None)})
+    with h5py.File(plain.with_name("iqtt-test-answers.h5"), "w") as file:
+        file["answers"] = np.array([0, 2, 1, 1])
+    with open_questions(plain, answers=answers_beside(plain)) as questions:
+        assert [record.answer for record in questions] == [0, 2, 1, 1]
+
+
+@pytest.mark.parametrize("shape", [(5,), (5, 1)])
+@pytest.mark.parametrize("dtype", ["uint8", "int8", ">i4", "int64", "uint64"])
+def test_released_answers_of_any_integer_type(released, shape, dtype):
+    answers = np.array([2, 0, 1, 1, 2], dtype).reshape(shape)
+    with open_questions(released(tables={"": (5, answers)})) as questions:
+        assert [record.answer for record in questions] == [2, 0, 1, 1, 2]
+        assert questions.read("answers", slice(1, 3)).tolist() == [0, 1]
+        assert questions.read("answers", 1).dtype == np.uint8
+        assert questions.spec is questions.split is questions.fingerprint is None
+        assert not questions.has_truth
+        assert questions[0].truth is None
+
+
+@pytest.mark.parametrize("dtype", ["float32", "uint8", "float16", ">f4"])
+@pytest.mark.parametrize("options", [{}, {"chunks": (2, 4, 7, 24, 1), "compression": "gzip"}])
+def test_released_images(released, dtype, options):
+    path = released("iqtt-train.h5", {"labeled": (3, [0, 1, 2]), "unlabeled": (7, None)}, dtype)
+    assert parts(path) == ("labeled", "unlabeled")
+    for part, count in (("labeled", 3), ("unlabeled", 7)):
+        with open_questions(path, part) as questions, h5py.File(path) as file:
+            assert len(questions) == count
+            assert (questions.height, questions.width) == (20, 24)
+            assert questions.has_answers == (part == "labeled")
+            stored = file[part]["questions"][count - 1]
+            np.testing.assert_array_equal(questions[-1].images, stored)
+            assert questions[-1].radiance.dtype == np.float32
+            assert questions[-1].radiance.max() <= 1.001
+
+
+def test_shapes_beside_released_questions_are_nobodys(damaged):
+    path = damaged(lambda file: file.attrs.clear())
+    with open_questions(path) as questions:
+        assert questions.fields == ("questions", "answers")
+
+
+def test_parts(split_folder, released):
+    assert parts(split_folder / "iqtt-train.h5") == ("labeled", "unlabeled")
+    assert parts(split_folder / "iqtt-test.h5") == parts(released()) == ("",)
+    only = released("iqtt-train.h5", {"unlabeled": (4, None)})
+    assert parts(only) == ("unlabeled",)
+    with open_questions(only) as questions:
+        assert (questions.part, len(questions)) == ("unlabeled", 4)
+
+
+def test_an_empty_table(released):
+    none = np.zeros(0, np.int64)
+    path = released("iqtt-train.h5", {"labeled": (0, none), "unlabeled": (2, None)})
+    with open_questions(path, "labeled") as questions:
+        assert (len(questions), list(questions)) == (0, [])
+        assert questions.read("questions", slice(0, 9)).shape == (0, 4, 20, 24, 3)
+        with pytest.raises(IndexError):
+            questions[0]
+
+
+def test_indices_and_closing(split_folder):
+    with open_questions(split_folder / "iqtt-val.h5") as questions:
+        assert questions[-1].index == questions[5].index == 5
+        for index in (6, -7, 10**12):
+            with pytest.raises(IndexError):
+                questions[index]
+        for index in (6, 10**12):
+            with pytest.raises(IndexError):
+                questions.read("answers", index)
+        with pytest.raises(SpecError, match=r"found 'cube', expected some of questions, answers"):
+            questions.read("cube", 0)
+    questions.close()
+    with pytest.raises(ValueError, match=r"iqtt-val\.h5"):
+        questions[0]
+
+
+def test_sizes_on_disk(split_folder):
+    path, answers = split_folder / "iqtt-test.h5", split_folder / "iqtt-test-answers.h5"
+    with QuestionsFile(path, answers=answers) as questions, h5py.File(answers) as known:
+        sizes = questions.stored_bytes()
+        assert list(sizes) == list(questions.fields)
+        assert sizes["questions"][1] == 6 * 4 * 32 * 32 * 3
+        assert 0 < sizes["questions"][0] < sizes["questions"][1]
+        assert sizes["answers"] == (6, 6)
+        depth = known["truth/depth"]
+        assert sizes["depth"] == (depth.id.get_storage_size(), depth.nbytes)
+
+
+def test_reading_loads_no_renderer(split_folder):
+    command = [sys.executable, "-c", READ, str(split_folder / "iqtt-val.h5")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"

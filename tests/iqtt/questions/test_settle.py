@@ -1,0 +1,256 @@
+"""Views of questions: every cube shows, far enough from the reference, each on its own."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from iqtt.questions import settle as module
+from iqtt.questions.draws import draw_rotations, rotation_angle_degrees
+from iqtt.questions.sampling import (
+    Pools,
+    Shapes,
+    draw_shapes,
+    make_pools,
+    question_key,
+)
+from iqtt.questions.settle import Tally, settle
+from iqtt.questions.specs import SplitSpec
+from iqtt.questions.views import Question, pack_questions
+from iqtt.shapes.polycube import box_centre, symmetries
+from scenegen.camera import pixel_directions
+from scenegen.common.errors import PlacementError
+from scenegen.common.seeding import Purpose, item_rng
+from scenegen.rendering.renderer import render
+
+SPEC = SplitSpec(seed=4, cubes=(5, 8), height=64, width=64, min_cube_pixels=3, lights=(1, 3))
+REQUESTS = [(i, i % 3, 0) for i in (0, 1, 2, 3, 40, 41, 42, 10**6)]
+
+
+@pytest.fixture(scope="module")
+def pools() -> Pools:
+    return make_pools(SPEC)
+
+
+@pytest.fixture(scope="module")
+def settled(pools: Pools) -> tuple[list[Question], Tally]:
+    tally = Tally()
+    return settle(SPEC, pools, "val", REQUESTS, tally), tally
+
+
+def bits(question: Question) -> tuple:
+    """All that a question is."""
+    values = [*vars(question).values(), *vars(question.shapes).values()]
+    return tuple(
+        v.tobytes() if isinstance(v, np.ndarray) else v for v in values if v is not question.shapes
+    )
+
+
+def test_every_cube_shows_in_the_full_image(settled):
+    """Counted with rays cast at the cubes in plain numpy, too."""
+    questions, _ = settled
+    ids = render(pack_questions(SPEC, questions)).object_id.reshape(len(questions), 4, 64, 64)
+    rays = pixel_directions(64, 64, SPEC.camera.fov_y_degrees).reshape(-1, 3)
+    enough = 0
+    for question, images in zip(questions, ids, strict=True):
+        count = question.shapes.cubes.shape[1]
+        for cubes, turn, image in zip(
+            question.shapes.cubes, question.world_from_shape, images, strict=True
+        ):
+            low = cubes - box_centre(cubes[None])[0]
+            eye = turn.T @ (0, 0, SPEC.camera_distance)
+            a, b = ((low + k - eye)[:, None] / (rays @ turn) for k in (0, 1))
+            near, far = np.minimum(a, b).max(axis=2), np.maximum(a, b).min(axis=2)
+            near[near > far] = np.inf
+            seen = np.where(np.isfinite(near.min(axis=0)), near.argmin(axis=0) + 1, -1)
+            assert (seen.reshape(64, 64) == image).mean() > 0.998
+            shown = np.bincount(image[image > 0], minlength=count + 1)[1:]
+            assert len(shown) == count
+            enough += int((shown >= SPEC.min_cube_pixels).all())
+            border = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
+            assert (border == -1).all(), "it lies whole inside"
+    assert enough >= 4 * len(questions) - 2, "now and then the small image promised too much"
+
+
+@pytest.mark.parametrize("least", [0, 30, 90])
+def test_answers_are_turned_far_enough_by_any_way_of_looking(pools, least):
+    """Against SciPy's rotations, tried on each shape; the right answer's angle is the one told."""
+    spec = replace(SPEC, min_angle_degrees=least, seed=4)
+    questions = settle(spec, pools, "train", REQUESTS, Tally())
+    angles = []
+    for question in questions:
+        reference, *others = map(Rotation.from_matrix, question.world_from_shape)
+        for k, (cubes, turn) in enumerate(zip(question.shapes.cubes[1:], others, strict=True)):
+            centred = 2 * cubes.astype(int) - cubes.min(axis=0) - cubes.max(axis=0)
+            angle = math.degrees(
+                min(
+                    (turn * g * reference.inv()).magnitude()
+                    for g in Rotation.create_group("O")
+                    if sorted(np.rint(g.apply(centred)).tolist()) == sorted(centred.tolist())
+                )
+            )
+            assert angle >= least - 1e-9
+            angles.append(angle)
+            if k == question.shapes.answer:
+                assert question.angle_degrees == pytest.approx(angle, abs=1e-6)
+    assert (min(angles) < 90) == (least < 90)
+
+
+@pytest.mark.parametrize("least", [30, 90])
+def test_far_enough_is_just_so_many_degrees(least):
+    shapes = ([[0, 0, 0], [1, 0, 0]], [[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0]])
+    symmetric = np.stack([symmetries(np.array([shape]))[0] for shape in shapes])
+    turns = draw_rotations(np.random.default_rng(0), (4, 500))
+    far = module._far(
+        replace(SPEC, min_angle_degrees=least), turns[:1, 0], turns[None, 1:], symmetric[None]
+    )
+    angles = [
+        [rotation_angle_degrees(turns[0, 0], turn, own) for turn in some]
+        for some, own in zip(turns[1:], symmetric, strict=True)
+    ]
+    assert (far[0] == (np.array(angles) >= least)).all()
+
+
+def test_questions_are_what_was_asked_for(settled):
+    questions, _ = settled
+    for question, (index, place, attempt) in zip(questions, REQUESTS, strict=True):
+        assert (question.index, question.shapes.answer) == (index, place)
+        assert question.shapes.kinds[place] == -1
+        assert question.attempt >= attempt
+        assert (question.shapes.cubes[0] == question.shapes.cubes[1 + place]).all()
+        turned = question.world_from_shape
+        assert abs(turned @ turned.swapaxes(1, 2) - np.eye(3)).max() < 1e-12
+        assert question.light_position.shape == question.light_color.shape == (4, 3, 3)
+        assert ((question.light_count >= 1) & (question.light_count <= 3)).all()
+    assert len({bits(q) for q in questions}) == len(questions)
+
+
+@pytest.mark.parametrize(
+    "constants",
+    [{}, {"PROPOSED": 1, "PROPOSALS_AT_ONCE": 1}, {"PROPOSED": 60}, {"PROPOSALS_AT_ONCE": 5000}],
+)
+def test_neither_company_nor_order_nor_chunks_change_a_question(
+    pools, settled, constants, monkeypatch
+):
+    for name, value in constants.items():
+        monkeypatch.setattr(module, name, value)
+    expected = [bits(q) for q in settled[0]]
+    tally = Tally()
+    for some in ([7, 6, 5], [0, 1, 2, 3, 4], [4]):
+        again = settle(SPEC, pools, "val", [REQUESTS[i] for i in some], tally)
+        assert [bits(q) for q in again] == [expected[i] for i in some]
+    total = Tally()
+    for request in REQUESTS:
+        settle(SPEC, pools, "val", [request], total)
+    assert total == settled[1], "proposals are counted one by one, however many are judged at once"
+    assert settle(SPEC, pools, "val", [], tally) == []
+
+
+def test_requests_that_say_so_begin_with_later_attempts(pools, settled):
+    [first] = settle(SPEC, pools, "val", [(40, 1, 0)], Tally())
+    [later] = settle(SPEC, pools, "val", [(40, 1, 3)], Tally())
+    assert (first.attempt, later.attempt) == (0, 3)
+    assert first.shapes.answer == later.shapes.answer == 1
+    assert bits(first) != bits(later)
+    assert not np.isclose(first.world_from_shape, later.world_from_shape).all(axis=(1, 2)).any()
+    assert (first.light_position != later.light_position).any()
+
+
+def proposed(question):
+    """The rotations of which its reference's and its answers' were chosen, (4, VIEWS, 3, 3)."""
+    rng = item_rng(SPEC.seed, question_key("val", question.index), Purpose.VIEW, 0)
+    turns = draw_rotations(rng, (6, module.VIEWS))
+    return turns[[question.shapes.answer, 3, 4, 5]]
+
+
+def test_views_are_the_first_good_ones_of_those_drawn(pools, settled):
+    """Which is what the tally counts: one accepted an image, and those before it refused."""
+    questions, tally = settled
+    assert {q.attempt for q in questions} == {0}
+    refused = 0
+    for question in questions:
+        proposals = proposed(question)
+        for image in range(4):
+            same = (proposals[image] == question.world_from_shape[image]).all(axis=(1, 2))
+            assert same.sum() == 1
+            refused += int(same.argmax())
+    assert tally.proposed == tally.refused + 4 * len(questions)
+    assert tally.refused <= refused, "those too near to the reference's view do not count"
+    free, every = replace(SPEC, min_angle_degrees=0), Tally()
+    for question in settle(free, pools, "val", REQUESTS, every):
+        proposals = proposed(question)
+        found = (proposals == question.world_from_shape[:, None]).all(axis=(2, 3)).argmax(axis=1)
+        every.refused -= int(found.sum())
+    assert every.refused == 0
+    assert every.proposed > 4 * len(REQUESTS)
+
+
+def test_a_shape_that_no_view_shows_whole_makes_way_for_another(pools, monkeypatch):
+    """With few proposals many are given up; then all of the question is drawn anew."""
+    monkeypatch.setattr(module, "VIEWS", 4)
+    tally = Tally()
+    questions = settle(SPEC, pools, "test", REQUESTS, tally)
+    assert {0, 1} <= {q.attempt for q in questions}
+    assert tally.proposed > tally.refused > 0
+    for question in questions:
+        [(cubes, _)] = draw_shapes(SPEC, pools, "test", [(question.index, question.attempt)])
+        assert (question.shapes.cubes[0] == cubes[0]).all()
+    alone = [settle(SPEC, pools, "test", [request], Tally())[0] for request in REQUESTS]
+    assert [bits(q) for q in alone] == [bits(q) for q in questions]
+
+
+def test_whether_crowded_shapes_are_asked_for_does_not_tell_which_is_right(monkeypatch):
+    """Given three shapes, a question comes about or not whichever of them is right; where each
+    answer needs but a view of its own, the right one is seen twice, and that tells."""
+    spec = replace(SPEC, cubes=(12, 12), max_radius=3.5, distractors="near", min_angle_degrees=60)
+    pools = make_pools(spec)
+    monkeypatch.setattr(module, "VIEWS", 12)
+    drawn = draw_shapes(spec, pools, "val", [(i, 0) for i in range(24)])
+    requests = [(i, 0, 0) for i in range(24)]
+
+    def came_about():
+        shown = []
+        for right in range(3):
+            order = [right, *(k for k in range(3) if k != right)]
+            shapes = [
+                Shapes(np.concatenate([cubes[[right]], cubes]), kinds[order], right)
+                for cubes, kinds in drawn
+            ]
+            symmetric = module._symmetries(shapes)
+            turns = module._find_views(spec, "val", requests, shapes, symmetric, Tally(), "auto")
+            shown.append(np.isfinite(turns).all(axis=(1, 2, 3)))
+        return np.array(shown)
+
+    fair = came_about()
+    assert (fair == fair[0]).all()
+    assert 0 < fair[0].sum() < 24
+    monkeypatch.setattr(module, "CROWDED", 13)
+    unfair = came_about()
+    assert (unfair != unfair[0]).any()
+
+
+def test_the_last_proposal_counts_as_well(pools, monkeypatch):
+    monkeypatch.setattr(module, "VIEWS", 1)
+    tally = Tally()
+    easy = replace(SPEC, min_cube_pixels=0, min_angle_degrees=0)
+    assert {q.attempt for q in settle(easy, pools, "test", REQUESTS, tally)} == {0}
+    assert tally == Tally(4 * len(REQUESTS), 0)
+
+
+def test_the_search_for_what_cannot_be_is_bounded(pools, monkeypatch):
+    monkeypatch.setattr(module, "QUESTION_ATTEMPTS", 3)
+    monkeypatch.setattr(module, "VIEWS", 5)
+    monkeypatch.setattr(module, "MARGIN", 1000)
+    tally = Tally()
+    with pytest.raises(PlacementError) as error:
+        settle(SPEC, pools, "test", [(9, 0, 0), (12, 2, 1)], tally)
+    assert str(error.value) == (
+        "test question 12: no view of 3 choices of shapes shows 3 pixels of every cube; try a"
+        " smaller --min-cube-pixels, or fewer --cubes"
+    )
+    assert tally == Tally(20, 20), "5 views of two references each, before the third attempts"
+    monkeypatch.setattr(module, "MARGIN", 0)
+    with pytest.raises(PlacementError, match="test question 9"):
+        settle(SPEC, pools, "test", [(9, 0, 3)], Tally())

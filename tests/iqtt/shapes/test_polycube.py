@@ -1,0 +1,173 @@
+"""Tests of rotations, canonical form, chirality and symmetries."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from iqtt.shapes.polycube import (
+    MAX_CUBES,
+    ROTATIONS,
+    bounding_radius,
+    canonical,
+    canonical_class,
+    is_chiral,
+    mirror,
+    set_ids,
+    symmetries,
+)
+from iqtt.shapes.sampling import Kind, random_shapes
+
+Shapes = NDArray[np.int8]
+
+ROD = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
+CORNER = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+SQUARE = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
+TRIPOD = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+TWIST = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 1]]
+BLOCK = list(itertools.product((0, 1), repeat=3))
+# Ten cubes with three right-angled bends, the form of Shepard & Metzler's own objects.
+BENT_ARM = (
+    [[0, 0, z] for z in (2, 1, 0)]
+    + [[x, 0, 0] for x in (1, 2, 3)]
+    + [[3, y, 0] for y in (1, 2)]
+    + [[x, 2, 0] for x in (4, 5)]
+)
+
+
+def one(cubes: object) -> Shapes:
+    return np.array(cubes, dtype=np.int8)[None]
+
+
+@st.composite
+def shapes(draw: st.DrawFn) -> Shapes:
+    """One random shape of 1 to 16 cubes, (1, n, 3)."""
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    kind: Kind = draw(st.sampled_from(("chain", "tree")))
+    return random_shapes(rng, 1, draw(st.integers(1, MAX_CUBES)), kind)
+
+
+@st.composite
+def shapes_and_copies(draw: st.DrawFn) -> tuple[Shapes, Shapes]:
+    """A shape, and the same one turned, moved and with its cubes in another order."""
+    shape = draw(shapes())
+    turn = ROTATIONS[draw(st.integers(0, 23))]
+    shift = np.array(draw(st.tuples(*[st.integers(-50, 50)] * 3)), dtype=np.int8)
+    order = draw(st.permutations(range(shape.shape[1])))
+    return shape, ((shape @ turn.T) + shift)[:, order]
+
+
+def test_the_rotations_are_a_group_of_24() -> None:
+    members = {rotation.tobytes() for rotation in ROTATIONS}
+    assert len(ROTATIONS) == len(members) == 24
+    assert (ROTATIONS[0] == np.eye(3)).all()
+    for a in ROTATIONS:
+        assert round(np.linalg.det(a)) == 1
+        assert a.T.tobytes() in members
+        assert (a @ a.T == np.eye(3)).all()
+        assert all((a @ b).tobytes() in members for b in ROTATIONS)
+
+
+def test_the_rotations_cannot_be_changed_by_accident() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        ROTATIONS[0, 0, 0] = 5
+
+
+@given(shapes())
+def test_mirror_is_an_involution_that_keeps_the_box(shape: Shapes) -> None:
+    image = mirror(shape)
+    assert (mirror(image) == shape).all()
+    assert (image.min(axis=1) == shape.min(axis=1)).all()
+    assert (image.max(axis=1) == shape.max(axis=1)).all()
+    assert image.dtype == shape.dtype
+    assert (image[..., 1:] == shape[..., 1:]).all()
+
+
+def test_mirror_turns_the_order_along_x_round() -> None:
+    assert mirror(np.array([[5, 0, 0], [6, 0, 0], [6, 1, 0]])).tolist() == [
+        [6, 0, 0],
+        [5, 0, 0],
+        [5, 1, 0],
+    ]
+
+
+@given(shapes_and_copies())
+def test_copies_have_one_canonical_form(pair: tuple[Shapes, Shapes]) -> None:
+    shape, copy = pair
+    assert (canonical(shape) == canonical(copy)).all()
+    assert (canonical_class(shape) == canonical_class(copy)).all()
+    assert (canonical_class(shape) == canonical_class(mirror(copy))).all()
+    assert is_chiral(shape) == is_chiral(copy)
+    assert symmetries(shape).sum() == symmetries(copy).sum()
+    assert bounding_radius(shape) == bounding_radius(copy)
+
+
+@given(shapes())
+def test_canonical_forms_are_idempotent_sorted_and_at_the_origin(shape: Shapes) -> None:
+    for form in (canonical, canonical_class):
+        result = form(shape)
+        assert result.dtype == np.int8
+        assert (form(result) == result).all()
+        assert (result.min(axis=1) == 0).all()
+        assert result[0].tolist() == sorted(result[0].tolist())
+
+
+@given(shapes())
+def test_the_canonical_form_is_a_turned_copy(shape: Shapes) -> None:
+    target = {tuple(cube) for cube in canonical(shape)[0].tolist()}
+    turned = [shape[0] @ rotation.T for rotation in ROTATIONS]
+    assert any({tuple(c) for c in (t - t.min(axis=0)).tolist()} == target for t in turned)
+
+
+def test_many_shapes_at_once_give_what_each_gives_alone() -> None:
+    many = random_shapes(np.random.default_rng(0), 20_000, 6)  # more than one chunk
+    together = canonical(many)
+    for row in (0, 8191, 8192, 19_999):
+        assert (together[row] == canonical(many[row : row + 1])[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("cubes", "chiral"),
+    [
+        ([[0, 0, 0]], False),
+        (ROD, False),
+        (CORNER, False),
+        (TRIPOD, False),
+        (BLOCK, False),
+        (TWIST, True),
+        (BENT_ARM, True),
+    ],
+)
+def test_chirality_of_known_shapes(cubes: list[list[int]], chiral: bool) -> None:
+    shape = one(cubes)
+    assert is_chiral(shape) == [chiral]
+    assert is_chiral(mirror(shape)) == [chiral]
+    assert (set_ids(canonical(shape)) != set_ids(canonical(mirror(shape)))) == [chiral]
+
+
+@pytest.mark.parametrize(
+    ("cubes", "count"),
+    [
+        ([[0, 0, 0]], 24),
+        (BLOCK, 24),
+        (ROD, 8),
+        (SQUARE, 8),
+        (TRIPOD, 3),
+        (CORNER, 2),
+        (TWIST, 2),
+        (BENT_ARM, 1),
+    ],
+)
+def test_symmetries_of_known_shapes(cubes: list[list[int]], count: int) -> None:
+    shape = one(cubes)
+    mask = symmetries(shape)
+    assert mask.shape == (1, 24)
+    assert mask.sum() == count
+    own = {tuple(cube) for cube in shape[0].tolist()}
+    for rotation, keeps in zip(ROTATIONS, mask[0], strict=True):
+        turned = shape[0] @ rotation.T
+        turned = turned - turned.min(axis=0) + shape[0].min(axis=0)
+        assert ({tuple(cube) for cube in turned.tolist()} == own) == keeps

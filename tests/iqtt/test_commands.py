@@ -1,0 +1,235 @@
+"""The iqtt commands as a user types them, and the mistakes that a user makes."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import cli
+
+TINY = "--train 6 --labeled 3 --val 3 --test 3 --size 32 --batch 4"
+FILES = ["iqtt-test-answers.h5", "iqtt-test.h5", "iqtt-train.h5", "iqtt-val.h5"]
+
+
+@pytest.fixture(scope="module")
+def split(tmp_path_factory):
+    """Return a folder with a tiny split that no test changes."""
+    folder = tmp_path_factory.mktemp("iqtt")
+    result = CliRunner().invoke(cli.iqtt, [*f"make-split {TINY} --out".split(), f"{folder}/split"])
+    assert result.exit_code == 0, result.output
+    return folder / "split"
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    """Run `iqtt ...` inside this process, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    return lambda *arguments: CliRunner().invoke(cli.iqtt, [str(a) for a in arguments])
+
+
+def files_in(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_every_option_is_recorded(run, monkeypatch, tmp_path):
+    line = (
+        "make-split --out x --train 6 --labeled 2 --val 3 --test 4 --seed 5 --cubes 6-7"
+        " --shapes tree --distractors near --min-angle 40 --min-cube-pixels 2 --max-radius 3"
+        " --size 40x32 --background 0.5,0.25,1 --lights 1-3 --image-dtype float32 --with-depth"
+        " --compression lzf --batch 2 --device cpu"
+    )
+    monkeypatch.setattr(sys, "argv", ["/somewhere/iqtt", *line.split()])
+    result = run(*line.split())
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("x: 6 + 3 + 4 questions (2 of training labelled), ")
+    assert "views hid a cube and were refused" in result.stdout
+    assert files_in(tmp_path / "x") == FILES
+    with h5py.File("x/iqtt-test-answers.h5") as file:
+        spec = json.loads(file.attrs["spec"])
+        assert file.attrs["creation_command"] == f"iqtt {line}"
+        assert file["truth/depth"].shape == (4, 4, 40, 32)
+    expected = {
+        "seed": 5,
+        "train": 6,
+        "labeled": 2,
+        "val": 3,
+        "test": 4,
+        "cubes": [6, 7],
+        "shapes": "tree",
+        "distractors": "near",
+        "min_angle_degrees": 40.0,
+        "min_cube_pixels": 2,
+        "max_radius": 3.0,
+        "height": 40,
+        "width": 32,
+        "background": [0.5, 0.25, 1.0],
+        "lights": [1, 3],
+        "image_dtype": "float32",
+        "with_depth": True,
+    }
+    assert {name: spec[name] for name in expected} == expected
+    with h5py.File("x/iqtt-train.h5") as file:
+        assert file["labeled/questions"].shape == (2, 4, 40, 32, 3)
+        assert file["labeled/questions"].dtype == "float32"
+        assert file["labeled/questions"].compression == "lzf"
+        assert np.unique(file["truth/labeled/light_count"][:]).max() <= 3
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ("", {"train": 1000, "labeled": 100, "val": 200, "test": 200}),
+        ("--train 50", {"train": 50, "labeled": 5}),
+        ("--preset v2", {"train": 100_000, "labeled": 10_000, "val": 10_000, "test": 10_000}),
+        ("--preset paper", {"train": 100_000, "labeled": 1_000, "val": 100_000, "test": 100_000}),
+        ("--preset paper --labeled 200", {"train": 100_000, "labeled": 200}),
+        ("--size 64", {"min_cube_pixels": 3, "height": 64, "width": 64}),
+        ("--background black", {"background": (0.0, 0.0, 0.0)}),
+    ],
+)
+def test_presets_and_what_follows_from_them(run, monkeypatch, options, expected, tmp_path):
+    from iqtt.files import make as module
+    from iqtt.questions.settle import Tally
+
+    asked = {}
+
+    def make_split(folder, spec, **how):
+        asked.update(vars(spec))
+        (tmp_path / "iqtt-split").mkdir()
+        return Tally()
+
+    monkeypatch.setattr(module, "make_split", make_split)
+    result = run("make-split", *options.split())
+    assert result.exit_code == 0, result.output
+    assert {name: asked[name] for name in expected} == expected
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("--cubes 3-4", ["cubes", "too few", "--cubes"]),
+        ("--cubes 5-40", ["cubes", "5-40", "3-16"]),
+        ("--cubes x", ["--cubes", "'x'"]),
+        ("--train -1", ["train", "-1"]),
+        ("--train 5 --labeled 6", ["labeled", "6", "5 training"]),
+        ("--size 8", ["size", "8x8", "16"]),
+        ("--min-angle 100", ["min angle", "100", "90"]),
+        ("--min-angle nan", ["min angle"]),
+        ("--background 2", ["background", "2"]),
+        ("--background red", ["background", "red", "R,G,B"]),
+        ("--lights 0", ["lights", "0"]),
+        ("--min-cube-pixels 9999", ["min cube pixels", "9999"]),
+        ("--max-radius 100", ["max radius", "100"]),
+        ("--seed -1", ["seed", "-1"]),
+        ("--preset huge", ["preset", "huge"]),
+        ("--out nowhere/x", ["nowhere", "does not exist"]),
+        ("--out a-file", ["a-file", "is a file"]),
+        ("--distractors none", ["distractors", "none"]),
+        ("--batch 0", ["batch"]),
+    ],
+)
+def test_a_mistake_is_one_line_and_leaves_nothing(run, options, words, tmp_path, check_refusal):
+    (tmp_path / "a-file").write_text("mine")
+    result = run("make-split", *options.split())
+    check_refusal(result.exit_code, result.stdout, result.stderr, tuple(words))
+    assert files_in(tmp_path) == ["a-file"]
+    assert (tmp_path / "a-file").read_text() == "mine"
+
+
+def test_a_split_is_replaced_only_when_told(run, split, tmp_path, check_refusal):
+    shutil.copytree(split, "x")
+    refused = run("make-split", *TINY.split(), "--out", "x")
+    check_refusal(refused.exit_code, refused.stdout, refused.stderr, ("x", "--overwrite"))
+    (tmp_path / "x" / "notes.txt").write_text("mine")
+    strange = run("make-split", *TINY.split(), "--out", "x", "--overwrite")
+    check_refusal(strange.exit_code, strange.stdout, strange.stderr, ("notes.txt",))
+    (tmp_path / "x" / "notes.txt").unlink()
+    again = run("make-split", *TINY.split(), "--out", "x", "--overwrite", "--seed", "1")
+    assert again.exit_code == 0, again.output
+    assert (tmp_path / "x/iqtt-val.h5").read_bytes() != (split / "iqtt-val.h5").read_bytes()
+    assert files_in(tmp_path) == ["x"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "rows"),
+    [
+        (["iqtt-val.h5"], 3),
+        (["iqtt-test.h5", "--answers"], 3),
+        (["iqtt-train.h5", "--part", "unlabeled", "--items", "0,2"], 2),
+    ],
+)
+def test_show_draws_questions(run, split, arguments, rows, tmp_path):
+    result = run("show", split / arguments[0], *arguments[1:], "--out", "sheet.png")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith(f"sheet.png: {rows} of ")
+    assert (tmp_path / "sheet.png").stat().st_size > 1000
+
+
+def test_show_needs_answers_to_show_them(run, split, tmp_path, check_refusal):
+    shutil.copy(split / "iqtt-test.h5", tmp_path)
+    result = run("show", "iqtt-test.h5", "--answers")
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("no answers",))
+
+
+def test_info_describes_every_file(run, split):
+    for name in FILES:
+        result = run("info", split / name)
+        assert result.exit_code == 0, result.output
+        assert "pix2shape-bench/iqtt 1.0" in result.stdout
+
+
+def test_audit_passes_and_writes_json(run, split, tmp_path, check_refusal):
+    result = run("audit", split, "--json", "audit.json")
+    assert result.exit_code == 0, result.output
+    assert "one right answer" in result.stdout
+    found = json.loads((tmp_path / "audit.json").read_text())
+    assert found["passed"] is True
+    assert {proof["status"] for proof in found["proofs"]} == {"ok"}
+    again = run("audit", split, "--json", "audit.json")
+    check_refusal(again.exit_code, again.stdout, again.stderr, ("audit.json", "--overwrite"))
+    told = run("audit", split, "--markdown")
+    assert "| --- |" in told.stdout
+
+
+def test_audit_exits_with_1_when_a_proof_fails(run, split, tmp_path):
+    shutil.copytree(split, "x")
+    with h5py.File("x/iqtt-val.h5", "r+") as file:
+        file["answers"][0] = (file["answers"][0] + 1) % 3
+    result = run("audit", "x")
+    assert result.exit_code == 1
+    assert "FAIL" in result.stdout
+    assert "one right answer" in result.stdout
+
+
+@pytest.mark.parametrize("command", ["show", "info", "audit"])
+@pytest.mark.parametrize("kind", ["missing", "text", "empty", "rooms"])
+def test_files_of_other_kinds_are_one_line(run, command, kind, tmp_path, rooms_path, check_refusal):
+    path = tmp_path / "x.h5"
+    if kind == "text":
+        path.write_text("hello")
+    elif kind == "empty":
+        with h5py.File(path, "w"):
+            pass
+    elif kind == "rooms":
+        shutil.copy(rooms_path, path)
+    result = run(command, path)
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("x.h5",))
+
+
+def test_reading_and_auditing_need_no_renderer(split, tmp_path):
+    """Only the audit's own ray caster is used; Mitsuba is not even imported."""
+    code = (
+        "import sys, cli; from click.testing import CliRunner;"
+        f"r = CliRunner().invoke(cli.iqtt, ['audit', {str(split)!r}]);"
+        "print(r.exit_code, 'mitsuba' in sys.modules, 'torch' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ
+    )
+    assert done.stdout.split() == ["0", "False", "False"]

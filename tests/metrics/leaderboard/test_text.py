@@ -1,0 +1,145 @@
+"""Leaderboards in Markdown, HTML and LaTeX, with names that would like to break them."""
+
+import re
+from html.parser import HTMLParser
+
+import pytest
+from made_scores import iqtt_scores, rooms_scores
+
+from metrics.leaderboard.leaderboard import leaderboard
+from metrics.leaderboard.text import to_html, to_latex, to_markdown
+from metrics.report.table_text import html, latex, markdown, plain
+
+HOSTILE = [
+    "a | b",
+    "under_score & amp; 100% #1 $x^2$ {braces} ~",
+    "<script>alert(1)</script>",
+    "\"><img src=x onerror='alert(1)'>",
+    "two\nlines\r\n| --- |",
+    "\\input{/etc/passwd} \\\\ \\end{tabular}",
+    "**bold** `code` [link](javascript:alert(1)) ![x](http://x.y/z.png)",
+    "日本語 🎲 é",
+    "\u202eright to left\u2066",
+    "\x00\x1b[2J\ud800",
+    "",
+    "</title></style><!--",
+]
+
+
+@pytest.fixture(scope="module")
+def board():
+    files = [
+        rooms_scores(
+            name,
+            {"chamfer": [0.1 + i / 100] * 2, "hausdorff": [0.5] * 2, "mse_depth": [0.02] * 2},
+            [0, 1],
+            runs=1 + i % 2,
+            comparable=i != 3,
+        )
+        for i, name in enumerate(HOSTILE)
+    ]
+    return leaderboard([*files, iqtt_scores("simple", [1, 0, 1])])
+
+
+TAGS = {"html", "head", "meta", "title", "style", "body", "h1", "div", "bdi", "small", "ul", "li"}
+TAGS |= {"table", "caption", "thead", "tbody", "tr", "th", "td"}
+
+
+class Page(HTMLParser):
+    """Tags in balance, and the texts of the cells of each row."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.tags, self.attributes, self.rows = [], set(), set(), []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.add(tag)
+        self.attributes.update(name for name, _ in attrs)
+        if tag != "meta":
+            self.open.append(tag)
+        if tag == "tr":
+            self.rows.append([])
+        if tag in ("td", "th"):
+            self.rows[-1].append("")
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "td" in self.open or "th" in self.open:
+            self.rows[-1][-1] += data
+
+
+def test_html_holds_nothing_but_its_own_tags(board):
+    page, text = Page(), to_html(board)
+    page.feed(text)
+    assert page.open == []
+    assert page.tags <= TAGS
+    assert page.attributes <= {"lang", "charset", "name", "content", "class", "scope"}
+    assert "url(" not in text
+    assert "@import" not in text
+    labels = [row[1] for row in page.rows]
+    for i, name in enumerate(HOSTILE):
+        told = " (2 runs)" if i % 2 else ""
+        assert plain(name) + told + (" ‡" if i == 3 else "") in labels
+    widths = [len(row) for row in page.rows[: len(HOSTILE) + 1]]
+    assert set(widths) == {5}
+    assert text.encode().decode() == text
+
+
+def test_the_best_are_marked_in_each_format(board):
+    first = HOSTILE[0]
+    assert f'<bdi>{html(first)}</bdi></th><td class="best">0.1000<small> [0.09' in to_html(board)
+    assert f"| 1 | {markdown(first)} | **0.1000** \\[0.09" in to_markdown(board)
+    assert rf"1 & {latex(first)} & \textbf{{0.1000}} [0.09" in to_latex(board)
+    for text, mark in ((to_html(board), 'class="best">0.1300'), (to_markdown(board), "**0.1300")):
+        assert mark not in text
+
+
+def test_markdown_rows_have_all_their_cells_and_no_markup_of_others(board):
+    text = to_markdown(board)
+    assert "<" not in text
+    for block in text.split("\n\n"):
+        rows = [line for line in block.splitlines() if line.startswith("|")]
+        bars = {len(re.findall(r"(?<!\\)(?:\\\\)*\|", row)) for row in rows}
+        assert len(bars) <= 1, rows
+    body = text.split("\n\n")[1].splitlines()
+    assert len(body) == 2 + len(HOSTILE) + 4  # the paper's four rows of Table 1
+    assert r"\[link\](javascript:alert(1)) !\[x\]" in text
+    assert r"\*\*bold\*\* \`code\`" in text
+    assert f"*{markdown(plain(HOSTILE[3]))} (2 runs) ‡*" in text
+    assert "‡ not comparable" in text
+
+
+def test_latex_has_balanced_braces_and_all_its_cells(board):
+    text = to_latex(board)
+    bare = re.sub(r"\\[\\{}%$#_&]", "", text.split("\n", 1)[1])
+    assert bare.count("{") == bare.count("}")
+    assert not re.search(r"(?<!\{)%", bare)  # but for \resizebox{...}{!}{%
+    assert "$" not in bare
+    assert "#" not in bare
+    assert text.count(r"\begin{table}") == text.count(r"\end{table}") == len(board.tables)
+    assert text.count(r"\begin{tabular}") == text.count(r"\end{tabular}}")
+    assert {"\\input", "\\end{tabular} ", "\\write"}.isdisjoint(re.findall(r"\\\w+", text))
+    for tabular in text.split(r"\begin{tabular}")[1:]:
+        layout, rows = tabular.split("}", 1)
+        ends = [line for line in rows.splitlines() if line.endswith(r" \\")]
+        assert {len(re.findall(r"(?<!\\)&", row)) for row in ends} == {len(layout) - 2}
+        assert ends
+    assert "XeLaTeX or LuaLaTeX" in text.splitlines()[0]
+    simple = to_latex(leaderboard([iqtt_scores("simple", [1, 0])], paper=False))
+    assert simple.isascii()
+    assert simple.startswith("% needs \\usepackage{booktabs,graphicx,textcomp}\n")
+
+
+def test_the_papers_figures_are_marked_in_each_format(board):
+    assert "*Pix2Shape, Shape scenes (Table 1) †*" in to_markdown(board)
+    assert r"\emph{Pix2Shape, Shape scenes (Table 1) \textdagger{}}" in to_latex(board)
+    page = to_html(board)
+    rows = re.findall(r"<tr class=\"([^\"]*)\">.*?<bdi>(.*?)</bdi>", page)
+    for classes, label in rows:
+        assert ("reported" in classes) == label.endswith("†")
+        assert ("incomparable" in classes) == label.endswith("‡")
+    for text in (to_markdown(board), page, to_latex(board)):
+        assert re.search(r"0\.7329(<small>)? (±|\\ensuremath\{\\pm\}) 0\.148", text)
+        assert "0.1969" in text

@@ -1,0 +1,198 @@
+"""Point-cloud distances against brute force, scipy, point-cloud-utils and hand-made cases."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.distance import cdist
+from scipy.spatial.transform import Rotation
+
+from metrics.measures import chamfer_hausdorff as points
+from metrics.measures.chamfer_hausdorff import NearestDistances, nearest_distances, point_scores
+from metrics.measures.checks import EmptyError, NonFiniteError
+from scenegen.camera import back_project
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def random_clouds(seed):
+    rng = np.random.default_rng(seed)
+    counts, scale = rng.integers(1, 60, 2), 10.0 ** rng.integers(-3, 4)
+    return tuple(scale * rng.standard_normal((count, 3)) for count in counts)
+
+
+def room_clouds(room_depth, size=48):
+    truth = room_depth(1, size)
+    noise = np.random.default_rng(2).standard_normal(truth.shape)
+    return tuple(back_project(d, 20.0)[truth > 0.0] for d in (truth + 0.05 * noise, truth))
+
+
+def expected_scores(a, b):
+    """By the definitions, from the full matrix of distances."""
+    matrix = cdist(a, b)
+    forward, reverse = matrix.min(axis=1), matrix.min(axis=0)
+    return {
+        "accuracy_distance": forward.mean(),
+        "completeness_distance": reverse.mean(),
+        "chamfer": forward.mean() + reverse.mean(),
+        "chamfer_squared": (forward**2).mean() + (reverse**2).mean(),
+        "hausdorff": max(forward.max(), reverse.max()),
+        "hausdorff_forward": forward.max(),
+        "hausdorff_reverse": reverse.max(),
+        "hausdorff_95": max(np.quantile(forward, 0.95), np.quantile(reverse, 0.95)),
+    }
+
+
+@given(SEEDS)
+def test_scores_follow_their_definitions(seed):
+    a, b = random_clouds(seed)
+    assert point_scores(nearest_distances(a, b)) == pytest.approx(expected_scores(a, b), rel=1e-9)
+
+
+@pytest.mark.parametrize("backend", ["pykdtree", "scipy"])
+def test_rooms_agree_with_brute_force(room_depth, backend):
+    if backend == "pykdtree":
+        pytest.importorskip("pykdtree")
+    a, b = room_clouds(room_depth)
+    scores = point_scores(nearest_distances(a, b, backend))
+    assert scores == pytest.approx(expected_scores(a, b), abs=1e-12, rel=1e-12)
+
+
+def test_agrees_with_point_cloud_utils(room_depth):
+    pcu = pytest.importorskip("point_cloud_utils")
+    for a, b in (room_clouds(room_depth), random_clouds(5)):
+        scores = point_scores(nearest_distances(a, b))
+        assert scores["chamfer"] == pytest.approx(pcu.chamfer_distance(a, b), rel=1e-9)
+        assert scores["hausdorff"] == pytest.approx(pcu.hausdorff_distance(a, b), rel=1e-9)
+        forward = pcu.one_sided_hausdorff_distance(a, b)[0]
+        assert scores["hausdorff_forward"] == pytest.approx(forward, rel=1e-9)
+
+
+def test_by_hand():
+    # Predicted points at 0 and 3 on a line, true points at 1 and 10.
+    line = np.array([[1.0, 0.0, 0.0]])
+    nearest = nearest_distances(np.array([[0.0], [3.0]]) * line, np.array([[1.0], [10.0]]) * line)
+    assert nearest.forward.tolist() == [1.0, 2.0]
+    assert nearest.reverse.tolist() == [1.0, 7.0]
+    assert point_scores(nearest, [1.5, 2.5]) == {
+        "accuracy_distance": 1.5,
+        "completeness_distance": 4.0,
+        "chamfer": 5.5,
+        "chamfer_squared": 27.5,
+        "hausdorff": 7.0,
+        "hausdorff_forward": 2.0,
+        "hausdorff_reverse": 7.0,
+        "hausdorff_95": pytest.approx(6.7),
+        "f_score_1.5": 0.5,
+        "f_score_2.5": pytest.approx(2 * 1.0 * 0.5 / 1.5),
+    }
+
+
+@given(SEEDS)
+def test_swapping_the_clouds_swaps_the_directions(seed):
+    a, b = random_clouds(seed)
+    there, back = point_scores(nearest_distances(a, b)), point_scores(nearest_distances(b, a))
+    assert there["chamfer_squared"] == pytest.approx(back["chamfer_squared"], rel=1e-12)
+    assert all(there[n] == back[n] for n in ("chamfer", "hausdorff", "hausdorff_95"))
+    assert there["accuracy_distance"] == back["completeness_distance"]
+    assert there["hausdorff_forward"] == back["hausdorff_reverse"]
+
+
+@given(SEEDS)
+def test_identical_clouds_are_perfect_in_any_order(seed):
+    a, _ = random_clouds(seed)
+    scores = point_scores(nearest_distances(a[::-1], a), [1e-9])
+    assert scores.pop("f_score_1e-09") == 1.0
+    assert set(scores.values()) == {0.0}
+
+
+@given(SEEDS)
+def test_rigid_motion_changes_nothing_and_scale_scales(seed):
+    a, b = random_clouds(seed)
+    turn = Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
+    moved = point_scores(nearest_distances(a @ turn + 7.0, b @ turn + 7.0))
+    scaled = point_scores(nearest_distances(2.0 * a, 2.0 * b))
+    scores = point_scores(nearest_distances(a, b))
+    assert moved == pytest.approx(scores, rel=1e-9, abs=1e-13)
+    assert scaled.pop("chamfer_squared") == pytest.approx(4.0 * scores.pop("chamfer_squared"))
+    assert scaled == pytest.approx({name: 2.0 * value for name, value in scores.items()})
+
+
+def test_f_score_counts_strictly_and_survives_nothing_near():
+    nearest = NearestDistances(np.array([0.1, 0.2]), np.array([0.1, 0.3]))
+    assert points.f_score(nearest, 0.1) == 0.0
+    assert points.f_score(nearest, 0.2) == 0.5
+    for bad in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="threshold"):
+            points.f_score(nearest, bad)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e101])
+@pytest.mark.parametrize("which", [0, 1])
+def test_non_finite_points_never_reach_a_tree(monkeypatch, bad, which):
+    monkeypatch.setattr(points, "query_nearest", lambda *_: pytest.fail("reached the tree"))
+    clouds = [np.zeros((5, 3)), np.zeros((5, 3))]
+    clouds[which][3, 1] = bad
+    clouds[which][4, 2] = bad
+    with pytest.raises(NonFiniteError, match=r"2 of 15 values .* at index \(3, 1\)") as caught:
+        nearest_distances(*clouds)
+    assert str(caught.value).startswith(("prediction", "truth")[which])
+
+
+def test_wrong_input_is_named():
+    good = np.zeros((2, 3))
+    with pytest.raises(EmptyError, match="prediction: the cloud has no points"):
+        nearest_distances(np.zeros((0, 3)), good)
+    with pytest.raises(EmptyError, match="truth: the cloud has no points"):
+        nearest_distances(good, np.zeros((0, 3)))
+    wrong = (np.zeros(3), np.zeros((2, 2)), np.zeros((2, 3, 1)), np.float64(1.0))
+    for bad in (*wrong, [["a"] * 3], good * 1j, good > 0, [[1, 2, 3], [1]], None, [[None] * 3]):
+        with pytest.raises(ValueError, match="truth"):
+            nearest_distances(good, bad)
+
+
+@pytest.mark.parametrize("backend", ["auto", "scipy"])
+def test_degenerate_clouds(backend):
+    same = np.ones((3000, 3))
+    line = np.linspace(0, 1, 3000)[:, None] * [1.0, 0.0, 0.0]
+    large = np.array([[1e99, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    for a, b in ((same, same[:1]), (line, same), (large, same[:2]), (line, line + 1e-300)):
+        found = nearest_distances(a, b, backend)
+        for one_way, matrix in ((found.forward, cdist(a, b)), (found.reverse, cdist(b, a))):
+            assert one_way == pytest.approx(matrix.min(axis=1), rel=1e-12)
+
+
+def test_integer_and_single_precision_input_is_scored_in_double():
+    a, b = np.array([[0, 0, 0]]), np.array([[0.1, 0.0, 0.0]], dtype=np.float32)
+    assert nearest_distances(a, b).forward[0] == np.float64(np.float32(0.1))
+
+
+def test_without_pykdtree_scipy_takes_over(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pykdtree.kdtree", None)
+    a, b = random_clouds(3)
+    assert point_scores(nearest_distances(a, b)) == pytest.approx(expected_scores(a, b))
+    with pytest.raises(ImportError):
+        nearest_distances(a, b, "pykdtree")
+
+
+IMPORT_CHECK = """
+import os, sys
+import numpy as np
+import metrics.measures.chamfer_hausdorff, metrics.measures.image_search
+import metrics.measures.depth, metrics.measures.normals
+import metrics.measures.answers, metrics.measures.statistics, metrics.comparison.statistics
+assert not {"scipy", "pykdtree"} & set(sys.modules), "a tree was loaded before it was needed"
+metrics.measures.chamfer_hausdorff.nearest_distances(np.zeros((1, 3)), np.ones((1, 3)))
+assert {"scipy", "pykdtree"} & set(sys.modules)
+assert "OMP_NUM_THREADS" not in os.environ
+"""
+
+
+def test_trees_are_imported_when_needed_and_leave_the_environment_alone():
+    environment = {k: v for k, v in os.environ.items() if k != "OMP_NUM_THREADS"}
+    environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))
+    subprocess.run([sys.executable, "-c", IMPORT_CHECK], env=environment, check=True)

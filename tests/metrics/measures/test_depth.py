@@ -1,0 +1,141 @@
+"""Depth errors by hand, alignment against general solvers, and hostile depth."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from metrics.measures.checks import EmptyError, NonFiniteError
+from metrics.measures.depth import align, compare_depth, delta, depth_scores, silog
+
+ALIGNMENTS = ["none", "median_scale", "scale", "scale_shift"]
+PERFECT = {"mse_depth": 0.0, "rmse": 0.0, "abs_rel": 0.0, "silog": 0.0}
+PERFECT |= {"delta_1": 1.0, "delta_2": 1.0, "delta_3": 1.0}
+
+
+def random_pair(seed):
+    rng = np.random.default_rng(seed)
+    true = rng.uniform(1.0, 3.0, (5, 6))
+    return compare_depth(true * rng.uniform(0.5, 2.0) + 0.3 * rng.random((5, 6)), true)
+
+
+def test_by_hand():
+    scores = depth_scores(compare_depth([1.0, 2.0, 4.0, 8.0], [1.0, 4.0, 2.0, 8.0]))
+    assert scores == {
+        "mse_depth": 2.0,
+        "rmse": pytest.approx(np.sqrt(2.0)),
+        "abs_rel": pytest.approx((0.5 + 1.0) / 4.0),
+        "silog": pytest.approx(100.0 * np.log(2.0) / np.sqrt(2.0)),
+        "delta_1": 0.5,
+        "delta_2": 0.5,
+        "delta_3": 0.5,
+    }
+
+
+def test_delta_limits_are_strict_and_symmetric():
+    pair = compare_depth([1.25, 1.0, 1.24, 1.0, 1.5625, 1.9], [1.0, 1.25, 1.0, 1.24, 1.0, 1.0])
+    assert [delta(pair, power) for power in (1, 2, 3)] == [2 / 6, 4 / 6, 6 / 6]
+
+
+@pytest.mark.parametrize("alignment", ALIGNMENTS)
+def test_the_truth_is_perfect_under_every_alignment(room_depth, alignment):
+    truth = room_depth(1, 32)
+    ending = "" if alignment == "none" else f"_after_{alignment}"
+    expected = {name + ending: value for name, value in PERFECT.items()}
+    scores = depth_scores(compare_depth(truth, truth), alignment)
+    assert scores == pytest.approx(expected, abs=1e-12)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_alignments_are_the_least_squares_ones(seed):
+    pair = random_pair(seed)
+    p, t = pair.predicted, pair.true
+    scale = np.linalg.lstsq(p[:, None], t, rcond=None)[0]
+    assert align(pair, "scale").predicted == pytest.approx(p * scale)
+    design = np.stack([p, np.ones_like(p)], axis=1)
+    best = np.linalg.lstsq(design, t, rcond=None)[0]
+    expected = design @ best if best[0] > 0.0 else np.full_like(t, t.mean())
+    assert align(pair, "scale_shift").predicted == pytest.approx(expected)
+    assert np.median(align(pair, "median_scale").predicted) == pytest.approx(np.median(t))
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.001, 1000.0), st.floats(-5.0, 5.0))
+def test_alignment_undoes_what_it_allows(seed, scale, shift):
+    true = random_pair(seed).true
+    for alignment, predicted in (
+        ("median_scale", scale * true),
+        ("scale", scale * true),
+        ("scale_shift", scale * true + shift),
+    ):
+        aligned = align(compare_depth(predicted, true), alignment)
+        assert aligned.predicted == pytest.approx(true, rel=1e-9)
+    assert silog(compare_depth(scale * true, true)) == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-200, 1e90])
+def test_the_size_of_the_unit_does_not_matter(scale):
+    true = np.linspace(1.0, 3.0, 7)
+    for alignment in ALIGNMENTS[1:]:
+        aligned = align(compare_depth(scale * true, true), alignment)
+        assert aligned.predicted == pytest.approx(true, rel=1e-9)
+
+
+def test_more_freedom_never_raises_the_squared_error():
+    for seed in range(50):
+        pair = random_pair(seed)
+        errors = [next(iter(depth_scores(pair, a).values())) for a in ("none", "scale")]
+        errors.append(depth_scores(pair, "scale_shift")["mse_depth_after_scale_shift"])
+        assert errors[0] >= errors[1] - 1e-15 >= errors[2] - 2e-15
+
+
+def test_disparity_is_not_depth_turned_round():
+    true = np.linspace(1.0, 3.0, 50)
+    scores = depth_scores(compare_depth(1.0 / true, true), "scale_shift")
+    assert scores["mse_depth_after_scale_shift"] == pytest.approx(np.var(true))
+    assert (align(compare_depth(-true, true), "scale").predicted == 0.0).all()
+    assert (align(compare_depth(-true, true), "median_scale").predicted == 0.0).all()
+
+
+@pytest.mark.parametrize("alignment", ALIGNMENTS)
+@pytest.mark.parametrize("value", [0.0, -1.0, 0.1, 2.5, 1e-300, 1e-30, 1e30, 1e100])
+def test_constants_have_finite_scores(alignment, value):
+    true = np.linspace(1.0, 3.0, 50)
+    pair = compare_depth(np.full(50, value), true)
+    assert np.isfinite(list(depth_scores(pair, alignment).values())).all()
+    if alignment == "scale_shift":
+        assert align(pair, alignment).predicted == pytest.approx(np.full(50, 2.0))
+
+
+def test_depth_behind_the_camera_scores_badly():
+    true = np.full(4, 2.0)
+    scores = depth_scores(compare_depth([2.0, 2.0, 2.0, -2.0], true))
+    assert scores["delta_3"] == 0.75
+    assert scores["silog"] > 100.0
+
+
+def test_only_the_mask_is_scored():
+    true = np.array([[1.0, 2.0], [np.nan, 4.0]])
+    predicted = np.array([[1.0, 3.0], [np.nan, np.inf]])
+    mask = np.array([[True, True], [False, False]])
+    assert depth_scores(compare_depth(predicted, true, mask))["mse_depth"] == 0.5
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e101])
+def test_non_finite_values_inside_the_mask_are_named(bad):
+    true, predicted = np.ones((3, 4)), np.ones((3, 4))
+    predicted[1, 3] = predicted[2, 0] = bad
+    with pytest.raises(NonFiniteError, match=r"predicted depth: 2 of 12 .* at index \(1, 3\)"):
+        compare_depth(predicted, true)
+    with pytest.raises(NonFiniteError, match="true depth"):
+        compare_depth(true, predicted, np.ones((3, 4), dtype=bool))
+
+
+def test_wrong_input_is_named():
+    with pytest.raises(EmptyError):
+        compare_depth([1.0], [np.nan])
+    with pytest.raises(ValueError, match="positive"):
+        compare_depth([1.0, 1.0], [1.0, 0.0])
+    with pytest.raises(ValueError, match="predicted depth has shape"):
+        compare_depth([1.0, 1.0], [[1.0, 1.0]])
+    with pytest.raises(ValueError, match="alignment must be one of"):
+        depth_scores(compare_depth([1.0], [1.0]), "affine")

@@ -1,0 +1,184 @@
+"""Intervals: known values, coverage by simulation, and the same numbers every time."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binomtest, bootstrap
+
+from metrics.measures import statistics
+from metrics.measures.checks import EmptyError, NonFiniteError
+from metrics.measures.statistics import (
+    Estimate,
+    bootstrap_interval,
+    cluster_bootstrap,
+    cluster_means,
+    normal_quantile,
+    wilson_interval,
+)
+
+# Scenes of skewed errors, as distances are, with their means.
+SKEWED = {
+    "exponential": (lambda rng, n: rng.exponential(1.0, n), 1.0),
+    "lognormal": (lambda rng, n: rng.lognormal(0.0, 0.8, n), np.exp(0.32)),
+    "gamma": (lambda rng, n: rng.gamma(0.5, 1.0, n), 0.5),
+    "nearly always right": (lambda rng, n: 1.0 - rng.beta(1.0, 20.0, n), 1.0 - 1.0 / 21.0),
+}
+
+
+def bootstrap_coverage(name, scenes, trials, resamples, seed):
+    """How often the interval of scenes with 1 to 4 views each holds the true mean."""
+    draw, mean = SKEWED[name]
+    rng = np.random.default_rng(seed)
+    hits = 0
+    for trial in range(trials):
+        views = np.repeat(np.arange(scenes), rng.integers(1, 5, scenes))
+        # Views differ within a scene and agree with it on average.
+        values = draw(rng, scenes)[views] * rng.uniform(0.5, 1.5, len(views))
+        found = cluster_bootstrap(values, views, trial, resamples)
+        hits += found.low <= mean <= found.high
+    return hits / trials
+
+
+@pytest.mark.parametrize("name", SKEWED)
+def test_bootstrap_covers(name):
+    # 3 standard errors of 400 trials; the slow test below is the sharp one.
+    assert bootstrap_coverage(name, 200, 400, 500, 1) == pytest.approx(0.95, abs=0.033)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenes", [200, 500])
+@pytest.mark.parametrize("name", SKEWED)
+def test_bootstrap_covers_93_to_97_percent(name, scenes):
+    assert 0.93 <= bootstrap_coverage(name, scenes, 4000, 1000, 2) <= 0.97
+
+
+@pytest.mark.parametrize("chance", [0.05, 1 / 3, 0.7, 0.98])
+@pytest.mark.parametrize("n", [200, 1000])
+def test_wilson_covers_93_to_97_percent(chance, n):
+    # Exactly, by summing the binomial distribution over the successes that the interval covers.
+    successes = np.arange(n + 1)
+    ends = np.array([wilson_interval(int(k), n) for k in successes])
+    covered = (ends[:, 0] <= chance) & (chance <= ends[:, 1])
+    logs = np.cumsum(np.log(np.maximum(successes, 1)))
+    logs = logs[-1] - logs - logs[::-1]
+    weights = np.exp(logs + successes * np.log(chance) + (n - successes) * np.log1p(-chance))
+    assert weights.sum() == pytest.approx(1.0)
+    assert 0.93 <= weights[covered].sum() <= 0.97
+
+
+@given(st.integers(1, 10**6), st.floats(0.0, 1.0), st.sampled_from([0.5, 0.9, 0.95, 0.999]))
+def test_wilson_agrees_with_scipy(n, share, confidence):
+    successes = round(n * share)
+    expected = binomtest(successes, n).proportion_ci(confidence, method="wilson")
+    found = wilson_interval(successes, n, confidence)
+    assert found == pytest.approx((expected.low, expected.high), rel=1e-9, abs=1e-12)
+    assert 0.0 <= found[0] <= successes / n <= found[1] <= 1.0
+
+
+def test_bca_agrees_with_scipy():
+    values = np.random.default_rng(3).lognormal(0.0, 1.0, (150, 1))
+    low, high = bootstrap_interval(values, seed=0, resamples=20000)
+    ours = np.array([low[0], high[0]])
+    scipys = bootstrap((values[:, 0],), np.mean, n_resamples=20000, method="BCa", rng=1)
+    expected = np.array(scipys.confidence_interval)
+    assert ours == pytest.approx(expected, abs=0.03 * float(np.ptp(expected)))
+
+
+def test_means_of_scenes_then_of_all():
+    values, scenes = [1.0, 3.0, 10.0, 20.0, 30.0], ["b", "b", "a", "a", "a"]
+    assert cluster_means(values, scenes).tolist() == [20.0, 2.0]
+    assert cluster_bootstrap(values, scenes, seed=0).value == 11.0
+    two = cluster_means(np.stack([values, np.ones(5)], axis=1), scenes)
+    assert two.tolist() == [[20.0, 1.0], [2.0, 1.0]]
+
+
+def test_views_of_one_scene_count_as_one():
+    values = np.random.default_rng(0).random(50)
+    once = cluster_bootstrap(values, np.arange(50), seed=4)
+    repeated = cluster_bootstrap(np.repeat(values, 7), np.repeat(np.arange(50), 7), seed=4)
+    assert repeated.n == once.n == 50
+    assert (repeated.low, repeated.high) == pytest.approx((once.low, once.high), rel=1e-12)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(-5.0, 5.0), st.sampled_from([0.01, 3.0, 1e30]))
+def test_the_interval_moves_with_the_values_and_holds_the_mean(seed, shift, scale):
+    values = np.random.default_rng(seed).exponential(1.0, (40, 2))
+    low, high = bootstrap_interval(values, 1, 200)
+    assert (low < values.mean(axis=0)).all()
+    assert (values.mean(axis=0) < high).all()
+    ends = bootstrap_interval(scale * (values + shift), 1, 200)
+    assert ends[0] == pytest.approx(scale * (low + shift), rel=1e-6, abs=1e-6 * scale)
+    assert ends[1] == pytest.approx(scale * (high + shift), rel=1e-6, abs=1e-6 * scale)
+
+
+def test_columns_do_not_disturb_each_other():
+    values = np.random.default_rng(0).random((60, 5))
+    together, alone = bootstrap_interval(values, 9), bootstrap_interval(values[:, 2:3], 9)
+    assert (together[0][2], together[1][2]) == (alone[0][0], alone[1][0])
+
+
+def test_the_size_of_the_pieces_does_not_matter(monkeypatch):
+    values = np.random.default_rng(0).random((60, 2))
+    expected = bootstrap_interval(values, 9)
+    monkeypatch.setattr(statistics, "_DRAWS", 1)
+    assert np.array_equal(bootstrap_interval(values, 9), expected)
+
+
+def test_few_scenes_and_constant_scores():
+    one = cluster_bootstrap([2.0, 4.0], [7, 7], seed=0)
+    assert (one.value, one.n) == (3.0, 1)
+    assert np.isnan([one.low, one.high]).all()
+    for value in (0.1, 0.7, 0.0, 1e90):
+        constant = cluster_bootstrap([value] * 30, np.arange(30), seed=0)
+        assert constant.low == constant.value == constant.high == pytest.approx(value)
+    assert cluster_bootstrap([0.0, 1.0], [0, 1], seed=0) == Estimate(0.5, 0.0, 1.0, 2)
+
+
+SCRIPT = """
+import numpy as np
+from metrics.measures.statistics import bootstrap_interval
+values = np.random.default_rng(0).lognormal(0.0, 1.0, (700, 30))
+print(*(end.hex() for ends in bootstrap_interval(values, 5) for end in ends.tolist()))
+"""
+
+
+def test_the_same_to_the_last_digit_on_any_number_of_threads():
+    outputs = set()
+    for threads in ("1", "2", "2"):
+        names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+        environment = os.environ | dict.fromkeys(names, threads)
+        environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))
+        command = [sys.executable, "-c", SCRIPT]
+        outputs.add(
+            subprocess.run(command, env=environment, check=True, capture_output=True).stdout
+        )
+    assert len(outputs) == 1
+    other = bootstrap_interval(np.random.default_rng(0).random((9, 1)), 6)
+    assert bootstrap_interval(np.random.default_rng(0).random((9, 1)), 5) != other
+
+
+def test_wrong_input_is_named():
+    with pytest.raises(NonFiniteError, match=r"values: 1 of 3 .* \(1,\)"):
+        cluster_bootstrap([1.0, np.nan, 2.0], [0, 1, 2], seed=0)
+    with pytest.raises(EmptyError):
+        cluster_bootstrap([], [], seed=0)
+    with pytest.raises(ValueError, match="cluster labels"):
+        cluster_bootstrap([1.0, 2.0], [0], seed=0)
+    with pytest.raises(ValueError, match="one score"):
+        cluster_bootstrap([[1.0], [2.0]], [0, 1], seed=0)
+    with pytest.raises(ValueError, match="at least 100"):
+        cluster_bootstrap([1.0, 2.0], [0, 1], seed=0, resamples=99)
+    with pytest.raises(ValueError, match="cluster means"):
+        bootstrap_interval(np.zeros((0, 2)), 0)
+    with pytest.raises(EmptyError):
+        wilson_interval(0, 0)
+    with pytest.raises(ValueError, match="successes"):
+        wilson_interval(3, 2)
+    for bad in (0.0, 1.0, np.nan, 95.0):
+        with pytest.raises(ValueError, match="confidence"):
+            normal_quantile(bad)

@@ -1,0 +1,128 @@
+"""The table of names against the functions that make the scores, and against the docs."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from metrics.measures.chamfer_hausdorff import NearestDistances, point_scores
+from metrics.measures.depth import compare_depth, depth_scores
+from metrics.measures.normals import normal_scores
+from metrics.scoring.metric_names import (
+    ALL,
+    HEADLINE,
+    UnknownMetricError,
+    in_order,
+    markdown_table,
+    metric,
+)
+
+DOCS = Path(__file__).parents[3] / "docs" / "scores.md"
+ALIGNMENTS = ("none", "median_scale", "scale", "scale_shift")
+
+
+def all_scores(noise):
+    """Every score that the plain functions make, for a prediction this far off."""
+    rng = np.random.default_rng(0)
+    true = rng.uniform(0.2, 3.0, (8, 8))
+    wrong = true * (1.0 + noise * rng.standard_normal((8, 8)))
+    points, moved = rng.random((50, 3)), rng.random((50, 3)) * noise
+    forward = cKDTree(points).query(points + moved)[0]
+    reverse = cKDTree(points + moved).query(points)[0]
+    found = point_scores(NearestDistances(forward, reverse), (0.01, 0.05, 0.1))
+    for alignment in ALIGNMENTS:
+        found |= depth_scores(compare_depth(wrong, true), alignment)
+    normals = normal_scores(50.0 * noise * rng.random(200))
+    return found | normals | {f"derived_{name}": value for name, value in normals.items()}
+
+
+def test_every_score_that_is_made_is_in_the_table_and_none_beside():
+    made = set(all_scores(0.2))
+    thresholds = {name for name in made if name.startswith("f_score_")}
+    assert len(thresholds) == 3
+    assert (made - thresholds) | {"f_score_<threshold>", "iqtt_accuracy"} == set(ALL)
+
+
+def test_directions_and_limits_hold_for_scores_that_are_made():
+    good, bad = all_scores(0.0), all_scores(1.0)
+    for name, value in good.items():
+        known = metric(name)
+        assert known.task == "rooms"
+        if known.higher_is_better:
+            assert value == known.largest == 1.0 > bad[name] >= 0.0
+            assert known.unit == "fraction"
+        else:
+            assert 0.0 <= value < 1e-12 < bad[name] <= known.largest
+
+
+def test_units_follow_the_scale_of_the_scene():
+    """Scores of a room ten times the size: by the power of ten that the unit says."""
+    rng = np.random.default_rng(1)
+    true, wrong = rng.uniform(2.0, 3.0, (2, 8, 8))
+    a, b = rng.random((2, 30))
+    powers = {"scene unit": 1, "scene unit squared": 2, "ratio": 0, "fraction": 0, "100 ln": 0}
+    for alignment in ALIGNMENTS:
+        small = depth_scores(compare_depth(wrong, true), alignment)
+        large = depth_scores(compare_depth(10.0 * wrong, 10.0 * true), alignment)
+        for name, value in small.items():
+            assert large[name] == pytest.approx(value * 10.0 ** powers[metric(name).unit])
+    small, large = (point_scores(NearestDistances(s * a, s * b)) for s in (1.0, 10.0))
+    for name, value in small.items():
+        assert large[name] == pytest.approx(value * 10.0 ** powers[metric(name).unit])
+
+
+def test_names_that_are_derived():
+    assert metric("f_score_0.05").title == "F-score at 0.05"
+    aligned = metric("delta_1_after_scale_shift")
+    assert aligned.higher_is_better
+    assert aligned.definition.startswith("`delta_1`: the same after the scale, at least 0, and")
+    assert metric("derived_normal_within_30").higher_is_better
+    assert metric("iqtt_accuracy").task == "iqtt"
+    for task, names in HEADLINE.items():
+        assert {metric(name).task for name in names} == {task}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "",
+        "Chamfer",
+        "chamfer ",
+        "chamfer_after_scale",
+        "f_score_<threshold>",
+        "f_score_",
+        "f_score_0",
+        "f_score_0.050",
+        "f_score_5e-2",
+        "f_score_-1",
+        "f_score_1.2.3",
+        "f_score_1e999",
+        "f_score_٣",
+        "delta_4",
+        "derived_chamfer",
+    ],
+)
+def test_other_names_are_unknown(name):
+    with pytest.raises(UnknownMetricError, match=r"is no score: docs/scores\.md"):
+        metric(name)
+
+
+def test_the_order_is_that_of_the_table():
+    names = ["zzz", "iqtt_accuracy", "mse_depth", "f_score_0.1", "f_score_0.05", "chamfer", "aaa"]
+    assert in_order(names) == [
+        "chamfer",
+        "f_score_0.05",
+        "f_score_0.1",
+        "mse_depth",
+        "iqtt_accuracy",
+        "aaa",
+        "zzz",
+    ]
+    known = [name for name in ALL if "<" not in name]
+    assert in_order(reversed(known)) == known
+
+
+def test_the_docs_hold_the_table():
+    assert f"\n\n{markdown_table()}\n\n" in DOCS.read_text()
+    assert all(row.count(" | ") == 3 for row in markdown_table().splitlines())

@@ -1,0 +1,239 @@
+"""Submissions against truths: what is averaged over what, and what is refused."""
+
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from baselines.trivial import write_chance, write_room_baseline
+from iqtt.files.make import make_split
+from iqtt.questions.specs import SplitSpec
+from metrics.prediction_writer import RoomPredictionWriter, write_answers
+from metrics.score_file import read_scores, to_json, write_scores
+from metrics.scoring.metric_names import metric
+from metrics.scoring.room_rows import ScoringError, view_angles
+from metrics.scoring.runs import Settings
+from metrics.scoring.scoring import score
+from scenegen.camera import Camera, back_project
+from scenegen.rooms.reader import RoomsFile
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory, rooms_path):
+    """Rooms (8 of them), and submissions for them."""
+    made = tmp_path_factory.mktemp("scoring")
+    shutil.copy(rooms_path, made / "rooms.h5")
+    for name in ("oracle", "empty-room"):
+        write_room_baseline(name, made / "rooms.h5", made / f"{name}.h5")
+    rng = np.random.default_rng(0)
+    with RoomsFile(made / "rooms.h5") as rooms:
+        for run in range(3):
+            path = made / f"noisy-{run}.h5"
+            with RoomPredictionWriter(path, made / "rooms.h5", method="noisy", run=f"{run}") as out:
+                for row in rng.permutation(len(rooms)).tolist():
+                    out.add(row, rooms[row].depth * rng.uniform(0.9, 1.1, rooms[row].depth.shape))
+    return made
+
+
+@pytest.fixture(scope="session")
+def questions(tmp_path_factory):
+    """A tiny split, and two runs of answers by chance."""
+    made = tmp_path_factory.mktemp("questions")
+    spec = SplitSpec(train=6, labeled=3, val=3, test=30, height=32, width=32, min_cube_pixels=1)
+    make_split(made / "split", spec)
+    for seed in range(2):
+        write_chance(made / "split/iqtt-test.h5", made / f"chance-{seed}.h5", seed)
+    return made
+
+
+def test_the_truth_is_perfect(folder):
+    found = score([folder / "oracle.h5"])
+    assert found.comparable
+    for name, value in found.metrics.items():
+        best = 1.0 if metric(name).higher_is_better else 0.0
+        assert value.value == pytest.approx(best, abs=1e-10), name
+    assert {"normal_mean_degrees", "derived_normal_mean_degrees"} <= set(found.metrics)
+    assert 0 < found.meta.chamfer_floor < 0.1
+
+
+def test_points_are_those_of_scipy_and_means_those_of_numpy(folder):
+    paths = [folder / f"noisy-{run}.h5" for run in range(3)]
+    found = score(paths)
+    expected = np.zeros((3, 8))
+    with RoomsFile(folder / "rooms.h5") as rooms:
+        for run, path in enumerate(paths):
+            with h5py.File(path) as file:
+                for row, depth in zip(file["row"][:], file["depth"][:], strict=True):
+                    room = rooms[int(row)]
+                    mask = np.isfinite(room.depth)
+                    a, b = (back_project(d, room.fov_y_degrees)[mask] for d in (depth, room.depth))
+                    halves = cKDTree(b).query(a)[0].mean() + cKDTree(a).query(b)[0].mean()
+                    expected[run, row] = halves
+    got = found.metrics["chamfer"]
+    assert np.asarray(found.items["chamfer"]) == pytest.approx(expected.mean(axis=0), rel=1e-9)
+    assert got.value == pytest.approx(expected.mean(), rel=1e-9)
+    assert got.std == pytest.approx(expected.mean(axis=1).std(ddof=1), rel=1e-9)
+    assert got.n == 8
+    assert got.low < got.value < got.high
+    assert [one.run for one in found.meta.submissions] == ["0", "1", "2"]
+    assert score(paths[:1]).metrics["chamfer"].std is None
+
+
+def test_processes_change_no_digit(folder):
+    paths = [folder / "empty-room.h5"]
+    one, two = (to_json(score(paths, settings=Settings(processes=n))) for n in (1, 2))
+    assert one == two
+    assert score(paths).metrics["chamfer"].value > 0.005
+
+
+def test_the_seed_moves_intervals_only(folder):
+    first, second = (
+        score([folder / "empty-room.h5"], settings=Settings(seed=seed)).metrics["chamfer"]
+        for seed in (0, 1)
+    )
+    assert first.value == second.value
+    assert (first.low, first.high) != (second.low, second.high)
+
+
+def test_a_score_file_reads_back(folder, tmp_path):
+    found = score([folder / "empty-room.h5"])
+    write_scores(found, tmp_path / "x.json")
+    assert to_json(read_scores(tmp_path / "x.json")) == to_json(found)
+
+
+def test_views_are_averaged_within_scenes_and_told_by_angle(folder, tmp_path):
+    """Rows 0 to 3 become one scene seen from 0, 35, 35 and 80 degrees; the others stay."""
+    truth = tmp_path / "rooms.h5"
+    shutil.copy(folder / "rooms.h5", truth)
+    with h5py.File(truth, "r+") as file:
+        file["scene_index"][:4] = 0
+        file["view_index"][:4] = np.arange(4)
+        for row, degrees in enumerate((10, 45, 45, 90)):
+            azimuth = np.radians(degrees)
+            position = 3 * np.array([np.sin(azimuth), 0.5, np.cos(azimuth)])
+            camera = Camera(tuple(position.tolist()), (0.0, 0.0, 0.0), 20.0)
+            file["camera/world_from_camera"][row] = camera.world_from_camera
+    found = score([folder / "noisy-0.h5"], truth)
+    items = np.asarray(found.items["mse_depth"])
+    assert np.asarray(found.items["view_angle_degrees"])[:4].tolist() == [0, 35, 35, 80]
+    value = np.mean([items[:4].mean(), *items[4:]])
+    assert found.metrics["mse_depth"].value == pytest.approx(value)
+    assert found.metrics["mse_depth"].n == 5
+    assert set(found.by_view_angle) == {"0", "35", "80"}
+    assert found.by_view_angle["35"]["mse_depth"].value == pytest.approx(items[1:3].mean())
+    assert found.by_view_angle["35"]["mse_depth"].low is None
+
+
+def test_view_angles_go_the_short_way_round():
+    def matrix(degrees):
+        turned = np.eye(4)
+        turned[:3, 2] = [np.sin(np.radians(degrees)), 0, np.cos(np.radians(degrees))]
+        return turned
+
+    cameras = np.stack([matrix(d) for d in (170, -170, 80, 5)])
+    found = view_angles(np.array([0, 0, 0, 7]), np.array([0, 1, 2, 1]), cameras)
+    assert found.tolist() == [0, 20, 90, -1]
+
+
+def test_missing_rows_are_refused_or_stamped(folder, tmp_path):
+    path = tmp_path / "part.h5"
+    truth = folder / "rooms.h5"
+    with (
+        RoomsFile(truth) as rooms,
+        RoomPredictionWriter(path, truth, method="part", allow_partial=True) as out,
+    ):
+        for row in (1, 4, 6):
+            out.add(row, rooms[row].depth)
+    with pytest.raises(ScoringError, match=r"5 of 8 missing.*--allow-partial"):
+        score([path])
+    found = score([path], settings=Settings(allow_partial=True))
+    assert not found.comparable
+    assert found.items["row"].tolist() == [1, 4, 6]
+    assert "3 of 8" in found.meta.warnings[0]
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e200])
+def test_what_is_not_finite_is_refused_with_its_rows_or_penalised(folder, tmp_path, bad):
+    path = tmp_path / "bad.h5"
+    shutil.copy(folder / "oracle.h5", path)
+    with h5py.File(path, "r+") as file:
+        depth = file["depth"][:].astype(np.float64)
+        depth[5, 3, 7] = bad
+        attributes = dict(file["depth"].attrs)
+        del file["depth"]
+        file["depth"] = depth
+        file["depth"].attrs.update(attributes)
+        row = int(file["row"][5])
+    with pytest.raises(ScoringError, match=rf"row {row}; 1 rows.*--non-finite penalise"):
+        score([path])
+    found = score([path], settings=Settings(non_finite="penalise"))
+    assert not found.comparable
+    assert found.meta.counts["rows_penalised"] == 1
+    with RoomsFile(folder / "rooms.h5") as rooms:
+        room = rooms[row]
+        worst = room.depth[3, 7] ** 2 / np.isfinite(room.depth).sum()
+    assert found.items["mse_depth"][row] == pytest.approx(worst)
+    assert np.count_nonzero(found.items["mse_depth"]) == 1
+
+
+def test_another_truth_is_refused(folder, make_rooms, tmp_path):
+    other = make_rooms(tmp_path / "other.h5", 8, seed=99)
+    with pytest.raises(ScoringError, match="fingerprint"):
+        score([folder / "oracle.h5"], other)
+
+
+def test_only_runs_of_one_method_are_averaged(folder):
+    with pytest.raises(ScoringError, match=r"method 'oracle'.*bench compare"):
+        score([folder / "empty-room.h5", folder / "oracle.h5"])
+    with pytest.raises(ScoringError, match="the same bytes"):
+        score([folder / "oracle.h5", folder / "oracle.h5"])
+
+
+def test_answers_are_scored_by_kind_angle_and_place(questions):
+    found = score([questions / "chance-0.h5"])
+    with h5py.File(questions / "split/iqtt-test-answers.h5") as file:
+        true, angles = file["answers"][:], file["truth/angle_degrees"][:]
+    with h5py.File(questions / "chance-0.h5") as file:
+        right = file["answer"][:] == true
+    total = found.metrics["iqtt_accuracy"]
+    assert total.value == right.mean()
+    assert total.n == 30
+    for place in range(3):
+        assert found.by_position[str(place)]["iqtt_accuracy"].value == right[true == place].mean()
+    assert sum(g["iqtt_accuracy"].n for g in found.by_distractor.values()) == 30
+    assert set(found.by_distractor) <= {"other", "near", "mirror"}
+    for key, group in found.by_rotation_angle.items():
+        low, high = map(float, key.split("-"))
+        inside = (angles >= low) & ((angles < high) | (high == 180))
+        assert group["iqtt_accuracy"].value == right[inside].mean()
+
+
+def test_true_answers_are_all_right_and_abstentions_wrong(questions, tmp_path):
+    with h5py.File(questions / "split/iqtt-test-answers.h5") as file:
+        true = file["answers"][:].astype(np.int64)
+    test = questions / "split/iqtt-test.h5"
+    write_answers(tmp_path / "all.h5", test, method="all", answer=true)
+    assert score([tmp_path / "all.h5"]).metrics["iqtt_accuracy"].value == 1.0
+    write_answers(tmp_path / "some.h5", test, method="some", answer=np.where(true == 0, -1, true))
+    found = score([tmp_path / "some.h5"])
+    assert found.metrics["iqtt_accuracy"].value == np.mean(true != 0)
+    assert found.meta.counts["abstained"] == np.count_nonzero(true == 0)
+    scores = np.eye(3)[true]
+    scores[:4] = 1.0
+    write_answers(tmp_path / "tied.h5", test, method="tied", scores=scores)
+    assert score([tmp_path / "tied.h5"]).metrics["iqtt_accuracy"].value == 26 / 30
+
+
+def test_answers_may_come_as_json_and_several_runs_are_averaged(questions, tmp_path):
+    answers = questions / "split/iqtt-test-answers.h5"
+    (tmp_path / "list.json").write_text(str([0] * 30))
+    found = score([tmp_path / "list.json"], answers)
+    assert found.metrics["iqtt_accuracy"].value == pytest.approx(1 / 3)
+    runs = score([questions / f"chance-{seed}.h5" for seed in range(2)])
+    each = [
+        score([questions / f"chance-{seed}.h5"]).metrics["iqtt_accuracy"].value for seed in range(2)
+    ]
+    assert runs.metrics["iqtt_accuracy"].value == pytest.approx(np.mean(each))
+    assert runs.metrics["iqtt_accuracy"].std == pytest.approx(np.std(each, ddof=1))

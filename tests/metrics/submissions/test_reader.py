@@ -1,0 +1,177 @@
+"""Submissions as a stranger writes them with plain h5py."""
+
+import hashlib
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from h5_edits import damaged_chunk, put
+from submissions import edited, good_answers, good_rooms
+
+from metrics.submissions.missing_rows import match_problems, size_problems
+from metrics.submissions.reader import (
+    RoomPredictions,
+    open_predictions,
+)
+from scenegen.common.errors import FileFormatError
+from scenegen.rooms.reader import RoomsFile
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture
+def by_hand(truths, tmp_path):
+    """Write the least that a submission needs; datasets as given."""
+
+    def write(**datasets):
+        path = tmp_path / "hand.h5"
+        with RoomsFile(truths.rooms) as rooms, h5py.File(path, "w") as file:
+            file.attrs["format"] = "pix2shape-bench/predictions"
+            file.attrs["format_version"] = "1.0"
+            file.attrs["task"] = "rooms"
+            file.attrs["method"] = "mine"
+            file.attrs["truth_fingerprint"] = rooms.fingerprint
+            depth = rooms.read("depth", slice(None))
+            made = {"row": np.arange(8), "depth": depth, **datasets}
+            for name, values in made.items():
+                file[name] = values
+        return path
+
+    return write
+
+
+def test_the_least_that_is_needed(by_hand, truths):
+    with open_predictions(by_hand()) as found, RoomsFile(truths.rooms) as rooms:
+        assert isinstance(found, RoomPredictions)
+        assert (found.task, found.method, found.run, found.notes) == ("rooms", "mine", "", "")
+        assert found.alignment == "none"
+        assert found.truth_path == ""
+        assert found.truth_fingerprint == rooms.fingerprint
+        assert found.rows.dtype == np.int64
+        assert found.rows.tolist() == list(range(8))
+        assert len(found) == 8
+        assert (found.height, found.width) == (32, 32)
+        assert not found.has_normals
+        depth = found.depth(3)
+        assert (depth.dtype, depth.shape) == (np.float64, (32, 32))
+        assert np.array_equal(depth, rooms.read("depth", 3))
+        with pytest.raises(FileFormatError, match="normal: the submission has none"):
+            found.normal(0)
+        assert match_problems(found, truths.rooms, rooms.fingerprint, len(rooms)) == []
+        assert size_problems(found, rooms) == []
+
+
+@pytest.mark.parametrize("dtype", ["f2", "f4", "f8", ">f4", ">f8"])
+def test_any_floats(by_hand, dtype):
+    values = np.linspace(1, 2, 8 * 32 * 32).reshape(8, 32, 32).astype(dtype)
+    with open_predictions(by_hand(depth=values)) as found:
+        assert found.depth(5).dtype == np.float64
+        assert np.array_equal(found.depth(5), values[5].astype("f8"))
+
+
+@pytest.mark.parametrize("dtype", ["u1", "i2", ">i4", "u8"])
+def test_any_integers_in_any_order(by_hand, dtype):
+    rows = np.array([3, 1, 0, 2, 7, 6, 5, 4])
+    depth = np.ones((8, 32, 32)) * rows[:, None, None]
+    with open_predictions(by_hand(row=rows.astype(dtype), depth=depth)) as found:
+        assert found.rows.tolist() == rows.tolist()
+        assert [found.depth(i)[0, 0] for i in range(8)] == rows.tolist()
+
+
+def test_normals_of_any_length(by_hand):
+    normal = np.full((8, 32, 32, 3), 7.0)
+    with open_predictions(by_hand(normal=normal)) as found:
+        assert found.has_normals
+        assert np.array_equal(found.normal(2), normal[2])
+
+
+def test_texts_of_any_kind(by_hand):
+    path = by_hand()
+    with h5py.File(path, "r+") as file:
+        file.attrs["method"] = np.bytes_("Größe 大 \U0001f600".encode())  # fixed length
+        file.attrs.create("run", "seed 1", dtype=h5py.string_dtype("ascii"))
+        file.attrs["notes"] = "two\nlines"
+        file.attrs["unknown"] = np.arange(3)
+        file["confidence"] = np.zeros(4)
+    with open_predictions(path) as found:
+        assert found.method == "Größe 大 \U0001f600"
+        assert (found.run, found.notes) == ("seed 1", "two\nlines")
+
+
+def test_opening_reads_no_pixels(truths, tmp_path):
+    path = edited(damaged_chunk("depth", 3))(tmp_path, truths.rooms)
+    with open_predictions(path) as found:
+        assert np.isfinite(found.depth(2)).all()
+        with pytest.raises(FileFormatError, match="depth, row 3: cannot be read") as error:
+            found.depth(3)
+        assert str(path) in str(error.value)
+
+
+def test_values_that_are_not_finite_are_handed_out(truths, tmp_path):
+    """Whether they are penalised or refused is for scoring to say."""
+    path = edited(put("depth", (1, 2, 3), np.nan))(tmp_path, truths.rooms)
+    with open_predictions(path) as found:
+        assert np.isnan(found.depth(1)[2, 3])
+
+
+def test_chunks_of_many_rows_are_unpacked_once(by_hand):
+    """h5py's own choice of chunks spans rows; row by row each would be unpacked many times."""
+    path = by_hand()
+    values = np.ones((8, 600, 600), "f4")
+    with h5py.File(path, "r+") as file:
+        del file["depth"]
+        file.create_dataset("depth", data=values, chunks=(8, 400, 600), compression="gzip")
+    with open_predictions(path) as found:
+        stored = found._datasets["depth"]
+        assert stored.id.get_access_plist().get_chunk_cache()[1] == 8 * 800 * 600 * 4
+        assert np.array_equal(found.depth(7), values[7])
+
+
+def test_sha256_is_that_of_the_file(by_hand):
+    path = by_hand()
+    with open_predictions(path) as found:
+        assert found.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_a_refused_file_is_closed(truths, tmp_path):
+    path = edited(put("row", 0, 1))(tmp_path, truths.rooms)
+    with pytest.raises(FileFormatError):
+        open_predictions(path)
+    with h5py.File(path, "r+") as file:
+        file["row"][0] = 0
+    with open_predictions(path) as found:
+        found.close()
+        found.close()
+    with h5py.File(path, "r+"):
+        pass
+
+
+def test_the_first_of_many_problems_is_told(truths, tmp_path):
+    path = edited(lambda file: [file.attrs.pop("method"), file.pop("depth")])(
+        tmp_path, truths.rooms
+    )
+    with pytest.raises(FileFormatError, match=r"method.* \(and 1 more problems\)$"):
+        open_predictions(path)
+
+
+def test_reading_loads_little(truths, tmp_path):
+    """Neither renderers nor networks, nor what only scoring needs."""
+    rooms = good_rooms(tmp_path, truths.rooms)
+    answers = good_answers(tmp_path, truths.iqtt)
+    code = f"""
+import sys
+from metrics.submissions.reader import find_truth, open_predictions
+from metrics.submissions.validation import validate
+for path in {[str(rooms), str(answers)]!r}:
+    find_truth(open_predictions(path))
+    assert validate(path) == []
+heavy = ("mitsuba", "drjit", "torch", "scipy", "pykdtree", "trimesh", "click", "PIL", "tqdm")
+print(*[name for name in heavy if name in sys.modules])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert done.stdout.split() == []

@@ -1,0 +1,296 @@
+"""Every broken submission of the corpus: found where it should be, in one clear line."""
+
+import time
+import tracemalloc
+
+import h5py
+import numpy as np
+import pytest
+from broken import CASES
+from h5_edits import damaged_chunk, put
+from submissions import edited, good_answers, good_rooms
+
+from metrics.submissions.missing_rows import match_problems, size_problems
+from metrics.submissions.reader import find_truth, open_predictions
+from metrics.submissions.validation import Problem, validate
+from scenegen.common.errors import SceneGenError
+from scenegen.rooms.reader import RoomsFile
+
+BYTES = 64 * 2**20
+SECONDS = 60.0  # what hangs takes longer; a busy machine does not
+NO_FILE = Problem("file", "present", "", "")
+
+
+def lines_of(problems):
+    """All problems as lines, each checked to be one."""
+    lines = [str(problem) for problem in problems]
+    assert [line for line in lines if "\n" in line or len(line) > 400 or not line] == []
+    assert all(line.isprintable() for line in lines), lines
+    return lines
+
+
+def test_the_corpus_is_large_and_names_are_unique():
+    assert len(CASES) >= 60
+    assert len({case.name for case in CASES}) == len(CASES)
+    assert {case.stage for case in CASES} == {"open", "match", "values", "hint"}
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_validate_tells(case, truths, tmp_path):
+    path = case.build(tmp_path, truths.of(case.task))
+    given = None if case.names_truth else truths.of(case.task)
+    before = time.perf_counter()
+    tracemalloc.start()
+    try:
+        problems = validate(path, given)
+        found = lines_of(problems)
+    except OSError as error:
+        problems, found = [NO_FILE], [f"{error.filename}: {error.strerror}"]
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    fits = [line for line in found if all(word in line for word in case.words)]
+    # "row 3, cannot be read" is the line of scoring; validate counts the rows.
+    if case.stage == "values":
+        words = [word.removeprefix("row ") for word in case.words]
+        fits = [line for line in found if all(word in line for word in words)]
+    assert fits, found
+    assert all(problem.is_hint for problem in problems) == (case.stage == "hint"), found
+    assert peak < BYTES, f"{peak / 2**20:.0f} MiB"
+    assert time.perf_counter() - before < SECONDS
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_opening_and_matching_refuse(case, truths, tmp_path):
+    """What needs no pixels is refused before any is read, by the first problem alone."""
+    path = case.build(tmp_path, truths.of(case.task))
+    given = None if case.names_truth else truths.of(case.task)
+    if case.stage == "open":
+        with pytest.raises((SceneGenError, OSError)) as error:
+            open_predictions(path)
+        line = str(error.value)
+        assert str(path) in line
+        assert [word for word in case.words if word not in line] == [], line
+        assert "\n" not in line
+        return
+    with open_predictions(path) as predictions:
+        if case.stage != "match":
+            assert find_truth(predictions, given)
+            return
+        try:
+            problems = problems_with_truth(predictions, find_truth(predictions, given))
+            line = str(problems[0])
+        except SceneGenError as error:
+            line = str(error)
+    assert [word for word in case.words if word not in line] == [], line
+
+
+def problems_with_truth(predictions, truth_path):
+    if predictions.task == "iqtt":
+        from iqtt.files.reader import AnswersFile
+
+        with AnswersFile(truth_path) as truth:
+            return match_problems(predictions, truth_path, truth.fingerprint, len(truth))
+    with RoomsFile(truth_path) as truth:
+        found = size_problems(predictions, truth)
+        return found + match_problems(predictions, truth_path, truth.fingerprint, len(truth))
+
+
+# ---- what validate is for: everything at once ----
+
+
+@pytest.mark.parametrize("normals", [True, False])
+def test_a_good_submission(truths, tmp_path, normals):
+    assert validate(good_rooms(tmp_path, truths.rooms, normals=normals)) == []
+    assert validate(good_answers(tmp_path, truths.iqtt)) == []
+
+
+def test_everything_at_once(truths, tmp_path):
+    def spoil(file):
+        file.attrs["method"] = ""
+        file.attrs["alignment"] = "affine"
+        file["row"][:3] = [7, 7, 99]
+        file["depth"][3, 5, 7:9] = np.nan
+        file["depth"][5, 5, 7] = np.inf
+        file["normal"][...] *= -1
+        file["normal"][4, 0, :] = 0.0
+        file["normal"][6, 1, 1, 2] = np.nan
+
+    path = edited(spoil)(tmp_path, truths.rooms)
+    problems = validate(path)
+    assert [(one.dataset, one.rule, one.ids) for one in problems] == [
+        ("method", "value", ()),
+        ("alignment", "value", ()),
+        ("row", "unique", (7,)),
+        ("row", "known", (99,)),
+        ("row", "complete", (0, 1, 2)),
+        ("depth", "finite", (3, 5)),
+        ("normal", "finite", (6,)),
+        ("normal", "length", (4,)),
+        ("normal", "hint", ()),
+    ]
+    by_rule = {(one.dataset, one.rule): one for one in problems}
+    assert by_rule["depth", "finite"].got == "NaN, infinite or huge at 3 pixels of 2 rows"
+    assert by_rule["normal", "length"].got == "length 0 at 32 pixels of 1 rows"
+    assert "'affine'" in by_rule["alignment", "value"].got
+    assert "scale_shift" in by_rule["alignment", "value"].expected
+    lines_of(problems)
+
+
+def test_ids_are_rows_of_the_truth(truths, tmp_path):
+    """Not places in the submission."""
+
+    def spoil(file):
+        file["row"][...] = np.arange(8)[::-1]
+        for name in ("depth", "normal"):
+            file[name][...] = file[name][()][::-1]
+        file["depth"][0, 0, 0] = np.nan
+
+    (problem,) = validate(edited(spoil)(tmp_path, truths.rooms))
+    assert problem.ids == (7,)
+
+
+def test_only_the_first_few_ids_are_told(truths, tmp_path):
+    (problem,) = (
+        one
+        for one in validate(edited(put("depth", np.s_[:, 0, 0], np.nan))(tmp_path, truths.rooms))
+        if one.dataset == "depth"
+    )
+    assert problem.ids == (0, 1, 2, 3, 4)
+    assert "8 pixels of 8 rows" in problem.got
+    assert str(problem) == (
+        "depth: NaN, infinite or huge at 8 pixels of 8 rows (ids 0, 1, 2, 3, 4),"
+        " expected finite numbers wherever the truth shows a surface"
+    )
+
+
+def test_a_damaged_row_does_not_hide_the_others(truths, tmp_path):
+    def spoil(file):
+        damaged_chunk("depth", 3)(file)
+        file["depth"][6, 0, 0] = np.nan
+
+    problems = validate(edited(spoil)(tmp_path, truths.rooms))
+    assert [(one.dataset, one.rule, one.ids) for one in problems] == [
+        ("depth", "finite", (6,)),
+        ("depth", "readable", (3,)),
+    ]
+
+
+def test_problems_of_answers_at_once(truths, tmp_path):
+    def spoil(file):
+        file.attrs["run"] = 3
+        file["question"][1] = 0
+        file["answer"][2] = 9
+
+    problems = validate(edited(spoil, good_answers)(tmp_path, truths.iqtt))
+    assert [(one.dataset, one.rule) for one in problems] == [
+        ("run", "type"),
+        ("question", "unique"),
+        ("answer", "range"),
+    ]
+
+
+def test_without_depth_the_rest_is_still_told(truths, tmp_path):
+    def spoil(file):
+        del file["depth"]
+        del file["normal"]
+        file["normal"] = np.zeros((8, 3))
+        file["row"][0] = 3
+
+    problems = validate(edited(spoil)(tmp_path, truths.rooms))
+    assert [(one.dataset, one.rule) for one in problems] == [
+        ("depth", "present"),
+        ("normal", "shape"),
+        ("row", "unique"),
+    ]
+
+
+def test_another_truth_is_told_alone(truths, tmp_path):
+    """Held against the wrong rooms, neither size nor value means anything."""
+
+    def spoil(file):
+        file.attrs["truth_fingerprint"] = "f" * 64
+        for name in ("depth", "normal"):
+            half = file[name][:, ::2, ::2] * np.nan
+            del file[name]
+            file[name] = half
+
+    (problem,) = validate(edited(spoil)(tmp_path, truths.rooms))
+    assert problem.rule == "match"
+
+
+def test_the_truth_as_given(truths, tmp_path):
+    path = edited(lambda file: file.attrs.update({"truth_path": "gone.h5"}))(tmp_path, truths.rooms)
+    assert validate(path, truths.rooms) == []
+    (problem,) = validate(path)
+    assert (problem.dataset, problem.rule) == ("truth", "readable")
+    (problem,) = validate(path, truths.iqtt)
+    assert "not a rooms file" in problem.got
+    (problem,) = validate(path, tmp_path / "none.h5")
+    assert "none.h5" in problem.got
+
+
+def test_answers_held_against_rooms(truths, tmp_path):
+    (problem,) = validate(good_answers(tmp_path, truths.iqtt), truths.rooms)
+    assert problem.dataset == "truth"
+    assert "not a question file" in problem.got
+
+
+def test_hints_on_scores(truths, tmp_path):
+    """The lowest score right every time: 6 of 6 questions are enough."""
+    with h5py.File(truths.iqtt.with_name("iqtt-test-answers.h5")) as file:
+        right = file["answers"][()]
+    path = edited(lambda file: file.pop("answer"), good_answers)(tmp_path, truths.iqtt)
+    with h5py.File(path, "r+") as file:
+        file["scores"][...] = 1.0 - np.eye(3)[right]
+    (problem,) = validate(path)
+    assert problem.is_hint
+    assert "distances" in problem.got
+
+
+def test_progress_counts_rows(truths, tmp_path):
+    steps = []
+    validate(good_rooms(tmp_path, truths.rooms), progress=steps.append)
+    assert steps == [1] * 8
+
+
+def test_memory_does_not_grow_with_rows(make_rooms, tmp_path):
+    """A row's pixels are gone when the next is read."""
+    peaks = []
+    for count in (6, 48):
+        truth = make_rooms(tmp_path / f"rooms{count}.h5", count)
+        path = good_rooms(tmp_path, truth, f"predictions{count}.h5")
+        validate(path)
+        tracemalloc.start()
+        assert validate(path) == []
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    # What hints look at is kept: 24 samples, and 64 pixels of every row.
+    assert peaks[1] < 24 / 6 * peaks[0]
+
+
+def test_a_truth_that_is_damaged(truths, tmp_path):
+    truth = tmp_path / "rooms.h5"
+    truth.write_bytes(truths.rooms.read_bytes())
+    path = good_rooms(tmp_path, truth)
+    with h5py.File(truth, "r+") as file:
+        file["depth"].id.write_direct_chunk((3, 0, 0), b"\x55" * 100)
+    (problem,) = validate(path)
+    assert problem.dataset == "truth"
+    assert "depth, row 3: cannot be read" in problem.got
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_damaged_bytes(truths, tmp_path, seed):
+    """Whatever bytes are changed, in the values that is: lines, and no exception.
+
+    Not in the global heap, where HDF5 2.0 itself may not return.
+    """
+    good = good_rooms(tmp_path, truths.rooms).read_bytes()
+    rng = np.random.default_rng(seed)
+    start = good.rindex(b"GCOL") + 4096
+    for _ in range(8):
+        data = bytearray(good)
+        for at in rng.integers(start, len(data), 40):
+            data[at] = rng.integers(256)
+        (tmp_path / "x.h5").write_bytes(data)
+        lines_of(validate(tmp_path / "x.h5", truths.rooms))

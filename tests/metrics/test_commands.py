@@ -1,0 +1,187 @@
+"""The bench commands as a user types them, and every broken submission of the corpus."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from broken import CASES
+from click.testing import CliRunner
+
+import cli
+
+ROOT = Path(__file__).parents[2]
+
+
+def bench(*arguments):
+    result = CliRunner().invoke(cli.bench, [str(a) for a in arguments])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise AssertionError(f"a traceback: {result.exception!r}") from result.exception
+    return result
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_corpus_is_large():
+    assert len(CASES) >= 60
+    assert len({case.name for case in CASES}) == len(CASES)
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_a_broken_submission_is_one_clear_line(case, truths, folder, check_refusal):
+    path = case.build(folder, truths.of(case.task))
+    options = [] if case.names_truth else ["--truth", truths.of(case.task)]
+    result = bench("score", path, *options, "--json", "x.json")
+    if case.stage == "hint":
+        assert result.exit_code == 0, result.output
+        told = bench("validate", path, *options)
+        assert told.exit_code == 0
+        assert all(word in told.stdout for word in case.words), told.stdout
+        return
+    check_refusal(result.exit_code, result.stdout, result.stderr, case.words)
+    assert not (folder / "x.json").exists()
+    if path.is_file():
+        told = bench("validate", path, *options)
+        assert told.exit_code == 2
+        assert "Traceback" not in told.output
+
+
+def test_a_baseline_goes_all_the_way(truths, folder):
+    for name in ("oracle", "empty-room"):
+        made = bench("baseline", name, "--data", truths.rooms, "--out", f"{name}.h5")
+        assert made.exit_code == 0, made.output
+        assert f"bench score {name}.h5" in made.stdout
+        assert bench("validate", f"{name}.h5").stdout == f"{name}.h5: valid\n"
+        outputs = ("--json", f"{name}.json", "--csv", f"{name}.csv", "--html", f"{name}.html")
+        scored = bench("score", f"{name}.h5", *outputs)
+        assert scored.exit_code == 0, scored.output
+        assert "chamfer" in scored.stdout
+        for ending in ("json", "csv", "html"):
+            assert (folder / f"{name}.{ending}").stat().st_size > 1000
+    assert json.loads((folder / "oracle.json").read_text())["metrics"]["chamfer"]["value"] == 0
+    compared = bench("compare", "empty-room.json", "oracle.json", "--json", "c.json")
+    assert compared.exit_code == 0, compared.output
+    assert "better" in compared.stdout
+    for form, word in (("markdown", "| "), ("html", "<table"), ("latex", "\\toprule")):
+        ranked = bench("leaderboard", "empty-room.json", "oracle.json", "--format", form)
+        assert ranked.exit_code == 0, ranked.output
+        assert word in ranked.stdout
+        assert ranked.stdout.index("oracle") < ranked.stdout.index("empty-room")
+        assert "as reported" in ranked.stdout
+    assert "| " in bench("score", "oracle.h5", "--markdown").stdout
+
+
+def test_chance_goes_all_the_way(truths, folder):
+    made = bench("baseline", "chance", "--data", truths.iqtt, "--out", "chance.h5")
+    assert made.exit_code == 0, made.output
+    scored = bench("score", "chance.h5", "--html", "chance.html")
+    assert scored.exit_code == 0, scored.output
+    assert "iqtt_accuracy" in scored.stdout
+    assert "chance" in scored.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("score", ("Missing argument",)),
+        ("score nothing.h5", ("nothing.h5", "no such file")),
+        ("score . ", (".",)),
+        ("validate nothing.h5", ("nothing.h5", "no such file")),
+        ("compare a.json", ("a.json",)),
+        ("compare broken.json broken.json", ("broken.json",)),
+        ("leaderboard broken.json", ("broken.json",)),
+        ("leaderboard --metric beauty", ("beauty",)),
+        ("baseline best --data x.h5", ("best",)),
+        ("baseline oracle", ("--data",)),
+        ("baseline oracle --data nothing.h5", ("nothing.h5",)),
+        ("baseline chance --data nothing.h5", ("nothing.h5",)),
+    ],
+)
+def test_a_mistake_is_one_line(arguments, words, folder, check_refusal):
+    (folder / "broken.json").write_text('{"format": ')
+    result = bench(*arguments.split())
+    check_refusal(result.exit_code, result.stdout, result.stderr, words)
+    assert sorted(os.listdir(folder)) == ["broken.json"]
+
+
+def test_outputs_are_not_replaced_unless_told(truths, folder, check_refusal):
+    bench("baseline", "oracle", "--data", truths.rooms, "--out", "oracle.h5")
+    (folder / "x.json").write_text("mine")
+    refused = bench("score", "oracle.h5", "--json", "x.json")
+    check_refusal(refused.exit_code, refused.stdout, refused.stderr, ("x.json", "--overwrite"))
+    assert (folder / "x.json").read_text() == "mine"
+    assert bench("score", "oracle.h5", "--json", "x.json", "--overwrite").exit_code == 0
+
+
+def test_the_format_is_described(folder):
+    text = bench("describe-format").stdout
+    for word in ("row", "depth", "normal", "answer", "scores", "truth_fingerprint", "alignment"):
+        assert word in text
+
+
+@pytest.mark.parametrize("example", ["submit", "submit_iqtt"])
+def test_the_examples_run_and_score(example, truths, folder):
+    lines = (ROOT / f"examples/{example}.py").read_text().splitlines()
+    assert len(lines) < 30
+    truth = truths.iqtt if example == "submit_iqtt" else truths.rooms
+    script = [sys.executable, f"{ROOT}/examples/{example}.py", str(truth), "out.h5"]
+    subprocess.run(script, check=True, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    assert bench("score", "out.h5").exit_code == 0
+
+
+SCORING = """
+import sys, cli
+from click.testing import CliRunner
+result = CliRunner().invoke(cli.bench, {arguments!r})
+print(result.exit_code, *sorted({{"mitsuba", "drjit", "torch", "trimesh"}} & set(sys.modules)))
+"""
+
+
+def loaded(arguments):
+    code = SCORING.format(arguments=arguments)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return done.stdout.split()
+
+
+def test_scoring_loads_neither_renderer_nor_torch(truths, folder):
+    bench("baseline", "empty-room", "--data", truths.rooms, "--out", "x.h5")
+    bench("baseline", "chance", "--data", truths.iqtt, "--out", "y.h5")
+    for path in ("x.h5", "y.h5"):
+        assert loaded(["score", path, "--processes", "1", "--html", f"{path}.html"]) == ["0"]
+
+
+def test_that_check_can_fail(folder):
+    code = SCORING.replace("import sys, cli", "import sys, cli, trimesh")
+    done = subprocess.run(
+        [sys.executable, "-c", code.format(arguments=["--help"])],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.split() == ["0", "trimesh"]
+
+
+def test_scoring_starts_in_under_a_second(folder):
+    """With the work of refusing a missing file; the fastest of a few."""
+    times = []
+    for _ in range(4):
+        start = time.perf_counter()
+        subprocess.run(
+            [sys.executable, "-c", "import cli; cli.bench()", "score", "nothing.h5"],
+            capture_output=True, check=False,
+        )  # fmt: skip
+        times.append(time.perf_counter() - start)
+    assert min(times) < 1.0
+
+
+def test_outputs_of_one_name_are_refused_before_anything_is_written(truths, folder, check_refusal):
+    bench("baseline", "empty-room", "--data", truths.rooms, "--out", "p.h5")
+    result = bench("score", "p.h5", "--json", "same", "--csv", "./same")
+    words = ("outputs: found same, same", "expected different files")
+    check_refusal(result.exit_code, result.stdout, result.stderr, words)
+    assert not (folder / "same").exists()

@@ -1,0 +1,212 @@
+"""Descriptions: JSON both ways, every setting guarded, fingerprints that notice every change."""
+
+import json
+from dataclasses import fields
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from scenegen.camera import Camera
+from scenegen.common.errors import SpecError
+from scenegen.common.records import changed_settings
+from scenegen.description.scenes import SHAPE_NAMES, Light, PlacedObject, SceneSpec
+from scenegen.description.specs import DatasetSpec, fingerprint
+from scenegen.sampling.scenes import sample_scene
+
+NUMBER = st.floats(-1e9, 1e9)
+VECTOR = st.tuples(NUMBER, NUMBER, NUMBER)
+QUATERNIONS = [(1.0, 0.0, 0.0, 0.0), (0.5, -0.5, 0.5, 0.5), (0.1, 0.7, -0.7, 0.1)]
+UNIT = st.floats(0.0, 1.0)
+COLOR = st.tuples(UNIT, UNIT, UNIT)
+INSIDE = st.floats(0.01, 0.99)
+
+
+def rising(values: st.SearchStrategy[Any]) -> st.SearchStrategy[tuple[Any, Any]]:
+    return st.tuples(values, values).map(lambda pair: (min(pair), max(pair)))
+
+
+CAMERAS = st.builds(Camera, VECTOR, st.just((0.3, 0.25, -0.1)), st.floats(1.0, 179.0))
+OBJECTS = st.builds(
+    PlacedObject,
+    st.sampled_from([*SHAPE_NAMES, "mug/0001", "chair/ä b/c"]),
+    VECTOR,
+    st.sampled_from(QUATERNIONS),
+    st.floats(1e-6, 1e3),
+    VECTOR,
+    st.floats(0.0, 10.0),
+    st.floats(1.0, 1e4),
+    st.text("0123456789abcdef", max_size=16),
+)
+SCENES = st.builds(
+    SceneSpec,
+    index=st.integers(0, 2**40),
+    cameras=st.lists(CAMERAS, min_size=1, max_size=2).map(tuple),
+    objects=st.lists(OBJECTS, max_size=3).map(tuple),
+    lights=st.lists(st.builds(Light, VECTOR, VECTOR), max_size=3).map(tuple),
+    ambient=VECTOR,
+    attenuation=st.tuples(NUMBER, NUMBER),
+    room_reflectance=st.none() | VECTOR,
+    background=VECTOR,
+)
+DATASETS = st.builds(
+    DatasetSpec,
+    seed=st.integers(0, 2**63 - 1),
+    height=st.integers(8, 4096),
+    width=st.integers(8, 4096),
+    objects=rising(st.integers(0, 100)),
+    shapes=st.lists(st.sampled_from(SHAPE_NAMES), min_size=1, unique=True).map(tuple),
+    object_radius=rising(st.floats(0.005, 0.5)),
+    pose=st.sampled_from(["resting", "any"]),
+    lights=rising(st.integers(0, 16)),
+    shadows=st.booleans(),
+    spp=st.integers(1, 1024),
+    image_dtype=st.sampled_from(["uint8", "float16", "float32"]),
+    min_visible_pixels=st.integers(0, 64),
+    allow_cropped=st.booleans(),
+    fov_degrees=st.floats(1.0, 120.0),
+    camera_radius=st.floats(2.0, 10.0),
+    camera_target=st.tuples(INSIDE, INSIDE, INSIDE),
+    light_radius=st.floats(2.0, 100.0),
+    light_level=st.floats(0.0, 100.0),
+    ambient=COLOR,
+    attenuation=st.tuples(st.floats(0.1, 9.0), st.floats(0.0, 9.0)),
+    reflectance=COLOR,
+    room_reflectance=COLOR,
+    random_reflectance=st.booleans(),
+    specular=rising(st.floats(0.0, 10.0)),
+    shininess=rising(st.floats(1.0, 10_000.0)),
+    light_saturation=UNIT,
+    views=st.lists(st.floats(0.1, 80.0), unique=True, max_size=5).map(
+        lambda some: (0.0, *sorted(some))
+    ),
+)
+
+NAN, INF = float("nan"), float("inf")
+OUT_OF_RANGE: dict[str, list[Any]] = {
+    "seed": [-1, 2**63],
+    "height": [7, 2**17 + 1],
+    "width": [7, 2**17 + 1],
+    "objects": [(-1, 2), (3, 2), (1, 101)],
+    "shapes": [(), ("box", "cube"), ("box", "box")],
+    "object_radius": [(0.004, 0.1), (0.1, 0.51), (0.2, 0.1), (0.1, NAN), (NAN, 0.1)],
+    "pose": ["flying"],
+    "lights": [(-1, 1), (1, 17), (2, 1)],
+    "spp": [0, 1025],
+    "image_dtype": ["uint16"],
+    "min_visible_pixels": [-1, 128 * 128 + 1],
+    "fov_degrees": [0.9, 121.0, NAN],
+    "camera_radius": [1.0, 10.1, NAN],
+    "camera_target": [(0.3, 0.0, 0.3), (0.3, 0.3, 1.0), (NAN, 0.3, 0.3)],
+    "light_radius": [1.0, 101.0, INF],
+    "light_level": [-0.1, 101.0, NAN],
+    "ambient": [(0.1, 1.1, 0.1), (-0.1, 0.1, 0.1), (0.1, 0.1, NAN)],
+    "attenuation": [(-0.1, 1.0), (1.0, -0.1), (0.0, 0.0), (NAN, 1.0), (1.0, NAN)],
+    "source": ["meshes"],
+    "object_split": ["dev", "train"],
+    "views": [(), (5.0,), (0.0, 5.0, 5.0), (0.0, 80.1), (0.0, -5.0), (0.0, NAN)],
+    "shading": ["phong"],
+    "light_saturation": [-0.1, 1.1, NAN],
+    "room_reflectance": [(0.1, 0.1, 1.1), (-0.1, 0.1, 0.1), (NAN, 0.1, 0.1)],
+    "specular": [(-0.1, 0.1), (0.2, 0.1), (0.0, 10.1), (0.0, NAN)],
+    "shininess": [(0.9, 2.0), (3.0, 2.0), (1.0, 10_001.0), (NAN, 2.0)],
+    "reflectance": [(0.1, 0.1, 1.1), (-0.1, 0.1, 0.1), (NAN, 0.1, 0.1)],
+}
+SHOWN = {"height": "size", "width": "size", "fov_degrees": "fov"}  # where not the field's name
+
+
+@settings(deadline=None)
+@given(scene=SCENES)
+def test_scene_json_keeps_every_bit(scene: SceneSpec) -> None:
+    again = SceneSpec.from_json(scene.to_json())
+    assert again == scene
+    assert again.to_json() == scene.to_json()
+    assert hash(again) == hash(scene), "tuples, not lists"
+    assert "\n" not in scene.to_json()
+
+
+@settings(deadline=None)
+@given(spec=DATASETS)
+def test_request_json_keeps_every_bit(spec: DatasetSpec) -> None:
+    again = DatasetSpec.from_json(spec.to_json())
+    assert again == spec
+    assert hash(again) == hash(spec)
+    assert fingerprint(again, []) == fingerprint(spec, [])
+
+
+@pytest.mark.parametrize(
+    ("field", "value"), [(field, value) for field, some in OUT_OF_RANGE.items() for value in some]
+)
+def test_a_setting_out_of_range_is_named(field: str, value: Any) -> None:
+    name = SHOWN.get(field, field.replace("_", " "))
+    with pytest.raises(SpecError, match=f"^{name}: found .*expected "):
+        DatasetSpec(**{field: value})
+    request = json.loads(DatasetSpec().to_json()) | {field: value}
+    with pytest.raises(SpecError, match=f"^{name}"):
+        DatasetSpec.from_json(json.dumps(request))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"cameras": ()},
+        {"index": -1},
+        {"objects": [{"shape": "cube"}]},
+        {"objects": [{"shape": "mug/"}]},
+        {"objects": [{"shape": "/0001"}]},
+        {"objects": [{"specular": -0.1}]},
+        {"objects": [{"shininess": 0.0}]},
+        {"objects": [{"scale": 0.0}]},
+        {"objects": [{"scale": -0.1}]},
+        {"objects": [{"rotation": (1.0, 0.1, 0.0, 0.0)}]},
+        {"cameras": [{"fov_y_degrees": 180.0}]},
+        {"cameras": [{"fov_y_degrees": 0.0}]},
+        {"cameras": [{"position": (0.3, 0.3, 0.3)}]},
+    ],
+    ids=str,
+)
+def test_what_no_scene_can_be_is_refused(change: dict[str, Any]) -> None:
+    scene = sample_scene(DatasetSpec(objects=(1, 1)), 0)
+    assert scene is not None
+    raw = json.loads(scene.to_json())
+    assert SceneSpec.from_json(json.dumps(raw)) == scene
+    for name, value in change.items():
+        nested = isinstance(value, list)
+        raw[name] = [raw[name][0] | value[0]] if nested else value
+        key = next(iter(value[0])).replace("_", ".") if nested else name
+        with pytest.raises(SpecError, match=f"{key}|camera"):
+            SceneSpec.from_json(json.dumps(raw))
+
+
+def test_every_setting_with_a_range_is_tried_above() -> None:
+    assert {f.name for f in fields(DatasetSpec)} - set(OUT_OF_RANGE) == {
+        "shadows",
+        "allow_cropped",
+        "listing",
+        "random_reflectance",
+    }
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", "null", '{"sed": 1}', '{"seed": "x"}'])
+def test_what_is_no_request_is_refused(text: str) -> None:
+    with pytest.raises(SpecError):
+        DatasetSpec.from_json(text)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"index": 0}', '{"cameras": 3}'])
+def test_what_is_no_scene_is_refused(text: str) -> None:
+    with pytest.raises(SpecError, match="scene description"):
+        SceneSpec.from_json(text)
+
+
+def test_changed_settings_tells_just_those() -> None:
+    assert changed_settings(DatasetSpec()) == {}
+    assert changed_settings(DatasetSpec(seed=4, spp=2)) == {"seed": 4, "spp": 2}
+
+
+def test_slots_hold_the_most_and_are_never_none() -> None:
+    full = DatasetSpec(objects=(1, 5), lights=(0, 4))
+    assert (full.object_slots, full.light_slots) == (5, 4)
+    empty = DatasetSpec(objects=(0, 0), lights=(0, 0))
+    assert (empty.object_slots, empty.light_slots) == (1, 1)

@@ -1,0 +1,254 @@
+"""Members of the built-in classes: exact surfaces, bodies for placement, and no two alike."""
+
+import hashlib
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from embreex import rtcore_scene
+from embreex.mesh_construction import TriangleMesh
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from scenegen.common.errors import SpecError
+from scenegen.description.scenes import FAMILY_NAMES
+from scenegen.objects.families import members
+from scenegen.objects.families.members import MEMBERS, member_shape
+from scenegen.objects.solids import UnitShape
+
+Array = NDArray[np.float64]
+ROOT = Path(__file__).parents[2]
+FAMILIES = pytest.mark.parametrize("family", FAMILY_NAMES)
+# Of members 0, 1 and 999, coordinates to 1e-6: whoever changes the geometry changes data sets.
+DIGESTS = {
+    "bag": "2b1cbf45bc3b9940",
+    "bottle": "f1505180b88207ca",
+    "bowl": "a3c7985a4303162b",
+    "can": "e863ed64b23933e5",
+    "cap": "751e0c92c2281926",
+    "chair": "d4fb9abba4a11746",
+    "lamp": "d49067bf36c2e9af",
+    "mug": "fcf53df21b766e59",
+    "table": "9a86c4af2fd566fb",
+}
+DIGEST_CODE = """
+import sys
+sys.path.insert(0, "tests/scenegen")
+from test_families import DIGESTS, digest
+print(*(digest(family) for family in reversed(DIGESTS)))
+"""
+PIXELS = 28  # of a small view's side: objects are 40 to 60 wide in pictures of 128
+VIEWS = ((35.0, 25.0), (215.0, 50.0))  # azimuth and elevation, degrees
+
+
+def spread(family: str, step: int = 37) -> Iterator[UnitShape]:
+    return (member_shape(family, member) for member in range(0, MEMBERS, step))
+
+
+def digest(family: str) -> str:
+    code = hashlib.sha256()
+    for member in (0, 1, 999):
+        shape = member_shape(family, member)
+        for values in (shape.triangles, shape.normals, shape.hull_points, shape.hull_discs):
+            code.update(np.round(values * 1e6).astype(np.int64).tobytes())
+    return code.hexdigest()[:16]
+
+
+def face_normals(shape: UnitShape) -> Array:
+    a, b, c = (shape.triangles[:, i] for i in range(3))
+    cross = np.cross(b - a, c - a)
+    return np.asarray(cross / np.linalg.norm(cross, axis=1, keepdims=True))
+
+
+def welded(shape: UnitShape) -> Array:
+    """Vertex numbers (F, 3): corners at one place, to 1e-8, are one vertex."""
+    places = np.round(shape.triangles.reshape(-1, 3) * 1e8).astype(np.int64)
+    return np.unique(places, axis=0, return_inverse=True)[1].reshape(-1, 3)
+
+
+def pieces(shape: UnitShape) -> list[Array]:
+    """The triangles of each connected part."""
+    vertices = welded(shape)
+    edges = vertices[:, [0, 1, 1, 2]].reshape(-1, 2).T
+    count = vertices.max() + 1
+    graph = coo_array((np.ones(edges.shape[1]), edges), shape=(count, count))
+    found, label = connected_components(graph, directed=False)
+    return [shape.triangles[label[vertices[:, 0]] == i] for i in range(found)]
+
+
+def test_classes_are_named_in_order() -> None:
+    assert tuple(sorted(FAMILY_NAMES)) == FAMILY_NAMES
+    assert len(FAMILY_NAMES) == 9
+    assert set(FAMILY_NAMES) == set(members._BUILDERS)
+    assert MEMBERS >= 1000
+
+
+@FAMILIES
+def test_every_part_is_closed_and_faces_outwards(family: str) -> None:
+    for shape in spread(family):
+        vertices = welded(shape)
+        edges = np.concatenate([vertices[:, [i, (i + 1) % 3]] for i in range(3)])
+        assert (edges[:, 0] != edges[:, 1]).all(), shape.name
+        there, back = (np.sort(edges @ order) for order in ([1, 10**6], [10**6, 1]))
+        np.testing.assert_array_equal(there, back, err_msg=shape.name)
+        for part in pieces(shape):
+            about = part - part.mean(axis=(0, 1))
+            volume = np.einsum("fi,fi->", about[:, 0], np.cross(about[:, 1], about[:, 2])) / 6
+            assert volume > 1e-8, shape.name
+
+
+@FAMILIES
+def test_parts_hang_together(family: str) -> None:
+    """The boxes about the parts overlap, from part to part."""
+    for shape in spread(family):
+        parts = pieces(shape)
+        low = np.array([part.min(axis=(0, 1)) for part in parts])
+        high = np.array([part.max(axis=(0, 1)) for part in parts])
+        meets = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
+        assert connected_components(coo_array(meets))[0] == 1, shape.name
+
+
+@FAMILIES
+def test_normals_are_unit_and_belong_to_their_faces(family: str) -> None:
+    """Facets turn by up to 16 degrees from their corners' normals; few, and tiny, do by more."""
+    wide, total = 0.0, 0.0
+    for shape in spread(family):
+        assert np.isfinite(shape.triangles).all()
+        np.testing.assert_allclose(np.linalg.norm(shape.normals, axis=-1), 1.0, atol=1e-12)
+        agreement = np.einsum("fi,fki->fk", face_normals(shape), shape.normals).min(axis=1)
+        assert agreement.min() > 0.7, shape.name
+        a, b, c = (shape.triangles[:, i] for i in range(3))
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        assert area.min() > 1e-9, shape.name
+        wide += area[agreement < np.cos(np.radians(16))].sum()
+        total += area.sum()
+    assert wide < 0.03 * total
+
+
+@FAMILIES
+def test_members_are_centred_of_radius_one_and_stand(family: str) -> None:
+    for shape in spread(family):
+        corners = shape.triangles.reshape(-1, 3)
+        np.testing.assert_allclose(corners.min(axis=0) + corners.max(axis=0), 0.0, atol=1e-12)
+        assert np.linalg.norm(corners, axis=1).max() == pytest.approx(1.0, abs=1e-12)
+        low = corners[:, 1].min()
+        assert abs(shape.support(np.array([[0.0, -1.0, 0.0]]))[0] + low) < 1e-9
+        on_floor = corners[corners[:, 1] < low + 1e-9]
+        assert (np.ptp(on_floor[:, [0, 2]], axis=0) > 0.1).all(), f"{shape.name}: no base"
+        np.testing.assert_array_equal(shape.resting_directions, [[0.0, -1.0, 0.0]])
+        assert not shape.is_sphere
+
+
+@FAMILIES
+def test_support_bounds_members_closely(family: str) -> None:
+    directions = np.random.default_rng(0).standard_normal((300, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    directions = np.concatenate([directions, np.eye(3), -np.eye(3)])
+    for shape in spread(family):
+        reach = (shape.triangles.reshape(-1, 3) @ directions.T).max(axis=0)
+        excess = shape.support(directions) - reach
+        assert excess.min() > -1e-12, f"{shape.name}: the body must contain the mesh"
+        assert excess.max() < 0.02, shape.name
+
+
+@FAMILIES
+def test_members_are_small(family: str) -> None:
+    shapes = list(spread(family))
+    assert max(len(shape.triangles) for shape in shapes) <= 4000
+    rows = [len(shape.hull_points) for shape in shapes]
+    assert np.median(rows) <= 150
+    assert max(rows) <= 250
+    assert all(len(shape.hull_discs) == n for shape, n in zip(shapes, rows, strict=True))
+
+
+@FAMILIES
+def test_members_look_as_they_did(family: str) -> None:
+    assert digest(family) == DIGESTS[family]
+
+
+def test_another_process_makes_the_same_members() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", DIGEST_CODE],
+        cwd=ROOT,
+        env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split() == [digest(family) for family in reversed(DIGESTS)]
+
+
+def test_a_member_is_named_and_built_once() -> None:
+    shape = member_shape("mug", 7)
+    assert shape.name == "mug/0007"
+    assert member_shape("mug", 7) is shape
+
+
+@pytest.mark.parametrize(
+    ("family", "member", "words"),
+    [
+        ("cup", 0, "family: found 'cup', expected one of bag, bottle, bowl, .*, table"),
+        ("", 0, "family: found ''"),
+        ("mug", MEMBERS, f"mug: found member {MEMBERS}, expected 0 to {MEMBERS - 1}"),
+        ("mug", -1, "mug: found member -1, expected 0 to"),
+    ],
+)
+def test_what_is_not_there_is_refused(family: str, member: int, words: str) -> None:
+    with pytest.raises(SpecError, match=words):
+        member_shape(family, member)
+
+
+def view_rays() -> tuple[Array, Array]:
+    """Parallel rays through the pixels of all views, float32."""
+    steps = (np.arange(PIXELS) + 0.5) / PIXELS * 2 - 1
+    x, y = (v.reshape(-1, 1) for v in np.meshgrid(steps, -steps))
+    origins, directions = [], []
+    for angles in VIEWS:
+        azimuth, elevation = np.radians(angles)
+        flat = np.cos(elevation)
+        ahead = -np.array([np.sin(azimuth) * flat, np.sin(elevation), np.cos(azimuth) * flat])
+        right = np.cross(ahead, [0.0, 1.0, 0.0]) / flat
+        origins.append(x * right + y * np.cross(right, ahead) - 2 * ahead)
+        directions.append(np.broadcast_to(ahead, (PIXELS**2, 3)))
+    return np.concatenate(origins, dtype=np.float32), np.concatenate(directions, dtype=np.float32)
+
+
+def least_difference(family: str, step: int) -> tuple[float, float]:
+    """Least and median over members of the part of the pixels that differ from the likest other.
+
+    Pixels are those that either covers in small depth images; depths differ by over 0.03.
+    """
+    origins, directions = view_rays()
+    images = []
+    for shape in spread(family, step):
+        scene = rtcore_scene.EmbreeScene()
+        TriangleMesh(scene, shape.triangles.astype(np.float32))
+        depth = scene.run(origins, directions, query="DISTANCE")
+        images.append(np.where(depth < 4.0, depth, 9.0).astype(np.float32))
+    every = np.array(images)
+    likest = []
+    for i, image in enumerate(every):
+        differs = np.count_nonzero(abs(every - image) > 0.03, axis=1)
+        covered = np.count_nonzero((every < 9.0) | (image < 9.0), axis=1)
+        likest.append(np.delete(differs / covered, i).min())
+    return min(likest), float(np.median(likest))
+
+
+@FAMILIES
+def test_members_are_visibly_different(family: str) -> None:
+    least, median = least_difference(family, 10)
+    assert least > 0.01
+    assert median > 0.25
+
+
+@pytest.mark.slow
+@FAMILIES
+def test_all_members_are_visibly_different(family: str) -> None:
+    least, median = least_difference(family, 1)
+    assert least > 0.01
+    assert median > 0.2

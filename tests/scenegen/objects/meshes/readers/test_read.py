@@ -1,0 +1,225 @@
+"""Files as people have them, against trimesh's readers and against meshes known by heart."""
+
+import struct
+from typing import Any
+
+import numpy as np
+import pytest
+from known_meshes import OBJ, PYRAMID, SPHERE
+from numpy.typing import NDArray
+
+from scenegen.objects.meshes.clean import clean_mesh
+from scenegen.objects.meshes.errors import BadMeshError
+from scenegen.objects.meshes.read import parse_mesh, read_mesh
+
+Array = NDArray[Any]
+
+
+def faces_of(vertices: Array, faces: Array) -> set[tuple[tuple[float, ...], ...]]:
+    """Triangles as sets of their corners' coordinates, whatever their numbers and order."""
+    return {tuple(sorted(map(tuple, np.round(vertices[face], 6).tolist()))) for face in faces}
+
+
+def pyramid_of(vertices: Array, faces: Array) -> None:
+    """Check that a mesh is the pyramid, its base cut along either diagonal."""
+    points = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1)], float)
+    found = faces_of(vertices, faces)
+    sides = [face for face in sorted(PYRAMID) if len(face) == 3]
+    assert faces_of(points, np.array(sides)) <= found
+    assert found - faces_of(points, np.array(sides)) in (
+        faces_of(points, np.array([(0, 1, 2), (0, 2, 3)])),
+        faces_of(points, np.array([(0, 1, 3), (1, 2, 3)])),
+    )
+    assert len(faces) == 6
+
+
+def area_of(vertices: Array, faces: Array) -> float:
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+@pytest.mark.parametrize("text", OBJ.values(), ids=OBJ.keys())
+@pytest.mark.parametrize(
+    "encode",
+    [
+        lambda text: text.encode(),
+        lambda text: text.replace("\n", "\r\n").encode(),
+        lambda text: text.replace("\n", "\r").encode(),
+        lambda text: text.encode("utf-8-sig"),
+        lambda text: text.encode("utf-16"),
+        lambda text: b"o caf\xe9 \xff\xfe\n" + text.encode() + b"\ng \xf0\x9f\x8d\xb5\x00\n",
+    ],
+    ids=["unix", "windows", "old mac", "byte order mark", "utf-16", "latin-1"],
+)
+def test_obj_in_many_hands(text: str, encode: Any) -> None:
+    pyramid_of(*parse_mesh(encode(text), ".obj"))
+
+
+def test_broken_lines_do_not_lose_a_model() -> None:
+    """They are told apart later: vertices that are not finite, faces that are out of range."""
+    text = OBJ["plain"] + (
+        "v 1 2\nv a b c\nv nan inf 1e999\nv 1,5 2,5 3,5\nv\nv -1.#IND 0 0\n"
+        "f 1 2 x\nf 0 1 2\nf 1 2 99\nf -99 1 2\nf 1 2 99999999999999999999999\nf\nf 1\nf 1 2\n"
+        "f 1 2 6\n"
+    )
+    vertices, faces = parse_mesh(text.encode(), ".obj")
+    assert len(vertices) == 11
+    assert not np.isfinite(vertices[5:]).all(axis=1).any()
+    mesh = clean_mesh(vertices, faces)
+    pyramid_of((mesh.vertices - mesh.vertices.min(axis=0)) * 0.75**0.5, mesh.faces)
+    assert mesh.mended["faces_out_of_range"] == 6
+    assert mesh.mended["degenerate_faces"] == 2
+    assert mesh.mended["faces_not_finite"] == 1
+
+
+def star(corners: int, tilt: float = 0.0) -> Array:
+    """A star with `corners` / 2 deep points, tilted about x."""
+    angle = np.arange(corners) * 2 * np.pi / corners
+    radius = np.where(np.arange(corners) % 2, 0.2, 1.0)
+    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    return np.stack([x, y * np.cos(tilt), y * np.sin(tilt)], axis=1)
+
+
+def area_inside(polygon: Array) -> float:
+    """The area of a flat polygon, by the sum over its edges."""
+    return float(np.linalg.norm(np.cross(polygon, np.roll(polygon, -1, axis=0)).sum(axis=0)) / 2)
+
+
+def covers_once(polygon: Array, vertices: Array, faces: Array) -> None:
+    """Check that triangles tile a simple flat polygon: its area, in its plane, none twice."""
+    cross = np.cross(
+        vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]]
+    )
+    assert area_of(vertices, faces) == pytest.approx(area_inside(polygon), rel=1e-9)
+    assert float(np.linalg.norm(cross.sum(axis=0)) / 2) == pytest.approx(
+        area_inside(polygon), rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("corners", [16, 272, 2000])
+@pytest.mark.parametrize("tilt", [0.0, 0.7, np.pi / 2])
+@pytest.mark.parametrize("turn", [1, -1])
+def test_huge_faces_that_are_not_convex(corners: int, tilt: float, turn: int) -> None:
+    """On one line of text, of thousands of characters; a fan would cover much besides."""
+    polygon = star(corners, tilt)[::turn]
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in polygon.tolist()]
+    lines.append("f " + " ".join(f"{i + 1}/{i + 1}/{i + 1}" for i in range(corners)))
+    vertices, faces = parse_mesh("\n".join(lines).encode(), ".obj")
+    assert len(faces) == corners - 2
+    covers_once(polygon, vertices, faces)
+    fan = np.stack([0 * faces[:, 0], np.arange(1, corners - 1), np.arange(2, corners)], axis=1)
+    assert area_of(vertices, fan) > 1.2 * area_inside(polygon), "the star is too tame a test"
+
+
+@pytest.mark.parametrize("first", range(4))
+@pytest.mark.parametrize("turn", [1, -1])
+def test_a_dart_is_cut_at_its_notch(first: int, turn: int) -> None:
+    dart = np.roll([(0, 0, 0), (2, 1, 0), (0, 2, 0), (0.5, 1, 0)], first, axis=0)[::turn]
+    text = "".join(f"v {x} {y} {z}\n" for x, y, z in dart) + "f 1 2 3 4\n"
+    covers_once(dart, *parse_mesh(text.encode(), ".obj"))
+
+
+def test_a_hole_joined_to_the_rim_by_a_slit_stays_open() -> None:
+    rim = [(0, 0, 0), (4, 0, 0), (4, 4, 0), (0, 4, 0)]
+    hole = [(1, 1, 0), (1, 3, 0), (3, 3, 0), (3, 1, 0)]
+    text = "".join(f"v {x} {y} {z}\n" for x, y, z in rim + hole) + "f 1 2 3 4 1 5 6 7 8 5\n"
+    vertices, faces = parse_mesh(text.encode(), ".obj")
+    assert area_of(vertices, faces) == pytest.approx(12.0)
+
+
+def test_sides_that_cross_and_sides_on_a_line() -> None:
+    """No right answer, or no area; but what there is lies in the polygon's plane."""
+    eight = [(0, 0, 0), (2, 2, 1), (2, 0, 1), (0, 2, 0), (-1, 1, -0.5)]
+    bow = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0), (1, 1, 0), (2, 1, 0)]
+    line = [(0, 0, 0), (3, 3, 3), (1, 1, 1), (2, 2, 2), (2.5, 2.5, 2.5)]
+    for points, area in ((eight, 1.0), (bow, 0.1), (line, 0.0)):
+        text = "".join(f"v {x} {y} {z}\n" for x, y, z in points)
+        text += "f " + " ".join(str(i + 1) for i in range(len(points)))
+        vertices, faces = parse_mesh(text.encode(), ".obj")
+        assert len(faces)
+        assert area_of(vertices, faces) >= area
+        a, b, c = vertices[faces].transpose(1, 0, 2)
+        plane = (-0.5, 0, 1) if points is eight else (0, 0, 1)
+        if area:
+            np.testing.assert_allclose(np.cross(np.cross(b - a, c - a), plane), 0, atol=1e-9)
+
+
+@pytest.mark.parametrize("suffix", ["obj", "ply", "stl", "off", "glb", "ascii ply", "ascii stl"])
+def test_each_format_gives_what_was_written(suffix: str, tmp_path: Any) -> None:
+    kind = suffix[-3:]
+    how = {"ascii ply": {"encoding": "ascii"}, "ascii stl": {"file_type": "stl_ascii"}}
+    path = tmp_path / f"caf\u00e9 \u6f22\u5b57.{kind.upper()}"
+    data = SPHERE.export(**{"file_type": kind, **how.get(suffix, {})})
+    path.write_bytes(data if isinstance(data, bytes) else data.encode())
+    vertices, faces = read_mesh(path)
+    np.testing.assert_allclose(
+        np.sort(vertices[faces], axis=None), np.sort(SPHERE.triangles, axis=None), atol=1e-6
+    )
+    assert faces_of(vertices.round(4), faces) == faces_of(SPHERE.vertices.round(4), SPHERE.faces)
+
+
+PLY_HEAD = "ply\nformat {} 1.0\ncomment made by hand\nobj_info x\nelement vertex 5\n"
+POINTS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1)]
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("name", ["vertex_index", "vertex_indices"])
+@pytest.mark.parametrize("columns", ["f", "d", "B"])
+def test_binary_ply_with_all_sorts_of_columns(order: str, name: str, columns: str) -> None:
+    """Polygons of several sizes, a second list, colours, and a table that nobody knows."""
+    kind = {"f": "float", "d": "double", "B": "uchar"}[columns]
+    long = {"<": "binary_little_endian", ">": "binary_big_endian"}[order]
+    head = PLY_HEAD.format(long) + f"property {kind} x\nproperty uchar red\nproperty {kind} y\n"
+    head += f"property {kind} z\nelement other 2\nproperty list uchar short what\n"
+    head += (
+        f"element face 5\nproperty list uint8 int32 {name}\nproperty list uchar float texcoord\n"
+    )
+    head += "property uchar flags\nend_header\n"
+    body = b"".join(struct.pack(f"{order}{columns}B2{columns}", x, 7, y, z) for x, y, z in POINTS)
+    body += struct.pack(f"{order}BhBhh", 1, 5, 2, 6, 7)
+    for face in sorted(PYRAMID):
+        body += struct.pack(f"{order}B{len(face)}iBffB", len(face), *face, 2, 0.5, 0.5, 1)
+    data = head.encode() + body
+    pyramid_of(*parse_mesh(data, ".ply"))
+    for length in range(0, len(data), 7):
+        with pytest.raises(BadMeshError):
+            parse_mesh(data[:length], ".ply")
+
+
+def test_text_ply() -> None:
+    head = PLY_HEAD.format("ascii") + "property float x\nproperty float y\nproperty float z\n"
+    head += "element face 5\nproperty uchar flags\nproperty list uchar int vertex_indices\n"
+    lines = [f"{x} {y} {z}" for x, y, z in POINTS]
+    lines += [" ".join(map(str, (0, len(face), *face))) for face in sorted(PYRAMID)]
+    text = head + "end_header\n" + "\n\n".join(lines)
+    pyramid_of(*parse_mesh(text.encode(), ".ply"))
+    pyramid_of(*parse_mesh(text.replace("\n", "\r\n").encode(), ".ply"))
+    for broken in (text.replace("0 4 0", "0 5 0"), text.replace("0 4 0", "x"), text[:-12]):
+        with pytest.raises(BadMeshError, match="PLY file"):
+            parse_mesh(broken.encode(), ".ply")
+
+
+@pytest.mark.parametrize(
+    "head",
+    ["OFF\n5 5 0\n", "OFF 5 5 0\n", "OFF5 5 0\n", "COFF\n5 5\n", "# x\n\nNOFF # y\n\n5 5 0 # z\n"],
+)
+def test_off_with_its_first_line_as_it_comes(head: str) -> None:
+    rows = [f"{x} {y} {z} 9 9 9 1" for x, y, z in POINTS]
+    rows += [" ".join(map(str, (len(face), *face, 255, 0, 0))) for face in sorted(PYRAMID)]
+    pyramid_of(*parse_mesh((head + "\n# between\n".join(rows)).encode(), ".off"))
+    with pytest.raises(BadMeshError, match="tells of 5 vertices and 5 faces, found 5 and 4"):
+        parse_mesh((head + "\n".join(rows[:-1])).encode(), ".off")
+
+
+def test_a_binary_stl_may_start_like_a_text_and_have_more_at_its_end() -> None:
+    data = SPHERE.export(file_type="stl")
+    for changed in (b"solid facet" + data[11:], data + b"more"):
+        vertices, faces = parse_mesh(changed, ".stl")
+        np.testing.assert_allclose(vertices[faces], SPHERE.triangles, atol=1e-6)
+    with pytest.raises(BadMeshError, match="cut short: 319 of 320 triangles"):
+        parse_mesh(data[:-1], ".stl")
+    text = SPHERE.export(file_type="stl_ascii").replace("\n", "\r\n")
+    vertices, faces = parse_mesh((text + text.replace("solid", "solid two")).encode(), ".stl")
+    assert len(faces) == 2 * len(SPHERE.faces)
+    with pytest.raises(BadMeshError, match="cut short: 959 corners"):
+        parse_mesh(text[: text.rindex("vertex")].encode(), ".stl")

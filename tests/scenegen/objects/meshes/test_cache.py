@@ -1,0 +1,234 @@
+"""Cleaned models on disk: found again, made again where damaged, and no danger to each other."""
+
+import multiprocessing
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.typing import NDArray
+
+from scenegen.objects.meshes import cache
+from scenegen.objects.meshes.cache import CachedModel, MeshCache, content_hash, default_cache_dir
+from scenegen.objects.meshes.errors import BadMeshError
+
+Array = NDArray[Any]
+BALL = trimesh.creation.icosphere(subdivisions=2)
+
+
+@pytest.fixture
+def ball(tmp_path: Path) -> Path:
+    path = tmp_path / "ball.ply"
+    path.write_bytes(BALL.export(file_type="ply"))
+    return path
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Counts how often a model was cleaned, not read from the cache."""
+    calls: list[int] = []
+    make = cache.make_model
+
+    def counted(data: bytes, suffix: str, up: str) -> CachedModel:
+        calls.append(len(data))
+        return make(data, suffix, up)
+
+    monkeypatch.setattr(cache, "make_model", counted)
+    return calls
+
+
+def same(one: CachedModel, two: CachedModel) -> None:
+    for name in ("vertices", "faces", "hull_points"):
+        a, b = getattr(one, name), getattr(two, name)
+        assert a.dtype == b.dtype
+        np.testing.assert_array_equal(a, b)
+    assert dict(one.mended) == dict(two.mended)
+    assert one.refusal == two.refusal
+
+
+def test_a_model_is_cleaned_once(ball: Path, tmp_path: Path, made: list[int]) -> None:
+    folder = tmp_path / "new" / "cache"
+    digest, fresh = MeshCache(folder).load(ball, "y")
+    again, found = MeshCache(folder).load(ball, "y")
+    assert len(made) == 1
+    assert digest == again == content_hash(ball.read_bytes(), ".ply", "y")
+    same(fresh, found)
+    assert [path.name for path in folder.iterdir()] == [f"{digest}.npz"]
+    same(fresh, MeshCache(None).load(ball, "y")[1])
+    assert len(made) == 2
+
+
+def test_what_a_model_was_made_from_is_in_its_name(
+    ball: Path, tmp_path: Path, made: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Up axis, kind of file, bytes, and the version of the cleaning; not where the file lies."""
+    store = MeshCache(tmp_path / "cache")
+    store.load(ball, "y")
+    copy = tmp_path / "copy.PLY"
+    copy.write_bytes(ball.read_bytes())
+    store.load(copy, "y")
+    assert len(made) == 1
+    store.load(ball, "z")
+    ball.write_bytes(ball.read_bytes() + b"\0")
+    store.load(ball, "y")
+    monkeypatch.setattr(cache, "CLEANING_VERSION", cache.CLEANING_VERSION + 1)
+    store.load(ball, "y")
+    assert len(made) == 4
+    assert content_hash(b"", ".obj", "y") != content_hash(b"", ".off", "y")
+
+
+def damages(whole: bytes) -> list[bytes]:
+    cut = [whole[:length] for length in (0, 1, 30, len(whole) // 2, len(whole) - 1)]
+    places = range(60, len(whole) - 60, len(whole) // 40)
+    bits = [whole[:at] + bytes([whole[at] ^ 64]) + whole[at + 1 :] for at in places]
+    return [*cut, *bits, b"nonsense", bytes(len(whole))]
+
+
+def test_damaged_entries_are_made_again(ball: Path, tmp_path: Path, made: list[int]) -> None:
+    """Cut short, or with one bit turned anywhere."""
+    store = MeshCache(tmp_path / "cache")
+    digest, fresh = store.load(ball, "y")
+    entry = tmp_path / "cache" / f"{digest}.npz"
+    whole = entry.read_bytes()
+    for damaged in damages(whole):
+        entry.write_bytes(damaged)
+        same(store.load(ball, "y")[1], fresh)
+        same(MeshCache(tmp_path / "cache").load(ball, "y")[1], fresh)
+    assert len(made) > 30
+    assert entry.read_bytes() == whole
+
+
+def test_entries_of_another_kind_are_made_again(
+    ball: Path, tmp_path: Path, made: list[int]
+) -> None:
+    """Whole as files, but not what they should be; none may run code."""
+    store = MeshCache(tmp_path / "cache")
+    digest, fresh = store.load(ball, "y")
+    entry = tmp_path / "cache" / f"{digest}.npz"
+    with np.load(entry) as arrays:
+        good = dict(arrays)
+    changes: list[dict[str, Any]] = [
+        {"vertices": good["vertices"].astype(float)}, {"vertices": good["vertices"][:5]},
+        {"faces": good["faces"][:, :2]}, {"faces": good["faces"] - 1}, {"faces": good["faces"][:0]},
+        {"about": np.frombuffer(b"[]", np.uint8)}, {"about": np.frombuffer(b"{}", np.uint8)},
+        {"hull_points": np.array([object()])},
+    ]  # fmt: skip
+    for i, change in enumerate(changes):
+        np.savez(entry, **(good | change))
+        same(store.load(ball, "y")[1], fresh)
+        assert len(made) == i + 2
+
+
+def test_refusals_are_kept_with_their_reasons(tmp_path: Path, made: list[int]) -> None:
+    bad = tmp_path / "bad.obj"
+    bad.write_text("v 0 0 0\n")
+    for _ in range(3):
+        with pytest.raises(BadMeshError, match="has 1 vertices but no faces"):
+            MeshCache(tmp_path / "cache").load(bad, "y")
+    assert len(made) == 1
+    with pytest.raises(BadMeshError, match="does not exist"):
+        MeshCache(tmp_path / "cache").load(tmp_path / "none.obj", "y")
+    assert len(list((tmp_path / "cache").iterdir())) == 1
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (MemoryError(), "needs more memory than there is"),
+        (np.linalg.LinAlgError("odd"), r"cannot be cleaned \(LinAlgError: odd\); please report"),
+    ],
+)
+def test_want_of_memory_and_our_own_mistakes_are_no_verdicts_on_the_file(
+    error: Exception, words: str, ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: Any) -> Any:
+        raise error
+
+    with monkeypatch.context() as patch:
+        patch.setattr(cache, "clean_mesh", fails)
+        with pytest.raises(BadMeshError, match=words):
+            MeshCache(tmp_path / "cache").load(ball, "y")
+    MeshCache(tmp_path / "cache").load(ball, "y")
+
+
+@pytest.mark.parametrize("place", ["a file", "below a file", "full"])
+def test_a_folder_that_takes_nothing_costs_one_warning(
+    place: str, ball: Path, tmp_path: Path, made: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = {"a file": ball, "below a file": ball / "x", "full": tmp_path / "cache"}[place]
+    if place == "full":
+
+        def full(*_: Any, **__: Any) -> None:
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr(np, "savez", full)
+    store = MeshCache(folder)
+    with pytest.warns(UserWarning, match=r"cannot be kept there .*--cache-dir"):
+        _, model = store.load(ball, "y")
+    assert len(model.faces) == 320
+    store.load(ball, "y")
+    assert len(made) == 2
+    assert place != "full" or list(folder.iterdir()) == []
+
+
+def fill(folder: str, paths: list[str], start: Any) -> None:
+    start.wait()
+    for path in paths:
+        MeshCache(folder).load(Path(path), "y")
+
+
+def test_several_processes_fill_one_folder(tmp_path: Path) -> None:
+    paths = []
+    for i in range(12):
+        paths.append(tmp_path / f"{i}.ply")
+        paths[-1].write_bytes(trimesh.creation.icosphere(3, 1 + i).export(file_type="ply"))
+    context = multiprocessing.get_context("spawn")
+    start = context.Barrier(4)
+    folder = str(tmp_path / "cache")
+    names = [str(path) for path in paths]
+    workers = [context.Process(target=fill, args=(folder, names, start)) for _ in range(4)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join(60)
+        assert worker.exitcode == 0
+    assert len(list(Path(folder).iterdir())) == 12, "and no leftovers"
+    for path in paths:
+        same(MeshCache(folder).load(path, "y")[1], MeshCache(None).load(path, "y")[1])
+
+
+def test_a_killed_process_leaves_no_entry_that_is_not_whole(ball: Path, tmp_path: Path) -> None:
+    code = f"""
+import os, numpy
+from pathlib import Path
+from scenegen.objects.meshes.cache import MeshCache
+write = numpy.savez
+def dies(file, **arrays):
+    write(file, **arrays)
+    os._exit(9)
+numpy.savez = dies
+MeshCache({str(tmp_path / "cache")!r}).load(Path({str(ball)!r}), "y")
+"""
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 9
+    assert list((tmp_path / "cache").glob("*.npz")) == []
+    assert len(MeshCache(tmp_path / "cache").load(ball, "y")[1].faces) == 320
+
+
+def test_where_the_cache_lies(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert default_cache_dir() == tmp_path / "pix2shape-bench" / "meshes"
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    for unset in ("", "not/absolute"):
+        monkeypatch.setenv("XDG_CACHE_HOME", unset)
+        assert default_cache_dir() == tmp_path / "home/.cache/pix2shape-bench/meshes"
+    assert list(tmp_path.iterdir()) == [], "nothing is made before it is needed"
+
+
+def test_nothing_warns(ball: Path, tmp_path: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        MeshCache(tmp_path / "cache").load(ball, "y")

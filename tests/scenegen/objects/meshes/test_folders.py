@@ -1,0 +1,241 @@
+"""Listings of ShapeNet, in both versions, and of plain folders; splits; what is wrong with them."""
+
+import hashlib
+import json
+import pickle
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from scenegen.objects.meshes.folders import (
+    MeshFolderError,
+    ModelFile,
+    ModelFolder,
+    object_split,
+    open_models,
+    open_objects,
+    open_shapenet,
+)
+
+Make = Callable[..., Path]
+INSIDE = {1: "model.obj", 2: "models/model_normalized.obj"}
+MUG, BOWL, PLANE = "03797390", "02880940", "02691156"
+
+
+@pytest.fixture
+def make(tmp_path: Path) -> Make:
+    """Write empty files of the given names below a folder."""
+
+    def files(*names: str, root: str = "root") -> Path:
+        for name in names:
+            path = tmp_path / root / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.touch()
+        return tmp_path / root
+
+    return files
+
+
+@pytest.fixture
+def shapenet(make: Make) -> Callable[..., Path]:
+    """Lay out empty models: three mugs, two bowls and a plane."""
+
+    def lay(version: int, root: str = "root") -> Path:
+        ids = [(MUG, "b"), (MUG, "a"), (MUG, "c"), (BOWL, "x"), (BOWL, "a"), (PLANE, "p")]
+        extra = f"{MUG}/a/models/model_normalized.mtl", f"{MUG}/a/images/t.jpg", "README.txt"
+        return make(*(f"{s}/{i}/{INSIDE[version]}" for s, i in ids), *extra, root=root)
+
+    return lay
+
+
+def names_of(folder: ModelFolder) -> list[str]:
+    return [file.name for name in folder.classes for file in folder.models[name]]
+
+
+@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("opened", [open_shapenet, open_models])
+def test_shapenet_of_both_versions(
+    shapenet: Callable[..., Path], version: int, opened: Callable[..., ModelFolder]
+) -> None:
+    root = shapenet(version)
+    found = opened(root)
+    assert (found.kind, found.up) == (f"shapenet-v{version}", "y")
+    assert found.classes == (PLANE, "bowl", "mug"), "the plane's name is not known without a file"
+    assert names_of(found) == [f"{PLANE}/p", "bowl/a", "bowl/x", "mug/a", "mug/b", "mug/c"]
+    assert all(file.path.is_file() for files in found.models.values() for file in files)
+    assert opened(str(root), ["mug", BOWL]).classes == ("mug", "bowl"), "in the order asked for"
+    assert opened(root, ["mug", MUG]).classes == ("mug",), "twice the same"
+    assert pickle.loads(pickle.dumps(found)) == found
+
+
+FLAT = [
+    {"synsetId": PLANE, "name": "airplane,aeroplane,plane", "children": ["1"], "numInstances": 9},
+    {"synsetId": MUG, "name": "drinking mug,mug", "children": []},
+    {"synsetId": BOWL, "name": "", "children": []},
+]
+TREE = {
+    "text": "root",
+    "children": [
+        {"metadata": {"name": PLANE, "label": "airplane,aeroplane,plane"}, "children": [{}, None]},
+        {"text": "things", "children": [{"synsetId": "01234567", "name": "odd,airplane"}]},
+    ],
+}
+
+
+@pytest.mark.parametrize("taxonomy", [FLAT, TREE], ids=["flat", "tree"])
+def test_names_from_the_taxonomy(shapenet: Callable[..., Path], taxonomy: Any) -> None:
+    root = shapenet(2)
+    (root / "taxonomy.json").write_text(json.dumps(taxonomy), encoding="utf-8-sig")
+    found = open_shapenet(root)
+    assert found.classes == ("airplane", "bowl", "mug"), "built-in names go first"
+    assert open_shapenet(root, ["aeroplane", PLANE]).classes == ("airplane",)
+    (root / "taxonomy.json").write_text('[{"synsetId": ')
+    with pytest.raises(MeshFolderError, match=r"taxonomy\.json: cannot be read as JSON .* delete"):
+        open_shapenet(root)
+
+
+def test_one_name_for_two_synsets(make: Make) -> None:
+    root = make(f"{PLANE}/a/model.obj", "01234567/a/model.obj")
+    taxonomy = [{"synsetId": s, "name": "a/b  c,x"} for s in (PLANE, "01234567")]
+    (root / "taxonomy.json").write_text(json.dumps(taxonomy))
+    assert open_shapenet(root).classes == ("a b c", f"a b c {PLANE}")
+
+
+def test_splits_by_hash() -> None:
+    """Seventy, ten and twenty in a hundred, by a rule that may never change."""
+    for model_id in ("a", "caf\u00e9", "1a2b3c", ""):
+        tenth = int(hashlib.sha256(model_id.encode()).hexdigest()[:16], 16) % 10
+        assert object_split(model_id) == (["train"] * 7 + ["val"] + ["test"] * 2)[tenth]
+    assert [object_split(f"{i}") for i in range(8)] == [
+        "train",
+        "train",
+        "train",
+        "train",
+        "train",
+        "train",
+        "test",
+        "train",
+    ]
+    parts = Counter(object_split(f"{i:032x}") for i in range(20_000))
+    for name, share in (("train", 0.7), ("val", 0.1), ("test", 0.2)):
+        assert parts[name] / 20_000 == pytest.approx(share, abs=0.01)
+
+
+def test_a_split_is_a_part(make: Make) -> None:
+    root = make(*(f"{c}/{i}.obj" for c in ("one", "two") for i in range(99)))
+    parts = [open_objects(root, split=name) for name in ("train", "val", "test")]
+    together = sorted(name for part in parts for name in names_of(part))
+    assert together == sorted(names_of(open_objects(root)))
+    assert all(object_split(n.partition("/")[2]) == "val" for n in names_of(parts[1]))
+    assert len({part.digest() for part in parts}) == 3
+
+
+def test_the_official_splits_go_before_the_hash(shapenet: Callable[..., Path]) -> None:
+    """A model that the list lacks is in no split; leading zeros may have been lost."""
+    root = shapenet(1)
+    rows = ["id,synsetId,subSynsetId,modelId,split", f"1,{MUG},{MUG},a,test", f"2,{MUG[1:]},,b,VAL"]
+    rows += [f"3,{BOWL},0,a,train", f"4,{PLANE},0,p,", "5,,,,", "short"]
+    (root / "all.csv").write_text("\r\n".join(rows))
+    assert names_of(open_shapenet(root, split="test")) == ["mug/a"]
+    assert names_of(open_shapenet(root, split="val")) == ["mug/b"]
+    assert names_of(open_shapenet(root, split="train")) == ["bowl/a"]
+    assert len(names_of(open_shapenet(root))) == 6
+    (root / "all.csv").write_text("id,synsetId,modelId\n")
+    with pytest.raises(MeshFolderError, match=r"all\.csv: .* expected also split"):
+        open_shapenet(root, split="val")
+
+
+def test_plain_folders(make: Make) -> None:
+    """Any depth and suffix, ids without suffix but where two would be one, and nothing hidden."""
+    root = make(
+        "mug/b.obj", "mug/a.PLY", "mug/deep/er/c.stl", "mug/twin.glb", "mug/twin.off", "mug/t.mtl",
+        "mug/v1.2.obj", "mug/.hidden.obj", ".git/x.obj", "caf\u00e9 \u6f22/z z.obj", "none/x.txt",
+        "top.obj",
+    )  # fmt: skip
+    found = open_objects(root, up="z")
+    assert (found.kind, found.up, found.classes) == ("folder", "z", ("caf\u00e9 \u6f22", "mug"))
+    assert names_of(found) == [
+        "caf\u00e9 \u6f22/z z", "mug/a", "mug/b", "mug/deep/er/c", "mug/twin.glb", "mug/twin.off",
+        "mug/v1.2",
+    ]  # fmt: skip
+    assert found.models["mug"][0] == ModelFile("mug/a", root / "mug" / "a.PLY")
+    assert open_models(root).kind == "folder"
+
+
+def test_links_are_followed_to_classes_and_files_but_not_in_circles(make: Make) -> None:
+    root = make("mug/a.obj", "mug/in/b.obj")
+    (root / "mug" / "in" / "up").symlink_to(root)
+    (root / "mug" / "self").symlink_to(root / "mug" / "self")
+    (root / "loop").symlink_to(root / "loop")
+    (root / "mug" / "c.obj").symlink_to(root / "mug" / "a.obj")
+    (root / "same").symlink_to(root / "mug", target_is_directory=True)
+    names = ["a", "c", "in/b"]
+    assert names_of(open_objects(root)) == [f"{c}/{n}" for c in ("mug", "same") for n in names]
+    (root / "03797390").symlink_to(root)
+    assert open_models(root).kind == "folder"
+
+
+def test_names_that_are_not_utf8_can_be_stored(make: Make) -> None:
+    root = make("mug/a.obj")
+    (root / "mug").joinpath("caf\udce9.obj").touch()
+    found = open_objects(root)
+    assert names_of(found) == ["mug/a", "mug/caf\\xe9"]
+    assert found.models["mug"][1].path.exists()
+    assert found.digest()
+    assert open_objects(root, split=object_split("caf\\xe9")).models["mug"]
+
+
+def test_the_digest_is_of_names_not_of_paths(shapenet: Callable[..., Path], make: Make) -> None:
+    one, two = open_shapenet(shapenet(1)), open_shapenet(shapenet(1, "elsewhere"))
+    assert one.digest() == two.digest()
+    assert len(one.digest()) == 64
+    others = [
+        open_shapenet(shapenet(2, "second")), open_shapenet(shapenet(1), ["mug"]),
+        open_shapenet(shapenet(1), ["mug", "bowl"]), open_shapenet(shapenet(1), ["bowl", "mug"]),
+    ]  # fmt: skip
+    plain = make("mug/a.obj", root="plain")
+    others += [open_objects(plain), open_objects(plain, up="z")]
+    assert len({other.digest() for other in [one, *others]}) == 7
+
+
+def test_what_is_wrong_is_said(shapenet: Callable[..., Path], make: Make) -> None:
+    def refusal(opened: Callable[..., ModelFolder], *arguments: Any, **more: Any) -> str:
+        with pytest.raises(MeshFolderError) as refused:
+            opened(*arguments, **more)
+        return str(refused.value)
+
+    root, plain = shapenet(1), make("mug/a.obj", "bowl/x.txt", root="plain")
+    empty, flat = make("x.txt", root="empty"), make("a.obj", "b.ply", root="flat")
+    for opened in (open_shapenet, open_objects, open_models):
+        assert "nothing: no such folder" in refusal(opened, root / "nothing")
+        assert "x.txt: is not a folder" in refusal(opened, empty / "x.txt")
+    assert "found no ShapeNet, expected <synset>/<id>/model.obj" in refusal(open_shapenet, plain)
+    assert "found no ShapeNet" in refusal(open_shapenet, make(f"{MUG}/a/x.txt", root="gutted"))
+    assert "no class cup; there are 02691156, bowl, mug" in refusal(open_shapenet, root, ["cup"])
+    assert "no class can; there are" in refusal(open_shapenet, root, ["can"])
+    assert "(none was named)" in refusal(open_shapenet, root, [])
+    assert "no class ., ..; there are bowl, mug" in refusal(open_objects, plain, [".", ".."])
+    assert "found no sub-folders, expected one" in refusal(open_objects, empty)
+    assert "but 2 meshes" in refusal(open_objects, flat)
+    assert "found no models" in refusal(open_objects, make("mug/readme.txt", root="textual"))
+    assert "bowl has no models in split 'all' (of" in refusal(open_objects, plain, ["bowl"])
+    part = next(s for s in ("train", "val", "test") if s != object_split("a"))
+    assert f"in split '{part}', 1 in others" in refusal(open_objects, plain, ["mug"], split=part)
+    assert "found 'dev', expected one of all, train" in refusal(open_objects, plain, split="dev")
+    assert "up: found 'x', expected y or z" in refusal(open_objects, plain, up="x")
+
+
+def test_fifty_thousand_models_are_listed_in_seconds(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        for i in range(2500):
+            (tmp_path / name / f"{i}.obj").touch()
+    started = time.process_time()
+    found = open_objects(tmp_path)
+    assert time.process_time() - started < 1.0, "a tenth of fifty thousand"
+    assert found.digest()
+    assert len(names_of(found)) == 5000

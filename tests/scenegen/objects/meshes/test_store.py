@@ -1,0 +1,246 @@
+"""Models as unit shapes: their surface, their hull, and how the store keeps them."""
+
+import pickle
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.typing import NDArray
+
+from scenegen.objects.meshes import hull, store
+from scenegen.objects.meshes.errors import BadMeshError
+from scenegen.objects.meshes.folders import open_objects
+from scenegen.objects.meshes.hull import hull_points
+from scenegen.objects.meshes.store import MeshStore
+from scenegen.objects.solids import UnitShape
+
+Array = NDArray[Any]
+DOWN = np.array([[0.0, -1.0, 0.0]])
+
+
+def bumpy(seed: int, faces: int = 1280) -> trimesh.Trimesh:
+    """A ball with dents, off its centre: no two directions are alike."""
+    mesh = trimesh.creation.icosphere(subdivisions={320: 2, 1280: 3, 5120: 4, 81920: 6}[faces])
+    rng = np.random.default_rng(seed)
+    waves = np.sin(mesh.vertices @ rng.uniform(-4, 4, (3, 5))).sum(axis=1)
+    mesh.vertices = mesh.vertices * (3 + 0.3 * waves)[:, None] * (1, 2, 0.7) + (50, -20, 7)
+    return mesh
+
+
+@pytest.fixture
+def models(tmp_path: Path) -> Path:
+    root = tmp_path / "models"
+    for name, seeds in (("odd", range(4)), ("other", range(4, 6))):
+        (root / name).mkdir(parents=True)
+        for seed in seeds:
+            (root / name / f"{seed}.ply").write_bytes(bumpy(seed).export(file_type="ply"))
+    (root / "odd" / "bad.obj").write_text("v 1 2 3\n")
+    return root
+
+
+@pytest.fixture
+def opened(models: Path, tmp_path: Path) -> Callable[[], MeshStore]:
+    return lambda: MeshStore(open_objects(models), tmp_path / "cache")
+
+
+def check_shape(shape: UnitShape) -> None:
+    """What holds of every model: sizes, exact values, flat unit normals, a hull that holds all."""
+    triangles = shape.triangles
+    corners = triangles.reshape(-1, 3)
+    assert triangles.dtype == np.float64
+    np.testing.assert_array_equal(triangles, triangles.astype(np.float32), "exact in float32")
+    assert np.linalg.norm(corners, axis=1).max() == pytest.approx(1, abs=1e-6)
+    np.testing.assert_allclose(corners.min(axis=0) + corners.max(axis=0), 0, atol=1e-6)
+    edges = triangles[:, 1:] - triangles[:, :1]
+    for i in range(3):
+        normals = shape.normals[:, i]
+        np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-12)
+        np.testing.assert_allclose(np.einsum("fki,fi->fk", edges, normals), 0, atol=1e-9)
+        assert (np.einsum("fi,fi->f", np.cross(edges[:, 0], edges[:, 1]), normals) > 0).all()
+    check_hull(shape, corners)
+    assert (shape.rounding, shape.is_sphere) == (0.0, False)
+    np.testing.assert_array_equal(shape.hull_discs, np.zeros(len(shape.hull_points)))
+    np.testing.assert_array_equal(shape.resting_directions, DOWN)
+
+
+def check_hull(shape: UnitShape, corners: Array) -> None:
+    directions = np.random.default_rng(0).standard_normal((500, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    reach = (corners @ directions.T).max(axis=0)
+    assert (shape.support(directions) > reach - 1e-9).all()
+    assert shape.support(DOWN)[0] == -corners[:, 1].min(), "it stands on the floor, exactly"
+
+
+def test_models_are_unit_shapes(opened: Callable[[], MeshStore]) -> None:
+    models = opened()
+    for name in ("odd/0", "odd/3", "other/5"):
+        shape = models.shape(name)
+        assert shape.name == name
+        assert len(shape.triangles) == 1280
+        check_shape(shape)
+        assert len(shape.hull_points) < 642
+
+
+def test_the_surface_is_the_file_s(opened: Callable[[], MeshStore]) -> None:
+    """Rays at trimesh's reading of the file, moved and scaled by its own numbers, by Embree."""
+    rng = np.random.default_rng(1)
+    origins = rng.standard_normal((4000, 3))
+    origins *= 3 / np.linalg.norm(origins, axis=1, keepdims=True)
+    directions = 0.2 * rng.standard_normal((4000, 3)) - origins
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+
+    def cast(triangles: Array) -> tuple[Array, Array]:
+        mesh = trimesh.Trimesh(
+            triangles.reshape(-1, 3), np.arange(triangles.size // 3).reshape(-1, 3), process=False
+        )
+        caster = trimesh.ray.ray_pyembree.RayMeshIntersector(mesh)
+        where, rays, faces = caster.intersects_location(origins, directions, multiple_hits=False)
+        distance, face = np.full(4000, np.inf), np.full(4000, -1)
+        distance[rays] = np.linalg.norm(where - origins[rays], axis=1)
+        face[rays] = faces
+        return distance, face
+
+    models = opened()
+    for file in models.folder.models["odd"][:3]:
+        mesh = trimesh.load_mesh(file.path, process=False)
+        triangles = mesh.triangles - mesh.bounds.mean(axis=0)
+        expected, face = cast(triangles / np.linalg.norm(triangles, axis=2).max())
+        shape = models.shape(file.name)
+        found, index = cast(shape.triangles)
+        hit = np.isfinite(expected)
+        assert hit.mean() > 0.5
+        np.testing.assert_array_equal(hit, np.isfinite(found))
+        np.testing.assert_allclose(found[hit], expected[hit], atol=1e-4)
+        along = np.abs(np.einsum("fi,fi->f", shape.normals[index, 0], mesh.face_normals[face]))
+        assert np.median(along[hit]) > 1 - 1e-6
+        assert (along[hit] > 0.999).mean() > 0.98, "elsewhere rays meet the edge of two faces"
+
+
+def test_a_coarser_hull_holds_the_model_and_stands_where_it_stands() -> None:
+    angle = np.linspace(0, 6.28, 5000)
+    disc = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
+    ball = trimesh.creation.icosphere(subdivisions=6).vertices
+    drum = np.concatenate([disc, disc + np.array([0, 1, 0])])
+    for corners in (bumpy(3, 81920).vertices, ball, drum):
+        centered = corners - (corners.min(axis=0) + corners.max(axis=0)) / 2
+        points = np.asarray(centered / np.linalg.norm(centered, axis=1).max())
+        body = hull_points(points)
+        shape = UnitShape("x", points, points, body, np.zeros(len(body)), 0.0, DOWN)
+        check_hull(shape, points)
+        assert len(body) < 2 * hull.MOST_POINTS
+        assert body[:, 1].min() == points[:, 1].min(), "nothing below the floor"
+        directions = points[::50] / np.linalg.norm(points[::50], axis=1, keepdims=True)
+        reach = (points @ directions.T).max(axis=0)
+        assert (shape.support(directions) < 1.03 * reach).all(), "and it is little larger"
+
+
+def test_a_hair_below_a_level_base_is_not_lost_in_rounding() -> None:
+    angle = np.linspace(0, 2 * np.pi, 30, endpoint=False)
+    rings = [np.stack([np.cos(angle), y + 0 * angle, np.sin(angle)], 1) for y in (-0.5, 0.5)]
+    for depth in np.geomspace(1e-15, 1e-10, 30):
+        points = np.concatenate([*rings, [(0.1, -0.5 - depth, 0.2)]])
+        assert hull_points(points)[:, 1].min() == -0.5 - depth
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+@pytest.mark.parametrize("side", [0, 2])
+def test_flat_models_have_hulls(turn: float, side: int, tmp_path: Path) -> None:
+    """A disc that stands, straight or leaning, along either axis."""
+    disc = trimesh.creation.icosphere(subdivisions=3).vertices
+    disc[:, side] = 0.0
+    disc = disc @ trimesh.transformations.rotation_matrix(turn, (1, 1, 0))[:3, :3].T
+    faces = trimesh.creation.icosphere(subdivisions=3).faces
+    (tmp_path / "flat").mkdir()
+    mesh = trimesh.Trimesh(disc, faces, process=False)
+    (tmp_path / "flat" / "disc.ply").write_bytes(mesh.export(file_type="ply"))
+    check_shape(MeshStore(open_objects(tmp_path), None).shape("flat/disc"))
+
+
+def test_shapes_in_memory_are_bounded(
+    opened: Callable[[], MeshStore], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The one used longest ago goes; one alone may be as large as it likes."""
+    monkeypatch.setattr(store, "MOST_FACES_KEPT", 3 * 1280)
+    models = opened()
+    first = {i: models.shape(f"odd/{i}") for i in range(3)}
+    assert models.shape("odd/0") is first[0]
+    models.shape("odd/3")
+    assert models.shape("odd/0") is first[0]
+    assert models.shape("odd/2") is first[2]
+    assert models.shape("odd/1") is not first[1]
+    monkeypatch.setattr(store, "MOST_FACES_KEPT", 100)
+    only = models.shape("other/4")
+    assert models.shape("other/4") is only
+
+
+def test_digests_are_of_the_file_that_gave_the_shape(opened: Callable[[], MeshStore]) -> None:
+    models, others = opened(), opened()
+    digest = models.digest("odd/0")
+    assert len(digest) == 16
+    assert int(digest, 16) >= 0
+    others.shape("odd/0")
+    file = models.folder.models["odd"][0]
+    file.path.write_bytes(bumpy(9).export(file_type="ply"))
+    assert others.digest("odd/0") == digest, "the shape in use is still the old one"
+    assert opened().digest("odd/0") != digest
+    assert len({models.digest(f"odd/{i}") for i in range(4)}) == 4
+
+
+def test_refusals_are_remembered(opened: Callable[[], MeshStore]) -> None:
+    models = opened()
+    models.shape("odd/0")
+    assert models.problems == {}
+    for ask in (models.shape, models.digest, models.shape):
+        with pytest.raises(BadMeshError, match=r"^odd/bad: has 1 vertices but no faces$"):
+            ask("odd/bad")
+    assert models.problems == {"odd/bad": "has 1 vertices but no faces"}
+    (models.folder.models["odd"][-1].path).write_bytes(bumpy(0).export(file_type="obj").encode())
+    with pytest.raises(BadMeshError, match="no faces"):  # one run, one answer
+        models.shape("odd/bad")
+    with pytest.raises(BadMeshError, match=r"odd/none: no such model .* such as odd/0"):
+        models.shape("odd/none")
+    models.folder.models["odd"][1].path.unlink()
+    with pytest.raises(BadMeshError, match="odd/1: the file does not exist"):
+        models.shape("odd/1")
+    assert set(models.problems) == {"odd/bad", "odd/1"}
+
+
+def test_a_store_can_be_sent_to_another_process(opened: Callable[[], MeshStore]) -> None:
+    models = opened()
+    shape = models.shape("odd/0")
+    sent = pickle.dumps(models)
+    assert len(sent) < 10_000, "without its shapes"
+    received = pickle.loads(sent)
+    assert received.folder == models.folder
+    assert received.cache_dir == models.cache_dir
+    np.testing.assert_array_equal(received.shape("odd/0").triangles, shape.triangles)
+    assert received.digest("odd/0") == models.digest("odd/0")
+
+
+def test_threads_may_share_a_store(
+    opened: Callable[[], MeshStore], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(store, "MOST_FACES_KEPT", 2 * 1280)
+    models, alone = opened(), opened()
+    names = [f"odd/{i}" for i in range(4)] + ["other/4", "other/5"]
+    expected = {name: alone.shape(name).triangles for name in names}
+    failed: list[str] = []
+
+    def ask(seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        for name in map(str, rng.choice(names, 60)):
+            found = models.shape(name).triangles
+            failed.extend([] if np.array_equal(found, expected[name]) else [name])
+
+    threads = [threading.Thread(target=ask, args=(seed,)) for seed in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert failed == []
+    kept = models._shapes.values()
+    assert sum(len(shape.triangles) for shape in kept) == models._faces <= 2 * 1280

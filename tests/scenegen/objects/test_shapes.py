@@ -1,0 +1,200 @@
+"""Unit shapes against closed forms, the room, and the mesh of a whole scene."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import nnls
+from scipy.spatial.transform import Rotation
+
+from scenegen.camera import Camera
+from scenegen.common.errors import SpecError
+from scenegen.description.scenes import SHAPE_NAMES, PlacedObject, SceneSpec
+from scenegen.objects.shapes import (
+    room_mesh,
+    rotation_matrix,
+    scene_mesh,
+    unit_shape,
+    welded,
+    world_from_object,
+)
+
+Array = NDArray[np.float64]
+CURVED = ("sphere", "cone", "torus", "cylinder", "capsule")
+SOLID = tuple(name for name in SHAPE_NAMES if name != "teapot")  # Newell's has no seam at its lid
+TESSELLATION = 4.5e-5  # the most that a unit mesh may lie off its smooth surface
+CYLINDER, PYRAMID, PRISM = 1.64**-0.5, 2.49**-0.5, (0.75 + 0.81 + 0.5625) ** -0.5  # scales
+DODECAHEDRON, ICOSAHEDRON = 4 / (3**0.5 * (1 + 5**0.5)), 4 / (10 + 2 * 5**0.5) ** 0.5  # edges
+VOLUMES = {
+    "box": 8 / 3**1.5,
+    "sphere": 4 / 3 * math.pi,
+    "cone": math.pi / 3 * 0.5 * 2**0.5,
+    "torus": 2 * math.pi**2 * 0.68 * 0.32**2,
+    "cylinder": math.pi * (0.8 * CYLINDER) ** 2 * 2 * CYLINDER,
+    "capsule": math.pi * 0.25 + 4 / 3 * math.pi * 0.125,
+    "pyramid": 4 * 1.4 / 3 * PYRAMID**3,
+    "prism": 0.75 * 3**0.5 * 1.8 * PRISM**3,
+    "tetrahedron": 8 / (9 * 3**0.5),
+    "octahedron": 4 / 3,
+    "dodecahedron": (15 + 7 * 5**0.5) / 4 * DODECAHEDRON**3,
+    "icosahedron": 5 * (3 + 5**0.5) / 12 * ICOSAHEDRON**3,
+}
+SIDES = {"box": 6, "pyramid": 5, "prism": 5, "tetrahedron": 4, "octahedron": 8}
+SIDES |= {"dodecahedron": 12, "icosahedron": 20, "torus": 2, "sphere": 0}
+
+
+def off_surface(name: str, p: Array) -> Array:
+    """Signed distance of points near the smooth surface, positive outside."""
+    r, y = np.hypot(p[..., 0], p[..., 2]), p[..., 1]
+    if name == "sphere":
+        return np.hypot(r, y) - 1
+    if name == "torus":
+        return np.hypot(r - 0.68, y) - 0.32
+    if name == "capsule":
+        return np.hypot(r, np.maximum(abs(y) - 0.5, 0)) - 0.5
+    if name == "cylinder":
+        return np.maximum(r - 0.8 * CYLINDER, abs(y) - CYLINDER)
+    return np.maximum(-y - 0.5**0.5, (2 * r + y - 0.5**0.5) / 5**0.5)  # cone
+
+
+def directions(count: int) -> Array:
+    d = np.random.default_rng(0).standard_normal((count, 3))
+    return np.asarray(d / np.linalg.norm(d, axis=1, keepdims=True))
+
+
+@pytest.mark.parametrize("name", SHAPE_NAMES)
+def test_bounding_radius_is_one_and_normals_agree_with_faces(name: str) -> None:
+    shape = unit_shape(name)
+    assert shape.name == name
+    assert unit_shape(name) is shape, "built once"
+    assert shape.is_sphere == (name == "sphere")
+    radius = np.linalg.norm(shape.triangles, axis=-1)
+    assert radius.max() == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(shape.normals, axis=-1), 1.0, atol=1e-12)
+    face = np.cross(*(shape.triangles[:, i] - shape.triangles[:, 0] for i in (1, 2)))
+    face /= np.linalg.norm(face, axis=1, keepdims=True)
+    agreement = np.einsum("fi,fki->fk", face, shape.normals).min()
+    assert agreement > (0.9 if name == "teapot" else 0.9999)
+
+
+@pytest.mark.parametrize("name", SOLID)
+def test_solids_are_closed_and_have_the_volume_of_their_formula(name: str) -> None:
+    mesh = welded(unit_shape(name))
+    assert mesh.is_watertight
+    assert mesh.is_winding_consistent
+    missing = VOLUMES[name] - mesh.volume
+    if name in CURVED:
+        assert 0 < missing < TESSELLATION * mesh.area
+    else:
+        assert missing == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_curved_meshes_follow_the_smooth_surface(name: str) -> None:
+    shape = unit_shape(name)
+    assert abs(off_surface(name, shape.triangles)).max() < 1e-12
+    middles = (shape.triangles + np.roll(shape.triangles, 1, axis=1)) / 2
+    centers = shape.triangles.mean(axis=1)
+    assert abs(off_surface(name, middles)).max() < TESSELLATION
+    assert abs(off_surface(name, centers)).max() < TESSELLATION
+    rng = np.random.default_rng(1)
+    some = rng.choice(len(centers), 2000)
+    p = shape.triangles[some] * (1 - 1e-3) + centers[some, None] * 1e-3  # not on rims
+    gradient = np.stack(
+        [off_surface(name, p + e) - off_surface(name, p - e) for e in 1e-6 * np.eye(3)], axis=-1
+    )
+    np.testing.assert_allclose(shape.normals[some], gradient / 2e-6, atol=7e-3)  # half a facet
+
+
+def test_the_teapot_is_open_at_its_seams_only() -> None:
+    mesh = welded(unit_shape("teapot"))
+    assert mesh.is_winding_consistent
+    users = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_counts=True)[1]
+    assert users.max() == 2
+    assert np.count_nonzero(users == 1) == 2 * 4 * 32 + 4 * 2 * 32  # rim, lid; handle and spout
+    assert 0.7 < mesh.volume < 0.75
+
+
+@pytest.mark.parametrize("name", SHAPE_NAMES)
+def test_support_bounds_the_mesh_closely(name: str) -> None:
+    shape, d = unit_shape(name), directions(200)
+    corners = welded(unit_shape(name)).vertices
+    reach = np.array([(corners @ one).max() for one in d])
+    excess = shape.support(d) - reach
+    assert excess.min() > -1e-12, "the body must contain the mesh"
+    assert excess.max() < (3e-3 if name == "teapot" else 5e-5)
+
+
+@pytest.mark.parametrize("name", SHAPE_NAMES)
+def test_bodies_stay_on_every_resting_side(name: str) -> None:
+    """The plumb line from the centre of mass meets the points touched: a convex combination."""
+    shape, mesh = unit_shape(name), welded(unit_shape(name))
+    solid = mesh.convex_hull if name == "teapot" else mesh
+    sides = shape.resting_directions
+    if name in SIDES:
+        assert len(sides) == SIDES[name]
+    for down in sides[:: max(1, len(sides) // 20)]:
+        assert np.linalg.norm(down) == pytest.approx(1.0, abs=1e-8)
+        reach = mesh.vertices @ down
+        touching = mesh.vertices[reach > reach.max() - 1e-7]
+        foot = solid.center_mass + (reach.max() - solid.center_mass @ down) * down
+        rows = np.vstack([touching.T, np.full(len(touching), 10.0)])
+        assert nnls(rows, np.append(foot, 10.0))[1] < 2e-6, down
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_round_bodies_do_not_roll_off_their_resting_sides(name: str) -> None:
+    """Tilting a little, any way, lifts the centre of mass, or leaves it as high (rolling)."""
+    mesh, rng = welded(unit_shape(name)), np.random.default_rng(2)
+    sides = unit_shape(name).resting_directions
+    for down in sides[:: max(1, len(sides) // 4)]:
+        tilted = down + 0.03 * rng.standard_normal((8, 3))
+        tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
+        height = ((mesh.vertices - mesh.center_mass) @ np.vstack([down, tilted]).T).max(axis=0)
+        assert (height[1:] > height[0] - 1e-4).all(), down
+
+
+def test_unknown_shapes_are_refused() -> None:
+    with pytest.raises(SpecError, match="'cube', expected one of box, sphere"):
+        unit_shape("cube")
+
+
+def test_rotations_are_scipys() -> None:
+    turns = Rotation.random(20, rng=1)
+    for turn, (x, y, z, w) in zip(turns.as_matrix(), turns.as_quat(), strict=True):
+        np.testing.assert_allclose(rotation_matrix((w, x, y, z)), turn, atol=1e-12)
+        matrix = world_from_object((1.0, 2.0, 3.0), (w, x, y, z), 0.5)
+        np.testing.assert_allclose(matrix[:3], np.c_[0.5 * turn, [1, 2, 3]], atol=1e-12)
+        np.testing.assert_array_equal(matrix[3], [0, 0, 0, 1])
+
+
+def test_the_room_is_three_unit_squares_facing_inwards() -> None:
+    room = room_mesh()
+    squares = room.triangles.reshape(3, 6, 3)
+    for normals, square in zip(room.face_normals.reshape(3, 2, 3), squares, strict=True):
+        axis = int(normals[0].argmax())
+        np.testing.assert_array_equal(normals, np.eye(3)[[axis, axis]])
+        assert (square[:, axis] == 0).all()
+        assert len(np.unique(np.delete(square, axis, axis=1), axis=0)) == 4
+    np.testing.assert_array_equal(np.sort(room.face_normals.argmax(axis=1)), [0, 0, 1, 1, 2, 2])
+    assert room.bounds.tolist() == [[0, 0, 0], [1, 1, 1]]
+
+
+def test_scene_mesh_is_the_room_and_every_object_in_its_place() -> None:
+    half = 0.5**0.5
+    objects = (
+        PlacedObject("box", (0.5, 0.25, 0.5), (half, 0.0, half, 0.0), 0.1, (1, 1, 1)),
+        PlacedObject("cone", (0.2, 0.3, 0.7), (half, half, 0.0, 0.0), 0.2, (1, 1, 1)),
+    )
+    camera = Camera((1.0, 1.0, 1.0), (0.0, 0.0, 0.0), 30.0)
+    scene = SceneSpec(0, (camera,), objects, (), (0, 0, 0), (1, 1), (1, 1, 1))
+    corners = scene_mesh(scene).triangles
+    assert len(corners) == 6 + 12 + len(unit_shape("cone").triangles)
+    np.testing.assert_array_equal(corners[:6], room_mesh().triangles)
+    side = 0.1 / 3**0.5
+    box = corners[6:18].reshape(-1, 3) - objects[0].position
+    np.testing.assert_allclose(abs(box), side, atol=1e-12)
+    cone = corners[18:].reshape(-1, 3) - objects[1].position
+    tip = cone[cone[:, 2].argmax()]  # a quarter turn about x takes y to z
+    np.testing.assert_allclose(tip, [0, 0, 0.2 * half], atol=1e-12)

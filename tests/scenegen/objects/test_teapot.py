@@ -1,0 +1,134 @@
+"""Newell's patches: a wrong number in the table opens a crack, breaks a mirror or bends a seam."""
+
+from collections import defaultdict
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from scenegen.objects.teapot import PROFILES, patches, tessellate, turned_quads
+
+RIM, LID, KNOB, BOTTOM = range(4), range(16, 20), range(12, 16), range(20, 24)
+# Handle above and below, spout at the body and at its mouth; each half and its mirror image.
+TUBE_ENDS = {(24, 0), (28, 0), (25, 1), (29, 1), (26, 0), (30, 0), (27, 1), (31, 1)}
+
+
+def borders() -> dict[tuple[float, ...], list[tuple[int, int]]]:
+    """(patch, side) by the border's control points, whichever way they are run through.
+
+    Sides 0 and 1 are the first and last row, 2 and 3 the first and last column.
+    """
+    found = defaultdict(list)
+    for i, net in enumerate(patches().round(9) + 0.0):
+        for side, curve in enumerate((net[0], net[-1], net[:, 0], net[:, -1])):
+            key = min(tuple(curve.ravel()), tuple(curve[::-1].ravel()))
+            found[key].append((i, side))
+    return found
+
+
+def test_there_are_32_bicubic_patches() -> None:
+    assert patches().shape == (32, 4, 4, 3)
+
+
+def test_every_border_is_shared_or_known_to_be_open() -> None:
+    alone = {users[0] for users in borders().values() if len(users) == 1}
+    open_rings = {(i, 0) for i in RIM} | {(i, 1) for i in LID}
+    assert alone == open_rings | TUBE_ENDS
+
+
+def test_poles_are_points_and_every_other_shared_border_has_two_sides() -> None:
+    shared = {key: users for key, users in borders().items() if len(users) != 1}
+    poles = {key: users for key, users in shared.items() if len(users) > 2}
+    assert sorted(poles.values()) == [[(i, 0) for i in KNOB], [(i, 1) for i in BOTTOM]]
+    points = sorted(tuple(np.unique(np.reshape(key, (4, 3)), axis=0).ravel()) for key in poles)
+    assert points == [(0.0, 0.0, 0.0), (0.0, 3.15, 0.0)]
+    assert all(len(users) == 2 for key, users in shared.items() if key not in poles)
+
+
+def test_the_surface_is_smooth_across_all_borders() -> None:
+    """Corners at one place have one normal, so seams neither crease nor turn inside out.
+
+    The handle's lower end only happens to touch the body, at one point.
+    """
+    corners, normals = tessellate(12)
+    by_place = defaultdict(list)
+    places = corners.reshape(-1, 3).round(7) + 0.0
+    for place, normal in zip(places, normals.reshape(-1, 3), strict=True):
+        by_place[tuple(place.tolist())].append(normal)
+    del by_place[(-2.0, 0.9, 0.0)]
+    worst = min((np.array(some) @ np.transpose(some)).min() for some in by_place.values())
+    assert worst > 0.9999
+
+
+@pytest.mark.parametrize("net", range(24, 28))
+def test_tubes_are_halves_that_meet_on_the_mirror_plane(net: int) -> None:
+    half, other = patches()[[net, net + 4]]
+    np.testing.assert_array_equal(half[:, [0, 3], 2], 0.0)
+    assert (half[:, 1:3, 2] * other[:, 1:3, 2] < 0).all()
+
+
+def test_it_is_its_own_mirror_image() -> None:
+    points = tessellate(8)[0].reshape(-1, 3)
+    turned = points[: 4 * turned_quads(8)]
+    quarter_turn = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    for some, image in ((points, points * (1, 1, -1)), (turned, turned @ quarter_turn)):
+        assert cKDTree(some).query(image)[0].max() < 1e-12
+    assert cKDTree(points).query(points @ quarter_turn)[0].max() > 0.5, "spout and handle"
+
+
+def test_known_extremes() -> None:
+    """Height of the knob, foot of the bottom, width of the belly, back of the handle."""
+    points = tessellate(64)[0].reshape(-1, 3)
+    low, high = points.min(axis=0), points.max(axis=0)
+    np.testing.assert_allclose(low, [-3.0, 0.0, -2.0], atol=1e-12)
+    np.testing.assert_allclose(high[1:], [3.15, 2.0], atol=1e-12)
+    assert 3.42 < high[0] < 3.525, "the spout's lip, inside its control points"
+    assert points[points[:, 0].argmax(), 1] == pytest.approx(2.46, abs=0.02)
+
+
+def test_published_points_are_where_they_were_published() -> None:
+    """Some vertices as printed, z up and y <= 0: rim, belly, knob, lid, bottom, handle, spout."""
+    printed = [(1.3375, -0.749, 2.53125), (1.75, -0.98, 1.875), (0.8, -0.45, 3.15)]
+    printed += [(0.4, -0.224, 2.55), (0.798, -1.425, 0.0), (-2.65, -0.3, 0.9375)]
+    printed += [(-2.5, 0.0, 1.125), (3.525, -0.25, 2.49375), (3.1, -0.66, 0.825), (2.4, 0, 2.025)]
+    z_up = patches().reshape(-1, 3)[:, [0, 2, 1]] * (1, -1, 1)
+    for point in printed:
+        assert np.linalg.norm(z_up - point, axis=1).min() < 1e-12, point
+
+
+def test_turned_patches_are_round_to_half_a_percent() -> None:
+    """Four cubics with tangents 0.56 r bulge by 0.4%; the knob's top, 0.5625 r, a bit more."""
+    for r, tangent, _ in np.reshape(PROFILES, (-1, 3)):
+        assert tangent == pytest.approx(0.56 * r, abs=0.0025 * r)
+    quarter = tessellate(16)[0][: 16 * 16].reshape(-1, 3)
+    rim = np.hypot(*quarter[np.isclose(quarter[:, 1], 2.4)][:, [0, 2]].T)
+    assert rim.min() == pytest.approx(1.4, abs=1e-9)
+
+
+def test_normals_point_outwards_and_quads_run_around_them() -> None:
+    corners, normals = tessellate(16)
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0, atol=1e-12)
+    across = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    assert (np.einsum("qi,qki->qk", across, normals) >= -1e-9).all()
+    body = slice(4 * 16**2, 12 * 16**2)
+    outwards = corners[body].mean(axis=1) * (1, 0, 1)
+    assert (np.einsum("qi,qi->q", outwards, normals[body].mean(axis=1)) > 0).all()
+    tubes = slice(turned_quads(16), None)
+    assert len(corners[tubes]) == 8 * 16**2
+
+
+def test_corners_lie_on_the_patches() -> None:
+    """De Casteljau's construction instead of Bernstein polynomials, at a few corners."""
+    corners = tessellate(4)[0].reshape(32, 4, 4, 4, 3)
+
+    def casteljau(points: NDArray[np.float64], t: float) -> NDArray[np.float64]:
+        while len(points) > 1:
+            points = (1 - t) * points[:-1] + t * points[1:]
+        return np.asarray(points[0])
+
+    for i in (0, 9, 14, 21, 24, 31):
+        for row, column in ((0, 0), (1, 2), (3, 3)):
+            curve = casteljau(patches()[i], row / 4)
+            expected = casteljau(curve, column / 4)
+            np.testing.assert_allclose(corners[i, row, column, 0], expected, atol=1e-12)

@@ -1,0 +1,142 @@
+"""Colours of objects, room and lights: as asked for, as stored, and as seen."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from click.testing import Result
+from numpy.typing import NDArray
+from scipy.stats import kstest
+
+from scenegen.description.scenes import Light, SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.sampling.scenes import sample_scene
+
+Array = NDArray[Any]
+SPARSE = DatasetSpec(objects=(1, 4), object_radius=(0.03, 0.04), seed=6)
+
+
+def scenes(spec: DatasetSpec, count: int) -> list[SceneSpec]:
+    found = [sample_scene(spec, index) for index in range(count)]
+    return [scene for scene in found if scene is not None]
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"reflectance": (0.9, 0.4, 0.2), "room_reflectance": (0.3, 0.5, 0.7)},
+        {"random_reflectance": True},
+        {"source": "families", "shapes": ("mug", "cap"), "random_reflectance": True},
+    ],
+    ids=["two-tone", "albedo", "albedo of models"],
+)
+def test_under_ambient_light_an_image_shows_the_stored_reflectance(
+    settings: dict[str, Any], make_rooms: Callable[..., Path], tmp_path: Path
+) -> None:
+    path = make_rooms(tmp_path / "x.h5", 4, lights=(0, 0), ambient=(0.25, 0.5, 1.0), objects=(2, 3),
+                      image_dtype="float32", specular=(0.5, 0.5), **settings)  # fmt: skip
+    with h5py.File(path) as file:
+        rho = file["material/reflectance"][:]
+        for row, ids in enumerate(file["object_id"][:]):
+            expected = rho[row, ids] * [0.25, 0.5, 1.0]
+            np.testing.assert_allclose(file["image"][row], expected, rtol=1e-6)
+            count = file["object/count"][row]
+            assert set(np.unique(ids)) == set(range(count + 1))
+            described = json.loads(file["scene"][row])
+            assert described["room_reflectance"] == rho[row, 0].tolist()
+            assert [o["reflectance"] for o in described["objects"]] == rho[
+                row, 1 : 1 + count
+            ].tolist()
+
+
+def test_random_reflectance_is_uniform_and_each_objects_own() -> None:
+    spec = replace(SPARSE, random_reflectance=True)
+    found = np.array([o.reflectance for s in scenes(spec, 200) for o in s.objects])
+    assert len(found) > 300
+    assert found.min() >= 0.15
+    assert found.max() <= 0.95
+    for channel in found.T:
+        assert kstest(channel, "uniform", (0.15, 0.8)).pvalue > 0.01
+    assert len(np.unique(found)) == found.size, "no channel is another's, no object another's"
+    assert {s.room_reflectance for s in scenes(spec, 5)} == {spec.room_reflectance}
+
+
+def test_specular_and_shininess_are_uniform_in_their_ranges_and_independent() -> None:
+    spec = replace(SPARSE, specular=(0.2, 0.6), shininess=(5.0, 45.0))
+    found = np.array([(o.specular, o.shininess) for s in scenes(spec, 200) for o in s.objects])
+    assert kstest(found[:, 0], "uniform", (0.2, 0.4)).pvalue > 0.01
+    assert kstest(found[:, 1], "uniform", (5, 40)).pvalue > 0.01
+    assert abs(np.corrcoef(found.T)[0, 1]) < 4 / len(found) ** 0.5
+
+
+def test_materials_change_nothing_else() -> None:
+    """Nor do attempts change materials."""
+    glossy = replace(SPARSE, random_reflectance=True, specular=(0.2, 0.6), shininess=(5.0, 45.0))
+    for plain, painted in zip(scenes(SPARSE, 8), scenes(glossy, 8), strict=True):
+        bare = [replace(o, reflectance=(0.8,) * 3, specular=0.0, shininess=1.0)
+                for o in painted.objects]  # fmt: skip
+        assert replace(painted, objects=tuple(bare)) == plain
+        again = sample_scene(glossy, painted.index, 1)
+        assert again is not None
+        for one, other in zip(painted.objects, again.objects, strict=True):
+            assert one.position != other.position
+            looks = [(o.shape, o.reflectance, o.specular, o.shininess) for o in (one, other)]
+            assert looks[0] == looks[1]
+
+
+def lights(saturation: float, count: int = 150, **settings: Any) -> list[Light]:
+    spec = DatasetSpec(objects=(0, 0), light_saturation=saturation, **settings)
+    return [light for scene in scenes(spec, count) for light in scene.lights]
+
+
+def test_saturation_is_how_far_channels_may_fall_below_the_brightest() -> None:
+    def ratios(saturation: float) -> Array:
+        colors = np.array([light.color for light in lights(saturation)])
+        return np.sort(colors / colors.max(axis=1, keepdims=True), axis=1)
+
+    assert (ratios(0.0) == 1).all(), "white"
+    assert ratios(0.25).min() > 0.75
+    assert ratios(1.0)[:, 0].min() < 0.02
+    means = [ratios(s)[:, 0].mean() for s in (0.0, 0.3, 0.6, 1.0)]
+    assert means == sorted(means, reverse=True)
+    assert means[-1] < 0.4, "strong colours are the rule"
+
+
+@pytest.mark.parametrize("saturation", [0.0, 0.7, 1.0])
+def test_saturation_moves_no_light_and_keeps_the_level(saturation: float) -> None:
+    """A white surface at the target that faces all lights: its brightest channels add up to it."""
+    some = {"lights": (1, 5), "light_level": 0.6, "attenuation": (0.2, 0.9), "light_radius": 3.0}
+    found = lights(saturation, 20, **some)
+    assert [x.position for x in found] == [x.position for x in lights(0.5, 20, **some)]
+    spec = DatasetSpec(objects=(0, 0), light_saturation=saturation, **some)
+    for scene in scenes(spec, 20):
+        level = sum(max(x.color) for x in scene.lights) / (0.2 * 3 + 0.9 * 3**2)
+        assert level == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize(
+    ("options", "objects", "room"),
+    [
+        ("", 0.8, 0.8),
+        ("--reflectance 0.5", 0.5, 0.5),
+        ("--room-reflectance 0.3", 0.8, 0.3),
+        ("--reflectance 0.5 --room-reflectance 0.3", 0.5, 0.3),
+        ("--preset two-tone --reflectance white", 1.0, (0.4, 0.6, 0.85)),
+        ("--reflectance 0.1,0.2,0.3", (0.1, 0.2, 0.3), (0.1, 0.2, 0.3)),
+        ("--reflectance black --room-reflectance white", 0.0, 1.0),
+    ],
+)
+def test_the_room_has_the_reflectance_told_for_objects_unless_told_its_own(
+    options: str, objects: Any, room: Any, run: Callable[..., Result]
+) -> None:
+    result = run("render", "--n", 1, "--size", 16, "--objects", 1, *options.split())
+    assert result.exit_code == 0, result.output
+    with h5py.File("rooms.h5") as file:
+        stored = file["material/reflectance"][0]
+    assert stored[0].tolist() == [*np.broadcast_to(room, 3)]
+    assert stored[1].tolist() == [*np.broadcast_to(objects, 3)]

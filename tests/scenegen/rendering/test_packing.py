@@ -1,0 +1,149 @@
+"""Scenes as arrays: each number in its slot, and nothing in the others."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scenegen.camera import Camera
+from scenegen.common.errors import SpecError
+from scenegen.description.scenes import Light, PlacedObject, SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.objects.shapes import world_from_object
+from scenegen.rendering.packing import pack, pixel_size
+
+SPEC = DatasetSpec(objects=(0, 3), lights=(0, 2), shapes=("cone", "box"), height=50, width=80)
+TURN = (0.5, 0.5, 0.5, 0.5)
+CONE = PlacedObject("cone", (0.1, 0.2, 0.3), TURN, 0.15, (0.1, 0.2, 0.3))
+BOX = PlacedObject("box", (0.4, 0.5, 0.6), (1.0, 0.0, 0.0, 0.0), 0.05, (0.4, 0.5, 0.6))
+LAMP = Light((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
+VIEWS = (
+    Camera((1.5, 1.0, 1.2), (0.3, 0.3, 0.3), 28.0),
+    Camera((1.0, 1.1, 1.9), (0.2, 0.3, 0.3), 33.0),
+)
+FULL = SceneSpec(
+    4, VIEWS, (BOX, CONE), (LAMP, LAMP), (0.1, 0.2, 0.3), (0.5, 0.6), (0.7, 0.8, 0.9), (1, 2, 3)
+)
+BARE = replace(FULL, index=5, objects=(), lights=(), room_reflectance=None)
+LAST = replace(FULL, index=6, objects=(CONE,), lights=(LAMP,))
+
+
+def test_every_number_is_in_its_slot() -> None:
+    batch = pack(SPEC, [FULL, BARE, LAST])
+    assert len(batch) == 3
+    assert batch.object_count.tolist() == [2, 0, 1]
+    assert batch.light_count.tolist() == [2, 0, 1]
+    assert batch.shape.tolist() == [[1, 0, -1], [-1, -1, -1], [0, -1, -1]]
+    assert batch.object_scale.tolist() == [[0.05, 0.15, 0], [0, 0, 0], [0.15, 0, 0]]
+    for row, slot, item in ((0, 0, BOX), (0, 1, CONE), (2, 0, CONE)):
+        expected = world_from_object(item.position, item.rotation, item.scale)
+        np.testing.assert_array_equal(batch.world_from_object[row, slot], expected)
+        assert batch.reflectance[row, 1 + slot].tolist() == list(item.reflectance)
+    assert not batch.world_from_object[batch.shape < 0].any()
+    assert batch.reflectance[:, 0].tolist() == [[0.7, 0.8, 0.9], [0, 0, 0], [0.7, 0.8, 0.9]]
+    assert not batch.reflectance[1, 1:].any()
+    assert batch.has_room.tolist() == [True, False, True]
+    assert batch.background.tolist() == [[1, 2, 3]] * 3
+    assert batch.ambient.tolist() == [[0.1, 0.2, 0.3]] * 3
+    assert batch.attenuation.tolist() == [[0.5, 0.6]] * 3
+    lit = [[True, True], [False, False], [True, False]]
+    assert batch.light_position[lit].tolist() == [[1, 2, 3]] * 3
+    assert batch.light_color[lit].tolist() == [[4, 5, 6]] * 3
+    assert not batch.light_color[np.logical_not(lit)].any()
+
+
+@pytest.mark.parametrize("view", [0, 1])
+def test_the_view_asked_for_is_the_one_packed(view: int) -> None:
+    batch = pack(SPEC, [FULL, LAST], (view,))
+    expected = VIEWS[view].world_from_camera
+    np.testing.assert_array_equal(batch.world_from_camera, [expected, expected])
+    assert batch.fov_y_degrees.tolist() == [VIEWS[view].fov_y_degrees] * 2
+
+
+def test_several_views_follow_scene_after_scene() -> None:
+    shiny = replace(LAST, objects=(replace(CONE, specular=0.25, shininess=7.0),))
+    batch = pack(SPEC, [FULL, BARE, shiny], (1, 0))
+    assert len(batch) == 6
+    assert batch.index.tolist() == [4, 4, 5, 5, 6, 6]
+    assert batch.view.tolist() == [1, 0] * 3
+    assert batch.fov_y_degrees.tolist() == [33.0, 28.0] * 3
+    assert batch.gloss[4:, 1].tolist() == [[0.25, 7.0]] * 2
+    assert batch.gloss[:4].tolist() == [[[0.0, 1.0]] * 4] * 4, "matte, unused slots too"
+    one = [pack(SPEC, [FULL, BARE, shiny], (view,)) for view in (1, 0)]
+    for name, values in vars(batch).items():
+        if isinstance(values, np.ndarray):
+            for first, alone in enumerate(one):
+                np.testing.assert_array_equal(values[first::2], getattr(alone, name), err_msg=name)
+
+
+@pytest.mark.parametrize("start", range(4))
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_rows_are_a_part_of_every_array(start: int, count: int) -> None:
+    batch = pack(SPEC, [FULL, BARE, LAST], (0, 1))
+    some = batch.rows(start, start + count)
+    rows = slice(start, start + count)
+    assert len(some) == min(count, 6 - start)
+    named = [[some.names[i] if i >= 0 else None for i in row] for row in some.shape.tolist()]
+    known = [
+        [batch.names[i] if i >= 0 else None for i in row] for row in batch.shape[rows].tolist()
+    ]
+    assert named == known
+    assert set(some.names) == {name for row in named for name in row if name}
+    assert some.shape.dtype == batch.shape.dtype
+    assert (some.spec, some.shape_of, some.blocks) == (batch.spec, batch.shape_of, batch.blocks)
+    for name, values in vars(batch).items():
+        if isinstance(values, np.ndarray) and name != "shape":
+            np.testing.assert_array_equal(getattr(some, name), values[rows], err_msg=name)
+
+
+@pytest.mark.parametrize("views", [(2,), (0, 2), (-1,), (0, -1), (1, 5)])
+def test_views_that_a_scene_lacks_are_refused(views: tuple[int, ...]) -> None:
+    """-1 would be Python's last one."""
+    shown = ", ".join(map(str, views))
+    with pytest.raises(SpecError, match=f"scene 4: found {shown}, expected views from 0 to 1"):
+        pack(SPEC, [FULL], views)
+    with pytest.raises(SpecError, match="scene 6: found 1, expected views from 0 to 0"):
+        pack(SPEC, [FULL, replace(LAST, cameras=VIEWS[:1])], (1,))
+
+
+def test_models_are_known_by_class_and_number() -> None:
+    spec = replace(SPEC, source="families", shapes=("mug", "can"))
+    mug, can = replace(CONE, shape="mug/0007"), replace(BOX, shape="can/0001")
+    batch = pack(spec, [replace(FULL, objects=(mug, can, mug)), replace(LAST, objects=(can,))])
+    assert batch.names == ("can/0001", "mug/0007")
+    assert batch.shape.tolist() == [[1, 0, 1], [0, -1, -1]]
+    assert batch.shape_of("mug/0007").name == "mug/0007"
+    with pytest.raises(SpecError, match="'bowl'"):
+        pack(spec, [replace(FULL, objects=(replace(CONE, shape="bowl/0001"),))])
+
+
+def test_a_folders_models_need_the_folder() -> None:
+    spec = replace(SPEC, source="folder", shapes=("mug",), listing="0" * 64)
+    with pytest.raises(SpecError, match=r"meshes \(folder\).*--objects-root"):
+        pack(spec, [BARE])
+    with pytest.raises(SpecError, match=r"meshes \(shapenet-v1\).*--shapenet-root"):
+        pack(replace(spec, source="shapenet-v1"), [BARE])
+
+
+def test_empty_rooms_alone_can_be_packed() -> None:
+    batch = pack(replace(SPEC, objects=(0, 0), lights=(0, 0)), [BARE])
+    assert batch.world_from_object.shape == (1, 1, 4, 4)
+    assert batch.light_position.shape == (1, 1, 3)
+    assert batch.shape.tolist() == [[-1]]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"objects": (BOX,) * 4}, "scene 4: found 4 objects, the spec allows 3"),
+        ({"lights": (LAMP,) * 3}, "scene 4: found 3 lights, the spec allows 2"),
+        ({"objects": (replace(BOX, shape="torus"),)}, "'torus'"),
+    ],
+)
+def test_a_scene_beyond_the_request_is_refused(change: dict[str, object], words: str) -> None:
+    with pytest.raises(SpecError, match=words):
+        pack(SPEC, [BARE, replace(FULL, **change)])
+
+
+def test_pixel_size_at_depth_one() -> None:
+    np.testing.assert_allclose(pixel_size(np.array([90.0, 60.0]), 10), [0.2, 0.2 / 3**0.5])

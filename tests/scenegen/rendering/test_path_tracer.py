@@ -1,0 +1,236 @@
+"""Path-traced images: the same truth to the bit, and light that can be worked out."""
+
+import importlib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter
+
+from scenegen.camera import Camera
+from scenegen.description.scenes import FAMILY_NAMES, Light, PlacedObject, SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.rendering.packing import pack
+from scenegen.rendering.renderer import launch_fields, render
+from scenegen.rooms.verify import verify_file
+
+Array = NDArray[Any]
+Scenes = Callable[[DatasetSpec, int], list[SceneSpec]]
+PATH = DatasetSpec(
+    height=24, width=32, shading="path", spp=4, image_dtype="float32", min_visible_pixels=0,
+    objects=(1, 2), lights=(0, 3), seed=3,
+)  # fmt: skip
+TARGET = PATH.camera_target
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+BALL = PlacedObject("sphere", TARGET, UPRIGHT, 0.2, (0.8, 0.5, 0.3))
+CAMERA = Camera((0.3, 0.6, 1.8), TARGET, 18.0)
+LAMP = Light((1.3, 1.9, 1.5), (3.0, 2.0, 1.0))
+BLACK = (0.0, 0.0, 0.0)
+OPEN = SceneSpec(0, (CAMERA,), (BALL,), (LAMP,), BLACK, (0.0, 1.0), None)
+
+
+def images(scene: SceneSpec, **settings: Any) -> tuple[Array, Array, Array]:
+    """The path tracer's image, the shading equation's, and where inside the first object."""
+    spec = replace(PATH, **{"spp": 64, **settings})
+    traced = render(pack(spec, [scene])).image[0]
+    paper = render(pack(replace(spec, shading="paper"), [scene]))
+    return traced, paper.image[0], minimum_filter(paper.object_id[0] == 1, 3)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{}, {"specular": (0.1, 0.5)}, {"source": "families", "shapes": FAMILY_NAMES}],
+    ids=["matte", "glossy", "models"],
+)
+def test_only_the_colour_is_traced(settings: dict[str, Any], scenes_of: Scenes) -> None:
+    spec = replace(PATH, **settings)
+    scenes = scenes_of(replace(spec, shading="paper"), 3)
+    traced = render(pack(spec, scenes))
+    paper = render(pack(replace(spec, shading="paper", spp=1), scenes))
+    for name in ("depth", "normal", "object_id"):
+        assert getattr(traced, name).tobytes() == getattr(paper, name).tobytes()
+    assert traced.image.shape == paper.image.shape
+    assert traced.image.dtype == np.float32
+    assert np.isfinite(traced.image).all()
+    assert traced.image.min() >= 0
+    assert (traced.image != paper.image).mean() > 0.5
+
+
+def test_models_kept_from_other_batches_are_let_go(scenes_of: Scenes) -> None:
+    """Dr.Jit traces paths through every mesh that is alive: with hundreds, for minutes."""
+    spec = replace(PATH, source="families", shapes=FAMILY_NAMES, spp=1)
+    kept = importlib.import_module("scenegen.rendering.model_scene")._models.kept
+    scenes = scenes_of(spec, 4)
+    render(pack(replace(spec, shading="paper"), scenes))
+    assert len(kept) > 3
+    render(pack(spec, scenes[:1]))
+    assert len(kept) == 0
+
+
+def test_fields_may_be_asked_for_one_by_one(scenes_of: Scenes) -> None:
+    batch = pack(PATH, scenes_of(PATH, 2))
+    whole = render(batch)
+    assert set(launch_fields(batch, ["depth"])()) == {"depth"}
+    only = launch_fields(batch, ["image"])()
+    assert set(only) == {"image"}
+    assert only["image"].tobytes() == whole.image.tobytes()
+
+
+def test_the_same_request_gives_the_same_bytes_in_any_batch(
+    make_rooms: Callable[..., Path], tmp_path: Path
+) -> None:
+    settings = {"shading": "path", "spp": 3, "views": (0.0, 30.0), "object_radius": (0.08, 0.15)}
+    files = [
+        make_rooms(tmp_path / f"{batch}.h5", 3, {"batch": batch}, **settings)
+        for batch in (1, 4, 64)
+    ]
+    assert len({path.read_bytes() for path in files}) == 1
+    checks = verify_file(files[0], items=3)
+    assert [check for check in checks if not check.ok] == []
+
+
+def test_noise_is_another_for_every_seed_scene_and_view() -> None:
+    """All show one picture, and no two the same noise."""
+    views = (CAMERA, CAMERA)
+    room = replace(OPEN, cameras=views, room_reflectance=(0.7,) * 3, ambient=(0.1,) * 3)
+    spec = replace(PATH, spp=16)
+    scenes = [room, replace(room, index=1)]
+    batch = pack(spec, scenes, (0, 1))
+    found = [*render(batch).image, *render(pack(replace(spec, seed=4), scenes, (0, 1))).image]
+    assert len({image.tobytes() for image in found}) == 8
+    assert [*render(batch).image][2].tobytes() == found[2].tobytes()
+    means = np.array([image.mean() for image in found])
+    assert means.std() < 0.02 * means.mean()
+
+
+@pytest.mark.parametrize("gloss", [(0.0, 1.0), (0.5, 6.0)], ids=["matte", "glossy"])
+@pytest.mark.parametrize("shape", ["sphere", "cylinder"])
+def test_direct_light_of_an_open_convex_object_is_the_shading_equation(
+    shape: str, gloss: tuple[float, float]
+) -> None:
+    """With k_l = 0 there is no other falloff than the inverse square, and nothing to bounce."""
+    item = replace(BALL, shape=shape, specular=gloss[0], shininess=gloss[1])
+    traced, paper, inside = images(replace(OPEN, objects=(item,)), specular=(0.0, 1.0))
+    assert inside.mean() > 0.15
+    assert paper[inside].max() > 0.3
+    assert traced[inside].mean(axis=0) == pytest.approx(paper[inside].mean(axis=0), rel=0.01)
+    lit = inside & (paper > 0.05).all(axis=-1)
+    off = abs(traced / np.maximum(paper, 0.05) - 1)[lit].max(axis=-1)
+    assert np.quantile(off, 0.8) < 0.03, "up to noise and outlines"
+
+
+def test_several_lights_add_up() -> None:
+    others = (LAMP, Light((-1.0, 1.5, 2.0), (0.5, 1.0, 4.0)), Light((0.3, 2.5, 0.3), (1.0,) * 3))
+    traced, paper, inside = images(replace(OPEN, lights=others), spp=256, lights=(3, 3))
+    assert traced[inside].mean(axis=0) == pytest.approx(paper[inside].mean(axis=0), rel=0.02)
+
+
+@pytest.mark.parametrize("attenuation", [(0.5, 0.5), (1.0, 0.0), (0.0, 2.0)])
+def test_at_the_target_a_light_is_as_bright_as_in_the_shading_equation(
+    attenuation: tuple[float, float],
+) -> None:
+    """A tiny ball at the target, where falloffs that differ elsewhere meet."""
+    tiny = replace(BALL, scale=0.004)
+    camera = Camera(CAMERA.position, TARGET, 0.4)
+    scene = replace(OPEN, objects=(tiny,), cameras=(camera,), attenuation=attenuation)
+    traced, paper, inside = images(scene)
+    assert inside.mean() > 0.1
+    assert traced[inside].mean(axis=0) == pytest.approx(paper[inside].mean(axis=0), rel=0.01)
+
+
+def test_ambient_light_alone_leaves_an_open_object_its_reflectance() -> None:
+    """The furnace: every point of an open convex object sees L_a all around."""
+    scene = replace(OPEN, lights=(), ambient=(0.5, 0.25, 0.125), background=(0.25, 0.5, 1.0))
+    traced, _, inside = images(scene, spp=256)
+    expected = np.array(BALL.reflectance) * scene.ambient
+    np.testing.assert_allclose(traced[inside].mean(axis=0), expected, rtol=0.02)
+    assert (traced[0] == np.float32(scene.background)).all(), "what lies beyond is no light"
+
+
+def test_a_glossy_object_in_the_furnace_reflects_both_lobes() -> None:
+    """Facing the viewer, rho + 2 k_s / (m + 1); towards the outline the lobe is cut off."""
+    item = replace(BALL, specular=0.6, shininess=5.0, scale=0.2)
+    camera = Camera((0.3, 0.3 + 1e-3, 1.8), TARGET, 2.0)
+    scene = replace(OPEN, objects=(item,), cameras=(camera,), lights=(), ambient=(0.5,) * 3)
+    traced, _, inside = images(scene, specular=(0.0, 1.0), spp=256)
+    assert inside.all()
+    expected = 0.5 * (np.array(item.reflectance) + 2 * 0.6 / 6)
+    np.testing.assert_allclose(traced.mean(axis=(0, 1)), expected, rtol=0.02)
+
+
+def test_rooms_have_shadows_and_light_in_them() -> None:
+    """Behind a ball, seen from the light, the floor is dark but for what bounces there."""
+    ball = replace(BALL, position=(0.5, 0.3, 0.5), scale=0.15)
+    camera, lamp = (
+        Camera((1.5, 1.2, 1.5), (0.5, 0.1, 0.5), 30.0),
+        Light((0.2, 1.2, 0.2), (1.0,) * 3),
+    )
+    scene = SceneSpec(0, (camera,), (ball,), (lamp,), BLACK, (0.0, 1.0), (0.3, 0.3, 0.3))
+    traced, paper, _ = images(scene)
+    hard = render(pack(replace(PATH, shading="paper", shadows=True), [scene]))
+    room = minimum_filter(hard.object_id[0] == 0, 3)
+    dark = minimum_filter((hard.image[0] == 0).all(axis=-1), 3) & room
+    lit = minimum_filter(np.isclose(hard.image[0], paper, rtol=1e-4).all(axis=-1), 3) & room
+    assert dark.sum() > 10
+    assert lit.sum() > 50
+    assert (traced[dark] > 0).mean() > 0.9, "not black: light that bounced"
+    assert traced[dark].mean() < 0.3 * paper[dark].mean(), "but in the shadow"
+    assert (traced[lit] > 0.97 * hard.image[0][lit]).mean() > 0.95, "light only adds up"
+
+
+def test_a_glossy_room_scene_is_the_same_picture_as_the_papers(scenes_of: Scenes) -> None:
+    """Upright, and every light where it should be."""
+    spec = replace(PATH, specular=(0.3, 0.5), shininess=(5.0, 9.0), lights=(1, 2), spp=64)
+    scenes = scenes_of(spec, 3)
+    traced = render(pack(spec, scenes)).image
+    paper = render(pack(replace(spec, shading="paper", shadows=True, spp=16), scenes)).image
+    for one, other in zip(traced, paper, strict=True):
+        match = np.corrcoef(one.ravel(), other.ravel())[0, 1]
+        flipped = [np.corrcoef(one.ravel(), x.ravel())[0, 1] for x in (other[::-1], other[:, ::-1])]
+        assert match > 0.85
+        assert match > max(flipped)
+
+
+@pytest.mark.parametrize("spp", [1, 2, 3, 5, 7, 10, 13])
+def test_any_number_of_samples_will_do(
+    spp: int, capfd: pytest.CaptureFixture[str], variant: str
+) -> None:
+    scene = replace(OPEN, room_reflectance=(0.5,) * 3, ambient=(0.2,) * 3)
+    image = render(pack(replace(PATH, spp=spp, height=8, width=8), [scene])).image
+    assert np.isfinite(image).all()
+    assert image.mean() > 0.05
+    assert capfd.readouterr() == ("", ""), "Mitsuba has nothing to warn of"
+
+
+@pytest.mark.parametrize("spp", [16, 19])
+def test_samples_in_several_goes_make_the_same_picture(
+    spp: int, monkeypatch: pytest.MonkeyPatch, variant: str
+) -> None:
+    """As where all do not fit into memory at once; each sample is drawn once."""
+    scene = replace(OPEN, room_reflectance=(0.5,) * 3, ambient=(0.2,) * 3)
+    batch = pack(replace(PATH, spp=spp), [scene])
+    best = render(pack(replace(PATH, spp=512), [scene])).image  # in one go: shares no noise
+    once, two = render(batch).image, render(pack(replace(PATH, spp=2), [scene])).image
+    path_tracer = importlib.import_module("scenegen.rendering.path_tracer")
+    monkeypatch.setattr(path_tracer, "RAYS_AT_ONCE", 2 * 24 * 32)
+    parts = render(batch).image
+    assert parts.tobytes() != once.tobytes()
+    error_once, error_parts, error_two = (
+        float(np.sqrt(np.mean((image - best) ** 2))) for image in (once, parts, two)
+    )
+    assert error_parts < 1.2 * error_two * (2 / spp) ** 0.5, "no noise is drawn twice"
+    assert error_parts < 1.8 * error_once, "but 16 at once are spread more evenly"
+
+
+def test_more_samples_are_less_noise() -> None:
+    scene = replace(OPEN, room_reflectance=(0.5,) * 3, ambient=(0.2,) * 3)
+    best = render(pack(replace(PATH, spp=1024), [scene])).image
+    error = [
+        float(np.sqrt(np.mean((render(pack(replace(PATH, spp=n), [scene])).image - best) ** 2)))
+        for n in (4, 16, 64)
+    ]
+    assert error[0] > 1.4 * error[1] > 1.4**2 * error[2]

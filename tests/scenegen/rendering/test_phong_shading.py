@@ -1,0 +1,216 @@
+"""Phong's lobe: by hand, by its symmetries, and the same from numpy, the wavefront and Embree."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import grey_dilation, grey_erosion
+from scipy.spatial.transform import Rotation
+
+from scenegen.camera import Camera, back_project, transform_points
+from scenegen.description.scenes import Light, PlacedObject, SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.rendering.ground_truth import GroundTruth
+from scenegen.rendering.packing import SceneBatch, pack
+from scenegen.rendering.reference import Cast, render_reference
+from scenegen.rendering.renderer import render
+from scenegen.rendering.shading import shade
+
+Array = NDArray[Any]
+Scenes = Callable[[DatasetSpec, int], list[SceneSpec]]
+ORIGIN = np.zeros((1, 3))
+UP = np.array([[0.0, 1.0, 0.0]])
+DARK, WHITE = np.zeros(3), np.ones(3)
+K = np.array([0.5, 0.25])
+GLOSSY = DatasetSpec(
+    height=40, width=56, objects=(2, 3), lights=(0, 4), specular=(0.2, 1.0), shininess=(2.0, 60.0),
+    image_dtype="float32", min_visible_pixels=0, seed=8, random_reflectance=True,
+)  # fmt: skip
+
+
+def shine(light: Any, viewpoint: Any, shininess: float, normal: Array = UP) -> float:
+    """Of a black surface at the origin, k_s and the light's colour being 1."""
+    lights, black = np.array([light], float), np.zeros(3)
+    one = shade(ORIGIN, normal, black, lights, np.ones((1, 3)), DARK, K, 1.0, shininess,
+                np.array(viewpoint, float))  # fmt: skip
+    assert (one == one[0, 0]).all()
+    return float(one[0, 0])
+
+
+def test_a_mirror_by_hand() -> None:
+    """3-4-5 triangles on both sides: d = 5, cosine 4/5, k_l d + k_q d^2 = 8.75, lobe 1."""
+    light, color = np.array([[3.0, 4.0, 0.0]]), np.array([[8.75, 17.5, 0.0]])
+    for shininess in (1.0, 30.0):
+        found = shade(ORIGIN, UP, np.array([0.5, 0.25, 1.0]), light, color, np.full(3, 0.1), K,
+                      0.3, shininess, np.array([-6.0, 8.0, 0.0]))  # fmt: skip
+        np.testing.assert_allclose(found, [[0.45 + 0.3, 0.025 + 0.4 + 0.6, 0.1]])
+
+
+@pytest.mark.parametrize("degrees", [0.0, 10.0, 30.0, 45.0])
+def test_beside_the_mirror_it_falls_with_a_power_of_the_cosine(degrees: float) -> None:
+    """Seen from above, a light at distance 2 (k_l d + k_q d^2 = 2)."""
+    angle = np.radians(degrees)
+    light = 2 * np.array([np.sin(angle), np.cos(angle), 0.0])
+    for shininess in (1.0, 7.5, 200.0):
+        expected = np.cos(angle) ** shininess / 2
+        assert shine(light, (0, 9, 0), shininess) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_light_below_the_surface_has_no_highlight_though_the_lobe_reaches_it() -> None:
+    viewpoint = (-10.0, 0.5, 0.0)  # the mirrored ray all but grazes
+    assert shine((10.0, 0.1, 0.0), viewpoint, 5.0) > 0
+    assert shine((10.0, -0.1, 0.0), viewpoint, 5.0) == 0
+    assert shine((10.0, 0.0, 0.0), viewpoint, 5.0) == 0
+    assert shine((-10.0, 0.1, 0.0), viewpoint, 5.0) == 0, "nor one behind the mirrored ray"
+
+
+def test_viewer_and_light_may_change_places() -> None:
+    """At one distance: r(v) . l = r(l) . v, so a highlight is as bright from either end."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        normal, a, b = rng.standard_normal((3, 3))
+        normal /= np.linalg.norm(normal)
+        a, b = (2 * x / np.linalg.norm(x) for x in (a, b))
+        a, b = (x * np.sign(x @ normal) for x in (a, b))
+        there, back = shine(a, b, 6.0, normal[None]), shine(b, a, 6.0, normal[None])
+        assert there == pytest.approx(back, rel=1e-9, abs=1e-15)
+
+
+def test_the_lobe_is_brightest_where_a_mirror_would_show_the_light() -> None:
+    rng = np.random.default_rng(1)
+    viewpoint = np.array([-1.0, 2.0, 0.5])
+    mirror = np.array([1.0, 2.0, -0.5]) / np.linalg.norm(viewpoint)
+    best = shine(2 * mirror, viewpoint, 20.0)
+    others = rng.standard_normal((200, 3))
+    others = 2 * others / np.linalg.norm(others, axis=1, keepdims=True)
+    assert best == pytest.approx(0.5)
+    assert max(shine(light, viewpoint, 20.0) for light in others) < best
+
+
+def test_without_specular_the_viewpoint_says_nothing() -> None:
+    rng = np.random.default_rng(2)
+    points, normals = rng.standard_normal((2, 40, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    lights, colors = rng.standard_normal((3, 3)) * 4, rng.random((3, 3))
+    matte = shade(points, normals, WHITE, lights, colors, WHITE, K)
+    some = shade(points, normals, WHITE, lights, colors, WHITE, K, np.zeros(40), np.full(40, 9.0),
+                 np.array([5.0, 5.0, 5.0]))  # fmt: skip
+    np.testing.assert_array_equal(some, matte)
+
+
+def test_each_point_has_a_material_of_its_own_and_any_frame_will_do() -> None:
+    rng = np.random.default_rng(3)
+    points, normals = rng.standard_normal((2, 6, 7, 3))
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    lights, colors = rng.standard_normal((3, 3)) * 4, rng.random((3, 3))
+    specular, shininess = rng.random((6, 7)), rng.uniform(1, 50, (6, 7))
+    viewpoint = np.array([3.0, -2.0, 1.0])
+    together = shade(
+        points, normals, WHITE, lights, colors, DARK, K, specular, shininess, viewpoint
+    )
+    for at in np.ndindex(6, 7):
+        alone = shade(points[at], normals[at], WHITE, lights, colors, DARK, K, specular[at],
+                      shininess[at], viewpoint)  # fmt: skip
+        np.testing.assert_allclose(together[at], alone, rtol=1e-12)
+    turn = Rotation.random(rng=4).as_matrix()
+    moved = [x @ turn.T + [1.0, -2.0, 3.0] for x in (points, lights, viewpoint)]
+    there = shade(moved[0], normals @ turn.T, WHITE, moved[1], colors, DARK, K, specular,
+                  shininess, moved[2])  # fmt: skip
+    np.testing.assert_allclose(there, together, rtol=1e-9, atol=1e-13)
+
+
+def test_a_missed_pixel_is_shaded_without_a_warning() -> None:
+    """Without depth its point is where the camera is, and its normal is zero."""
+    found = shade(
+        ORIGIN, ORIGIN, WHITE, UP * 2, np.ones((1, 3)), np.full(3, 0.1), K, 1.0, 5.0, DARK
+    )
+    np.testing.assert_allclose(found, 0.1)
+
+
+def shaded_again(batch: SceneBatch, truth: GroundTruth, b: int) -> Array:
+    """In the camera frame, from the pixels' own depth and normals."""
+    camera_from_world = np.linalg.inv(batch.world_from_camera[b])
+    ids = np.maximum(truth.object_id[b], 0)
+    lights = slice(0, batch.light_count[b])
+    specular, shininess = batch.gloss[b, ids].T.swapaxes(1, 2)
+    return shade(
+        np.nan_to_num(back_project(truth.depth[b], float(batch.fov_y_degrees[b]))),
+        truth.normal[b],
+        batch.reflectance[b, ids],
+        transform_points(camera_from_world, batch.light_position[b, lights]),
+        batch.light_color[b, lights],
+        batch.ambient[b],
+        batch.attenuation[b],
+        specular,
+        shininess,
+        np.zeros(3),
+    )
+
+
+def test_shading_the_pixels_own_truth_gives_their_image(scenes_of: Scenes) -> None:
+    batch = pack(GLOSSY, scenes_of(GLOSSY, 12))
+    assert {0, 4} <= set(batch.light_count.tolist())
+    truth = render(batch)
+    matte = render(replace(batch, spec=replace(GLOSSY, specular=(0.0, 0.0))))
+    assert (truth.image - matte.image).max() > 0.1
+    assert ((truth.image > matte.image).any(-1) <= (truth.object_id > 0)).all(), "the room is matte"
+    for b in range(len(batch)):
+        assert abs(truth.image[b] - shaded_again(batch, truth, b)).max() < 1e-5
+
+
+@pytest.mark.parametrize("change", [{}, {"shadows": True}, {"spp": 3, "shadows": True}], ids=str)
+def test_highlights_agree_with_another_engine(
+    change: dict[str, Any], scenes_of: Scenes, embree_cast: Cast
+) -> None:
+    batch = pack(replace(GLOSSY, **change), scenes_of(GLOSSY, 4))
+    ours, theirs = render(batch), render_reference(batch, embree_cast)
+    edges = np.stack([grey_dilation(ids, 3) != grey_erosion(ids, 3) for ids in ours.object_id])
+    same = (ours.object_id == theirs.object_id) & ~edges
+    assert same.mean() > 0.8
+    off = abs(ours.image - theirs.image).max(axis=-1)[same] > 1e-3
+    assert off.mean() < 3e-3, "but for the borders of shadows, and creases"
+
+
+def test_rays_that_meet_nothing_are_no_trouble_to_the_reference(embree_cast: Cast) -> None:
+    item = PlacedObject("box", (0.5,) * 3, (1.0, 0, 0, 0), 0.1, (0.5,) * 3, 0.5, 9.0)
+    camera = Camera((0.5, 0.6, 2.5), (0.5, 0.5, 0.5), 20.0)
+    lamp = Light((1.0, 2.0, 2.0), (1.0,) * 3)
+    scene = SceneSpec(0, (camera,), (item,), (lamp,), (0.1,) * 3, (0.5, 0.5), None, (0.2, 0.3, 0.4))
+    spec = replace(GLOSSY, height=16, width=16, objects=(1, 1))
+    ours, theirs = (f(pack(spec, [scene])) for f in
+                    (render, lambda batch: render_reference(batch, embree_cast)))  # fmt: skip
+    assert (ours.object_id == -1).mean() > 0.5
+    np.testing.assert_allclose(ours.image, theirs.image, atol=1e-4)
+
+
+@pytest.mark.parametrize("blocked", [False, True])
+def test_a_highlight_by_hand_and_in_the_shadow(blocked: bool) -> None:
+    """A box's top, seen and lit at 3-4-5 triangles from either side; a ball before the light."""
+    box = PlacedObject(
+        "box", (0.5, 0.2, 0.5), (1.0, 0, 0, 0), 0.2 * 3**0.5, (0.5, 0.25, 1.0), 0.4, 12.0
+    )
+    ball = PlacedObject("sphere", (-0.1, 1.2, 0.5), (1.0, 0, 0, 0), 0.05, (1.0,) * 3)
+    camera = Camera((1.7, 2.0, 0.5), (0.5, 0.4, 0.5), 20.0)
+    lamp = Light((-0.7, 2.0, 0.5), (2.0, 4.0, 1.0))
+    objects = (box, ball) if blocked else (box,)
+    scene = SceneSpec(0, (camera,), objects, (lamp,), (0.1,) * 3, (0.5, 0.25), (0.8,) * 3)
+    spec = replace(GLOSSY, height=33, width=33, objects=(1, 2), lights=(1, 1), shadows=True)
+    truth = render(pack(spec, [scene]))
+    assert truth.object_id[0, 16, 16] == 1
+    rho, color = np.array(box.reflectance), np.array(lamp.color)
+    expected = rho * (0.1 + 0.8 * color / 2) + 0.4 * color / 2  # d = 2: k_l d + k_q d^2 = 2
+    np.testing.assert_allclose(
+        truth.image[0, 16, 16], 0.1 * rho if blocked else expected, rtol=1e-4
+    )
+
+
+def test_a_glossy_image_is_the_same_in_every_batch(scenes_of: Scenes) -> None:
+    """Matte neighbours too: whether there is gloss is said by the request, not found out."""
+    scenes = scenes_of(GLOSSY, 6)
+    dull = [replace(s, objects=tuple(replace(o, specular=0.0) for o in s.objects)) for s in scenes]
+    alone = [render(pack(GLOSSY, [scene])).image[0].tobytes() for scene in scenes]
+    mixed = render(pack(GLOSSY, [x for pair in zip(dull, scenes, strict=True) for x in pair])).image
+    assert [image.tobytes() for image in mixed[1::2]] == alone

@@ -1,0 +1,160 @@
+"""The wavefront against other engines: Embree on whole scenes, and on unit shapes in numpy."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from other_engines import cast_whole_scene
+from scipy.ndimage import grey_dilation, grey_erosion
+
+from scenegen.camera import Camera, pixel_directions
+from scenegen.description.scenes import SHAPE_NAMES, PlacedObject, SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.rendering.ground_truth import GroundTruth
+from scenegen.rendering.packing import pack
+from scenegen.rendering.reference import Cast, render_reference, sample_positions
+from scenegen.rendering.renderer import render
+
+Array = NDArray[Any]
+Scenes = Callable[[DatasetSpec, int], list[SceneSpec]]
+FLOAT = DatasetSpec(image_dtype="float32", seed=11)
+SMALL = replace(FLOAT, height=47, width=61, objects=(2, 3), min_visible_pixels=0)
+
+
+def near_silhouettes(object_id: Array) -> Array:
+    """Pixels within one pixel, corners included, of another object id."""
+    changes = [grey_dilation(ids, 3) != grey_erosion(ids, 3) for ids in object_id]
+    return np.stack(changes)
+
+
+def check_against_whole_scenes(spec: DatasetSpec, scenes: list[SceneSpec]) -> None:
+    truth = render(pack(spec, scenes))
+    cast = [cast_whole_scene(scene, spec) for scene in scenes]
+    depth, object_id, normal = (np.stack(part) for part in zip(*cast, strict=True))
+    off = ~(abs(truth.depth - depth) <= 1e-4)
+    assert off.mean() <= 1e-3
+    edges = near_silhouettes(truth.object_id)
+    assert not (off & ~edges).any(), "depth disagrees away from silhouettes"
+    assert not ((truth.object_id != object_id) & ~edges).any()
+    facing = abs((truth.normal * normal).sum(axis=-1))  # faces of curved shapes and of open ones
+    assert np.quantile(facing, 1e-3) > 0.97, "but for pixels on creases"
+    assert set(np.unique(truth.object_id)) == set(range(spec.objects[1] + 1))
+
+
+def test_whole_scenes_agree_with_another_engine(scenes_of: Scenes) -> None:
+    check_against_whole_scenes(FLOAT, scenes_of(FLOAT, 12))
+
+
+@pytest.mark.slow
+def test_a_hundred_whole_scenes_agree_with_another_engine(scenes_of: Scenes) -> None:
+    spec = replace(FLOAT, seed=0, pose="any")
+    check_against_whole_scenes(spec, scenes_of(spec, 50))
+    spec = replace(FLOAT, seed=1, width=160, height=96, allow_cropped=True, objects=(1, 5))
+    check_against_whole_scenes(spec, scenes_of(spec, 50))
+
+
+def compare(ours: GroundTruth, theirs: GroundTruth) -> None:
+    """All pixels but some on silhouettes: fewer than 0.1%, where single precision decides."""
+    edges = near_silhouettes(ours.object_id)
+    same = ours.object_id == theirs.object_id
+    assert (same | edges).all()
+    assert same.mean() > 0.999
+    close = np.isclose(ours.depth, theirs.depth, rtol=0, atol=1e-5, equal_nan=True)
+    assert (close | edges | ~same).all()
+    assert (close & same).mean() > 0.999
+    aligned = abs(ours.normal - theirs.normal).max(axis=-1) <= 1e-3
+    assert (aligned & same).mean() > 0.999
+    assert (abs(ours.image - theirs.image).max(axis=-1) < 1e-3).mean() > 0.998
+
+
+@pytest.mark.parametrize("name", SHAPE_NAMES)
+def test_each_shape_agrees_in_depth_normal_and_image(
+    name: str, scenes_of: Scenes, embree_cast: Cast
+) -> None:
+    spec = replace(SMALL, shapes=(name,), pose="any", shadows=True)
+    batch = pack(spec, scenes_of(spec, 3))
+    truth = render(batch)
+    assert (truth.object_id > 0).mean() > 0.02
+    compare(truth, render_reference(batch, embree_cast))
+
+
+def test_normals_face_the_viewer_inside_open_shapes_too(embree_cast: Cast) -> None:
+    """Into a teapot's spout from above, where its inside is seen, and along its coarse outline."""
+    camera = Camera((0.7, 2.0, 0.5), (0.5, 0.5, 0.5), 22.0)
+    teapot = PlacedObject("teapot", (0.5, 0.5, 0.5), (1.0, 0.0, 0.0, 0.0), 0.5, (0.8, 0.8, 0.8))
+    scene = SceneSpec(0, (camera,), (teapot,), (), (0.1, 0.1, 0.1), (0.5, 0.5), (0.8, 0.8, 0.8))
+    spec = replace(FLOAT, height=256, width=256, objects=(1, 1), shapes=("teapot",))
+    batch = pack(spec, [scene])
+    truth = render(batch)
+    rays = pixel_directions(256, 256, camera.fov_y_degrees)
+    assert (truth.normal[0] * rays).sum(axis=-1).max() < 1e-6
+    faces = cast_whole_scene(scene, spec)[2]
+    inside = ((faces * rays).sum(axis=-1) > 0) & ~near_silhouettes(truth.object_id)[0]
+    assert inside.sum() > 100
+    expected = render_reference(batch, embree_cast).normal[0]
+    assert (abs(truth.normal[0] - expected).max(axis=-1)[inside] < 1e-3).mean() > 0.95
+
+
+def test_scenes_without_a_room_agree_and_show_their_background(
+    scenes_of: Scenes, embree_cast: Cast
+) -> None:
+    sky = (0.2, 0.3, 0.4)
+    floating = [
+        replace(scene, room_reflectance=None, background=sky) for scene in scenes_of(SMALL, 4)
+    ]
+    batch = pack(replace(SMALL, shadows=True), floating)
+    truth = render(batch)
+    compare(truth, render_reference(batch, embree_cast))
+    missed = truth.object_id == -1
+    assert set(np.unique(truth.object_id)) == {-1, 1, 2, 3}
+    assert np.isnan(truth.depth[missed]).all()
+    assert not truth.normal[missed].any()
+    np.testing.assert_array_equal(truth.image[missed], np.float32(sky) * np.ones((missed.sum(), 1)))
+
+
+def test_shadows_agree_and_are_there(scenes_of: Scenes, embree_cast: Cast) -> None:
+    scenes = scenes_of(SMALL, 5)
+    lit, shadowed = (render(pack(replace(SMALL, shadows=s), scenes)) for s in (False, True))
+    dark = (lit.image - shadowed.image).max(axis=-1) > 0.01
+    assert dark.mean() > 0.01
+    assert (shadowed.image <= lit.image).all()
+    assert lit.depth.tobytes() == shadowed.depth.tobytes()
+    expected = render_reference(pack(replace(SMALL, shadows=True), scenes), embree_cast)
+    wrong = abs(shadowed.image - expected.image).max(axis=-1) > 1e-3
+    assert wrong.mean() < 2e-3, "but for some pixels on the shadows' borders"
+
+
+def test_samples_start_at_the_centre_and_cover_the_pixel() -> None:
+    assert sample_positions(1).tolist() == [[0.5, 0.5]]
+    many = sample_positions(256)
+    np.testing.assert_array_equal(many[:16], sample_positions(16))
+    cells = np.floor(many * 8).astype(int) @ [8, 1]
+    assert np.bincount(cells, minlength=64).min() >= 2, "four a cell on average"
+
+
+def test_supersampling_agrees_sample_by_sample(scenes_of: Scenes, embree_cast: Cast) -> None:
+    batch = pack(replace(SMALL, spp=5), scenes_of(SMALL, 2))
+    compare(render(batch), render_reference(batch, embree_cast))
+
+
+def test_supersampling_converges_and_leaves_the_truth_alone(scenes_of: Scenes) -> None:
+    """To the mean of 8 x 8 pixels of an image eight times as large."""
+    spec = replace(SMALL, height=32, width=48)
+    scenes = scenes_of(spec, 4)
+    large = render(pack(replace(spec, height=256, width=384), scenes)).image
+    expected = large.reshape(4, 32, 8, 48, 8, 3).mean(axis=(2, 4))
+    error = []
+    for spp in (1, 4, 16, 64):
+        truth = render(pack(replace(spec, spp=spp), scenes))
+        error.append(float(np.sqrt(np.mean((truth.image - expected) ** 2))))
+        if spp == 1:
+            first = truth
+        assert truth.depth.tobytes() == first.depth.tobytes()
+        assert truth.normal.tobytes() == first.normal.tobytes()
+        assert truth.object_id.tobytes() == first.object_id.tobytes()
+    assert all(after < 0.65 * before for before, after in pairwise(error))
+    assert error[-1] < 3e-3

@@ -1,0 +1,73 @@
+"""Which way an image is made, and that the slow way makes the same image."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from other_engines import render_elsewhere
+
+from scenegen.description.scenes import SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.rendering import renderer
+from scenegen.rendering.ground_truth import GroundTruth
+from scenegen.rendering.packing import SceneBatch, pack
+from scenegen.rendering.renderer import launch, render
+
+TINY = DatasetSpec(
+    height=18, width=22, objects=(2, 3), image_dtype="float32", shadows=True, spp=2, seed=1,
+    min_visible_pixels=0, shapes=("sphere", "cone", "teapot", "prism"),
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def scenes(scenes_of: Callable[..., list[SceneSpec]]) -> list[SceneSpec]:
+    return scenes_of(TINY, 4)
+
+
+def test_the_scalar_fallback_agrees_with_the_wavefront(scenes: list[SceneSpec]) -> None:
+    """In a process of its own, where no vectorised variant is ever loaded."""
+    slow = render_elsewhere(TINY, scenes, scalar=True)
+    fast = render(pack(TINY, scenes))
+    for name in vars(fast):
+        ours, theirs = getattr(fast, name), getattr(slow, name)
+        assert (ours.shape, ours.dtype) == (theirs.shape, theirs.dtype)
+    same = fast.object_id == slow.object_id
+    assert same.mean() > 0.997
+    assert (fast.object_id > 0).mean() > 0.03
+    assert (abs(fast.depth - slow.depth)[same] < 1e-5).mean() > 0.999
+    aligned = abs(fast.normal - slow.normal).max(axis=-1) < 1e-3
+    assert aligned[same].mean() > 0.999
+    assert (abs(fast.image - slow.image).max(axis=-1) < 1e-3).mean() > 0.99
+
+
+def test_without_llvm_the_work_is_done_when_fetched(
+    monkeypatch: pytest.MonkeyPatch, scenes: list[SceneSpec]
+) -> None:
+    made: list[SceneBatch] = []
+    truth = render(pack(TINY, scenes))
+
+    def reference(batch: SceneBatch, cast: object) -> GroundTruth:
+        made.append(batch)
+        return truth
+
+    monkeypatch.setattr(renderer, "select_variant", lambda device: "scalar_rgb")
+    monkeypatch.setattr(renderer, "render_reference", reference)
+    batch = pack(TINY, scenes)
+    fetch = launch(batch)
+    assert made == []
+    assert fetch().image is truth.image
+    assert made == [batch]
+
+
+def test_the_cpu_is_what_auto_means_here(scenes: list[SceneSpec]) -> None:
+    """Bit for bit; the next process, and another machine of the kind, must do so too."""
+    batch = pack(TINY, scenes)
+    first, second = render(batch, "auto"), render(batch, "cpu")
+    for name in vars(first):
+        assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
+
+
+def test_another_process_gives_the_same_bits(scenes: list[SceneSpec]) -> None:
+    there, here = render_elsewhere(TINY, scenes), render(pack(TINY, scenes))
+    for name in vars(here):
+        np.testing.assert_array_equal(getattr(there, name), getattr(here, name))

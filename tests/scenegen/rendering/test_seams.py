@@ -1,0 +1,136 @@
+"""Rays at the very edges between triangles: none slips through, wherever its model lies."""
+
+import importlib
+from collections.abc import Callable
+from functools import partial
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from scenegen.objects.catalogue import built_in_shape
+from scenegen.objects.shapes import unit_shape
+from scenegen.objects.solids import UnitShape
+
+Array = NDArray[Any]
+RAYS = 40_000
+BASIC = ("box", "torus", "teapot", "icosahedron", "cone")
+OVERLAP = 4e-6
+MODELS = ("mug/0001", "chair/0002", "bottle/0003", "bag/0004", "table/0005")
+
+
+@pytest.fixture(scope="module")
+def unit(variant: str) -> ModuleType:
+    """Return the module of unit scenes, whose import needs the variant to be chosen."""
+    return importlib.import_module("scenegen.rendering.unit_scene")
+
+
+@pytest.fixture(scope="module")
+def models(variant: str) -> ModuleType:
+    """Return the module of models' scenes, likewise."""
+    return importlib.import_module("scenegen.rendering.model_scene")
+
+
+def slips(unit: Any, i: int, shape: UnitShape, seed: int = 0) -> int:
+    """Count rays that pass a point of an edge of a triangle that faces them."""
+    import mitsuba as mi
+
+    rng = np.random.default_rng(seed)
+    face, corner = rng.integers(len(shape.triangles), size=RAYS), rng.integers(3, size=RAYS)
+    triangles = shape.triangles[face].astype(np.float32).astype(float)
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    start, end = (triangles[np.arange(RAYS), (corner + k) % 3] for k in (0, 1))
+    target = start + rng.random((RAYS, 1)) * (end - start)
+    direction = rng.standard_normal((RAYS, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    cosine = np.einsum("ri,ri->r", direction, normals)
+    direction *= -np.sign(cosine)[:, None]
+    origin = target - direction * rng.uniform(0.3, 1.0, (RAYS, 1))
+    if unit.grid:
+        origin = np.round(origin / unit.grid) * unit.grid
+    direction = target - origin
+    origin = origin + unit.offset[i]
+    o, d = (mi.Vector3f(*(mi.Float(x) for x in v.T)) for v in (origin, direction))
+    hit = unit.scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(o), d), coherent=False)
+    late = np.asarray(hit.t) > 1 + 1e-4 / np.linalg.norm(direction, axis=1)
+    return int((late & (abs(cosine) > 0.2)).sum())
+
+
+def test_no_ray_slips_through_basic_shapes_and_without_overlap_some_do(
+    variant: str, unit: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def count(build: Callable[..., Any]) -> list[int]:
+        scene = build(variant, BASIC)
+        return [slips(scene, i, unit_shape(name)) for i, name in enumerate(BASIC)]
+
+    assert count(unit.unit_scene) == [0] * len(BASIC)
+    monkeypatch.setattr(unit, "OVERLAP", 0.0)
+    assert min(count(unit.unit_scene.__wrapped__)) > 30
+
+
+@pytest.mark.parametrize("names", [BASIC, MODELS], ids=["basic", "families"])
+def test_no_ray_slips_through_models_and_without_overlap_some_do(
+    names: tuple[str, ...],
+    variant: str,
+    unit: ModuleType,
+    models: ModuleType,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """At the middle of a lattice of 5 x 5 x 5, and at either end."""
+
+    def count() -> int:
+        own = partial(built_in_shape)  # models are kept by where they come from
+        others = names[:1] * 50
+        scene = models.model_scene(variant, own, [*names, *others, *names, *others, *names])
+        places = [k + start for start in (0, 55, 110) for k in range(5)]
+        return sum(slips(scene, i, own(names[i % 55])) for i in places)
+
+    assert count() == 0
+    monkeypatch.setattr(unit, "OVERLAP", 0.0)
+    assert count() > 3000
+
+
+@pytest.mark.parametrize("name", [*BASIC, *MODELS])
+def test_triangles_grow_by_the_overlap_each_in_its_plane(name: str, unit: ModuleType) -> None:
+    triangles = built_in_shape(name).triangles
+    grown = unit.overlapping(triangles)
+    edges = np.roll(triangles, -1, axis=1) - triangles
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    moved = grown - triangles
+    assert abs(np.einsum("fki,fi->fk", moved, normals)).max() < 1e-12
+    assert np.linalg.norm(moved, axis=2).max() <= 4.0001 * OVERLAP
+    outward = np.cross(edges, normals[:, None])
+    outward /= np.linalg.norm(outward, axis=2, keepdims=True)
+    start, end = (np.einsum("fki,fki->fk", m, outward) for m in (moved, np.roll(moved, -1, axis=1)))
+    assert min(start.min(), end.min()) > -1e-15
+    sharp = np.linalg.norm(moved, axis=2) > 3.99 * OVERLAP
+    blunt = ~(sharp | np.roll(sharp, -1, axis=1))
+    np.testing.assert_allclose(start[blunt], OVERLAP, rtol=1e-6)
+    np.testing.assert_allclose(end[blunt], OVERLAP, rtol=1e-6)
+
+
+def test_degenerate_triangles_stay_finite(unit: ModuleType) -> None:
+    point, line = np.ones((1, 3, 3)), np.arange(9.0).reshape(1, 3, 3)
+    for triangle in (point, line):
+        grown = unit.overlapping(triangle)
+        assert np.isfinite(grown).all()
+        assert np.linalg.norm(grown - triangle, axis=2).max() <= 4.0001 * OVERLAP
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 9, 700, "most"])
+def test_places_of_models_are_exact_in_single_precision(
+    count: Any, variant: str, models: ModuleType
+) -> None:
+    """Below 16 with the models around them, so that every point of the grid is a float there."""
+    count = models.MOST_MODELS if count == "most" else count
+    found = models.model_scene(variant, unit_shape, ["tetrahedron"] * count)
+    assert abs(found.offset).max() + 1.0002 < 2.0**24 * found.grid
+    np.testing.assert_array_equal(np.round(found.offset / found.grid) * found.grid, found.offset)
+    assert len(np.unique(found.offset, axis=0)) == max(1, count)
+    if count > 1:
+        gaps = np.diff(np.unique(found.offset[:, 2]))
+        assert gaps.min() > 2.0004, "their bounding spheres, a bit enlarged, are apart"

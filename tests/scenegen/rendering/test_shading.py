@@ -1,0 +1,102 @@
+"""The shading equation against numbers worked out by hand, and against its own symmetries."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from scenegen.rendering.shading import shade
+
+ORIGIN = np.zeros((1, 3))
+UP = np.array([[0.0, 1.0, 0.0]])
+WHITE = np.ones(3)
+DARK = np.zeros(3)
+NO_LIGHT = np.zeros((0, 3))
+K = np.array([0.5, 0.25])
+
+
+def test_ambient_alone() -> None:
+    ambient = np.array([0.1, 0.2, 0.3])
+    result = shade(ORIGIN, UP, np.array([0.5, 1.0, 0.0]), NO_LIGHT, NO_LIGHT, ambient, K)
+    np.testing.assert_allclose(result, [[0.05, 0.2, 0.0]])
+
+
+def test_light_overhead() -> None:
+    """At distance 2: k_l d + k_q d^2 = 0.5 * 2 + 0.25 * 4 = 2, cosine 1."""
+    light, color = np.array([[0.0, 2.0, 0.0]]), np.array([[4.0, 2.0, 1.0]])
+    result = shade(ORIGIN, UP, np.array([1.0, 0.5, 1.0]), light, color, np.full(3, 0.1), K)
+    np.testing.assert_allclose(result, [[2.1, 0.5 * 1.1, 0.6]])
+
+
+def test_cosine_and_distance_of_a_slanted_light() -> None:
+    """A 3-4-5 triangle: d = 5, cosine 4/5, k_l d + k_q d^2 = 2.5 + 6.25 = 8.75."""
+    light = np.array([[3.0, 4.0, 0.0]])
+    result = shade(ORIGIN, UP, WHITE, light, np.array([[8.75, 0.0, 0.0]]), DARK, K)
+    np.testing.assert_allclose(result, [[0.8, 0.0, 0.0]])
+
+
+def test_linear_and_quadratic_terms_are_not_swapped() -> None:
+    light, color = np.array([[0.0, 2.0, 0.0]]), np.ones((1, 3))
+    linear = shade(ORIGIN, UP, WHITE, light, color, DARK, np.array([1.0, 0.0]))
+    quadratic = shade(ORIGIN, UP, WHITE, light, color, DARK, np.array([0.0, 1.0]))
+    np.testing.assert_allclose(linear, 0.5)
+    np.testing.assert_allclose(quadratic, 0.25)
+
+
+@pytest.mark.parametrize("light", [[0.0, -1.0, 0.0], [1.0, -1e-3, 0.0], [1.0, 0.0, 0.0]])
+def test_light_from_behind_takes_nothing_away(light: list[float]) -> None:
+    result = shade(ORIGIN, UP, WHITE, np.array([light]), np.ones((1, 3)), np.full(3, 0.1), K)
+    np.testing.assert_allclose(result, 0.1)
+
+
+def test_zero_normal_receives_ambient_only() -> None:
+    light, color = np.array([[0.0, 1.0, 0.0]]), np.ones((1, 3))
+    result = shade(ORIGIN, np.zeros((1, 3)), WHITE, light, color, np.full(3, 0.1), K)
+    np.testing.assert_allclose(result, 0.1)
+
+
+def test_lights_add_up() -> None:
+    rng = np.random.default_rng(1)
+    points, normals = rng.standard_normal((2, 4, 5, 3))
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    rho, lights, colors = rng.random((4, 5, 3)), rng.standard_normal((3, 3)) * 5, rng.random((3, 3))
+    one_by_one = sum(
+        shade(points, normals, rho, lights[j : j + 1], colors[j : j + 1], DARK, K) for j in range(3)
+    )
+    together = shade(points, normals, rho, lights, colors, DARK, K)
+    assert together.shape == (4, 5, 3)
+    assert together.max() > 0
+    np.testing.assert_allclose(together, one_by_one, atol=1e-14)
+
+
+def test_any_rigid_frame_gives_the_same_radiance() -> None:
+    """Points, normals and lights may be in camera or world coordinates."""
+    rng = np.random.default_rng(2)
+    points, normals = rng.standard_normal((2, 50, 3))
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    lights, colors = rng.standard_normal((3, 3)) * 4, rng.random((3, 3))
+    turn = Rotation.random(rng=3).as_matrix()
+    moved = [x @ turn.T + [1.0, -2.0, 3.0] for x in (points, lights)]
+    here = shade(points, normals, WHITE, lights, colors, WHITE, K)
+    there = shade(moved[0], normals @ turn.T, WHITE, moved[1], colors, WHITE, K)
+    np.testing.assert_allclose(there, here, rtol=1e-12)
+
+
+def test_float32_input_is_shaded_in_double_precision() -> None:
+    points = np.array([[0.1, 0.2, 0.3]], np.float32)
+    light, color = np.array([[2.0, 2.0, 2.0]]), np.ones((1, 3))
+    single = shade(points, UP.astype(np.float32), WHITE, light, color, DARK, K)
+    double = shade(points.astype(float), UP, WHITE, light, color, DARK, K)
+    assert single.dtype == np.float64
+    np.testing.assert_array_equal(single, double)
+
+
+def test_inputs_are_left_alone() -> None:
+    points, normals, ambient = ORIGIN.copy(), UP.copy(), np.full(3, 0.1)
+    shade(points, normals, WHITE, np.array([[0.0, 1.0, 0.0]]), np.ones((1, 3)), ambient, K)
+    np.testing.assert_array_equal(points, ORIGIN)
+    np.testing.assert_array_equal(ambient, 0.1)
+
+
+def test_as_many_colours_as_lights() -> None:
+    with pytest.raises(ValueError, match="zip"):
+        shade(ORIGIN, UP, WHITE, np.ones((2, 3)), np.ones((1, 3)), DARK, K)

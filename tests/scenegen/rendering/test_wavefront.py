@@ -1,0 +1,172 @@
+"""One wavefront for many images: no image knows of another, down to the last bit."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenegen.camera import Camera, back_project, transform_points
+from scenegen.description.scenes import PlacedObject, SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.rendering.ground_truth import GroundTruth, decode_image
+from scenegen.rendering.packing import pack
+from scenegen.rendering.renderer import launch, render
+from scenegen.rendering.shading import shade
+from scenegen.sampling.scenes import sample_scene
+
+ODD = DatasetSpec(
+    height=37, width=53, objects=(1, 4), lights=(0, 3), attenuation=(0.2, 0.6), seed=2,
+    min_visible_pixels=0,
+)  # fmt: skip
+
+
+def bits(truth: GroundTruth, row: int) -> tuple[bytes, ...]:
+    return tuple(getattr(truth, name)[row].tobytes() for name in vars(truth))
+
+
+@pytest.fixture(scope="module")
+def scenes(scenes_of: Callable[..., list[SceneSpec]]) -> list[SceneSpec]:
+    """Every object of another colour, and the room too."""
+    rng = np.random.default_rng(9)
+    colored = []
+    for scene in scenes_of(ODD, 11):
+        paint = [tuple(rng.uniform(0.2, 1.0, 3).tolist()) for _ in range(5)]
+        objects = tuple(replace(item, reflectance=paint[k]) for k, item in enumerate(scene.objects))
+        colored.append(replace(scene, objects=objects, room_reflectance=paint[4]))
+    return colored
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"image_dtype": "float32"}, {"image_dtype": "float32", "shadows": True, "spp": 3}, {}],
+)
+def test_an_image_is_the_same_alone_and_in_every_batch(
+    settings: dict[str, Any], scenes: list[SceneSpec]
+) -> None:
+    spec = replace(ODD, **settings)
+    alone = [bits(render(pack(spec, [scene])), 0) for scene in scenes]
+    assert len(set(alone)) == len(alone)
+    for size in (2, 3, 7, 11):
+        for start in range(0, len(scenes), size):
+            some = scenes[start : start + size]
+            together = render(pack(spec, some))
+            found = [bits(together, row) for row in range(len(some))]
+            assert found == alone[start : start + len(some)]
+    backwards = render(pack(spec, scenes[::-1]))
+    assert [bits(backwards, row) for row in range(len(scenes))] == alone[::-1]
+
+
+def test_neighbours_cannot_change_a_bit_of_an_image(scenes: list[SceneSpec]) -> None:
+    """Around image 1: nothing, crowds, objects as large as the room, lights as bright as can be."""
+    spec = replace(ODD, shadows=True, image_dtype="float32")
+    middle = scenes[1]
+    expected = bits(render(pack(spec, scenes[:3])), 1)
+    giant = PlacedObject("box", (0.5, 0.5, 0.5), (1.0, 0.0, 0.0, 0.0), 5.0, (1.0, 1.0, 1.0))
+    dark = replace(scenes[0], objects=(giant,) * 4, lights=())
+    bright = tuple(replace(light, color=(1e6, 1e6, 1e6)) for light in middle.lights)
+    bare = replace(scenes[2], objects=(), lights=bright, room_reflectance=None)
+    for before, after in ((dark, dark), (bare, bare), (dark, bare), (middle, middle)):
+        assert bits(render(pack(spec, [before, middle, after])), 1) == expected
+
+
+def test_two_wavefronts_may_be_in_flight(scenes: list[SceneSpec]) -> None:
+    first, second = pack(ODD, scenes[:4]), pack(ODD, scenes[4:8])
+    fetch_first, fetch_second = launch(first), launch(second)
+    late, early = fetch_second(), fetch_first()
+    assert [bits(early, r) for r in range(4)] == [bits(render(first), r) for r in range(4)]
+    assert [bits(late, r) for r in range(4)] == [bits(render(second), r) for r in range(4)]
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
+def test_shapes_and_types_of_what_comes_back(dtype: str, scenes: list[SceneSpec]) -> None:
+    truth = render(pack(replace(ODD, image_dtype=dtype), scenes[:2]))
+    shape = (2, 37, 53)
+    assert (truth.image.shape, truth.image.dtype) == ((*shape, 3), np.dtype(dtype))
+    assert (truth.depth.shape, truth.depth.dtype) == (shape, np.float32)
+    assert (truth.normal.shape, truth.normal.dtype) == ((*shape, 3), np.float32)
+    assert (truth.object_id.shape, truth.object_id.dtype) == (shape, np.int8)
+    assert all(getattr(truth, name).flags.c_contiguous for name in vars(truth))
+
+
+def test_image_types_hold_the_same_radiance(scenes: list[SceneSpec]) -> None:
+    exact, half, byte = (
+        render(pack(replace(ODD, image_dtype=dtype), scenes))
+        for dtype in ("float32", "float16", "uint8")
+    )
+    assert exact.image.max() > 0.5
+    np.testing.assert_allclose(decode_image(half.image), exact.image, rtol=2**-11, atol=1e-7)
+    clipped = np.clip(exact.image, 0, 1)
+    assert abs(decode_image(byte.image) - clipped).max() <= 0.5 / 255 + 1e-6
+    assert exact.depth.tobytes() == half.depth.tobytes() == byte.depth.tobytes()
+    assert exact.normal.tobytes() == byte.normal.tobytes()
+
+
+def test_bright_light_clips_in_eight_bits_only(scenes: list[SceneSpec]) -> None:
+    glaring = [
+        replace(s, lights=tuple(replace(x, color=(99.0,) * 3) for x in s.lights)) for s in scenes
+    ]
+    byte = render(pack(ODD, glaring)).image
+    exact = render(pack(replace(ODD, image_dtype="float32"), glaring)).image
+    assert exact.max() > 5
+    assert (byte[exact >= 1] == 255).all()
+
+
+@pytest.mark.parametrize(
+    ("dtype", "tolerance"), [("uint8", 0.5 / 255 + 1e-5), ("float32", 1e-5), ("float16", 5e-4)]
+)
+def test_shading_the_stored_truth_gives_the_stored_image(
+    dtype: str, tolerance: float, scenes: list[SceneSpec]
+) -> None:
+    """In the camera frame, from stored depth and normals alone: what a model's renderer does."""
+    truth = render(pack(replace(ODD, image_dtype=dtype), scenes))
+    for b, scene in enumerate(scenes):
+        camera = scene.cameras[0]
+        camera_from_world = np.linalg.inv(camera.world_from_camera)
+        points = back_project(truth.depth[b], camera.fov_y_degrees)
+        lights = np.array([light.position for light in scene.lights]).reshape(-1, 3)
+        rho = np.array([scene.room_reflectance, *(item.reflectance for item in scene.objects)])
+        expected = shade(
+            points,
+            truth.normal[b],
+            rho[truth.object_id[b]],
+            transform_points(camera_from_world, lights),
+            np.array([light.color for light in scene.lights]).reshape(-1, 3),
+            np.array(scene.ambient),
+            np.array(scene.attenuation),
+        )
+        assert (truth.object_id[b] >= 0).all()
+        if dtype == "uint8":
+            expected = np.clip(expected, 0, 1)
+        error = abs(decode_image(truth.image[b]) - expected)
+        assert error.max() <= tolerance
+
+
+def test_rooms_without_objects_and_without_lights() -> None:
+    spec = DatasetSpec(
+        height=16, width=24, objects=(0, 0), lights=(0, 0), image_dtype="float32", spp=2,
+        shadows=True, min_visible_pixels=0,
+    )  # fmt: skip
+    scenes = [scene for i in range(3) if (scene := sample_scene(spec, i))]
+    assert len(scenes) == 3
+    truth = render(pack(spec, scenes))
+    assert (truth.object_id == 0).all()
+    np.testing.assert_allclose(truth.image, 0.8 * 0.1, rtol=1e-6)
+
+
+@pytest.mark.parametrize("room", [None, (1.0, 1.0, 1.0)])
+def test_nothing_but_the_background_is_seen_where_no_room_is(room: Any) -> None:
+    camera = Camera((0.5, 0.5, 3.0), (0.5, 0.4, 9.0 if room else 0.0), 30.0)
+    black, sky = (0.0, 0.0, 0.0), (0.25, 0.5, 1.0)
+    spec = replace(ODD, image_dtype="float32", spp=2)
+    scenes = [
+        SceneSpec(i, (camera,), (), (), (1.0, 1.0, 1.0), (1.0, 1.0), room, background)
+        for i, background in enumerate((black, sky))
+    ]
+    truth = render(pack(spec, scenes))
+    assert (truth.object_id == -1).all()
+    assert np.isnan(truth.depth).all()
+    assert not truth.normal.any()
+    assert not truth.image[0].any()
+    assert (truth.image[1] == sky).all()

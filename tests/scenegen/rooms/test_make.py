@@ -1,0 +1,193 @@
+"""A data set depends on its request alone: not on batches, on its own length, or on retries."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from scenegen import open_rooms
+from scenegen.common.errors import PlacementError, SpecError
+from scenegen.description.specs import DatasetSpec
+from scenegen.rooms.make import make_dataset, render_items
+
+SPEC = DatasetSpec(height=32, width=32, min_visible_pixels=3, seed=3)
+PIXELS = ("image", "depth", "normal", "object_id")
+PEAK = """
+import resource, sys
+from scenegen.rooms.make import make_dataset
+from scenegen.description.specs import DatasetSpec
+make_dataset("x.h5", DatasetSpec(height=64, width=64, min_visible_pixels=3), int(sys.argv[1]))
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def contents(path):
+    """Return every dataset of a file, and the fingerprint."""
+    found = {}
+    with h5py.File(path) as file:
+        file.visititems(
+            lambda name, item: found.update({name: item[:]}) if hasattr(item, "dtype") else None
+        )
+        return found, file.attrs["fingerprint"]
+
+
+@pytest.mark.parametrize("batch", [1, 3, 7, 64])
+def test_batch_size_never_changes_a_byte(rooms_path, make_rooms, tmp_path, batch):
+    again = make_rooms(tmp_path / "x.h5", 8, {"batch": batch})
+    assert again.read_bytes() == rooms_path.read_bytes()
+
+
+def test_the_same_command_gives_the_same_bytes_in_another_process(make_rooms, tmp_path):
+    render = "render --n 5 --seed 8 --size 32 --min-visible-pixels 3 --out x.h5 --batch 2"
+    command = [sys.executable, "-c", "import cli; cli.scenegen()", *render.split()]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    again = make_rooms(tmp_path / "again.h5", 5, {"command": f"scenegen {render}"}, seed=8)
+    assert again.read_bytes() == (tmp_path / "x.h5").read_bytes()
+
+
+def test_the_first_items_of_a_larger_file_are_those_of_a_smaller(rooms_path, make_rooms, tmp_path):
+    small, _ = contents(make_rooms(tmp_path / "x.h5", 3, {"batch": 2}))
+    large, _ = contents(rooms_path)
+    assert set(small) == set(large)
+    for name, values in small.items():
+        np.testing.assert_array_equal(values, large[name][:3], err_msg=name)
+
+
+def test_neighbouring_seeds_differ_in_every_item(rooms_path, make_rooms, tmp_path):
+    """In every item, and no item of one seed turns up anywhere under the next."""
+    here, mark = contents(rooms_path)
+    there, other = contents(make_rooms(tmp_path / "x.h5", 8, seed=4))
+    assert mark != other
+    for name in ("image", "depth", "normal", "camera/world_from_camera", "light/color", "scene"):
+        rows = [np.asarray(values).tobytes() for values in (*here[name], *there[name])]
+        if name == "scene":
+            rows = [*here[name], *there[name]]
+        assert len(set(rows)) == 16, name
+
+
+def test_image_types_agree(make_rooms, tmp_path):
+    images = {}
+    for dtype in ("uint8", "float16", "float32"):
+        with open_rooms(make_rooms(tmp_path / dtype, 4, image_dtype=dtype)) as rooms:
+            images[dtype] = np.stack([room.image for room in rooms])
+            radiance = np.stack([room.radiance for room in rooms])
+        assert images[dtype].dtype == dtype
+        with h5py.File(tmp_path / dtype) as file:
+            stored = file["image"][:] * np.float64(file["image"].attrs["scale"])
+        np.testing.assert_allclose(radiance, stored, rtol=1e-6)
+    exact = images["float32"]
+    assert 0.05 < exact.min() < exact.max() < 2
+    np.testing.assert_array_equal(images["uint8"], np.rint(np.clip(exact, 0, 1) * 255))
+    np.testing.assert_array_equal(images["float16"], exact.astype(np.float16))
+
+
+@pytest.mark.parametrize(("height", "width"), [(8, 8), (9, 11), (37, 31), (33, 8)])
+def test_odd_sizes(tmp_path, height, width):
+    """No number of pixels has to be a multiple of anything."""
+    spec = DatasetSpec(
+        height=height, width=width, objects=(1, 1), object_radius=(0.05, 0.1), min_visible_pixels=0
+    )
+    make_dataset(tmp_path / "x.h5", spec, 3)
+    with open_rooms(tmp_path / "x.h5") as rooms:
+        for room in rooms:
+            assert room.image.shape == (height, width, 3)
+            assert np.isfinite(room.depth).all()
+            points = room.points_world[room.object_id == 0]
+            assert np.abs(points).min(axis=1).max() < 1e-5
+
+
+@pytest.mark.parametrize(("height", "width"), [(48, 64), (64, 48)])
+def test_defaults_can_be_placed_in_images_that_are_not_square(make_rooms, tmp_path, height, width):
+    with open_rooms(make_rooms(tmp_path / "x.h5", 60, height=height, width=width)) as rooms:
+        assert len(rooms) == 60
+
+
+def test_retries_keep_the_order_and_do_not_depend_on_batches(tmp_path):
+    spec = DatasetSpec(height=32, width=32, min_visible_pixels=45, seed=5)
+    easy = DatasetSpec(height=32, width=32, min_visible_pixels=3, seed=5)
+    for batch in (1, 2, 5, 64):
+        make_dataset(tmp_path / f"{batch}", spec, 12, batch=batch, command="tests")
+    make_dataset(tmp_path / "easy", easy, 12, command="tests")
+    files = [(tmp_path / f"{batch}").read_bytes() for batch in (1, 2, 5, 64)]
+    assert files[0] == files[1] == files[2] == files[3]
+    strict, relaxed = contents(tmp_path / "1")[0], contents(tmp_path / "easy")[0]
+    np.testing.assert_array_equal(strict["scene_index"], np.arange(12))
+    visible = strict["object/visible_pixels"]
+    used = np.arange(3) < strict["object/count"][:, None]
+    assert visible[used].min() >= 45
+    retried = (strict["depth"] != relaxed["depth"]).any(axis=(1, 2))
+    assert 2 <= retried.sum() <= 11, "some were proposed again, some were not: a sharp test"
+    for name in ("camera/world_from_camera", "light/color", "object/shape", "object/count"):
+        np.testing.assert_array_equal(strict[name], relaxed[name], err_msg=name)
+
+
+def test_progress_counts_rows_and_comes_before_the_end(tmp_path):
+    told = []
+    make_dataset(tmp_path / "x.h5", SPEC, 20, batch=4, progress=told.append)
+    assert sum(told) == 20
+    assert len(told) > 2
+
+
+def test_an_error_of_the_caller_ends_the_run(tmp_path):
+    with pytest.raises(ZeroDivisionError):
+        make_dataset(tmp_path / "x.h5", SPEC, 20, batch=4, progress=lambda done: done / 0)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"objects": (30, 30)}, r"item 0: at most \d+ of its 30 objects .* fewer --objects"),
+        ({"min_visible_pixels": 1000}, r"item \d+: 100 proposals .* --min-visible-pixels"),
+    ],
+)
+def test_what_cannot_be_placed_leaves_nothing_behind(tmp_path, settings, words):
+    spec = DatasetSpec(**{**vars(SPEC), **settings})
+    with pytest.raises(PlacementError, match=words):
+        make_dataset(tmp_path / "x.h5", spec, 3)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("how", [{"batch": 0}, {"batch": 10**9}, {"compression": "zip"}])
+def test_bad_arguments(tmp_path, how):
+    with pytest.raises(SpecError, match="found"):
+        make_dataset(tmp_path / "x.h5", SPEC, 3, **how)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux how much memory is used")
+def test_waiting_items_take_no_memory():
+    """What is asked for, but not begun, must not exist: N may be a hundred million."""
+
+    def resident():
+        pages = Path("/proc/self/statm").read_text().split()[1]
+        return int(pages) * os.sysconf("SC_PAGE_SIZE")
+
+    next(render_items(SPEC, range(4), 4))
+    before = resident()
+    rooms = render_items(SPEC, range(3_000_000), 4)
+    assert next(rooms)[0].scene.index == 0
+    assert resident() - before < 60e6, "24 MB for the pointers alone, 96 MB for the numbers"
+    rooms.close()
+
+
+@pytest.mark.slow
+def test_memory_is_flat(tmp_path):
+    few, many = (
+        int(
+            subprocess.run(
+                [sys.executable, "-c", PEAK, str(count)],
+                cwd=tmp_path / name,
+                check=True,
+                capture_output=True,
+                text=True,
+            ).stdout
+        )
+        for name, count in (("a", 400), ("b", 4000))
+        if not (tmp_path / name).mkdir()
+    )
+    assert many < 1.15 * few

@@ -1,0 +1,192 @@
+"""What lies in a rooms file, read with plain h5py, by hand, and with the reading API."""
+
+import dataclasses
+import json
+import zlib
+
+import h5py
+import numpy as np
+import pytest
+
+from scenegen import open_rooms, shade
+from scenegen.camera import transform_vectors
+from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
+from scenegen.description.specs import DatasetSpec, fingerprint
+from scenegen.layout import FIELDS
+
+# The layout as promised, written out: name, row, type, unit. K = 3 objects, L = 3 lights here.
+LAYOUT = [
+    ("image", (32, 32, 3), "uint8", "linear radiance, times `scale`"),
+    ("depth", (32, 32), "float32", "scene unit"),
+    ("normal", (32, 32, 3), "float32", "1"),
+    ("object_id", (32, 32), "int8", "1"),
+    ("scene_index", (), "int64", "1"),
+    ("view_index", (), "int32", "1"),
+    ("view_angle_degrees", (), "float64", "degree"),
+    ("camera/world_from_camera", (4, 4), "float64", "scene unit"),
+    ("camera/fov_y_degrees", (), "float64", "degree"),
+    ("light/count", (), "int32", "1"),
+    ("light/position", (3, 3), "float64", "scene unit"),
+    ("light/color", (3, 3), "float64", "radiance"),
+    ("light/ambient", (3,), "float64", "radiance"),
+    ("light/attenuation", (2,), "float64", "1 / scene unit, 1 / scene unit squared"),
+    ("material/reflectance", (4, 3), "float64", "1"),
+    ("material/specular", (4,), "float64", "1"),
+    ("material/shininess", (4,), "float64", "1"),
+    ("object/count", (), "int32", "1"),
+    ("object/shape", (3,), "int16", "1"),
+    ("object/model", (3,), "object", "-"),
+    ("object/world_from_object", (3, 4, 4), "float64", "scene unit"),
+    ("object/scale", (3,), "float64", "scene unit"),
+    ("object/visible_pixels", (3,), "int32", "pixel"),
+    ("scene", (), "object", "-"),
+]
+
+
+def test_every_dataset_and_its_attributes(rooms_path):
+    found = {}
+    with h5py.File(rooms_path) as file:
+        file.visititems(lambda name, item: found.update({name: item}))
+        found = {name: item for name, item in found.items() if isinstance(item, h5py.Dataset)}
+        assert sorted(found) == sorted(name for name, *_ in LAYOUT)
+        for name, row, dtype, unit in LAYOUT:
+            dataset = found[name]
+            assert (name, dataset.shape, str(dataset.dtype)) == (name, (8, *row), dtype)
+            assert dataset.attrs["unit"] == unit
+            assert dataset.attrs["shape"].startswith("(N")
+            assert dataset.attrs["shape"].count(",") == max(1, len(row)) - (not row)
+            assert len(dataset.attrs["frame"]) > 0
+            assert len(dataset.attrs["meaning"]) > 0
+            per_image = (1, *row) if len(row) >= 2 and row[0] == 32 else dataset.chunks
+            assert dataset.chunks == per_image, f"{name}: one chunk to an image"
+        assert file["image"].attrs["scale"] == 1 / 255
+        assert list(file["object/shape"].attrs["names"]) == list(SHAPE_NAMES)
+    assert [field.name for field in FIELDS] == [name for name, *_ in LAYOUT]
+
+
+def test_root_attributes(rooms_path):
+    with h5py.File(rooms_path) as file:
+        root = dict(file.attrs)
+    assert root["format"] == "pix2shape-bench/rooms"
+    assert root["format_version"] == "2.0"
+    assert root["writer"].startswith("pix2shape-bench ")
+    assert root["count"] == 8
+    assert root["creation_command"] == "tests"
+    assert root["compression"] == "gzip"
+    spec = json.loads(root["spec"])
+    assert (spec["height"], spec["width"], spec["seed"]) == (32, 32, 3)
+    assert set(spec) == {f.name for f in dataclasses.fields(DatasetSpec)}
+
+
+def test_the_fingerprint_is_that_of_spec_and_scenes(rooms_path):
+    with h5py.File(rooms_path) as file:
+        spec = DatasetSpec.from_json(file.attrs["spec"])
+        lines = file["scene"].asstr()[:]
+        assert file.attrs["fingerprint"] == fingerprint(spec, lines)
+        assert file.attrs["fingerprint"] != fingerprint(spec, lines[:-1])
+        assert file.attrs["fingerprint"] != fingerprint(dataclasses.replace(spec, spp=2), lines)
+
+
+@pytest.mark.parametrize("name", ["image", "depth", "normal", "object_id"])
+def test_a_raw_chunk_decodes_by_the_books(rooms_path, name):
+    """Undo, by hand and in reverse order, what the file's own filter list says."""
+    with h5py.File(rooms_path) as file:
+        dataset = file[name]
+        plist = dataset.id.get_create_plist()
+        filters = [plist.get_filter(i) for i in range(plist.get_nfilters())]
+        mask, data = dataset.id.read_direct_chunk((5, *(0,) * (dataset.ndim - 1)))
+        assert mask == 0
+        assert h5py.h5z.FILTER_DEFLATE in [f[0] for f in filters], "compressed by default"
+        for number, _, values, _ in reversed(filters):
+            if number == h5py.h5z.FILTER_DEFLATE:
+                data = zlib.decompress(data)
+            elif number == h5py.h5z.FILTER_SHUFFLE:
+                planes = np.frombuffer(data, np.uint8).reshape(values[0], -1)
+                data = planes.T.tobytes()
+            else:
+                pytest.fail(f"filter {number} is not in every HDF5 library")
+        expected = dataset[5]
+        np.testing.assert_array_equal(
+            np.frombuffer(data, expected.dtype).reshape(expected.shape), expected
+        )
+        assert dataset.shuffle == (expected.itemsize > 1)
+
+
+def test_every_compression_gives_equal_contents(rooms_path, make_rooms, tmp_path):
+    sizes = [rooms_path.stat().st_size]
+    for compression in ("lzf", "none"):
+        path = make_rooms(tmp_path / compression, 8, {"compression": compression})
+        sizes.append(path.stat().st_size)
+        with h5py.File(rooms_path) as a, h5py.File(path) as b:
+            assert b["depth"].compression == (None if compression == "none" else compression)
+            for name, *_ in LAYOUT:
+                np.testing.assert_array_equal(a[name][:], b[name][:], err_msg=name)
+            assert a.attrs["fingerprint"] == b.attrs["fingerprint"]
+    assert sizes[0] < sizes[1] < sizes[2]
+
+
+def test_scene_descriptions_agree_with_the_arrays(rooms_path):
+    with h5py.File(rooms_path) as file:
+        for i in range(8):
+            scene = SceneSpec.from_json(file["scene"].asstr()[i])
+            assert scene.to_json() == file["scene"].asstr()[i]
+            objects, lights = len(scene.objects), len(scene.lights)
+            assert (file["object/count"][i], file["light/count"][i]) == (objects, lights)
+            assert file["scene_index"][i] == scene.index == i
+            assert file["view_index"][i] == 0
+            names = file["object/shape"].attrs["names"]
+            shapes = file["object/shape"][i]
+            assert [names[s] for s in shapes[:objects]] == [item.shape for item in scene.objects]
+            assert (shapes[objects:] == -1).all()
+            for k, item in enumerate(scene.objects):
+                placed = file["object/world_from_object"][i, k]
+                np.testing.assert_array_equal(placed[:3, 3], item.position)
+                assert np.linalg.det(placed[:3, :3]) == pytest.approx(item.scale**3)
+                assert file["object/scale"][i, k] == item.scale
+                seen = (file["object_id"][i] == k + 1).sum()
+                assert file["object/visible_pixels"][i, k] == seen >= 3
+            assert (file["object/world_from_object"][i, objects:] == 0).all()
+            for j, light in enumerate(scene.lights):
+                np.testing.assert_array_equal(file["light/position"][i, j], light.position)
+                np.testing.assert_array_equal(file["light/color"][i, j], light.color)
+            assert (file["light/color"][i, lights:] == 0).all()
+
+
+def test_points_of_the_room_lie_on_its_planes(float_path):
+    with open_rooms(float_path) as rooms:
+        for room in rooms:
+            points = room.points_world[room.object_id == 0]
+            assert len(points) > 1000
+            assert np.abs(points).min(axis=1).max() < 1e-5
+            assert points.min() > -1e-5
+            assert points.max() < 1 + 1e-5
+            normals = transform_vectors(room.world_from_camera, room.normal[room.object_id == 0])
+            nearest = np.abs(points).argmin(axis=1)
+            clear = np.sort(np.abs(points), axis=1)[:, 1] > 1e-3  # not in a corner
+            np.testing.assert_allclose(normals[clear], np.eye(3)[nearest[clear]], atol=1e-6)
+
+
+def test_a_room_is_complete_and_shades_to_its_image(float_path):
+    with open_rooms(float_path) as rooms, h5py.File(float_path) as file:
+        room = rooms[2]
+        assert (room.index, room.view_index, room.scene.index) == (2, 0, 2)
+        for name in ("image", "depth", "normal", "object_id"):
+            np.testing.assert_array_equal(getattr(room, name), file[name][2])
+        assert room.depth.shape == (48, 40)
+        assert room.image.dtype == room.radiance.dtype == np.float32
+        camera = room.scene.cameras[0]
+        np.testing.assert_allclose(room.world_from_camera, camera.world_from_camera, atol=1e-15)
+        assert room.fov_y_degrees == file["camera/fov_y_degrees"][2]
+        np.testing.assert_allclose(room.points[..., 2], -room.depth, atol=1e-7)
+        assert room.points[0, 0, 0] < 0 < room.points[0, 0, 1]  # top left: x left, y up
+        rho = np.array([room.scene.room_reflectance, *(o.reflectance for o in room.scene.objects)])
+        image = shade(
+            room.points_world,
+            transform_vectors(room.world_from_camera, room.normal),
+            rho[room.object_id],
+            np.array([light.position for light in room.scene.lights]),
+            np.array([light.color for light in room.scene.lights]),
+            np.array(room.scene.ambient),
+            np.array(room.scene.attenuation),
+        )
+        np.testing.assert_allclose(room.image, image, atol=2e-6)

@@ -1,0 +1,128 @@
+"""Nothing half-written ever carries the final name, whatever goes wrong."""
+
+import os
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenegen.common.errors import SpecError
+from scenegen.common.row_file import shuffle_bytes
+from scenegen.description.specs import DatasetSpec
+from scenegen.rendering.packing import pack
+from scenegen.rooms.make import render_items
+from scenegen.rooms.writer import create_rooms
+
+SPEC = DatasetSpec(height=32, width=32, min_visible_pixels=3, seed=3)
+
+
+@pytest.fixture(scope="module")
+def rows():
+    """Return 4 rendered rooms and their packed scenes: what `append` takes."""
+    rooms = [room for part in render_items(SPEC, range(4), 4) for room in part]
+    return rooms, pack(SPEC, [room.scene for room in rooms])
+
+
+def test_only_a_complete_file_gets_the_final_name(tmp_path, rows):
+    path = tmp_path / "x.h5"
+    with create_rooms(path, SPEC, 4) as writer:
+        assert not path.exists()
+        writer.append(*rows)
+        assert not path.exists()
+        assert len(list(tmp_path.iterdir())) == 1
+    assert [p.name for p in tmp_path.iterdir()] == ["x.h5"]
+
+
+def test_an_exception_removes_the_temporary_file_and_passes(tmp_path, rows):
+    with pytest.raises(ZeroDivisionError):
+        write_and_then(lambda: 1 / 0, tmp_path / "x.h5", rows)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_too_few_rows_make_no_file(tmp_path, rows):
+    with (
+        pytest.raises(RuntimeError, match="got 4 of 5 rows"),
+        create_rooms(tmp_path / "x.h5", SPEC, 5) as writer,
+    ):
+        writer.append(*rows)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_existing_file_is_kept_without_overwrite(tmp_path):
+    path = tmp_path / "x.h5"
+    path.write_text("mine")
+    with pytest.raises(FileExistsError, match="say --overwrite"):
+        create_rooms(path, SPEC, 4).__enter__()
+    assert path.read_text() == "mine"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_that_appears_meanwhile_is_kept(tmp_path, rows):
+    path = tmp_path / "x.h5"
+    with pytest.raises(FileExistsError):
+        write_and_then(lambda: path.write_text("someone else's"), path, rows)
+    assert path.read_text() == "someone else's"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_overwrite_replaces_only_when_complete(tmp_path, rows):
+    path = tmp_path / "x.h5"
+    path.write_text("old")
+    with pytest.raises(ZeroDivisionError):
+        write_and_then(lambda: 1 / 0, path, rows, overwrite=True)
+    assert path.read_text() == "old"
+    with create_rooms(path, SPEC, 4, overwrite=True) as writer:
+        writer.append(*rows)
+        assert path.read_text() == "old"
+    with h5py.File(path) as file:
+        assert file["image"].shape == (4, 32, 32, 3)
+
+
+def test_paths_that_cannot_be_written(tmp_path):
+    (tmp_path / "file").write_text("")
+    for path, error in (
+        (tmp_path / "none" / "x.h5", FileNotFoundError),
+        (tmp_path, IsADirectoryError),
+        (tmp_path / "file" / "x.h5", NotADirectoryError),
+    ):
+        with pytest.raises(error) as caught:
+            create_rooms(path, SPEC, 4, overwrite=True).__enter__()
+        assert caught.value.filename is not None
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_something_that_is_no_regular_file_is_never_replaced(tmp_path):
+    """As /dev/null would be, by a rename as root."""
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    with pytest.raises(OSError, match="file"), create_rooms(path, SPEC, 4, overwrite=True):
+        pass
+    assert path.is_fifo()
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(("count", "compression"), [(0, "gzip"), (-1, "gzip"), (1, "zip")])
+def test_bad_settings(tmp_path, count, compression):
+    with pytest.raises(SpecError, match="found"):
+        create_rooms(tmp_path / "x.h5", SPEC, count, compression=compression).__enter__()
+    assert list(tmp_path.iterdir()) == []
+
+
+@given(
+    st.binary(min_size=0, max_size=48).map(lambda data: data * 8),
+    st.sampled_from(["uint8", "int16", "float32", "float64"]),
+)
+def test_shuffle_is_that_of_hdf5(data, dtype):
+    values = np.frombuffer(data or bytes(8), "uint8").view(dtype)
+    with h5py.File("shuffled", "w", driver="core", backing_store=False) as file:
+        dataset = file.create_dataset("x", values.shape, dtype, chunks=values.shape, shuffle=True)
+        dataset.id.write_direct_chunk((0,), shuffle_bytes(values).tobytes())
+        assert dataset[...].tobytes() == values.tobytes()
+
+
+def write_and_then(happens, path, rows, overwrite=False):
+    with create_rooms(path, SPEC, 4, overwrite=overwrite) as writer:
+        writer.append(*rows)
+        happens()

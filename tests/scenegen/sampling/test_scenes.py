@@ -1,0 +1,191 @@
+"""Scenes: pure, drawn from the distributions they claim, and sound on the geometry itself."""
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import chisquare, kstest
+
+from scenegen.camera import Camera
+from scenegen.common.errors import PlacementError
+from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.sampling import scenes as sampling
+from scenegen.sampling.scenes import MAX_ATTEMPTS, POSES_PER_OBJECT, refusal, sample_scene
+
+Array = NDArray[Any]
+CROWD = DatasetSpec(objects=(40, 40))
+EMPTY = DatasetSpec(objects=(0, 0), lights=(1, 3))  # always succeeds: distributions as drawn
+
+
+def scene_of(spec: DatasetSpec, index: int) -> SceneSpec:
+    scene = sample_scene(spec, index)
+    assert scene is not None
+    return scene
+
+
+@pytest.fixture(scope="module")
+def empty_rooms() -> list[SceneSpec]:
+    return [scene_of(EMPTY, index) for index in range(1500)]
+
+
+def test_sampling_is_pure() -> None:
+    spec = DatasetSpec(seed=5)
+    forwards = [sample_scene(spec, i, a) for i in range(8) for a in (0, 1)]
+    backwards = [sample_scene(replace(spec), i, a) for i in range(7, -1, -1) for a in (1, 0)]
+    assert forwards == backwards[::-1]
+
+
+def test_a_new_attempt_changes_poses_and_nothing_else(scenes_of: Callable[..., Any]) -> None:
+    spec = DatasetSpec()
+    for first in scenes_of(spec, 6):
+        again = next(s for a in range(1, 50) if (s := sample_scene(spec, first.index, a)))
+        assert replace(again, objects=()) == replace(first, objects=())
+        assert [o.shape for o in again.objects] == [o.shape for o in first.objects]
+        for ours, theirs in itertools.product(again.objects, first.objects):
+            assert (ours.position, ours.rotation) != (theirs.position, theirs.rotation)
+
+
+def test_object_settings_leave_camera_and_lights_alone() -> None:
+    with_objects = scene_of(DatasetSpec(objects=(1, 1)), 3)
+    without = scene_of(DatasetSpec(objects=(0, 0)), 3)
+    assert (with_objects.cameras, with_objects.lights) == (without.cameras, without.lights)
+
+
+def check_octant(offsets: Array, radius: float) -> None:
+    """Uniform by area over the positive octant: height and azimuth uniform and independent."""
+    np.testing.assert_allclose(np.linalg.norm(offsets, axis=1), radius, rtol=1e-12)
+    height = offsets[:, 1] / radius
+    azimuth = np.arctan2(offsets[:, 2], offsets[:, 0])
+    assert kstest(height, "uniform").pvalue > 0.01
+    assert kstest(azimuth, "uniform", (0, math.pi / 2)).pvalue > 0.01
+    assert kstest(offsets[:, 0] / radius, "uniform").pvalue > 0.01, "as along any axis"
+    assert abs(np.corrcoef(height, azimuth)[0, 1]) < 4 / math.sqrt(len(offsets))
+    assert len(np.unique(offsets, axis=0)) == len(offsets)
+
+
+def test_cameras_are_uniform_on_the_octant(empty_rooms: list[SceneSpec]) -> None:
+    cameras = [scene.cameras[0] for scene in empty_rooms]
+    assert {camera.target for camera in cameras} == {EMPTY.camera_target}
+    assert {camera.fov_y_degrees for camera in cameras} == {EMPTY.fov_degrees}
+    positions = np.array([camera.position for camera in cameras])
+    check_octant(positions - EMPTY.camera_target, EMPTY.camera_radius)
+
+
+def test_lights_are_uniform_on_the_octant(empty_rooms: list[SceneSpec]) -> None:
+    lights = np.array([light.position for scene in empty_rooms for light in scene.lights])
+    check_octant(lights - EMPTY.camera_target, EMPTY.light_radius)
+    counts = np.bincount([len(scene.lights) for scene in empty_rooms])
+    assert counts[0] == 0
+    assert chisquare(counts[1:]).pvalue > 0.01
+
+
+def test_lights_share_the_level_and_differ_in_colour(empty_rooms: list[SceneSpec]) -> None:
+    falloff = EMPTY.attenuation[0] * EMPTY.light_radius + EMPTY.attenuation[1] * 2.5**2
+    hues = []
+    for scene in empty_rooms:
+        at_target = np.array([light.color for light in scene.lights]) / falloff
+        np.testing.assert_allclose(at_target.max(axis=1), EMPTY.light_level / len(scene.lights))
+        assert (at_target > 0).all()
+        hues.extend((at_target / at_target.max(axis=1, keepdims=True)).tolist())
+    assert chisquare(np.bincount(np.argmax(hues, axis=1))).pvalue > 0.01
+    assert np.std(hues, axis=0).min() > 0.1
+
+
+def test_shapes_and_their_number_are_uniform() -> None:
+    """On requests with tiny objects, so that none is refused for want of room."""
+    spec = DatasetSpec(object_radius=(0.02, 0.03), shapes=SHAPE_NAMES)
+    scenes = [scene_of(spec, index) for index in range(600)]
+    assert chisquare(np.bincount([len(scene.objects) for scene in scenes])[1:]).pvalue > 0.01
+    names = [item.shape for scene in scenes for item in scene.objects]
+    assert chisquare([names.count(name) for name in SHAPE_NAMES]).pvalue > 0.01
+    scales = np.array([item.scale for scene in scenes for item in scene.objects])
+    assert kstest(scales, "uniform", (0.02, 0.01)).pvalue > 0.01
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{}, {"pose": "any", "height": 60, "width": 90}, {"allow_cropped": True}, {"objects": (4, 5)}],
+)
+def test_objects_are_in_the_room_on_the_floor_in_the_image_and_disjoint(
+    settings: dict[str, Any],
+    scenes_of: Callable[..., list[SceneSpec]],
+    world_corners: Callable[[Any], Array],
+    gap_between: Callable[[Array, Array], float],
+) -> None:
+    spec = DatasetSpec(**settings)
+    hover = 3e-3 if spec.pose == "any" else 1e-3  # of the radius; the teapot's body is a bit round
+    for scene in scenes_of(spec, 10):
+        camera = scene.cameras[0]
+        camera_from_world = np.linalg.inv(camera.world_from_camera)
+        half = (
+            math.tan(math.radians(spec.fov_degrees) / 2)
+            * math.sqrt(2)
+            / math.hypot(spec.height, spec.width)
+        )
+        placed = [world_corners(item) for item in scene.objects]
+        for item, corners in zip(scene.objects, placed, strict=True):
+            assert corners.min() > -1e-12
+            assert corners.max() < 1 + 1e-12
+            assert corners[:, 1].min() < hover * item.scale
+            shown = np.array([item.position]) if spec.allow_cropped else corners
+            seen = shown @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
+            border = -seen[:, 2:] * half * [spec.width, spec.height]
+            assert (seen[:, 2] < 0).all()
+            assert (abs(seen[:, :2]) <= border + 1e-9).all()
+        for one, other in itertools.combinations(placed, 2):
+            assert gap_between(one, other) > 0.0
+
+
+@pytest.mark.parametrize("size", [(128, 128), (96, 160), (160, 96)])
+def test_the_room_fills_the_image_from_everywhere_on_the_octant(size: tuple[int, int]) -> None:
+    """Rays through the image's borders and inside, from corners, edges and inside the octant."""
+    spec = DatasetSpec(height=size[0], width=size[1])
+    half = math.tan(math.radians(spec.fov_degrees) / 2) * math.sqrt(2) / math.hypot(*size)
+    x, y = np.meshgrid(*(np.linspace(-half * side, half * side, 13) for side in size[::-1]))
+    directions = np.stack([x, y, -np.ones_like(x)], axis=-1).reshape(-1, 3)
+    for height in [*np.linspace(0, 1, 15)[:-1], 1 - 1e-9]:
+        for azimuth in np.linspace(0, math.pi / 2, 15):
+            around = math.sqrt(1 - height**2)
+            offset = (around * math.cos(azimuth), height, around * math.sin(azimuth))
+            position = np.array(spec.camera_target) + spec.camera_radius * np.array(offset)
+            camera = Camera(tuple(position.tolist()), spec.camera_target, spec.fov_y_degrees)
+            rays = directions @ camera.world_from_camera[:3, :3].T
+            with np.errstate(divide="ignore"):
+                t = np.where(rays < 0, -position / rays, np.inf).min(axis=1)
+            assert (position + t[:, None] * rays).max() <= 1.0, (height, azimuth)
+
+
+def test_a_crowd_is_refused_after_bounded_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = 0
+    find_place = sampling.find_place
+
+    def counted(*args: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        return find_place(*args)
+
+    monkeypatch.setattr(sampling, "find_place", counted)
+    assert all(sample_scene(CROWD, 0, attempt) is None for attempt in range(10))
+    assert 0 < calls <= 10 * 40 * POSES_PER_OBJECT
+    error = refusal(CROWD, 0, 0)
+    assert isinstance(error, PlacementError)
+    assert calls <= 20 * 40 * POSES_PER_OBJECT
+
+
+def test_refusals_say_what_and_what_to_try() -> None:
+    crowded = str(refusal(CROWD, 7, 0))
+    assert crowded.startswith("item 7: at most ")
+    assert f"of its 40 objects found room in {MAX_ATTEMPTS} proposals" in crowded
+    assert 1 <= int(crowded.split()[4]) < 40
+    for option in ("--objects", "--object-radius", "--allow-cropped"):
+        assert option in crowded
+    hidden = str(refusal(DatasetSpec(objects=(2, 2), min_visible_pixels=9000), 3, 12))
+    assert hidden.startswith(f"item 3: {MAX_ATTEMPTS} proposals with 2 objects, 12 of which")
+    assert "fewer than 9000 pixels" in hidden
+    assert "--min-visible-pixels" in hidden

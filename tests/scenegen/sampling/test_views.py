@@ -1,0 +1,221 @@
+"""Several views of a scene: turned by just so much, all in the octant, and all of one scene."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter, minimum_filter
+from scipy.stats import binomtest, kstest
+
+from scenegen.common.seeding import Purpose, item_rng
+from scenegen.description.scenes import SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.rendering.packing import SceneBatch, pack
+from scenegen.rendering.renderer import render
+from scenegen.rooms import make as dataset
+from scenegen.rooms.make import render_items
+from scenegen.sampling.scenes import sample_cameras, sample_scene
+
+Array = NDArray[Any]
+ANGLES = (0.0, 5.0, 35.0, 55.0, 80.0)
+MANY = DatasetSpec(views=ANGLES, seed=4)
+TINY = {
+    "views": ANGLES, "objects": (2, 2), "object_radius": (0.08, 0.15), "min_visible_pixels": 8,
+    "height": 64, "width": 64, "image_dtype": "float32", "random_reflectance": True,
+}  # fmt: skip
+
+
+def offsets(spec: DatasetSpec, index: int) -> Array:
+    """From the target to each camera."""
+    return np.array([np.subtract(c.position, c.target) for c in sample_cameras(spec, index)])
+
+
+def azimuths(spec: DatasetSpec, index: int) -> Array:
+    away = offsets(spec, index)
+    return np.degrees(np.arctan2(away[:, 2], away[:, 0]))
+
+
+@pytest.fixture(scope="module")
+def views_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a file of four scenes from five sides; settings as in TINY."""
+    path = tmp_path_factory.mktemp("views") / "views.h5"
+    return make_rooms(path, 4, **TINY)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.integers(0, 2**62),
+    st.lists(st.floats(0.01, 80.0), max_size=6, unique=True).map(sorted),
+    st.floats(1.3, 5.0),
+)
+def test_cameras_turn_about_the_vertical_by_the_angles_asked_for(
+    seed: int, turns: list[float], radius: float
+) -> None:
+    """At one height and distance, all one way, all looking at the target with level heads."""
+    spec = DatasetSpec(views=(0.0, *turns), seed=seed, camera_radius=radius)
+    away = offsets(spec, 3)
+    np.testing.assert_allclose(np.linalg.norm(away, axis=1), radius, rtol=1e-12)
+    np.testing.assert_allclose(away[:, 1], away[0, 1], rtol=1e-12)
+    assert away.min() >= -1e-12, "nobody looks from behind a wall"
+    flat = away[:, [0, 2]] / np.linalg.norm(away[:, [0, 2]], axis=1, keepdims=True)
+    across = flat[0, 0] * flat[:, 1] - flat[0, 1] * flat[:, 0]
+    turned = np.degrees(np.arctan2(across, flat @ flat[0]))
+    np.testing.assert_allclose(abs(turned), spec.views, atol=1e-7)
+    assert (turned[1:] > 0).all() or (turned[1:] < 0).all()
+    for camera in sample_cameras(spec, 3):
+        assert camera.target == spec.camera_target
+        assert camera.world_from_camera[1, 0] == 0
+
+
+def test_input_views_are_uniform_in_their_span_on_either_side() -> None:
+    """The widest turn leaves 10 degrees of azimuth, at one side of the octant or at the other."""
+    found = np.array([azimuths(MANY, index)[:2] for index in range(800)])
+    low = found[:, 1] > found[:, 0]
+    assert binomtest(int(low.sum()), len(low)).pvalue > 0.01
+    assert kstest(found[low, 0], "uniform", (0, 10)).pvalue > 0.01
+    assert kstest(found[~low, 0], "uniform", (80, 10)).pvalue > 0.01
+    heights = np.array([offsets(MANY, index)[0, 1] for index in range(800)]) / MANY.camera_radius
+    assert kstest(heights, "uniform").pvalue > 0.01
+    assert kstest(heights[low], "uniform").pvalue > 0.01, "which side says nothing of the height"
+
+
+def test_one_view_is_drawn_from_the_whole_octant_as_ever() -> None:
+    for index in range(20):
+        height, turn = item_rng(7, index, Purpose.CAMERA).random(2)
+        around = math.sqrt(1 - height * height)
+        direction = [around * math.cos(turn * math.pi / 2), height,
+                     around * math.sin(turn * math.pi / 2)]  # fmt: skip
+        (camera,) = sample_cameras(DatasetSpec(seed=7), index)
+        expected = [0.3 + 1.5 * float(x) for x in direction]
+        assert camera.position == tuple(expected), "to the bit: files of one view stay as they are"
+
+
+def test_views_leave_lights_and_materials_alone() -> None:
+    some = DatasetSpec(objects=(1, 1), random_reflectance=True, object_radius=(0.05, 0.06))
+    for index in range(5):
+        one, five = (sample_scene(replace(some, views=v), index) for v in ((0.0,), ANGLES))
+        assert one is not None
+        assert five is not None
+        assert one.lights == five.lights
+        materials = [[(o.shape, o.reflectance) for o in s.objects] for s in (one, five)]
+        assert materials[0] == materials[1]
+
+
+def test_rows_are_the_views_of_scene_after_scene(views_path: Path) -> None:
+    with h5py.File(views_path) as file:
+        assert file.attrs["count"] == len(file["image"]) == 20
+        assert file["scene_index"][:].tolist() == [i for i in range(4) for _ in ANGLES]
+        assert file["view_index"][:].tolist() == [*range(5)] * 4
+        assert file["view_angle_degrees"][:].tolist() == [*ANGLES] * 4
+        for name in ("scene", "light/position", "light/color", "material/reflectance",
+                     "object/shape", "object/model", "object/world_from_object"):  # fmt: skip
+            rows = file[name][:].reshape(4, 5, -1)
+            assert (rows == rows[:, :1]).all(), name
+            assert name == "object/shape" or len({str(row) for row in rows[:, 0]}) > 1, name
+        camera = file["camera/world_from_camera"][:].reshape(4, 5, 4, 4)
+        away = camera[..., :3, 3] - MANY.camera_target
+        angle = np.degrees(np.arctan2(away[..., 2], away[..., 0]))
+        np.testing.assert_allclose(abs(angle - angle[:, :1]), [ANGLES] * 4, atol=1e-9)
+        assert (file["object/visible_pixels"][:] >= 8).all(), "each object in every view"
+
+
+def test_every_pixel_sees_the_inside(views_path: Path) -> None:
+    with h5py.File(views_path) as file:
+        assert (file["object_id"][:] >= 0).all()
+        assert (file["depth"][:] < MANY.camera_radius + 3**0.5).all()
+        turn = file["camera/world_from_camera"][:, :3, :3]
+        normal = np.einsum("bij,bhwj->bhwi", turn, file["normal"][:])
+        room = normal[file["object_id"][:] == 0]
+        np.testing.assert_allclose(room.max(axis=-1), 1, atol=1e-5)
+
+
+def test_objects_are_whole_in_every_view(
+    world_corners: Callable[[Any], Array], scenes_of: Callable[..., list[SceneSpec]]
+) -> None:
+    spec = replace(MANY, object_radius=(0.08, 0.15), height=60, width=90)
+    for scene in scenes_of(spec, 4):
+        assert len(scene.cameras) == 5
+        for camera in scene.cameras:
+            camera_from_world = np.linalg.inv(camera.world_from_camera)
+            half = math.tan(math.radians(camera.fov_y_degrees) / 2)
+            for item in scene.objects:
+                seen = world_corners(item) @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
+                border = -seen[:, 2:] * half * [1.5, 1.0]
+                assert (abs(seen[:, :2]) <= border + 1e-9).all()
+
+
+def test_what_two_views_see_is_one_scene(views_path: Path) -> None:
+    """No surfel of a view lies in front of what another view sees there; many are seen by both."""
+    with h5py.File(views_path) as file:
+        depth, ids = file["depth"][:].astype(float), file["object_id"][:]
+        matrix, fov = file["camera/world_from_camera"][:], file["camera/fov_y_degrees"][:]
+    size = 64
+    focal = size / 2 / np.tan(np.radians(fov / 2))
+    row, column = np.mgrid[:size, :size] + 0.5
+    for first in range(0, 20, 5):
+        for a in range(first, first + 5):
+            across, up = (column - size / 2) / focal[a], (size / 2 - row) / focal[a]
+            rays = np.stack([across, up, -np.ones_like(row)], axis=-1)
+            world = (depth[a][..., None] * rays) @ matrix[a, :3, :3].T + matrix[a, :3, 3]
+            for b in set(range(first, first + 5)) - {a}:
+                seen = (world - matrix[b, :3, 3]) @ matrix[b, :3, :3]
+                z = -seen[..., 2]
+                x = size / 2 + focal[b] * seen[..., 0] / z
+                y = size / 2 - focal[b] * seen[..., 1] / z
+                inside = (z > 0) & (np.minimum(x, y) >= 1) & (np.maximum(x, y) < size - 1)
+                at = y[inside].astype(int), x[inside].astype(int)
+                near, far = minimum_filter(depth[b], 3)[at], maximum_filter(depth[b], 3)[at]
+                hidden_by_nothing = z[inside] < near - 2e-3
+                assert hidden_by_nothing.mean() < 1e-3, (a, b)
+                alone = (minimum_filter(ids[b], 5) == maximum_filter(ids[b], 5))[at]
+                both = alone & (z[inside] > near - 2e-3) & (z[inside] < far + 2e-3)
+                assert both.mean() > 0.1, (a, b)
+                same = ids[a][inside][both] == ids[b][at][both]
+                assert same.mean() > 0.99, (a, b)
+
+
+def test_a_view_is_the_same_alone_and_among_the_others(views_path: Path) -> None:
+    with h5py.File(views_path) as file:
+        spec = DatasetSpec.from_json(file.attrs["spec"])
+        scenes = [SceneSpec.from_json(text) for text in file["scene"].asstr()[::5]]
+        stored = {n: file[n][:] for n in ("image", "depth", "normal", "object_id")}
+    for view in range(5):
+        batch = pack(spec, scenes[::-1], (view,))
+        assert batch.view.tolist() == [view] * 4
+        truth = render(batch)
+        for name, values in stored.items():
+            assert getattr(truth, name).tobytes() == values[view::5][::-1].tobytes()
+
+
+@pytest.mark.parametrize("batch", [1, 5, 14])
+def test_no_wavefront_has_more_images_than_the_batch_or_one_scene(
+    batch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sizes = []
+    launch = dataset.launch
+
+    def counted(images: SceneBatch, device: str) -> Any:
+        sizes.append(len(images))
+        return launch(images, device)
+
+    monkeypatch.setattr(dataset, "launch", counted)
+    spec = DatasetSpec(**{**TINY, "height": 16, "width": 16, "min_visible_pixels": 0})
+    found = [room.scene.index for some in render_items(spec, range(7), batch) for room in some]
+    assert found == [*range(7)]
+    assert max(sizes) == max(5, batch // 5 * 5)
+
+
+@pytest.mark.parametrize("batch", [1, 7])
+def test_the_batch_changes_no_byte_of_a_file_with_views(
+    batch: int, views_path: Path, make_rooms: Callable[..., Path], tmp_path: Path
+) -> None:
+    again = make_rooms(tmp_path / "again.h5", 4, {"batch": batch}, **TINY)
+    assert again.read_bytes() == views_path.read_bytes()

@@ -1,0 +1,89 @@
+"""Score files for tests, made in memory."""
+
+import numpy as np
+
+from metrics.measures.answers import CHANCE
+from metrics.measures.statistics import Estimate, cluster_means
+from metrics.score_file import Meta, Score, ScoreFile, Submission, score
+from metrics.scoring.metric_names import metric
+
+TRUTH = "0123456789abcdef" * 4
+HEADLINE = ("chamfer", "hausdorff", "mse_depth")
+
+
+def make_meta(method, runs=1, truth=TRUTH, **other):
+    digest = f"{sum(map(ord, method)) * 1000:x}"
+    submissions = tuple(
+        Submission(f"{method}-{i}.h5", f"{digest}{i:x}".rjust(64, "0"), f"seed {i}")
+        for i in range(runs)
+    )
+    told = {
+        "truth_path": "rooms.h5",
+        "writer": "bench 0.1.0",
+        "versions": {"numpy": "2.4.6", "h5py": "3.12"},
+        "seed": 0,
+        "resamples": 2000,
+        "confidence": 0.95,
+        "counts": {"images": 4},
+        "warnings": (),
+    }
+    return Meta(truth_fingerprint=truth, submissions=submissions, **{**told, **other})
+
+
+def make_score(name, values, clusters, std=None):
+    means = cluster_means(values, clusters)
+    mean = float(means.mean())
+    return score(name, Estimate(mean, 0.9 * mean, 1.1 * mean, len(means)), std)
+
+
+def rooms_scores(method, columns, scenes, runs=1, rows=None, **other):
+    """Rooms with these columns of scores (N,) by name; scene labels (N,)."""
+    count = len(scenes)
+    views = [list(scenes[:i]).count(scene) for i, scene in enumerate(scenes)]
+    rows = range(count) if rows is None else rows
+    items = {"row": rows, "scene_index": scenes, "view_index": views, **columns}
+    std = 0.002 if runs > 1 else None
+    own = {"comparable": True, "alignment": "none", "by_view_angle": {}, "path": None}
+    told = {name: other.pop(name, default) for name, default in own.items()}
+    return ScoreFile(
+        task="rooms",
+        method=method,
+        metrics={name: make_score(name, column, scenes, std) for name, column in columns.items()},
+        items={name: np.asarray(column) for name, column in items.items()},
+        meta=make_meta(method, runs, **other),
+        **told,
+    )
+
+
+def iqtt_scores(method, right, runs=1, questions=None, **other):
+    """Questions with these means (Q,) of right answers over the runs."""
+    values = np.asarray(right, np.float64)
+    ids = np.arange(len(values)) if questions is None else np.asarray(questions)
+    comparable = other.pop("comparable", True)
+    group = {"mirror": {"iqtt_accuracy": Score(CHANCE, None, None, "fraction", len(values))}}
+    return ScoreFile(
+        task="iqtt",
+        method=method,
+        comparable=comparable,
+        alignment="none",
+        metrics={"iqtt_accuracy": make_score("iqtt_accuracy", values, ids)},
+        items={"question": ids, "iqtt_accuracy": values},
+        meta=make_meta(method, runs, **other),
+        by_distractor=group,
+        path=None,
+    )
+
+
+def simple_rooms(method="mine", **other):
+    """Two scenes of two views each."""
+    columns = {
+        "chamfer": [0.1, 0.3, 0.2, 0.2],
+        "hausdorff": [0.5, 0.5, 0.25, 0.75],
+        "mse_depth": [0.01, 0.02, 0.03, 1 / 3],
+        "f_score_0.05": [0.5, 0.25, 1.0, 0.0],
+    }
+    angles = {
+        str(angle): {"chamfer": Score(0.1, None, None, metric("chamfer").unit, 2)}
+        for angle in (0, 35, 5)
+    }
+    return rooms_scores(method, columns, [0, 0, 1, 1], by_view_angle=angles, **other)
