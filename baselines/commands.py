@@ -2,6 +2,8 @@
 
 import click
 
+from scenegen.common.command_line import OVERWRITE, progress_bar
+
 
 @click.command()
 @click.argument(
@@ -13,7 +15,7 @@ import click
 @click.option("--out", default="predictions.h5", show_default=True, help="Submission to write.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of chance.")
 @click.option("--weights", help="Of pix2shape.  [the bundled ones that suit the data]")
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+@OVERWRITE
 def baseline(
     name: str,
     data: str,
@@ -31,8 +33,6 @@ def baseline(
     if name == "pix2shape":
         _reference_model(weights, data, out, train, overwrite)
         return
-    from tqdm import tqdm
-
     from baselines.trivial import write_chance, write_room_baseline
     from scenegen.rooms.reader import RoomsFile
 
@@ -41,7 +41,7 @@ def baseline(
     else:
         with RoomsFile(data) as rooms:
             count = len(rooms)
-        with tqdm(total=count, unit="image", disable=None, leave=False) as bar:
+        with progress_bar(count, "image") as bar:
             write_room_baseline(
                 name, data, out, train=train, overwrite=overwrite, progress=bar.update
             )

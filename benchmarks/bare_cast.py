@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from benchmarks.scenes import read_depth, read_scenes
 from benchmarks.timing import repeat
+from scenegen.camera import pixel_size
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.shapes import unit_shape
 from scenegen.rendering.backend import select_variant
 from scenegen.rendering.kernel import Scenes, closest_hit
-from scenegen.rendering.packing import SceneBatch, pack, pixel_size
+from scenegen.rendering.packing import SceneBatch, pack
 from scenegen.rendering.unit_scene import mitsuba_shape
 from scenegen.rendering.wavefront import _upload
 
@@ -94,7 +95,8 @@ def evaluate(casts: Sequence[Callable[[], tuple[Any, Any]]]) -> None:
 def camera_table(batch: SceneBatch, offset: Array | float = 0.0) -> Any:
     """Return 16 floats an image: 3x4 world_from_camera, pixel size, where its scene is moved to."""
     camera = batch.world_from_camera[:, :3].reshape(-1, 12)
-    pixel = pixel_size(batch.fov_y_degrees, batch.spec.height)[:, None]
+    fovs = batch.fov_y_degrees.tolist()
+    pixel = np.array([[pixel_size(batch.spec.height, fov)] for fov in fovs])
     move = np.broadcast_to(offset, (len(batch), 3))
     table = np.concatenate([camera, pixel, move], axis=1)
     return mi.Float(table.astype(np.float32).ravel())

@@ -23,7 +23,7 @@ import click
 import h5py
 import numpy as np
 
-VOLATILE = ("command", "created", "writer", "versions", "path", "sha256", "tool")
+VOLATILE = ("creation_command", "writer", "versions", "submissions")
 PRESETS = (
     "shapes", "shapes-single", "shapenet", "shapenet-single", "furniture-256", "specular",
     "two-tone", "albedo", "random-lights", "views",
@@ -83,7 +83,8 @@ def commands(folder: Path) -> Iterator[str]:
     yield f"bench baseline chance --data {answers}.h5 --out chance.h5"
     for name in ("constant", "mean-depth", "empty-room", "oracle", "pix2shape"):
         yield f"bench score {name}.h5 --json {name}.json --csv {name}.csv --markdown"
-    yield "bench baseline constant --data truth.h5 --train truth.h5 --out constant-2.h5"
+    yield "scenegen render --n 6 --seed 6 --out train-2.h5"
+    yield "bench baseline constant --data truth.h5 --train train-2.h5 --out constant-2.h5"
     yield "bench score constant.h5 constant-2.h5 --json runs.json"
     for name in ("chance", "pix2shape-answers"):
         yield f"bench score {name}.h5 --truth {answers}-answers.h5 --json {name}.json"

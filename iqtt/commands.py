@@ -11,11 +11,13 @@ from scenegen.common.command_line import (
     COMPRESSION,
     DEVICE,
     IMAGE_DTYPE,
+    OVERWRITE,
     SEED,
     SIZE,
     Color,
     Items,
     Range,
+    progress_bar,
 )
 
 SHOWN = 8  # questions that `show` draws unless told which
@@ -75,7 +77,7 @@ SHOWN = 8  # questions that `show` draws unless told which
 @COMPRESSION
 @click.option("--batch", type=click.IntRange(1), default=64, show_default=True, help="Questions.")
 @DEVICE
-@click.option("--overwrite", is_flag=True, help="Replace an existing split.")
+@OVERWRITE
 def make_split(
     out: str,
     preset: str,
@@ -90,8 +92,6 @@ def make_split(
 
     Training, validation and test files share no shape, and no mirror image of one.
     """
-    from tqdm import tqdm
-
     from iqtt.files import make as split
     from iqtt.questions.specs import preset_spec
 
@@ -99,7 +99,7 @@ def make_split(
     spec = preset_spec(preset, height=size[0], width=size[1], **chosen)
     count = spec.train + spec.val + spec.test
     started = time.perf_counter()
-    with tqdm(total=count, unit="question", disable=None, leave=False, smoothing=0.1) as bar:
+    with progress_bar(count, "question") as bar:
         tally = split.make_split(
             out,
             spec,
@@ -165,7 +165,7 @@ def info(file: str) -> None:
     show_default=True,
     help="Most questions that the shortcuts are tried on.",
 )
-@click.option("--overwrite", is_flag=True, help="Replace an existing JSON file.")
+@OVERWRITE
 @click.pass_context
 def audit(
     ctx: click.Context,
@@ -178,8 +178,6 @@ def audit(
     """Prove that every question of some folders or files is right, and try to answer them without
     looking at shapes. Exits with 1 if a proof fails.
     """
-    from tqdm import tqdm
-
     from iqtt.audit import audit as audits
     from iqtt.audit import report as audit_report
     from scenegen.common.new_file import check_writable, written_beside
@@ -187,7 +185,7 @@ def audit(
     if json_path:
         check_writable(Path(json_path), overwrite)
     count = audits.question_count(splits)
-    with tqdm(total=count, unit="question", disable=None, leave=False) as bar:
+    with progress_bar(count, "question") as bar:
         found = audits.audit(splits, probed=probed, progress=bar.update)
     click.echo(audit_report.markdown(found) if markdown else audit_report.table(found))
     if json_path:

@@ -1,12 +1,11 @@
 """The `bench` commands: parse, one library call, print. Heavy imports happen inside them."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
-OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
+from scenegen.common.command_line import OVERWRITE, progress_bar
 
 
 @click.command()
@@ -56,8 +55,8 @@ def score(
         check_writable(path, overwrite)
     if len({path.resolve() for path in outputs}) < len(outputs):
         raise SpecError(f"outputs: found {', '.join(map(str, outputs))}, expected different files")
-    with _progress(count_rows(submissions[0]), "image") as advance:
-        found = score_files(submissions, truth, Settings(**settings), advance)
+    with progress_bar(count_rows(submissions[0]), "image") as bar:
+        found = score_files(submissions, truth, Settings(**settings), bar.update)
     click.echo(report.markdown_report(found) if markdown else report.table(found))
     if json_path:
         from metrics.score_file import write_scores
@@ -173,21 +172,6 @@ def describe_format() -> None:
     from metrics.submissions.layout import describe_format as text
 
     click.echo(text())
-
-
-def _progress(count: int, unit: str) -> Any:
-    """Return a context that shows a bar and gives what advances it."""
-    from contextlib import contextmanager
-
-    from tqdm import tqdm
-
-    @contextmanager
-    def shown() -> Any:
-        with tqdm(total=count, unit=unit, disable=None, leave=False) as bar:
-            advance: Callable[[int], Any] = bar.update
-            yield advance
-
-    return shown()
 
 
 COMMANDS = (score, validate, compare, leaderboard, describe_format)

@@ -74,9 +74,14 @@ def _cross(a: Array, b: Array) -> Array:
     )
 
 
+def pixel_size(height: int, fov_y_degrees: float) -> float:
+    """Return the side of a pixel on the plane at depth 1, scene units."""
+    return 2 * math.tan(math.radians(fov_y_degrees) / 2) / height
+
+
 def pixel_directions(height: int, width: int, fov_y_degrees: float) -> NDArray[np.float64]:
     """Return the rays through the pixel centres, camera frame, z = -1: (height, width, 3)."""
-    pixel = 2 * math.tan(math.radians(fov_y_degrees) / 2) / height  # side of a pixel at depth 1
+    pixel = pixel_size(height, fov_y_degrees)
     directions = np.empty((height, width, 3))
     directions[..., 0] = (np.arange(width) + 0.5 - width / 2) * pixel
     directions[..., 1] = ((height / 2 - 0.5) - np.arange(height))[:, None] * pixel

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import Items, UserError
+from scenegen.common.command_line import OVERWRITE, Items, UserError
 
 PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
 
@@ -17,7 +17,6 @@ WEIGHTS = click.option(
     "  [those that suit the data]",
 )
 DATA = click.option("--data", required=True, help="Rooms, or questions.")
-OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 DEVICE = click.option(
     "--device",
     type=click.Choice(["auto", "cpu", "cuda"]),

@@ -165,7 +165,9 @@ class QuestionsFile(TableFile):
         first = self.read("questions", 0)
         low, high = first.min(), first.max()
         if not (low >= -TOLERANCE and high <= 1 + TOLERANCE):  # so NaN is refused too
-            raise self._wrong("questions", 0, f"values from {low:g} to {high:g}, expected 0 to 1")
+            raise FileFormatError(
+                self.place("questions", 0), f"values from {low:g} to {high:g}", "0 to 1"
+            )
 
     def _join(self, answers: str | Path) -> None:
         """Take in answers and truth of another file, if they are those of this one."""

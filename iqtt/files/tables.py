@@ -20,7 +20,7 @@ from scenegen.common.row_file import (
     checking,
     column_problems,
     open_file,
-    reason,
+    reading,
 )
 
 PARTS = ("labeled", "unlabeled")
@@ -99,10 +99,8 @@ class TableFile:
             SpecError: there is no such dataset.
         """
         self.check_field(name)
-        try:
+        with reading(self.place(name, rows)):
             return self._datasets[name][rows]
-        except (OSError, RuntimeError, KeyError, ValueError) as error:
-            raise self._wrong(name, rows, f"cannot be read ({reason(error)})") from error
 
     def truth(self, row: int) -> QuestionTruth | None:
         """Return what is known of one question; None where nothing is. Raises as `read`."""
@@ -167,7 +165,9 @@ class TableFile:
         answers = dataset[()].reshape(-1)
         wrong = np.flatnonzero((answers < 0) | (answers > 2))
         if len(wrong):
-            raise self._wrong("answers", int(wrong[0]), f"{answers[wrong[0]]}, expected 0, 1 or 2")
+            raise FileFormatError(
+                self.place("answers", int(wrong[0])), answers[wrong[0]], "0, 1 or 2"
+            )
         self._datasets["answers"] = answers.astype(np.uint8)
         return len(answers)
 
@@ -196,12 +196,13 @@ class TableFile:
             raise FileFormatError(f"{self.path}: attribute {name!r}: found {found!r:.40}")
         return found
 
-    def _wrong(self, name: str, rows: int | slice, found: str) -> FileFormatError:
+    def place(self, name: str, rows: int | slice) -> str:
+        """Return the file, the data set and the rows, to begin an error with."""
         where = f"row {rows}"
         if isinstance(rows, slice):
             first, end, _ = rows.indices(len(self))
             where = f"rows {first} to {end - 1}"
-        return FileFormatError(f"{self.path}: {name}, {where}: {found}")
+        return f"{self.path}: {name}, {where}"
 
 
 class NoImagesError(FileFormatError):

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.polycube import ROTATIONS
+from scenegen.common.rotations import rotation_matrix
 
 Array = NDArray[Any]
 FIRST_LIGHT_COSINE = 0.5  # of the widest angle between the first light and the camera
@@ -29,13 +30,7 @@ def rotation_angle_degrees(a: Array, b: Array, symmetric: Array) -> float:
 def draw_rotations(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
     """Draw rotations uniform on SO(3), (*shape, 3, 3)."""
     quaternion = rng.standard_normal((4, *shape))
-    w, x, y, z = quaternion / np.sqrt((quaternion * quaternion).sum(axis=0))
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    return rotation_matrix(quaternion / np.sqrt((quaternion * quaternion).sum(axis=0)))
 
 
 def draw_lights(

@@ -23,9 +23,9 @@ from metrics.comparison.statistics import (
     smallest_significant_fraction,
 )
 from metrics.measures.statistics import RESAMPLES, cluster_means
-from metrics.report.table_text import distinct, plain
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import ScoreFile
+from scenegen.common.text_table import distinct, plain
 
 Array = NDArray[np.float64]
 ALPHA, POWER, CONFIDENCE = 0.05, 0.8, 0.95

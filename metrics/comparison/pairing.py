@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.checks import LARGEST_MAGNITUDE
-from metrics.report.table_text import plain
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ID_COLUMNS, ScoreFile
 from scenegen.common.errors import SceneGenError
+from scenegen.common.text_table import plain
 
 Array = NDArray[np.float64]
 IDS_SHOWN = 5

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict
 
 from metrics.comparison.compare import ALPHA, CONFIDENCE, POWER, SIGN_FLIP, Comparison, Difference
-from metrics.report.table_text import aligned, markdown, number, piped
 from metrics.scoring.metric_names import metric
+from scenegen.common.text_table import aligned, markdown, number, piped
 
 FORMAT_NAME = "pix2shape-bench/comparison"
 FORMAT_VERSION = "1.0"

@@ -21,10 +21,10 @@ from metrics.leaderboard.table import (
     reported_cell,
 )
 from metrics.measures.answers import CHANCE
-from metrics.report.table_text import distinct, number, plain
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ID_COLUMNS, ScoreFile
 from scenegen.common.errors import SceneGenError
+from scenegen.common.text_table import distinct, number, plain
 
 
 class LeaderboardError(SceneGenError):

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from metrics.leaderboard.paper_tables import REPORTED, SOURCE, Figure
-from metrics.report.table_text import number
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import Score, ScoreFile
+from scenegen.common.text_table import number
 
 Kind = Literal["ranked", "not comparable", "reported"]
 REPORTED_MARK, INCOMPARABLE_MARK = "†", "‡"

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from metrics.leaderboard.leaderboard import Leaderboard
 from metrics.leaderboard.table import Cell, Row, Table
-from metrics.report.table_text import html, latex, markdown, piped
+from scenegen.common.text_table import html, latex, markdown, piped
 
 _STYLE = """
 :root { color-scheme: light dark; }

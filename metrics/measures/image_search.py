@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from metrics.measures.chamfer_hausdorff import NearestDistances, query_nearest
 from metrics.measures.checks import require_depth_pair, require_fov
-from scenegen.camera import pixel_directions
+from scenegen.camera import pixel_directions, pixel_size
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -123,7 +123,7 @@ def _rings_per_distance(grid: _Grid, z: Array, fov_y_degrees: float) -> Array:
     no ring settles it.
     """
     shape = grid.inside.shape
-    pitch = 2.0 * math.tan(math.radians(fov_y_degrees) / 2.0) / shape[0]  # of pixels, at depth 1
+    pitch = pixel_size(shape[0], fov_y_degrees)
     edge = (max(shape) - 1) / 2.0 * pitch
     bound = pitch / math.sqrt(1.0 + edge * edge) * _BOUND_MARGIN
     per_ring: Array = (1.0 / bound) / np.maximum(np.abs(z), 1e-100)

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from metrics.report.charts import histogram, intervals
 from metrics.report.pictures import view_pictures
-from metrics.report.table_text import number
 from metrics.report.text import CHANCE, GROUP_TITLES, SHORT, interval_cells
 from metrics.scoring.metric_names import HEADLINE, in_order, metric
 from metrics.scoring.records import GROUPINGS, ScoreFile
 from metrics.submissions.reader import RoomPredictions, open_predictions
+from scenegen.common.text_table import number
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
 

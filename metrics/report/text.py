@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from metrics.report.table_text import aligned, markdown, number, piped, plain
 from metrics.scoring.metric_names import in_order, metric
 from metrics.scoring.records import GROUPINGS, Score, ScoreFile
 from scenegen.common.new_file import written_beside
+from scenegen.common.text_table import aligned, markdown, number, piped, plain
 
 HEAD = ("score", "value", "95% interval", "std of runs", "unit", "better")
 GROUP_TITLES = {

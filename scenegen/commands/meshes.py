@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenegen.common.command_line import CACHE_DIR, UP, Names
+from scenegen.common.command_line import CACHE_DIR, OVERWRITE, UP, Names, progress_bar
 
 if TYPE_CHECKING:
     from scenegen.objects.meshes.check import ModelCheck
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.option("--classes", type=Names(), help="Classes to try, such as bowl,mug [default: all].")
 @CACHE_DIR
 @click.option("--json", "json_path", help="File to write all records to.")
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+@OVERWRITE
 @click.option(
     "--jobs", type=click.IntRange(1), default=1, show_default=True, help="Processes to use."
 )
@@ -39,8 +39,6 @@ def check_objects(
 
     Prints counts per class and the reason of every refusal; exits with 1 if no model is usable.
     """
-    from tqdm import tqdm
-
     from scenegen.common.new_file import check_writable, written_beside
     from scenegen.objects.meshes.cache import default_cache_dir
     from scenegen.objects.meshes.check import check_models
@@ -51,7 +49,7 @@ def check_objects(
     found = open_models(folder, classes, up)
     cache = Path(cache_dir) if cache_dir else default_cache_dir()
     total = sum(map(len, found.models.values()))
-    with tqdm(total=total, unit="model", disable=None, leave=False, smoothing=0.1) as bar:
+    with progress_bar(total, "model") as bar:
         records = check_models(found, cache, jobs, bar.update)
     for line in _table(found, records):
         click.echo(line)

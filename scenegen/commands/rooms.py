@@ -12,6 +12,7 @@ from scenegen.common.command_line import (
     DEVICE,
     IMAGE_DTYPE,
     MESHES,
+    OVERWRITE,
     SEED,
     Color,
     Items,
@@ -19,6 +20,7 @@ from scenegen.common.command_line import (
     Numbers,
     Range,
     Size,
+    progress_bar,
 )
 
 NUMBERS = Numbers()
@@ -105,7 +107,7 @@ OBJECT_OPTIONS = (
     help="Images in one wavefront; views of a scene stay together.",
 )
 @DEVICE
-@click.option("--overwrite", is_flag=True, help="Replace an existing file.")
+@OVERWRITE
 def render(
     count: int,
     out: str,
@@ -118,8 +120,6 @@ def render(
     **settings: Any,
 ) -> None:
     """Render rooms to an HDF5 file: image, depth, normals, object ids, cameras, lights, scenes."""
-    from tqdm import tqdm
-
     from scenegen.description.presets import preset_spec
     from scenegen.objects.sources import object_source
     from scenegen.rooms.make import make_dataset
@@ -133,7 +133,7 @@ def render(
     command = " ".join(["scenegen", *sys.argv[1:]])
     images = count * len(spec.views)
     started = time.perf_counter()
-    with tqdm(total=images, unit="img", disable=None, leave=False, smoothing=0.1) as bar:
+    with progress_bar(images, "image") as bar:
         make_dataset(
             out,
             spec,
@@ -211,8 +211,6 @@ def info(file: str) -> None:
 @click.pass_context
 def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: Any) -> None:
     """Check layout and values of every row, render some again; exits with 1 if a check fails."""
-    from tqdm import tqdm
-
     from scenegen.objects.sources import file_objects
     from scenegen.rooms.reader import RoomsFile
     from scenegen.rooms.verify import verify_file
@@ -220,7 +218,7 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     with RoomsFile(file) as rooms:
         count = len(rooms)
         objects = file_objects(rooms.spec, **meshes)
-    with tqdm(total=count, unit="img", disable=None, leave=False) as bar:
+    with progress_bar(count, "image") as bar:
         checks = verify_file(file, items, device, objects, bar.update)
     for check in checks:
         click.echo(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:26} {check.detail}")
@@ -242,7 +240,7 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     help="exr: all channels; png: 16 bits; ply: surfels; obj: the scene's mesh.",
 )
 @click.option("--out", default=".", show_default=True, help="Folder to write to.")
-@click.option("--overwrite", is_flag=True, help="Replace existing files.")
+@OVERWRITE
 @MESHES
 def export(
     file: str, items: list[int], form: str, out: str, overwrite: bool, **meshes: Any

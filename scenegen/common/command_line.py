@@ -160,6 +160,16 @@ class Color(click.ParamType):  # type: ignore[type-arg]
         return tuple(float(part) for part in (parts if len(parts) == 3 else parts * 3))
 
 
+def progress_bar(count: int | None, unit: str) -> Any:
+    """Return a progress bar with rate and time left on standard error; hidden where that is no
+    terminal. To be used in a `with`; its `update` takes how many more items are done.
+    """
+    from tqdm import tqdm
+
+    return tqdm(total=count, unit=unit, disable=None, leave=False, smoothing=0.1)
+
+
+OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 DEVICE = click.option(
     "--device",
     type=click.Choice(["auto", "cpu", "cuda"]),

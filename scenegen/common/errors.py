@@ -1,8 +1,42 @@
-"""What can go wrong for a user, as exceptions whose text is meant for that user."""
+"""Errors whose text is meant for the person at the keyboard.
+
+Every error that a user can cause is a `SceneGenError`. It says where something is wrong, what was
+found there, what was expected instead, and what to do about it. The command line prints the text
+as one line and exits with code 2; programs and tests read the fields.
+"""
+
+from typing import Self
 
 
 class SceneGenError(ValueError):
-    """Base of every error a caller may want to show instead of a traceback."""
+    """Base of every error that a caller may show to a person instead of a traceback.
+
+    Attributes:
+        where: the file, row, setting or option that is wrong, such as `rooms.h5: depth, row 3`.
+        found: what is there; empty where `where` says it all.
+        expected: what should be there instead.
+        hint: what the user can do about it.
+    """
+
+    def __init__(
+        self, where: object, found: object = "", expected: object = "", hint: object = ""
+    ) -> None:
+        """Keep the fields as texts; all of them go to `args`, so that errors can be pickled."""
+        self.where, self.found = str(where), str(found)
+        self.expected, self.hint = str(expected), str(hint)
+        super().__init__(self.where, self.found, self.expected, self.hint)
+
+    def __str__(self) -> str:
+        """Return `where: found ..., expected ...; hint` without the parts that are empty."""
+        found = f"found {self.found}" if self.found else ""
+        expected = f"expected {self.expected}" if self.expected else ""
+        what = ", ".join(part for part in (found, expected) if part)
+        text = f"{self.where}: {what}" if what else self.where
+        return f"{text}; {self.hint}" if self.hint else text
+
+    def inside(self, place: object) -> Self:
+        """Return the same error with `place` before `where`, such as the file that a row is in."""
+        return type(self)(f"{place}: {self.where}", self.found, self.expected, self.hint)
 
 
 class SpecError(SceneGenError):
@@ -14,7 +48,7 @@ class PlacementError(SceneGenError):
 
 
 class FileFormatError(SceneGenError):
-    """A file is not what its name or its caller claims."""
+    """A file is not what its name or its caller claims, or it is damaged."""
 
 
 class BackendError(SceneGenError):

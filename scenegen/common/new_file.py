@@ -38,6 +38,12 @@ def written_beside(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
+def write_text(path: str | Path, text: str, overwrite: bool = False) -> None:
+    """Write a text file as UTF-8, complete or not at all. Raises OSError as `written_beside`."""
+    with written_beside(path, overwrite) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
 def _reason(error: Exception) -> str | None:
     """Say in a few words what the disk, or HDF5 about it, has to say; None for other errors."""
     text = str(error)

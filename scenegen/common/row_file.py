@@ -21,6 +21,8 @@ Array = NDArray[Any]
 COMPRESSIONS = ("gzip", "lzf", "none")
 DEFLATE_LEVEL = 1
 CLOSING_SLACK = 8192  # bytes that HDF5 may need on top of what it says it needs
+# What h5py raises on damaged files, by the kind of damage: this tuple is the only list of them.
+HDF5_ERRORS = (OSError, RuntimeError, KeyError, TypeError, ValueError, MemoryError)
 BLOCK_ROWS = 1024  # rows of the small datasets that are kept and written together
 
 
@@ -152,20 +154,29 @@ def open_file(path: str | Path, kind: str) -> h5py.File:
 
 
 @contextmanager
-def checking(file: h5py.File) -> Iterator[None]:
-    """Close a file in which something is found wrong.
+def reading(where: object) -> Iterator[None]:
+    """Turn whatever HDF5 raises on a damaged file into a FileFormatError of one line.
 
-    What HDF5 raises on damaged files becomes a FileFormatError of one line.
+    `where` names the file, the data set and the row as far as they are known.
+    An IndexError passes: a row beyond the end is the caller's mistake, not the file's.
     """
-    path = file.filename
     try:
         yield
     except SceneGenError:
+        raise
+    except HDF5_ERRORS as error:
+        raise FileFormatError(f"{where}: cannot be read ({reason(error)})") from error
+
+
+@contextmanager
+def checking(file: h5py.File) -> Iterator[None]:
+    """Close a file in which something is found wrong. Raises FileFormatError as `reading`."""
+    try:
+        with reading(file.filename):
+            yield
+    except SceneGenError:
         file.close()
         raise
-    except (OSError, RuntimeError, KeyError, TypeError, ValueError, MemoryError) as error:
-        file.close()
-        raise FileFormatError(f"{path}: damaged ({reason(error)})") from error
 
 
 def check_version(path: str | Path, attributes: Mapping[str, Any], version: str) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from scenegen.common.errors import SpecError
+from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scenes import SceneSpec
 from scenegen.objects import teapot
 from scenegen.objects.solids import (
@@ -67,18 +68,6 @@ def room_mesh() -> trimesh.Trimesh:
     floor = np.array([[0, 0, 0], [0, 0, 1], [1, 0, 1], [1, 0, 0]], float)
     planes = [floor, floor[:, [1, 2, 0]], floor[:, [2, 0, 1]]]  # turning the axes keeps the winding
     return trimesh.util.concatenate([trimesh.Trimesh(p, faces, process=False) for p in planes])
-
-
-def rotation_matrix(quaternion: tuple[float, float, float, float]) -> NDArray[np.float64]:
-    """Return the (3, 3) rotation of a unit quaternion (w, x, y, z)."""
-    w, x, y, z = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def world_from_object(

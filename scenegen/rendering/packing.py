@@ -5,7 +5,6 @@ So scenes need no lattice and no space between them: a ray meets no object but i
 construction, and an image's bits cannot depend on the rest of its batch.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -15,10 +14,10 @@ from numpy.typing import NDArray
 
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check
+from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
-from scenegen.objects.shapes import rotation_matrix
 from scenegen.objects.solids import UnitShape
 
 Array = NDArray[Any]
@@ -180,8 +179,3 @@ def pack(
         has_room=each(np.array([scene.room_reflectance is not None for scene in scenes])),
         background=each(np.array([scene.background for scene in scenes])),
     )
-
-
-def pixel_size(fov_y_degrees: Array, height: int) -> Array:
-    """Return the side of a pixel at depth 1, (B,), scene units."""
-    return np.asarray(2 * np.tan(np.asarray(fov_y_degrees) * (math.pi / 360)) / height)

@@ -17,10 +17,11 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.camera import pixel_size
 from scenegen.common.seeding import Purpose, item_seed
 from scenegen.objects.shapes import room_mesh
 from scenegen.rendering.ground_truth import encode_image
-from scenegen.rendering.packing import SceneBatch, pixel_size
+from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.phong import phong_bsdf
 from scenegen.rendering.reference import sample_positions
 from scenegen.rendering.unit_scene import triangle_mesh
@@ -46,7 +47,7 @@ def _trace_one(batch: SceneBatch, b: int, integrator: Any) -> Array:
     scene = _scene(batch, b)
     pixels = spec.height * spec.width
     right, up, back, origin = (mi.Vector3f(*v) for v in batch.world_from_camera[b, :3].T.tolist())
-    size = float(pixel_size(batch.fov_y_degrees[b], spec.height))
+    size = pixel_size(spec.height, float(batch.fov_y_degrees[b]))
     seed = item_seed(spec.seed, int(batch.index[b]), Purpose.PATHS, int(batch.view[b]))
     places = sample_positions(spec.spp)
     total = np.zeros((pixels, 3))

@@ -4,14 +4,13 @@ Two uses: the fallback where no LLVM can be had (Mitsuba's scalar variant casts)
 independent check of the wavefront (any other ray caster does). One image at a time, float64.
 """
 
-import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import pixel_directions
+from scenegen.camera import pixel_directions, pixel_size
 from scenegen.objects.solids import UnitShape
 from scenegen.rendering.ground_truth import GroundTruth, encode_image
 from scenegen.rendering.packing import SceneBatch
@@ -47,7 +46,7 @@ def _render_one(batch: SceneBatch, b: int, cast: Cast) -> tuple[Array, Array, Ar
     spec = batch.spec
     world_from_camera = batch.world_from_camera[b]
     directions = pixel_directions(spec.height, spec.width, float(batch.fov_y_degrees[b]))
-    pixel = 2 * math.tan(math.radians(float(batch.fov_y_degrees[b])) / 2) / spec.height
+    pixel = pixel_size(spec.height, float(batch.fov_y_degrees[b]))
     origin = world_from_camera[:3, 3]
 
     def look(x: float, y: float) -> tuple[Array, Array, Array, Array]:

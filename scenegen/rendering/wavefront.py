@@ -8,10 +8,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.camera import pixel_size
 from scenegen.rendering.blocks import Blocks, closest_block, upload_blocks
 from scenegen.rendering.kernel import Scenes, closest_hit, gather_row, normal_at, radiance_at
 from scenegen.rendering.model_scene import model_scene
-from scenegen.rendering.packing import SceneBatch, pixel_size
+from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.reference import SAMPLE_STEPS
 from scenegen.rendering.unit_scene import unit_scene
 
@@ -58,7 +59,7 @@ def _upload(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
     offset = -np.einsum("bkij,bkj->bki", linear, center) + (0.0 if unit.grid else place)
     per_light = np.concatenate([batch.light_position, batch.light_color], axis=-1)
     lights = [batch.ambient, batch.attenuation, per_light.reshape(count, -1)]
-    pixel = pixel_size(batch.fov_y_degrees, spec.height)
+    pixel = np.array([pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()])
     camera = [batch.world_from_camera[:, :3].reshape(count, 12), pixel[:, None]]
     scenes = Scenes(
         unit=unit.scene,

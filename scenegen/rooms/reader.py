@@ -19,7 +19,7 @@ from scenegen.common.row_file import (
     checking,
     column_problems,
     open_file,
-    reason,
+    reading,
 )
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
@@ -124,11 +124,8 @@ class RoomsFile:
 
     def read(self, name: str, rows: int | slice) -> Any:
         """Read rows of one dataset. Raises FileFormatError where they are damaged."""
-        try:
+        with reading(f"{self.path}: {name}, row {rows}"):
             return self._file[name][rows]
-        except (OSError, KeyError, ValueError) as error:
-            where = f"{self.path}: {name}, row {rows}"
-            raise FileFormatError(f"{where}: cannot be read ({reason(error)})") from error
 
     def problems(self) -> list[str]:
         """Return what is wrong with the layout, the datasets' own descriptions included."""

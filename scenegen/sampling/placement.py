@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import Camera
-from scenegen.objects.shapes import rotation_matrix
+from scenegen.common.rotations import rotation_matrix
 from scenegen.objects.solids import UnitShape
 
 Array = NDArray[Any]

@@ -13,12 +13,12 @@ import numpy as np
 
 from scenegen.camera import Camera, Vector3
 from scenegen.common.errors import PlacementError, SpecError
+from scenegen.common.rotations import rotation_matrix
 from scenegen.common.seeding import Purpose, item_rng
 from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of, outline
 from scenegen.objects.meshes.errors import BadMeshError
-from scenegen.objects.shapes import rotation_matrix
 from scenegen.objects.solids import UnitShape
 from scenegen.sampling.placement import Body, find_place, frustum_normals, random_rotation
 

@@ -6,12 +6,13 @@ Camera frame: x right, y up, looking along -z; pixels and planar depth as in `sc
 All functions work on whole batches; B images of H x W, channels first.
 """
 
-import math
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 from torch.nn import functional
+
+from scenegen.camera import pixel_size
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +44,7 @@ def pixel_rays(
     height: int, width: int, fov_y_degrees: float, like: Tensor
 ) -> tuple[Tensor, Tensor]:
     """Return x, (1, W), and y, (H, 1), of the rays (x, y, -1) through the pixels' centres."""
-    pixel = 2 * math.tan(math.radians(fov_y_degrees) / 2) / height
+    pixel = pixel_size(height, fov_y_degrees)
     x = (torch.arange(width, dtype=like.dtype, device=like.device) + 0.5 - width / 2) * pixel
     y = (height / 2 - 0.5 - torch.arange(height, dtype=like.dtype, device=like.device)) * pixel
     return x[None], y[:, None]

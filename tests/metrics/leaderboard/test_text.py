@@ -8,7 +8,7 @@ from made_scores import iqtt_scores, rooms_scores
 
 from metrics.leaderboard.leaderboard import leaderboard
 from metrics.leaderboard.text import to_html, to_latex, to_markdown
-from metrics.report.table_text import html, latex, markdown, plain
+from scenegen.common.text_table import html, latex, markdown, plain
 
 HOSTILE = [
     "a | b",

@@ -15,9 +15,9 @@ from baselines.trivial import write_room_baseline
 from metrics.report.charts import histogram, intervals
 from metrics.report.page import html_report
 from metrics.report.pictures import view_pictures
-from metrics.report.table_text import number
 from metrics.report.text import markdown_report, table, write_csv
 from metrics.scoring.scoring import score
+from scenegen.common.text_table import number
 from scenegen.rooms.preview import NOTHING
 
 VOID = {"meta", "img", "line", "rect", "circle", "br"}

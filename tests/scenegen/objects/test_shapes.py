@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from scenegen.camera import Camera
 from scenegen.common.errors import SpecError
+from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scenes import SHAPE_NAMES, PlacedObject, SceneSpec
 from scenegen.objects.shapes import (
     room_mesh,
-    rotation_matrix,
     scene_mesh,
     unit_shape,
     welded,

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenegen.camera import Camera
+from scenegen.camera import Camera, pixel_size
 from scenegen.common.errors import SpecError
 from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.shapes import world_from_object
-from scenegen.rendering.packing import pack, pixel_size
+from scenegen.rendering.packing import pack
 
 SPEC = DatasetSpec(objects=(0, 3), lights=(0, 2), shapes=("cone", "box"), height=50, width=80)
 TURN = (0.5, 0.5, 0.5, 0.5)
@@ -146,4 +146,5 @@ def test_a_scene_beyond_the_request_is_refused(change: dict[str, object], words:
 
 
 def test_pixel_size_at_depth_one() -> None:
-    np.testing.assert_allclose(pixel_size(np.array([90.0, 60.0]), 10), [0.2, 0.2 / 3**0.5])
+    sizes = [pixel_size(10, fov) for fov in (90.0, 60.0)]
+    np.testing.assert_allclose(sizes, [0.2, 0.2 / 3**0.5])

@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chisquare, kstest
 
 from scenegen.camera import Camera
+from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scenes import SHAPE_NAMES
-from scenegen.objects.shapes import rotation_matrix, unit_shape
+from scenegen.objects.shapes import unit_shape
 from scenegen.sampling.placement import (
     GAP,
     SEPARATORS,

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.common.rotations import rotation_matrix
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.limits import MOST_FACES
 
@@ -114,12 +115,7 @@ def _transform(node: dict[str, Any]) -> Array:
         return np.array(node["matrix"], float).reshape(4, 4).T  # stored by columns
     x, y, z, w = node.get("rotation", (0, 0, 0, 1))
     matrix = np.eye(4)
-    matrix[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    matrix[:3, :3] *= np.array(node.get("scale", (1, 1, 1)), float)
+    matrix[:3, :3] = rotation_matrix((w, x, y, z)) * np.array(node.get("scale", (1, 1, 1)), float)
     matrix[:3, 3] = node.get("translation", (0, 0, 0))
     return matrix
 

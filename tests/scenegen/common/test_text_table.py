@@ -8,7 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from metrics.report.table_text import aligned, distinct, html, latex, markdown, number, piped, plain
+from scenegen.common.text_table import (
+    aligned,
+    distinct,
+    html,
+    latex,
+    markdown,
+    number,
+    piped,
+    plain,
+)
 
 ANY_TEXT = st.text(st.characters(exclude_categories=()), max_size=30)
 
