@@ -79,6 +79,18 @@ def test_trivial_baselines_load_no_torch(rooms_path, tmp_path):
     assert set(loaded) <= {"h5py", "numpy", "scipy", "tqdm"}
 
 
+def test_scoring_loads_no_renderer_and_no_torch(rooms_path, tmp_path):
+    baseline = ["baseline", "empty-room", "--data", str(rooms_path)]
+    heavy_after(QUIETLY.format(group="bench", arguments=baseline), tmp_path)
+    score = ["score", "predictions.h5", "--json", "s.json", "--html", "s.html", "--processes", "1"]
+    loaded = heavy_after(QUIETLY.format(group="bench", arguments=score), tmp_path)
+    assert (tmp_path / "s.html").exists()
+    assert not {"mitsuba", "drjit", "torch"} & set(loaded)
+    # The check can fail: the same command with the renderer loaded first.
+    code = "import mitsuba\n" + QUIETLY.format(group="bench", arguments=["--help"])
+    assert "mitsuba" in heavy_after(code, tmp_path)
+
+
 def test_this_check_can_fail(tmp_path):
     assert heavy_after("import scenegen; scenegen.make_dataset", tmp_path) != []
     render = ["render", "--n", "1", "--size", "32", "--out", "nowhere/x.h5"]
@@ -115,10 +127,18 @@ def test_contracts_can_break(tmp_path):
     for name in ("cli.py", "pyproject.toml"):
         (tmp_path / name).write_text((ROOT / name).read_text())
     with (tmp_path / "scenegen" / "camera.py").open("a") as file:
-        file.write("\nimport mitsuba, torch\nfrom scenegen import dataset\n")
+        file.write("\nimport mitsuba, torch\nfrom scenegen.rooms import make\n")
+    with (tmp_path / "metrics" / "report" / "charts.py").open("a") as file:
+        file.write("\nfrom metrics.report import page\n")
     done = lint(tmp_path)
     assert done.returncode == 1
-    for title in ("Inside scenegen, from", "Only the renderer knows", "torch stays in the"):
+    broken = (
+        "Folders of scenegen",
+        "Files of metrics.report",
+        "Only rendering knows mitsuba",
+        "torch stays in the",
+    )
+    for title in broken:
         assert re.search(rf"^{title}.* BROKEN$", done.stdout, re.MULTILINE), title
     assert "scenegen.camera -> mitsuba" in done.stdout
     assert "Nothing imports the command line KEPT" in done.stdout
