@@ -1,8 +1,9 @@
-"""Do two methods differ? Paired comparison of score files over the same images or questions.
+"""Paired comparison of score files over the same images or questions.
 
-Each file is compared with the first one. All pairs would ask more questions than people do ("is
-mine better than these?"), and the correction for their number would hide differences that are
-there. Whoever wants another reference puts it first.
+Each file is compared with the first one, the reference. Comparing all pairs would test more than
+the usual question, whether one method differs from each of some others, and the correction for the
+number of tests would hide differences that are there. To compare with another reference, put it
+first.
 """
 
 import math
@@ -17,12 +18,11 @@ from metrics.comparison.statistics import (
     SIGN_FLIPS,
     holm,
     mcnemar_exact,
-    paired_bootstrap,
     sign_flip_test,
     smallest_detectable_difference,
     smallest_significant_fraction,
 )
-from metrics.measures.statistics import RESAMPLES, cluster_means
+from metrics.measures.statistics import RESAMPLES, cluster_bootstrap, cluster_means
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import ScoreFile
 from scenegen.common.text_table import distinct, plain
@@ -38,7 +38,7 @@ class Difference:
 
     Attributes:
         metric: name of the score.
-        method: as listed in `Comparison.methods`.
+        method: its name in `Comparison.methods`.
         value, reference_value: means over the rows that are compared, in the score's unit.
         difference: value - reference_value.
         low, high: its 95% interval, not corrected for the number of comparisons; None for a single
@@ -48,7 +48,7 @@ class Difference:
         p_holm: corrected for all comparisons of the family.
         wins, losses, ties: scenes (or questions) in which the method is better, worse, the same.
         smallest: the least difference that this test set would have shown in 80% of cases, given
-            how the differences spread; None where it could show none, or nothing spreads.
+            how the differences spread; None where it could show none, or all differences are equal.
     """
 
     metric: str
@@ -81,14 +81,15 @@ class Comparison:
 
     Attributes:
         task: "rooms" or "iqtt".
-        truth_fingerprint: of their test set.
+        truth_fingerprint: fingerprint of their test set.
         reference: name of the first file's method.
-        methods: names of the others, told apart.
-        items, clusters: images and scenes compared; both the questions for questions.
-        differences: by metric, then by method.
+        methods: names of the others; equal names are made distinct.
+        items, clusters: how many images and scenes were compared; for questions both are their
+            number.
+        differences: one for each score and method, ordered by score, then by method.
         comparable: False where a file says that it is not, and was compared all the same.
-        notes: for a person.
-        seed, resamples: of intervals and random sign flips.
+        notes: what a reader has to know, in sentences.
+        seed, resamples: of the bootstrap; the seed is that of random sign flips, too.
     """
 
     task: str
@@ -116,10 +117,10 @@ def compare(
 
     Args:
         files: two or more, of one test set.
-        metrics: names; else `metric_names.HEADLINE` of the task. All of them times all later files
-            are the family that Holm's correction goes by, so name what you mean to ask.
-        seed: of the bootstrap and of random sign flips.
-        resamples: of the bootstrap.
+        metrics: the scores to compare; None means `metric_names.HEADLINE` of the task. Holm's
+            correction is for the number of these scores times that of the later files.
+        seed: seed of the bootstrap and of random sign flips.
+        resamples: how many resamples the bootstrap draws.
         allow_incomparable: compare files that say that they are not comparable, over the rows that
             all of them hold.
 
@@ -132,10 +133,11 @@ def compare(
     pairs = [(name, i) for name in names for i in range(1, len(files))]
     found = []
     for name, i in pairs:
-        a, b = (column(files[k], name, orders[k]) for k in (i, 0))
+        values = column(files[i], name, orders[i]), column(files[0], name, orders[0])
         exact = files[0].task == "iqtt" and files[i].runs == files[0].runs == 1
-        pair = _Pair(name, a, b, clusters, exact)
-        found.append(_difference(pair, labels[i], len(pairs), seed, resamples))
+        found.append(
+            _difference(name, labels[i], values, clusters, exact, len(pairs), seed, resamples)
+        )
     count = len(np.unique(clusters))
     adjusted = holm([difference.p_value for difference in found])
     return Comparison(
@@ -155,49 +157,46 @@ def compare(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Pair:
-    """A method's values (N,) of a score beside the reference's, and the clusters they lie in."""
-
-    metric: str
-    a: Array
-    b: Array
-    clusters: NDArray[np.int64]
-    exact: bool
-
-
-def _difference(pair: _Pair, method: str, family: int, seed: int, resamples: int) -> Difference:
-    estimate = paired_bootstrap(pair.a, pair.b, pair.clusters, seed, resamples, CONFIDENCE)
-    means, reference_means = (cluster_means(v, pair.clusters) for v in (pair.a, pair.b))
-    apart = cluster_means(pair.a - pair.b, pair.clusters)
-    better = apart if metric(pair.metric).higher_is_better else -apart
-    if pair.exact:
-        p_value = mcnemar_exact(pair.a == 1.0, pair.b == 1.0).p_value
-    else:
-        p_value = sign_flip_test(apart, seed)
+def _difference(
+    name: str,
+    method: str,
+    values: tuple[Array, Array],
+    clusters: NDArray[np.int64],
+    exact: bool,
+    family: int,
+    seed: int,
+    resamples: int,
+) -> Difference:
+    """Compare a method's values (N,) of a score with the reference's, by clusters (N,)."""
+    a, b = values
+    estimate = cluster_bootstrap(a - b, clusters, seed, resamples, CONFIDENCE)
+    means, reference_means = (cluster_means(v, clusters) for v in values)
+    apart = cluster_means(a - b, clusters)
+    better = apart if metric(name).higher_is_better else -apart
+    p_value = mcnemar_exact(a == 1.0, b == 1.0) if exact else sign_flip_test(apart, seed)
     single = math.isnan(estimate.low)
     return Difference(
-        metric=pair.metric,
+        metric=name,
         method=method,
         value=float(means.mean()),
         reference_value=float(reference_means.mean()),
         difference=estimate.value,
         low=None if single else estimate.low,
         high=None if single else estimate.high,
-        test=MCNEMAR if pair.exact else SIGN_FLIP,
+        test=MCNEMAR if exact else SIGN_FLIP,
         p_value=p_value,
         p_holm=p_value,
         wins=int(np.count_nonzero(better > 0.0)),
         losses=int(np.count_nonzero(better < 0.0)),
         ties=int(np.count_nonzero(better == 0.0)),
-        smallest=_smallest(apart, pair.exact, ALPHA / family),
+        smallest=_smallest(apart, exact, ALPHA / family),
     )
 
 
 def _smallest(apart: Array, exact: bool, alpha: float) -> float | None:
     """The least difference found with 80% power at alpha, the strictest level of Holm's steps.
 
-    Above what the test needs to be able to say anything at all; None where that is out of reach.
+    It is at least what the test can call significant at all; None where nothing is.
     """
     count = len(apart)
     if count < 2:

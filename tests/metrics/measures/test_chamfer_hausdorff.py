@@ -11,9 +11,12 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 from scipy.spatial.transform import Rotation
 
-from metrics.measures import chamfer_hausdorff as points
-from metrics.measures.chamfer_hausdorff import NearestDistances, nearest_distances, point_scores
-from metrics.measures.checks import EmptyError, NonFiniteError
+from metrics.measures.chamfer_hausdorff import (
+    NearestDistances,
+    f_score,
+    nearest_distances,
+    point_scores,
+)
 from scenegen.camera import back_project
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -124,35 +127,8 @@ def test_rigid_motion_changes_nothing_and_scale_scales(seed):
 
 def test_f_score_counts_strictly_and_survives_nothing_near():
     nearest = NearestDistances(np.array([0.1, 0.2]), np.array([0.1, 0.3]))
-    assert points.f_score(nearest, 0.1) == 0.0
-    assert points.f_score(nearest, 0.2) == 0.5
-    for bad in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match="threshold"):
-            points.f_score(nearest, bad)
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e101])
-@pytest.mark.parametrize("which", [0, 1])
-def test_non_finite_points_never_reach_a_tree(monkeypatch, bad, which):
-    monkeypatch.setattr(points, "query_nearest", lambda *_: pytest.fail("reached the tree"))
-    clouds = [np.zeros((5, 3)), np.zeros((5, 3))]
-    clouds[which][3, 1] = bad
-    clouds[which][4, 2] = bad
-    with pytest.raises(NonFiniteError, match=r"2 of 15 values .* at index \(3, 1\)") as caught:
-        nearest_distances(*clouds)
-    assert str(caught.value).startswith(("prediction", "truth")[which])
-
-
-def test_wrong_input_is_named():
-    good = np.zeros((2, 3))
-    with pytest.raises(EmptyError, match="prediction: the cloud has no points"):
-        nearest_distances(np.zeros((0, 3)), good)
-    with pytest.raises(EmptyError, match="truth: the cloud has no points"):
-        nearest_distances(good, np.zeros((0, 3)))
-    wrong = (np.zeros(3), np.zeros((2, 2)), np.zeros((2, 3, 1)), np.float64(1.0))
-    for bad in (*wrong, [["a"] * 3], good * 1j, good > 0, [[1, 2, 3], [1]], None, [[None] * 3]):
-        with pytest.raises(ValueError, match="truth"):
-            nearest_distances(good, bad)
+    assert f_score(nearest, 0.1) == 0.0
+    assert f_score(nearest, 0.2) == 0.5
 
 
 @pytest.mark.parametrize("backend", ["auto", "scipy"])
