@@ -131,9 +131,8 @@ def compare(
     metrics: tuple[str, ...],
     json_path: str | None,
     markdown: bool,
-    seed: int,
-    allow_incomparable: bool,
     overwrite: bool,
+    **settings: Any,
 ) -> None:
     """Compare methods with the first one, item by item.
 
@@ -147,12 +146,7 @@ def compare(
 
     if json_path:
         check_writable(Path(json_path), overwrite)
-    found = compare_files(
-        [read_scores(path) for path in scores],
-        metrics or None,
-        seed=seed,
-        allow_incomparable=allow_incomparable,
-    )
+    found = compare_files([read_scores(path) for path in scores], metrics or None, **settings)
     click.echo(text_report(found, markdown))
     if json_path:
         write_text(json_path, to_json(found), overwrite)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.comparison.pairing import ComparisonError, column, common_rows, require_same_test
+from metrics.comparison.pairing import column, common_rows, require_same_test
 from metrics.comparison.statistics import (
     SIGN_FLIPS,
     holm,
@@ -131,15 +131,35 @@ def compare(
     clusters = files[0].clusters[orders[0]]
     labels = distinct([f.method for f in files], [f.path.stem if f.path else "" for f in files])
     pairs = [(name, i) for name in names for i in range(1, len(files))]
-    found = []
-    for name, i in pairs:
-        values = column(files[i], name, orders[i]), column(files[0], name, orders[0])
+
+    def difference(name: str, i: int) -> Difference:
+        a, b = (column(files[k], name, orders[k]) for k in (i, 0))
+        estimate = cluster_bootstrap(a - b, clusters, seed, resamples, CONFIDENCE)
+        apart = cluster_means(a - b, clusters)
+        better = apart if metric(name).higher_is_better else -apart
         exact = files[0].task == "iqtt" and files[i].runs == files[0].runs == 1
-        found.append(
-            _difference(name, labels[i], values, clusters, exact, len(pairs), seed, resamples)
+        p_value = mcnemar_exact(a == 1.0, b == 1.0) if exact else sign_flip_test(apart, seed)
+        single = math.isnan(estimate.low)
+        return Difference(
+            metric=name,
+            method=labels[i],
+            value=float(cluster_means(a, clusters).mean()),
+            reference_value=float(cluster_means(b, clusters).mean()),
+            difference=estimate.value,
+            low=None if single else estimate.low,
+            high=None if single else estimate.high,
+            test=MCNEMAR if exact else SIGN_FLIP,
+            p_value=p_value,
+            p_holm=p_value,
+            wins=int(np.count_nonzero(better > 0.0)),
+            losses=int(np.count_nonzero(better < 0.0)),
+            ties=int(np.count_nonzero(better == 0.0)),
+            smallest=_smallest(apart, exact, ALPHA / len(pairs)),
         )
+
+    found = [difference(name, i) for name, i in pairs]
+    adjusted = holm([one.p_value for one in found]).tolist()
     count = len(np.unique(clusters))
-    adjusted = holm([difference.p_value for difference in found])
     return Comparison(
         task=files[0].task,
         truth_fingerprint=files[0].meta.truth_fingerprint,
@@ -147,49 +167,11 @@ def compare(
         methods=tuple(labels[1:]),
         items=len(clusters),
         clusters=count,
-        differences=tuple(
-            replace(d, p_holm=float(p)) for d, p in zip(found, adjusted, strict=True)
-        ),
+        differences=tuple(replace(d, p_holm=p) for d, p in zip(found, adjusted, strict=True)),
         comparable=all(file.comparable for file in files),
         notes=tuple(_notes(files, labels, len(clusters), count)),
         seed=seed,
         resamples=resamples,
-    )
-
-
-def _difference(
-    name: str,
-    method: str,
-    values: tuple[Array, Array],
-    clusters: NDArray[np.int64],
-    exact: bool,
-    family: int,
-    seed: int,
-    resamples: int,
-) -> Difference:
-    """Compare a method's values (N,) of a score with the reference's, by clusters (N,)."""
-    a, b = values
-    estimate = cluster_bootstrap(a - b, clusters, seed, resamples, CONFIDENCE)
-    means, reference_means = (cluster_means(v, clusters) for v in values)
-    apart = cluster_means(a - b, clusters)
-    better = apart if metric(name).higher_is_better else -apart
-    p_value = mcnemar_exact(a == 1.0, b == 1.0) if exact else sign_flip_test(apart, seed)
-    single = math.isnan(estimate.low)
-    return Difference(
-        metric=name,
-        method=method,
-        value=float(means.mean()),
-        reference_value=float(reference_means.mean()),
-        difference=estimate.value,
-        low=None if single else estimate.low,
-        high=None if single else estimate.high,
-        test=MCNEMAR if exact else SIGN_FLIP,
-        p_value=p_value,
-        p_holm=p_value,
-        wins=int(np.count_nonzero(better > 0.0)),
-        losses=int(np.count_nonzero(better < 0.0)),
-        ties=int(np.count_nonzero(better == 0.0)),
-        smallest=_smallest(apart, exact, ALPHA / family),
     )
 
 
@@ -240,6 +222,3 @@ def _notes(
             f"{clusters} scenes cannot show any difference: the least possible p-value is"
             f" {least_p_value(clusters):.3g}"
         )
-
-
-__all__ = ["Comparison", "ComparisonError", "Difference", "compare", "least_p_value"]

@@ -6,7 +6,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.measures.checks import EmptyError, as_float64, require, require_finite
+from metrics.measures.checks import as_float64, require, require_finite, require_some
 from metrics.measures.statistics import normal_quantile
 
 Array = NDArray[np.float64]
@@ -62,8 +62,7 @@ def mcnemar_exact(first_right: ArrayLike, second_right: ArrayLike) -> float:
     ok = a.dtype == b.dtype == np.bool_ and a.ndim == 1 and a.shape == b.shape
     found = f"{a.dtype} {a.shape} and {b.dtype} {b.shape}"
     require(ok, "answers", found, "two boolean arrays (Q,)")
-    if len(a) == 0:
-        raise EmptyError("answers", "no questions", "at least one")
+    require_some(len(a), "answers")
     only_a, only_b = int(np.count_nonzero(a & ~b)), int(np.count_nonzero(b & ~a))
     trials = only_a + only_b
     ways = tail = 1
@@ -113,8 +112,7 @@ def smallest_significant_fraction(questions: int, alpha: float = 0.05) -> float:
     It is d / questions, where d is the least number of discordant questions, all won by one method,
     with 2^(1 - d) <= alpha: 6 at 0.05. Above 1, so few questions can show no difference.
     """
-    if questions < 1:
-        raise EmptyError("questions", questions, "at least one")
+    require_some(questions, "questions")
     require(0.0 < alpha < 1.0, "alpha", alpha, "between 0 and 1")
     discordant = 1
     while 2.0 ** (1 - discordant) > alpha:
@@ -125,7 +123,6 @@ def smallest_significant_fraction(questions: int, alpha: float = 0.05) -> float:
 def _require_differences(differences: ArrayLike) -> Array:
     values = as_float64(differences, "differences")
     require(values.ndim == 1, "differences", f"shape {values.shape}", "(S,)")
-    if len(values) == 0:
-        raise EmptyError("differences", "none", "at least one")
+    require_some(len(values), "differences")
     require_finite(values, "differences")
     return values

@@ -4,7 +4,7 @@ Scores of different test sets never share a ranking. Scores that are not compara
 and so do the paper's figures, which were measured on the authors' data; neither has a rank.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -91,7 +91,7 @@ def _tables(
         title,
         {name: (name, column_head(name)) for name in names},
         [(label, file.comparable, file.metrics) for label, file in ranked],
-        _by_row((f, f.metric) for f in used),
+        _by_row(used, _figure_label, lambda figure: figure.metric),
         list(_notes([file for _, file in ranked], names)),
         ranked=True,
     )
@@ -108,7 +108,7 @@ def _tables(
                 f"{title}: {column_head(name)} by view angle",
                 {angle: (name, f"{angle}°") for angle in angles},
                 entries,
-                _by_row((f, str(f.view_angle)) for f in used),
+                _by_row(used, _figure_label, lambda figure: str(figure.view_angle)),
                 ["Angle between each view and its scene's first one. Rows as in the ranking."],
                 ranked=False,
             )
@@ -135,14 +135,19 @@ def _label(file: ScoreFile, name: str) -> str:
     return name + (f" ({'; '.join(told)})" if told else "") + mark
 
 
-def _by_row(figures: Iterable[tuple[Figure, str]]) -> dict[str, dict[str, Figure]]:
+def _by_row(
+    figures: Iterable[Figure], label: Callable[[Figure], str], key: Callable[[Figure], str]
+) -> dict[str, dict[str, Figure]]:
     """Figures of the paper by the label of their row, then by the key of their column."""
     rows: dict[str, dict[str, Figure]] = {}
-    for figure, key in figures:
-        labels = "" if figure.labels is None else f", {figure.labels} labels"
-        label = f"{figure.method}, {figure.data}{labels} (Table {figure.table}) {REPORTED_MARK}"
-        rows.setdefault(label, {})[key] = figure
+    for figure in figures:
+        rows.setdefault(f"{label(figure)} {REPORTED_MARK}", {})[key(figure)] = figure
     return rows
+
+
+def _figure_label(figure: Figure) -> str:
+    labels = "" if figure.labels is None else f", {figure.labels} labels"
+    return f"{figure.method}, {figure.data}{labels} (Table {figure.table})"
 
 
 def _notes(files: Sequence[ScoreFile], names: Sequence[str]) -> Iterator[str]:
@@ -167,18 +172,17 @@ def _notes(files: Sequence[ScoreFile], names: Sequence[str]) -> Iterator[str]:
 
 def _paper_table(table: PaperTable) -> Table:
     """A table of the paper on its own."""
-    keys: dict[str, None] = {}
-    rows: dict[str, dict[str, Figure]] = {}
-    for figure in table.figures:
-        key = metric(figure.metric).title
-        key += "" if figure.view_angle is None else f" {figure.view_angle}°"
-        key += "" if figure.labels is None else f", {figure.labels} labels"
-        keys[key] = None
-        label = f"{figure.method}, {figure.data} {REPORTED_MARK}"
-        rows.setdefault(label, {})[key] = figure
+
+    def key(figure: Figure) -> str:
+        angle = "" if figure.view_angle is None else f" {figure.view_angle}°"
+        labels = "" if figure.labels is None else f", {figure.labels} labels"
+        return metric(figure.metric).title + angle + labels
+
+    keys = tuple(dict.fromkeys(map(key, table.figures)))
+    rows = _by_row(table.figures, lambda figure: f"{figure.method}, {figure.data}", key)
     return Table(
         f"{SOURCE}, Table {table.number}: {REPORTED}. {table.caption}",
-        tuple(keys),
-        reported_rows(rows, tuple(keys)),
+        keys,
+        reported_rows(rows, keys),
         (f"{REPORTED_MARK} {REPORTED}. Unit: {table.unit}.", table.remark),
     )

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.measures.checks import EmptyError, as_float64, require, require_finite
+from metrics.measures.checks import as_float64, require, require_finite, require_some
 from metrics.measures.statistics import Estimate, wilson_interval
 
 CANDIDATES = 3
@@ -26,8 +26,7 @@ def answers_from_scores(scores: ArrayLike) -> NDArray[np.int64]:
     ok = table.ndim == 2 and table.shape[1] == CANDIDATES
     require(ok, "scores", f"shape {table.shape}", f"(Q, {CANDIDATES})")
     require_finite(table, "scores")
-    if len(table) == 0:
-        raise EmptyError("scores", "no questions", "at least one")
+    require_some(len(table), "scores")
     tied = np.count_nonzero(table == table.max(axis=1, keepdims=True), axis=1) > 1
     return np.where(tied, ABSTAINED, table.argmax(axis=1))
 
@@ -56,8 +55,7 @@ def _require_answers(values: ArrayLike, what: str, least: int) -> NDArray[np.int
     array = np.asarray(values)
     ok = array.ndim == 1 and (not array.size or array.dtype.kind in "iu")
     require(ok, what, f"{array.dtype} {array.shape}", "integers of shape (Q,)")
-    if array.size == 0:
-        raise EmptyError(what, "no questions", "at least one")
+    require_some(array.size, what)
     wrong = (array < least) | (array >= CANDIDATES)
     first = int(np.argmax(wrong))
     found = f"{np.count_nonzero(wrong)} of {len(array)} others, first {array[first]} at {first}"

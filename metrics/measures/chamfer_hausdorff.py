@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.measures.checks import EmptyError, as_float64, require, require_finite
+from metrics.measures.checks import as_float64, require, require_finite, require_some
 
 Backend = Literal["auto", "pykdtree", "scipy"]
 
@@ -90,8 +90,7 @@ def _import_pykdtree(required: bool) -> Any:
 def _require_cloud(points: ArrayLike, what: str) -> NDArray[np.float64]:
     cloud = np.ascontiguousarray(as_float64(points, what))
     require(cloud.ndim == 2 and cloud.shape[1] == 3, what, f"shape {cloud.shape}", "(N, 3)")
-    if len(cloud) == 0:
-        raise EmptyError(what, "no points", "at least one")
+    require_some(len(cloud), what)
     require_finite(cloud, what)
     return cloud
 
@@ -184,14 +183,9 @@ def point_scores(
     nearest: NearestDistances, f_score_thresholds: Sequence[float] = ()
 ) -> dict[str, float]:
     """Return every score of this module by name; F-scores as `f_score_<threshold>`."""
-    named = {
-        "chamfer": chamfer(nearest),
-        "accuracy_distance": accuracy_distance(nearest),
-        "completeness_distance": completeness_distance(nearest),
-        "chamfer_squared": chamfer_squared(nearest),
-        "hausdorff": hausdorff(nearest),
-        "hausdorff_forward": hausdorff_forward(nearest),
-        "hausdorff_reverse": hausdorff_reverse(nearest),
-        "hausdorff_95": hausdorff_95(nearest),
-    }
+    scores = (
+        *(chamfer, accuracy_distance, completeness_distance, chamfer_squared),
+        *(hausdorff, hausdorff_forward, hausdorff_reverse, hausdorff_95),
+    )
+    named = {score.__name__: score(nearest) for score in scores}
     return named | {f"f_score_{t:g}": f_score(nearest, t) for t in f_score_thresholds}

@@ -31,6 +31,12 @@ def require(ok: bool, where: str, found: object, expected: str) -> None:
         raise MeasureError(where, found, expected)
 
 
+def require_some(count: int, where: str) -> None:
+    """Raise EmptyError where there is nothing to score."""
+    if count < 1:
+        raise EmptyError(where, "none", "at least one")
+
+
 def as_float64(values: ArrayLike, what: str) -> NDArray[np.float64]:
     """Return real numbers as a float64 array.
 
@@ -71,8 +77,7 @@ def require_mask(mask: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.
     inside = np.asarray(mask)
     ok = inside.dtype == np.bool_ and inside.shape == shape
     require(ok, "mask", f"{inside.dtype} {inside.shape}", f"bool {shape}")
-    if not inside.any():
-        raise EmptyError("mask", "no pixel", "at least one")
+    require_some(int(np.count_nonzero(inside)), "mask")
     return inside
 
 

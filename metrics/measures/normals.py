@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from metrics.measures.checks import (
-    EmptyError,
     NoDirectionError,
     as_float64,
     require,
     require_finite,
     require_fov,
     require_mask,
+    require_some,
 )
 from scenegen.camera import back_project
 
@@ -77,8 +77,7 @@ def normal_scores(angles: Array) -> dict[str, float]:
     degrees. Source: Fouhey et al. 2013 (Data-Driven 3D Primitives). Raises EmptyError without
     angles.
     """
-    if angles.size == 0:
-        raise EmptyError("angles", "none", "at least one")
+    require_some(angles.size, "angles")
     require_finite(angles, "angles")
     scores = {
         "normal_mean_degrees": float(angles.mean()),

@@ -7,7 +7,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.measures.checks import EmptyError, as_float64, require, require_finite
+from metrics.measures.checks import as_float64, require, require_finite, require_some
 
 Array = NDArray[np.float64]
 
@@ -34,8 +34,7 @@ def wilson_interval(successes: int, n: int, confidence: float = 0.95) -> tuple[f
     with scipy.stats.binomtest, which rounds the last digit differently for most k and n; score
     files would change if it took the place of this formula.
     """
-    if n <= 0:
-        raise EmptyError("trials", n, "at least one")
+    require_some(n, "trials")
     require(0 <= successes <= n, "successes", successes, f"0 to {n}")
     z = normal_quantile(confidence)
     middle, total = successes + z * z / 2.0, n + z * z
@@ -63,8 +62,7 @@ def cluster_means(values: ArrayLike, clusters: ArrayLike) -> Array:
     table, labels = as_float64(values, "values"), np.asarray(clusters)
     ok = table.ndim in (1, 2) and labels.shape == table.shape[:1]
     require(ok, "cluster labels", f"shape {labels.shape}", f"one for each value of {table.shape}")
-    if len(table) == 0:
-        raise EmptyError("values", "none", "at least one")
+    require_some(len(table), "values")
     require_finite(table, "values")
     names, index = np.unique(labels, return_inverse=True)
     sums = np.zeros((len(names), *table.shape[1:]))

@@ -130,7 +130,7 @@ def test_answers_averaged_over_runs_go_by_sign_flips():
     assert d.test == "sign flips"
     assert d.difference == pytest.approx((mean - one).mean())
     assert d.verdict == "better"
-    assert any(n.startswith("three: means over 3 training runs") for n in found.notes)
+    assert any("three" in note and "3 training runs" in note for note in found.notes)
     # Even where all runs agree, so that every mean is 0 or 1.
     agreeing = iqtt_scores("three", one, runs=3)
     assert compare([files[0], agreeing]).differences[0].test == "sign flips"
@@ -156,7 +156,7 @@ def test_too_few_scenes_can_show_nothing(scenes, may):
     assert d.p_value == least_p_value(scenes)
     assert (d.smallest is not None, d.verdict == "worse") == (may, may)
     assert (d.low is None) == (scenes == 1)
-    assert any(f"{scenes} scenes cannot show any" in note for note in found.notes) != may
+    assert (len(found.notes) == 0) == may
 
 
 def test_methods_of_one_name_are_told_apart_and_one_submission_noticed():
@@ -165,9 +165,9 @@ def test_methods_of_one_name_are_told_apart_and_one_submission_noticed():
     found = compare(files, ["chamfer"])
     assert (found.reference, found.methods) == ("m [first]", ("m [worse]",))
     again = compare([first, replace(other, meta=first.meta)], ["chamfer"])
-    assert "worse and first were scored from the same submission" in again.notes
+    assert any("worse and first" in note for note in again.notes)
     claimed = compare([first, replace(other, alignment="scale")], ["chamfer"])
-    assert any(note.startswith("worse claims its depth only when scaled") for note in claimed.notes)
+    assert any("worse" in note and "scaled" in note for note in claimed.notes)
     assert found.notes == ()
 
 

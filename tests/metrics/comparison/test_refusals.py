@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from made_scores import iqtt_scores, rooms_scores
 
-from metrics.comparison.compare import ComparisonError, compare
+from metrics.comparison.compare import compare
+from metrics.comparison.pairing import ComparisonError
 from metrics.scoring.metric_names import UnknownMetricError
 
 SCENES = [0, 0, 1, 1, 2, 2]

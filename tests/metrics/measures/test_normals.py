@@ -72,16 +72,6 @@ def test_a_plane_has_its_normal_everywhere(tilt, turn, distance):
     assert on_surface.all() or tilt > 60.0
 
 
-def test_a_tilted_prediction_scores_ten_degrees():
-    normals = [
-        normals_from_depth(plane_depth(unit([0.0, np.sin(a), np.cos(a)]), 2.0), FOV)[0]
-        for a in np.radians([30.0, 40.0])
-    ]
-    scores = normal_scores(angular_errors_degrees(*normals))
-    assert scores["normal_mean_degrees"] == pytest.approx(10.0, abs=1e-8)
-    assert scores["normal_within_11.25"] == 1.0
-
-
 def test_normals_solve_the_least_squares_problem():
     depth = 2.0 + 0.003 * np.random.default_rng(1).random((8, 8))
     normals, _ = normals_from_depth(depth, FOV)
