@@ -22,9 +22,7 @@ SEED = click.option(
 )
 
 
-@click.command(
-    epilog="\b\nExample:\n  bench score predictions.h5 --json mine.json --html mine.html"
-)
+@click.command(epilog=EXAMPLE + "bench score predictions.h5 --json mine.json --html mine.html")
 @click.argument("submissions", nargs=-1, required=True, metavar="PREDICTIONS...")
 @TRUTH
 @click.option("--json", "json_path", help="Write the means and the scores of all items here.")
@@ -153,7 +151,7 @@ def compare(
 
 
 @click.command(
-    epilog="\b\nExample:\n  bench leaderboard baseline.json mine.json --format html --out b.html"
+    epilog=EXAMPLE + "bench leaderboard baseline.json mine.json --format html --out b.html"
 )
 @click.argument("scores", nargs=-1, metavar="[SCORES.json]...")
 @click.option(

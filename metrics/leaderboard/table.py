@@ -23,21 +23,14 @@ class Cell:
     Attributes:
         value: the score with 4 significant digits, or a figure of the paper as printed; "-" where
             there is none.
-        interval: such as "[0.1, 0.2]", or empty.
-        spread: the standard deviation over runs, or what the paper prints after "±"; or empty.
+        rest: what follows the value, such as " ± 0.01 [0.1, 0.2]": the standard deviation over runs
+            (or what the paper prints after "±"), and the interval; or empty.
         best: whether no ranked score of the column is better, as far as the shown digits tell.
     """
 
     value: str = "-"
-    interval: str = ""
-    spread: str = ""
+    rest: str = ""
     best: bool = False
-
-    @property
-    def rest(self) -> str:
-        """What stands behind the value: its spread and its interval, each after a space."""
-        spread = f" ± {self.spread}" if self.spread else ""
-        return f"{spread} {self.interval}".rstrip()
 
 
 @dataclass(frozen=True)
@@ -120,14 +113,16 @@ def reported_rows(
     figures: Mapping[str, Mapping[str, Figure]], keys: Sequence[str]
 ) -> tuple[Row, ...]:
     """Return a row of the paper's figures, as printed, for each label."""
-    none = Cell()
+
+    def cell(figure: Figure | None) -> Cell:
+        if figure is None:
+            return Cell()
+        return Cell(figure.text, f" ± {figure.spread}" if figure.spread else "")
+
     return tuple(
-        Row("", label, "reported", tuple(
-            Cell(found[key].text, spread=found[key].spread) if key in found else none
-            for key in keys
-        ))
+        Row("", label, "reported", tuple(cell(found.get(key)) for key in keys))
         for label, found in figures.items()
-    )  # fmt: skip
+    )
 
 
 def column_head(name: str) -> str:
@@ -147,5 +142,5 @@ def _cell(score: Score | None, best: str | Literal[False]) -> Cell:
     if score is None:
         return Cell()
     value, interval = interval_cells(score)
-    spread = "" if score.std is None else number(score.std, score.value)
-    return Cell(value, interval.removeprefix("-"), spread, value == best)
+    spread = "" if score.std is None else f" ± {number(score.std, score.value)}"
+    return Cell(value, spread + ("" if interval == "-" else f" {interval}"), value == best)

@@ -39,7 +39,7 @@ def test_ranks_and_best_cells():
         "c": [False, True, False],
     }
     assert table.columns[0] == "Chamfer ↓ (scene unit)"
-    assert by_label(table)["a"].cells[0].interval == "[0.0900, 0.1100]"
+    assert by_label(table)["a"].cells[0].rest == " [0.0900, 0.1100]"
     assert table.title == "Rooms, truth 0123456789ab"
     assert len(leaderboard(files, paper=False)) == 1
 
@@ -107,7 +107,7 @@ def test_labels_tell_runs_and_claims():
     table = leaderboard([several, rooms("b")], paper=False)[0]
     row = table.rows[0]
     assert row.label == "a (3 runs; claims depth when scaled and shifted)"
-    assert row.cells[0].spread == "0.0020"
+    assert row.cells[0].rest.startswith(" ± 0.0020 [")
     floor = replace(several, meta=replace(several.meta, chamfer_floor=0.0123, confidence=0.9))
     notes = leaderboard([floor, rooms("b")], paper=False)[0].notes
     assert "Noise floor of Chamfer at this resolution: 0.01230 scene units." in notes
@@ -165,4 +165,4 @@ def test_figures_of_other_scores_or_angles_do_not_slip_into_a_ranking():
     assert [row.kind for row in alone.rows] == ["ranked"]
     people = leaderboard([iqtt_scores("a", [1])])[0]
     cell = by_label(people)["Human Evaluation, 3D-IQTT, 0 labels (Table 3) †"].cells[0]
-    assert (cell.value, cell.spread) == ("0.7329", "0.148")
+    assert (cell.value, cell.rest) == ("0.7329", " ± 0.148")
