@@ -10,6 +10,7 @@ from made_scores import iqtt_scores, rooms_scores
 from scipy.stats import binomtest, norm
 
 from metrics.comparison.compare import Difference, compare, least_p_value
+from metrics.comparison.statistics import holm
 from metrics.measures.statistics import cluster_bootstrap
 
 SCENES = np.repeat(np.arange(8), 2)
@@ -29,15 +30,6 @@ def three_methods(views=2, scenes=8):
         rooms_scores(name, {"chamfer": column, "f_score_0.05": np.exp(-column)}, labels)
         for name, column in columns.items()
     ]
-
-
-def holm_by_definition(p_values):
-    """Step by step, as the paper of 1979 has it."""
-    adjusted = {}
-    for rank, i in enumerate(np.argsort(p_values, kind="stable")):
-        before = max(adjusted.values(), default=0.0)
-        adjusted[i] = max(before, min(1.0, (len(p_values) - rank) * p_values[i]))
-    return [adjusted[i] for i in range(len(p_values))]
 
 
 def test_distances_by_brute_force():
@@ -66,8 +58,8 @@ def test_distances_by_brute_force():
         assert (d.wins, d.losses, d.ties) == (better.sum(), (~better).sum(), 0)
         reach = norm.ppf(1 - 0.05 / 4 / 2) + norm.ppf(0.8)
         assert d.smallest == pytest.approx(reach * apart.std(ddof=1) / np.sqrt(8), rel=1e-6)
-    expected = holm_by_definition([d.p_value for d in found.differences])
-    assert [d.p_holm for d in found.differences] == pytest.approx(expected)
+    expected = holm([d.p_value for d in found.differences])
+    assert [d.p_holm for d in found.differences] == expected.tolist()
     assert [d.verdict for d in found.differences] == ["worse", "not shown", "worse", "not shown"]
 
 
