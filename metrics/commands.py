@@ -1,4 +1,7 @@
-"""The `bench` commands: parse, one library call, print. Heavy imports happen inside them."""
+"""The `bench` commands that score: each parses its options, makes one library call, and prints.
+
+Heavy imports happen inside the commands, so that `--help` is fast.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -7,30 +10,46 @@ import click
 
 from scenegen.common.command_line import OVERWRITE, progress_bar
 
+EXAMPLE = "\b\nExample:\n  "  # click keeps the line breaks of a paragraph that begins with \b
+TRUTH = click.option(
+    "--truth",
+    help="The rooms file or the file of answers to score against [default: the file that the"
+    " submission names].",
+)
+MARKDOWN = click.option("--markdown", is_flag=True, help="Print Markdown instead of aligned text.")
+SEED = click.option(
+    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the bootstrap."
+)
 
-@click.command()
+
+@click.command(epilog=EXAMPLE + "bench score predictions.h5 --json mine.json --html mine.html")
 @click.argument("submissions", nargs=-1, required=True, metavar="PREDICTIONS...")
-@click.option("--truth", help="Rooms file, or answers [default: as the submission says].")
-@click.option("--json", "json_path", help="Write the scores of all items, and their means.")
-@click.option("--csv", "csv_path", help="Write the scores of every item as a table.")
-@click.option("--html", "html_path", help="Write a page with distributions and pictures.")
-@click.option("--markdown", is_flag=True, help="Print Markdown.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Bootstrap.")
+@TRUTH
+@click.option("--json", "json_path", help="Write the means and the scores of all items here.")
+@click.option("--csv", "csv_path", help="Write a table of the scores of every item here.")
+@click.option("--html", "html_path", help="Write a page with distributions and pictures here.")
+@MARKDOWN
+@SEED
 @click.option(
     "--resamples", type=click.IntRange(100, 100_000), default=2000, show_default=True,
-    help="Of the bootstrap.",
+    help="How many resamples the bootstrap draws.",
 )  # fmt: skip
 @click.option(
-    "--allow-partial", is_flag=True, help="Score the rows that are there; not comparable."
+    "--allow-partial",
+    is_flag=True,
+    help="Score only the rows that are predicted; the scores are then not comparable.",
 )
 @click.option(
     "--non-finite",
     type=click.Choice(["error", "penalise"]),
     default="error",
     show_default=True,
-    help="Values that are not finite: refuse, or score at the worst; not comparable.",
+    help="Refuse values that are not finite, or score them as the worst possible; the scores are"
+    " then not comparable.",
 )
-@click.option("--processes", type=click.IntRange(1), help="[default: one a core]")
+@click.option(
+    "--processes", type=click.IntRange(1), help="How many processes score [default: one a core]."
+)
 @OVERWRITE
 def score(
     submissions: tuple[str, ...],
@@ -42,43 +61,42 @@ def score(
     overwrite: bool,
     **settings: Any,
 ) -> None:
-    """Score a submission, or several runs of one method, and print a table."""
-    from metrics.report import text as report
+    """Score a submission, or several training runs of one method, and print a table."""
+    from metrics.report.text import text_report, write_csv
+    from metrics.score_file import write_scores
     from metrics.scoring.runs import Settings
     from metrics.scoring.scoring import count_rows
     from metrics.scoring.scoring import score as score_files
     from scenegen.common.errors import SpecError
-    from scenegen.common.new_file import check_writable, written_beside
+    from scenegen.common.new_file import check_writable, write_text
 
     outputs = [Path(path) for path in (json_path, csv_path, html_path) if path]
     for path in outputs:
         check_writable(path, overwrite)
     if len({path.resolve() for path in outputs}) < len(outputs):
-        raise SpecError(f"outputs: found {', '.join(map(str, outputs))}, expected different files")
+        raise SpecError("outputs", ", ".join(map(str, outputs)), "different files")
     with progress_bar(count_rows(submissions[0]), "image") as bar:
         found = score_files(submissions, truth, Settings(**settings), bar.update)
-    click.echo(report.markdown_report(found) if markdown else report.table(found))
+    click.echo(text_report(found, markdown))
     if json_path:
-        from metrics.score_file import write_scores
-
         write_scores(found, json_path, overwrite)
     if csv_path:
-        report.write_csv(found, csv_path, overwrite)
+        write_csv(found, csv_path, overwrite)
     if html_path:
         from metrics.report.page import html_report
 
         page = html_report(found, Path(found.meta.truth_path), [Path(p) for p in submissions])
-        with written_beside(html_path, overwrite) as temporary:
-            temporary.write_text(page, encoding="utf-8")
+        write_text(html_path, page, overwrite)
 
 
-@click.command()
+@click.command(epilog=EXAMPLE + "bench validate predictions.h5 --truth rooms.h5")
 @click.argument("submission", metavar="PREDICTIONS")
-@click.option("--truth", help="Rooms file, or answers [default: as the submission says].")
+@TRUTH
 @click.pass_context
 def validate(ctx: click.Context, submission: str, truth: str | None) -> None:
-    """Say everything that is wrong with a submission, and what it looks like; exits with 2 if it
-    cannot be scored.
+    """List everything that is wrong with a submission, and hints at likely mistakes.
+
+    The exit code is 2 if the submission cannot be scored.
     """
     from metrics.submissions.validation import validate as problems_of
 
@@ -91,56 +109,68 @@ def validate(ctx: click.Context, submission: str, truth: str | None) -> None:
     ctx.exit(2 if wrong else 0)
 
 
-@click.command()
+@click.command(epilog=EXAMPLE + "bench compare baseline.json mine.json --metric chamfer")
 @click.argument("scores", nargs=-1, required=True, metavar="REFERENCE.json OTHER.json...")
-@click.option("--metric", "metrics", multiple=True, help="Scores to compare [default: headline].")
-@click.option("--json", "json_path", help="Write the comparison.")
-@click.option("--markdown", is_flag=True, help="Print Markdown.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Bootstrap.")
-@click.option("--allow-incomparable", is_flag=True, help="Compare the rows that all hold.")
+@click.option(
+    "--metric", "metrics", multiple=True,
+    help="A score to compare; may be repeated [default: the headline scores].",
+)  # fmt: skip
+@click.option("--json", "json_path", help="Write the comparison here.")
+@MARKDOWN
+@SEED
+@click.option(
+    "--allow-incomparable",
+    is_flag=True,
+    help="Compare files that say that they are not comparable, over the rows that all have.",
+)
 @OVERWRITE
 def compare(
     scores: tuple[str, ...],
     metrics: tuple[str, ...],
     json_path: str | None,
     markdown: bool,
-    seed: int,
-    allow_incomparable: bool,
     overwrite: bool,
+    **settings: Any,
 ) -> None:
-    """Compare methods with the first, item by item: differences, tests, and what could show."""
-    from metrics.comparison import report as compare_report
+    """Compare methods with the first one, item by item.
+
+    Prints the differences, their confidence intervals and significance tests, and the smallest
+    difference that the test set could show.
+    """
     from metrics.comparison.compare import compare as compare_files
+    from metrics.comparison.report import text_report, to_json
     from metrics.score_file import read_scores
-    from scenegen.common.new_file import check_writable, written_beside
+    from scenegen.common.new_file import check_writable, write_text
 
     if json_path:
         check_writable(Path(json_path), overwrite)
-    found = compare_files(
-        [read_scores(path) for path in scores],
-        metrics or None,
-        seed=seed,
-        allow_incomparable=allow_incomparable,
-    )
-    click.echo(compare_report.markdown_report(found) if markdown else compare_report.table(found))
+    found = compare_files([read_scores(path) for path in scores], metrics or None, **settings)
+    click.echo(text_report(found, markdown))
     if json_path:
-        with written_beside(json_path, overwrite) as temporary:
-            temporary.write_text(compare_report.to_json(found), encoding="utf-8")
+        write_text(json_path, to_json(found), overwrite)
 
 
-@click.command()
+@click.command(
+    epilog=EXAMPLE + "bench leaderboard baseline.json mine.json --format html --out b.html"
+)
 @click.argument("scores", nargs=-1, metavar="[SCORES.json]...")
-@click.option("--metric", "metrics", multiple=True, help="Columns, the first to rank by.")
+@click.option(
+    "--metric", "metrics", multiple=True,
+    help="A score to show; may be repeated, and the first one ranks [default: the headline"
+    " scores].",
+)  # fmt: skip
 @click.option(
     "--format",
     "form",
     type=click.Choice(["markdown", "html", "latex"]),
     default="markdown",
     show_default=True,
-    help="Of what is printed or written.",
+    help="Format of the tables.",
 )
 @click.option("--out", help="Write to this file instead of printing.")
-@click.option("--paper/--no-paper", default=True, help="The paper's own figures [default: yes].")
+@click.option(
+    "--paper/--no-paper", default=True, help="Show the paper's own figures [default: yes]."
+)
 @OVERWRITE
 def leaderboard(
     scores: tuple[str, ...],
@@ -150,23 +180,25 @@ def leaderboard(
     paper: bool,
     overwrite: bool,
 ) -> None:
-    """Put score files into tables, beside what the paper reported on its own data."""
-    from metrics.leaderboard import text as leaderboard_text
-    from metrics.leaderboard.leaderboard import leaderboard as rank
-    from metrics.score_file import read_scores
-    from scenegen.common.new_file import written_beside
+    """Rank score files in one table for each test set.
 
-    board = rank([read_scores(path) for path in scores], metrics or None, paper=paper)
-    text: str = getattr(leaderboard_text, f"to_{form}")(board)
+    What the paper reported on its own data stands beside, without a rank.
+    """
+    from metrics.leaderboard import text
+    from metrics.leaderboard.ranking import leaderboard as rank
+    from metrics.score_file import read_scores
+    from scenegen.common.new_file import write_text
+
+    tables = rank([read_scores(path) for path in scores], metrics or None, paper=paper)
+    page: str = getattr(text, f"to_{form}")(tables)
     if out is None:
-        click.echo(text)
+        click.echo(page)
         return
-    with written_beside(out, overwrite) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_text(out, page, overwrite)
     click.echo(f"{out}: {len(scores)} score files")
 
 
-@click.command("describe-format")
+@click.command("describe-format", epilog=EXAMPLE + "bench describe-format")
 def describe_format() -> None:
     """Print the format of submissions, and how to write one."""
     from metrics.submissions.layout import describe_format as text

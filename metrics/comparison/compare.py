@@ -1,8 +1,9 @@
-"""Do two methods differ? Paired comparison of score files over the same images or questions.
+"""Paired comparison of score files over the same images or questions.
 
-Each file is compared with the first one. All pairs would ask more questions than people do ("is
-mine better than these?"), and the correction for their number would hide differences that are
-there. Whoever wants another reference puts it first.
+Each file is compared with the first one, the reference. Comparing all pairs would test more than
+the usual question, whether one method differs from each of some others, and the correction for the
+number of tests would hide differences that are there. To compare with another reference, put it
+first.
 """
 
 import math
@@ -12,17 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.comparison.pairing import ComparisonError, column, common_rows, require_same_test
+from metrics.comparison.pairing import column, common_rows, require_same_test
 from metrics.comparison.statistics import (
     SIGN_FLIPS,
     holm,
     mcnemar_exact,
-    paired_bootstrap,
     sign_flip_test,
     smallest_detectable_difference,
     smallest_significant_fraction,
 )
-from metrics.measures.statistics import RESAMPLES, cluster_means
+from metrics.measures.statistics import RESAMPLES, cluster_bootstrap, cluster_means
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import ScoreFile
 from scenegen.common.text_table import distinct, plain
@@ -38,7 +38,7 @@ class Difference:
 
     Attributes:
         metric: name of the score.
-        method: as listed in `Comparison.methods`.
+        method: its name in `Comparison.methods`.
         value, reference_value: means over the rows that are compared, in the score's unit.
         difference: value - reference_value.
         low, high: its 95% interval, not corrected for the number of comparisons; None for a single
@@ -48,7 +48,7 @@ class Difference:
         p_holm: corrected for all comparisons of the family.
         wins, losses, ties: scenes (or questions) in which the method is better, worse, the same.
         smallest: the least difference that this test set would have shown in 80% of cases, given
-            how the differences spread; None where it could show none, or nothing spreads.
+            how the differences spread; None where it could show none, or all differences are equal.
     """
 
     metric: str
@@ -81,14 +81,15 @@ class Comparison:
 
     Attributes:
         task: "rooms" or "iqtt".
-        truth_fingerprint: of their test set.
+        truth_fingerprint: fingerprint of their test set.
         reference: name of the first file's method.
-        methods: names of the others, told apart.
-        items, clusters: images and scenes compared; both the questions for questions.
-        differences: by metric, then by method.
+        methods: names of the others; equal names are made distinct.
+        items, clusters: how many images and scenes were compared; for questions both are their
+            number.
+        differences: one for each score and method, ordered by score, then by method.
         comparable: False where a file says that it is not, and was compared all the same.
-        notes: for a person.
-        seed, resamples: of intervals and random sign flips.
+        notes: what a reader has to know, in sentences.
+        seed, resamples: of the bootstrap; the seed is that of random sign flips, too.
     """
 
     task: str
@@ -116,10 +117,10 @@ def compare(
 
     Args:
         files: two or more, of one test set.
-        metrics: names; else `metric_names.HEADLINE` of the task. All of them times all later files
-            are the family that Holm's correction goes by, so name what you mean to ask.
-        seed: of the bootstrap and of random sign flips.
-        resamples: of the bootstrap.
+        metrics: the scores to compare; None means `metric_names.HEADLINE` of the task. Holm's
+            correction is for the number of these scores times that of the later files.
+        seed: seed of the bootstrap and of random sign flips.
+        resamples: how many resamples the bootstrap draws.
         allow_incomparable: compare files that say that they are not comparable, over the rows that
             all of them hold.
 
@@ -130,14 +131,35 @@ def compare(
     clusters = files[0].clusters[orders[0]]
     labels = distinct([f.method for f in files], [f.path.stem if f.path else "" for f in files])
     pairs = [(name, i) for name in names for i in range(1, len(files))]
-    found = []
-    for name, i in pairs:
+
+    def difference(name: str, i: int) -> Difference:
         a, b = (column(files[k], name, orders[k]) for k in (i, 0))
+        estimate = cluster_bootstrap(a - b, clusters, seed, resamples, CONFIDENCE)
+        apart = cluster_means(a - b, clusters)
+        better = apart if metric(name).higher_is_better else -apart
         exact = files[0].task == "iqtt" and files[i].runs == files[0].runs == 1
-        pair = _Pair(name, a, b, clusters, exact)
-        found.append(_difference(pair, labels[i], len(pairs), seed, resamples))
+        p_value = mcnemar_exact(a == 1.0, b == 1.0) if exact else sign_flip_test(apart, seed)
+        single = math.isnan(estimate.low)
+        return Difference(
+            metric=name,
+            method=labels[i],
+            value=float(cluster_means(a, clusters).mean()),
+            reference_value=float(cluster_means(b, clusters).mean()),
+            difference=estimate.value,
+            low=None if single else estimate.low,
+            high=None if single else estimate.high,
+            test=MCNEMAR if exact else SIGN_FLIP,
+            p_value=p_value,
+            p_holm=p_value,
+            wins=int(np.count_nonzero(better > 0.0)),
+            losses=int(np.count_nonzero(better < 0.0)),
+            ties=int(np.count_nonzero(better == 0.0)),
+            smallest=_smallest(apart, exact, ALPHA / len(pairs)),
+        )
+
+    found = [difference(name, i) for name, i in pairs]
+    adjusted = holm([one.p_value for one in found]).tolist()
     count = len(np.unique(clusters))
-    adjusted = holm([difference.p_value for difference in found])
     return Comparison(
         task=files[0].task,
         truth_fingerprint=files[0].meta.truth_fingerprint,
@@ -145,9 +167,7 @@ def compare(
         methods=tuple(labels[1:]),
         items=len(clusters),
         clusters=count,
-        differences=tuple(
-            replace(d, p_holm=float(p)) for d, p in zip(found, adjusted, strict=True)
-        ),
+        differences=tuple(replace(d, p_holm=p) for d, p in zip(found, adjusted, strict=True)),
         comparable=all(file.comparable for file in files),
         notes=tuple(_notes(files, labels, len(clusters), count)),
         seed=seed,
@@ -155,49 +175,10 @@ def compare(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Pair:
-    """A method's values (N,) of a score beside the reference's, and the clusters they lie in."""
-
-    metric: str
-    a: Array
-    b: Array
-    clusters: NDArray[np.int64]
-    exact: bool
-
-
-def _difference(pair: _Pair, method: str, family: int, seed: int, resamples: int) -> Difference:
-    estimate = paired_bootstrap(pair.a, pair.b, pair.clusters, seed, resamples, CONFIDENCE)
-    means, reference_means = (cluster_means(v, pair.clusters) for v in (pair.a, pair.b))
-    apart = cluster_means(pair.a - pair.b, pair.clusters)
-    better = apart if metric(pair.metric).higher_is_better else -apart
-    if pair.exact:
-        p_value = mcnemar_exact(pair.a == 1.0, pair.b == 1.0).p_value
-    else:
-        p_value = sign_flip_test(apart, seed)
-    single = math.isnan(estimate.low)
-    return Difference(
-        metric=pair.metric,
-        method=method,
-        value=float(means.mean()),
-        reference_value=float(reference_means.mean()),
-        difference=estimate.value,
-        low=None if single else estimate.low,
-        high=None if single else estimate.high,
-        test=MCNEMAR if pair.exact else SIGN_FLIP,
-        p_value=p_value,
-        p_holm=p_value,
-        wins=int(np.count_nonzero(better > 0.0)),
-        losses=int(np.count_nonzero(better < 0.0)),
-        ties=int(np.count_nonzero(better == 0.0)),
-        smallest=_smallest(apart, pair.exact, ALPHA / family),
-    )
-
-
 def _smallest(apart: Array, exact: bool, alpha: float) -> float | None:
     """The least difference found with 80% power at alpha, the strictest level of Holm's steps.
 
-    Above what the test needs to be able to say anything at all; None where that is out of reach.
+    It is at least what the test can call significant at all; None where nothing is.
     """
     count = len(apart)
     if count < 2:
@@ -241,6 +222,3 @@ def _notes(
             f"{clusters} scenes cannot show any difference: the least possible p-value is"
             f" {least_p_value(clusters):.3g}"
         )
-
-
-__all__ = ["Comparison", "ComparisonError", "Difference", "compare", "least_p_value"]

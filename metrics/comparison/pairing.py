@@ -1,4 +1,4 @@
-"""Score files that may be compared, and their entries for the same images or questions."""
+"""Which score files may be compared, and where each of them has the same images or questions."""
 
 from collections.abc import Sequence
 
@@ -22,54 +22,61 @@ class ComparisonError(SceneGenError):
 def require_same_test(
     files: Sequence[ScoreFile], metrics: Sequence[str] | None, allow_incomparable: bool
 ) -> tuple[str, ...]:
-    """The metrics' names, if the files are of one test set and may be compared."""
+    """Return the names of the scores to compare, if the files are of one test set.
+
+    Raises ComparisonError where they are not, or where one of them says that it is not comparable
+    and that is not allowed, and UnknownMetricError.
+    """
     if len(files) < 2:
-        raise ComparisonError(f"found {len(files)} score file, expected two or more to compare")
+        raise ComparisonError("comparison", f"{len(files)} score file", "two or more")
     first = files[0]
     for file in files:
-        _require_same("task", file, file.task, first, first.task)
-        truths = (f.meta.truth_fingerprint for f in (file, first))
-        _require_same("truth", file, next(truths), first, next(truths))
+        for what, found, expected in (
+            ("task", file.task, first.task),
+            ("truth", file.meta.truth_fingerprint, first.meta.truth_fingerprint),
+        ):
+            if found != expected:
+                raise ComparisonError(
+                    file.place,
+                    f"scores of {what} {plain(found)[:12]}",
+                    f"{plain(expected)[:12]} as in {first.place}",
+                    "only scores of one test set compare",
+                )
         if not file.comparable and not allow_incomparable:
-            why = f" ({plain(file.meta.warnings[0])})" if file.meta.warnings else ""
+            why = f": {plain(file.meta.warnings[0])}" if file.meta.warnings else ""
             raise ComparisonError(
-                f"{file.place}: says that it is not comparable{why}; score all rows without"
-                " penalties, or say --allow-incomparable"
+                file.place,
+                f"scores that are not comparable{why}",
+                "comparable ones",
+                "score all rows without penalties, or say --allow-incomparable",
             )
     names = tuple(dict.fromkeys(metrics or HEADLINE[first.task]))
     for name in names:
         if metric(name).task != first.task:
-            raise ComparisonError(f"{name} is no score of task {first.task!r}")
+            raise ComparisonError("metric", name, f"a score of task {first.task!r}")
     return names
 
 
-def _require_same(what: str, file: ScoreFile, found: str, first: ScoreFile, expected: str) -> None:
-    if found != expected:
-        raise ComparisonError(
-            f"{file.place}: found scores of {what} {plain(found)[:12]}, expected"
-            f" {plain(expected)[:12]} as in {first.place}: only scores of one test set compare"
-        )
-
-
 def common_rows(files: Sequence[ScoreFile]) -> list[NDArray[np.int64]]:
-    """For each file, where its entries of the rows common to all lie, by rising row.
+    """Return, for each file, the indices of its entries of the rows that all files have.
 
-    Raises ComparisonError where comparable files hold different rows, or any disagree about scenes.
+    The entries are in the order of their row numbers. Raises ComparisonError where comparable
+    files hold different rows, or where files disagree about which scene a row belongs to.
     """
     first, what = files[0], ID_COLUMNS[files[0].task][0]
     common = np.sort(first.ids)
     for file in files[1:]:
         missing, extra = np.setdiff1d(first.ids, file.ids), np.setdiff1d(file.ids, first.ids)
         if (len(missing) or len(extra)) and file.comparable and first.comparable:
-            which = missing if len(missing) else extra
+            which = f"without {_listed(missing)}" if len(missing) else f"with {_listed(extra)}"
             raise ComparisonError(
-                f"{file.place}: found {len(file.ids)} {what}s, expected the {len(first.ids)} of"
-                f" {first.place}: {'without' if len(missing) else 'with'}"
-                f" {', '.join(map(str, which[:IDS_SHOWN]))}{' ...' * (len(which) > IDS_SHOWN)}"
+                file.place,
+                f"{len(file.ids)} {what}s, {which}",
+                f"the {len(first.ids)} of {first.place}",
             )
         common = np.intersect1d(common, file.ids)
     if not len(common):
-        raise ComparisonError(f"there is no {what} that all of the files score")
+        raise ComparisonError("comparison", f"no {what} that all of the files score", "some")
     orders = []
     for file in files:
         rising = np.argsort(file.ids)
@@ -77,24 +84,35 @@ def common_rows(files: Sequence[ScoreFile]) -> list[NDArray[np.int64]]:
         wrong = file.clusters[orders[-1]] != first.clusters[orders[0]]
         if wrong.any():
             raise ComparisonError(
-                f"{file.place}: found {what} {common[wrong][0]} in another scene than in"
-                f" {first.place}: one of them was changed"
+                file.place,
+                f"{what} {common[wrong][0]} in another scene",
+                f"that of {first.place}",
+                "one of the files was changed",
             )
     return orders
 
 
 def column(file: ScoreFile, name: str, order: NDArray[np.int64]) -> Array:
-    """A score of the compared rows."""
+    """Return a score of the compared rows, (N,).
+
+    Raises ComparisonError where the file lacks it, or holds no usable number for one of the rows.
+    """
+    where = f"{file.place}: items.{name}"
     if name not in file.items:
         held = ", ".join(n for n in file.items if n in file.metrics)
-        raise ComparisonError(f"{file.place}: found no items.{name}, expected one; it has {held}")
+        raise ComparisonError(where, "none", "the scores of all items", f"the file has {held}")
     values: Array = file.items[name][order]
     bad = ~(np.abs(values) <= LARGEST_MAGNITUDE)
     if bad.any():
         rows = file.ids[order][bad]
         raise ComparisonError(
-            f"{file.place}: items.{name} holds no usable number for {len(rows)} of {len(values)}"
-            f" {ID_COLUMNS[file.task][0]}s: {', '.join(map(str, rows[:IDS_SHOWN]))}"
-            f"{' ...' * (len(rows) > IDS_SHOWN)}"
+            where,
+            f"{len(rows)} of {len(values)} {ID_COLUMNS[file.task][0]}s without a usable number:"
+            f" {_listed(rows)}",
+            "finite numbers",
         )
     return values
+
+
+def _listed(ids: NDArray[np.int64]) -> str:
+    return ", ".join(map(str, ids[:IDS_SHOWN])) + " ..." * (len(ids) > IDS_SHOWN)

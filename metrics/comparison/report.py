@@ -1,4 +1,4 @@
-"""A comparison for people, as aligned text and as Markdown; and as JSON."""
+"""A comparison for people, as aligned text or Markdown, and for programs, as JSON."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -6,7 +6,7 @@ from dataclasses import asdict
 
 from metrics.comparison.compare import ALPHA, CONFIDENCE, POWER, SIGN_FLIP, Comparison, Difference
 from metrics.scoring.metric_names import metric
-from scenegen.common.text_table import aligned, markdown, number, piped
+from scenegen.common.text_table import laid_out, markdown, number
 
 FORMAT_NAME = "pix2shape-bench/comparison"
 FORMAT_VERSION = "1.0"
@@ -22,25 +22,17 @@ _HEAD = (
 )
 
 
-def table(comparison: Comparison) -> str:
-    """Lines for a terminal: for each score the reference, then the others against it."""
-    lines = [_title(comparison, str)]
-    for name, rows in _blocks(comparison, str):
-        lines += ["", _heading(name), *("  " + line for line in aligned([_HEAD, *rows]))]
-    return "\n".join([*lines, "", *_legend(comparison), *(f"note: {n}" for n in comparison.notes)])
-
-
-def markdown_report(comparison: Comparison) -> str:
-    """The same as Markdown."""
-    lines = [_title(comparison, markdown)]
-    for name, rows in _blocks(comparison, markdown):
-        lines += ["", f"**{markdown(_heading(name))}**", "", *piped([_HEAD, *rows])]
-    notes = [f"- {markdown(note)}" for note in comparison.notes]
-    return "\n".join([*lines, "", *_legend(comparison), *([""] if notes else []), *notes])
+def text_report(comparison: Comparison, as_markdown: bool = False) -> str:
+    """Return a table for each score: the reference, then the others against it; and a legend."""
+    escape = markdown if as_markdown else str
+    lines = [_title(comparison, escape), *laid_out(_tables(comparison, escape), as_markdown)]
+    notes = [f"- {markdown(n)}" if as_markdown else f"note: {n}" for n in comparison.notes]
+    between = [""] if as_markdown and notes else []
+    return "\n".join([*lines, "", *_legend(comparison), *between, *notes])
 
 
 def to_json(comparison: Comparison) -> str:
-    """The same as JSON; keys are the attributes of `Comparison` and `Difference`."""
+    """Return JSON whose keys are the attributes of `Comparison` and `Difference`."""
     content = {
         "format": FORMAT_NAME,
         "format_version": FORMAT_VERSION,
@@ -67,20 +59,16 @@ def _title(comparison: Comparison, escape: Callable[[str], str]) -> str:
     return f"Against {escape(comparison.reference)}, over {size} (truth {fingerprint}).{stamp}"
 
 
-def _heading(name: str) -> str:
-    known = metric(name)
-    return f"{name} ({known.unit}, {known.direction})"
-
-
-def _blocks(
+def _tables(
     comparison: Comparison, escape: Callable[[str], str]
 ) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
-    """For each score its name and its rows, the reference first."""
+    """Yield a title and the rows for each score, the reference first."""
     for name in dict.fromkeys(d.metric for d in comparison.differences):
         found = [d for d in comparison.differences if d.metric == name]
         reference = (escape(comparison.reference), number(found[0].reference_value))
-        rows = [(*reference, *("" for _ in _HEAD[2:]))]
-        yield name, rows + [_row(difference, escape) for difference in found]
+        rows = [_HEAD, (*reference, *("" for _ in _HEAD[2:]))]
+        title = f"{name} ({metric(name).unit}, {metric(name).direction})"
+        yield escape(title), rows + [_row(difference, escape) for difference in found]
 
 
 def _row(d: Difference, escape: Callable[[str], str]) -> tuple[str, ...]:

@@ -1,67 +1,36 @@
-"""Comparing two methods on the same items: intervals and tests for paired differences."""
+"""Tests for paired differences: are two methods different on the same scenes or questions?"""
 
 import math
-from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.measures.checks import EmptyError, as_float64, require_finite
-from metrics.measures.statistics import RESAMPLES, Estimate, cluster_bootstrap, normal_quantile
+from metrics.measures.checks import as_float64, require, require_finite, require_some
+from metrics.measures.statistics import normal_quantile
 
 Array = NDArray[np.float64]
 
 SIGN_FLIPS = 9999
-# With so few clusters all sign patterns are tried: 2^13 = 8192.
+# Up to so many differences, all sign patterns are tried: 2^13 = 8192.
 _ALL_PATTERNS_UP_TO = 13
 _SIGNS = 1 << 22
 
 
-@dataclass(frozen=True)
-class McNemar:
-    """Questions that only one of two methods answers rightly, and the exact two-sided p-value."""
-
-    only_first: int
-    only_second: int
-    p_value: float
-
-
-def paired_bootstrap(
-    first: ArrayLike,
-    second: ArrayLike,
-    clusters: ArrayLike,
-    seed: int,
-    resamples: int = RESAMPLES,
-    confidence: float = 0.95,
-) -> Estimate:
-    """The mean of first - second, over items within clusters, then over clusters; with interval.
-
-    Values (N,) of the same items in the same order, in the unit of the score. The differences are
-    resampled by whole clusters (`statistics.cluster_bootstrap`), which keeps the pairs together.
-    Source: Efron and Tibshirani 1993.
-    """
-    a, b = as_float64(first, "first"), as_float64(second, "second")
-    if a.shape != b.shape:
-        raise ValueError(f"paired values must have one shape, got {a.shape} and {b.shape}")
-    require_finite(a, "first")
-    require_finite(b, "second")
-    return cluster_bootstrap(a - b, clusters, seed, resamples, confidence)
-
-
 def sign_flip_test(differences: ArrayLike, seed: int, flips: int = SIGN_FLIPS) -> float:
-    """Two-sided p-value of "the paired differences (S,) are symmetric about 0", by their mean.
+    """Return the two-sided p-value of "the paired differences (S,) are symmetric about 0".
 
-    The fraction of sign patterns whose |mean| reaches the observed one: of all 2^S for S up to 13,
-    else (1 + hits) / (1 + flips) over random patterns, which is valid at any number of flips. Give
-    one difference per scene. Sources: Fisher 1935, section 21; Phipson and Smyth 2010 for the 1.
+    It is the fraction of sign patterns whose |mean| reaches the observed one: among all 2^S
+    patterns for S up to 13, else (1 + hits) / (1 + flips) among random ones, which is valid for any
+    number of flips. Give one difference for each scene. Sources: Fisher 1935, section 21; Phipson
+    and Smyth 2010 for the added 1.
     """
     values = _require_differences(differences)
     largest = float(np.abs(values).max())
     if largest == 0.0:
         return 1.0
     unit = values / largest
-    # Equal sums differ by rounding, according to the order of their terms.
+    # Sums of the same terms in another order may differ by rounding.
     observed = abs(float(unit.sum())) - 1e-12 * len(unit)
     if len(unit) <= _ALL_PATTERNS_UP_TO:
         patterns = np.arange(2 ** len(unit))[:, None] >> np.arange(len(unit)) & 1
@@ -82,38 +51,37 @@ def _count_reaching(patterns: NDArray[np.integer], values: Array, observed: floa
     return int(np.count_nonzero(np.abs(sums) >= observed))
 
 
-def mcnemar_exact(first_right: ArrayLike, second_right: ArrayLike) -> McNemar:
-    """Exact test that two methods are right equally often on the same questions (Q,), booleans.
+def mcnemar_exact(first_right: ArrayLike, second_right: ArrayLike) -> float:
+    """Two-sided p-value of "two methods are right equally often" on the same questions (Q,).
 
     p = min(1, 2 P(X <= min(b, c))), X binomial with b + c trials at 1/2, where b and c count the
-    questions that only one of them gets right; summed in whole numbers, hence exact. Source:
-    McNemar 1947, in its exact form.
+    questions that only one of the methods answers rightly. The sum is in whole numbers, hence
+    exact. Source: McNemar 1947, in its exact form. The answers are booleans: right or not.
     """
     a, b = np.asarray(first_right), np.asarray(second_right)
-    if a.dtype != np.bool_ or b.dtype != np.bool_ or a.ndim != 1 or a.shape != b.shape:
-        raise ValueError(
-            f"expected two boolean arrays (Q,), got {a.dtype} {a.shape} and {b.dtype} {b.shape}"
-        )
-    if len(a) == 0:
-        raise EmptyError("there are no questions")
+    ok = a.dtype == b.dtype == np.bool_ and a.ndim == 1 and a.shape == b.shape
+    found = f"{a.dtype} {a.shape} and {b.dtype} {b.shape}"
+    require(ok, "answers", found, "two boolean arrays (Q,)")
+    require_some(len(a), "answers")
     only_a, only_b = int(np.count_nonzero(a & ~b)), int(np.count_nonzero(b & ~a))
     trials = only_a + only_b
     ways = tail = 1
     for k in range(min(only_a, only_b)):
         ways = ways * (trials - k) // (k + 1)
         tail += ways
-    return McNemar(only_a, only_b, min(1.0, 2 * tail / 2**trials))
+    return min(1.0, float(2 * tail / 2**trials))
 
 
 def holm(p_values: ArrayLike) -> Array:
-    """Adjusted p-values (K,), in the given order: reject where they are at most alpha.
+    """Return adjusted p-values (K,), in the given order: reject where they are at most alpha.
 
-    The i-th smallest becomes the running maximum of (K - i + 1) p_(i), at most 1; this bounds the
-    chance of any false rejection in the family by alpha. Source: Holm 1979.
+    The i-th smallest becomes the running maximum of (K - i + 1) p_(i), at most 1. This bounds the
+    chance of any false rejection among the K tests by alpha. Source: Holm 1979. (scipy.stats 1.17
+    adjusts for the false discovery rate only.)
     """
     p = as_float64(p_values, "p-values")
-    if p.ndim != 1 or not ((p >= 0.0) & (p <= 1.0)).all():
-        raise ValueError("p-values must be of shape (K,) and lie between 0 and 1")
+    ok = p.ndim == 1 and bool(((p >= 0.0) & (p <= 1.0)).all())
+    require(ok, "p-values", p, "numbers from 0 to 1, (K,)")
     order = np.argsort(p, kind="stable")
     raised = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1))
     adjusted = np.empty_like(p)
@@ -124,33 +92,28 @@ def holm(p_values: ArrayLike) -> Array:
 def smallest_detectable_difference(
     differences: ArrayLike, alpha: float = 0.05, power: float = 0.8
 ) -> float:
-    """The mean difference that a two-sided test at alpha would find with this power.
+    """Return the mean difference that a two-sided test at alpha would find with this power.
 
     (z_(1 - alpha/2) + z_power) s / sqrt(S), with s the standard deviation of the paired differences
-    (S,), one per scene; in their unit. Source: the normal approximation of the power of the paired
-    t-test, Cohen 1988. Values of -1, 0 and 1 (right by one method only) give that of
-    McNemar's test (Connor 1987); see also `smallest_significant_fraction`.
+    (S,), one for each scene. Source: the normal approximation of the power of the paired t-test,
+    Cohen 1988. For differences of -1, 0 and 1 (right by one method only) it is that of McNemar's
+    test (Connor 1987); see also `smallest_significant_fraction`.
     """
     values = _require_differences(differences)
-    if len(values) < 2:
-        raise ValueError("the spread of differences needs at least 2 of them")
-    if not 0.5 <= power < 1.0:
-        raise ValueError(f"power must be at least 0.5 and below 1, got {power}")
+    require(len(values) >= 2, "differences", len(values), "at least 2, to know their spread")
+    require(0.5 <= power < 1.0, "power", power, "at least 0.5 and below 1")
     reach = normal_quantile(1.0 - alpha) + NormalDist().inv_cdf(power)
     return float(reach * values.std(ddof=1) / math.sqrt(len(values)))
 
 
 def smallest_significant_fraction(questions: int, alpha: float = 0.05) -> float:
-    """The smallest difference in accuracy that the exact McNemar test could call significant.
+    """Return the smallest difference in accuracy that the exact McNemar test can call significant.
 
-    d / questions, where d is the least number of discordant questions, all won by one method, with
-    2^(1 - d) <= alpha: 6 at 0.05. This many questions can show no smaller difference, however alike
-    the methods are; above 1, they can show none.
+    It is d / questions, where d is the least number of discordant questions, all won by one method,
+    with 2^(1 - d) <= alpha: 6 at 0.05. Above 1, so few questions can show no difference.
     """
-    if questions < 1:
-        raise EmptyError("there are no questions")
-    if not 0.0 < alpha < 1.0:
-        raise ValueError(f"alpha must lie between 0 and 1, got {alpha}")
+    require_some(questions, "questions")
+    require(0.0 < alpha < 1.0, "alpha", alpha, "between 0 and 1")
     discordant = 1
     while 2.0 ** (1 - discordant) > alpha:
         discordant += 1
@@ -159,9 +122,7 @@ def smallest_significant_fraction(questions: int, alpha: float = 0.05) -> float:
 
 def _require_differences(differences: ArrayLike) -> Array:
     values = as_float64(differences, "differences")
-    if values.ndim != 1:
-        raise ValueError(f"expected differences of shape (S,), got {values.shape}")
-    if len(values) == 0:
-        raise EmptyError("there are no differences")
+    require(values.ndim == 1, "differences", f"shape {values.shape}", "(S,)")
+    require_some(len(values), "differences")
     require_finite(values, "differences")
     return values

@@ -1,11 +1,11 @@
-"""The figures of the Pix2Shape paper, Tables 1 to 4: as reported, on the authors' data.
+"""The figures of the Pix2Shape paper, Tables 1 to 4, as printed and measured on the authors' data.
 
 Rajeswar, Mannan, Golemo, Parent-Lévesque, Vazquez, Nowrouzezahrai, Courville: Pix2Shape: Towards
 Unsupervised Learning of 3D Scenes from Images using a View-based Representation. IJCV 2020,
-https://doi.org/10.1007/s11263-020-01322-1. Every figure is kept as it is printed.
+https://doi.org/10.1007/s11263-020-01322-1.
 
-They were measured on other images and questions than any test set made here, and the paper states
-no unit of length, so no score made here ranks with them.
+The authors' images and questions differ from those of any test set made here, and the paper states
+no unit of length, so no score made here ranks with these figures.
 """
 
 from collections.abc import Iterator, Sequence
@@ -22,14 +22,14 @@ class Figure:
     """One number of the paper.
 
     Attributes:
-        table: number of its table.
-        method: ours is "Pix2Shape"; the others as the paper names them.
+        table: the number of its table.
+        method: "Pix2Shape" where the paper has "ours"; else as the paper names the method.
         data: what it was measured on, as the paper names it.
-        metric: what this benchmark calls the score.
+        metric: the name of this score in our benchmark.
         text: as printed, without the part after "±".
         spread: the part after "±" as printed, which the paper does not explain; or empty.
         view_angle: degrees between the input's and the predicted view; None where not told.
-        labels: labelled questions trained on; None for other tasks.
+        labels: how many labelled questions the method was trained on; None for other tasks.
     """
 
     table: int
@@ -40,11 +40,6 @@ class Figure:
     spread: str = ""
     view_angle: int | None = None
     labels: int | None = None
-
-    @property
-    def value(self) -> float:
-        """The number, in `PaperTable.unit`."""
-        return float(self.text)
 
 
 @dataclass(frozen=True)
@@ -64,11 +59,6 @@ class PaperTable:
     unit: str
     remark: str
     figures: tuple[Figure, ...]
-
-    @property
-    def source(self) -> str:
-        """Where it is printed, and what its figures are."""
-        return f"{SOURCE}, Table {self.number}: {REPORTED}"
 
 
 _SHAPES, _SHAPENET, _MULTIPLE = "Shape scenes", "ShapeNet scenes", "Multiple-shape scenes"
@@ -128,6 +118,11 @@ def _table_3() -> Iterator[Figure]:
 
 
 def _table_4() -> Iterator[Figure]:
+    """Yield the figures of five sets of losses.
+
+    Each set has Chamfer distances at four view angles on ShapeNet scenes, where the mutual
+    information loss plays no part, and accuracies without labels and with 1,000.
+    """
     rows = (
         ("adversarial loss", "1.927 2.341 2.350 2.281", "0.4024 0.4454"),
         ("reconstruction loss", "0.1066 0.1935 0.201 0.1925", "0.3321 0.3789"),
@@ -143,45 +138,39 @@ def _table_4() -> Iterator[Figure]:
             yield Figure(4, method, "3D-IQTT", "iqtt_accuracy", text, labels=labels)
 
 
-def _table(
-    number: int, caption: str, unit: str, remark: str, figures: Iterator[Figure]
-) -> PaperTable:
-    return PaperTable(number, caption, unit, remark, tuple(figures))
-
-
 TABLES: Sequence[PaperTable] = (
-    _table(
+    PaperTable(
         1,
         "Scene reconstruction results. Evaluation of Pix2Shape on scene reconstruction with Chamfer"
         " distance and Hausdorff metric on 2.5D surfels and MSE on the depth maps.",
         DEPTH_UNIT,
         "PTN: Perspective Transformer Nets.",
-        _table_1(),
+        tuple(_table_1()),
     ),
-    _table(
+    PaperTable(
         2,
         "View point reconstruction. Quantitative evaluation of scene reconstruction for unseen"
         " views by extrapolating the view angle from 0° (original) to 80°.",
         DEPTH_UNIT,
         "PTN: Perspective Transformer Nets, for which no HD is printed. The text calls the"
         " multiple-shape scenes ShapeNet scenes.",
-        _table_2(),
+        tuple(_table_2()),
     ),
-    _table(
+    PaperTable(
         3,
         "3D-IQTT results. Evaluation on the 3D-IQTT task of our model, two CNN-based baselines,"
         " Perspective Transformer Nets and Rezende et al.",
         SHARE_UNIT,
         "Chance is 1/3. What ± stands for is not stated. People answered 20 questions each.",
-        _table_3(),
+        tuple(_table_3()),
     ),
-    _table(
+    PaperTable(
         4,
         "Loss analysis. Ablation study of the different losses used to train our model on both"
         " reconstruction task and 3D-IQTT task.",
         f"{DEPTH_UNIT} (Chamfer), {SHARE_UNIT} (3D-IQTT)",
         "The head names both losses L_ALI; the second is the reconstruction loss. All three losses"
         " give 0.5526 and 0.7020 here, 0.5519 and 0.7012 in Table 3.",
-        _table_4(),
+        tuple(_table_4()),
     ),
 )

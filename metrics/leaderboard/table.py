@@ -1,15 +1,18 @@
-"""One table of a leaderboard: which rows are ranked, which cells are best, what stands beside."""
+"""One table of a leaderboard: its rows, their ranks, and the best cell of each column."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from metrics.leaderboard.paper_tables import REPORTED, SOURCE, Figure
+from metrics.report.text import interval_cells
 from metrics.scoring.metric_names import metric
-from metrics.scoring.records import Score, ScoreFile
+from metrics.scoring.records import Score
 from scenegen.common.text_table import number
 
-Kind = Literal["ranked", "not comparable", "reported"]
+Kind = Literal["ranked", "incomparable", "reported"]
+Entry = tuple[str, bool, Mapping[str, Score]]
 REPORTED_MARK, INCOMPARABLE_MARK = "†", "‡"
 
 
@@ -18,15 +21,15 @@ class Cell:
     """A score as it is shown.
 
     Attributes:
-        value: with 4 significant digits; as printed for the paper's figures; "-" for none.
-        interval: such as "[0.1, 0.2]", or empty.
-        spread: standard deviation over runs, or what the paper has after "±"; or empty.
-        best: whether no ranked score of its column is better, as far as the digits tell.
+        value: the score with 4 significant digits, or a figure of the paper as printed; "-" where
+            there is none.
+        rest: what follows the value, such as " ± 0.01 [0.1, 0.2]": the standard deviation over runs
+            (or what the paper prints after "±"), and the interval; or empty.
+        best: whether no ranked score of the column is better, as far as the shown digits tell.
     """
 
     value: str = "-"
-    interval: str = ""
-    spread: str = ""
+    rest: str = ""
     best: bool = False
 
 
@@ -35,10 +38,10 @@ class Row:
     """A method.
 
     Attributes:
-        rank: by the first column, such as "1"; empty where it has none.
-        label: its name and what belongs to it, in one line; not escaped.
+        rank: its place by the first column, such as "1"; empty where it has none.
+        label: the method's name and what has to be known about it, in one line, not escaped.
         kind: only "ranked" rows have ranks and best cells.
-        cells: one a column.
+        cells: one for each column.
     """
 
     rank: str
@@ -49,93 +52,95 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows under column heads; `notes` stand below. Texts are not escaped."""
+    """Rows under the heads of their columns, with notes below. The texts are not escaped."""
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
     notes: tuple[str, ...] = ()
 
+    @property
+    def parts(self) -> list[tuple[Row, ...]]:
+        """The rows in order, cut where another kind of row begins."""
+        return [tuple(part) for _, part in itertools.groupby(self.rows, lambda row: row.kind)]
 
-@dataclass(frozen=True)
-class Grid:
-    """What a table of one test set is made of. Columns go by keys, files by their order.
 
-    Attributes:
-        title: above it.
-        metrics: for each column's key, which score it holds.
-        heads: of the columns.
-        scores: of each file, by column.
-        figures: of the paper, by label of their row, then by column.
-        notes: below it.
-        ranked: whether its first column ranks the files.
+def build_table(
+    title: str,
+    columns: Mapping[str, tuple[str, str]],
+    entries: Sequence[Entry],
+    figures: Mapping[str, Mapping[str, Figure]],
+    notes: Sequence[str],
+    ranked: bool,
+) -> Table:
+    """Return a table of the scored methods, then of the paper's figures.
+
+    Args:
+        title: of the table.
+        columns: by key, the name of the score in each column and the column's head.
+        entries: for each method, best first: its label, whether it is comparable, and its scores
+            by the columns' keys.
+        figures: of the paper, by the label of their row, then by the columns' keys.
+        notes: stand below the table, before those on marks that its rows bear.
+        ranked: whether the first column ranks the methods.
     """
-
-    title: str
-    metrics: Mapping[str, str]
-    heads: tuple[str, ...]
-    scores: tuple[Mapping[str, Score], ...]
-    figures: Mapping[str, Mapping[str, Figure]]
-    notes: tuple[str, ...]
-    ranked: bool
-
-
-def build_table(grid: Grid, labelled: Sequence[tuple[str, ScoreFile]]) -> Table:
-    """The files' rows, best first as they come, then the paper's; labels are not escaped."""
-    keys = list(grid.metrics)
-    comparable = [file.comparable for _, file in labelled]
-    best = {key: _best(grid, key, comparable) for key in keys}
+    first = next(iter(columns))
+    best = {key: _best(entries, key, name) for key, (name, _) in columns.items()}
     rows: list[Row] = []
     place, last = 0, ""
-    for (label, file), scores in zip(labelled, grid.scores, strict=True):
-        cells = tuple(_cell(scores.get(key), file.comparable and best[key]) for key in keys)
+    for label, comparable, scores in entries:
+        cells = tuple(_cell(scores.get(key), comparable and best[key]) for key in columns)
         rank = ""
-        if grid.ranked and file.comparable and keys[0] in scores:
+        if ranked and comparable and first in scores:
             place = place if cells[0].value == last else len(rows) + 1
             rank, last = str(place), cells[0].value
-        rows.append(Row(rank, label, "ranked" if file.comparable else "not comparable", cells))
-    for label, figures in grid.figures.items():
-        cells = tuple(reported_cell(figures.get(key)) for key in keys)
-        rows.append(Row("", label, "reported", cells))
-    notes = [*grid.notes]
-    if not all(comparable):
-        notes.append(
+        rows.append(Row(rank, label, "ranked" if comparable else "incomparable", cells))
+    told = list(notes)
+    if not all(comparable for _, comparable, _ in entries):
+        told.append(
             f"{INCOMPARABLE_MARK} not comparable, so not ranked: not all of the test set was"
             " scored, or values that are not finite were scored at the worst."
         )
-    if grid.figures:
-        shares = {"iqtt_accuracy"}.issuperset(grid.metrics.values())
+    if figures:
+        shares = {"iqtt_accuracy"}.issuperset(name for name, _ in columns.values())
         unit = "" if shares else "; it states no unit of length"
-        notes.append(f"{REPORTED_MARK} {SOURCE}, {REPORTED}, so not ranked{unit}.")
-    return Table(grid.title, grid.heads, tuple(rows), tuple(notes))
+        told.append(f"{REPORTED_MARK} {SOURCE}, {REPORTED}, so not ranked{unit}.")
+    rows += reported_rows(figures, tuple(columns))
+    return Table(title, tuple(head for _, head in columns.values()), tuple(rows), tuple(told))
 
 
-def _best(grid: Grid, key: str, comparable: Sequence[bool]) -> str:
-    """The best of the comparable scores of a column, as shown; empty where there are none."""
-    values = [
-        s[key].value for s, may in zip(grid.scores, comparable, strict=True) if may and key in s
-    ]
-    if not values:
-        return ""
-    return number((max if metric(grid.metrics[key]).higher_is_better else min)(values))
+def reported_rows(
+    figures: Mapping[str, Mapping[str, Figure]], keys: Sequence[str]
+) -> tuple[Row, ...]:
+    """Return a row of the paper's figures, as printed, for each label."""
+
+    def cell(figure: Figure | None) -> Cell:
+        if figure is None:
+            return Cell()
+        return Cell(figure.text, f" ± {figure.spread}" if figure.spread else "")
+
+    return tuple(
+        Row("", label, "reported", tuple(cell(found.get(key)) for key in keys))
+        for label, found in figures.items()
+    )
+
+
+def column_head(name: str) -> str:
+    """Return the title of a score, an arrow that tells which way is better, and its unit."""
+    known = metric(name)
+    return f"{known.title} {'↑' if known.higher_is_better else '↓'} ({known.unit})"
+
+
+def _best(entries: Sequence[Entry], key: str, name: str) -> str:
+    """The best of the comparable scores of a column as it is shown; empty where there is none."""
+    values = [scores[key].value for _, may, scores in entries if may and key in scores]
+    better = max if metric(name).higher_is_better else min
+    return number(better(values)) if values else ""
 
 
 def _cell(score: Score | None, best: str | Literal[False]) -> Cell:
     if score is None:
         return Cell()
-    value, interval = number(score.value), ""
-    if score.low is not None and score.high is not None:
-        interval = f"[{number(score.low, score.value)}, {number(score.high, score.value)}]"
-    spread = "" if score.std is None else number(score.std, score.value)
-    return Cell(value, interval, spread, value == best)
-
-
-def reported_cell(figure: Figure | None) -> Cell:
-    """A figure of the paper as it is printed."""
-    return Cell(figure.text, spread=figure.spread) if figure else Cell()
-
-
-def column_head(name: str) -> str:
-    """Title, direction and unit of a score."""
-    known = metric(name)
-    return f"{known.title} {'↑' if known.higher_is_better else '↓'} ({known.unit})"
+    value, interval = interval_cells(score)
+    spread = "" if score.std is None else f" ± {number(score.std, score.value)}"
+    return Cell(value, spread + ("" if interval == "-" else f" {interval}"), value == best)

@@ -1,9 +1,10 @@
 """Distances between two point clouds, from one pass of nearest neighbours in double precision.
 
-Every score here is a function of `NearestDistances`: find it once with `nearest_distances` (any two
-clouds) or `image_search.nearest_distances_on_image` (two depth images of one camera), then read
-all scores from it. "Forward" runs from the prediction to the truth, "reverse" from the truth to the
-prediction. Distances are in the unit of the points (scene units in this benchmark).
+Every score here is a function of `NearestDistances`. Compute these once, with `nearest_distances`
+for any two clouds or `image_search.nearest_distances_on_image` for two depth images of one camera;
+all scores follow from them. "Forward" means from the prediction to the truth, "reverse" from the
+truth to the prediction. In the formulas, a is a predicted point (of the paper's set A) and b a true
+one (of B). Distances are in the unit of the points: scene units in this benchmark.
 """
 
 import os
@@ -14,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.measures.checks import EmptyError, as_float64, require_finite
+from metrics.measures.checks import as_float64, require, require_finite, require_some
 
 Backend = Literal["auto", "pykdtree", "scipy"]
 
@@ -23,7 +24,9 @@ Backend = Literal["auto", "pykdtree", "scipy"]
 class NearestDistances:
     """Distance of each point to the nearest point of the other cloud.
 
-    forward: (N,) predicted points to the truth. reverse: (M,) true points to the prediction.
+    Attributes:
+        forward: from each predicted point to the truth, (N,).
+        reverse: from each true point to the prediction, (M,).
     """
 
     forward: NDArray[np.float64]
@@ -33,10 +36,11 @@ class NearestDistances:
 def nearest_distances(
     prediction: ArrayLike, truth: ArrayLike, backend: Backend = "auto"
 ) -> NearestDistances:
-    """Exact nearest-neighbour distances both ways between clouds (N, 3) and (M, 3).
+    """Return exact nearest-neighbour distances both ways between clouds (N, 3) and (M, 3).
 
-    Raises NonFiniteError on NaN, infinity or absurd magnitudes and EmptyError on an empty cloud,
-    before any tree sees them. "auto" takes pykdtree when it is installed, else scipy.
+    The backend "auto" takes pykdtree where it is installed, else scipy. Before a tree is built,
+    NaN, infinity and absurd magnitudes raise NonFiniteError, an empty cloud raises EmptyError, and
+    other shapes raise MeasureError.
     """
     predicted = _require_cloud(prediction, "prediction")
     true = _require_cloud(truth, "truth")
@@ -48,7 +52,10 @@ def nearest_distances(
 def query_nearest(
     data: NDArray[np.float64], queries: NDArray[np.float64], backend: Backend = "auto"
 ) -> NDArray[np.float64]:
-    """Distance (Q,) from each query (Q, 3) to the nearest of data (N, 3), both already checked."""
+    """Return the distance (Q,) from each query (Q, 3) to the nearest point of data (N, 3).
+
+    Both must have been checked.
+    """
     if backend != "scipy":
         tree_class = _import_pykdtree(required=backend == "pykdtree")
         if tree_class is not None:
@@ -60,10 +67,10 @@ def query_nearest(
 
 
 def _import_pykdtree(required: bool) -> Any:
-    """Pykdtree's KDTree bound to one thread, or None when it is not installed.
+    """Return pykdtree's KDTree, bound to one thread, or None when it is not installed.
 
-    Its OpenMP runtime reads the thread count once, when it is loaded. Scoring runs one process per
-    core, where more threads only get in each other's way; a count set by the user is respected.
+    Its OpenMP runtime reads the number of threads once, when it is loaded. Scoring runs one process
+    per core, so more threads would only compete for cores. A number that the user set is respected.
     """
     unset = "OMP_NUM_THREADS" not in os.environ
     if unset:
@@ -82,36 +89,36 @@ def _import_pykdtree(required: bool) -> Any:
 
 def _require_cloud(points: ArrayLike, what: str) -> NDArray[np.float64]:
     cloud = np.ascontiguousarray(as_float64(points, what))
-    if cloud.ndim != 2 or cloud.shape[1] != 3:
-        raise ValueError(f"{what}: expected points of shape (N, 3), got {cloud.shape}")
-    if len(cloud) == 0:
-        raise EmptyError(f"{what}: the cloud has no points")
+    require(cloud.ndim == 2 and cloud.shape[1] == 3, what, f"shape {cloud.shape}", "(N, 3)")
+    require_some(len(cloud), what)
     require_finite(cloud, what)
     return cloud
 
 
 def accuracy_distance(nearest: NearestDistances) -> float:
-    """Mean over predicted points a of min_b |a - b|: how far off is what was predicted.
+    """mean_a min_b |a - b|: how far predicted points are from the truth, on average.
 
-    The first half of `chamfer`. Sources: Pix2Shape, section "Scene Reconstruction"; the names of
-    the halves follow Seitz et al. 2006 (multi-view stereo), who summarise by other statistics.
+    This is the first term of `chamfer`. Sources: Pix2Shape, section "Scene Reconstruction", the
+    equation of CD(A, B); the names of the two terms follow Seitz et al. 2006 (multi-view stereo),
+    who use other statistics than the mean.
     """
     return float(nearest.forward.mean())
 
 
 def completeness_distance(nearest: NearestDistances) -> float:
-    """Mean over true points b of min_a |b - a|: how far off is what should have been predicted.
+    """mean_b min_a |b - a|: how far true points are from the prediction, on average.
 
-    The second half of `chamfer`. Sources as for `accuracy_distance`.
+    This is the second term of `chamfer`. Sources as for `accuracy_distance`.
     """
     return float(nearest.reverse.mean())
 
 
 def chamfer(nearest: NearestDistances) -> float:
-    """mean_a min_b |a - b| + mean_b min_a |b - a|: distances unsquared, halves added.
+    """mean_a min_b |a - b| + mean_b min_a |b - a|: the sum of both means, distances not squared.
 
-    Source: Pix2Shape, section "Scene Reconstruction", the equation for CD(A, B). Other work
-    squares the distances (`chamfer_squared`) or halves the sum; such numbers do not compare.
+    Source: Pix2Shape, section "Scene Reconstruction", the equation of CD(A, B), and its Tables 1, 2
+    and 4. Other work squares the distances (`chamfer_squared`) or halves the sum, so its numbers
+    differ.
     """
     return accuracy_distance(nearest) + completeness_distance(nearest)
 
@@ -119,23 +126,23 @@ def chamfer(nearest: NearestDistances) -> float:
 def chamfer_squared(nearest: NearestDistances) -> float:
     """mean_a min_b |a - b|^2 + mean_b min_a |b - a|^2, in squared units.
 
-    Source: Fan et al. 2017 (A Point Set Generation Network), with means for sums.
+    Source: Fan et al. 2017 (A Point Set Generation Network), with means instead of sums.
     """
     return float(np.square(nearest.forward).mean() + np.square(nearest.reverse).mean())
 
 
 def hausdorff_forward(nearest: NearestDistances) -> float:
-    """max_a min_b |a - b|: the predicted point farthest from the truth.
+    """max_a min_b |a - b|: the distance of the predicted point that is farthest from the truth.
 
-    Source: Pix2Shape, section "Scene Reconstruction", max D_H^+(A, B) with A the prediction.
+    Source: Pix2Shape, section "Scene Reconstruction", max D_H^+(A, B); Hausdorff-F in its appendix.
     """
     return float(nearest.forward.max())
 
 
 def hausdorff_reverse(nearest: NearestDistances) -> float:
-    """max_b min_a |b - a|: the true point farthest from the prediction.
+    """max_b min_a |b - a|: the distance of the true point that is farthest from the prediction.
 
-    Source: Pix2Shape, section "Scene Reconstruction", max D_H^+(B, A) with A the prediction.
+    Source: Pix2Shape, section "Scene Reconstruction", max D_H^+(B, A); Hausdorff-R in its appendix.
     """
     return float(nearest.reverse.max())
 
@@ -143,7 +150,7 @@ def hausdorff_reverse(nearest: NearestDistances) -> float:
 def hausdorff(nearest: NearestDistances) -> float:
     """The larger of `hausdorff_forward` and `hausdorff_reverse`.
 
-    Source: Hausdorff 1914; Pix2Shape, section "Scene Reconstruction".
+    Source: Hausdorff 1914; Pix2Shape, section "Scene Reconstruction", and its Tables 1 and 2.
     """
     return max(hausdorff_forward(nearest), hausdorff_reverse(nearest))
 
@@ -159,14 +166,13 @@ def hausdorff_95(nearest: NearestDistances) -> float:
 
 
 def f_score(nearest: NearestDistances, threshold: float) -> float:
-    """2 P R / (P + R) in [0, 1], 0 when both are 0.
+    """2 P R / (P + R), in [0, 1]; 0 where precision P and recall R are both 0.
 
-    Precision P is the fraction of predicted points nearer than `threshold` to the truth, recall R
-    that of true points nearer than it to the prediction; both strict. The threshold has the unit of
-    the points. Source: Knapitsch et al. 2017 (Tanks and Temples).
+    P is the fraction of predicted points that are nearer to the truth than `threshold`, R that of
+    true points that are nearer to the prediction than it. The threshold has the unit of the points.
+    Source: Knapitsch et al. 2017 (Tanks and Temples).
     """
-    if not 0.0 < threshold < np.inf:
-        raise ValueError(f"an F-score threshold must be positive and finite, got {threshold}")
+    require(0.0 < threshold < np.inf, "F-score threshold", threshold, "a positive finite number")
     precision = float(np.mean(nearest.forward < threshold))
     recall = float(np.mean(nearest.reverse < threshold))
     total = precision + recall
@@ -176,15 +182,10 @@ def f_score(nearest: NearestDistances, threshold: float) -> float:
 def point_scores(
     nearest: NearestDistances, f_score_thresholds: Sequence[float] = ()
 ) -> dict[str, float]:
-    """Every score of this module by name; F-scores as `f_score_<threshold>`."""
-    named = {
-        "chamfer": chamfer(nearest),
-        "accuracy_distance": accuracy_distance(nearest),
-        "completeness_distance": completeness_distance(nearest),
-        "chamfer_squared": chamfer_squared(nearest),
-        "hausdorff": hausdorff(nearest),
-        "hausdorff_forward": hausdorff_forward(nearest),
-        "hausdorff_reverse": hausdorff_reverse(nearest),
-        "hausdorff_95": hausdorff_95(nearest),
-    }
+    """Return every score of this module by name; F-scores as `f_score_<threshold>`."""
+    scores = (
+        *(chamfer, accuracy_distance, completeness_distance, chamfer_squared),
+        *(hausdorff, hausdorff_forward, hausdorff_reverse, hausdorff_95),
+    )
+    named = {score.__name__: score(nearest) for score in scores}
     return named | {f"f_score_{t:g}": f_score(nearest, t) for t in f_score_thresholds}

@@ -1,32 +1,52 @@
-"""What every metric refuses: numbers that are not numbers, and nothing at all."""
+"""What every measure refuses: arrays of the wrong kind, values that are not finite, no values."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# Squares of larger magnitudes overflow within a sum; no scene or prediction comes near.
+from scenegen.common.errors import SceneGenError
+
+# The squares of larger magnitudes overflow within a sum; no scene or prediction comes near.
 LARGEST_MAGNITUDE = 1e100
 
 
-class NonFiniteError(ValueError):
+class MeasureError(SceneGenError):
+    """Arrays or parameters that cannot be scored."""
+
+
+class NonFiniteError(MeasureError):
     """A NaN, an infinity or an absurdly large magnitude where a number is scored."""
 
 
-class NoDirectionError(ValueError):
+class NoDirectionError(MeasureError):
     """A vector of length 0 where a direction is scored."""
 
 
-class EmptyError(ValueError):
+class EmptyError(MeasureError):
     """Nothing to score: an empty cloud, an empty mask, no questions."""
 
 
+def require(ok: bool, where: str, found: object, expected: str) -> None:
+    """Raise MeasureError with these fields unless `ok`."""
+    if not ok:
+        raise MeasureError(where, found, expected)
+
+
+def require_some(count: int, where: str) -> None:
+    """Raise EmptyError where there is nothing to score."""
+    if count < 1:
+        raise EmptyError(where, "none", "at least one")
+
+
 def as_float64(values: ArrayLike, what: str) -> NDArray[np.float64]:
-    """Real numbers as a float64 array; booleans, complex, text and ragged input are ValueErrors."""
+    """Return real numbers as a float64 array.
+
+    Raises MeasureError on booleans, complex numbers, text and ragged input.
+    """
     try:
         array = np.asarray(values)
     except ValueError as error:
-        raise ValueError(f"{what}: not an array of numbers ({error})") from error
-    if array.dtype.kind not in "fiu":
-        raise ValueError(f"{what}: expected real numbers, got dtype {array.dtype}")
+        raise MeasureError(what, error, "an array of numbers") from error
+    require(array.dtype.kind in "fiu", what, f"dtype {array.dtype}", "real numbers")
     return array.astype(np.float64, copy=False)
 
 
@@ -43,35 +63,35 @@ def require_finite(
         good |= ~mask.reshape(mask.shape + (1,) * (values.ndim - mask.ndim))
     if good.all():
         return
-    count = int(np.count_nonzero(~good))
     first = tuple(int(i) for i in np.unravel_index(int(np.argmin(good)), good.shape))
     raise NonFiniteError(
-        f"{what}: {count} of {good.size} values are not finite or exceed "
-        f"{LARGEST_MAGNITUDE:g}; the first is {values[first]} at index {first}"
+        what,
+        f"{np.count_nonzero(~good)} of {good.size} values not finite or beyond"
+        f" {LARGEST_MAGNITUDE:g}, the first is {values[first]} at index {first}",
+        "finite numbers",
     )
 
 
 def require_mask(mask: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """The mask, if it is boolean, has this shape and holds a pixel."""
+    """Return the mask if it is boolean, has this shape and contains a pixel; else raise."""
     inside = np.asarray(mask)
-    if inside.dtype != np.bool_ or inside.shape != shape:
-        raise ValueError(f"expected a boolean mask {shape}, got {inside.dtype} {inside.shape}")
-    if not inside.any():
-        raise EmptyError("the mask holds no pixel")
+    ok = inside.dtype == np.bool_ and inside.shape == shape
+    require(ok, "mask", f"{inside.dtype} {inside.shape}", f"bool {shape}")
+    require_some(int(np.count_nonzero(inside)), "mask")
     return inside
 
 
 def require_depth_pair(
     predicted_depth: ArrayLike, true_depth: ArrayLike, mask: NDArray[np.bool_] | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Predicted and true depth of one shape, finite inside the mask, and the mask.
+    """Return predicted and true depth, both of one shape and finite inside the mask, and the mask.
 
-    The mask is the truth's: as given, or where the truth is finite.
+    The mask is the truth's: the given one, or the pixels where the truth is finite.
     """
     predicted = as_float64(predicted_depth, "predicted depth")
     true = as_float64(true_depth, "true depth")
-    if predicted.shape != true.shape:
-        raise ValueError(f"predicted depth has shape {predicted.shape}, the truth {true.shape}")
+    same = predicted.shape == true.shape
+    require(same, "predicted depth", f"shape {predicted.shape}", f"the truth's {true.shape}")
     inside = require_mask(np.isfinite(true) if mask is None else mask, true.shape)
     require_finite(predicted, "predicted depth", inside)
     require_finite(true, "true depth", inside)
@@ -79,6 +99,5 @@ def require_depth_pair(
 
 
 def require_fov(fov_y_degrees: float) -> None:
-    """Raise ValueError unless this is a field of view of a pinhole camera."""
-    if not 0.0 < fov_y_degrees < 180.0:
-        raise ValueError(f"fov_y_degrees must lie between 0 and 180, got {fov_y_degrees}")
+    """Raise MeasureError unless this is a vertical field of view of a pinhole camera, degrees."""
+    require(0.0 < fov_y_degrees < 180.0, "fov_y_degrees", fov_y_degrees, "between 0 and 180")

@@ -1,9 +1,9 @@
 """Errors of planar depth, as given and after alignment to the truth.
 
-The scored pixels are the truth's: `mask`, or where the truth is finite. A prediction that is not
-finite there is an error, never a smaller mask. Truth must be positive. `compare_depth` picks and
-checks the pixels once; every metric takes its result. p is a predicted depth, t the true one, and
-means run over the scored pixels.
+The truth decides which pixels are scored: those of `mask`, or those where the truth is finite. A
+prediction that is not finite there is an error; it never makes the mask smaller. True depth must be
+positive. `compare_depth` selects and checks the pixels once, and every score takes its result. In
+the formulas, p is a predicted depth, t the true one, and means are over the scored pixels.
 """
 
 from dataclasses import dataclass, replace
@@ -12,12 +12,12 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.measures.checks import require_depth_pair
+from metrics.measures.checks import MeasureError, require_depth_pair
 
 Array = NDArray[np.float64]
 Alignment = Literal["none", "median_scale", "scale", "scale_shift"]
 
-# Depths below this count as this in logarithms, which have no value at 0 and below. In scene units.
+# Scene units. Smaller depths are raised to this before a logarithm, which needs positive numbers.
 SMALLEST_LOG_DEPTH = 1e-3
 DELTA_BASE = 1.25
 
@@ -33,20 +33,20 @@ class DepthPair:
 def compare_depth(
     predicted_depth: ArrayLike, true_depth: ArrayLike, mask: NDArray[np.bool_] | None = None
 ) -> DepthPair:
-    """The scored pixels of two depth arrays of one shape, usually (H, W).
+    """Return the scored pixels of two depth arrays of one shape, usually (H, W).
 
-    Raises NonFiniteError with the count and the first pixel if either is not finite inside the
-    mask, EmptyError on an empty mask, ValueError on a truth that is not positive.
+    Raises NonFiniteError, with the count and the first pixel, where either is not finite inside the
+    mask, EmptyError on an empty mask, MeasureError on other shapes or a truth that is not positive.
     """
     predicted, true, inside = require_depth_pair(predicted_depth, true_depth, mask)
     pair = DepthPair(predicted[inside], true[inside])
     if not (pair.true > 0.0).all():
-        raise ValueError(f"true depth must be positive inside the mask, got {pair.true.min()}")
+        raise MeasureError("true depth", pair.true.min(), "positive depth inside the mask")
     return pair
 
 
 def align(pair: DepthPair, alignment: Alignment) -> DepthPair:
-    """The pair with the prediction moved on to the truth, by what the alignment allows.
+    """Return the pair with the prediction fitted to the truth, as far as the alignment allows.
 
     - none: p as given.
     - median_scale: s p, s = median(t) / median(p). Source: Zhou et al. 2017 (Unsupervised Learning
@@ -55,9 +55,11 @@ def align(pair: DepthPair, alignment: Alignment) -> DepthPair:
     - scale_shift: s p + b, which minimises sum (s p + b - t)^2. Source: Ranftl et al. 2020 (MiDaS),
       here applied to depth where they align disparity.
 
-    A scale is never negative: with s < 0 a prediction that swaps near and far (disparity, say)
-    would pass for depth. Where the formula gives s < 0 or none (p is 0 throughout, or constant
-    under scale_shift), s = 0, which is the least-squares optimum under s >= 0.
+    A scale is never negative, or a prediction that swaps near and far, such as disparity, would
+    count as depth. Where the formula gives a negative s or none (p is 0 throughout, or constant
+    under scale_shift), s is 0, the least-squares optimum under s >= 0.
+
+    Raises MeasureError on another alignment.
     """
     p, t = pair.predicted, pair.true
     if alignment == "none":
@@ -73,7 +75,7 @@ def align(pair: DepthPair, alignment: Alignment) -> DepthPair:
         centred, target = unit - unit.mean(), t - t.mean()
         spread = float(centred @ centred)
         return replace(pair, predicted=_ratio(float(centred @ target), spread) * centred + t.mean())
-    raise ValueError(f"alignment must be one of {get_args(Alignment)}, got {alignment!r}")
+    raise MeasureError("alignment", alignment, f"one of {', '.join(get_args(Alignment))}")
 
 
 def _ratio(above: float, below: float) -> float:
@@ -81,36 +83,39 @@ def _ratio(above: float, below: float) -> float:
 
 
 def mse_depth(pair: DepthPair) -> float:
-    """Mean (p - t)^2, in squared depth units. Source: Pix2Shape, section "Scene Reconstruction"."""
+    """Return mean (p - t)^2, in squared units of depth.
+
+    Source: Pix2Shape, section "Scene Reconstruction"; MSE-depth in its Table 1, MSE in its Table 2.
+    """
     return float(np.square(pair.predicted - pair.true).mean())
 
 
 def rmse(pair: DepthPair) -> float:
-    """sqrt(mean (p - t)^2), in depth units. Source: Eigen et al. 2014, "RMSE (linear)"."""
+    """Return sqrt(mean (p - t)^2), in units of depth. Source: Eigen et al. 2014, RMSE (linear)."""
     return float(np.sqrt(mse_depth(pair)))
 
 
 def abs_rel(pair: DepthPair) -> float:
-    """Mean |p - t| / t, a ratio. Source: Eigen et al. 2014, "Abs Relative difference"."""
+    """Return mean |p - t| / t, a ratio. Source: Eigen et al. 2014, "Abs Relative difference"."""
     return float((np.abs(pair.predicted - pair.true) / pair.true).mean())
 
 
 def silog(pair: DepthPair) -> float:
-    """100 sqrt(mean d^2 - (mean d)^2) with d = ln p - ln t: scale-invariant log error.
+    """Return the scale-invariant logarithmic error 100 sqrt(var d), with d = ln p - ln t.
 
-    In hundredths of natural-log units; multiplying the prediction by a constant changes nothing.
-    A p below 0.001 scene units counts as 0.001, so that depth at or behind the camera has
-    a score, and a bad one. Source: the KITTI depth benchmark (Uhrig et al. 2017), which takes the
-    root of the scale-invariant error of Eigen et al. 2014, section 3.2, times 100.
+    Multiplying the prediction by a constant does not change it. Depths below 0.001 scene units
+    count as 0.001, so that depth at or behind the camera gets a score, a bad one. Source: the KITTI
+    depth benchmark (Uhrig et al. 2017): the root of the scale-invariant error of Eigen et al. 2014,
+    section 3.2, times 100.
     """
     logs = np.log(np.maximum(pair.predicted, SMALLEST_LOG_DEPTH))
     return float(100.0 * np.sqrt(np.var(logs - np.log(np.maximum(pair.true, SMALLEST_LOG_DEPTH)))))
 
 
 def delta(pair: DepthPair, power: int) -> float:
-    """The fraction of pixels with max(p / t, t / p) < 1.25^power, in [0, 1].
+    """Return the fraction of pixels with max(p / t, t / p) < 1.25^power, in [0, 1].
 
-    A p that is not positive never counts. Sources: Ladicky et al. 2014; Eigen et al. 2014,
+    Pixels with p <= 0 never count. Sources: Ladicky et al. 2014; Eigen et al. 2014,
     "Threshold", with powers 1, 2 and 3.
     """
     p, t, limit = pair.predicted, pair.true, DELTA_BASE**power
@@ -118,7 +123,7 @@ def delta(pair: DepthPair, power: int) -> float:
 
 
 def depth_scores(pair: DepthPair, alignment: Alignment = "none") -> dict[str, float]:
-    """Every score of this module by name, after alignment.
+    """Return every score of this module by name, after alignment.
 
     The names are `mse_depth`, `rmse`, `abs_rel`, `silog`, `delta_1`, `delta_2` and `delta_3`; with
     an alignment they end in `_after_median_scale`, `_after_scale` or `_after_scale_shift`.

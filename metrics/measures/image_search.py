@@ -1,15 +1,16 @@
 """Exact nearest neighbours between two depth images of one camera, faster than a tree.
 
-Both clouds have one point on the ray of each pixel. So the distance at the same pixel bounds the
-nearest distance from above, and the rays bound it from below: all points of a pixel k columns away
-lie in one plane through the camera, and a point at depth z is at least z k pitch / sqrt(1 + e^2)
-from that plane, e being the largest |x| on the image plane at depth 1; the same for rows. A point
-is settled once its best distance is below the bound of all pixels not yet looked at.
+Both clouds have one point on the ray of each pixel. The distance to the other cloud's point at the
+same pixel is an upper bound of the nearest distance. The rays give a lower bound: all points on
+rays k columns away lie in one plane through the camera, and a point at depth z is at least
+z k pitch / sqrt(1 + e^2) from that plane, where e is the largest |x| on the image plane at depth 1;
+the same holds for rows. A point is settled once its best distance so far is below the lower bound
+of all pixels not yet searched.
 
-The search looks at square rings of growing radius, for all pixels at once and for both directions
-at once, as long as the next rings are certain to settle enough points to pay for themselves. The
-points still open then go to a kd-tree. Good predictions settle in the first rings; bad ones reach
-the tree having lost the time of a few passes over the image.
+The search visits square rings of growing radius, for all pixels and both directions at once, as
+long as the next rings are certain to settle enough points to be worth their time. The points that
+are still open then go to a kd-tree. Good predictions settle in the first rings; for bad ones, a few
+passes over the image are wasted before the tree is built.
 """
 
 import math
@@ -19,25 +20,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from metrics.measures.chamfer_hausdorff import NearestDistances, query_nearest
-from metrics.measures.checks import require_depth_pair, require_fov
+from metrics.measures.checks import require, require_depth_pair, require_fov
 from scenegen.camera import pixel_directions, pixel_size
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _LARGEST_RING = 8
-# Costs in looks (one pixel at one neighbour): a tree query, what it costs more for each ring of
-# distance (far queries visit more leaves), building the tree, for each of its points, and the calls
-# it takes to look from all pixels. Measured; wrong values cost time, never exactness.
+# Measured costs, in units of one look (comparing one pixel with one neighbour): a query of the
+# tree, its extra cost for each ring of distance (far queries visit more leaves), building the tree,
+# per point, and the overhead of a pass over all pixels. Wrong values cost time, never exactness.
 _QUERY_LOOKS = 85.0
 _QUERY_LOOKS_PER_RING = 40.0
 _BUILD_LOOKS = 20.0
-_CALL_LOOKS = 3000.0
-# Elements handled at a time, so that they stay in the second-level cache.
+CALL_LOOKS = 3000.0
+# Elements handled at a time, so that they fit into the second-level cache.
 _STRIP = 8192
-# Rounding moves distances by about 1e-13 of a pixel pitch: far inside this margin of the bound.
+# Rounding changes distances by about 1e-13 of a pixel pitch, far less than this margin.
 _BOUND_MARGIN = 1.0 - 1e-9
-# Where there is no point: far from all points, and from the other cloud's missing points.
+# Coordinate of missing points, far from all others; the other cloud's is the negative of it.
 _NOWHERE = 1e110
 
 
@@ -47,17 +48,16 @@ def nearest_distances_on_image(
     fov_y_degrees: float,
     mask: Mask | None = None,
 ) -> NearestDistances:
-    """Nearest distances both ways between the surfels of two planar depth images (H, W).
+    """Return nearest distances both ways between the surfels of two planar depth images (H, W).
 
-    Equals `points.nearest_distances` of the back-projected points of the pixels in `mask` (default:
-    where the truth is finite), in row-major order and in the unit of the depth: exactly, whatever
-    the prediction. Raises NonFiniteError on non-finite depth inside the mask and EmptyError on an
-    empty mask.
+    The result equals `chamfer_hausdorff.nearest_distances` of the back-projected points of the
+    pixels in `mask` (default: where the truth is finite), in row-major order and in the unit of the
+    depth, for any prediction. Raises NonFiniteError where depth inside the mask is not finite,
+    EmptyError on an empty mask, and MeasureError on other shapes.
     """
     predicted, true, inside = require_depth_pair(predicted_depth, true_depth, mask)
     require_fov(fov_y_degrees)
-    if inside.ndim != 2:
-        raise ValueError(f"depth must have shape (H, W), got {inside.shape}")
+    require(inside.ndim == 2, "depth", f"shape {inside.shape}", "(H, W)")
     grid = _Grid(inside)
     clouds = _lay_out_clouds(grid, predicted, true, fov_y_degrees)
     per_ring = _rings_per_distance(grid, clouds[:, 2], fov_y_degrees)
@@ -82,8 +82,8 @@ def nearest_distances_on_image(
 class _Grid:
     """An image laid out in one dimension, with room before and after it for the largest ring.
 
-    A step by whole rows and columns is then a shift of the index. A step out of the image at the
-    side ends on another row: one look more than needed, at a true distance, so it does no harm.
+    A step by rows and columns is then a shift of the index. A step across the side of the image
+    ends in another row, which costs a needless look at a true distance and so does no harm.
     """
 
     def __init__(self, inside: Mask) -> None:
@@ -117,10 +117,10 @@ def _lay_out_clouds(grid: _Grid, predicted: Array, true: Array, fov_y_degrees: f
 
 
 def _rings_per_distance(grid: _Grid, z: Array, fov_y_degrees: float) -> Array:
-    """How many rings a distance of 1 spans at most, (2, size): the lower bound's reciprocal.
+    """Return how many rings a distance of 1 spans at most, (2, size): 1 / the bound of one ring.
 
-    0 where there is no point, so that nothing is ever open there. A point at depth 0 has no bound:
-    no ring settles it.
+    It is 0 where there is no point, so that nothing is ever open there. A point at depth 0 has no
+    lower bound, and no ring settles it.
     """
     shape = grid.inside.shape
     pitch = pixel_size(shape[0], fov_y_degrees)
@@ -132,14 +132,14 @@ def _rings_per_distance(grid: _Grid, z: Array, fov_y_degrees: float) -> Array:
 
 
 def _next_rings_pay(reach: Array, ring: int) -> bool:
-    """Whether looking on as far as some larger ring costs less than the tree queries it saves.
+    """Tell whether searching up to some larger ring costs less than the tree queries it saves.
 
-    Only queries certain to be saved count: `reach` is the best distance so far in rings, and falls
-    while looking, but a point is settled for certain after ring ceil(reach) - 1.
+    `reach` is the best distance so far, in rings. It can only fall, so a point is certainly settled
+    after ring ceil(reach) - 1; only queries that are certain to be saved count.
     """
     rings = np.arange(ring + 1, _LARGEST_RING + 1)
     shifts = np.square(2.0 * rings + 1.0) - (2 * ring + 1) ** 2
-    looks = shifts * (reach.shape[1] + _CALL_LOOKS)
+    looks = shifts * (reach.shape[1] + CALL_LOOKS)
     saved = np.zeros(len(rings))
     for one_way in reach:
         left = np.array([np.count_nonzero(one_way > r) for r in range(ring + 1, _LARGEST_RING + 2)])
@@ -150,7 +150,7 @@ def _next_rings_pay(reach: Array, ring: int) -> bool:
 
 
 def _squared_distances(a: Array, b: Array) -> Array:
-    """Squared distances (...) between points (3, ...), added in the order x, y, z."""
+    """Return squared distances (...) between points (3, ...), added in the order x, y, z."""
     total: Array = np.square(a[0] - b[0])
     total += np.square(a[1] - b[1])
     total += np.square(a[2] - b[2])
@@ -158,7 +158,7 @@ def _squared_distances(a: Array, b: Array) -> Array:
 
 
 def _look_at_ring(clouds: Array, best: Array, grid: _Grid, ring: int) -> None:
-    """Lower `best` (squared distances) in place by all pairs of pixels exactly `ring` apart."""
+    """Lower `best`, squared distances, in place by all pairs of pixels exactly `ring` apart."""
     steps = range(-ring, ring + 1)
     width = grid.inside.shape[1]
     shifts = [i * width + j for i in steps for j in steps if max(abs(i), abs(j)) == ring]
@@ -181,7 +181,7 @@ def _look_at_ring(clouds: Array, best: Array, grid: _Grid, ring: int) -> None:
 
 
 def _finish(grid: _Grid, cloud: Array, other: Array, squared: Array, unsettled: Mask) -> Array:
-    """Distances (N,) of one cloud's points, the unsettled ones from a tree over the other cloud."""
+    """Distances (N,) of a cloud's points, the unsettled ones by a tree of the other cloud."""
     distances = np.sqrt(squared)
     if unsettled.any():
         places, present = np.flatnonzero(unsettled), np.flatnonzero(grid.present)

@@ -1,7 +1,7 @@
 """Errors of surface normals, and normals derived from depth.
 
-Normals are in the camera frame (x right, y up, looking along -z) and face the viewer. The scored
-pixels are the truth's. Angles are in degrees.
+Normals are in the camera frame (x right, y up, looking along -z) and face the viewer. The truth
+decides which pixels are scored. Angles are in degrees. The paper reports no errors of normals.
 """
 
 import math
@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from metrics.measures.checks import (
-    EmptyError,
     NoDirectionError,
     as_float64,
+    require,
     require_finite,
     require_fov,
     require_mask,
+    require_some,
 )
 from scenegen.camera import back_project
 
@@ -23,9 +24,10 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 WITHIN_DEGREES = (11.25, 22.5, 30.0)
-# A neighbour lies on the same surface if the line to it makes at least this angle with the view.
+# The line to a neighbour on the same surface makes at least this angle with the viewing ray.
 GRAZING_DEGREES = 10.0
-# Variances across and along a patch: less than this is a line, and rounding in single precision.
+# Smallest ratio of the middle to the largest variance of a patch. A patch below it is a line; the
+# middle variance may then be rounding in single precision.
 _THINNEST = 1e-6
 _NEIGHBOURS = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]
 
@@ -33,16 +35,18 @@ _NEIGHBOURS = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]
 def angular_errors_degrees(
     predicted: ArrayLike, true: ArrayLike, mask: Mask | None = None
 ) -> Array:
-    """Angles (N,), in degrees within [0, 180], between normals (..., 3) of the pixels in the mask.
+    """Return angles (N,), degrees in [0, 180], between normals (..., 3) of the pixels in the mask.
 
-    angle = atan2(|p x t|, p . t), which needs no unit length and is exact for small angles, where
-    acos(p . t) loses half of the digits. The mask (...) defaults to where the truth is finite and
-    not zero. Raises NonFiniteError on what is not finite inside the mask, NoDirectionError on a
-    vector of length 0, and EmptyError on an empty mask.
+    The formula is atan2(|p x t|, p . t). It needs no unit length and is exact for small angles,
+    where acos(p . t) loses half of the digits. The mask (...) defaults to the pixels where the
+    truth is finite and not zero.
+
+    Raises NonFiniteError where a vector inside the mask is not finite, NoDirectionError where its
+    length is 0, EmptyError on an empty mask, and MeasureError on shapes that do not agree.
     """
     p, t = as_float64(predicted, "predicted normals"), as_float64(true, "true normals")
-    if t.ndim < 1 or t.shape[-1] != 3 or p.shape != t.shape:
-        raise ValueError(f"expected two arrays (..., 3), got {p.shape} and {t.shape}")
+    ok = t.ndim >= 1 and t.shape[-1] == 3 and p.shape == t.shape
+    require(ok, "normals", f"shapes {p.shape} and {t.shape}", "two arrays (..., 3) of one shape")
     if mask is None:
         mask = np.asarray(np.isfinite(t).all(axis=-1) & t.any(axis=-1))
     inside = require_mask(mask, t.shape[:-1])
@@ -59,22 +63,21 @@ def _unit(vectors: Array, what: str) -> Array:
     largest = np.abs(vectors).max(axis=-1, keepdims=True)
     if not largest.all():
         count = np.count_nonzero(largest == 0.0)
-        raise NoDirectionError(f"{what}: {count} vectors have length 0")
+        raise NoDirectionError(what, f"{count} vectors of length 0", "directions")
     scaled = vectors / largest
     unit: Array = scaled / np.linalg.norm(scaled, axis=-1, keepdims=True)
     return unit
 
 
 def normal_scores(angles: Array) -> dict[str, float]:
-    """Mean, median and root mean square in degrees, and the fractions (0 to 1) within limits.
+    """Return the scores of angles (N,), in degrees, by name.
 
-    `normal_mean_degrees`, `normal_median_degrees`, `normal_rmse_degrees`, and
-    `normal_within_<degrees>`: the fraction of angles below 11.25, 22.5 and 30 degrees (strictly).
-    Source: Fouhey et al. 2013 (Data-Driven 3D Primitives). `angles` (N,) are those of
-    `angular_errors_degrees`.
+    These are `normal_mean_degrees`, `normal_median_degrees`, `normal_rmse_degrees` (the root mean
+    square), and `normal_within_<limit>`: the fractions, 0 to 1, of angles below 11.25, 22.5 and 30
+    degrees. Source: Fouhey et al. 2013 (Data-Driven 3D Primitives). Raises EmptyError without
+    angles.
     """
-    if angles.size == 0:
-        raise EmptyError("no angles to score")
+    require_some(angles.size, "angles")
     require_finite(angles, "angles")
     scores = {
         "normal_mean_degrees": float(angles.mean()),
@@ -87,22 +90,21 @@ def normal_scores(angles: Array) -> dict[str, float]:
 def normals_from_depth(
     depth: ArrayLike, fov_y_degrees: float, mask: Mask | None = None
 ) -> tuple[Array, Mask]:
-    """Unit normals (H, W, 3) of planar depth (H, W), and where they rest on a surface (H, W).
+    """Return unit normals (H, W, 3) of planar depth (H, W), and where they are reliable (H, W).
 
-    The normal of the plane through the pixel and its 8 neighbours that minimises the sum of squared
-    distances (total least squares, Hoppe et al. 1992), with n . ray < 0: facing the
-    viewer. Neighbours outside the image or the mask (default: finite depth) do not count, nor does
-    one across a depth discontinuity: where the line from the pixel to it is within 10 degrees of
-    the viewing ray. If the rest lie on one line, or are fewer than 2, all neighbours in the mask
-    count after all; if those do not span a plane either, the normal points at the viewer.
+    A normal is that of the plane that minimises the sum of squared distances to the points of the
+    pixel and its 8 neighbours (total least squares, Hoppe et al. 1992), and faces the viewer. A
+    neighbour does not count if it is outside the image or the mask (default: finite depth), or
+    across a depth discontinuity: if the line to it is within 10 degrees of the viewing ray. Where
+    fewer than 2 are left, or all lie on one line, every neighbour in the mask counts; if those do
+    not span a plane either, the normal points at the viewer. Outside the mask normals are 0.
 
-    The second array tells where the first rule sufficed. Score where it holds for the truth: a
-    prediction has a normal at every pixel of the mask, so ragged depth takes no pixel out of
-    the score. Outside the mask normals are 0.
+    Normals are reliable where the first rule sufficed. Score the pixels where that holds for the
+    truth. A prediction has a normal at every pixel of the mask, so that noisy depth takes no pixel
+    out of the score.
     """
     planar = as_float64(depth, "depth")
-    if planar.ndim != 2:
-        raise ValueError(f"depth must have shape (H, W), got {planar.shape}")
+    require(planar.ndim == 2, "depth", f"shape {planar.shape}", "(H, W)")
     inside = require_mask(np.isfinite(planar) if mask is None else mask, planar.shape)
     require_finite(planar, "depth", inside)
     require_fov(fov_y_degrees)
@@ -120,14 +122,14 @@ def normals_from_depth(
 
 
 def _neighbours(points: Array, rays: Array, inside: Mask) -> tuple[Array, Mask, Mask]:
-    """Steps (8, 3, H, W) to the neighbours, which are in the mask, and which are near as well."""
+    """Steps (8, 3, H, W) to the neighbours; which are in the mask; which are near as well."""
     height, width = inside.shape
     padded, padded_inside = np.pad(points, ((0, 0), (1, 1), (1, 1))), np.pad(inside, 1)
     windows = [(..., slice(i, i + height), slice(j, j + width)) for i, j in _NEIGHBOURS]
     steps = np.stack([padded[window] - points for window in windows])
     counted = np.stack([padded_inside[window] for window in windows]) & inside
     steps *= counted[:, None]
-    # The shape of the patch is all that matters: with its size taken out, no power overflows.
+    # Only the shape of the patch matters. Dividing by its size keeps powers from overflowing.
     size = np.abs(steps).max(axis=(0, 1))
     steps /= np.where(size > 0.0, size, 1.0)
     along, lengths = (steps * rays).sum(axis=1), np.square(steps).sum(axis=1)
@@ -155,8 +157,8 @@ def _least_axis(
 ) -> tuple[Array, Mask]:
     """Unit eigenvectors (3, ...) of the smallest eigenvalue of symmetric 3 x 3 matrices.
 
-    The second array (...) is false where two eigenvalues all but vanish or all three agree. In
-    closed form (Smith 1961): a general solver takes longer than the rest of this module.
+    The second array (...) is false where two eigenvalues are nearly 0 or all three are equal. This
+    is the closed form of Smith 1961, as a general solver takes longer than the rest of this module.
     """
     third = (xx + yy + zz) / 3.0
     x, y, z = xx - third, yy - third, zz - third
@@ -168,13 +170,13 @@ def _least_axis(
     largest = third + 2.0 * spread * np.cos(angle)
     least = third + 2.0 * spread * np.cos(angle + 2.0 * math.pi / 3.0)
     rows = np.array([[xx - least, xy, xz], [xy, yy - least, yz], [xz, yz, zz - least]])
-    # Any two independent rows are normal to the eigenvector; the longest product is the safest.
+    # The cross product of two independent rows is the eigenvector; the longest one is most exact.
     candidates = np.stack([np.cross(rows[i], rows[i - 1], axis=0) for i in range(3)])
     lengths = np.linalg.norm(candidates, axis=1)
     best = lengths.argmax(axis=0)[None]
     axis = np.take_along_axis(candidates, best[:, None], axis=0)[0]
     length = np.take_along_axis(lengths, best, axis=0)[0]
     middle = 3.0 * third - largest - least
-    # All rows vanish when the eigenvalues are all the same: no axis is the least.
+    # With three equal eigenvalues all rows are 0, and there is no smallest axis.
     clear = (middle > _THINNEST * largest) & (length > 1e-12 * largest * largest)
     return axis / np.where(clear, length, 1.0), clear

@@ -1,4 +1,4 @@
-"""Intervals for scores: Wilson's for fractions, the bootstrap over scenes for everything else."""
+"""Confidence intervals: Wilson's for fractions, the bootstrap over scenes for all other scores."""
 
 import math
 from dataclasses import dataclass
@@ -7,18 +7,18 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.measures.checks import EmptyError, as_float64, require_finite
+from metrics.measures.checks import as_float64, require, require_finite, require_some
 
 Array = NDArray[np.float64]
 
 RESAMPLES = 2000
-# Draws held at a time: bounds the memory, whatever the number of scenes, and stays in the cache.
-_DRAWS = 1 << 16
+# How many draws are held at a time. This bounds the memory for any number of scenes.
+DRAWS_HELD = 1 << 16
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A mean over `n` clusters with its interval; low and high are NaN for n = 1."""
+    """A mean over `n` scenes or questions with the ends of its interval, NaN where it has none."""
 
     value: float
     low: float
@@ -27,19 +27,19 @@ class Estimate:
 
 
 def wilson_interval(successes: int, n: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Wilson's score interval for a fraction, within [0, 1]; n independent trials.
+    """Return Wilson's score interval, within [0, 1], for a fraction of n independent trials.
 
     (k + z^2/2 -+ z sqrt(k (n - k) / n + z^2/4)) / (n + z^2), with k successes and z the normal
-    quantile at (1 + confidence) / 2. Source: Wilson 1927, Probable Inference.
+    quantile at (1 + confidence) / 2. Source: Wilson 1927, Probable Inference. The tests compare it
+    with scipy.stats.binomtest, which rounds the last digit differently for most k and n; score
+    files would change if it took the place of this formula.
     """
-    if n <= 0:
-        raise EmptyError("a fraction needs at least one trial")
-    if not 0 <= successes <= n:
-        raise ValueError(f"successes must lie between 0 and {n}, got {successes}")
+    require_some(n, "trials")
+    require(0 <= successes <= n, "successes", successes, f"0 to {n}")
     z = normal_quantile(confidence)
     middle, total = successes + z * z / 2.0, n + z * z
     half = z * math.sqrt(successes * (n - successes) / n + z * z / 4.0)
-    # At 0 and n successes an end is the fraction itself, which rounding may miss.
+    # At 0 and at n successes, an end equals the fraction; rounding may put it slightly off.
     share = successes / n
     return max(0.0, min(share, (middle - half) / total)), min(
         1.0, max(share, (middle + half) / total)
@@ -47,22 +47,22 @@ def wilson_interval(successes: int, n: int, confidence: float = 0.95) -> tuple[f
 
 
 def normal_quantile(confidence: float) -> float:
-    """Z with P(-z < Z < z) = confidence, for Z standard normal."""
-    if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence must lie between 0 and 1, got {confidence}")
+    """Return z with P(-z < Z < z) = confidence, for Z standard normal."""
+    require(0.0 < confidence < 1.0, "confidence", confidence, "between 0 and 1")
     return NormalDist().inv_cdf((1.0 + confidence) / 2.0)
 
 
 def cluster_means(values: ArrayLike, clusters: ArrayLike) -> Array:
-    """The mean of the values of each cluster (S,), by sorted label; usually items within scenes.
+    """Return the mean of the values of each cluster, (S,), in the order of the sorted labels.
 
-    Values (N,) or (N, K) for K scores at once, which gives (S, K). Clusters (N,) are labels.
+    Args:
+        values: (N,), or (N, K) for K scores at once, which gives (S, K).
+        clusters: a label for each value, (N,), usually the scene of the image.
     """
     table, labels = as_float64(values, "values"), np.asarray(clusters)
-    if table.ndim not in (1, 2) or labels.shape != table.shape[:1]:
-        raise ValueError(f"got values {table.shape} with cluster labels {labels.shape}")
-    if len(table) == 0:
-        raise EmptyError("there are no values")
+    ok = table.ndim in (1, 2) and labels.shape == table.shape[:1]
+    require(ok, "cluster labels", f"shape {labels.shape}", f"one for each value of {table.shape}")
+    require_some(len(table), "values")
     require_finite(table, "values")
     names, index = np.unique(labels, return_inverse=True)
     sums = np.zeros((len(names), *table.shape[1:]))
@@ -78,15 +78,14 @@ def cluster_bootstrap(
     resamples: int = RESAMPLES,
     confidence: float = 0.95,
 ) -> Estimate:
-    """The mean over clusters of their means, with the interval of `bootstrap_interval`.
+    """Return the mean over clusters of their means, with the interval of `bootstrap_interval`.
 
-    Values (N,), clusters (N,) labels. Whole clusters are resampled, as views of one scene err
-    together (Davison and Hinkley 1997, section 3.8): with items resampled instead, intervals come
-    out too short.
+    Values and cluster labels are (N,). Whole clusters are resampled, because the errors of the
+    views of one scene are correlated (Davison and Hinkley 1997, section 3.8); resampling single
+    views would give intervals that are too short.
     """
     means = cluster_means(values, clusters)
-    if means.ndim != 1:
-        raise ValueError("cluster_bootstrap takes one score (N,); see bootstrap_interval for more")
+    require(means.ndim == 1, "values", f"shape {np.shape(values)}", "one score, (N,)")
     low, high = bootstrap_interval(means[:, None], seed, resamples, confidence)
     return Estimate(float(means.mean()), float(low[0]), float(high[0]), len(means))
 
@@ -94,27 +93,27 @@ def cluster_bootstrap(
 def bootstrap_interval(
     means: Array, seed: int, resamples: int = RESAMPLES, confidence: float = 0.95
 ) -> tuple[Array, Array]:
-    """BCa intervals, low (K,) and high (K,), for the column means of cluster means (S, K).
+    """Return BCa intervals, low (K,) and high (K,), for the column means of cluster means (S, K).
 
-    Bias-corrected and accelerated percentiles of the bootstrapped mean. Sources: Efron 1987; Efron
-    and Tibshirani 1993, equations 14.9 to 14.15. Columns share their resamples, and a column's
-    interval does not depend on the others. The same seed gives the same interval. Both ends are
-    NaN for one cluster, which says nothing about the spread.
+    The ends are bias-corrected and accelerated percentiles of the bootstrapped mean. Sources: Efron
+    1987; Efron and Tibshirani 1993, equations 14.9 to 14.15. Columns share their resamples, and a
+    column's interval does not depend on the others. The same seed gives the same interval. Both
+    ends are NaN for a single cluster, which tells nothing about the spread.
 
-    Chosen by simulation with 200 clusters: coverage is 93 to 95% on skewed scores, as that of plain
-    percentiles, and nearer to 95% where most clusters score 0. It falls to about 90% where the mean
-    hangs on a few clusters (one in fifty fails), as it does with any interval from so little.
+    The method was chosen by simulation with 200 clusters. Its coverage is 93 to 95% on skewed
+    scores, like that of plain percentiles, and nearer to 95% where most clusters score 0. It falls
+    to about 90% where the mean depends on a few clusters (one in fifty fails), as that of any
+    interval does with so little data.
     """
     table = as_float64(means, "cluster means")
-    if table.ndim != 2 or table.size == 0:
-        raise ValueError(f"expected cluster means (S, K), got {table.shape}")
-    if not isinstance(resamples, int) or resamples < 100:
-        raise ValueError(f"a bootstrap needs at least 100 resamples, got {resamples}")
+    require(table.ndim == 2 and table.size > 0, "cluster means", f"shape {table.shape}", "(S, K)")
+    ok = isinstance(resamples, int) and resamples >= 100
+    require(ok, "resamples", resamples, "a whole number, at least 100")
     require_finite(table, "cluster means")
     z = normal_quantile(confidence)
     if len(table) == 1:
         return np.full(table.shape[1], np.nan), np.full(table.shape[1], np.nan)
-    # Distances from the mean: a constant column is then exactly 0 in every resample.
+    # Of deviations from the mean, every resample of a constant column is exactly 0.
     centre = table.mean(axis=0)
     deviations = table - centre
     deviations[:, (table == table[0]).all(axis=0)] = 0.0
@@ -125,16 +124,16 @@ def bootstrap_interval(
 
 
 def _resampled_means(values: Array, seed: int, resamples: int) -> Array:
-    """Means (B, K) of `resamples` draws, with replacement, of the rows of values (S, K)."""
+    """Return means (B, K) of B `resamples`, drawn with replacement from the rows of (S, K)."""
     rng = np.random.default_rng(seed)
     count = len(values)
-    step = max(1, _DRAWS // count)
+    step = max(1, DRAWS_HELD // count)
     means = []
     for start in range(0, resamples, step):
         rows = min(step, resamples - start)
         drawn = rng.integers(0, count, (rows, count)) + count * np.arange(rows)[:, None]
         times = np.bincount(drawn.ravel(), minlength=rows * count).reshape(rows, count)
-        # Not a matrix product: BLAS may add in another order on another number of threads.
+        # A matrix product by BLAS may add in another order when the number of threads differs.
         means.append(np.einsum("bs,sk->bk", times.astype(np.float64), values) / count)
     return np.concatenate(means)
 
@@ -144,10 +143,10 @@ def _bca_ends(deviations: Array, resampled: Array, z: float) -> tuple[float, flo
     squares = float(np.square(deviations).sum())
     if squares == 0.0:
         return 0.0, 0.0
-    # Skewness of the jackknife values, which for a mean are the deviations times a constant.
+    # The skewness of the jackknife values, which for a mean are proportional to the deviations.
     unit = deviations / math.sqrt(squares)
     acceleration = float((unit**3).sum()) / 6.0
-    # Resamples that equal the mean miss 0 by rounding, either way.
+    # Resamples that equal the mean may differ from 0 by rounding.
     equal = 1e-12 * math.sqrt(squares)
     below = np.count_nonzero(resampled < -equal) + 0.5 * np.count_nonzero(
         np.abs(resampled) <= equal

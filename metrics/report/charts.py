@@ -1,23 +1,28 @@
-"""Small charts as SVG text, for pages that load nothing from anywhere."""
+"""Small charts as SVG, for pages that load nothing."""
 
-from collections.abc import Sequence
-from html import escape
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
+Scale = Callable[[float], float]
+Svg = Markup  # what a page shows without escaping it again
 WIDTH, HEIGHT = 360, 170
 LEFT, RIGHT, TOP, BOTTOM = 46, 28, 24, 34
 BINS = 30
 
 
-def histogram(values: Array, title: str, unit: str) -> str:
-    """Return the distribution of the values, (N,), with their mean and median marked."""
+def histogram(values: Array, title: str, unit: str) -> Svg:
+    """Return a chart of the distribution of values, (N,), with their mean and median marked.
+
+    Values that are not finite are left out; without any other value the chart is empty text.
+    """
     finite = values[np.isfinite(values)]
     if not finite.size:
-        return ""
+        return Svg()
     low, high = float(finite.min()), float(finite.max())
     if high - low <= 1e-12 * max(abs(high), abs(low), 1e-300):
         half = max(abs(low), 1e-3) / 2
@@ -30,23 +35,27 @@ def histogram(values: Array, title: str, unit: str) -> str:
         for a, b, n in zip(edges[:-1], edges[1:], counts.tolist(), strict=True)
     )
     marks = "".join(
-        f'<line class="{name}" x1="{x(at):.1f}" x2="{x(at):.1f}" y1="{TOP}" y2="{y(0):.1f}">'
-        f"<title>{name} {at:.4g}</title></line>"
+        _line(name, x(at), TOP, x(at), y(0), f"{name} {at:.4g}")
         for name, at in (("mean", float(finite.mean())), ("median", float(np.median(finite))))
     )
-    axis = _axis(x, (low, (low + high) / 2, high), unit) + _top_count(y, int(counts.max()))
-    return _chart(title, bars + marks + axis)
+    axes = _axes(x, (low, (low + high) / 2, high), unit, y, counts.max(), f"{counts.max()}")
+    return _chart(title, bars + marks + axes)
 
 
-def intervals(points: Sequence[tuple[float, float, float, float]], title: str, unit: str) -> str:
-    """Return values with their intervals over an angle: (degrees, value, low, high) each."""
+def intervals(points: Sequence[tuple[float, float, float, float]], title: str, unit: str) -> Svg:
+    """Return a chart of values and their intervals over an angle.
+
+    Args:
+        points: degrees, value, low and high end of each; the ends are NaN where there is none.
+        title, unit: of the values.
+    """
     if not points:
-        return ""
+        return Svg()
     table = np.array(points, float)
     top = float(np.nanmax(table[:, 1:])) or 1.0
     degrees = table[:, 0].tolist()
-    span = (min(degrees) - 4, max(degrees) + 4)
-    x, y = _scale(*span, LEFT, WIDTH - RIGHT), _scale(0, top * 1.08, HEIGHT - BOTTOM, TOP)
+    x = _scale(min(degrees) - 4, max(degrees) + 4, LEFT, WIDTH - RIGHT)
+    y = _scale(0, top * 1.08, HEIGHT - BOTTOM, TOP)
     shown = []
     for degree, value, low, high in points:
         if np.isfinite(low) and np.isfinite(high):
@@ -55,36 +64,35 @@ def intervals(points: Sequence[tuple[float, float, float, float]], title: str, u
             f'<circle class="dot" cx="{x(degree):.1f}" cy="{y(value):.1f}" r="4">'
             f"<title>{degree:g} degrees: {value:.4g} [{low:.4g}, {high:.4g}]</title></circle>"
         )
-    labels = _axis(x, degrees, "degrees") + _text(LEFT - 4, y(top) + 4, f"{top:.3g}", "end")
-    return _chart(f"{title} ({unit})", "".join(shown) + labels)
+    axes = _axes(x, degrees, "degrees", y, top, f"{top:.3g}")
+    return _chart(f"{title} ({unit})", "".join(shown) + axes)
 
 
-def _scale(low: float, high: float, start: float, stop: float) -> Any:
+def _scale(low: float, high: float, start: float, stop: float) -> Scale:
     return lambda value: start + (value - low) / ((high - low) or 1.0) * (stop - start)
 
 
-def _chart(title: str, content: str) -> str:
+def _chart(title: str, content: str) -> Svg:
     floor = _line("axis", LEFT, HEIGHT - BOTTOM, WIDTH - RIGHT, HEIGHT - BOTTOM)
     head = f'<text class="title" x="{LEFT}" y="14">{escape(title)}</text>'
-    return (
+    return Svg(  # what stands in it from elsewhere, titles and units, is escaped
         f'<svg role="img" aria-label="{escape(title)}" viewBox="0 0 {WIDTH} {HEIGHT}"'
         f' width="{WIDTH}" height="{HEIGHT}">{head}{floor}{content}</svg>'
     )
 
 
-def _axis(x: Any, values: Sequence[float], unit: str) -> str:
-    below = HEIGHT - BOTTOM + 14
-    ticks = "".join(_text(x(value), below, f"{value:.3g}", "middle") for value in values)
-    return ticks + _text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 4, unit, "middle")
-
-
-def _top_count(y: Any, count: int) -> str:
-    return _text(LEFT - 4, y(count) + 4, f"{count}", "end")
+def _axes(x: Scale, ticks: Sequence[float], unit: str, y: Scale, top: float, label: str) -> str:
+    """Ticks and the unit below, and one label at the height of the value `top`."""
+    below = "".join(_text(x(tick), HEIGHT - BOTTOM + 14, f"{tick:.3g}", "middle") for tick in ticks)
+    below += _text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 4, unit, "middle")
+    return below + _text(LEFT - 4, y(top) + 4, label, "end")
 
 
 def _text(x: float, y: float, text: str, anchor: str) -> str:
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(text)}</text>'
 
 
-def _line(name: str, x1: float, y1: float, x2: float, y2: float) -> str:
-    return f'<line class="{name}" x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}"/>'
+def _line(name: str, x1: float, y1: float, x2: float, y2: float, title: str = "") -> str:
+    told = f"<title>{title}</title>" if title else ""
+    ends = f'x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}"'
+    return f'<line class="{name}" {ends}>{told}</line>'

@@ -1,4 +1,4 @@
-"""Scores for people: a table for the terminal, the same as Markdown, and items as CSV."""
+"""Scores as text for a terminal or as Markdown, and the scores of every item as CSV."""
 
 import csv
 from collections.abc import Callable, Iterator, Sequence
@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from metrics.measures.answers import CHANCE
 from metrics.scoring.metric_names import in_order, metric
 from metrics.scoring.records import GROUPINGS, Score, ScoreFile
 from scenegen.common.new_file import written_beside
-from scenegen.common.text_table import aligned, markdown, number, piped, plain
+from scenegen.common.text_table import by_number, laid_out, markdown, number, plain
 
 HEAD = ("score", "value", "95% interval", "std of runs", "unit", "better")
 GROUP_TITLES = {
@@ -18,32 +19,23 @@ GROUP_TITLES = {
     "by_rotation_angle": "by rotation between reference and right answer, degrees",
     "by_position": "by place of the right answer",
 }
-CHANCE = 1 / 3
+GROUP_SCORES = {
+    "rooms": ("chamfer", "hausdorff", "hausdorff_forward", "hausdorff_reverse", "mse_depth"),
+    "iqtt": ("iqtt_accuracy",),
+}
 
 
-def table(scores: ScoreFile) -> str:
-    """Return aligned text for a terminal."""
-    lines = [_title(scores, plain), ""]
-    lines += ["  " + line for line in aligned([HEAD, *_rows(scores, str)])]
-    for title, rows in _group_tables(scores, str):
-        lines += ["", title, *("  " + line for line in aligned(rows))]
-    return "\n".join([*lines, "", *_notes(scores)])
-
-
-def markdown_report(scores: ScoreFile) -> str:
-    """Return the same as Markdown."""
-    lines = [
-        _title(scores, lambda text: markdown(plain(text))),
-        "",
-        *piped([HEAD, *_rows(scores, markdown)]),
-    ]
-    for title, rows in _group_tables(scores, markdown):
-        lines += ["", f"**{title}**", "", *piped(rows)]
-    return "\n".join([*lines, "", *(f"- {markdown(note)}" for note in _notes(scores))])
+def text_report(scores: ScoreFile, as_markdown: bool = False) -> str:
+    """Return all scores, then the main ones by group, as aligned text or as Markdown."""
+    escape = markdown if as_markdown else str
+    tables = [("", score_rows(scores, escape))]
+    tables += [(GROUP_TITLES[name], rows) for name, rows in group_tables(scores, escape)]
+    notes = [f"- {markdown(note)}" if as_markdown else note for note in _notes(scores)]
+    return "\n".join([_title(scores, escape), *laid_out(tables, as_markdown), "", *notes])
 
 
 def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> None:
-    """Write the scores of every item, a line each; raises as `new_file.written_beside`."""
+    """Write a line with the scores of each item. Raises OSError as `new_file.written_beside`."""
     with (
         written_beside(path, overwrite) as temporary,
         temporary.open("w", newline="", encoding="utf-8") as file,
@@ -54,54 +46,54 @@ def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> N
         out.writerows(zip(*columns, strict=True))
 
 
+def score_rows(scores: ScoreFile, escape: Callable[[str], str] = str) -> list[Sequence[str]]:
+    """Return a head, and a row for each score; what chance or noise gives follows its score."""
+    floor = scores.meta.chamfer_floor
+    references = {"iqtt_accuracy": ("  chance", CHANCE)}
+    if floor is not None:
+        references["chamfer"] = ("  noise floor", floor)
+    rows: list[Sequence[str]] = [HEAD]
+    for name in in_order(scores.metrics):
+        score, known = scores.metrics[name], metric(name)
+        better = "higher" if known.higher_is_better else "lower"
+        std = "-" if score.std is None else number(score.std, score.value)
+        rows.append((escape(name), *interval_cells(score), std, escape(score.unit), better))
+        if name in references:
+            label, value = references[name]
+            rows.append((escape(label), number(value, score.value), "-", "-", score.unit, ""))
+    return rows
+
+
+def group_tables(
+    scores: ScoreFile, escape: Callable[[str], str] = str
+) -> Iterator[tuple[str, list[Sequence[str]]]]:
+    """Yield each grouping that the scores have, and its table: a row for each group."""
+    names = [name for name in GROUP_SCORES[scores.task] if name in scores.metrics]
+    for grouping in GROUPINGS[scores.task]:
+        groups = getattr(scores, grouping)
+        rows: list[Sequence[str]] = [("", *map(escape, names), "n")]
+        for key in by_number(groups):
+            cells = [" ".join(interval_cells(groups[key][name])) for name in names]
+            rows.append((escape(key), *cells, str(groups[key][names[0]].n)))
+        if groups:
+            yield grouping, rows
+
+
+def interval_cells(score: Score) -> tuple[str, str]:
+    """Return a score's value and its interval as text; "-" stands for no interval."""
+    if score.low is None or score.high is None:
+        return number(score.value), "-"
+    ends = f"[{number(score.low, score.value)}, {number(score.high, score.value)}]"
+    return number(score.value), ends
+
+
 def _title(scores: ScoreFile, escape: Callable[[str], str]) -> str:
     counts = scores.meta.counts
     what = f"{counts['rows']} images of {counts['scenes']} scenes" if "rows" in counts else ""
     what = what or f"{counts['questions']} questions"
     runs = f", mean of {scores.runs} runs" if scores.runs > 1 else ""
-    return f"{escape(scores.method)}: {what} of {escape(scores.meta.truth_path)}{runs}"
-
-
-def _rows(scores: ScoreFile, escape: Callable[[str], str]) -> Iterator[Sequence[str]]:
-    floor = scores.meta.chamfer_floor
-    for name in in_order(scores.metrics):
-        score, known = scores.metrics[name], metric(name)
-        better = "higher" if known.higher_is_better else "lower"
-        std = "-" if score.std is None else number(score.std, score.value)
-        yield (escape(name), *interval_cells(score), std, escape(score.unit), better)
-        if name == "chamfer" and floor is not None:
-            yield (escape("  noise floor"), number(floor, score.value), "-", "-", score.unit, "")
-        if name == "iqtt_accuracy":
-            yield (escape("  chance"), number(CHANCE, score.value), "-", "-", score.unit, "")
-
-
-def _group_tables(
-    scores: ScoreFile, escape: Callable[[str], str]
-) -> Iterator[tuple[str, list[Sequence[str]]]]:
-    for grouping in GROUPINGS[scores.task]:
-        groups = getattr(scores, grouping)
-        if not groups:
-            continue
-        names = [name for name in SHORT[scores.task] if name in scores.metrics]
-        rows: list[Sequence[str]] = [("", *(f"{escape(name)}" for name in names), "n")]
-        for key, found in groups.items():
-            cells = [" ".join(interval_cells(found[name])) for name in names]
-            rows.append((escape(key), *cells, str(found[names[0]].n)))
-        yield GROUP_TITLES[grouping], rows
-
-
-SHORT = {
-    "rooms": ("chamfer", "hausdorff", "hausdorff_forward", "hausdorff_reverse", "mse_depth"),
-    "iqtt": ("iqtt_accuracy",),
-}
-
-
-def interval_cells(score: Score) -> tuple[str, str]:
-    """Return a score's value and its interval as text, "-" where it has none."""
-    if score.low is None or score.high is None:
-        return number(score.value), "-"
-    ends = f"[{number(score.low, score.value)}, {number(score.high, score.value)}]"
-    return number(score.value), ends
+    method, truth = (escape(plain(text)) for text in (scores.method, scores.meta.truth_path))
+    return f"{method}: {what} of {truth}{runs}"
 
 
 def _notes(scores: ScoreFile) -> Iterator[str]:

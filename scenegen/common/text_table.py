@@ -1,70 +1,49 @@
-"""Names and numbers as cells of tables: for terminals, Markdown, HTML and LaTeX.
+"""Tables of names and numbers as text, for terminals and as Markdown.
 
-Names come from others' files: whatever they hold, they stay one cell and show as they are.
+Names come from other people's files. Whatever a name holds, it stays within one cell and is shown
+as it is.
 """
 
-import html as html_module
 import math
-import re
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
-DIGITS = 4  # significant ones of a score
+DIGITS = 4  # significant digits of a score
 LONGEST = 60  # characters of a name
 UNNAMED = "(unnamed)"
-_CONTROLS = ("Cc", "Cs", "Cn", "Co", "Zl", "Zp")
-_DIRECTIONS = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
+Rows = Sequence[Sequence[str]]
+_HIDDEN_CATEGORIES = ("Cc", "Cs", "Cn", "Co", "Zl", "Zp")
+_TEXT_DIRECTIONS = frozenset(
+    "\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
+)
 _MARKDOWN = {c: f"\\{c}" for c in "\\`*_[]|~$"} | {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
-_LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "<": r"\textless{}",
-    ">": r"\textgreater{}",
-    "|": r"\textbar{}",
-    '"': r"{\char34}",
-    "`": r"\textasciigrave{}",
-    "'": r"\textquotesingle{}",
-    "°": r"\textdegree{}",
-    "↑": r"\ensuremath{\uparrow}",
-    "↓": r"\ensuremath{\downarrow}",
-    "±": r"\ensuremath{\pm}",
-    "†": r"\textdagger{}",
-    "‡": r"\textdaggerdbl{}",
-}
 
 
 def plain(name: str) -> str:
-    """A name in one line, of characters that show; "(unnamed)" where there are none."""
+    """Return a name as one line of visible characters, shortened to 60 of them.
+
+    Characters that cannot be shown become U+FFFD, marks that turn the direction of the text are
+    dropped, and a name of which nothing is left becomes "(unnamed)".
+    """
     kept = "".join(
-        c if c.isspace() or _shows(c) else "\ufffd" for c in name if c not in _DIRECTIONS
+        c if c.isspace() or unicodedata.category(c) not in _HIDDEN_CATEGORIES else "\ufffd"
+        for c in name
+        if c not in _TEXT_DIRECTIONS
     )
     line = " ".join(kept.split()) or UNNAMED
     return line if len(line) <= LONGEST else line[: LONGEST - 3] + "..."
 
 
-def _shows(character: str) -> bool:
-    return unicodedata.category(character) not in _CONTROLS
-
-
 def markdown(text: str) -> str:
-    """A text in one line as a Markdown cell that shows it."""
+    """Escape one line of text so that a Markdown table shows it unchanged within one cell."""
     return "".join(_MARKDOWN.get(c, c) for c in text)
 
 
-def html(text: str) -> str:
-    """A text as HTML that shows it, within elements and quoted attributes."""
-    return html_module.escape(text, quote=True)
-
-
-def latex(text: str) -> str:
-    """A text as LaTeX that shows it, given textcomp."""
-    escaped = "".join(_LATEX.get(c, c) for c in text)
-    return re.sub("-(?=-)", "-{}", escaped)  # else hyphens become a dash
-
-
 def distinct(names: Sequence[str], hints: Sequence[str]) -> list[str]:
-    """Names in one line each, told apart: by their hints where two are alike, else by number."""
+    """Return each name as one line, different from all others.
+
+    Equal names get their hints in brackets; names that are equal even then are numbered.
+    """
     found = [plain(name) for name in names]
     hinted = [
         f"{name} [{plain(hint)}]" if found.count(name) > 1 else name
@@ -73,10 +52,23 @@ def distinct(names: Sequence[str], hints: Sequence[str]) -> list[str]:
     return [f"{name} #{i + 1}" if hinted.count(name) > 1 else name for i, name in enumerate(hinted)]
 
 
-def number(value: float, like: float | None = None) -> str:
-    """A number with 4 significant digits, without exponent where 8 decimals hold it.
+def by_number(keys: Iterable[str]) -> list[str]:
+    """Sort keys by the number that they begin with: "30-60" stands before "120-150".
 
-    With `like`, as many decimals as that number is shown with.
+    Keys that begin with no number follow in alphabetical order.
+    """
+
+    def place(key: str) -> tuple[float, str]:
+        first = key.partition("-")[0]
+        return (float(first) if first.isdecimal() else math.inf, key)
+
+    return sorted(keys, key=place)
+
+
+def number(value: float, like: float | None = None) -> str:
+    """Return a number with 4 significant digits, without an exponent where 8 decimals hold it.
+
+    With `like`, it has as many decimals as that number would be shown with.
     """
     scale = abs(value if like is None or like == 0.0 else like)
     if value == 0.0 and scale == 0.0:
@@ -88,8 +80,8 @@ def number(value: float, like: float | None = None) -> str:
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of equal length as lines, columns aligned."""
+def aligned(rows: Rows) -> list[str]:
+    """Return rows of equal length as lines whose columns are aligned in a terminal."""
     widths = [max(map(_width, column)) for column in zip(*rows, strict=True)]
     return [
         "  ".join(
@@ -104,7 +96,22 @@ def _width(text: str) -> int:
     return len(text) + wide - sum(unicodedata.combining(c) > 0 for c in text)
 
 
-def piped(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows as the lines of a Markdown table, the first as its head; cells escaped already."""
+def piped(rows: Rows) -> list[str]:
+    """Return the lines of a Markdown table with the first row as its head.
+
+    The cells have to be escaped already, with `markdown`.
+    """
     head, *rest = ["| " + " | ".join(row) + " |" for row in rows]
     return [head, "| " + " | ".join("---" for _ in rows[0]) + " |", *rest]
+
+
+def laid_out(tables: Iterable[tuple[str, Rows]], as_markdown: bool) -> Iterator[str]:
+    """Yield the lines of tables, each after an empty line and its title, which may be empty.
+
+    Titles and cells have to be escaped already where they are Markdown.
+    """
+    for title, rows in tables:
+        yield ""
+        if title:
+            yield from (f"**{title}**", "") if as_markdown else (title,)
+        yield from piped(rows) if as_markdown else ("  " + line for line in aligned(rows))

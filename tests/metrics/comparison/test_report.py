@@ -8,7 +8,7 @@ import pytest
 from made_scores import iqtt_scores, rooms_scores
 
 from metrics.comparison.compare import Comparison, Difference, compare
-from metrics.comparison.report import markdown_report, table, to_json
+from metrics.comparison.report import text_report, to_json
 
 HOSTILE = "a|b_*<script>&\x1b[31m\n\u202e近"
 
@@ -25,7 +25,7 @@ def comparison():
 
 
 def test_the_table_says_everything_in_aligned_lines(comparison):
-    lines = table(comparison).splitlines()
+    lines = text_report(comparison).splitlines()
     assert lines[0] == "Against first, over 20 images of 10 scenes (truth 0123456789ab)."
     assert lines[2] == "chamfer (scene unit, lower is better)"
     assert "mse_depth (scene unit squared, lower is better)" in lines
@@ -41,7 +41,7 @@ def test_the_table_says_everything_in_aligned_lines(comparison):
 
 
 def test_markdown_escapes_names_and_keeps_its_columns(comparison):
-    text = markdown_report(comparison)
+    text = text_report(comparison, as_markdown=True)
     rows = [line for line in text.splitlines() if line.startswith("| ")]
     assert len(rows) == 2 * 5
     for row in rows:
@@ -65,16 +65,16 @@ def test_json_holds_every_attribute_and_no_nan(comparison):
     )
     stored = json.loads(to_json(single), parse_constant=pytest.fail)["differences"][0]
     assert (stored["low"], stored["high"], stored["smallest"]) == (None, None, None)
-    assert "[" not in table(single).split("chamfer (", 1)[1].split("difference:")[0]
+    assert "[" not in text_report(single).split("chamfer (", 1)[1].split("difference:")[0]
 
 
 def test_questions_and_what_is_not_comparable_say_so():
     files = [iqtt_scores("a", [1, 0] * 10), iqtt_scores("b", [1, 1] * 10, comparable=False)]
-    text = table(compare(files, allow_incomparable=True))
+    text = text_report(compare(files, allow_incomparable=True))
     assert text.startswith("Against a, over 20 questions (truth 0123456789ab). NOT COMPARABLE")
     assert "iqtt_accuracy (fraction, higher is better)" in text
     assert "10/0/10" in text
     assert "p: exact McNemar test, two-sided" in text
     assert "\nnote: b says that it is not comparable" in text
     several = [*files[:1], iqtt_scores("c", [1, 1 / 3] * 10, runs=3), iqtt_scores("d", [1] * 20)]
-    assert "p: exact McNemar test; sign flips for means" in table(compare(several))
+    assert "p: exact McNemar test; sign flips for means" in text_report(compare(several))

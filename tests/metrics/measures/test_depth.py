@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from metrics.measures.checks import EmptyError, NonFiniteError
 from metrics.measures.depth import align, compare_depth, delta, depth_scores, silog
 
 ALIGNMENTS = ["none", "median_scale", "scale", "scale_shift"]
@@ -80,14 +79,6 @@ def test_the_size_of_the_unit_does_not_matter(scale):
         assert aligned.predicted == pytest.approx(true, rel=1e-9)
 
 
-def test_more_freedom_never_raises_the_squared_error():
-    for seed in range(50):
-        pair = random_pair(seed)
-        errors = [next(iter(depth_scores(pair, a).values())) for a in ("none", "scale")]
-        errors.append(depth_scores(pair, "scale_shift")["mse_depth_after_scale_shift"])
-        assert errors[0] >= errors[1] - 1e-15 >= errors[2] - 2e-15
-
-
 def test_disparity_is_not_depth_turned_round():
     true = np.linspace(1.0, 3.0, 50)
     scores = depth_scores(compare_depth(1.0 / true, true), "scale_shift")
@@ -118,24 +109,3 @@ def test_only_the_mask_is_scored():
     predicted = np.array([[1.0, 3.0], [np.nan, np.inf]])
     mask = np.array([[True, True], [False, False]])
     assert depth_scores(compare_depth(predicted, true, mask))["mse_depth"] == 0.5
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e101])
-def test_non_finite_values_inside_the_mask_are_named(bad):
-    true, predicted = np.ones((3, 4)), np.ones((3, 4))
-    predicted[1, 3] = predicted[2, 0] = bad
-    with pytest.raises(NonFiniteError, match=r"predicted depth: 2 of 12 .* at index \(1, 3\)"):
-        compare_depth(predicted, true)
-    with pytest.raises(NonFiniteError, match="true depth"):
-        compare_depth(true, predicted, np.ones((3, 4), dtype=bool))
-
-
-def test_wrong_input_is_named():
-    with pytest.raises(EmptyError):
-        compare_depth([1.0], [np.nan])
-    with pytest.raises(ValueError, match="positive"):
-        compare_depth([1.0, 1.0], [1.0, 0.0])
-    with pytest.raises(ValueError, match="predicted depth has shape"):
-        compare_depth([1.0, 1.0], [[1.0, 1.0]])
-    with pytest.raises(ValueError, match="alignment must be one of"):
-        depth_scores(compare_depth([1.0], [1.0]), "affine")

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from metrics.measures import image_search
 from metrics.measures.chamfer_hausdorff import nearest_distances
-from metrics.measures.checks import EmptyError, NonFiniteError
 from metrics.measures.image_search import nearest_distances_on_image
 from scenegen.camera import back_project
 
@@ -55,24 +54,19 @@ def test_rooms_agree_with_scipy(room_depth, name):
         assert_exact(np.where(np.isnan(true), np.nan, predictions(truth)[name]), true)
 
 
-def always(_, ring):
-    return ring < image_search._LARGEST_RING
+ALWAYS, NEVER = -1e12, 1e12  # overheads of a ring that make the search take all or none of them
 
 
-def never(_, __):
-    return False
-
-
-@pytest.mark.parametrize("look", [always, never])
+@pytest.mark.parametrize("overhead", [ALWAYS, NEVER])
 @pytest.mark.parametrize("name", ["smooth", "noise", "wild", "random", "shifted", "negative"])
-def test_costs_decide_on_time_only(room_depth, monkeypatch, look, name):
-    monkeypatch.setattr(image_search, "_next_rings_pay", look)
+def test_costs_decide_on_time_only(room_depth, monkeypatch, overhead, name):
+    monkeypatch.setattr(image_search, "CALL_LOOKS", overhead)
     truth = room_depth(4, 40)
     assert_exact(predictions(truth)[name], truth)
 
 
-@given(st.integers(0, 2**32 - 1), st.sampled_from([None, always]))
-def test_any_shape_field_of_view_and_mask(seed, look):
+@given(st.integers(0, 2**32 - 1), st.sampled_from([image_search.CALL_LOOKS, ALWAYS]))
+def test_any_shape_field_of_view_and_mask(seed, overhead):
     rng = np.random.default_rng(seed)
     shape = tuple(rng.integers(1, 24, 2))
     true = rng.uniform(1.0, 3.0) + rng.choice([0.0, 0.01, 1.0]) * rng.random(shape)
@@ -81,19 +75,14 @@ def test_any_shape_field_of_view_and_mask(seed, look):
     mask[0, 0] = True
     predicted[~mask] = rng.choice([np.nan, np.inf, 0.0])
     with pytest.MonkeyPatch.context() as patch:
-        if look:
-            patch.setattr(image_search, "_next_rings_pay", look)
+        patch.setattr(image_search, "CALL_LOOKS", overhead)
         assert_exact(predicted, true, rng.uniform(1.0, 170.0), mask)
 
 
-def test_good_predictions_need_no_tree_and_bad_ones_no_rings(room_depth, monkeypatch):
+def test_good_predictions_need_no_tree(room_depth, monkeypatch):
     truth = room_depth(5, 64)
-    with monkeypatch.context() as patch:
-        patch.setattr(image_search, "query_nearest", lambda *_: pytest.fail("asked a tree"))
-        nearest_distances_on_image(truth, truth, 20.0)
-        nearest_distances_on_image(predictions(truth)["smooth"], truth, 20.0)
-    monkeypatch.setattr(image_search, "_look_at_ring", lambda *_: pytest.fail("looked at a ring"))
-    for name in ("scaled", "millimetres", "negative", "disparity"):
+    monkeypatch.setattr(image_search, "query_nearest", lambda *_: pytest.fail("asked a tree"))
+    for name in ("perfect", "smooth"):
         nearest_distances_on_image(predictions(truth)[name], truth, 20.0)
 
 
@@ -103,27 +92,3 @@ def test_order_is_that_of_the_mask():
     predicted[2, 3] = 2.001
     forward = nearest_distances_on_image(predicted, true, 20.0).forward
     assert np.flatnonzero(forward).tolist() == [2 * 5 + 3]
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e101])
-def test_non_finite_depth_inside_the_mask_is_named(bad):
-    true, predicted = np.full((4, 5), 2.0), np.full((4, 5), 2.0)
-    predicted[1, 2] = predicted[3, 0] = bad
-    with pytest.raises(NonFiniteError, match=r"predicted depth: 2 of 20 .* at index \(1, 2\)"):
-        nearest_distances_on_image(predicted, true, 20.0)
-    with pytest.raises(NonFiniteError, match="true depth"):
-        nearest_distances_on_image(true, predicted, 20.0, np.ones((4, 5), dtype=bool))
-
-
-def test_wrong_input_is_named():
-    true = np.ones((4, 5))
-    with pytest.raises(EmptyError, match="mask holds no pixel"):
-        nearest_distances_on_image(true, true * np.nan, 20.0)
-    with pytest.raises(ValueError, match="predicted depth has shape"):
-        nearest_distances_on_image(true.T, true, 20.0)
-    with pytest.raises(ValueError, match=r"shape \(H, W\)"):
-        nearest_distances_on_image(true[None], true[None], 20.0)
-    with pytest.raises(ValueError, match="boolean mask"):
-        nearest_distances_on_image(true, true, 20.0, np.ones((4, 5)))
-    with pytest.raises(ValueError, match="fov_y_degrees"):
-        nearest_distances_on_image(true, true, 180.0)

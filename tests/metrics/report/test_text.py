@@ -1,0 +1,65 @@
+"""Scores as aligned text, Markdown and CSV."""
+
+import csv
+import re
+from dataclasses import replace
+
+import pytest
+from made_scores import iqtt_scores, simple_rooms
+
+from metrics.report.page import html_report
+from metrics.report.text import text_report, write_csv
+from scenegen.common.text_table import number
+
+
+def rooms(name="mine", **meta):
+    scores = simple_rooms(name, counts={"rows": 4, "scenes": 2}, **meta)
+    return replace(scores, by_view_angle=dict.fromkeys(("0", "35", "5"), scores.metrics))
+
+
+def test_the_text_shows_every_score_and_its_reference():
+    scores = rooms(chamfer_floor=0.0123, warnings=("mind the gap",))
+    title, table, *_, notes = text_report(scores).split("\n\n")
+    assert title == "mine: 4 images of 2 scenes of rooms.h5"
+    cells = {line.split()[0]: line.split() for line in table.splitlines()}
+    for name, score in scores.metrics.items():
+        assert cells[name][1:3] == [number(score.value), f"[{number(score.low, score.value)},"]
+    assert cells["noise"][:3] == ["noise", "floor", "0.0123"]
+    assert "warning: mind the gap" in notes.splitlines()
+    questions = iqtt_scores("many", [1, 0], runs=3, counts={"questions": 2})
+    text = text_report(questions)
+    assert text.startswith("many: 2 questions of rooms.h5, mean of 3 runs\n")
+    assert "chance 0.3333" in " ".join(text.split())
+
+
+@pytest.mark.parametrize("form", ["text", "markdown", "html"])
+def test_groups_stand_in_the_order_of_their_numbers(form, tmp_path):
+    scores = iqtt_scores("a", [1, 0], counts={"questions": 2})
+    (group,) = scores.by_distractor.values()
+    spans = ["120-150", "150-180", "30-60", "60-90", "90-120"]
+    scores = replace(scores, by_rotation_angle=dict.fromkeys(spans, group))
+    if form == "html":
+        text = html_report(scores, tmp_path, [])
+    else:
+        text = text_report(scores, form == "markdown")
+    shown = re.findall(r"\b(?:\d+)-(?:\d+)\b", text)
+    assert shown == ["30-60", "60-90", "90-120", "120-150", "150-180"]
+
+
+def test_markdown_escapes_the_methods_name():
+    text = text_report(rooms("a|b_*c*<x>\nnew"), as_markdown=True)
+    assert text.startswith(r"a\|b\_\*c\*&lt;x&gt; new: 4 images")
+    for block in text.split("\n\n"):
+        rows = [line for line in block.splitlines() if line.startswith("|")]
+        assert len({len(re.findall(r"(?<!\\)\|", row)) for row in rows}) <= 1
+
+
+def test_csv_holds_every_item_to_the_last_digit(tmp_path):
+    scores = simple_rooms()
+    write_csv(scores, tmp_path / "x.csv")
+    with (tmp_path / "x.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    for name, column in scores.items.items():
+        assert [float(row[name]) for row in rows] == column.tolist()
+    with pytest.raises(FileExistsError):
+        write_csv(scores, tmp_path / "x.csv")
