@@ -249,11 +249,12 @@ def export(
     from scenegen.common.errors import SpecError
     from scenegen.common.new_file import check_writable
     from scenegen.objects.catalogue import changed_meshes
-    from scenegen.objects.sources import file_objects
+    from scenegen.objects.sources import file_objects, mesh_folder
     from scenegen.rooms.export import export_paths, export_room
     from scenegen.rooms.preview import pick_rows
     from scenegen.rooms.reader import RoomsFile
 
+    mesh_folder(meshes["shapenet_root"], meshes["objects_root"], meshes["up"])
     with RoomsFile(file) as rooms:
         objects = file_objects(rooms.spec, **meshes) if form == "obj" else None
         rows = pick_rows(len(rooms), items)

@@ -110,4 +110,22 @@ def test_a_file_of_built_in_objects_needs_no_folder(run: Run, meshes: Path) -> N
     assert run("render", "--n", 1, "--size", 24).exit_code == 0
     result = run("verify", "rooms.h5", "--objects-root", meshes)
     assert result.exit_code == 2
-    assert "objects are built in" in result.stderr
+    assert "built in" in result.stderr
+
+
+@pytest.mark.parametrize("command", ["verify", "export --items 0 --format obj",
+                                     "export --items 0 --format exr"])  # fmt: skip
+def test_folder_options_that_contradict_one_another_are_refused(
+    run: Run, refuses: Callable[..., str], meshes: Path, shapenet: Path, command: str
+) -> None:
+    """As `render` refuses them; the file itself could be read with the first option alone."""
+    name, *options = command.split()
+    for root, more, words in (
+        (("--shapenet-root", shapenet), ("--up", "z"), ("up: found 'z'", "--shapenet-root")),
+        (("--shapenet-root", shapenet), ("--objects-root", meshes), ("expected one of them",)),
+        (("--objects-root", meshes), ("--shapenet-root", shapenet), ("expected one of them",)),
+        ((), ("--up", "z"), ("up: found 'z'", "--objects-root")),
+    ):
+        render(run, *(root or ("--objects-root", meshes)), "--overwrite", count=1)
+        told = (*root, "--cache-dir", "cache")
+        refuses(name, "rooms.h5", *options, *told, *more, words=words)
