@@ -10,7 +10,7 @@ from scenegen.common.row_file import Column
 from scenegen.description.specs import DatasetSpec
 
 FORMAT_NAME = "pix2shape-bench/rooms"
-FORMAT_VERSION = "2.0"
+FORMAT_VERSION = "2.1"
 
 
 @dataclass(frozen=True)

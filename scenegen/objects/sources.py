@@ -6,9 +6,8 @@ from typing import Any
 
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check
-from scenegen.description.checks import BUILT_IN
 from scenegen.description.presets import PRESETS
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import BUILT_IN, DatasetSpec
 from scenegen.objects.catalogue import Objects, mesh_objects, objects_of
 from scenegen.objects.meshes.cache import default_cache_dir
 from scenegen.objects.meshes.folders import ModelFolder, open_objects, open_shapenet

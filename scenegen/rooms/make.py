@@ -11,7 +11,7 @@ from scenegen.common.new_file import check_writable
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
-from scenegen.rendering.backend import select_variant
+from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.ground_truth import GroundTruth, visible_pixels
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import launch
@@ -61,7 +61,7 @@ def make_dataset(
     variant = select_variant(device)
     objects = objects or objects_of(spec)
     views = range(len(spec.views))
-    attributes = {"creation_command": command, "variant": variant}
+    attributes = {"creation_command": command, "variant": variant, **versions()}
     with (
         create_rooms(
             path,

@@ -1,6 +1,5 @@
 """Write a rooms file."""
 
-import hashlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from scenegen.common.records import check
 from scenegen.common.row_file import Table, new_file, writer_name
 from scenegen.description.scenes import SceneSpec
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import DatasetSpec, Fingerprint
 from scenegen.layout import FORMAT_NAME, FORMAT_VERSION, columns
 from scenegen.rendering.packing import SceneBatch
 
@@ -45,7 +44,7 @@ class RoomsWriter:
         """Create the datasets of `count` scenes."""
         self.classes, self.views = spec.shapes, spec.views
         self.table = Table(file, columns(spec), count * len(spec.views), compression)
-        self.digest = hashlib.sha256(spec.to_json().encode())
+        self.fingerprint = Fingerprint(spec)
 
     def append(self, rooms: Sequence[RenderedScene], batch: SceneBatch) -> None:
         """Write a row for each view of each scene; `batch` is they, packed."""
@@ -54,7 +53,7 @@ class RoomsWriter:
         classes = np.array([*numbers, -1])  # the last one is that of unused slots
         for room in rooms:
             description = room.scene.to_json()
-            self.digest.update(b"\n" + description.encode())
+            self.fingerprint.add(description.encode())
             models = [item.shape for item in room.scene.objects]
             for view, i in zip(range(len(room.image)), images, strict=False):
                 shape = batch.shape[i]
@@ -126,4 +125,4 @@ def create_rooms(
         yield writer
         if writer.table.rows != rows:
             raise RuntimeError(f"{path}: got {writer.table.rows} of {rows} rows")
-        file.attrs["fingerprint"] = writer.digest.hexdigest()
+        file.attrs["fingerprint"] = writer.fingerprint.hex

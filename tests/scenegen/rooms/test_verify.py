@@ -4,6 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from h5_edits import put, values
+
+from scenegen.rendering.backend import VERSION_ATTRIBUTES
+from scenegen.rooms.verify import verify_file
 
 ALL = {
     "layout",
@@ -45,6 +49,59 @@ def test_other_kinds_of_files_pass(verdict, make_rooms, tmp_path, settings):
     path = make_rooms(tmp_path / "x.h5", 3, **settings)
     code, checks, _ = verdict(path, "--items", 3)
     assert (code, failed(checks)) == (0, set())
+
+
+OTHER_VERSION = {
+    "the same": ({}, "bit for bit"),
+    "another Mitsuba": ({"mitsuba_version": "3.8.1"}, "mitsuba_version 3.8.1"),
+    "another LLVM": ({"llvm_version": "20.0.0"}, "llvm_version 20.0.0"),
+    "another variant": ({"variant": "scalar_rgb"}, "variant scalar_rgb"),
+    "none stored": (dict.fromkeys(VERSION_ATTRIBUTES), "mitsuba_version not stored"),
+}
+
+
+def nudge_depth(by):
+    return lambda file: file["depth"].write_direct(file["depth"][:] + np.float32(by))
+
+
+def nudge_image(by):
+    return lambda file: file["image"].write_direct((file["image"][:].astype(int) + by).astype("u1"))
+
+
+@pytest.mark.parametrize("versions", OTHER_VERSION)
+@pytest.mark.parametrize(
+    ("edit", "alike"),
+    [
+        (lambda file: None, True),
+        (nudge_depth(1e-7), True),
+        (nudge_depth(1e-2), False),
+        (values("normal", lambda v: v + np.float32(5e-4)), True),
+        (values("normal", lambda v: v + np.float32(5e-3)), False),
+        (nudge_image(1), True),
+        (nudge_image(3), False),
+        (put("object_id", (5, 7, 9), 3), True),
+        (put("object_id", (5, 7, slice(9, 13)), 3), False),
+    ],
+    ids=["as rendered", "depth 1e-7", "depth 1e-2", "normal 5e-4", "normal 5e-3", "image 1",
+         "image 3", "one id", "four ids"],
+)  # fmt: skip
+def test_other_versions_are_told_and_compared_within_a_tolerance(damaged, versions, edit, alike):
+    """With the same versions a single bit counts."""
+    attributes, remark = OTHER_VERSION[versions]
+
+    def spoil(file):
+        before = {name: file[name][:] for name in ("image", "depth", "normal", "object_id")}
+        edit(file)
+        spoil.changed = any((before[name] != file[name][:]).any() for name in before)
+        for name, value in attributes.items():
+            del file.attrs[name]
+            if value is not None:
+                file.attrs[name] = value
+
+    path = damaged(spoil)
+    again = {check.name: check for check in verify_file(path, 8)}["rendered again"]
+    assert again.ok == (alike if attributes else not spoil.changed), again.detail
+    assert remark in again.detail or not attributes
 
 
 def test_lists_and_counts(verdict, rooms_path):
