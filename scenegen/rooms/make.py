@@ -1,4 +1,9 @@
-"""Render a data set: propose, cast, check, write; overlapped, in flat memory."""
+"""Render a data set to a file of rooms.
+
+Scenes are proposed, rendered, checked and written in batches. These steps overlap: while one batch
+is rendered, the next is proposed and the one before is written. Memory does not grow with the
+number of scenes.
+"""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -6,8 +11,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from scenegen.common.errors import SpecError
 from scenegen.common.new_file import check_writable
+from scenegen.common.records import check
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
@@ -20,8 +25,8 @@ from scenegen.sampling.scenes import MAX_ATTEMPTS, refusal, sample_scene
 
 DEFAULT_BATCH = 64
 MAX_BATCH = 4096
-MAX_RAYS = 2**28  # of a wavefront; 8 GiB of pixels
-WINDOW = 4  # batches that may be in the making while the oldest item is still being retried
+MAX_RAYS = 2**28  # pixels of one batch; they take 8 GiB
+WINDOW = 4  # batches that may be begun while the oldest item is still being proposed again
 
 
 def make_dataset(
@@ -40,23 +45,23 @@ def make_dataset(
     """Render scenes 0 .. count - 1 of `spec` to a rooms file, each with a row for each view.
 
     Args:
-        batch: images in one wavefront; bounds memory, never changes a byte of a row.
+        batch: images rendered at once; it bounds memory and changes no byte of the file.
         device, compression: as in `backend.DEVICES` and `row_file.COMPRESSIONS`.
-        command: what to record as the file's creation command.
+        command: stored as the file's creation command.
         objects: what the scenes are made of; None for `objects_of(spec)`.
-        progress: is told, now and then, how many more rows were written.
+        progress: called now and then with the number of rows written since the last call.
 
     Raises:
-        SpecError, BackendError: a setting.
+        SpecError: a setting is out of range.
+        BackendError: the device cannot render here.
         PlacementError: no scene meets the request.
-        OSError: the path, or the disk.
+        OSError: the file cannot be written.
     """
-    if not 1 <= batch <= MAX_BATCH:
-        raise SpecError(f"batch: found {batch}, expected from 1 to {MAX_BATCH}")
-    if max(batch, len(spec.views)) * spec.height * spec.width > MAX_RAYS:
-        most = MAX_RAYS // (spec.height * spec.width)
-        found = f"{batch}, with {len(spec.views)} views of a scene"
-        raise SpecError(f"batch: found {found}, expected at most {most} images of this size")
+    check(1 <= batch <= MAX_BATCH, "batch", batch, f"from 1 to {MAX_BATCH}")
+    most = MAX_RAYS // (spec.height * spec.width)
+    found = f"{batch}, with {len(spec.views)} views of a scene"
+    enough = max(batch, len(spec.views)) <= most
+    check(enough, "batch", found, f"at most {most} images of this size")
     check_writable(Path(path), overwrite)
     variant = select_variant(device)
     objects = objects or objects_of(spec)
@@ -94,10 +99,11 @@ def render_items(
     device: str = "auto",
     objects: Objects | None = None,
 ) -> Iterator[list[RenderedScene]]:
-    """Yield accepted items in order, as they become complete.
+    """Yield the accepted items in order, a list of them whenever some are complete.
 
-    While a batch is cast, the next one is proposed. An item whose objects do not all show enough
-    pixels is proposed again in the next batch; new items wait when the oldest falls far behind.
+    While a batch is rendered, the next one is proposed. An item whose objects do not all show
+    enough pixels is proposed again in the next batch. No new item is begun while the oldest one
+    that is incomplete is more than WINDOW batches behind.
     """
     objects = objects or objects_of(spec)
     views = range(len(spec.views))

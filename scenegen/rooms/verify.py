@@ -1,4 +1,9 @@
-"""Is a rooms file what it says? Layout, invariants of every row, and rows rendered again."""
+"""Check a file of rooms: its layout, the values of every row, and some rows rendered again.
+
+For every row: the arrays agree with the scene's description; depths, normals and object ids are
+possible and agree with one another; and shading them gives the image. For some rows: the seed
+still gives the description, and the description the pixels.
+"""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -22,10 +27,10 @@ from scenegen.rooms.reader import Room, RoomsFile
 from scenegen.sampling.scenes import MAX_ATTEMPTS, sample_scene
 
 Array = NDArray[Any]
-UNIT_TOLERANCE = 1e-5  # of a normal's length
-PLANE_TOLERANCE = 1e-5  # scene units, of a float32 depth
-RADIANCE_TOLERANCE = 1e-5  # of the shading equation in float32, where radiance is 1 or less
-LOBE_TOLERANCE = 4e-7  # of a highlight's radiance, times its exponent
+UNIT_TOLERANCE = 1e-5  # by which the length of a normal may differ from 1
+PLANE_TOLERANCE = 1e-5  # scene units that float32 depths may put a surfel off its plane
+RADIANCE_TOLERANCE = 1e-5  # float32's rounding in the shading equation, for radiance up to 1
+LOBE_TOLERANCE = 4e-7  # relative rounding of a highlight for each unit of its exponent
 # Rows rendered again agree bit for bit where variant and versions are those that wrote the file.
 # Elsewhere a pixel agrees where its object id is equal, its depth and each component of its normal
 # differ by no more than this, and its image by no more than one step of uint8 or, for floats, this
@@ -34,12 +39,12 @@ DEPTH_TOLERANCE = 1e-5  # scene units
 NORMAL_TOLERANCE = 1e-3
 IMAGE_TOLERANCE = {"uint8": 0.0, "float16": 2.0**-10, "float32": 1e-4}
 EDGE_SHARE = 1e-3  # of a row's pixels that may disagree
-SHOWN = 5  # row numbers named in a message
+SHOWN = 5  # problems that a message names; of more it gives the number
 
 
 @dataclass(frozen=True)
 class Check:
-    """One rule and whether the file keeps it; `detail` says what was looked at or found wrong."""
+    """One rule, whether the file keeps it, and what was checked or found wrong (`detail`)."""
 
     name: str
     ok: bool
@@ -53,16 +58,16 @@ def verify_file(
     objects: Objects | None = None,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> list[Check]:
-    """Check a file: every row's values, and `items` rows, spread evenly, rendered again.
+    """Check every row's values, and render `items` rows, spread evenly over the file, again.
 
     Args:
-        objects: what its scenes are made of; None where that is built in.
-        progress: is told how many more rows were read.
+        objects: what its scenes are made of; None where its objects are built in.
+        progress: called with the number of rows read since the last call.
 
     Raises:
-        FileNotFoundError, FileFormatError: it cannot be opened as a rooms file.
+        FileNotFoundError, FileFormatError: the file cannot be opened as a file of rooms.
         SpecError: it shows meshes, and `objects` are not given.
-        BackendError: nothing can render here.
+        BackendError: the device cannot render here.
     """
     with RoomsFile(path) as rooms:
         objects = objects or objects_of(rooms.spec)
@@ -220,7 +225,7 @@ def _image_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable
     if rooms.spec.shading == "path":
         return
     if rooms.spec.spp > 1 or rooms.spec.shadows:
-        # Whatever the shadows, and whatever else a pixel sees: no darker than ambient light.
+        # With shadows, or the mean of several samples, only a lower bound is known: ambient light.
         darkest = (batch.reflectance[0, : batch.object_count[0] + 1] * batch.ambient[0]).min(axis=0)
         if (room.object_id >= 0).all() and (radiance < darkest - 0.5 / 255 - 1e-3).any():
             yield "a pixel is darker than ambient light alone"
@@ -252,7 +257,7 @@ def _image_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable
 
 
 def _sampled_again(rooms: RoomsFile, rows: Array, objects: Objects) -> Check:
-    """Whether the seed still gives the stored descriptions."""
+    """Check that the seed still gives the stored descriptions."""
     wrong = []
     for i in rows.tolist():
         try:
@@ -270,7 +275,7 @@ def _sampled_again(rooms: RoomsFile, rows: Array, objects: Objects) -> Check:
 
 
 def _rendered_again(rooms: RoomsFile, rows: Array, device: str, objects: Objects) -> Check:
-    """Whether the stored descriptions give the stored pixels."""
+    """Check that the stored descriptions still give the stored pixels."""
     here = {"variant": select_variant(device), **versions()}
     stored = {name: rooms.attributes.get(name, "not stored") for name in here}
     others = [f"{name} {stored[name]}, here {here[name]}" for name in here
@@ -298,7 +303,7 @@ def _rendered_again(rooms: RoomsFile, rows: Array, device: str, objects: Objects
 
 
 def _differ(name: str, stored: Array, again: Array, spec: DatasetSpec, within: bool) -> bool:
-    """Whether two arrays of pixels differ, or do so by more than the tolerance if `within`."""
+    """Return whether two arrays of pixels differ; if `within`, by more than the tolerance."""
     if not within:
         return not np.array_equal(stored, again, equal_nan=True)
     most: float | Array

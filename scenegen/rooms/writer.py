@@ -1,4 +1,4 @@
-"""Write a rooms file."""
+"""Write a file of rooms, row by row."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -27,7 +27,10 @@ CONVENTIONS = (
 
 @dataclass(frozen=True, eq=False)
 class RenderedScene:
-    """An accepted item: its scene, and the pixels of its V views, as in `GroundTruth`."""
+    """An accepted item: its scene, and the pixels of its V views, (V, ...) as in `GroundTruth`.
+
+    `visible_pixels` is (V, K): how many pixels of each view show each object.
+    """
 
     scene: SceneSpec
     image: Array
@@ -38,7 +41,7 @@ class RenderedScene:
 
 
 class RoomsWriter:
-    """The rows of a rooms file in the making; `create_rooms` makes one."""
+    """Writes the rows of a new file of rooms; `create_rooms` makes one."""
 
     def __init__(self, file: h5py.File, spec: DatasetSpec, count: int, compression: str) -> None:
         """Create the datasets of `count` scenes."""
@@ -47,7 +50,7 @@ class RoomsWriter:
         self.fingerprint = Fingerprint(spec)
 
     def append(self, rooms: Sequence[RenderedScene], batch: SceneBatch) -> None:
-        """Write a row for each view of each scene; `batch` is they, packed."""
+        """Write a row for each view of each scene; `batch` holds the same scenes, packed."""
         images = iter(range(len(batch)))
         numbers = [self.classes.index(name.partition("/")[0]) for name in batch.names]
         classes = np.array([*numbers, -1])  # the last one is that of unused slots
@@ -97,13 +100,13 @@ def create_rooms(
     overwrite: bool = False,
     attributes: dict[str, str] | None = None,
 ) -> Iterator[RoomsWriter]:
-    """Open a rooms file to write `count` scenes; it gets its name when the block ends well.
+    """Open a new file of rooms for `count` scenes; it gets its name when the block ends well.
 
-    Its bytes depend on the rows alone, not on how they were handed over.
+    Its bytes depend on the rows alone, not on how many were appended at a time.
 
     Raises:
         SpecError: unknown compression, or a count below 1.
-        OSError: the path, or the disk.
+        OSError: the file cannot be written.
     """
     rows = count * len(spec.views)
     most = MAX_COUNT // len(spec.views)

@@ -144,7 +144,7 @@ def test_a_setting_out_of_range_is_named(field: str, value: Any) -> None:
         DatasetSpec(**{field: value})
     assert caught.value.where == name
     assert caught.value.found
-    assert caught.value.found
+    assert caught.value.expected
     request = json.loads(DatasetSpec().to_json()) | {field: value}
     with pytest.raises(SpecError) as caught:
         DatasetSpec.from_json(json.dumps(request))
