@@ -44,7 +44,7 @@ class DatasetSpec:
             uniformly on SO(3) and lowers it until it touches the floor.
         lights: fewest and most point lights.
         views: degrees about the vertical axis through the target, from the input view, which is
-            the first, to each view of a scene; see `sampling.view_cameras`.
+            the first, to each view of a scene; see `sampling.cameras`.
         shading: "paper" for the paper's equation, "path" for a path tracer on the same scene.
         shadows: whether lights are occluded (the paper's shading equation has no visibility term).
         spp: colour samples per pixel; 1 shades the ground-truth hit itself.

@@ -104,7 +104,7 @@ def test_missing_and_surplus_arguments(refuses):
 
 def test_what_cannot_be_placed_ends_within_a_minute(refuses):
     start = time.monotonic()
-    words = ("item 0", "of its", "objects found room", "try", "--objects", "--object-radius")
+    words = ("item 0", "of its", "objects", "try", "--objects", "--object-radius")
     refuses("render", "--n", 5, "--objects", "1-40", "--out", "o.h5", words=words)
     assert time.monotonic() - start < 60
 
