@@ -329,8 +329,8 @@ def export(
         for row in rows:
             changed = changed_meshes(objects, rooms.scene(row)) if objects else []
             if changed:
-                where = f"{file}: row {row} was made from other files than the folder holds now"
-                raise SpecError(where, ", ".join(changed))
+                found = f"models that changed in the folder: {', '.join(changed)}"
+                raise SpecError(f"{file}: row {row}", found, "the files it was made from")
         paths = {row: export_paths(row, out, Path(file).stem, form) for row in rows}
         if not Path(out).exists():
             Path(out).mkdir()

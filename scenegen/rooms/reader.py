@@ -89,7 +89,7 @@ class RoomsFile:
             self.spec = self._check_root()
             problems = _layout_problems(self._file, self.spec)
             if problems:
-                raise FileFormatError(path, and_more(problems))
+                raise FileFormatError(f"{path}: {and_more(problems)}")
         self.fingerprint = str(self.attributes["fingerprint"])
         self._count = int(self._file["image"].shape[0])
 

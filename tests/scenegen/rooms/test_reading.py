@@ -58,18 +58,6 @@ def test_closing(rooms_path):
         rooms[0]
 
 
-def test_an_unreadable_file_is_not_kept_open(tmp_path, rooms_path):
-    data = rooms_path.read_bytes()
-    path = tmp_path / "cut.h5"
-    path.write_bytes(data[: len(data) // 2])
-    for _ in range(3):
-        with pytest.raises(FileFormatError, match=r"cut\.h5"):
-            open_rooms(path)
-    path.write_bytes(data)
-    with open_rooms(path) as rooms:
-        assert len(rooms) == 8
-
-
 def test_map_style_dataset(rooms_path):
     data = RoomsDataset(rooms_path, fields=("image", "camera/fov_y_degrees", "light/position"))
     assert len(data) == 8
@@ -86,10 +74,11 @@ def test_map_style_dataset(rooms_path):
 
 
 def test_unknown_fields_are_named(rooms_path):
-    with pytest.raises(SpecError, match=r"found 'depht', expected some of image, depth"):
-        RoomsDataset(rooms_path, fields=("image", "depht"))
-    with pytest.raises(SpecError, match="found 'scene'"):
-        RoomsDataset(rooms_path, fields=("scene",))
+    for fields in (("image", "depht"), ("scene",)):
+        with pytest.raises(SpecError) as caught:
+            RoomsDataset(rooms_path, fields=fields)
+        assert caught.value.found == repr(fields[-1])
+        assert "image, depth" in caught.value.expected
 
 
 def test_pickling_after_reading(rooms_path):
