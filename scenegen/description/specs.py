@@ -1,4 +1,4 @@
-"""Frozen description of a data set, JSON both ways: the request; `scenes.SceneSpec` answers it.
+"""Description of a data set, as JSON and back: what is asked for. `SceneSpec` describes a scene.
 
 Lengths are in scene units (the room's edge), frames as in `camera.py`.
 """

@@ -18,7 +18,7 @@ from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.ground_truth import GroundTruth, visible_pixels
-from scenegen.rendering.packing import pack
+from scenegen.rendering.packing import SceneBatch, pack
 from scenegen.rendering.renderer import launch
 from scenegen.rooms.writer import RenderedScene, create_rooms
 from scenegen.sampling.scenes import MAX_ATTEMPTS, refusal, sample_scene
@@ -27,6 +27,8 @@ DEFAULT_BATCH = 64
 MAX_BATCH = 4096
 MAX_RAYS = 2**28  # pixels of one batch; they take 8 GiB
 WINDOW = 4  # batches that may be begun while the oldest item is still being proposed again
+
+_Begun = tuple[list[SceneSpec], SceneBatch, Callable[[], GroundTruth]]  # a batch being rendered
 
 
 def make_dataset(
@@ -65,7 +67,6 @@ def make_dataset(
     check_writable(Path(path), overwrite)
     variant = select_variant(device)
     objects = objects or objects_of(spec)
-    views = range(len(spec.views))
     attributes = {"creation_command": command, "variant": variant, **versions()}
     with (
         create_rooms(
@@ -81,8 +82,8 @@ def make_dataset(
         writing: deque[Future[int]] = deque()
 
         def write(items: list[RenderedScene]) -> int:
-            writer.append(items, pack(spec, [item.scene for item in items], views, objects))
-            return len(items) * len(views)
+            writer.append(items)
+            return len(items) * len(spec.views)
 
         for items in render_items(spec, range(count), batch, device, objects):
             writing.append(pool.submit(write, items))
@@ -129,18 +130,19 @@ def render_items(
             scenes.append(_next_proposal(spec, index, attempts, rendered, objects))
         return scenes
 
-    scenes: list[SceneSpec] = []
-    pending: Callable[[], GroundTruth] | None = None
-    while True:
-        if pending is None:
-            scenes = propose()
-            if not scenes:
-                return
-            pending = launch(pack(spec, scenes, views, objects), device)
+    def begin(scenes: list[SceneSpec]) -> _Begun | None:
+        if not scenes:
+            return None
+        packed = pack(spec, scenes, views, objects)
+        return scenes, packed, launch(packed, device)
+
+    begun: _Begun | None = None
+    while begun := begun or begin(propose()):
+        scenes, packed, fetch = begun
         following = propose()
-        truth = pending()
-        pending = launch(pack(spec, following, views, objects), device) if following else None
-        for scene, shown in zip(scenes, _shown(spec, scenes, truth), strict=True):
+        truth = fetch()
+        begun = begin(following)
+        for scene, shown in zip(scenes, _shown(scenes, packed, truth), strict=True):
             if shown is None:
                 retries.append(scene.index)
                 rendered[scene.index] += 1
@@ -148,7 +150,6 @@ def render_items(
                 finished[scene.index] = shown
                 attempts.pop(scene.index)
                 rendered.pop(scene.index)
-        scenes = following
         ready = []
         while next_out < len(indices) and indices[next_out] in finished:
             ready.append(finished.pop(indices[next_out]))
@@ -158,16 +159,17 @@ def render_items(
 
 
 def _shown(
-    spec: DatasetSpec, scenes: list[SceneSpec], truth: GroundTruth
+    scenes: list[SceneSpec], batch: SceneBatch, truth: GroundTruth
 ) -> Iterator[RenderedScene | None]:
     """Yield each scene with its pixels, or None where an object shows too few in some view."""
+    spec = batch.spec
     visible = visible_pixels(truth.object_id, spec.object_slots)
-    views = len(spec.views)
-    for row, scene in enumerate(scenes):
-        images = slice(row * views, (row + 1) * views)
+    for first, scene in zip(range(0, len(batch), len(spec.views)), scenes, strict=True):
+        images = slice(first, first + len(spec.views))
         enough = visible[images, : len(scene.objects)] >= spec.min_visible_pixels
-        pixels = (truth.image, truth.depth, truth.normal, truth.object_id, visible)
-        yield RenderedScene(scene, *(values[images] for values in pixels)) if enough.all() else None
+        pixels = {name: values[images] for name, values in vars(truth).items()}
+        shown = RenderedScene(scene, batch, first, pixels, visible[images])
+        yield shown if enough.all() else None
 
 
 def _next_proposal(

@@ -24,6 +24,7 @@ from scenegen.rendering.packing import SceneBatch, pack
 from scenegen.rendering.renderer import render
 from scenegen.rendering.shading import shade
 from scenegen.rooms.reader import Room, RoomsFile
+from scenegen.rooms.writer import described
 from scenegen.sampling.scenes import MAX_ATTEMPTS, sample_scene
 
 Array = NDArray[Any]
@@ -151,35 +152,14 @@ def _description_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> It
         return
     if room.view_index and rooms.read("scene", room.index) != rooms.read("scene", first):
         yield "the scene's description differs from that of its first view"
-    stored = {
-        "camera/world_from_camera": batch.world_from_camera,
-        "camera/fov_y_degrees": batch.fov_y_degrees,
-        "light/count": batch.light_count,
-        "light/position": batch.light_position,
-        "light/color": batch.light_color,
-        "light/ambient": batch.ambient,
-        "light/attenuation": batch.attenuation,
-        "material/reflectance": batch.reflectance,
-        "material/specular": batch.gloss[..., 0],
-        "material/shininess": batch.gloss[..., 1],
-        "object/count": batch.object_count,
-        "object/world_from_object": batch.world_from_object,
-        "object/scale": batch.object_scale,
-        "scene_index": np.array([room.scene.index]),
-        "view_angle_degrees": np.array(rooms.spec.views)[[room.view_index]],
-    }
-    for name, values in stored.items():
-        if not np.allclose(rooms.read(name, room.index), values[0], rtol=0, atol=1e-12):
+    for name, expected in described(batch, 0, room.scene).items():
+        found = rooms.read(name, room.index)
+        if name == "object/model":
+            same = [model.decode("utf-8", "replace") for model in found] == expected
+        else:
+            same = np.allclose(found, expected, rtol=0, atol=1e-12)
+        if not same:
             yield f"{name} differs from the scene's description"
-    unused = rooms.spec.object_slots - len(room.scene.objects)
-    models = [item.shape for item in room.scene.objects] + [""] * unused
-    if [
-        name.decode("utf-8", "replace") for name in rooms.read("object/model", room.index)
-    ] != models:
-        yield "object/model differs from the scene's description"
-    classes = [rooms.spec.shapes.index(item.name) for item in room.scene.objects]
-    if rooms.read("object/shape", room.index).tolist() != classes + [-1] * unused:
-        yield "object/shape differs from the scene's description"
 
 
 def _depth_problems(room: Room) -> Iterable[str]:

@@ -1,4 +1,4 @@
-"""The commands as a user types them: options reach the request, helps tell defaults and examples."""
+"""Commands as a user types them: options reach the request, help tells defaults and examples."""
 
 import contextlib
 import json
