@@ -18,7 +18,7 @@ class Field:
     """One dataset, with a row for each image.
 
     Attributes:
-        shape: of a row; `row_shape` says what its letters stand for.
+        shape: of a row; H and W are the image's size, K the object slots, L the light slots.
         dtype: NumPy name; "image" stands for the spec's image type, "text" for UTF-8 strings.
         per_pixel: whether each row is stored as a chunk of its own, as images are.
     """
@@ -81,46 +81,31 @@ FIELDS = (
 # fmt: on
 
 
-def row_shape(field: Field, spec: DatasetSpec) -> tuple[int, ...]:
-    """Return the shape of a row under that spec."""
-    sizes: dict[str | int, int] = {
+def columns(spec: DatasetSpec) -> list[Column]:
+    """Return the datasets of a file that answers that spec, with their attributes."""
+    sizes = {
         "H": spec.height,
         "W": spec.width,
         "K": spec.object_slots,
         "K+1": spec.object_slots + 1,
         "L": spec.light_slots,
     }
-    return tuple(sizes[s] if isinstance(s, str) else s for s in field.shape)
-
-
-def numpy_dtype(field: Field, spec: DatasetSpec) -> str:
-    """Return the NumPy dtype of a field that is not text."""
-    return spec.image_dtype if field.dtype == "image" else field.dtype
-
-
-def image_scale(spec: DatasetSpec) -> float:
-    """Return what a stored pixel is multiplied by to give radiance."""
-    return 1 / 255 if spec.image_dtype == "uint8" else 1.0
-
-
-def columns(spec: DatasetSpec) -> list[Column]:
-    """Return the datasets of a file that answers that spec, with their attributes."""
-    return [_column(field, spec) for field in FIELDS]
-
-
-def _column(field: Field, spec: DatasetSpec) -> Column:
-    attributes: dict[str, Any] = {
-        "unit": field.unit,
-        "frame": field.frame,
-        "shape": "(" + ", ".join(["N", *map(str, field.shape)]) + ")",
-        "meaning": field.meaning,
-    }
-    if field.name == "image":
-        attributes["scale"] = image_scale(spec)
-    if field.name == "object/shape":
-        attributes["names"] = list(spec.shapes)
-    dtype = "text" if field.dtype == "text" else numpy_dtype(field, spec)
-    return Column(field.name, row_shape(field, spec), dtype, field.per_pixel, attributes)
+    found = []
+    for field in FIELDS:
+        attributes: dict[str, Any] = {
+            "unit": field.unit,
+            "frame": field.frame,
+            "shape": "(" + ", ".join(["N", *map(str, field.shape)]) + ")",
+            "meaning": field.meaning,
+        }
+        if field.name == "image":
+            attributes["scale"] = 1 / 255 if spec.image_dtype == "uint8" else 1.0
+        if field.name == "object/shape":
+            attributes["names"] = list(spec.shapes)
+        shape = tuple(sizes[n] if isinstance(n, str) else n for n in field.shape)
+        dtype = spec.image_dtype if field.dtype == "image" else field.dtype
+        found.append(Column(field.name, shape, dtype, field.per_pixel, attributes))
+    return found
 
 
 def markdown_table() -> str:

@@ -37,109 +37,67 @@ OBJECT_OPTIONS = (
 )
 
 
+# fmt: off
 @click.command()
 @click.option("--n", "count", type=int, required=True, help="Number of scenes.")
 @click.option("--out", default="rooms.h5", show_default=True, help="File to write.")
-@click.option(
-    "--preset",
-    default="shapes",
-    show_default=True,
-    help="Settings to start from, as `scenegen presets` lists them; options below override them.",
-)
+@click.option("--preset", default="shapes", show_default=True,
+              help="Settings to start from, as `scenegen presets` lists them; options below override"
+              " them.")
 @SEED
 @click.option("--size", type=Size(), help="Image size in pixels [128].")
 @click.option("--objects", type=Range(int), help="Number of objects in a scene [1-3].")
 @click.option("--shapes", type=Names(), help="Basic shapes to draw from, such as box,sphere [all].")
 @click.option("--classes", type=Names(), help="Object classes to draw from, such as mug,bowl.")
-@click.option(
-    "--object-split",
-    type=click.Choice(["all", "train", "val", "test"]),
-    help="Which models of a class to draw from [all].",
-)
+@click.option("--object-split", type=click.Choice(["all", "train", "val", "test"]),
+              help="Which models of a class to draw from [all].")
 @MESHES
-@click.option(
-    "--object-radius",
-    type=Range(float),
-    help="Bounding radius of objects in scene units; with several views the default is a quarter"
-    " smaller [0.11-0.22].",
-)
-@click.option(
-    "--pose",
-    type=click.Choice(["resting", "any"]),
-    help="Whether objects lie as they would stay, or are turned at random [resting].",
-)
-@click.option(
-    "--views",
-    type=Numbers(),
-    help="Views of each scene, in degrees about the vertical axis from the first view, such as"
-    " 0,5,35,55,80 [0].",
-)
-@click.option(
-    "--min-visible-pixels",
-    type=int,
-    help="Fewest pixels that show an object, in every view [0.3%].",
-)
-@click.option(
-    "--allow-cropped", is_flag=True, default=None, help="Let the image's border cut objects."
-)
-@click.option(
-    "--reflectance",
-    type=Color(),
-    help="Reflectance of objects; also of the room, without --room-reflectance [0.8].",
-)
+@click.option("--object-radius", type=Range(float),
+              help="Bounding radius of objects in scene units; with several views the default is a"
+              " quarter smaller [0.11-0.22].")
+@click.option("--pose", type=click.Choice(["resting", "any"]),
+              help="Whether objects lie as they would stay, or are turned at random [resting].")
+@click.option("--views", type=Numbers(),
+              help="Views of each scene, in degrees about the vertical axis from the first view,"
+              " such as 0,5,35,55,80 [0].")
+@click.option("--min-visible-pixels", type=int,
+              help="Fewest pixels that show an object, in every view [0.3%].")
+@click.option("--allow-cropped", is_flag=True, default=None,
+              help="Let the image's border cut objects.")
+@click.option("--reflectance", type=Color(),
+              help="Reflectance of objects; also of the room, without --room-reflectance [0.8].")
 @click.option("--room-reflectance", type=Color(), help="Reflectance of floor and walls.")
-@click.option(
-    "--random-reflectance/--same-reflectance",
-    default=None,
-    help="Whether each object gets a random colour or all the same [same].",
-)
+@click.option("--random-reflectance/--same-reflectance", default=None,
+              help="Whether each object gets a random colour or all the same [same].")
 @click.option("--specular", type=Range(float), help="Phong's coefficient k_s of objects [0].")
 @click.option("--shininess", type=Range(float), help="Phong's exponent of objects [1].")
 @click.option("--lights", type=Range(int), help="Number of lights in a scene [1-3].")
-@click.option(
-    "--light-saturation", type=float, help="How coloured lights are, from 0 (white) to 1 [0.7]."
-)
-@click.option(
-    "--light-level",
-    type=float,
-    help="Radiance of a white surface at the target that faces all lights [0.95].",
-)
-@click.option(
-    "--light-radius", type=float, help="Distance of lights from the target, scene units [2.5]."
-)
+@click.option("--light-saturation", type=float,
+              help="How coloured lights are, from 0 (white) to 1 [0.7].")
+@click.option("--light-level", type=float,
+              help="Radiance of a white surface at the target that faces all lights [0.95].")
+@click.option("--light-radius", type=float,
+              help="Distance of lights from the target, scene units [2.5].")
 @click.option("--ambient", type=Color(), help="Ambient light L_a [0.1].")
-@click.option(
-    "--attenuation",
-    type=Numbers(),
-    help="k_l,k_q: how light falls off with distance and its square [0.5,0.5].",
-)
-@click.option(
-    "--shading",
-    type=click.Choice(["paper", "path"]),
-    help="The paper's shading equation, or path tracing, with shadows and indirect light;"
-    " slower [paper].",
-)
+@click.option("--attenuation", type=Numbers(),
+              help="k_l,k_q: how light falls off with distance and its square [0.5,0.5].")
+@click.option("--shading", type=click.Choice(["paper", "path"]),
+              help="The paper's shading equation, or path tracing, with shadows and indirect light;"
+              " slower [paper].")
 @click.option("--shadows/--no-shadows", default=None, help="Whether objects cast shadows [no].")
-@click.option(
-    "--spp", type=int, help="Colour samples per pixel; with --shading path, 64 by default [1]."
-)
-@click.option(
-    "--fov", "fov_degrees", type=float, help="Field of view of a square image, degrees [28]."
-)
-@click.option(
-    "--camera-radius", type=float, help="Distance of cameras from the target, scene units [1.5]."
-)
+@click.option("--spp", type=int,
+              help="Colour samples per pixel; with --shading path, 64 by default [1].")
+@click.option("--fov", "fov_degrees", type=float,
+              help="Field of view of a square image, degrees [28].")
+@click.option("--camera-radius", type=float,
+              help="Distance of cameras from the target, scene units [1.5].")
 @IMAGE_DTYPE
 @COMPRESSION
-@click.option(
-    "--batch",
-    type=int,
-    default=64,
-    show_default=True,
-    help="Images rendered at once; more take more memory.",
-)
+@click.option("--batch", type=int, default=64, show_default=True,
+              help="Images rendered at once; more take more memory.")
 @DEVICE
 @OVERWRITE
+# fmt: on
 def render(
     count: int,
     out: str,

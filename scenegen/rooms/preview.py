@@ -23,18 +23,10 @@ SMALLEST_TILE = 128  # pixels; narrower images are enlarged by a whole factor
 BACKGROUND, INK, FAINT = (250, 250, 250), (20, 20, 20), (110, 110, 110)
 NOTHING = (90, 0, 110)  # colour of pixels whose ray meets nothing
 PALETTE = np.array(  # of object ids: the room is grey; objects repeat Okabe and Ito's colours
-    [
-        (200, 200, 200),
-        (230, 159, 0),
-        (86, 180, 233),
-        (0, 158, 115),
-        (240, 228, 66),
-        (0, 114, 178),
-        (213, 94, 0),
-        (204, 121, 167),
-    ],
+    [(200, 200, 200), (230, 159, 0), (86, 180, 233), (0, 158, 115), (240, 228, 66),
+     (0, 114, 178), (213, 94, 0), (204, 121, 167)],
     np.uint8,
-)
+)  # fmt: skip
 TITLES = ("image", "depth, near is dark", "normal, xyz as rgb", "object id")
 
 
