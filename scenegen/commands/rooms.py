@@ -42,8 +42,7 @@ OBJECT_OPTIONS = (
 @click.option("--n", "count", type=int, required=True, help="Number of scenes.")
 @click.option("--out", default="rooms.h5", show_default=True, help="File to write.")
 @click.option("--preset", default="shapes", show_default=True,
-              help="Settings to start from, as `scenegen presets` lists them; options below override"
-              " them.")
+              help="Settings to start from, as `scenegen presets` lists them; options override them.")
 @SEED
 @click.option("--size", type=Size(), help="Image size in pixels [128].")
 @click.option("--objects", type=Range(int), help="Number of objects in a scene [1-3].")
@@ -97,7 +96,6 @@ OBJECT_OPTIONS = (
               help="Images rendered at once; more take more memory.")
 @DEVICE
 @OVERWRITE
-# fmt: on
 def render(
     count: int,
     out: str,
@@ -151,6 +149,7 @@ def render(
         click.echo(line, err=True)
 
 
+# fmt: on
 @click.command()
 def presets() -> None:
     """List the presets of `render` with their settings: the paper's data sets.
