@@ -42,7 +42,7 @@ OBJECT_OPTIONS = (
 @click.option("--n", "count", type=int, required=True, help="Number of scenes.")
 @click.option("--out", default="rooms.h5", show_default=True, help="File to write.")
 @click.option("--preset", default="shapes", show_default=True,
-              help="Settings to start from, as `scenegen presets` lists them; options override them.")
+              help="Settings to start from, as `scenegen presets` lists them.")
 @SEED
 @click.option("--size", type=Size(), help="Image size in pixels [128].")
 @click.option("--objects", type=Range(int), help="Number of objects in a scene [1-3].")

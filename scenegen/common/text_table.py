@@ -1,6 +1,7 @@
 """Names and numbers as cells of tables: for terminals, Markdown, HTML and LaTeX.
 
-Names come from others' files: whatever they hold, they stay one cell and show as they are.
+Names come from files of other people. Whatever characters they hold, a name stays one cell of one
+line and is shown as it is.
 """
 
 import html as html_module
@@ -35,7 +36,7 @@ _LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {
 
 
 def plain(name: str) -> str:
-    """A name in one line, of characters that show; "(unnamed)" where there are none."""
+    """Return a name as one line of visible characters, "(unnamed)" if it has none."""
     kept = "".join(
         c if c.isspace() or _shows(c) else "\ufffd" for c in name if c not in _DIRECTIONS
     )
@@ -48,23 +49,23 @@ def _shows(character: str) -> bool:
 
 
 def markdown(text: str) -> str:
-    """A text in one line as a Markdown cell that shows it."""
+    """Return a text of one line as a Markdown cell that shows it."""
     return "".join(_MARKDOWN.get(c, c) for c in text)
 
 
 def html(text: str) -> str:
-    """A text as HTML that shows it, within elements and quoted attributes."""
+    """Return a text as HTML that shows it, within elements and quoted attributes."""
     return html_module.escape(text, quote=True)
 
 
 def latex(text: str) -> str:
-    """A text as LaTeX that shows it, given textcomp."""
+    """Return a text as LaTeX that shows it; the document must load textcomp."""
     escaped = "".join(_LATEX.get(c, c) for c in text)
     return re.sub("-(?=-)", "-{}", escaped)  # else hyphens become a dash
 
 
 def distinct(names: Sequence[str], hints: Sequence[str]) -> list[str]:
-    """Names in one line each, told apart: by their hints where two are alike, else by number."""
+    """Return names as one line each; equal ones get their hint, or else a number, to differ."""
     found = [plain(name) for name in names]
     hinted = [
         f"{name} [{plain(hint)}]" if found.count(name) > 1 else name
@@ -74,9 +75,9 @@ def distinct(names: Sequence[str], hints: Sequence[str]) -> list[str]:
 
 
 def number(value: float, like: float | None = None) -> str:
-    """A number with 4 significant digits, without exponent where 8 decimals hold it.
+    """Return a number with 4 significant digits, without exponent where 8 decimals suffice.
 
-    With `like`, as many decimals as that number is shown with.
+    With `like`, it gets as many decimals as that number would.
     """
     scale = abs(value if like is None or like == 0.0 else like)
     if value == 0.0 and scale == 0.0:
@@ -89,7 +90,7 @@ def number(value: float, like: float | None = None) -> str:
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of equal length as lines, columns aligned."""
+    """Return rows of equal length as lines of text with aligned columns."""
     widths = [max(map(_width, column)) for column in zip(*rows, strict=True)]
     return [
         "  ".join(
@@ -105,6 +106,6 @@ def _width(text: str) -> int:
 
 
 def piped(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows as the lines of a Markdown table, the first as its head; cells escaped already."""
+    """Return rows of escaped cells as the lines of a Markdown table; the first is its head."""
     head, *rest = ["| " + " | ".join(row) + " |" for row in rows]
     return [head, "| " + " | ".join("---" for _ in rows[0]) + " |", *rest]

@@ -13,22 +13,37 @@ from scenegen.common.records import check, check_range, from_json, normalise, to
 from scenegen.description.scenes import FAMILY_NAMES, SHAPE_NAMES
 
 IMAGE_DTYPES = ("uint8", "float16", "float32")
-POSES = ("resting", "any")
 BUILT_IN = {"shapes": SHAPE_NAMES, "families": FAMILY_NAMES}
 FOLDERS = ("shapenet-v1", "shapenet-v2", "folder")
 SPLITS = ("all", "train", "val", "test")
-SHADINGS = ("paper", "path")
-MAX_OBJECTS = 100  # object ids are stored as int8
 MAX_CLASSES = 4000  # their names are an attribute, of which HDF5 allows 64 kB
 MAX_LIGHTS = 16
 MAX_PIXELS = 4096 * 4096
 MAX_VIEWS = 64
 MOST_TURN = 80.0  # degrees between two views; at 90 all input views would be the same
+LIMITS: dict[str, tuple[float, float]] = {  # of settings that are a number or a range of numbers
+    "spp": (1, 1024),
+    "objects": (0, 100),  # object ids are stored as int8
+    "object_radius": (0.005, 0.5),
+    "specular": (0.0, 10.0),
+    "shininess": (1.0, 10_000.0),
+    "fov_degrees": (1.0, 120.0),
+    "lights": (0, MAX_LIGHTS),
+    "light_level": (0.0, 100.0),
+    "light_saturation": (0.0, 1.0),
+}
+CHOICES = {
+    "image_dtype": IMAGE_DTYPES,
+    "shading": ("paper", "path"),
+    "pose": ("resting", "any"),
+    "source": (*BUILT_IN, *FOLDERS),
+    "object_split": SPLITS,
+}
 
 
 @dataclass(frozen=True)
 class DatasetSpec:
-    """The request that a file of rooms answers; item i depends on this and on i alone.
+    """What a file of rooms should hold; item i depends on this and on i alone.
 
     Attributes:
         seed: dataset seed, 0 to 2**63 - 1.
@@ -99,19 +114,19 @@ class DatasetSpec:
     def __post_init__(self) -> None:
         normalise(self)
         check(0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2**63 - 1")
+        _check_limits(self)
         _check_image(self)
         _check_objects(self)
-        _check_camera(self)
-        _check_light(self)
+        _check_places(self)
 
     @property
     def object_slots(self) -> int:
-        """Length of the object axis of every array; at least 1, as HDF5 wants it."""
+        """Length of the object axis of every array; at least 1, which HDF5 needs."""
         return max(1, self.objects[1])
 
     @property
     def light_slots(self) -> int:
-        """Length of the light axis of every array; at least 1, as HDF5 wants it."""
+        """Length of the light axis of every array; at least 1, which HDF5 needs."""
         return max(1, self.lights[1])
 
     @property
@@ -148,38 +163,36 @@ class Fingerprint:
         return self._digest.hexdigest()
 
 
-def _one_of(name: str, value: str, known: tuple[str, ...]) -> None:
-    check(value in known, name, value, f"one of {', '.join(known)}")
+def _check_limits(spec: DatasetSpec) -> None:
+    """Check each setting by itself, where two numbers or a few words limit it."""
+    for name, (low, high) in LIMITS.items():
+        value, shown = getattr(spec, name), name.removesuffix("_degrees").replace("_", " ")
+        if isinstance(value, tuple):
+            check_range(shown, value, low, high)
+        else:
+            check(low <= value <= high, shown, value, f"from {low:g} to {high:g}")
+    for name, known in CHOICES.items():
+        value = getattr(spec, name)
+        check(value in known, name.replace("_", " "), value, f"one of {', '.join(known)}")
+    for name in ("ambient", "reflectance", "room_reflectance"):
+        color = getattr(spec, name)
+        ok = len(color) == 3 and all(0.0 <= c <= 1.0 for c in color)
+        check(ok, name.replace("_", " "), color, "channels from 0 to 1")
 
 
 def _check_image(spec: DatasetSpec) -> None:
-    sides = f"{spec.height}x{spec.width}"
+    sides, pixels = f"{spec.height}x{spec.width}", spec.height * spec.width
     check(min(spec.height, spec.width) >= 8, "size", sides, "at least 8 pixels a side")
-    pixels = spec.height * spec.width
     check(pixels <= MAX_PIXELS, "size", sides, f"at most {MAX_PIXELS:,} pixels")
-    _one_of("image dtype", spec.image_dtype, IMAGE_DTYPES)
-    _one_of("shading", spec.shading, SHADINGS)
-    check(1 <= spec.spp <= 1024, "spp", spec.spp, "from 1 to 1024")
-    check(
-        not (spec.shadows and spec.shading == "path"),
-        "shadows",
-        "with shading 'path'",
-        "one of the two: a path tracer always casts shadows",
-    )
-    check(
-        0 <= spec.min_visible_pixels <= pixels,
-        "min visible pixels",
-        spec.min_visible_pixels,
-        f"from 0 to the image's {pixels} pixels",
-    )
+    least = spec.min_visible_pixels
+    expected = f"from 0 to the image's {pixels} pixels"
+    check(0 <= least <= pixels, "min visible pixels", least, expected)
+    allowed = "one of the two: a path tracer always casts shadows"
+    both = spec.shadows and spec.shading == "path"
+    check(not both, "shadows", "with shading 'path'", allowed)
 
 
 def _check_objects(spec: DatasetSpec) -> None:
-    check_range("objects", spec.objects, 0, MAX_OBJECTS)
-    check_range("object radius", spec.object_radius, 0.005, 0.5)
-    _one_of("pose", spec.pose, POSES)
-    _one_of("source", spec.source, (*BUILT_IN, *FOLDERS))
-    _one_of("object split", spec.object_split, SPLITS)
     what = "shapes" if spec.source == "shapes" else "classes"
     known = BUILT_IN.get(spec.source)
     some = f"some of {', '.join(known)}" if known else "names of classes"
@@ -191,18 +204,11 @@ def _check_objects(spec: DatasetSpec) -> None:
     check(len(set(spec.shapes)) == len(spec.shapes), what, spec.shapes, "each name once")
     if spec.source == "shapes":
         check(spec.object_split == "all", "object split", spec.object_split, "'all' for shapes")
-    check_range("specular", spec.specular, 0.0, 10.0)
-    check_range("shininess", spec.shininess, 1.0, 10_000.0)
 
 
-def _check_camera(spec: DatasetSpec) -> None:
-    check(1.0 <= spec.fov_degrees <= 120.0, "fov", spec.fov_degrees, "from 1 to 120 degrees")
-    check(
-        all(0.0 < x < 1.0 for x in spec.camera_target),
-        "camera target",
-        spec.camera_target,
-        "inside the unit room",
-    )
+def _check_places(spec: DatasetSpec) -> None:
+    inside = all(0.0 < x < 1.0 for x in spec.camera_target)
+    check(inside, "camera target", spec.camera_target, "inside the unit room")
     corner = math.dist(spec.camera_target, (1.0, 1.0, 1.0))
     for name, radius, most in (
         ("camera radius", spec.camera_radius, 10.0),
@@ -218,20 +224,9 @@ def _check_camera(spec: DatasetSpec) -> None:
         ", ".join(f"{v:g}" for v in views) or "none",
         f"rising degrees from 0, the input view, to at most {MOST_TURN:g}, such as 0,5,35,55,80",
     )
-
-
-def _check_light(spec: DatasetSpec) -> None:
-    check_range("lights", spec.lights, 0, MAX_LIGHTS)
-    check(0.0 <= spec.light_level <= 100.0, "light level", spec.light_level, "from 0 to 100")
-    check(0.0 <= spec.light_saturation <= 1.0, "light saturation", spec.light_saturation, "0 to 1")
-    for name in ("ambient", "reflectance", "room_reflectance"):
-        color = getattr(spec, name)
-        ok = len(color) == 3 and all(0.0 <= c <= 1.0 for c in color)
-        check(ok, name.replace("_", " "), color, "channels from 0 to 1")
+    both = len(spec.attenuation) == 2 and all(0.0 <= k <= 100.0 for k in spec.attenuation)
     check(
-        len(spec.attenuation) == 2
-        and all(0.0 <= k <= 100.0 for k in spec.attenuation)
-        and sum(spec.attenuation) >= 1e-6,
+        both and sum(spec.attenuation) >= 1e-6,
         "attenuation",
         spec.attenuation,
         "k_l and k_q from 0 to 100, not both 0",

@@ -125,15 +125,15 @@ def _row_problems(rooms: RoomsFile, i: int, objects: Objects) -> Iterable[tuple[
         if not unreadable:
             yield "description", str(error)
         return
+    found = {
+        "description": _description_problems(rooms, room, batch, objects),
+        "depth": _depth_problems(room),
+        "normal": _normal_problems(room),
+        "object_id": _object_problems(rooms, room),
+        "image": _image_problems(rooms, room, batch),
+    }
     with np.errstate(all="ignore"):  # a damaged number may overflow, and is found all the same
-        yield from (("description", p) for p in _description_problems(rooms, room, batch))
-        changed = changed_meshes(objects, room.scene)
-        if changed:
-            yield "description", f"made from other files than the folder's: {', '.join(changed)}"
-        yield from (("depth", p) for p in _depth_problems(room))
-        yield from (("normal", p) for p in _normal_problems(room))
-        yield from (("object_id", p) for p in _object_problems(rooms, room))
-        yield from (("image", p) for p in _image_problems(rooms, room, batch))
+        yield from ((name, problem) for name, some in found.items() for problem in some)
 
 
 def _can_read(rooms: RoomsFile, name: str, row: int) -> bool:
@@ -144,7 +144,12 @@ def _can_read(rooms: RoomsFile, name: str, row: int) -> bool:
     return True
 
 
-def _description_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable[str]:
+def _description_problems(
+    rooms: RoomsFile, room: Room, batch: SceneBatch, objects: Objects
+) -> Iterable[str]:
+    changed = changed_meshes(objects, room.scene)
+    if changed:
+        yield f"made from other files than the folder's: {', '.join(changed)}"
     views = len(rooms.spec.views)
     first = room.index - room.index % views
     if room.view_index != room.index - first or len(room.scene.cameras) != views:
