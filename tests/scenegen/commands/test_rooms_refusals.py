@@ -114,9 +114,13 @@ def test_missing_arguments(run, refuses):
     assert "Missing option '--format'" in result.stderr  # click lists the choices below it
 
 
+def missing(library, *_, **__):
+    raise OSError(f"{library}: cannot open shared object file")
+
+
 @pytest.mark.parametrize("command", [RENDER, ("verify", "FILE")])
 def test_no_gpu_here(refuses, monkeypatch, rooms_path, command):
-    monkeypatch.setattr("scenegen.rendering.backend._cuda_driver", lambda: False)
+    monkeypatch.setattr("ctypes.CDLL", missing)
     given = [rooms_path if part == "FILE" else part for part in command]
     refuses(*given, "--device", "cuda", words=("cuda", "--device cpu"))
 

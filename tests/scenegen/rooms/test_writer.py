@@ -103,7 +103,7 @@ def test_something_that_is_no_regular_file_is_never_replaced(tmp_path):
 
 @pytest.mark.parametrize(("count", "compression"), [(0, "gzip"), (-1, "gzip"), (1, "zip")])
 def test_bad_settings(tmp_path, count, compression):
-    with pytest.raises(SpecError, match="found"):
+    with pytest.raises(SpecError):
         create_rooms(tmp_path / "x.h5", SPEC, count, compression=compression).__enter__()
     assert list(tmp_path.iterdir()) == []
 
