@@ -138,8 +138,9 @@ class RoomsFile:
         HDF5 does not tell the size of the heaps that hold texts. The dataset "scene" is said to
         take what all others leave of the file.
         """
-        sizes = {f.name: self._file[f.name].id.get_storage_size() for f in FIELDS}
-        memory = {f.name: self._file[f.name].nbytes for f in FIELDS}
+        with reading(self.path):
+            sizes = {f.name: self._file[f.name].id.get_storage_size() for f in FIELDS}
+            memory = {f.name: self._file[f.name].nbytes for f in FIELDS}
         texts = self.path.stat().st_size - sum(sizes.values()) + sizes["scene"]
         sizes["scene"] = memory["scene"] = texts
         memory["object/model"] = sizes["object/model"]

@@ -95,6 +95,27 @@ def test_other_versions_are_told_and_compared_within_a_tolerance(damaged, versio
     assert remark in again.detail or not attributes
 
 
+@pytest.mark.parametrize(
+    ("settings", "factor", "alike"),
+    [
+        ({"image_dtype": "float32"}, 1 + 5e-5, True),
+        ({"image_dtype": "float32"}, 1 + 1e-3, False),
+        ({"image_dtype": "float16"}, 1 + 2.0**-11, True),
+        ({"image_dtype": "float16"}, 1 + 2.0**-8, False),
+        ({"shading": "path", "spp": 2}, 0.5, True),
+    ],
+    ids=str,
+)
+def test_images_of_other_versions(make_rooms, tmp_path, settings, factor, alike):
+    """Floats relative to the radiance; images of a path tracer not at all."""
+    path = make_rooms(tmp_path / "x.h5", 2, **settings)
+    with h5py.File(path, "r+") as file:
+        file.attrs["drjit_version"] = "1.4.0"
+        file["image"][...] = (file["image"][:] * factor).astype(file["image"].dtype)
+    again = {check.name: check for check in verify_file(path, 8)}["rendered again"]
+    assert again.ok == alike, again.detail
+
+
 def test_lists_and_counts(verdict, rooms_path):
     assert set(verdict(rooms_path, "--items", 0)[1]) == ROWS
     assert "3 rows, bit for bit" in verdict(rooms_path, "--items", 3)[2]
