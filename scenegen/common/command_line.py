@@ -182,54 +182,31 @@ def progress_bar(count: int | None, unit: str) -> Any:
     return tqdm(total=count, unit=unit, disable=None, leave=False, smoothing=0.1)
 
 
+# fmt: off
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
-DEVICE = click.option(
-    "--device",
-    type=click.Choice(["auto", "cpu", "cuda"]),
-    default="auto",
-    show_default=True,
-    help="Where to render. auto is the CPU, with LLVM or else slowly.",
-)
-IMAGE_DTYPE = click.option(
-    "--image-dtype",
-    type=click.Choice(["uint8", "float16", "float32"]),
-    default="uint8",
-    show_default=True,
-    help="Type that radiance is stored as.",
-)
-COMPRESSION = click.option(
-    "--compression",
-    type=click.Choice(["gzip", "lzf", "none"]),
-    default="gzip",
-    show_default=True,
-    help="How images are compressed; only h5py reads lzf.",
-)
-SIZE = click.option(
-    "--size", type=Size(), default="128", show_default=True, help="Image size in pixels."
-)
-SEED = click.option(
-    "--seed", type=int, default=0, show_default=True, help="Seed of every random choice."
-)
-
-
-UP = click.option(
-    "--up",
-    type=click.Choice(["y", "z"]),
-    default="y",
-    show_default=True,
-    help="Axis that points up in the meshes; in ShapeNet it is y.",
-)
+DEVICE = click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
+                      show_default=True,
+                      help="Where to render. auto is the CPU, with LLVM or else slowly.")
+IMAGE_DTYPE = click.option("--image-dtype", type=click.Choice(["uint8", "float16", "float32"]),
+                           default="uint8", show_default=True, help="Type of stored radiance.")
+COMPRESSION = click.option("--compression", type=click.Choice(["gzip", "lzf", "none"]),
+                           default="gzip", show_default=True,
+                           help="How images are compressed; only h5py reads lzf.")
+SIZE = click.option("--size", type=Size(), default="128", show_default=True,
+                    help="Image size in pixels.")
+SEED = click.option("--seed", type=int, default=0, show_default=True,
+                    help="Seed of every random choice.")
+UP = click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True,
+                  help="Axis that points up in the meshes; in ShapeNet it is y.")
 CACHE_DIR = click.option("--cache-dir", help="Folder for cleaned meshes [the user's cache].")
+# fmt: on
 
 
 def MESHES(command: Any) -> Any:  # noqa: N802
     """Add the options that name the folder of meshes that objects are taken from."""
     options = (
         click.option("--shapenet-root", help="Folder of ShapeNetCore 1 or 2 with the objects."),
-        click.option(
-            "--objects-root",
-            help="Folder with the objects, a sub-folder per class.",
-        ),
+        click.option("--objects-root", help="Folder with the objects, a sub-folder per class."),
         UP,
         CACHE_DIR,
     )
