@@ -1,4 +1,4 @@
-"""Cameras, pixel rays and back-projection in numpy: frames and pixel conventions stated once.
+"""Cameras, rays of pixels and back-projection. The conventions of frames and pixels are:
 
 World: right-handed, y up; the room is the half-open unit box with floor y = 0 and walls x = 0 and
 z = 0; its edge is the unit of length ("scene unit").
@@ -55,9 +55,7 @@ class Camera:
         right = np.array([back[2], 0.0, -back[0]])  # y axis x back
         length = math.hypot(back[2], back[0])
         if length < 1e-9:
-            raise SpecError(
-                f"camera: {self.position} looks straight along y; its roll is undefined"
-            )
+            raise SpecError("camera", f"a view straight along y from {self.position}", "a slope")
         right /= length
         matrix = np.eye(4)
         matrix[:3, 0] = right
@@ -68,19 +66,22 @@ class Camera:
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """Cross product of two 3-vectors (np.cross is ten times slower on so few numbers)."""
+    """Return the cross product of two 3-vectors, ten times as fast as np.cross."""
     return np.array(
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     )
 
 
 def pixel_size(height: int, fov_y_degrees: float) -> float:
-    """Return the side of a pixel on the plane at depth 1, scene units."""
+    """Return the side of a pixel on the plane at depth 1, in scene units."""
     return 2 * math.tan(math.radians(fov_y_degrees) / 2) / height
 
 
 def pixel_directions(height: int, width: int, fov_y_degrees: float) -> NDArray[np.float64]:
-    """Return the rays through the pixel centres, camera frame, z = -1: (height, width, 3)."""
+    """Return the directions of the rays through the pixel centres: (height, width, 3).
+
+    They are in the camera frame and have z = -1.
+    """
     pixel = pixel_size(height, fov_y_degrees)
     directions = np.empty((height, width, 3))
     directions[..., 0] = (np.arange(width) + 0.5 - width / 2) * pixel
@@ -90,9 +91,9 @@ def pixel_directions(height: int, width: int, fov_y_degrees: float) -> NDArray[n
 
 
 def back_project(depth: Array, fov_y_degrees: float) -> NDArray[np.float64]:
-    """Return the surfel positions of a planar depth map, camera frame: (H, W) -> (H, W, 3).
+    """Return the surface points of a planar depth map in the camera frame: (H, W) -> (H, W, 3).
 
-    NaN where the depth is not finite.
+    Points are NaN where the depth is not finite.
     """
     height, width = depth.shape
     directions = pixel_directions(height, width, fov_y_degrees)
@@ -111,6 +112,6 @@ def transform_vectors(matrix: Array, vectors: Array) -> NDArray[np.float64]:
 
 
 def intrinsics(height: int, width: int, fov_y_degrees: float) -> NDArray[np.float64]:
-    """Return the (3, 3) matrix of OpenCV-style tools (x right, y DOWN, z forward), in pixels."""
+    """Return the (3, 3) camera matrix, in pixels, of tools with x right, y DOWN, z forward."""
     focal = height / 2 / math.tan(math.radians(fov_y_degrees) / 2)
     return np.array([[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]])

@@ -1,4 +1,4 @@
-"""The HDF5 layout of a rooms file, as data.
+"""The HDF5 layout of a file of rooms, as a table: name, shape, type, unit, frame and meaning.
 
 `python -m scenegen.layout` prints it as the table of `docs/rooms-file.md`.
 """
@@ -10,17 +10,17 @@ from scenegen.common.row_file import Column
 from scenegen.description.specs import DatasetSpec
 
 FORMAT_NAME = "pix2shape-bench/rooms"
-FORMAT_VERSION = "2.0"
+FORMAT_VERSION = "2.1"
 
 
 @dataclass(frozen=True)
 class Field:
-    """One dataset: a row per image.
+    """One dataset, with a row for each image.
 
     Attributes:
-        shape: of a row; letters as in `sizes`.
+        shape: of a row; H and W are the image's size, K the object slots, L the light slots.
         dtype: NumPy name; "image" stands for the spec's image type, "text" for UTF-8 strings.
-        per_pixel: whether a row is a chunk of its own.
+        per_pixel: whether each row is stored as a chunk of its own, as images are.
     """
 
     name: str
@@ -32,192 +32,80 @@ class Field:
     per_pixel: bool = False
 
 
+# fmt: off
 FIELDS = (
-    Field(
-        "image",
-        ("H", "W", 3),
-        "image",
-        "linear radiance, times `scale`",
-        "pixels: row 0 on top",
-        "RGB of the shading equation, or of path tracing (`spec`); stored value times `scale` is"
-        " radiance (no gamma)",
-        True,
-    ),
-    Field(
-        "depth",
-        ("H", "W"),
-        "float32",
-        "scene unit",
-        "camera",
-        "planar depth, -z in the camera frame, of the one ray through the pixel's centre;"
-        " NaN where it meets nothing",
-        True,
-    ),
-    Field(
-        "normal",
-        ("H", "W", 3),
-        "float32",
-        "1",
-        "camera",
-        "unit surface normal of the same hit, facing the viewer; zero where nothing is hit",
-        True,
-    ),
-    Field(
-        "object_id",
-        ("H", "W"),
-        "int8",
-        "1",
-        "pixels: row 0 on top",
-        "what the same ray hits: -1 nothing, 0 the room, k the k-th object (from 1)",
-        True,
-    ),
+    Field("image", ("H", "W", 3), "image", "linear radiance, times `scale`", "pixels: row 0 on top",
+          "RGB of the shading equation, or of path tracing (`spec`); stored value times"
+          " `scale` is radiance (no gamma)", True),
+    Field("depth", ("H", "W"), "float32", "scene unit", "camera",
+          "planar depth, -z in the camera frame, of the one ray through the pixel's centre;"
+          " NaN where it meets nothing", True),
+    Field("normal", ("H", "W", 3), "float32", "1", "camera",
+          "unit surface normal of the same hit, facing the viewer; zero where nothing is hit",
+          True),
+    Field("object_id", ("H", "W"), "int8", "1", "pixels: row 0 on top",
+          "what the same ray hits: -1 nothing, 0 the room, k the k-th object (from 1)", True),
     Field("scene_index", (), "int64", "1", "-", "which scene the image shows"),
     Field("view_index", (), "int32", "1", "-", "which view of that scene, from 0"),
-    Field(
-        "view_angle_degrees",
-        (),
-        "float64",
-        "degree",
-        "-",
-        "from the scene's input view (view 0), about the vertical axis",
-    ),
-    Field(
-        "camera/world_from_camera",
-        (4, 4),
-        "float64",
-        "scene unit",
-        "world from camera",
-        "rigid transform; the camera looks along -z, x right, y up",
-    ),
-    Field(
-        "camera/fov_y_degrees",
-        (),
-        "float64",
-        "degree",
-        "-",
-        "vertical field of view; pixels are square, the principal point is the image's middle",
-    ),
+    Field("view_angle_degrees", (), "float64", "degree", "-",
+          "from the scene's input view (view 0), about the vertical axis"),
+    Field("camera/world_from_camera", (4, 4), "float64", "scene unit", "world from camera",
+          "rigid transform; the camera looks along -z, x right, y up"),
+    Field("camera/fov_y_degrees", (), "float64", "degree", "-",
+          "vertical field of view; pixels are square, the principal point is the image's middle"),
     Field("light/count", (), "int32", "1", "-", "number of point lights"),
-    Field(
-        "light/position",
-        ("L", 3),
-        "float64",
-        "scene unit",
-        "world",
-        "point lights; slots from light/count on are unused",
-    ),
+    Field("light/position", ("L", 3), "float64", "scene unit", "world",
+          "point lights; slots from light/count on are unused"),
     Field("light/color", ("L", 3), "float64", "radiance", "RGB", "L_j; zero in unused slots"),
     Field("light/ambient", (3,), "float64", "radiance", "RGB", "L_a"),
-    Field(
-        "light/attenuation",
-        (2,),
-        "float64",
-        "1 / scene unit, 1 / scene unit squared",
-        "-",
-        "k_l and k_q",
-    ),
-    Field(
-        "material/reflectance",
-        ("K+1", 3),
-        "float64",
-        "1",
-        "RGB by object id",
-        "rho of the room (row 0) and of each object (row k); zero in unused slots",
-    ),
-    Field(
-        "material/specular",
-        ("K+1",),
-        "float64",
-        "1",
-        "by object id",
-        "k_s of Phong's lobe; 0 for the room and in unused slots",
-    ),
-    Field(
-        "material/shininess",
-        ("K+1",),
-        "float64",
-        "1",
-        "by object id",
-        "exponent of Phong's lobe; 1 for the room and in unused slots",
-    ),
+    Field("light/attenuation", (2,), "float64", "1 / scene unit, 1 / scene unit squared", "-",
+          "k_l and k_q"),
+    Field("material/reflectance", ("K+1", 3), "float64", "1", "RGB by object id",
+          "rho of the room (row 0) and of each object (row k); zero in unused slots"),
+    Field("material/specular", ("K+1",), "float64", "1", "by object id",
+          "k_s of Phong's lobe; 0 for the room and in unused slots"),
+    Field("material/shininess", ("K+1",), "float64", "1", "by object id",
+          "exponent of Phong's lobe; 1 for the room and in unused slots"),
     Field("object/count", (), "int32", "1", "-", "number of objects"),
-    Field(
-        "object/shape",
-        ("K",),
-        "int16",
-        "1",
-        "-",
-        "basic shape or class, index into the attribute `names`; -1 in unused slots",
-    ),
-    Field(
-        "object/model",
-        ("K",),
-        "text",
-        "-",
-        "-",
-        "which model of the class, class/model; the shape's name for a basic shape",
-    ),
-    Field(
-        "object/world_from_object",
-        ("K", 4, 4),
-        "float64",
-        "scene unit",
-        "world from object",
-        "similarity that places the unit shape (bounding radius 1); zero in unused slots",
-    ),
-    Field(
-        "object/scale",
-        ("K",),
-        "float64",
-        "scene unit",
-        "-",
-        "bounding radius, the scale in world_from_object",
-    ),
+    Field("object/shape", ("K",), "int16", "1", "-",
+          "basic shape or class, index into the attribute `names`; -1 in unused slots"),
+    Field("object/model", ("K",), "text", "-", "-",
+          "which model of the class, class/model; the shape's name for a basic shape"),
+    Field("object/world_from_object", ("K", 4, 4), "float64", "scene unit", "world from object",
+          "similarity that places the unit shape (bounding radius 1); zero in unused slots"),
+    Field("object/scale", ("K",), "float64", "scene unit", "-",
+          "bounding radius, the scale in world_from_object"),
     Field("object/visible_pixels", ("K",), "int32", "pixel", "-", "pixels that show the object"),
     Field("scene", (), "text", "-", "-", "full description of the scene, JSON"),
 )
+# fmt: on
 
 
-def row_shape(field: Field, spec: DatasetSpec) -> tuple[int, ...]:
-    """Return the shape of a row under that spec."""
-    sizes: dict[str | int, int] = {
+def columns(spec: DatasetSpec) -> list[Column]:
+    """Return the datasets of a file that answers that spec, with their attributes."""
+    sizes = {
         "H": spec.height,
         "W": spec.width,
         "K": spec.object_slots,
         "K+1": spec.object_slots + 1,
         "L": spec.light_slots,
     }
-    return tuple(sizes[s] if isinstance(s, str) else s for s in field.shape)
-
-
-def numpy_dtype(field: Field, spec: DatasetSpec) -> str:
-    """Return the NumPy dtype of a field that is not text."""
-    return spec.image_dtype if field.dtype == "image" else field.dtype
-
-
-def image_scale(spec: DatasetSpec) -> float:
-    """Return what a stored pixel is multiplied by to give radiance."""
-    return 1 / 255 if spec.image_dtype == "uint8" else 1.0
-
-
-def columns(spec: DatasetSpec) -> list[Column]:
-    """Return the datasets of a file that answers that spec, with their attributes."""
-    return [_column(field, spec) for field in FIELDS]
-
-
-def _column(field: Field, spec: DatasetSpec) -> Column:
-    attributes: dict[str, Any] = {
-        "unit": field.unit,
-        "frame": field.frame,
-        "shape": "(" + ", ".join(["N", *map(str, field.shape)]) + ")",
-        "meaning": field.meaning,
-    }
-    if field.name == "image":
-        attributes["scale"] = image_scale(spec)
-    if field.name == "object/shape":
-        attributes["names"] = list(spec.shapes)
-    dtype = "text" if field.dtype == "text" else numpy_dtype(field, spec)
-    return Column(field.name, row_shape(field, spec), dtype, field.per_pixel, attributes)
+    found = []
+    for field in FIELDS:
+        attributes: dict[str, Any] = {
+            "unit": field.unit,
+            "frame": field.frame,
+            "shape": "(" + ", ".join(["N", *map(str, field.shape)]) + ")",
+            "meaning": field.meaning,
+        }
+        if field.name == "image":
+            attributes["scale"] = 1 / 255 if spec.image_dtype == "uint8" else 1.0
+        if field.name == "object/shape":
+            attributes["names"] = list(spec.shapes)
+        shape = tuple(sizes[n] if isinstance(n, str) else n for n in field.shape)
+        dtype = spec.image_dtype if field.dtype == "image" else field.dtype
+        found.append(Column(field.name, shape, dtype, field.per_pixel, attributes))
+    return found
 
 
 def markdown_table() -> str:

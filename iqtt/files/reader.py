@@ -13,7 +13,7 @@ from iqtt.files.tables import TableFile, read_root, table_parts
 from iqtt.files.truth import QuestionTruth
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.row_file import checking, open_file
-from scenegen.description.checks import IMAGE_DTYPES
+from scenegen.description.specs import IMAGE_DTYPES
 from scenegen.rendering.ground_truth import decode_image
 
 Array = NDArray[Any]

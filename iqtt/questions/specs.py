@@ -8,8 +8,7 @@ from iqtt.shapes.polycube import MAX_CUBES
 from iqtt.shapes.sampling import Kind
 from scenegen.camera import Camera, Vector3
 from scenegen.common.records import check, from_json, normalise, to_json
-from scenegen.description.checks import IMAGE_DTYPES, MAX_LIGHTS
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import IMAGE_DTYPES, MAX_LIGHTS, DatasetSpec
 
 SPLITS = ("train", "val", "test")
 DISTRACTORS = ("other", "near", "mirror", "mixed")

@@ -14,7 +14,7 @@ from metrics.submissions.layout import MOST_ROWS, Dataset
 from metrics.submissions.problems import Problem
 from metrics.submissions.texts import READ_ERRORS
 from scenegen.common.row_file import reason
-from scenegen.description.checks import MAX_PIXELS
+from scenegen.description.specs import MAX_PIXELS
 
 MOST_BYTES = 256 * 2**20  # to be unpacked for one row
 CHUNK_SLOTS = 10_007

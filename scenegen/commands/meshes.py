@@ -1,4 +1,4 @@
-"""The command that tries a folder of meshes. Heavy imports happen inside it."""
+"""The command that checks a folder of meshes. Heavy imports happen inside it."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 @click.command("check-objects")
 @click.argument("folder")
 @UP
-@click.option("--classes", type=Names(), help="Classes to try, such as bowl,mug [default: all].")
+@click.option("--classes", type=Names(), help="Classes to check, such as bowl,mug [default: all].")
 @CACHE_DIR
-@click.option("--json", "json_path", help="File to write all records to.")
+@click.option("--json", "json_path", help="File to write the result for every model to.")
 @OVERWRITE
 @click.option(
-    "--jobs", type=click.IntRange(1), default=1, show_default=True, help="Processes to use."
+    "--jobs", type=click.IntRange(1), default=1, show_default=True, help="Number of processes."
 )
 @click.pass_context
 def check_objects(
@@ -35,11 +35,16 @@ def check_objects(
     overwrite: bool,
     jobs: int,
 ) -> None:
-    """Try every model of a folder, ShapeNet's or one with a sub-folder per class.
+    """Read and clean every model of a folder, as rendering would.
 
-    Prints counts per class and the reason of every refusal; exits with 1 if no model is usable.
+    The folder is ShapeNetCore's or has a sub-folder for each class. Prints counts for each class
+    and why each model is refused. Exits with 1 if no model is usable.
+
+    \b
+    Example:
+        scenegen check-objects ShapeNetCore.v2 --classes mug,bowl --jobs 4
     """
-    from scenegen.common.new_file import check_writable, written_beside
+    from scenegen.common.new_file import check_writable, write_text
     from scenegen.objects.meshes.cache import default_cache_dir
     from scenegen.objects.meshes.check import check_models
     from scenegen.objects.meshes.folders import open_models
@@ -54,8 +59,7 @@ def check_objects(
     for line in _table(found, records):
         click.echo(line)
     if json_path:
-        with written_beside(json_path, overwrite) as path:
-            path.write_text(_json(found, records), encoding="utf-8")
+        write_text(json_path, _json(found, records), overwrite)
     ctx.exit(0 if any(record.ok for record in records) else 1)
 
 

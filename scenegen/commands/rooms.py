@@ -1,4 +1,7 @@
-"""The `scenegen` commands: parse, one library call, print. Heavy imports happen inside them."""
+"""Commands that make, show, check and export files of rooms.
+
+Each one parses its options, makes one library call, and prints. Heavy imports happen inside.
+"""
 
 import sys
 import time
@@ -23,8 +26,6 @@ from scenegen.common.command_line import (
     progress_bar,
 )
 
-NUMBERS = Numbers()
-
 OBJECT_OPTIONS = (
     "shapes",
     "classes",
@@ -36,76 +37,63 @@ OBJECT_OPTIONS = (
 )
 
 
+# fmt: off
 @click.command()
 @click.option("--n", "count", type=int, required=True, help="Number of scenes.")
 @click.option("--out", default="rooms.h5", show_default=True, help="File to write.")
-@click.option(
-    "--preset",
-    default="shapes",
-    show_default=True,
-    help="Settings to begin with; `scenegen presets` lists them. What follows goes on top.",
-)
+@click.option("--preset", default="shapes", show_default=True,
+              help="Settings to start from, as `scenegen presets` lists them.")
 @SEED
 @click.option("--size", type=Size(), help="Image size in pixels [128].")
-@click.option("--objects", type=Range(int), help="Objects a scene [1-3].")
+@click.option("--objects", type=Range(int), help="Number of objects in a scene [1-3].")
 @click.option("--shapes", type=Names(), help="Basic shapes to draw from, such as box,sphere [all].")
 @click.option("--classes", type=Names(), help="Object classes to draw from, such as mug,bowl.")
-@click.option(
-    "--object-split",
-    type=click.Choice(["all", "train", "val", "test"]),
-    help="Which objects of a class to draw from [all].",
-)
+@click.option("--object-split", type=click.Choice(["all", "train", "val", "test"]),
+              help="Which models of a class to draw from [all].")
 @MESHES
-@click.option(
-    "--object-radius",
-    type=Range(float),
-    help="Bounding radius, scene units; a quarter less with several views [0.11-0.22].",
-)
-@click.option(
-    "--pose",
-    type=click.Choice(["resting", "any"]),
-    help="How objects lie: as they would stay, or turned anyhow [resting].",
-)
-@click.option(
-    "--views",
-    type=NUMBERS,
-    help="Degrees about the vertical from the input view to each view, as 0,5,35,55,80 [0].",
-)
-@click.option("--min-visible-pixels", type=int, help="Least pixels of each object [0.3%].")
-@click.option("--allow-cropped", is_flag=True, default=None, help="Let the border cut objects.")
-@click.option("--reflectance", type=Color(), help="Of objects, and unless told of the room [0.8].")
-@click.option("--room-reflectance", type=Color(), help="Of floor and walls.")
-@click.option(
-    "--random-reflectance/--same-reflectance",
-    default=None,
-    help="A colour for every object [same].",
-)
-@click.option("--specular", type=Range(float), help="Phong's k_s of objects [0].")
+@click.option("--object-radius", type=Range(float),
+              help="Bounding radius of objects in scene units; with several views the default is a"
+              " quarter smaller [0.11-0.22].")
+@click.option("--pose", type=click.Choice(["resting", "any"]),
+              help="Whether objects lie as they would stay, or are turned at random [resting].")
+@click.option("--views", type=Numbers(),
+              help="Views of each scene, in degrees about the vertical axis from the first view,"
+              " such as 0,5,35,55,80 [0].")
+@click.option("--min-visible-pixels", type=int,
+              help="Fewest pixels that show an object, in every view [0.3%].")
+@click.option("--allow-cropped", is_flag=True, default=None,
+              help="Let the image's border cut objects.")
+@click.option("--reflectance", type=Color(),
+              help="Reflectance of objects; also of the room, without --room-reflectance [0.8].")
+@click.option("--room-reflectance", type=Color(), help="Reflectance of floor and walls.")
+@click.option("--random-reflectance/--same-reflectance", default=None,
+              help="Whether each object gets a random colour or all the same [same].")
+@click.option("--specular", type=Range(float), help="Phong's coefficient k_s of objects [0].")
 @click.option("--shininess", type=Range(float), help="Phong's exponent of objects [1].")
-@click.option("--lights", type=Range(int), help="Lights a scene [1-3].")
-@click.option("--light-saturation", type=float, help="How coloured, 0 (white) to 1 [0.7].")
-@click.option("--light-level", type=float, help="Radiance of white that faces all lights [0.95].")
-@click.option("--light-radius", type=float, help="Distance of lights, scene units [2.5].")
+@click.option("--lights", type=Range(int), help="Number of lights in a scene [1-3].")
+@click.option("--light-saturation", type=float,
+              help="How coloured lights are, from 0 (white) to 1 [0.7].")
+@click.option("--light-level", type=float,
+              help="Radiance of a white surface at the target that faces all lights [0.95].")
+@click.option("--light-radius", type=float,
+              help="Distance of lights from the target, scene units [2.5].")
 @click.option("--ambient", type=Color(), help="Ambient light L_a [0.1].")
-@click.option("--attenuation", type=NUMBERS, help="k_l,k_q of the shading equation [0.5,0.5].")
-@click.option(
-    "--shading",
-    type=click.Choice(["paper", "path"]),
-    help="path: images by path tracing, with shadows and indirect light; slower [paper].",
-)
+@click.option("--attenuation", type=Numbers(),
+              help="k_l,k_q: how light falls off with distance and its square [0.5,0.5].")
+@click.option("--shading", type=click.Choice(["paper", "path"]),
+              help="The paper's shading equation, or path tracing, with shadows and indirect light;"
+              " slower [paper].")
 @click.option("--shadows/--no-shadows", default=None, help="Whether objects cast shadows [no].")
-@click.option("--spp", type=int, help="Colour samples a pixel; for path 64, else [1].")
-@click.option("--fov", "fov_degrees", type=float, help="Field of view, degrees [28].")
-@click.option("--camera-radius", type=float, help="Distance of cameras, scene units [1.5].")
+@click.option("--spp", type=int,
+              help="Colour samples per pixel; with --shading path, 64 by default [1].")
+@click.option("--fov", "fov_degrees", type=float,
+              help="Field of view of a square image, degrees [28].")
+@click.option("--camera-radius", type=float,
+              help="Distance of cameras from the target, scene units [1.5].")
 @IMAGE_DTYPE
 @COMPRESSION
-@click.option(
-    "--batch",
-    type=int,
-    default=64,
-    show_default=True,
-    help="Images in one wavefront; views of a scene stay together.",
-)
+@click.option("--batch", type=int, default=64, show_default=True,
+              help="Images rendered at once; more take more memory.")
 @DEVICE
 @OVERWRITE
 def render(
@@ -119,7 +107,15 @@ def render(
     overwrite: bool,
     **settings: Any,
 ) -> None:
-    """Render rooms to an HDF5 file: image, depth, normals, object ids, cameras, lights, scenes."""
+    """Render rooms with objects to an HDF5 file, with exact ground truth.
+
+    Every image comes with its depth, normals, object ids, camera, lights and scene description.
+    Square brackets hold the defaults, which presets may change.
+
+    \b
+    Example:
+        scenegen render --n 1000 --preset shapenet --seed 1 --out rooms.h5
+    """
     from scenegen.description.presets import preset_spec
     from scenegen.objects.sources import object_source
     from scenegen.rooms.make import make_dataset
@@ -153,9 +149,15 @@ def render(
         click.echo(line, err=True)
 
 
+# fmt: on
 @click.command()
 def presets() -> None:
-    """List the presets of `render`: the paper's data sets."""
+    """List the presets of `render` with their settings: the paper's data sets.
+
+    \b
+    Example:
+        scenegen presets
+    """
     from scenegen.description.presets import PRESETS
 
     width = max(map(len, PRESETS))
@@ -174,11 +176,16 @@ def _shown(value: Any) -> str:
 @click.option("--out", default="sheet.png", show_default=True, help="Picture to write.")
 @click.option("--items", type=Items(), help="Rows to show [default: the first 12].")
 @click.option(
-    "--random", "number", type=click.IntRange(1, 400), help="Show so many rows at random."
+    "--random", "number", type=click.IntRange(1, 400), help="Number of rows to pick at random."
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Which ones --random picks.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of --random.")
 def preview(file: str, out: str, items: list[int] | None, number: int | None, seed: int) -> None:
-    """Make a contact sheet: image, depth, normals, object ids, with labels."""
+    """Show some rooms of a file in one picture: image, depth, normals and object ids.
+
+    \b
+    Example:
+        scenegen preview rooms.h5 --random 12 --out sheet.png
+    """
     from scenegen.rooms.preview import contact_sheet, pick_rows, save_picture
     from scenegen.rooms.reader import RoomsFile
 
@@ -191,7 +198,12 @@ def preview(file: str, out: str, items: list[int] | None, number: int | None, se
 @click.command()
 @click.argument("file")
 def info(file: str) -> None:
-    """Say what is in a file: spec, counts, ranges, units, sizes, versions, fingerprint."""
+    """Print what a file holds: settings, ranges of values, units, sizes, versions, fingerprint.
+
+    \b
+    Example:
+        scenegen info rooms.h5
+    """
     from scenegen.rooms.info import describe
 
     click.echo(describe(file))
@@ -204,13 +216,21 @@ def info(file: str) -> None:
     type=click.IntRange(0),
     default=8,
     show_default=True,
-    help="Rows to draw and render again.",
+    help="Number of rows to draw from the seed and render again.",
 )
 @MESHES
 @DEVICE
 @click.pass_context
 def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: Any) -> None:
-    """Check layout and values of every row, render some again; exits with 1 if a check fails."""
+    """Check that a file is whole and true: every row's values, and some rows rendered again.
+
+    Rows rendered again must agree bit for bit, or within a stated tolerance where the file was
+    rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.
+
+    \b
+    Example:
+        scenegen verify rooms.h5 --items 20
+    """
     from scenegen.objects.sources import file_objects
     from scenegen.rooms.reader import RoomsFile
     from scenegen.rooms.verify import verify_file
@@ -237,7 +257,7 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     "form",
     type=click.Choice(["exr", "png", "ply", "obj"]),
     required=True,
-    help="exr: all channels; png: 16 bits; ply: surfels; obj: the scene's mesh.",
+    help="exr has all channels; png 16 bits a channel; ply the surfels; obj the scene's mesh.",
 )
 @click.option("--out", default=".", show_default=True, help="Folder to write to.")
 @OVERWRITE
@@ -245,25 +265,29 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
 def export(
     file: str, items: list[int], form: str, out: str, overwrite: bool, **meshes: Any
 ) -> None:
-    """Write single rooms for other tools."""
+    """Write rows of a file in the formats of other tools.
+
+    \b
+    Example:
+        scenegen export rooms.h5 --items 0,5-7 --format exr --out exported
+    """
     from scenegen.common.errors import SpecError
     from scenegen.common.new_file import check_writable
     from scenegen.objects.catalogue import changed_meshes
-    from scenegen.objects.sources import file_objects
+    from scenegen.objects.sources import file_objects, mesh_folder
     from scenegen.rooms.export import export_paths, export_room
     from scenegen.rooms.preview import pick_rows
     from scenegen.rooms.reader import RoomsFile
 
+    mesh_folder(meshes["shapenet_root"], meshes["objects_root"], meshes["up"])
     with RoomsFile(file) as rooms:
         objects = file_objects(rooms.spec, **meshes) if form == "obj" else None
         rows = pick_rows(len(rooms), items)
         for row in rows:
             changed = changed_meshes(objects, rooms.scene(row)) if objects else []
             if changed:
-                raise SpecError(
-                    f"{file}: row {row} was made from other files than the folder holds now:"
-                    f" {', '.join(changed)}"
-                )
+                found = f"models that changed in the folder: {', '.join(changed)}"
+                raise SpecError(f"{file}: row {row}", found, "the files it was made from")
         paths = {row: export_paths(row, out, Path(file).stem, form) for row in rows}
         if not Path(out).exists():
             Path(out).mkdir()

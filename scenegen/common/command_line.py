@@ -1,4 +1,4 @@
-"""What the commands share: errors as one line, options' types, and commands loaded when used."""
+"""What all commands share: how errors are shown, types of options, and options by name."""
 
 import importlib
 import re
@@ -9,13 +9,13 @@ from typing import Any
 import click
 
 NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
-MOST_ITEMS = 1_000_000  # of a range; keeps 0-99999999999 from eating the memory
+MOST_ITEMS = 1_000_000  # numbers of a range; keeps 0-99999999999 from filling the memory
 
 
 class PackageCommands(click.Group):
-    """The `COMMANDS` of some modules, imported when a command is first asked for.
+    """A group of the `COMMANDS` of some modules, which are imported when a command is asked for.
 
-    What went wrong for a user is shown as one line, and ends with exit code 2.
+    A mistake that the user can mend is shown as one line, and ends with exit code 2.
     """
 
     def __init__(self, *arguments: Any, modules: tuple[str, ...], **attributes: Any) -> None:
@@ -31,7 +31,7 @@ class PackageCommands(click.Group):
         return next((command for command in self._loaded() if command.name == cmd_name), None)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command; errors meant for people become click's own."""
+        """Run a command; show what it raises for users, and its warnings, as one line each."""
         warnings.showwarning = _show_warning
         try:
             return super().invoke(ctx)
@@ -64,156 +64,149 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     click.echo(f"note: {message}", err=True)
 
 
-class Range(click.ParamType):  # type: ignore[type-arg]
+class _Parsed(click.ParamType):  # type: ignore[type-arg]
+    """The value of an option that is not one of click's types.
+
+    `parse` raises ValueError where the text is not what `expected` says. A value that is no text,
+    such as a default, passes as it is.
+    """
+
+    expected: str
+
+    def parse(self, text: str) -> Any:
+        """Return the value that a text stands for."""
+        raise NotImplementedError
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse a text."""
+        if not isinstance(value, str):
+            return value
+        try:
+            return self.parse(value)
+        except ValueError:
+            self.fail(f"found {value!r:.60}, expected {self.expected}", param, ctx)
+
+
+def _matched(pattern: str, text: str) -> re.Match[str]:
+    match = re.fullmatch(pattern, text.strip())
+    if match is None:
+        raise ValueError(text)
+    return match
+
+
+class Range(_Parsed):
     """`3` or `1-3`, as two numbers."""
+
+    name, expected = "N or N-M", "a number or a range such as 1-3"
 
     def __init__(self, number: Callable[[str], Any]) -> None:
         self.number = number
-        self.name = "N or N-M"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse; a tuple (a default) passes."""
-        if isinstance(value, tuple):
-            return value
-        match = re.fullmatch(rf"({NUMBER})(?:-({NUMBER}))?", str(value).strip())
-        try:
-            ends = [self.number(end) for end in match.groups() if end] if match else []
-        except ValueError:
-            ends = []
-        if not ends:
-            self.fail(f"found {value!r}, expected a number or a range such as 1-3", param, ctx)
-        return ends[0], ends[-1]
+    def parse(self, text: str) -> tuple[Any, Any]:
+        """Return both ends, which may be equal."""
+        first, last = _matched(rf"({NUMBER})(?:-({NUMBER}))?", text).groups()
+        return self.number(first), self.number(last or first)
 
 
-class Size(click.ParamType):  # type: ignore[type-arg]
-    """`128` or `HxW`, as (height, width)."""
+class Size(_Parsed):
+    """`128` or `96x128`, as (height, width)."""
 
-    name = "N or HxW"
+    name, expected = "N or HxW", "a number such as 128 or HxW such as 96x128"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse."""
-        parts = str(value).lower().split("x")
-        if len(parts) not in (1, 2) or not all(part.isdecimal() for part in parts):
-            self.fail(
-                f"found {value!r}, expected a number such as 128 or HxW such as 96x128", param, ctx
-            )
-        return int(parts[0]), int(parts[-1])
+    def parse(self, text: str) -> tuple[int, int]:
+        """Return height and width."""
+        height, width = _matched("([0-9]+)(?:x([0-9]+))?", text.lower()).groups()
+        return int(height), int(width or height)
 
 
-class Items(click.ParamType):  # type: ignore[type-arg]
+class Items(_Parsed):
     """`0,5,7` or `0-7` or both, as a list of numbers."""
 
-    name = "0,5,7 or 0-7"
+    name, expected = "0,5,7 or 0-7", "numbers such as 0,5,7 or rising ranges such as 0-7"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse."""
+    def parse(self, text: str) -> list[int]:
+        """Return the numbers in the order told, of one range `MOST_ITEMS` and one at most."""
         chosen: list[int] = []
-        for part in str(value).split(","):
-            match = re.fullmatch(r"([0-9]+)(?:-([0-9]+))?", part.strip())
-            if not match:
-                self.fail(f"found {value!r}, expected numbers such as 0,5,7 or 0-7", param, ctx)
+        for part in text.split(","):
+            match = _matched("([0-9]+)(?:-([0-9]+))?", part)
             first, last = int(match[1]), int(match[2] or match[1])
             if last < first:
-                self.fail(f"found {part!r}, expected a rising range such as 0-7", param, ctx)
+                raise ValueError(part)
             chosen.extend(range(first, min(last, first + MOST_ITEMS) + 1))
         return chosen
 
 
-class Names(click.ParamType):  # type: ignore[type-arg]
+class Names(_Parsed):
     """`mug,bowl`, as a tuple of texts."""
 
-    name = "NAME,NAME"
+    name, expected = "NAME,NAME", "names such as mug,bowl"
 
-    def convert(
-        self, value: Any, _param: click.Parameter | None, _ctx: click.Context | None
-    ) -> Any:
-        """Parse."""
-        return tuple(part.strip() for part in str(value).split(","))
+    def parse(self, text: str) -> tuple[str, ...]:
+        """Return the names, without the blanks around them."""
+        return tuple(part.strip() for part in text.split(","))
 
 
-class Numbers(click.ParamType):  # type: ignore[type-arg]
+class Numbers(_Parsed):
     """`0,5,35`, as a tuple of numbers."""
 
-    name = "N,N"
+    name, expected = "N,N", "numbers such as 0,5,35"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse."""
-        parts = [part.strip() for part in str(value).split(",")]
-        if not all(re.fullmatch(NUMBER, part) for part in parts):
-            self.fail(f"found {value!r}, expected numbers such as 0,5,35", param, ctx)
-        return tuple(map(float, parts))
+    def parse(self, text: str) -> tuple[float, ...]:
+        """Return the numbers."""
+        return tuple(float(_matched(NUMBER, part)[0]) for part in text.split(","))
 
 
-class Color(click.ParamType):  # type: ignore[type-arg]
+class Color(_Parsed):
     """`white`, `black`, a grey such as `0.5`, or `R,G,B`, as three numbers."""
 
     name = "white, black, GREY or R,G,B"
+    expected = "white, black, a grey from 0 to 1, or R,G,B"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse."""
-        text = {"white": "1", "black": "0"}.get(str(value).lower(), str(value))
-        parts = [part.strip() for part in text.split(",")]
-        if len(parts) not in (1, 3) or not all(re.fullmatch(NUMBER, part) for part in parts):
-            self.fail(
-                f"found {value!r}, expected white, black, a grey from 0 to 1, or R,G,B", param, ctx
-            )
-        return tuple(float(part) for part in (parts if len(parts) == 3 else parts * 3))
+    def parse(self, text: str) -> tuple[float, ...]:
+        """Return red, green and blue."""
+        told = {"white": "1", "black": "0"}.get(text.lower(), text)
+        channels = tuple(float(_matched(NUMBER, part)[0]) for part in told.split(","))
+        if len(channels) not in (1, 3):
+            raise ValueError(text)
+        return channels if len(channels) == 3 else channels * 3
 
 
 def progress_bar(count: int | None, unit: str) -> Any:
-    """Return a progress bar with rate and time left on standard error; hidden where that is no
-    terminal. To be used in a `with`; its `update` takes how many more items are done.
+    """Return a progress bar with rate and time left, to be used in a `with`.
+
+    It is shown on standard error where that is a terminal. Its `update` takes the number of items
+    done since the last call.
     """
     from tqdm import tqdm
 
     return tqdm(total=count, unit=unit, disable=None, leave=False, smoothing=0.1)
 
 
+# fmt: off
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
-DEVICE = click.option(
-    "--device",
-    type=click.Choice(["auto", "cpu", "cuda"]),
-    default="auto",
-    show_default=True,
-    help="auto: the CPU's fast path, else a slow one.",
-)
-IMAGE_DTYPE = click.option(
-    "--image-dtype",
-    type=click.Choice(["uint8", "float16", "float32"]),
-    default="uint8",
-    show_default=True,
-    help="How radiance is stored.",
-)
-COMPRESSION = click.option(
-    "--compression",
-    type=click.Choice(["gzip", "lzf", "none"]),
-    default="gzip",
-    show_default=True,
-    help="lzf is read by h5py only.",
-)
-SIZE = click.option(
-    "--size", type=Size(), default="128", show_default=True, help="Image size in pixels."
-)
-SEED = click.option(
-    "--seed", type=int, default=0, show_default=True, help="Seed of every random choice."
-)
-
-
-UP = click.option(
-    "--up",
-    type=click.Choice(["y", "z"]),
-    default="y",
-    show_default=True,
-    help="Which axis points up in a folder of meshes; in ShapeNet's it is y.",
-)
-CACHE_DIR = click.option("--cache-dir", help="Where cleaned meshes are kept [the user's cache].")
+DEVICE = click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
+                      show_default=True,
+                      help="Where to render. auto is the CPU, with LLVM or else slowly.")
+IMAGE_DTYPE = click.option("--image-dtype", type=click.Choice(["uint8", "float16", "float32"]),
+                           default="uint8", show_default=True, help="Type of stored radiance.")
+COMPRESSION = click.option("--compression", type=click.Choice(["gzip", "lzf", "none"]),
+                           default="gzip", show_default=True,
+                           help="How images are compressed; only h5py reads lzf.")
+SIZE = click.option("--size", type=Size(), default="128", show_default=True,
+                    help="Image size in pixels.")
+SEED = click.option("--seed", type=int, default=0, show_default=True,
+                    help="Seed of every random choice.")
+UP = click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True,
+                  help="Axis that points up in the meshes; in ShapeNet it is y.")
+CACHE_DIR = click.option("--cache-dir", help="Folder for cleaned meshes [the user's cache].")
+# fmt: on
 
 
 def MESHES(command: Any) -> Any:  # noqa: N802
-    """Add the options that say which meshes objects are made of."""
+    """Add the options that name the folder of meshes that objects are taken from."""
     options = (
-        click.option("--shapenet-root", help="Folder of ShapeNetCore v1 or v2."),
-        click.option("--objects-root", help="Folder of meshes, a sub-folder for each class."),
+        click.option("--shapenet-root", help="Folder of ShapeNetCore 1 or 2 with the objects."),
+        click.option("--objects-root", help="Folder with the objects, a sub-folder per class."),
         UP,
         CACHE_DIR,
     )

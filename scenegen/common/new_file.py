@@ -13,12 +13,13 @@ _NUMBERS = itertools.count()
 
 @contextmanager
 def written_beside(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
-    """Give a hidden name in the same folder to write to; rename it when the block ends well.
+    """Give a hidden path in the same folder to write to; it is renamed when the block ends well.
 
     Whatever goes wrong, nothing is left under either name that was not there before.
 
     Raises:
-        OSError: as `check_writable`; or the disk's own, told of `path`, not of the hidden name.
+        OSError: as `check_writable`, or what the disk raises, with `path` instead of the hidden
+            path as file name.
     """
     path = Path(path)
     check_writable(path, overwrite)
@@ -45,7 +46,7 @@ def write_text(path: str | Path, text: str, overwrite: bool = False) -> None:
 
 
 def _reason(error: Exception) -> str | None:
-    """Say in a few words what the disk, or HDF5 about it, has to say; None for other errors."""
+    """Return why the disk refused, from an error of the system or of HDF5; None for others."""
     text = str(error)
     told = re.search(r"error message = '([^']*)'|Cannot open image file [^ ]* (.*)", text)
     if told:
@@ -56,7 +57,7 @@ def _reason(error: Exception) -> str | None:
 
 
 def check_writable(path: Path, overwrite: bool) -> None:
-    """Raise the OSError that would end in a lost run: better before rendering than after."""
+    """Raise an OSError where a file cannot be written, so that it is known before a long run."""
     parent = path.parent
     problems = (
         (not parent.exists(), errno.ENOENT, "the folder does not exist; create it first", parent),

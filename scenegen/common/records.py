@@ -1,30 +1,61 @@
-"""Frozen dataclasses from JSON, every value checked against the field's type."""
+"""Frozen dataclasses as JSON, both ways, and the checks that their `__post_init__` make.
+
+Reading is pydantic's work: every value is checked against the field's type. It is imported when
+the first text is read.
+"""
 
 import json
-import types
 import typing
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import fields
+from functools import cache
 from typing import Any, TypeVar
 
 from scenegen.common.errors import SpecError
 
 T = TypeVar("T")
 LARGEST = 1e9  # no length, colour or angle is larger; keeps later arithmetic from overflowing
+# What holds for every part of a record, by the part's type in pydantic's core schema.
+_RULES: dict[str, dict[str, Any]] = {
+    "dataclass": {"config": {"strict": True, "extra_fields_behavior": "forbid"}},
+    "float": {"ge": -LARGEST, "le": LARGEST, "allow_inf_nan": False},
+    "tuple": {"fail_fast": True},  # one wrong item of a million is enough
+}
+_NUMBER = f"a finite number of at most {LARGEST:g}"
+_EXPECTED = {
+    "bool_type": "true or false",
+    "dataclass_type": "a JSON object",
+    "finite_number": _NUMBER,
+    "float_type": _NUMBER,
+    "greater_than_equal": _NUMBER,
+    "int_type": "a whole number",
+    "json_invalid": "JSON",
+    "less_than_equal": _NUMBER,
+    "missing": "a value",
+    "string_type": "a text",
+    "too_long": "fewer values",
+    "tuple_type": "a list",
+    "unexpected_keyword_argument": "",
+}
 
 
 def from_json(cls: type[T], text: str | bytes, what: str) -> T:
     """Build a dataclass, nested ones and tuples included, from what `to_json` wrote.
 
-    Raises SpecError, beginning with `what`, where the text is no JSON, or a field is missing,
-    unknown, or of another type.
+    Types must be exact, but a whole number may stand for a float. Floats are finite and of at
+    most `LARGEST`.
+
+    Args:
+        what: name of the record, for errors that belong to none of its fields.
+
+    Raises SpecError, naming the field, where the text is no JSON, where a field is missing,
+    unknown or of another type, and where the dataclass itself refuses the values.
     """
+    from pydantic_core import ValidationError
+
     try:
-        record: T = _build(cls, json.loads(text), what)
-    except (ValueError, RecursionError) as error:  # UnicodeDecodeError is a ValueError
-        if isinstance(error, SpecError):
-            raise
-        reason = "nested too deeply" if isinstance(error, RecursionError) else str(error)
-        raise SpecError(f"{what}: cannot be read as JSON: {reason}") from error
+        record: T = _validator(typing.cast(Any, cls)).validate_json(text)
+    except ValidationError as error:
+        raise _spec_error(error.errors(include_url=False)[0], what) from error
     return record
 
 
@@ -59,7 +90,7 @@ def normalise(record: Any) -> None:
 def check(ok: bool, name: str, found: object, expected: str) -> None:
     """Raise SpecError, saying what was found and expected, unless `ok`."""
     if not ok:
-        raise SpecError(f"{name}: found {found}, expected {expected}")
+        raise SpecError(name, str(found) or "nothing", expected)
 
 
 def check_range(name: str, value: tuple[float, float], low: float, high: float) -> None:
@@ -69,42 +100,38 @@ def check_range(name: str, value: tuple[float, float], low: float, high: float) 
     check(ok, name, shown, f"a number or a rising range within {low}-{high}")
 
 
-def _build(cls: Any, raw: Any, where: str) -> Any:
-    check(isinstance(raw, dict), where, type(raw).__name__, "a JSON object")
-    types_by_name = typing.get_type_hints(cls)
-    known = {f.name for f in fields(cls)}
-    needed = {f.name for f in fields(cls) if f.default is MISSING}
-    for name in sorted(set(raw) - known):
-        raise SpecError(f"{where}: found an unknown field {name!r}")
-    for name in sorted(needed - set(raw)):
-        raise SpecError(f"{where}: the field {name!r} is missing")
-    return cls(
-        **{
-            name: _value(types_by_name[name], value, name.replace("_", " "))
-            for name, value in raw.items()
-        }
-    )
+@cache
+def _validator(cls: Any) -> Any:
+    from pydantic import TypeAdapter
+    from pydantic_core import SchemaValidator
+
+    return SchemaValidator(_with_rules(TypeAdapter(cls).core_schema))
 
 
-def _value(kind: Any, raw: Any, where: str) -> Any:
-    """Return a value as its type says, or raise SpecError."""
-    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
-    if origin in (typing.Union, types.UnionType):
-        return None if raw is None else _value(arguments[0], raw, where)
-    if origin is tuple:
-        check(isinstance(raw, list), where, f"{raw!r:.40}", "a list")
-        kinds = [arguments[0]] * len(raw) if arguments[-1] is Ellipsis else list(arguments)
-        check(len(raw) == len(kinds), where, f"{len(raw)} values", str(len(kinds)))
-        return tuple(_value(k, v, where) for k, v in zip(kinds, raw, strict=True))
-    if is_dataclass(kind):
-        return _build(kind, raw, where)
-    if kind is float:
-        number = isinstance(raw, int | float) and not isinstance(raw, bool)
-        ok = number and abs(raw) <= LARGEST  # not so for NaN
-        check(ok, where, f"{raw!r:.40}", "a finite number")
-        return float(raw)
-    ok = type(raw) is kind
-    check(
-        ok, where, f"{raw!r:.40}", {int: "a whole number", str: "a text"}.get(kind, "true or false")
-    )
-    return raw
+def _with_rules(schema: Any) -> Any:
+    """Return a core schema with `_RULES` added to each of its parts."""
+    if isinstance(schema, list):
+        return [_with_rules(part) for part in schema]
+    if not isinstance(schema, dict):
+        return schema
+    return {k: _with_rules(v) for k, v in schema.items()} | _RULES.get(schema.get("type", ""), {})
+
+
+def _spec_error(detail: Any, what: str) -> SpecError:
+    """Say in plain words what pydantic tells of one error."""
+    kind, context = detail["type"], detail.get("ctx", {})
+    if isinstance(context.get("error"), SpecError):  # a check of the dataclass's own
+        return typing.cast(SpecError, context["error"])
+    places = [str(part).replace("_", " ") for part in detail["loc"]]
+    found, expected = f"{detail['input']!r:.40}", _EXPECTED.get(kind, detail["msg"])
+    if kind == "json_invalid":
+        found = context["error"]
+    elif kind == "unexpected_keyword_argument":
+        found = f"an unknown field {detail['loc'][-1]!r:.40}"
+        places.pop()
+    elif kind == "missing" and isinstance(detail["input"], list):
+        found, expected = f"{len(detail['input'])} values", "more values"
+        places.pop()
+    elif kind == "missing":
+        found = "nothing"
+    return SpecError(" ".join(places) or what, found, expected)

@@ -1,4 +1,8 @@
-"""HDF5 files that hold rows: written in order, compressed by us, renamed when complete; opened."""
+"""HDF5 files that hold rows: written in order, row by row, and opened with clear errors.
+
+Images are compressed here, by isal, and handed to HDF5 as finished chunks: that is faster than its
+own filter and any HDF5 library reads it. A file gets its name when it is complete.
+"""
 
 import errno
 import importlib.metadata
@@ -20,7 +24,7 @@ from scenegen.common.new_file import written_beside
 Array = NDArray[Any]
 COMPRESSIONS = ("gzip", "lzf", "none")
 DEFLATE_LEVEL = 1
-CLOSING_SLACK = 8192  # bytes that HDF5 may need on top of what it says it needs
+CLOSING_SLACK = 8192  # bytes that HDF5 may need to close a file beyond what it says it needs
 # What h5py raises on damaged files, by the kind of damage: this tuple is the only list of them.
 HDF5_ERRORS = (OSError, RuntimeError, KeyError, TypeError, ValueError, MemoryError)
 BLOCK_ROWS = 1024  # rows of the small datasets that are kept and written together
@@ -47,7 +51,7 @@ class Column:
 class Table:
     """Columns of equal length in one HDF5 group, filled row by row.
 
-    The bytes written depend on the rows alone, not on when they come.
+    The bytes written depend on the rows alone, not on how many are appended at a time.
     """
 
     def __init__(
@@ -55,11 +59,10 @@ class Table:
     ) -> None:
         """Create the datasets. Raises SpecError for an unknown compression or a negative count."""
         if compression not in COMPRESSIONS:
-            raise SpecError(
-                f"compression: found {compression!r}, expected one of {', '.join(COMPRESSIONS)}"
-            )
+            known = f"one of {', '.join(COMPRESSIONS)}"
+            raise SpecError("compression", repr(compression), known)
         if count < 0:
-            raise SpecError(f"count: found {count}, expected 0 or more")
+            raise SpecError("count", count, "0 or more")
         self.count, self.rows = count, 0
         self._columns, self._compression = columns, compression
         self._datasets = {column.name: self._create(group, column) for column in columns}
@@ -116,16 +119,16 @@ class Table:
 
 @contextmanager
 def new_file(path: str | Path, overwrite: bool = False) -> Iterator[h5py.File]:
-    """Open an HDF5 file to write, under a temporary name as `written_beside` gives it."""
+    """Open a new HDF5 file, which gets its name when the block ends well, as `written_beside`."""
     with written_beside(path, overwrite) as temporary:
-        file = h5py.File(temporary, "w", rdcc_nbytes=0)  # no chunk stays behind unwritten
+        file = h5py.File(temporary, "w", rdcc_nbytes=0)  # without a cache of unwritten chunks
         try:
             yield file
             _check_room_to_close(file, temporary)
             file.close()
         except BaseException:
-            # The file is lost. If it is the disk that is full, emptying it first makes room for
-            # HDF5 to close in order; half closed, it would crash the process.
+            # The file is lost. Where the disk is full, emptying the file first makes room for HDF5
+            # to close it; a file that it cannot close would crash the process at exit.
             os.truncate(temporary, 0)
             with suppress(Exception):
                 file.close()
@@ -184,13 +187,14 @@ def check_version(path: str | Path, attributes: Mapping[str, Any], version: str)
     found, major = str(attributes.get("format_version")), version.split(".", maxsplit=1)[0]
     if found.split(".", maxsplit=1)[0] != major:
         raise FileFormatError(
-            f"{path}: format version {found}, this program reads {major}.x;"
-            f" use the release that wrote it ({attributes.get('writer')})"
+            f"{path}: format version {found}",
+            expected=f"{major}.x",
+            hint=f"read it with the release that wrote it ({attributes.get('writer')})",
         )
 
 
 def column_problems(group: h5py.Group, columns: Sequence[Column], count: int) -> list[str]:
-    """Say which columns are missing or have the wrong shape or type."""
+    """Return a sentence for each column that is missing or has the wrong shape or type."""
     problems = []
     for column in columns:
         dataset = group.get(column.name)
@@ -208,7 +212,7 @@ def column_problems(group: h5py.Group, columns: Sequence[Column], count: int) ->
 
 
 def reason(error: BaseException) -> str:
-    """Return what HDF5's error says in its innermost words, on one line."""
+    """Return what an error of HDF5 says in its innermost parentheses, on one line."""
     text = str(error.args[0]) if error.args else type(error).__name__
     inside = text[text.find("(") + 1 : text.rfind(")")] if "(" in text else text
     return inside.split("\n")[0]
@@ -230,12 +234,12 @@ def _check_room_to_close(file: h5py.File, path: Path) -> None:
 
 
 def writer_name() -> str:
-    """Return the release that writes, as files record it."""
+    """Return name and version of this program, as files record them."""
     return f"pix2shape-bench {importlib.metadata.version('pix2shape-bench')}"
 
 
 def shuffle_bytes(values: Array) -> Array:
-    """Do HDF5's shuffle filter: all first bytes of the elements, then all second ones, ..."""
+    """Apply HDF5's shuffle filter: first bytes of all elements, then all second bytes, ..."""
     size = values.dtype.itemsize
     flat = values.reshape(-1).view(np.uint8)
     return flat if size == 1 else np.ascontiguousarray(flat.reshape(-1, size).T)

@@ -1,8 +1,8 @@
-"""The only place where random generators are made, but for those of `families.members`.
+"""Random generators, all made here except those of `objects.families.members`.
 
 Every random choice derives from (dataset seed, item index, purpose, attempt) through NumPy's
 `SeedSequence` spawn keys, so that neighbouring seeds and neighbouring items share no stream
-(`seed + index` would).
+(with `seed + index` they would).
 """
 
 from enum import IntEnum

@@ -1,4 +1,4 @@
-"""The paper's data sets as settings of `DatasetSpec`; `scenegen presets` lists them."""
+"""The paper's data sets, as settings of `DatasetSpec`; `scenegen presets` lists them."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,10 +7,10 @@ from scenegen.common.records import check
 from scenegen.description.specs import DatasetSpec
 
 VESSELS = ("bag", "bottle", "bowl", "can", "cap", "lamp", "mug")
-PAPER_VIEWS = (0.0, 5.0, 35.0, 55.0, 80.0)  # degrees; the paper's table of unseen views
-VISIBLE_SHARE = 0.003  # of the image's pixels, that every object shows by default
-VIEWS_SHRINK = 0.75  # of objects that show whole in several views
-PATH_SAMPLES = 64  # colour samples a pixel of a path tracer, by default
+PAPER_VIEWS = (0.0, 5.0, 35.0, 55.0, 80.0)  # degrees, as in the paper's table of unseen views
+VISIBLE_SHARE = 0.003  # least share of the image's pixels that show an object, by default
+VIEWS_SHRINK = 0.75  # factor on object radii where several views must show objects whole
+PATH_SAMPLES = 64  # colour samples per pixel of the path tracer, by default
 
 
 @dataclass(frozen=True)
@@ -61,13 +61,14 @@ PRESETS = {
 
 
 def preset_spec(preset: str, **settings: Any) -> DatasetSpec:
-    """Return a preset with other settings on top.
+    """Return the request of a preset, with `settings` in place of the preset's own.
 
-    Four that are not told follow others: `min_visible_pixels` is a share of the image, objects are
-    smaller where several views have to hold them, `spp` is PATH_SAMPLES for a path tracer, and
-    `room_reflectance` the objects' where only that is told.
+    Some settings that are not given follow from others: `min_visible_pixels` is VISIBLE_SHARE of
+    the image, `object_radius` is smaller by VIEWS_SHRINK with several views, `spp` is PATH_SAMPLES
+    for the path tracer, and `room_reflectance` is `reflectance` if that is given.
 
-    Raises SpecError.
+    Raises SpecError for an unknown preset, and for settings that are out of range or contradict
+    one another.
     """
     check(preset in PRESETS, "preset", preset, f"one of {', '.join(PRESETS)}")
     chosen = {**PRESETS[preset].settings, **settings}

@@ -1,30 +1,17 @@
-"""Frozen description of one scene, JSON both ways: all that the renderer needs, nothing random.
+"""Description of one scene, as JSON and back: all that the renderer needs, nothing left to chance.
 
 Lengths are in scene units (the room's edge), frames as in `camera.py`.
 """
 
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 from scenegen.camera import Camera, Vector3
 from scenegen.common.records import check, from_json, to_json
 
-ShapeName = Literal[
-    "box",
-    "sphere",
-    "cone",
-    "torus",
-    "cylinder",
-    "teapot",
-    "capsule",
-    "pyramid",
-    "prism",
-    "tetrahedron",
-    "octahedron",
-    "dodecahedron",
-    "icosahedron",
-]
-SHAPE_NAMES: tuple[str, ...] = get_args(ShapeName)
+SHAPE_NAMES = (
+    "box", "sphere", "cone", "torus", "cylinder", "teapot", "capsule", "pyramid", "prism",
+    "tetrahedron", "octahedron", "dodecahedron", "icosahedron",
+)  # fmt: skip
 FAMILY_NAMES = ("bag", "bottle", "bowl", "can", "cap", "chair", "lamp", "mug", "table")
 
 
@@ -38,17 +25,17 @@ class Light:
 
 @dataclass(frozen=True)
 class PlacedObject:
-    """A unit shape at its place: p_world = position + scale * rotate(rotation, p_object).
+    """A unit shape in its place: p_world = position + scale * rotate(rotation, p_object).
 
     Attributes:
-        shape: a basic shape's name, or class and model of an object, as in "mug/0412".
+        shape: the name of a basic shape, or class and model of an object, as in "mug/0412".
         position: world, of the unit shape's origin.
         rotation: unit quaternion (w, x, y, z).
         scale: radius of the bounding sphere about `position`; unit shapes have radius 1.
         reflectance: the RGB of rho, for diffuse reflection.
-        specular: k_s, for Phong's reflection of every colour alike.
+        specular: Phong's k_s, the same for all colours.
         shininess: Phong's exponent.
-        mesh: digest of the model's file, 16 hex digits; empty for what the program itself makes.
+        mesh: digest of the model's file, 16 hex digits; empty for built-in objects.
     """
 
     shape: str
@@ -79,8 +66,13 @@ class PlacedObject:
 class SceneSpec:
     """One scene in full.
 
-    `attenuation` is (k_l, k_q) of the shading equation; `room_reflectance` is None where there is
-    no room; `background` is the radiance of rays that meet nothing.
+    Attributes:
+        index: number of the scene in its data set.
+        cameras: one for each view.
+        ambient: the RGB of L_a.
+        attenuation: (k_l, k_q) of the shading equation.
+        room_reflectance: the RGB of rho of floor and walls; None where there is no room.
+        background: radiance of rays that meet nothing.
     """
 
     index: int

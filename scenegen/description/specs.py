@@ -1,21 +1,49 @@
-"""Frozen description of a data set, JSON both ways: the request; `scenes.SceneSpec` answers it.
+"""Description of a data set, as JSON and back: what is asked for. `SceneSpec` describes a scene.
 
 Lengths are in scene units (the room's edge), frames as in `camera.py`.
 """
 
 import hashlib
-from collections.abc import Iterable
+import itertools
+import math
 from dataclasses import dataclass
 
 from scenegen.camera import Camera, Vector3
-from scenegen.common.records import from_json, normalise, to_json
-from scenegen.description.checks import check_dataset_spec
-from scenegen.description.scenes import SHAPE_NAMES
+from scenegen.common.records import check, check_range, from_json, normalise, to_json
+from scenegen.description.scenes import FAMILY_NAMES, SHAPE_NAMES
+
+IMAGE_DTYPES = ("uint8", "float16", "float32")
+BUILT_IN = {"shapes": SHAPE_NAMES, "families": FAMILY_NAMES}
+FOLDERS = ("shapenet-v1", "shapenet-v2", "folder")
+SPLITS = ("all", "train", "val", "test")
+MAX_CLASSES = 4000  # their names are an attribute, of which HDF5 allows 64 kB
+MAX_LIGHTS = 16
+MAX_PIXELS = 4096 * 4096
+MAX_VIEWS = 64
+MOST_TURN = 80.0  # degrees between two views; at 90 all input views would be the same
+LIMITS: dict[str, tuple[float, float]] = {  # of settings that are a number or a range of numbers
+    "spp": (1, 1024),
+    "objects": (0, 100),  # object ids are stored as int8
+    "object_radius": (0.005, 0.5),
+    "specular": (0.0, 10.0),
+    "shininess": (1.0, 10_000.0),
+    "fov_degrees": (1.0, 120.0),
+    "lights": (0, MAX_LIGHTS),
+    "light_level": (0.0, 100.0),
+    "light_saturation": (0.0, 1.0),
+}
+CHOICES = {
+    "image_dtype": IMAGE_DTYPES,
+    "shading": ("paper", "path"),
+    "pose": ("resting", "any"),
+    "source": (*BUILT_IN, *FOLDERS),
+    "object_split": SPLITS,
+}
 
 
 @dataclass(frozen=True)
 class DatasetSpec:
-    """The request that a file of rooms answers; item i depends on this and on i alone.
+    """What a file of rooms should hold; item i depends on this and on i alone.
 
     Attributes:
         seed: dataset seed, 0 to 2**63 - 1.
@@ -31,7 +59,7 @@ class DatasetSpec:
             uniformly on SO(3) and lowers it until it touches the floor.
         lights: fewest and most point lights.
         views: degrees about the vertical axis through the target, from the input view, which is
-            the first, to each view of a scene; see `sampling.view_cameras`.
+            the first, to each view of a scene; see `sampling.cameras`.
         shading: "paper" for the paper's equation, "path" for a path tracer on the same scene.
         shadows: whether lights are occluded (the paper's shading equation has no visibility term).
         spp: colour samples per pixel; 1 shades the ground-truth hit itself.
@@ -85,16 +113,20 @@ class DatasetSpec:
 
     def __post_init__(self) -> None:
         normalise(self)
-        check_dataset_spec(self)
+        check(0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2**63 - 1")
+        _check_limits(self)
+        _check_image(self)
+        _check_objects(self)
+        _check_places(self)
 
     @property
     def object_slots(self) -> int:
-        """Length of the object axis of every array; at least 1, as HDF5 wants it."""
+        """Length of the object axis of every array; at least 1, which HDF5 needs."""
         return max(1, self.objects[1])
 
     @property
     def light_slots(self) -> int:
-        """Length of the light axis of every array; at least 1, as HDF5 wants it."""
+        """Length of the light axis of every array; at least 1, which HDF5 needs."""
         return max(1, self.lights[1])
 
     @property
@@ -112,12 +144,90 @@ class DatasetSpec:
         return from_json(cls, text, "dataset spec")
 
 
-def fingerprint(spec: DatasetSpec, scene_lines: Iterable[str]) -> str:
-    """SHA-256, as hex, of the request and of every scene: equal if and only if the truth is.
+class Fingerprint:
+    """SHA-256 of a request and of every scene: equal if and only if the ground truth is.
 
     It says nothing about storage (compression) or about the machine that rendered.
     """
-    digest = hashlib.sha256(spec.to_json().encode())
-    for line in scene_lines:
-        digest.update(b"\n" + line.encode())
-    return digest.hexdigest()
+
+    def __init__(self, spec: DatasetSpec) -> None:
+        self._digest = hashlib.sha256(spec.to_json().encode())
+
+    def add(self, scene_line: bytes) -> None:
+        """Add the next scene, as the UTF-8 of what `SceneSpec.to_json` returns."""
+        self._digest.update(b"\n" + scene_line)
+
+    @property
+    def hex(self) -> str:
+        """The fingerprint of what was added so far, 64 hex digits."""
+        return self._digest.hexdigest()
+
+
+def _check_limits(spec: DatasetSpec) -> None:
+    """Check each setting by itself, where two numbers or a few words limit it."""
+    for name, (low, high) in LIMITS.items():
+        value, shown = getattr(spec, name), name.removesuffix("_degrees").replace("_", " ")
+        if isinstance(value, tuple):
+            check_range(shown, value, low, high)
+        else:
+            check(low <= value <= high, shown, value, f"from {low:g} to {high:g}")
+    for name, known in CHOICES.items():
+        value = getattr(spec, name)
+        check(value in known, name.replace("_", " "), value, f"one of {', '.join(known)}")
+    for name in ("ambient", "reflectance", "room_reflectance"):
+        color = getattr(spec, name)
+        ok = len(color) == 3 and all(0.0 <= c <= 1.0 for c in color)
+        check(ok, name.replace("_", " "), color, "channels from 0 to 1")
+
+
+def _check_image(spec: DatasetSpec) -> None:
+    sides, pixels = f"{spec.height}x{spec.width}", spec.height * spec.width
+    check(min(spec.height, spec.width) >= 8, "size", sides, "at least 8 pixels a side")
+    check(pixels <= MAX_PIXELS, "size", sides, f"at most {MAX_PIXELS:,} pixels")
+    least = spec.min_visible_pixels
+    expected = f"from 0 to the image's {pixels} pixels"
+    check(0 <= least <= pixels, "min visible pixels", least, expected)
+    allowed = "one of the two: a path tracer always casts shadows"
+    both = spec.shadows and spec.shading == "path"
+    check(not both, "shadows", "with shading 'path'", allowed)
+
+
+def _check_objects(spec: DatasetSpec) -> None:
+    what = "shapes" if spec.source == "shapes" else "classes"
+    known = BUILT_IN.get(spec.source)
+    some = f"some of {', '.join(known)}" if known else "names of classes"
+    check(len(spec.shapes) > 0, what, "none", some)
+    check(len(spec.shapes) <= MAX_CLASSES, what, len(spec.shapes), f"at most {MAX_CLASSES:,}")
+    for name in spec.shapes:
+        ok = name in known if known else name != "" and "/" not in name
+        check(ok, what, repr(name), some)
+    check(len(set(spec.shapes)) == len(spec.shapes), what, spec.shapes, "each name once")
+    if spec.source == "shapes":
+        check(spec.object_split == "all", "object split", spec.object_split, "'all' for shapes")
+
+
+def _check_places(spec: DatasetSpec) -> None:
+    inside = all(0.0 < x < 1.0 for x in spec.camera_target)
+    check(inside, "camera target", spec.camera_target, "inside the unit room")
+    corner = math.dist(spec.camera_target, (1.0, 1.0, 1.0))
+    for name, radius, most in (
+        ("camera radius", spec.camera_radius, 10.0),
+        ("light radius", spec.light_radius, 100.0),
+    ):
+        expected = f"from {corner:.3f} (just around the room) to {most:g} scene units"
+        check(corner <= radius <= most, name, radius, expected)
+    views = spec.views
+    rising = all(a < b for a, b in itertools.pairwise(views))
+    check(
+        0 < len(views) <= MAX_VIEWS and views[0] == 0 and rising and views[-1] <= MOST_TURN,
+        "views",
+        ", ".join(f"{v:g}" for v in views) or "none",
+        f"rising degrees from 0, the input view, to at most {MOST_TURN:g}, such as 0,5,35,55,80",
+    )
+    both = len(spec.attenuation) == 2 and all(0.0 <= k <= 100.0 for k in spec.attenuation)
+    check(
+        both and sum(spec.attenuation) >= 1e-6,
+        "attenuation",
+        spec.attenuation,
+        "k_l and k_q from 0 to 100, not both 0",
+    )

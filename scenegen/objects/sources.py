@@ -6,9 +6,8 @@ from typing import Any
 
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check
-from scenegen.description.checks import BUILT_IN
 from scenegen.description.presets import PRESETS
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import BUILT_IN, DatasetSpec
 from scenegen.objects.catalogue import Objects, mesh_objects, objects_of
 from scenegen.objects.meshes.cache import default_cache_dir
 from scenegen.objects.meshes.folders import ModelFolder, open_objects, open_shapenet
@@ -60,13 +59,7 @@ def object_source(
         SpecError: settings that contradict one another.
         MeshFolderError: a folder without such models.
     """
-    if shapenet_root and objects_root:
-        raise SpecError("objects: found --shapenet-root and --objects-root, expected one of them")
-    if shapenet_root and up != "y":
-        raise SpecError(f"up: found {up!r}, expected 'y' with --shapenet-root, which is y up")
-    root = shapenet_root or objects_root
-    if root is None and up != "y":
-        raise SpecError(f"up: found {up!r} without a folder of meshes, expected --objects-root")
+    root = mesh_folder(shapenet_root, objects_root, up)
     if shapes is not None and (classes is not None or root):
         raise SpecError(
             "objects: found --shapes beside --classes or a folder of meshes, expected one of them"
@@ -84,6 +77,20 @@ def object_source(
     return ObjectSource({**settings, **split}, mesh_objects(store), store)
 
 
+def mesh_folder(shapenet_root: str | None, objects_root: str | None, up: str) -> str | None:
+    """Return the folder of meshes that the options name, or None.
+
+    Raises SpecError where the options contradict one another.
+    """
+    both = bool(shapenet_root and objects_root)
+    check(not both, "objects", "--shapenet-root and --objects-root", "one of them")
+    if up != "y":
+        with_shapenet = "'y' with --shapenet-root, where y is always up"
+        check(not shapenet_root, "up", repr(up), with_shapenet)
+        check(bool(objects_root), "up", f"{up!r} without a folder of meshes", "--objects-root")
+    return shapenet_root or objects_root
+
+
 def file_objects(
     spec: DatasetSpec,
     *,
@@ -98,8 +105,9 @@ def file_objects(
         SpecError: they are meshes, and no folder is told, or one that holds others.
         MeshFolderError: a folder without such models.
     """
-    if spec.source in BUILT_IN and (shapenet_root or objects_root or up != "y"):
-        raise SpecError("objects: found options on meshes, but the file's objects are built in")
+    told = mesh_folder(shapenet_root, objects_root, up)
+    if spec.source in BUILT_IN and told:
+        raise SpecError("objects", f"the folder {told}", "none: the file's objects are built in")
     root = objects_root if spec.source == "folder" else shapenet_root
     if root is None:
         return objects_of(spec)

@@ -1,4 +1,4 @@
-"""One item of a rooms file in the formats of other tools: EXR, PNG, PLY, OBJ."""
+"""Write one row of a file of rooms in the formats of other tools: EXR, PNG, PLY, OBJ."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -19,11 +19,11 @@ from scenegen.rooms.reader import Room
 Array = NDArray[Any]
 Writer = Callable[[Room, Path], None]
 FORMATS = ("exr", "png", "ply", "obj")
-PNG_DEPTH_UNIT = 1e-4  # scene units a step: 16 bits reach 6.5535
+PNG_DEPTH_UNIT = 1e-4  # scene units for each step of a 16-bit depth: it reaches 6.5535
 
 
 def export_paths(row: int, folder: str | Path, stem: str, form: str) -> list[Path]:
-    """Return the files that one row becomes in a format (one of FORMATS)."""
+    """Return the paths of the files that one row is written to in a format (one of FORMATS)."""
     name = f"{stem}-{row:06d}"
     if form != "png":
         return [Path(folder) / f"{name}.{form}"]
@@ -40,7 +40,7 @@ def export_room(
     """Write one room to its `export_paths`. Raises OSError as `new_file.written_beside`.
 
     Args:
-        objects: what the scene is made of, for "obj"; None where that is built in.
+        objects: what the scene is made of, for "obj"; None where its objects are built in.
     """
     shape_of = objects.shape if objects else built_in_shape
     obj: Writer = lambda room, path: write_mesh_obj(room, path, shape_of)  # noqa: E731

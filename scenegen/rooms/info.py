@@ -1,4 +1,4 @@
-"""What a rooms file holds, as text for a person."""
+"""Describe a file of rooms as text: what it was asked for, what it holds, how it is stored."""
 
 from pathlib import Path
 from typing import Any
@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 from scenegen.common.records import changed_settings
 from scenegen.layout import FIELDS
+from scenegen.rendering.backend import VERSION_ATTRIBUTES
 from scenegen.rooms.reader import RoomsFile
 
-SAMPLED = 64  # rows read for the ranges
+SAMPLED = 64  # rows that are read to tell the ranges of values
 
 
 def describe(path: str | Path) -> str:
-    """Return spec, counts, ranges, units, sizes, versions and fingerprint of a file, as lines.
+    """Return a file's spec, counts, ranges, units, sizes, versions and fingerprint, as one text.
 
     Raises FileNotFoundError, FileFormatError as `RoomsFile`.
     """
@@ -22,12 +23,14 @@ def describe(path: str | Path) -> str:
         rows = np.unique(np.linspace(0, len(rooms) - 1, min(SAMPLED, len(rooms))).astype(int))
         ranges, shapes = _ranges(rooms, rows)
         attributes = rooms.attributes
+        released = [f"{name} {attributes.get(name, 'not stored')}" for name in VERSION_ATTRIBUTES]
         lines = [
             f"{path}: {len(rooms)} images of {rooms.spec.height}x{rooms.spec.width},"
             f" {Path(path).stat().st_size / 1e6:.1f} MB",
             "",
             f"  format        {attributes['format']} {attributes['format_version']}",
             f"  written by    {attributes['writer']}, {attributes.get('variant')}",
+            f"  rendered by   {', '.join(released)}",
             f"  command       {attributes.get('creation_command') or '-'}",
             f"  fingerprint   {rooms.fingerprint}",
             f"  conventions   {attributes.get('conventions')}",

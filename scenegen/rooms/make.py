@@ -1,4 +1,9 @@
-"""Render a data set: propose, cast, check, write; overlapped, in flat memory."""
+"""Render a data set to a file of rooms.
+
+Scenes are proposed, rendered, checked and written in batches. These steps overlap: while one batch
+is rendered, the next is proposed and the one before is written. Memory does not grow with the
+number of scenes.
+"""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -6,22 +11,24 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from scenegen.common.errors import SpecError
 from scenegen.common.new_file import check_writable
+from scenegen.common.records import check
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
-from scenegen.rendering.backend import select_variant
+from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.ground_truth import GroundTruth, visible_pixels
-from scenegen.rendering.packing import pack
+from scenegen.rendering.packing import SceneBatch, pack
 from scenegen.rendering.renderer import launch
 from scenegen.rooms.writer import RenderedScene, create_rooms
 from scenegen.sampling.scenes import MAX_ATTEMPTS, refusal, sample_scene
 
 DEFAULT_BATCH = 64
 MAX_BATCH = 4096
-MAX_RAYS = 2**28  # of a wavefront; 8 GiB of pixels
-WINDOW = 4  # batches that may be in the making while the oldest item is still being retried
+MAX_RAYS = 2**28  # pixels of one batch; they take 8 GiB
+WINDOW = 4  # batches that may be begun while the oldest item is still being proposed again
+
+_Begun = tuple[list[SceneSpec], SceneBatch, Callable[[], GroundTruth]]  # a batch being rendered
 
 
 def make_dataset(
@@ -40,28 +47,27 @@ def make_dataset(
     """Render scenes 0 .. count - 1 of `spec` to a rooms file, each with a row for each view.
 
     Args:
-        batch: images in one wavefront; bounds memory, never changes a byte of a row.
+        batch: images rendered at once; it bounds memory and changes no byte of the file.
         device, compression: as in `backend.DEVICES` and `row_file.COMPRESSIONS`.
-        command: what to record as the file's creation command.
+        command: stored as the file's creation command.
         objects: what the scenes are made of; None for `objects_of(spec)`.
-        progress: is told, now and then, how many more rows were written.
+        progress: called now and then with the number of rows written since the last call.
 
     Raises:
-        SpecError, BackendError: a setting.
+        SpecError: a setting is out of range.
+        BackendError: the device cannot render here.
         PlacementError: no scene meets the request.
-        OSError: the path, or the disk.
+        OSError: the file cannot be written.
     """
-    if not 1 <= batch <= MAX_BATCH:
-        raise SpecError(f"batch: found {batch}, expected from 1 to {MAX_BATCH}")
-    if max(batch, len(spec.views)) * spec.height * spec.width > MAX_RAYS:
-        most = MAX_RAYS // (spec.height * spec.width)
-        found = f"{batch}, with {len(spec.views)} views of a scene"
-        raise SpecError(f"batch: found {found}, expected at most {most} images of this size")
+    check(1 <= batch <= MAX_BATCH, "batch", batch, f"from 1 to {MAX_BATCH}")
+    most = MAX_RAYS // (spec.height * spec.width)
+    found = f"{batch}, with {len(spec.views)} views of a scene"
+    enough = max(batch, len(spec.views)) <= most
+    check(enough, "batch", found, f"at most {most} images of this size")
     check_writable(Path(path), overwrite)
     variant = select_variant(device)
     objects = objects or objects_of(spec)
-    views = range(len(spec.views))
-    attributes = {"creation_command": command, "variant": variant}
+    attributes = {"creation_command": command, "variant": variant, **versions()}
     with (
         create_rooms(
             path,
@@ -76,8 +82,8 @@ def make_dataset(
         writing: deque[Future[int]] = deque()
 
         def write(items: list[RenderedScene]) -> int:
-            writer.append(items, pack(spec, [item.scene for item in items], views, objects))
-            return len(items) * len(views)
+            writer.append(items)
+            return len(items) * len(spec.views)
 
         for items in render_items(spec, range(count), batch, device, objects):
             writing.append(pool.submit(write, items))
@@ -94,10 +100,11 @@ def render_items(
     device: str = "auto",
     objects: Objects | None = None,
 ) -> Iterator[list[RenderedScene]]:
-    """Yield accepted items in order, as they become complete.
+    """Yield the accepted items in order, a list of them whenever some are complete.
 
-    While a batch is cast, the next one is proposed. An item whose objects do not all show enough
-    pixels is proposed again in the next batch; new items wait when the oldest falls far behind.
+    While a batch is rendered, the next one is proposed. An item whose objects do not all show
+    enough pixels is proposed again in the next batch. No new item is begun while the oldest one
+    that is incomplete is more than WINDOW batches behind.
     """
     objects = objects or objects_of(spec)
     views = range(len(spec.views))
@@ -123,18 +130,19 @@ def render_items(
             scenes.append(_next_proposal(spec, index, attempts, rendered, objects))
         return scenes
 
-    scenes: list[SceneSpec] = []
-    pending: Callable[[], GroundTruth] | None = None
-    while True:
-        if pending is None:
-            scenes = propose()
-            if not scenes:
-                return
-            pending = launch(pack(spec, scenes, views, objects), device)
+    def begin(scenes: list[SceneSpec]) -> _Begun | None:
+        if not scenes:
+            return None
+        packed = pack(spec, scenes, views, objects)
+        return scenes, packed, launch(packed, device)
+
+    begun: _Begun | None = None
+    while begun := begun or begin(propose()):
+        scenes, packed, fetch = begun
         following = propose()
-        truth = pending()
-        pending = launch(pack(spec, following, views, objects), device) if following else None
-        for scene, shown in zip(scenes, _shown(spec, scenes, truth), strict=True):
+        truth = fetch()
+        begun = begin(following)
+        for scene, shown in zip(scenes, _shown(scenes, packed, truth), strict=True):
             if shown is None:
                 retries.append(scene.index)
                 rendered[scene.index] += 1
@@ -142,7 +150,6 @@ def render_items(
                 finished[scene.index] = shown
                 attempts.pop(scene.index)
                 rendered.pop(scene.index)
-        scenes = following
         ready = []
         while next_out < len(indices) and indices[next_out] in finished:
             ready.append(finished.pop(indices[next_out]))
@@ -152,16 +159,17 @@ def render_items(
 
 
 def _shown(
-    spec: DatasetSpec, scenes: list[SceneSpec], truth: GroundTruth
+    scenes: list[SceneSpec], batch: SceneBatch, truth: GroundTruth
 ) -> Iterator[RenderedScene | None]:
     """Yield each scene with its pixels, or None where an object shows too few in some view."""
+    spec = batch.spec
     visible = visible_pixels(truth.object_id, spec.object_slots)
-    views = len(spec.views)
-    for row, scene in enumerate(scenes):
-        images = slice(row * views, (row + 1) * views)
+    for first, scene in zip(range(0, len(batch), len(spec.views)), scenes, strict=True):
+        images = slice(first, first + len(spec.views))
         enough = visible[images, : len(scene.objects)] >= spec.min_visible_pixels
-        pixels = (truth.image, truth.depth, truth.normal, truth.object_id, visible)
-        yield RenderedScene(scene, *(values[images] for values in pixels)) if enough.all() else None
+        pixels = {name: values[images] for name, values in vars(truth).items()}
+        shown = RenderedScene(scene, batch, first, pixels, visible[images])
+        yield shown if enough.all() else None
 
 
 def _next_proposal(

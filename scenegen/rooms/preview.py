@@ -1,4 +1,4 @@
-"""Contact sheets: what a person looks at to trust a file of rooms."""
+"""Contact sheets: pictures of some rows of a file, for a person to check it by eye."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from scenegen.common.errors import SpecError
 from scenegen.common.new_file import written_beside
+from scenegen.common.records import check
 from scenegen.common.seeding import Purpose, item_rng
 from scenegen.rooms.reader import Room
 
@@ -18,22 +19,14 @@ DEFAULT_ROWS = 12
 MAX_ROWS = 400
 GAP = 6
 LABEL_HEIGHT = 18
-SMALLEST_TILE = 128  # smaller images are enlarged by a whole factor
+SMALLEST_TILE = 128  # pixels; narrower images are enlarged by a whole factor
 BACKGROUND, INK, FAINT = (250, 250, 250), (20, 20, 20), (110, 110, 110)
-NOTHING = (90, 0, 110)  # where a ray meets nothing
-PALETTE = np.array(  # object ids: the room grey, then Okabe and Ito's colours, again and again
-    [
-        (200, 200, 200),
-        (230, 159, 0),
-        (86, 180, 233),
-        (0, 158, 115),
-        (240, 228, 66),
-        (0, 114, 178),
-        (213, 94, 0),
-        (204, 121, 167),
-    ],
+NOTHING = (90, 0, 110)  # colour of pixels whose ray meets nothing
+PALETTE = np.array(  # of object ids: the room is grey; objects repeat Okabe and Ito's colours
+    [(200, 200, 200), (230, 159, 0), (86, 180, 233), (0, 158, 115), (240, 228, 66),
+     (0, 114, 178), (213, 94, 0), (204, 121, 167)],
     np.uint8,
-)
+)  # fmt: skip
 TITLES = ("image", "depth, near is dark", "normal, xyz as rgb", "object id")
 
 
@@ -86,7 +79,7 @@ def srgb_bytes(radiance: Array) -> NDArray[np.uint8]:
 
 
 def depth_bytes(depth: Array) -> NDArray[np.uint8]:
-    """Stretch a depth map over black (nearest) to white (farthest), as the paper shows it."""
+    """Show a depth map in grey, (H, W) -> (H, W, 3): black nearest, white farthest."""
     known = np.isfinite(depth)
     if not known.any():
         return np.zeros((*depth.shape, 3), np.uint8)
@@ -104,7 +97,7 @@ def _caption(room: Room) -> str:
 
 
 def _fitted(text: str, font: Any, width: int) -> str:
-    """Shorten a text that is too long for its place."""
+    """Return a text, shortened where it is wider than `width` pixels."""
     if font.getlength(text) <= width:
         return text
     while text and font.getlength(text + "...") > width:
@@ -115,34 +108,31 @@ def _fitted(text: str, font: Any, width: int) -> str:
 def pick_rows(
     count: int, items: list[int] | None, number: int | None = None, seed: int = 0
 ) -> list[int]:
-    """Return the rows to show: those named, or `number` at random, or the first 12.
+    """Return the rows to show: `items`, or `number` rows drawn at random, or the first 12.
 
-    Raises SpecError for a row beyond the file, and where both ways are asked for.
+    Raises SpecError for a row beyond the file, and where both are asked for.
     """
     if items is not None and number is not None:
-        raise SpecError("items and random: found both, expected one of them")
-    if seed < 0:
-        raise SpecError(f"seed: found {seed}, expected 0 or more")
+        raise SpecError("items and random", "both", "one of them")
+    check(seed >= 0, "seed", seed, "0 or more")
     if number is not None:
         rng = item_rng(seed, 0, Purpose.SELECTION)
         return sorted(rng.choice(count, min(number, count), replace=False).tolist())
     chosen = list(range(min(DEFAULT_ROWS, count))) if items is None else items
     outside = [i for i in chosen if i >= count]
-    if outside:
-        raise SpecError(f"items: found {outside[0]}, expected rows from 0 to {count - 1}")
-    if not 0 < len(chosen) <= MAX_ROWS:
-        raise SpecError(f"items: found {len(chosen)} rows, expected from 1 to {MAX_ROWS}")
+    check(not outside, "items", min(outside, default=0), f"rows from 0 to {count - 1}")
+    check(0 < len(chosen) <= MAX_ROWS, "items", f"{len(chosen)} rows", f"from 1 to {MAX_ROWS}")
     return chosen
 
 
 def check_picture_name(path: Path) -> None:
     """Raise SpecError for an ending that names no picture format."""
-    if path.suffix.lower() not in (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff"):
-        raise SpecError(f"out: found {path.name!r}, expected a picture's name such as sheet.png")
+    known = path.suffix.lower() in (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
+    check(known, "out", repr(path.name), "a picture's name such as sheet.png")
 
 
 def save_picture(picture: Image.Image, path: str | Path) -> None:
-    """Write a picture under a temporary name, then rename it.
+    """Write a picture; the file appears, or is replaced, when it is complete.
 
     Raises SpecError for an ending that names no picture format, OSError for the path.
     """

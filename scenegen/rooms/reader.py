@@ -1,10 +1,10 @@
-"""Read a rooms file: typed records by index, and a map-style dataset for training loops."""
+"""Read a file of rooms: typed records by index, and a map-style dataset for training loops."""
 
 import os
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import h5py
@@ -69,9 +69,9 @@ class RoomsFile:
     """An open rooms file: a sequence of `Room`s. Use it as a context manager, or close it.
 
     Attributes:
-        path: where it lies.
+        path: of the file.
         spec: the request that it answers.
-        fingerprint: SHA-256 of request and scenes (`specs.fingerprint`).
+        fingerprint: SHA-256 of request and scenes (`specs.Fingerprint`).
         attributes: all root attributes.
     """
 
@@ -80,14 +80,14 @@ class RoomsFile:
 
         Raises:
             FileNotFoundError: no such file.
-            FileFormatError: not HDF5, not a rooms file, of a newer format, or damaged.
+            FileFormatError: not HDF5, not a file of rooms, of another major version, or damaged.
         """
         self.path = Path(path)
         self._file = open_file(path, "rooms file")
         with checking(self._file):
             self.attributes: dict[str, Any] = dict(self._file.attrs)
             self.spec = self._check_root()
-            problems = layout_problems(self._file, self.spec)
+            problems = _layout_problems(self._file, self.spec)
             if problems:
                 raise FileFormatError(f"{path}: {and_more(problems)}")
         self.fingerprint = str(self.attributes["fingerprint"])
@@ -117,10 +117,8 @@ class RoomsFile:
 
     def scene(self, index: int) -> SceneSpec:
         """Return the description of the scene that row `index` shows."""
-        try:
+        with _inside(f"{self.path}: scene, row {index}"):
             return SceneSpec.from_json(self.read("scene", index))
-        except SpecError as error:
-            raise FileFormatError(f"{self.path}: scene, row {index}: {error}") from error
 
     def read(self, name: str, rows: int | slice) -> Any:
         """Read rows of one dataset. Raises FileFormatError where they are damaged."""
@@ -129,15 +127,20 @@ class RoomsFile:
 
     def problems(self) -> list[str]:
         """Return what is wrong with the layout, the datasets' own descriptions included."""
-        return layout_problems(self._file, self.spec) + attribute_problems(self._file, self.spec)
+        with reading(self.path):
+            return _layout_problems(self._file, self.spec) + _attribute_problems(
+                self._file, self.spec
+            )
 
     def stored_bytes(self) -> dict[str, tuple[int, int]]:
-        """Return for each dataset its bytes on disk and in memory.
+        """Return the bytes on disk and in memory of each dataset, by name.
 
-        HDF5 keeps texts in heaps of which it tells no size; they get what the others leave.
+        HDF5 does not tell the size of the heaps that hold texts. The dataset "scene" is said to
+        take what all others leave of the file.
         """
-        sizes = {f.name: self._file[f.name].id.get_storage_size() for f in FIELDS}
-        memory = {f.name: self._file[f.name].nbytes for f in FIELDS}
+        with reading(self.path):
+            sizes = {f.name: self._file[f.name].id.get_storage_size() for f in FIELDS}
+            memory = {f.name: self._file[f.name].nbytes for f in FIELDS}
         texts = self.path.stat().st_size - sum(sizes.values()) + sizes["scene"]
         sizes["scene"] = memory["scene"] = texts
         memory["object/model"] = sizes["object/model"]
@@ -150,45 +153,49 @@ class RoomsFile:
     def __enter__(self) -> "RoomsFile":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _check_root(self) -> DatasetSpec:
         found = self.attributes.get("format")
         if not isinstance(found, str) or found != FORMAT_NAME:
-            what = "no format attribute" if found is None else repr(found)
             raise FileFormatError(
-                f"{self.path}: not a rooms file: found {what}, expected"
-                f" format {FORMAT_NAME!r} (written by scenegen render)"
+                f"{self.path}: not a rooms file",
+                "no format attribute" if found is None else f"format {found!r:.60}",
+                f"{FORMAT_NAME!r}, as scenegen render writes it",
             )
         check_version(self.path, self.attributes, FORMAT_VERSION)
         for name in ("spec", "fingerprint", "writer"):
             if name not in self.attributes:
-                raise FileFormatError(f"{self.path}: root attribute {name!r} is missing")
-        try:
+                raise FileFormatError(self.path, f"no root attribute {name!r}")
+        with _inside(f"{self.path}: attribute 'spec'"):
             return DatasetSpec.from_json(str(self.attributes["spec"]))
-        except SpecError as error:
-            raise FileFormatError(f"{self.path}: attribute 'spec': {error}") from error
 
 
-def layout_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
-    """Say what is missing or has the wrong shape or type."""
+@contextmanager
+def _inside(place: str) -> Iterator[None]:
+    """Turn the error of a description into one of the file that holds it."""
+    try:
+        yield
+    except SpecError as error:
+        raise FileFormatError(f"{place}: {error.where}", error.found, error.expected) from error
+
+
+def _layout_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
+    """Return a sentence for each dataset that is missing or has the wrong shape or type."""
     image = file.get("image")
     count = image.shape[0] if isinstance(image, h5py.Dataset) and image.shape else 0
     problems = column_problems(file, columns(spec), count)
     told = file.attrs.get("count")
     if not problems and (count == 0 or not np.array_equal(count, told)):
-        problems.append(f"found {count} rows, the attribute 'count' says {told}, expected over 0")
+        problems.append(
+            f"found {count} rows, but the attribute 'count' says {told}, expected over 0"
+        )
     return problems
 
 
-def attribute_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
-    """Say which datasets describe themselves otherwise than `layout.columns` does."""
+def _attribute_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
+    """Return a sentence for each attribute of a dataset that is not as in `layout.columns`."""
     problems = []
     for column in columns(spec):
         for name, expected in column.attributes.items():
@@ -201,8 +208,8 @@ def attribute_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
 class RoomsDataset:
     """A map-style dataset (`__len__`, `__getitem__` -> dict of arrays) for any training loop.
 
-    `torch.utils.data.DataLoader` takes it as it is, with any number of workers: it pickles as its
-    path, and every process opens the file for itself when it first reads.
+    `torch.utils.data.DataLoader` takes it as it is, with any number of workers: pickled, it is no
+    more than its path, and every process opens the file for itself when it first reads.
     """
 
     def __init__(
@@ -214,7 +221,7 @@ class RoomsDataset:
         known = [field.name for field in FIELDS if field.dtype != "text"]
         for name in fields:
             if name not in known:
-                raise SpecError(f"field: found {name!r}, expected some of {', '.join(known)}")
+                raise SpecError("field", repr(name), f"some of {', '.join(known)}")
         self.path, self.fields = Path(path), tuple(fields)
         with RoomsFile(path) as rooms:
             self._length, self.spec, self.fingerprint = len(rooms), rooms.spec, rooms.fingerprint

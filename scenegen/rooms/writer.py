@@ -1,6 +1,5 @@
-"""Write a rooms file."""
+"""Write a file of rooms, row by row."""
 
-import hashlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -8,13 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.records import check
 from scenegen.common.row_file import Table, new_file, writer_name
 from scenegen.description.scenes import SceneSpec
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import DatasetSpec, Fingerprint
 from scenegen.layout import FORMAT_NAME, FORMAT_VERSION, columns
 from scenegen.rendering.packing import SceneBatch
 
@@ -28,64 +26,71 @@ CONVENTIONS = (
 
 @dataclass(frozen=True, eq=False)
 class RenderedScene:
-    """An accepted item: its scene, and the pixels of its V views, as in `GroundTruth`."""
+    """An accepted item with the pixels of its V views.
+
+    Attributes:
+        scene: its description.
+        batch, first: where it is packed: its views are the images from `first` on.
+        pixels: image, depth, normal and object_id of the views, (V, ...) as in `GroundTruth`.
+        visible_pixels: how many pixels of each view show each object, (V, K).
+    """
 
     scene: SceneSpec
-    image: Array
-    depth: Array
-    normal: Array
-    object_id: Array
+    batch: SceneBatch
+    first: int
+    pixels: dict[str, Array]
     visible_pixels: Array
 
 
 class RoomsWriter:
-    """The rows of a rooms file in the making; `create_rooms` makes one."""
+    """Writes the rows of a new file of rooms; `create_rooms` makes one."""
 
     def __init__(self, file: h5py.File, spec: DatasetSpec, count: int, compression: str) -> None:
         """Create the datasets of `count` scenes."""
-        self.classes, self.views = spec.shapes, spec.views
+        self.views = range(len(spec.views))
         self.table = Table(file, columns(spec), count * len(spec.views), compression)
-        self.digest = hashlib.sha256(spec.to_json().encode())
+        self.fingerprint = Fingerprint(spec)
 
-    def append(self, rooms: Sequence[RenderedScene], batch: SceneBatch) -> None:
-        """Write a row for each view of each scene; `batch` is they, packed."""
-        images = iter(range(len(batch)))
-        numbers = [self.classes.index(name.partition("/")[0]) for name in batch.names]
-        classes = np.array([*numbers, -1])  # the last one is that of unused slots
+    def append(self, rooms: Sequence[RenderedScene]) -> None:
+        """Write a row for each view of each scene."""
         for room in rooms:
             description = room.scene.to_json()
-            self.digest.update(b"\n" + description.encode())
-            models = [item.shape for item in room.scene.objects]
-            for view, i in zip(range(len(room.image)), images, strict=False):
-                shape = batch.shape[i]
-                self.table.append(
-                    {
-                        "image": room.image[view],
-                        "depth": room.depth[view],
-                        "normal": room.normal[view],
-                        "object_id": room.object_id[view],
-                        "scene_index": room.scene.index,
-                        "view_index": view,
-                        "view_angle_degrees": self.views[view],
-                        "camera/world_from_camera": batch.world_from_camera[i],
-                        "camera/fov_y_degrees": batch.fov_y_degrees[i],
-                        "light/count": batch.light_count[i],
-                        "light/position": batch.light_position[i],
-                        "light/color": batch.light_color[i],
-                        "light/ambient": batch.ambient[i],
-                        "light/attenuation": batch.attenuation[i],
-                        "material/reflectance": batch.reflectance[i],
-                        "material/specular": batch.gloss[i, :, 0],
-                        "material/shininess": batch.gloss[i, :, 1],
-                        "object/count": batch.object_count[i],
-                        "object/shape": classes[shape],
-                        "object/model": models + [""] * (len(shape) - len(models)),
-                        "object/world_from_object": batch.world_from_object[i],
-                        "object/scale": batch.object_scale[i],
-                        "object/visible_pixels": room.visible_pixels[view],
-                        "scene": description,
-                    }
-                )
+            self.fingerprint.add(description.encode())
+            for view in self.views:
+                row = {name: values[view] for name, values in room.pixels.items()}
+                row |= described(room.batch, room.first + view, room.scene)
+                row |= {"object/visible_pixels": room.visible_pixels[view], "scene": description}
+                self.table.append(row)
+
+
+def described(batch: SceneBatch, i: int, scene: SceneSpec) -> dict[str, Any]:
+    """Return what a row holds that follows from a scene's description, by name of the dataset.
+
+    Args:
+        i: the image of `batch` that shows a view of `scene`.
+    """
+    spec, view = batch.spec, int(batch.view[i])
+    unused = spec.object_slots - len(scene.objects)
+    return {
+        "scene_index": scene.index,
+        "view_index": view,
+        "view_angle_degrees": spec.views[view],
+        "camera/world_from_camera": batch.world_from_camera[i],
+        "camera/fov_y_degrees": batch.fov_y_degrees[i],
+        "light/count": batch.light_count[i],
+        "light/position": batch.light_position[i],
+        "light/color": batch.light_color[i],
+        "light/ambient": batch.ambient[i],
+        "light/attenuation": batch.attenuation[i],
+        "material/reflectance": batch.reflectance[i],
+        "material/specular": batch.gloss[i, :, 0],
+        "material/shininess": batch.gloss[i, :, 1],
+        "object/count": batch.object_count[i],
+        "object/shape": [spec.shapes.index(item.name) for item in scene.objects] + [-1] * unused,
+        "object/model": [item.shape for item in scene.objects] + [""] * unused,
+        "object/world_from_object": batch.world_from_object[i],
+        "object/scale": batch.object_scale[i],
+    }
 
 
 @contextmanager
@@ -98,13 +103,13 @@ def create_rooms(
     overwrite: bool = False,
     attributes: dict[str, str] | None = None,
 ) -> Iterator[RoomsWriter]:
-    """Open a rooms file to write `count` scenes; it gets its name when the block ends well.
+    """Open a new file of rooms for `count` scenes; it gets its name when the block ends well.
 
-    Its bytes depend on the rows alone, not on how they were handed over.
+    Its bytes depend on the rows alone, not on how many were appended at a time.
 
     Raises:
         SpecError: unknown compression, or a count below 1.
-        OSError: the path, or the disk.
+        OSError: the file cannot be written.
     """
     rows = count * len(spec.views)
     most = MAX_COUNT // len(spec.views)
@@ -126,4 +131,4 @@ def create_rooms(
         yield writer
         if writer.table.rows != rows:
             raise RuntimeError(f"{path}: got {writer.table.rows} of {rows} rows")
-        file.attrs["fingerprint"] = writer.digest.hexdigest()
+        file.attrs["fingerprint"] = writer.fingerprint.hex

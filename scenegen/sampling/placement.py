@@ -1,11 +1,12 @@
-"""Where objects may stand: support functions of convex bodies, and the search for a free place.
+"""Where objects stand: the search for a free place on the floor.
 
-A body's support in direction d is the largest p . d over it. Floor, walls and the image's borders
-are planes, so a support is all it takes to keep a body on one side of them; two bodies are apart
-if some direction separates their supports. Bodies are the shapes' convex hulls (`UnitShape`), so a
-scene's objects are not merely disjoint: a plane passes between any two of them. The planes tried
-are those normal to `SEPARATORS`; as supports move with their bodies, one set of them serves all
-places that an orientation is tried at.
+Bodies are compared by their support functions: the support in direction d is the largest p . d
+over all points p of the body. Floor, walls and the image's borders are planes, so the supports
+along their normals tell on which side of them a body lies. Two bodies are apart if their supports
+along some direction are; that direction is the normal of a plane between them. Only the directions
+in `SEPARATORS` are tried. Bodies are the convex hulls of the shapes (`UnitShape`), so a plane
+passes between any two objects of a scene. Supports move with their bodies, so those of one
+orientation are computed once for all places tried.
 """
 
 import math
@@ -16,11 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import Camera
-from scenegen.common.rotations import rotation_matrix
 from scenegen.objects.solids import UnitShape
 
 Array = NDArray[Any]
-Quaternion = tuple[float, float, float, float]
 GAP = 2e-3  # least distance between two objects, scene units
 CANDIDATES = 48  # places tried at once for one orientation
 
@@ -111,45 +110,3 @@ def find_place(
         free &= are_apart(places, support, other)
     first = int(free.argmax())
     return Body(places[first], support) if free[first] else None
-
-
-def random_rotation(shape: UnitShape, pose: str, rng: np.random.Generator) -> Quaternion:
-    """Draw an orientation: uniform on SO(3) for pose "any"; for "resting" the shape is dropped in
-    such an orientation, settles on the nearest side on which it stays, and is turned about y.
-    """
-    quaternion = rng.standard_normal(4)
-    quaternion /= math.sqrt(quaternion @ quaternion)
-    turn = rng.random() * math.pi
-    if pose == "any" or not len(shape.resting_directions):
-        return _as_tuple(quaternion)
-    down = rotation_matrix(_as_tuple(quaternion))[1] * -1.0  # the world's -y, object frame
-    side = shape.resting_directions[(shape.resting_directions @ down).argmax()]
-    return _multiply((math.cos(turn), 0.0, math.sin(turn), 0.0), _shortest_to_minus_y(side))
-
-
-def _shortest_to_minus_y(direction: Array) -> Quaternion:
-    """Return the smallest rotation that takes the unit `direction` to -y."""
-    x, y, z = (float(v) for v in direction)
-    if y > 1.0 - 1e-12:
-        return (0.0, 1.0, 0.0, 0.0)  # half a turn about x
-    # The half-way quaternion (1 + d . -y, d x -y), normalised.
-    w = 1.0 - y
-    norm = math.sqrt(w * w + z * z + x * x)
-    return (w / norm, z / norm, 0.0, -x / norm)
-
-
-def _multiply(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Return the rotation that applies b, then a."""
-    aw, ax, ay, az = a
-    bw, bx, by, bz = b
-    return (
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    )
-
-
-def _as_tuple(quaternion: Array) -> Quaternion:
-    w, x, y, z = (float(v) for v in quaternion)
-    return (w, x, y, z)

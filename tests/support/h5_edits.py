@@ -1,5 +1,7 @@
 """Edits of HDF5 files: each makes a function that changes an open file, to spoil a good one."""
 
+import json
+
 
 def attribute(name, value):
     return lambda file: file.attrs.update({name: value})
@@ -87,5 +89,30 @@ def damaged_chunk(name, row):
         at = (row, *(0,) * (file[name].ndim - 1))
         _, data = file[name].id.read_direct_chunk(at)
         file[name].id.write_direct_chunk(at, data[:20] + b"\x55" * (len(data) - 20))
+
+    return edit
+
+
+def edit_scene(row, change):
+    """A change of the scene that one row of a file of rooms describes."""
+
+    def edit(file):
+        scene = json.loads(file["scene"][row])
+        change(scene)
+        file["scene"][row] = json.dumps(scene, separators=(",", ":"))
+
+    return edit
+
+
+def swap_rows(a, b, *names):
+    """Two rows of some datasets, or of all, in each other's place."""
+
+    def edit(file):
+        found = []
+        file.visititems(lambda name, x: found.append(name) if hasattr(x, "dtype") else None)
+        for name in names or found:
+            rows = file[name][:]
+            rows[[a, b]] = rows[[b, a]]
+            file[name][:] = rows
 
     return edit

@@ -24,7 +24,8 @@ from scenegen.common.errors import SpecError
 from scenegen.common.seeding import Purpose, item_seed
 from scenegen.description.scenes import Light
 from scenegen.description.specs import DatasetSpec
-from scenegen.sampling.scenes import sample_cameras, sample_lights
+from scenegen.sampling.cameras import sample_cameras
+from scenegen.sampling.lights import sample_lights
 
 Array = NDArray[Any]
 ROW = 8  # tiles side by side

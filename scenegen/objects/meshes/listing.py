@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from scenegen.description.checks import SPLITS
+from scenegen.description.specs import SPLITS
 from scenegen.objects.meshes.disk import SUFFIXES
 from scenegen.objects.meshes.errors import MeshFolderError
 

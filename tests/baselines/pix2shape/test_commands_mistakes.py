@@ -33,7 +33,7 @@ def folder(pix2shape_files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         (f"predict {ROOMS} --weights rooms.json", ("'rooms.json'", "expected a .safetensors")),
         (f"predict {ROOMS} --weights .", ("weights: found '.'",)),
         (f"predict {ROOMS} --weights alone.safetensors", ("alone.json: No such file",)),
-        (f"predict {ROOMS} --weights garbage.safetensors", ("garbage.json", "cannot be read as")),
+        (f"predict {ROOMS} --weights garbage.safetensors", ("garbage.json", "expected JSON")),
         (f"predict {ROOMS} --weights text.safetensors", ("text.safetensors", "not a safetensors")),
         (f"predict {ROOMS} --weights questions.safetensors", ("weights: a model of no camera",)),
         (f"predict {ROOMS} --weights classes.safetensors", ("weights: a model of classes",)),

@@ -31,7 +31,7 @@ REFUSED = [
         for cubes, text in (((2, 5), "2-5"), ((5, 17), "5-17"), ((7, 6), "7-6"), ((-3, 3), "-3-3"))
     ),
     ({"shapes": "ring"}, "shapes: found ring, expected one of chain, tree"),
-    ({"distractors": ""}, "distractors: found , expected one of other, near, mirror, mixed"),
+    ({"distractors": ""}, "distractors: found nothing, expected one of other, near, mirror, mixed"),
     ({"height": 15}, "size: found 15x128, expected from 16 to 4096 pixels a side"),
     ({"width": 15}, "size: found 128x15, expected from 16 to 4096 pixels a side"),
     ({"height": 4097}, "size: found 4097x128, expected from 16 to 4096 pixels a side"),
@@ -127,14 +127,14 @@ def test_json_is_one_sorted_line_of_pythons_own_types():
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("{", "split spec: cannot be read as JSON"),
-        ("[]", "split spec: found list, expected a JSON object"),
+        ("{", "split spec: found EOF"),
+        ("[]", "split spec: found [], expected a JSON object"),
         ('{"size":3}', "split spec: found an unknown field 'size'"),
         ('{"train":1.5}', "train: found 1.5, expected a whole number"),
         ('{"seed":"1"}', "seed: found '1', expected a whole number"),
         ('{"light_level":NaN}', "light level: found nan, expected a finite number"),
         ('{"train":-1}', "train: found -1, expected from 0"),
-        ('{"cubes":[5]}', "cubes: found 1 values, expected 2"),
+        ('{"cubes":[5]}', "cubes: found 1 values, expected more"),
     ],
 )
 def test_what_is_no_request_is_refused(text, told):

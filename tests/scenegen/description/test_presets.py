@@ -196,5 +196,7 @@ def test_what_follows_other_settings() -> None:
 
 
 def test_an_unknown_preset_is_refused_with_those_there_are() -> None:
-    with pytest.raises(SpecError, match="preset: found shape, expected one of shapes, "):
+    with pytest.raises(SpecError) as caught:
         preset_spec("shape")
+    assert (caught.value.where, caught.value.found) == ("preset", "shape")
+    assert all(name in caught.value.expected for name in PRESETS)

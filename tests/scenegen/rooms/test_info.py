@@ -24,7 +24,7 @@ def test_header_and_spec(float_path):
     assert text.splitlines()[0] == f"{float_path}: 5 images of 48x40, {size:.1f} MB"
     assert value(text, "fingerprint") == root["fingerprint"]
     assert value(text, "command") == "tests"
-    assert value(text, "format") == "pix2shape-bench/rooms 2.0"
+    assert value(text, "format") == "pix2shape-bench/rooms 2.1"
     assert value(text, "written by") == f"{root['writer']}, {root['variant']}"
     assert "y up" in value(text, "conventions")
     for name, setting in json.loads(root["spec"]).items():

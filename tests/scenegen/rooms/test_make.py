@@ -139,22 +139,21 @@ def test_an_error_of_the_caller_ends_the_run(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        ({"objects": (30, 30)}, r"item 0: at most \d+ of its 30 objects .* fewer --objects"),
-        ({"min_visible_pixels": 1000}, r"item \d+: 100 proposals .* --min-visible-pixels"),
-    ],
+    ("settings", "option"),
+    [({"objects": (30, 30)}, "--objects"), ({"min_visible_pixels": 1000}, "--min-visible-pixels")],
 )
-def test_what_cannot_be_placed_leaves_nothing_behind(tmp_path, settings, words):
+def test_what_cannot_be_placed_leaves_nothing_behind(tmp_path, settings, option):
     spec = DatasetSpec(**{**vars(SPEC), **settings})
-    with pytest.raises(PlacementError, match=words):
+    with pytest.raises(PlacementError) as caught:
         make_dataset(tmp_path / "x.h5", spec, 3)
+    assert caught.value.where.startswith("item ")
+    assert option in caught.value.hint
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("how", [{"batch": 0}, {"batch": 10**9}, {"compression": "zip"}])
 def test_bad_arguments(tmp_path, how):
-    with pytest.raises(SpecError, match="found"):
+    with pytest.raises(SpecError):
         make_dataset(tmp_path / "x.h5", SPEC, 3, **how)
     assert list(tmp_path.iterdir()) == []
 

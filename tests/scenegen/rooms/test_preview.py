@@ -146,7 +146,7 @@ def test_choice_of_rows():
     ("items", "number"), [([5], None), ([0], 2), ([], None), ([0] * 401, None)]
 )
 def test_impossible_choices_of_rows(items, number):
-    with pytest.raises(SpecError, match="found"):
+    with pytest.raises(SpecError):
         pick_rows(5, items, number)
 
 

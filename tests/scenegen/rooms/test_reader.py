@@ -1,18 +1,25 @@
-"""What lies in a rooms file, read with plain h5py, by hand, and with the reading API."""
+"""What a file of rooms holds, read with plain h5py, by hand, and with the reading API."""
 
 import dataclasses
+import hashlib
+import importlib.metadata
 import json
+import pickle
+import subprocess
+import sys
 import zlib
 
 import h5py
 import numpy as np
 import pytest
 
-from scenegen import open_rooms, shade
+from scenegen import RoomsDataset, open_rooms, shade
 from scenegen.camera import transform_vectors
+from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
-from scenegen.description.specs import DatasetSpec, fingerprint
+from scenegen.description.specs import DatasetSpec
 from scenegen.layout import FIELDS
+from scenegen.rendering.backend import VERSION_ATTRIBUTES, versions
 
 # The layout as promised, written out: name, row, type, unit. K = 3 objects, L = 3 lights here.
 LAYOUT = [
@@ -68,23 +75,24 @@ def test_root_attributes(rooms_path):
     with h5py.File(rooms_path) as file:
         root = dict(file.attrs)
     assert root["format"] == "pix2shape-bench/rooms"
-    assert root["format_version"] == "2.0"
+    assert root["format_version"] == "2.1"
     assert root["writer"].startswith("pix2shape-bench ")
     assert root["count"] == 8
     assert root["creation_command"] == "tests"
     assert root["compression"] == "gzip"
+    assert {name: root[name] for name in VERSION_ATTRIBUTES} == versions()
+    assert root["mitsuba_version"] == importlib.metadata.version("mitsuba")
     spec = json.loads(root["spec"])
     assert (spec["height"], spec["width"], spec["seed"]) == (32, 32, 3)
     assert set(spec) == {f.name for f in dataclasses.fields(DatasetSpec)}
 
 
 def test_the_fingerprint_is_that_of_spec_and_scenes(rooms_path):
+    """SHA-256 over the stored spec and one line a scene, computed without the library."""
     with h5py.File(rooms_path) as file:
-        spec = DatasetSpec.from_json(file.attrs["spec"])
-        lines = file["scene"].asstr()[:]
-        assert file.attrs["fingerprint"] == fingerprint(spec, lines)
-        assert file.attrs["fingerprint"] != fingerprint(spec, lines[:-1])
-        assert file.attrs["fingerprint"] != fingerprint(dataclasses.replace(spec, spp=2), lines)
+        lines = [file.attrs["spec"], *file["scene"].asstr()[:]]
+        expected = hashlib.sha256("\n".join(lines).encode()).hexdigest()
+        assert file.attrs["fingerprint"] == expected
 
 
 @pytest.mark.parametrize("name", ["image", "depth", "normal", "object_id"])
@@ -190,3 +198,102 @@ def test_a_room_is_complete_and_shades_to_its_image(float_path):
             np.array(room.scene.attenuation),
         )
         np.testing.assert_allclose(room.image, image, atol=2e-6)
+
+
+# Reads a file in other processes, after it was read here; prints the sum each of them found.
+PROCESSES = """
+import multiprocessing, sys, warnings
+from scenegen import RoomsDataset
+warnings.simplefilter("ignore", DeprecationWarning)  # 3.12 on: forking a process with threads
+
+def total(i):
+    return float(data[i]["depth"].sum()) if "data" in globals() else None
+
+def from_pickle(pair):
+    rooms, i = pair
+    return float(rooms[i]["depth"].sum())
+
+if __name__ == "__main__":
+    data = RoomsDataset(sys.argv[1])
+    here = [total(i) for i in range(len(data))]
+    with multiprocessing.get_context("fork").Pool(3) as pool:
+        for _ in range(5):
+            assert pool.map(total, range(len(data)), chunksize=1) == here, "fork"
+    pairs = [(data, i) for i in range(len(data))]
+    with multiprocessing.get_context("spawn").Pool(2) as pool:
+        assert pool.map(from_pickle, pairs, chunksize=1) == here, "spawn"
+    assert [total(i) for i in range(len(data))] == here, "here again"
+    print("equal")
+"""
+
+
+def test_indices(rooms_path):
+    with open_rooms(rooms_path) as rooms:
+        assert len(rooms) == 8
+        assert rooms[-1].index == rooms[7].index == 7
+        np.testing.assert_array_equal(rooms[-8].depth, rooms[0].depth)
+        assert not np.array_equal(rooms[0].depth, rooms[1].depth, equal_nan=True)
+        for index in (8, -9, 10**12):
+            with pytest.raises(IndexError):
+                rooms[index]
+        assert [room.index for room in rooms] == list(range(8))
+        assert rooms.scene(3) == rooms[3].scene
+
+
+def test_closing(rooms_path):
+    rooms = open_rooms(rooms_path)
+    rooms.close()
+    rooms.close()
+    with pytest.raises((FileFormatError, ValueError)):
+        rooms[0]
+
+
+def test_map_style_dataset(rooms_path):
+    data = RoomsDataset(rooms_path, fields=("image", "camera/fov_y_degrees", "light/position"))
+    assert len(data) == 8
+    item = data[-2]
+    assert list(item) == ["image", "camera/fov_y_degrees", "light/position"]
+    with open_rooms(rooms_path) as rooms:
+        np.testing.assert_array_equal(item["image"], rooms[6].image)
+        assert data.fingerprint == rooms.fingerprint
+        assert data.spec == rooms.spec
+    for index in (8, -9):
+        with pytest.raises(IndexError):
+            data[index]
+    assert sum(1 for _ in data) == 8, "the old iteration protocol ends at IndexError"
+
+
+def test_unknown_fields_are_named(rooms_path):
+    for fields in (("image", "depht"), ("scene",)):
+        with pytest.raises(SpecError) as caught:
+            RoomsDataset(rooms_path, fields=fields)
+        assert caught.value.found == repr(fields[-1])
+        assert "image, depth" in caught.value.expected
+
+
+def test_pickling_after_reading(rooms_path):
+    data = RoomsDataset(rooms_path)
+    first = data[0]
+    again = pickle.loads(pickle.dumps(data))
+    for name, values in again[0].items():
+        np.testing.assert_array_equal(values, first[name])
+    assert again.fingerprint == data.fingerprint
+
+
+def test_reading_in_several_processes(rooms_path, tmp_path):
+    script = tmp_path / "read.py"
+    script.write_text(PROCESSES)
+    command = [sys.executable, str(script), str(rooms_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.stdout == "equal\n", done.stderr
+
+
+@pytest.mark.slow
+def test_torch_loader_with_workers(rooms_path):
+    torch = pytest.importorskip("torch")
+    data = RoomsDataset(rooms_path)
+    data[0]  # open here, before the workers are forked
+    loader = torch.utils.data.DataLoader(data, batch_size=3, num_workers=2)
+    depth = torch.cat([batch["depth"] for batch in loader])
+    with open_rooms(rooms_path) as rooms:
+        np.testing.assert_array_equal(depth.numpy(), np.stack([room.depth for room in rooms]))

@@ -1,6 +1,5 @@
 """`scenegen verify` on files of several views, of highlights, and of bright light."""
 
-import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from h5_edits import edit_scene, put, swap_rows
 
 from scenegen.description.presets import preset_spec
 from scenegen.rooms.make import make_dataset
@@ -28,31 +28,6 @@ def failed(path: Path, items: int) -> set[str]:
     return {check.name for check in verify_file(path, items) if not check.ok}
 
 
-def edit_scene(row: int, change: Callable[[Any], Any]) -> Edit:
-    def edit(file: h5py.File) -> None:
-        scene = json.loads(file["scene"][row])
-        change(scene)
-        file["scene"][row] = json.dumps(scene, separators=(",", ":"))
-
-    return edit
-
-
-def swap(a: int, b: int, *names: str) -> Edit:
-    def edit(file: h5py.File) -> None:
-        found: list[str] = []
-        file.visititems(lambda name, x: found.append(name) if hasattr(x, "dtype") else None)
-        for name in names or found:
-            rows = file[name][:]
-            rows[[a, b]] = rows[[b, a]]
-            file[name][:] = rows
-
-    return edit
-
-
-def assign(name: str, row: int, value: Any) -> Edit:
-    return lambda file: file[name].__setitem__(row, value)
-
-
 DAMAGE: dict[str, tuple[Edit, set[str]]] = {
     "another background in one view's JSON": (
         edit_scene(4, lambda s: s.update(background=[0.5, 0.0, 0.0])), {"description"},
@@ -60,18 +35,18 @@ DAMAGE: dict[str, tuple[Edit, set[str]]] = {
     "a camera too many in one view's JSON": (
         edit_scene(4, lambda s: s["cameras"].append(s["cameras"][0])), {"description"},
     ),
-    "a view beyond the spec's": (assign("view_index", 4, 7), {"description"}),
-    "a view below 0": (assign("view_index", 4, -2), {"description"}),
-    "a view's number twice": (assign("view_index", 4, 2), {"description"}),
-    "a view said to be the first": (assign("view_index", 4, 0), {"description", "fingerprint"}),
-    "an angle": (assign("view_angle_degrees", 4, 5.5), {"description"}),
-    "two views' rows swapped": (swap(4, 5), {"description"}),
-    "two views' cameras swapped": (swap(4, 5, "camera/world_from_camera"), {"description"}),
-    "two scenes' views swapped": (swap(4, 7), {"description"}),
-    "two views' images swapped": (swap(4, 5, "image"), {"image"}),
-    "a material": (assign("material/specular", 4, [0.0, 0.1, 0.1, 0.1]), {"description"}),
-    "a model": (assign("object/model", 4, ["box/1", "", ""]), {"description"}),
-    "a class": (assign("object/shape", 4, [-1, -1, -1]), {"description"}),
+    "a view beyond the spec's": (put("view_index", 4, 7), {"description"}),
+    "a view below 0": (put("view_index", 4, -2), {"description"}),
+    "a view's number twice": (put("view_index", 4, 2), {"description"}),
+    "a view said to be the first": (put("view_index", 4, 0), {"description", "fingerprint"}),
+    "an angle": (put("view_angle_degrees", 4, 5.5), {"description"}),
+    "two views' rows swapped": (swap_rows(4, 5), {"description"}),
+    "two views' cameras swapped": (swap_rows(4, 5, "camera/world_from_camera"), {"description"}),
+    "two scenes' views swapped": (swap_rows(4, 7), {"description"}),
+    "two views' images swapped": (swap_rows(4, 5, "image"), {"image"}),
+    "a material": (put("material/specular", 4, [0.0, 0.1, 0.1, 0.1]), {"description"}),
+    "a model": (put("object/model", 4, ["box/1", "", ""]), {"description"}),
+    "a class": (put("object/shape", 4, [-1, -1, -1]), {"description"}),
 }  # fmt: skip
 
 

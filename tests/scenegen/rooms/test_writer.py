@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from scenegen.common.errors import SpecError
 from scenegen.common.row_file import shuffle_bytes
 from scenegen.description.specs import DatasetSpec
-from scenegen.rendering.packing import pack
 from scenegen.rooms.make import render_items
 from scenegen.rooms.writer import create_rooms
 
@@ -20,16 +19,15 @@ SPEC = DatasetSpec(height=32, width=32, min_visible_pixels=3, seed=3)
 
 @pytest.fixture(scope="module")
 def rows():
-    """Return 4 rendered rooms and their packed scenes: what `append` takes."""
-    rooms = [room for part in render_items(SPEC, range(4), 4) for room in part]
-    return rooms, pack(SPEC, [room.scene for room in rooms])
+    """Return 4 rendered rooms, as `append` takes them."""
+    return [room for part in render_items(SPEC, range(4), 4) for room in part]
 
 
 def test_only_a_complete_file_gets_the_final_name(tmp_path, rows):
     path = tmp_path / "x.h5"
     with create_rooms(path, SPEC, 4) as writer:
         assert not path.exists()
-        writer.append(*rows)
+        writer.append(rows)
         assert not path.exists()
         assert len(list(tmp_path.iterdir())) == 1
     assert [p.name for p in tmp_path.iterdir()] == ["x.h5"]
@@ -46,7 +44,7 @@ def test_too_few_rows_make_no_file(tmp_path, rows):
         pytest.raises(RuntimeError, match="got 4 of 5 rows"),
         create_rooms(tmp_path / "x.h5", SPEC, 5) as writer,
     ):
-        writer.append(*rows)
+        writer.append(rows)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -74,7 +72,7 @@ def test_overwrite_replaces_only_when_complete(tmp_path, rows):
         write_and_then(lambda: 1 / 0, path, rows, overwrite=True)
     assert path.read_text() == "old"
     with create_rooms(path, SPEC, 4, overwrite=True) as writer:
-        writer.append(*rows)
+        writer.append(rows)
         assert path.read_text() == "old"
     with h5py.File(path) as file:
         assert file["image"].shape == (4, 32, 32, 3)
@@ -105,7 +103,7 @@ def test_something_that_is_no_regular_file_is_never_replaced(tmp_path):
 
 @pytest.mark.parametrize(("count", "compression"), [(0, "gzip"), (-1, "gzip"), (1, "zip")])
 def test_bad_settings(tmp_path, count, compression):
-    with pytest.raises(SpecError, match="found"):
+    with pytest.raises(SpecError):
         create_rooms(tmp_path / "x.h5", SPEC, count, compression=compression).__enter__()
     assert list(tmp_path.iterdir()) == []
 
@@ -124,5 +122,5 @@ def test_shuffle_is_that_of_hdf5(data, dtype):
 
 def write_and_then(happens, path, rows, overwrite=False):
     with create_rooms(path, SPEC, 4, overwrite=overwrite) as writer:
-        writer.append(*rows)
+        writer.append(rows)
         happens()

@@ -21,8 +21,8 @@ from scenegen.sampling.placement import (
     are_apart,
     find_place,
     frustum_normals,
-    random_rotation,
 )
+from scenegen.sampling.poses import random_rotation
 
 Array = NDArray[Any]
 CAMERA = Camera((1.2, 1.1, 1.3), (0.3, 0.3, 0.3), 30.0)

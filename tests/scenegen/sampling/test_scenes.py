@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -179,13 +180,15 @@ def test_a_crowd_is_refused_after_bounded_work(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_refusals_say_what_and_what_to_try() -> None:
-    crowded = str(refusal(CROWD, 7, 0))
-    assert crowded.startswith("item 7: at most ")
-    assert f"of its 40 objects found room in {MAX_ATTEMPTS} proposals" in crowded
-    assert 1 <= int(crowded.split()[4]) < 40
+    crowded = refusal(CROWD, 7, 0)
+    assert crowded.where == "item 7"
+    placed, wanted, attempts = map(int, re.findall(r"\d+", crowded.found))
+    assert 1 <= placed < wanted == 40
+    assert attempts == MAX_ATTEMPTS
     for option in ("--objects", "--object-radius", "--allow-cropped"):
-        assert option in crowded
-    hidden = str(refusal(DatasetSpec(objects=(2, 2), min_visible_pixels=9000), 3, 12))
-    assert hidden.startswith(f"item 3: {MAX_ATTEMPTS} proposals with 2 objects, 12 of which")
-    assert "fewer than 9000 pixels" in hidden
-    assert "--min-visible-pixels" in hidden
+        assert option in crowded.hint
+    hidden = refusal(DatasetSpec(objects=(2, 2), min_visible_pixels=9000), 3, 12)
+    assert hidden.where == "item 3"
+    assert re.findall(r"\d+", hidden.found) == [str(MAX_ATTEMPTS), "2", "12"]
+    assert "9000 pixels" in hidden.expected
+    assert "--min-visible-pixels" in hidden.hint

@@ -22,7 +22,8 @@ from scenegen.rendering.packing import SceneBatch, pack
 from scenegen.rendering.renderer import render
 from scenegen.rooms import make as dataset
 from scenegen.rooms.make import render_items
-from scenegen.sampling.scenes import sample_cameras, sample_scene
+from scenegen.sampling.cameras import sample_cameras
+from scenegen.sampling.scenes import sample_scene
 
 Array = NDArray[Any]
 ANGLES = (0.0, 5.0, 35.0, 55.0, 80.0)

@@ -17,7 +17,8 @@ from scenegen.common.errors import SpecError
 from scenegen.description.presets import PAPER_VIEWS
 from scenegen.description.specs import DatasetSpec
 from scenegen.rooms.reader import RoomsFile
-from scenegen.sampling.scenes import sample_cameras, sample_lights
+from scenegen.sampling.cameras import sample_cameras
+from scenegen.sampling.lights import sample_lights
 
 torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402

@@ -114,12 +114,12 @@ def test_files_that_are_not_there(tmp_path, path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (b"", "cannot be read as JSON"),
-        (b"\xff\xfe\x00", "cannot be read as JSON"),
-        (b"{" * 100_000, "cannot be read as JSON"),
-        (b"[" * 100_000, "nested too deeply"),
+        (b"", "expected JSON"),
+        (b"\xff\xfe\x00", "expected JSON"),
+        (b"{" * 100_000, "expected JSON"),
+        (b"[" * 100_000, "recursion limit exceeded"),
         (b"[]", "expected a JSON object"),
-        (b"{}", "'config' is missing"),
+        (b"{}", "config: found nothing"),
         (b" " * (LARGEST_JSON + 1), "over 1000000 bytes"),
     ],
 )

@@ -1,0 +1,157 @@
+"""Whatever a user asks for wrongly: one clear line, exit code 2, and the disk as it was.
+
+Which values a setting may have is tested with `DatasetSpec`, what a text may look like with the
+types of options; here are the mistakes that only a command can meet.
+"""
+
+import shlex
+import subprocess
+import sys
+
+import pytest
+
+RENDER = ("render", "--n", "2", "--size", "32", "--min-visible-pixels", "3", "--out", "o.h5")
+# Options, and what the line must say: the option's name, what was found, what was expected.
+RENDER_MISTAKES = [
+    ("--n 0", "n: found 0", "from 1 to"),
+    ("--n 1.5", "--n", "'1.5'", "integer"),
+    (f"--n {2**70}", f"found {2**70}", "expected"),
+    ("--size 12xx", "--size", "'12xx'", "HxW"),
+    ("--size 4096", "batch: found 64", "at most 16 images of this size"),
+    ("--objects 3-1", "objects: found 3-1", "rising range", "0-100"),
+    ("--views 5,0", "views: found 5, 0", "rising degrees from 0"),
+    ("--attenuation 1e999,1", "attenuation: found (inf, 1.0)", "from 0 to 100"),
+    ("--light-level nan", "light level: found nan", "0 to 100"),
+    ("--ambient 2", "ambient: found (2.0, 2.0, 2.0)", "0 to 1"),
+    ("--shapes box,", "shapes: found ''", "box, sphere, cone"),
+    ("--batch 0", "batch: found 0", "1 to 4096"),
+    (f"--batch {10**9}", f"batch: found {10**9}", "1 to 4096"),
+    ("--object-radius 0.5", "item 0", "objects", "smaller --object-radius"),
+    ("--min-visible-pixels 1024", "item ", "1024 pixels", "--min-visible-pixels"),
+    ("--objects 1-40", "item 0", "of its", "objects", "try", "--objects", "--object-radius"),
+    ("--preset nosuch", "preset: found nosuch", "shapes-single", "views"),
+    ("--pose flying", "--pose", "'flying'", "'resting', 'any'"),
+    ("--compression zip", "--compression", "'zip'", "'gzip', 'lzf', 'none'"),
+    ("--device tpu", "--device", "'tpu'", "'auto', 'cpu', 'cuda'"),
+    ("--shading path --no-shadows", "shadows: found with shading 'path'", "one of the two"),
+    ("--shininess 32", "shininess: found no specular"),
+    ("--classes MUG", "classes: found 'MUG'", "mug"),
+    ("--shapes box --classes mug", "--shapes beside --classes", "one of them"),
+    ("--shapes box --objects-root .", "--shapes beside", "folder of meshes", "one of them"),
+    ("--object-split train", "object split: found train", "'all' for shapes"),
+    ("--shapenet-root . --objects-root .", "--shapenet-root and --objects-root", "one of them"),
+    ("--shapenet-root . --up z", "up: found 'z'", "expected 'y' with --shapenet-root"),
+    ("--up z", "without a folder of meshes"),
+    ("--objects-root nosuch", "nosuch: no such folder"),
+    ("--shapenet-root .", "found no ShapeNet", "--objects-root"),
+    ("--objects-root empty", "no sub-folders"),
+    ("--out .", "is a folder"),
+    ("--out ''", "is a folder"),
+    ("--out none/x.h5", "none: ", "does not exist"),
+    ("--out text/x.h5", "text: ", "not a folder"),
+    ("--out /proc/x.h5", "/proc"),
+    (f"--out {'a' * 300}.h5", "too long"),
+    ("--bogus 1", "--bogus"),
+    ("extra", "extra"),
+]
+PREVIEW_MISTAKES = [
+    ("--items 0-500", "items: found 8", "0 to 7"),
+    (f"--items {'9' * 30}", "items: found 999", "0 to 7"),
+    ("--items 5-2", "--items", "5-2"),
+    ("--random 401", "--random", "401", "1<=x<=400"),
+    ("--items 0 --random 2", "items", "random", "one of them"),
+    ("--random 2 --seed -1", "seed: found -1"),
+    ("--out none/s.png", "none: ", "folder does not exist"),
+    ("--out text/s.png", "text: ", "not a folder"),
+    ("--out folder.png", "folder.png: ", "is a folder"),
+    ("--out s.xyz", "'s.xyz'", "sheet.png"),
+    ("--out rooms.h5", "'rooms.h5'", "sheet.png"),
+    ("--out ''", "sheet.png"),
+    ("--out /proc/s.png", "/proc"),
+    (f"--out {'a' * 300}.png", "too long"),
+]
+EXPORT_MISTAKES = [
+    ("--items 8", "items: found 8", "0 to 7"),
+    ("--items -1", "--items", "'-1'"),
+    ("--format stl", "--format", "'stl'"),
+    ("--out none/deep", "none", "o such file"),
+    ("--out text", "text: ", "not a folder"),
+    ("--out /proc", "/proc"),
+    ("--objects-root .", "objects: found the folder .", "built in"),
+]
+VERIFY_MISTAKES = [
+    ("--items -1", "--items", "-1"),
+    ("--device tpu", "--device", "'tpu'", "'auto', 'cpu', 'cuda'"),
+    ("--objects-root .", "objects: found the folder .", "built in"),
+]
+MISTAKES = [
+    *((RENDER, *case) for case in RENDER_MISTAKES),
+    *((("preview", "FILE"), *case) for case in PREVIEW_MISTAKES),
+    *((("export", "FILE", "--items", "0", "--format", "obj"), *case) for case in EXPORT_MISTAKES),
+    *((("verify", "FILE"), *case) for case in VERIFY_MISTAKES),
+]
+
+
+@pytest.mark.parametrize("case", MISTAKES, ids=lambda case: f"{case[0][0]} {case[1]:.30}")
+def test_a_mistake_is_told_in_one_line(refuses, tmp_path, rooms_path, case):
+    (tmp_path / "text").write_text("mine")
+    (tmp_path / "folder.png").mkdir()
+    (tmp_path / "empty").mkdir()
+    command, options, *words = case
+    given = [rooms_path if part == "FILE" else part for part in command]
+    line = refuses(*given, *shlex.split(options), words=tuple(words))
+    assert ".partial" not in line, "the user's name for it, not that of a temporary file"
+
+
+def test_missing_arguments(run, refuses):
+    refuses("render", words=("--n",))
+    refuses("nosuch", words=("nosuch",))
+    for command in ("info", "preview", "verify", "export"):
+        refuses(command, words=("FILE",))
+    refuses("export", "x.h5", "--format", "exr", words=("--items",))
+    result = run("export", "x.h5", "--items", "0")
+    assert result.exit_code == 2
+    assert "Missing option '--format'" in result.stderr  # click lists the choices below it
+
+
+def missing(library, *_, **__):
+    raise OSError(f"{library}: cannot open shared object file")
+
+
+@pytest.mark.parametrize("command", [RENDER, ("verify", "FILE")])
+def test_no_gpu_here(refuses, monkeypatch, rooms_path, command):
+    monkeypatch.setattr("ctypes.CDLL", missing)
+    given = [rooms_path if part == "FILE" else part for part in command]
+    refuses(*given, "--device", "cuda", words=("cuda", "--device cpu"))
+
+
+def test_the_longest_name_that_a_disk_takes(run, tmp_path):
+    """Where the final name is possible, no hidden longer one may get in the way."""
+    name = "b" * 252 + ".h5"
+    assert run(*RENDER[:-1], name).exit_code == 0
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="sets Linux's limit of memory")
+@pytest.mark.parametrize(
+    "options",
+    ["render --n 1000000000000 --size 32", "preview FILE --items 0-9999999999"],
+)
+def test_huge_numbers_do_not_fill_the_memory(tmp_path, check_refusal, rooms_path, options):
+    """With 4 GB of address space, so that a failing test harms nobody."""
+    code = "import resource as r; r.setrlimit(r.RLIMIT_AS, (2**32, 2**32)); import cli; "
+    done = subprocess.run(
+        [sys.executable, "-c", code + "cli.scenegen()",
+         *options.replace("FILE", str(rooms_path)).split()],
+        cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    check_refusal(done.returncode, done.stdout, done.stderr)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("form", ["exr", "png", "ply", "obj"])
+def test_export_makes_its_folder_and_keeps_existing_files(run, refuses, rooms_path, tmp_path, form):
+    export = ("export", rooms_path, "--format", form, "--out", "exports", "--items")
+    assert run(*export, "1").exit_code == 0
+    assert any((tmp_path / "exports").iterdir())
+    refuses(*export, "0,1", words=("rooms-000001", "exists already", "--overwrite"))
