@@ -64,9 +64,9 @@ def score(
     """Score a submission, or several training runs of one method, and print a table."""
     from metrics.report.text import text_report, write_csv
     from metrics.score_file import write_scores
+    from metrics.scoring.evaluate import count_rows
+    from metrics.scoring.evaluate import score as score_files
     from metrics.scoring.runs import Settings
-    from metrics.scoring.scoring import count_rows
-    from metrics.scoring.scoring import score as score_files
     from scenegen.common.errors import SpecError
     from scenegen.common.new_file import check_writable, write_text
 

@@ -1,19 +1,22 @@
-"""Score files: what `bench score` writes, and `compare`, `leaderboard` and others read.
+"""Score files: `bench score` writes them; `compare`, `leaderboard` and other programs read them.
 
-The contract is in docs/scores.md. What is written here reads back to the same bits.
+docs/scores.md describes the format. Numbers that are written here read back to the same bits.
 """
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from metrics.scoring.metric_names import in_order
-from metrics.scoring.parser import FORMAT_NAME, FORMAT_VERSION, parse_scores
 from metrics.scoring.records import (
+    FORMAT_NAME,
+    FORMAT_VERSION,
     GROUPINGS,
     ID_COLUMNS,
     OPTIONAL_COLUMNS,
@@ -22,10 +25,12 @@ from metrics.scoring.records import (
     Score,
     ScoreFile,
     Submission,
-    score,
 )
-from metrics.submissions.strict_json import JsonError, parse_json, read_json
+from metrics.submissions.problems import JsonError
 from scenegen.common.new_file import written_beside
+
+MOST_BYTES = 256 * 2**20
+MOST_KEYS = 10_000  # of one object
 
 __all__ = [
     "FORMAT_NAME",
@@ -36,7 +41,6 @@ __all__ = [
     "ScoreFile",
     "Submission",
     "read_scores",
-    "score",
     "to_json",
     "write_scores",
 ]
@@ -47,9 +51,13 @@ def read_scores(path: str | Path) -> ScoreFile:
 
     Raises:
         OSError: it cannot be read.
-        JsonError: it is no score file, or a broken one; says where, what was found and expected.
+        JsonError: it is no score file, or a broken one.
     """
-    return parse_scores(read_json(Path(path)))
+    from metrics.submissions.strict_json import read_bytes
+
+    path = Path(path)
+    with _naming(path):
+        return replace(_parsed(read_bytes(path, MOST_BYTES)), path=path)
 
 
 def write_scores(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> None:
@@ -59,15 +67,35 @@ def write_scores(scores: ScoreFile, path: str | Path, overwrite: bool = False) -
         OSError: it cannot be written, or exists and may not be overwritten.
         JsonError: the reader would refuse it.
     """
-    path = Path(path)
-    with written_beside(path, overwrite) as temporary:
-        data = to_json(scores).encode("utf-8", "surrogatepass")  # which the parser refuses
-        parse_scores(parse_json(data, path))
+    with written_beside(path, overwrite) as temporary, _naming(path):
+        data = to_json(scores).encode("utf-8", "surrogatepass")  # which `_parsed` refuses
+        _parsed(data)
         temporary.write_bytes(data)
 
 
+@contextmanager
+def _naming(path: str | Path) -> Iterator[None]:
+    """Put the path into a JsonError."""
+    try:
+        yield
+    except JsonError as error:
+        raise error.inside(path) from error
+
+
+def _parsed(data: bytes) -> ScoreFile:
+    from metrics.scoring.schema import parse_scores
+    from metrics.submissions.strict_json import parse_json
+
+    return parse_scores(parse_json(data, MOST_KEYS))
+
+
 def to_json(scores: ScoreFile) -> str:
-    """The text of a score file: keys in a fixed order, a line for each column of the items."""
+    """Return the text of a score file: keys in a fixed order, a line for each column of items."""
+    meta = asdict(scores.meta)
+    for name in ("versions", "counts"):
+        meta[name] = dict(sorted(meta[name].items()))
+    if scores.meta.chamfer_floor is None:
+        del meta["chamfer_floor"]
     head = {
         "format": FORMAT_NAME,
         "format_version": FORMAT_VERSION,
@@ -77,12 +105,15 @@ def to_json(scores: ScoreFile) -> str:
         "alignment": scores.alignment,
         "metrics": _metrics(scores.metrics),
         **{name: _groups(getattr(scores, name)) for name in GROUPINGS.get(scores.task, ())},
-        "meta": _meta(scores.meta),
+        "meta": meta,
     }
     text = json.dumps(_plain(head), indent=2, ensure_ascii=False, allow_nan=False)
+    first = (*ID_COLUMNS.get(scores.task, ()), *OPTIONAL_COLUMNS.get(scores.task, ()))
+    names = [name for name in first if name in scores.items]
+    names += in_order(name for name in scores.items if name not in first)
     lines = [
         f"    {json.dumps(name, ensure_ascii=False)}: {json.dumps(_column(scores.items[name]))}"
-        for name in _column_names(scores)
+        for name in names
     ]
     return f'{text[:-2]},\n  "items": {{\n' + ",\n".join(lines) + "\n  }\n}\n"
 
@@ -92,7 +123,7 @@ def _metrics(found: Mapping[str, Score]) -> dict[str, Any]:
 
 
 def _groups(groups: Groups) -> dict[str, Any]:
-    """Groups in the order of the numbers that their keys begin with, then by key."""
+    """Return groups in the order of the numbers that their keys begin with, then by key."""
 
     def place(key: str) -> tuple[float, str]:
         first = key.partition("-")[0]
@@ -101,38 +132,19 @@ def _groups(groups: Groups) -> dict[str, Any]:
     return {key: _metrics(groups[key]) for key in sorted(groups, key=place)}
 
 
-def _meta(meta: Meta) -> dict[str, Any]:
-    found = dict(vars(meta))
-    found["submissions"] = [vars(submission) for submission in meta.submissions]
-    for name in ("versions", "counts"):
-        found[name] = dict(sorted(found[name].items()))
-    if meta.chamfer_floor is None:
-        del found["chamfer_floor"]
-    return found
-
-
-def _column_names(scores: ScoreFile) -> list[str]:
-    first = (*ID_COLUMNS.get(scores.task, ()), *OPTIONAL_COLUMNS.get(scores.task, ()))
-    rest = in_order(name for name in scores.items if name not in first)
-    return [name for name in first if name in scores.items] + rest
-
-
 def _column(values: Any) -> list[Any]:
     array = np.asarray(values)
-    if array.dtype.kind == "f" and not np.isfinite(array).all():
-        return [value if math.isfinite(value) else None for value in array.tolist()]
+    finite = array.dtype.kind != "f" or np.isfinite(array).all()
     found: list[Any] = array.tolist()
-    return found
+    return found if finite else [value if math.isfinite(value) else None for value in found]
 
 
 def _plain(value: Any) -> Any:
-    """The same in Python's own types; numbers that are not finite become None."""
+    """Return the same in Python's own types; numbers that are not finite become None."""
     if isinstance(value, Mapping):
         return {key: _plain(member) for key, member in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(member) for member in value]
     if isinstance(value, np.generic):
         return _plain(value.item())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value
+    return None if isinstance(value, float) and not math.isfinite(value) else value

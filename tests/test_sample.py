@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from metrics.score_file import read_scores
-from metrics.scoring.scoring import score
+from metrics.scoring.evaluate import score
 
 SAMPLE = Path(__file__).parents[1] / "examples" / "sample"
 

@@ -1,4 +1,7 @@
-"""Every score by name: its unit, which way is better, what it is. The one table of all of them."""
+"""The table of all scores: name, unit, which direction is better, and definition.
+
+`docs/scores.md` shows the same table, made by `markdown_table`.
+"""
 
 import math
 import re
@@ -34,16 +37,16 @@ class UnknownMetricError(SceneGenError):
 
 @dataclass(frozen=True)
 class Metric:
-    """What a score is.
+    """The unit, direction and definition of a score.
 
     Attributes:
         name: its key in score files.
         title: for the head of a table.
         task: "rooms" or "iqtt".
         unit: of its values; "fraction" runs from 0 to 1.
-        higher_is_better: which way is better.
-        definition: in one sentence, of one image or question.
-        largest: no value is above it, and none below 0.
+        higher_is_better: whether larger values are better.
+        definition: one sentence that defines the score of one image or question.
+        largest: the upper limit of its values; the lower one is 0.
     """
 
     name: str
@@ -56,7 +59,7 @@ class Metric:
 
     @property
     def direction(self) -> str:
-        """Which way is better, in words."""
+        """The direction that is better, in words."""
         return "higher is better" if self.higher_is_better else "lower is better"
 
 
@@ -74,98 +77,53 @@ def _angle(name: str, title: str, definition: str) -> Metric:
 
 _POINTS = (
     _distance("chamfer", "Chamfer", "`accuracy_distance` + `completeness_distance`; not squared."),
-    _distance(
-        "accuracy_distance",
-        "Accuracy distance",
-        "mean distance from the predicted points to the nearest true point.",
-    ),
-    _distance(
-        "completeness_distance",
-        "Completeness distance",
-        "mean distance from the true points to the nearest predicted point.",
-    ),
-    _distance(
-        "chamfer_squared",
-        "Chamfer, squared",
-        "mean squared distance from the predicted points to the nearest true point, plus that from"
-        " the true points to the nearest predicted point.",
-        "scene unit squared",
-    ),
+    _distance("accuracy_distance", "Accuracy distance",
+              "mean distance from the predicted points to the nearest true point."),
+    _distance("completeness_distance", "Completeness distance",
+              "mean distance from the true points to the nearest predicted point."),
+    _distance("chamfer_squared", "Chamfer, squared",
+              "mean squared distance from the predicted points to the nearest true point, plus that"
+              " from the true points to the nearest predicted point.", "scene unit squared"),
     _distance("hausdorff", "Hausdorff", "larger of `hausdorff_forward` and `hausdorff_reverse`."),
-    _distance(
-        "hausdorff_forward",
-        "Hausdorff, forward",
-        "largest distance from a predicted point to the nearest true point.",
-    ),
-    _distance(
-        "hausdorff_reverse",
-        "Hausdorff, reverse",
-        "largest distance from a true point to the nearest predicted point.",
-    ),
-    _distance(
-        "hausdorff_95",
-        "Hausdorff, 95%",
-        "larger of the 95th percentiles of the nearest distances from predicted to true and from"
-        " true to predicted points.",
-    ),
-    _share(
-        F_SCORE,
-        "F-score",
-        "harmonic mean of the fractions of predicted points nearer than the threshold (scene"
-        " units) to a true point, and of true points nearer to a predicted one.",
-    ),
-)
+    _distance("hausdorff_forward", "Hausdorff, forward",
+              "largest distance from a predicted point to the nearest true point."),
+    _distance("hausdorff_reverse", "Hausdorff, reverse",
+              "largest distance from a true point to the nearest predicted point."),
+    _distance("hausdorff_95", "Hausdorff, 95%",
+              "larger of the 95th percentiles of the nearest distances from predicted to true and"
+              " from true to predicted points."),
+    _share(F_SCORE, "F-score",
+           "harmonic mean of the fractions of predicted points nearer than the threshold (scene"
+           " units) to a true point, and of true points nearer to a predicted one."),
+)  # fmt: skip
 _DEPTH = (
-    _distance(
-        "mse_depth",
-        "MSE-depth",
-        "mean squared difference of predicted and true planar depth.",
-        "scene unit squared",
-    ),
+    _distance("mse_depth", "MSE-depth",
+              "mean squared difference of predicted and true planar depth.", "scene unit squared"),
     _distance("rmse", "RMSE", "square root of `mse_depth` of the image."),
-    _distance(
-        "abs_rel", "AbsRel", "mean of absolute difference of depth divided by true depth.", "ratio"
-    ),
-    _distance(
-        "silog",
-        "SILog",
-        "standard deviation of ln predicted - ln true depth, times 100; depths below 0.001 count"
-        " as 0.001.",
-        "100 ln",
-    ),
-    *(
-        _share(
-            f"delta_{power}",
-            f"delta {power}",
-            "fraction of pixels whose predicted and true depth differ by a factor below"
-            f" {'1.25' if power == 1 else f'1.25^{power}'}.",
-        )
-        for power in (1, 2, 3)
-    ),
-)
+    _distance("abs_rel", "AbsRel",
+              "mean of absolute difference of depth divided by true depth.", "ratio"),
+    _distance("silog", "SILog",
+              "standard deviation of ln predicted - ln true depth, times 100; depths below 0.001"
+              " count as 0.001.", "100 ln"),
+    *(_share(f"delta_{power}", f"delta {power}",
+             "fraction of pixels whose predicted and true depth differ by a factor below"
+             f" {factor}.")
+      for power, factor in enumerate(("1.25", "1.25^2", "1.25^3"), start=1)),
+)  # fmt: skip
 _NORMALS = (
-    _angle(
-        "normal_mean_degrees", "Normals, mean", "mean angle between predicted and true normals."
-    ),
+    _angle("normal_mean_degrees", "Normals, mean",
+           "mean angle between predicted and true normals."),
     _angle("normal_median_degrees", "Normals, median", "median of these angles in the image."),
     _angle("normal_rmse_degrees", "Normals, RMS", "root mean square of these angles."),
-    *(
-        _share(
-            f"normal_within_{limit}",
-            f"Normals within {limit}°",
-            f"fraction of these angles below {limit} degrees.",
-        )
-        for limit in ("11.25", "22.5", "30")
-    ),
-)
+    *(_share(f"normal_within_{limit}", f"Normals within {limit}°",
+             f"fraction of these angles below {limit} degrees.")
+      for limit in ("11.25", "22.5", "30")),
+)  # fmt: skip
 _ANSWERS = (
-    _share(
-        "iqtt_accuracy",
-        "IQTT accuracy",
-        "1 where the right answer is given, else 0, abstentions included; chance is 1/3.",
-        "iqtt",
-    ),
-)
+    _share("iqtt_accuracy", "IQTT accuracy",
+           "1 where the right answer is given, else 0, abstentions included; chance is 1/3.",
+           "iqtt"),
+)  # fmt: skip
 
 
 def _aligned(metric: Metric, ending: str) -> Metric:
@@ -203,21 +161,20 @@ _PLACES = {name: place for place, name in enumerate(ALL)}
 
 
 def metric(name: str) -> Metric:
-    """What the score of this name is; F-scores by their threshold, such as `f_score_0.05`.
+    """Return the score of this name; F-scores carry their threshold, such as `f_score_0.05`.
 
     Raises UnknownMetricError.
     """
     threshold = _threshold(name)
     if threshold is not None:
-        title = f"F-score at {threshold:g}"
-        return replace(ALL[F_SCORE], name=name, title=title)
+        return replace(ALL[F_SCORE], name=name, title=f"F-score at {threshold:g}")
     if name not in ALL or name == F_SCORE:
-        raise UnknownMetricError(f"{name!r:.60} is no score: docs/scores.md lists them")
+        raise UnknownMetricError("score", f"{name!r:.60}", "a name listed in docs/scores.md")
     return ALL[name]
 
 
 def in_order(names: Iterable[str]) -> list[str]:
-    """Names in the order of the table, F-scores by threshold; unknown ones last."""
+    """Return names in the order of the table, F-scores by threshold, unknown names last."""
 
     def place(name: str) -> tuple[int, float, str]:
         threshold = _threshold(name)
@@ -229,7 +186,7 @@ def in_order(names: Iterable[str]) -> list[str]:
 
 
 def _threshold(name: str) -> float | None:
-    """The threshold of an F-score in its only spelling, that of `:g`."""
+    """Return the threshold in the name of an F-score; it has one spelling only, that of `:g`."""
     match = re.fullmatch(r"f_score_([0-9][0-9.e+-]{0,15})", name)
     try:
         threshold = float(match[1]) if match else 0.0
@@ -240,9 +197,9 @@ def _threshold(name: str) -> float | None:
 
 
 def markdown_table() -> str:
-    """All scores as a Markdown table: that of docs/scores.md."""
+    """Return all scores as the Markdown table of docs/scores.md."""
     forms = [
-        (f"<depth score>{ending}", "as it", "as it", definition)
+        (f"<depth score>{ending}", "the same", "the same", definition)
         for ending, (_, definition) in _ALIGNED.items()
     ]
     derived = "the same of normals derived from the predicted and from the true depth."
@@ -250,7 +207,7 @@ def markdown_table() -> str:
         *map(_cells, (*_POINTS, *_DEPTH)),
         *forms,
         *map(_cells, _NORMALS),
-        (f"{DERIVED}<normal score>", "as it", "as it", derived),
+        (f"{DERIVED}<normal score>", "the same", "the same", derived),
         *map(_cells, _ANSWERS),
     ]
     lines = [f"| `{name}` | {' | '.join(cells)} |" for name, *cells in rows]

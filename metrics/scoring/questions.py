@@ -1,4 +1,4 @@
-"""Submissions of answers to mental-rotation questions -> scores."""
+"""Scores of submissions that answer mental-rotation questions."""
 
 import hashlib
 import itertools
@@ -31,7 +31,7 @@ ANGLE_BINS = (0, 30, 60, 90, 120, 150, 180)  # degrees, of IQTT's rotations
 def score_questions(
     files: Sequence[QuestionPredictions], truth_path: Path, settings: Settings, progress: Progress
 ) -> ScoreFile:
-    """As `scoring.score`, for runs on mental-rotation questions."""
+    """Score runs of one method on a file of answers; raises as `evaluate.score`."""
     from iqtt.files.reader import open_answers
 
     with open_answers(truth_path) as truth:
@@ -98,11 +98,11 @@ def _accuracy(right: Array, settings: Settings) -> Score:
 
 
 def _kinds(row: Array, names: Sequence[str]) -> str:
-    """Name the question's kind by its two wrong answers': mirror where one is a mirror image."""
+    """Return the kind of a question: "mirror" where a wrong answer is a mirror image, else both."""
     found = {names[kind] for kind in row.tolist() if kind >= 0}
     return "mirror" if "mirror" in found else "+".join(sorted(found))
 
 
 def _digest(answers: Array) -> str:
-    """Return what stands for a truth without fingerprint: SHA-256 of its answers."""
+    """Return SHA-256 of the answers, the fingerprint of a truth that has none."""
     return hashlib.sha256(answers.astype(np.uint8).tobytes()).hexdigest()

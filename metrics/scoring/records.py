@@ -1,37 +1,25 @@
-"""Scores of one method on one test set, as records; `score_file` reads and writes them."""
+"""The scores of one method on one test set, as records; `metrics.score_file` reads and writes."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 from numpy.typing import NDArray
 
-from metrics.scoring.metric_names import metric
-
+FORMAT_NAME = "pix2shape-bench/scores"
+FORMAT_VERSION = "1.0"
+LONGEST_NAME = 200  # characters of method, run and fingerprint
+LONGEST_TEXT = 10_000
 Task = Literal["rooms", "iqtt"]
 Groups = Mapping[str, Mapping[str, "Score"]]
-# Columns of `ScoreFile.items` that say what each entry is about: the first one tells them apart.
+# Columns of `ScoreFile.items` that identify each entry; no two entries share the first one.
 ID_COLUMNS = {"rooms": ("row", "scene_index", "view_index"), "iqtt": ("question",)}
 OPTIONAL_COLUMNS = {"rooms": ("view_angle_degrees",), "iqtt": ()}
 GROUPINGS = {
     "rooms": ("by_view_angle",),
     "iqtt": ("by_distractor", "by_rotation_angle", "by_position"),
 }
-
-
-class Interval(Protocol):
-    """What `statistics.Estimate` and `answers.Accuracy` have in common."""
-
-    @property
-    def value(self) -> float: ...  # noqa: D102
-    @property
-    def low(self) -> float: ...  # noqa: D102
-    @property
-    def high(self) -> float: ...  # noqa: D102
-    @property
-    def n(self) -> int: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -54,16 +42,6 @@ class Score:
     std: float | None = None
 
 
-def score(name: str, found: Interval, std: float | None = None) -> Score:
-    """The score of this name from an estimate; ends that are NaN become None.
-
-    Raises UnknownMetricError.
-    """
-    known = math.isfinite(found.low) and math.isfinite(found.high)
-    low, high = (found.low, found.high) if known else (None, None)
-    return Score(found.value, low, high, metric(name).unit, found.n, std)
-
-
 @dataclass(frozen=True)
 class Submission:
     """A file that was scored: one training run."""
@@ -80,14 +58,14 @@ class Meta:
     Attributes:
         truth_fingerprint: of the test set; never empty. Where the truth file has none (the released
             3D-IQTT), SHA-256 of its answers.
-        truth_path: where it lay.
-        submissions: one a training run.
+        truth_path: where the truth lay.
+        submissions: one for each training run.
         writer: the program and its release.
-        versions: of what it computed with, by package.
+        versions: releases of the libraries that computed the scores, by package.
         seed, resamples: of the bootstrap; 0 resamples where intervals come by formula.
         confidence: of all intervals, between 0 and 1.
-        counts: such as "images", "scenes", "penalised".
-        warnings: for a person; why scores are not comparable, for one.
+        counts: such as the number of rows, scenes, runs.
+        warnings: for a person, such as why the scores are not comparable.
         chamfer_floor: Chamfer distance between two samples of the true surface at this
             resolution, scene units; None where it was not measured.
     """
@@ -141,20 +119,20 @@ class ScoreFile:
 
     @property
     def runs(self) -> int:
-        """How many training runs the scores are means of."""
+        """The number of training runs over which the scores are means."""
         return len(self.meta.submissions)
 
     @property
     def ids(self) -> NDArray[Any]:
-        """Which row of the truth, or which question, each entry of the columns is about."""
+        """The row of the truth, or the question, that each entry of the columns is about, (N,)."""
         return self.items[ID_COLUMNS[self.task][0]]
 
     @property
     def clusters(self) -> NDArray[Any]:
-        """What errs together: the scene of each image; each question alone."""
+        """The scene of each image, whose errors are correlated; each question by itself, (N,)."""
         return self.items["scene_index" if self.task == "rooms" else "question"]
 
     @property
     def place(self) -> str:
-        """The path, or the method where there is none: to begin an error with."""
+        """The path, or the method where there is none, to begin an error with."""
         return str(self.path) if self.path is not None else self.method

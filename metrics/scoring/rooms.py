@@ -1,19 +1,34 @@
-"""Submissions of rooms -> scores."""
+"""Scores of submissions that predict rooms: every row is scored, in one or more processes."""
 
-from collections.abc import Sequence
+import atexit
+import functools
+import multiprocessing
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.measures.checks import NoDirectionError, NonFiniteError
+from metrics.measures.depth import Alignment
 from metrics.measures.statistics import bootstrap_interval, cluster_means
+from metrics.scoring.image_scores import (
+    ALIGNMENTS,
+    TrueView,
+    chamfer_floor,
+    score_view,
+)
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import Score, ScoreFile
-from metrics.scoring.room_rows import RoomScores, ScoringError, score_rows
 from metrics.scoring.runs import (
     CONFIDENCE,
     Progress,
+    ScoringError,
     Settings,
     known,
     matched_rows,
@@ -22,16 +37,20 @@ from metrics.scoring.runs import (
     warnings_of,
 )
 from metrics.submissions.missing_rows import size_problems
-from metrics.submissions.reader import RoomPredictions
+from metrics.submissions.reader import RoomPredictions, open_predictions
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
+CHUNK = 8  # rows scored between two reports of progress
+FEW = 32  # rows that are not worth starting processes for
+FLOOR_ROWS = 16  # rows on which the noise floor is measured
+IDS_SHOWN = 8
 
 
 def score_rooms(
     files: Sequence[RoomPredictions], truth_path: Path, settings: Settings, progress: Progress
 ) -> ScoreFile:
-    """As `scoring.score`, for runs on a rooms file."""
+    """Score runs of one method on a rooms file; raises as `evaluate.score`."""
     with RoomsFile(truth_path) as truth:
         count, fingerprint = len(truth), truth.fingerprint
         for file in files:
@@ -39,52 +58,184 @@ def score_rooms(
     rows, whole = matched_rows(files, truth_path, fingerprint, count, settings.allow_partial)
     for file in files:
         if file.has_normals != files[0].has_normals:
-            raise ScoringError(f"{file.path}: normal: some runs have normals, others have none")
-    scored = score_rows(
-        [file.path for file in files],
-        truth_path,
-        rows,
-        files[0].alignment,
-        non_finite=settings.non_finite,
-        processes=settings.processes,
-        progress=progress,
-    )
-    metrics = _estimates(scored, np.ones(len(rows), bool), settings)
-    angles = np.unique(scored.view_angle_degrees).tolist()
+            found, expected = ("normals", "none") if file.has_normals else ("none", "normals")
+            raise ScoringError(f"{file.path}: normal", found, f"{expected} as in {files[0].path}")
+    alignment, paths = files[0].alignment, [file.path for file in files]
+    scores, bad = score_rows(paths, truth_path, rows, alignment, settings.processes, progress)
+    if bad and settings.non_finite == "error":
+        first = next(iter(bad.values()))
+        shown = ", ".join(map(str, list(bad)[:IDS_SHOWN])) + ", ..." * (len(bad) > IDS_SHOWN)
+        told = f"rows that cannot be scored, {len(bad)} in all: {shown}"
+        advice = "mend them, or score them at the worst with --non-finite penalise"
+        raise ScoringError(first.where, first.found, first.expected, f"{told}; {advice}")
+    with RoomsFile(truth_path) as truth:
+        scene = truth.read("scene_index", slice(None))
+        view = truth.read("view_index", slice(None))
+        angle = view_angles(scene, view, truth.read("camera/world_from_camera", slice(None)))[rows]
+        scene, view = scene[rows], view[rows]
+        some = rows[np.unique(np.linspace(0, len(rows) - 1, FLOOR_ROWS).astype(int))]
+        floors = np.array([chamfer_floor(_true_view(truth, int(row))) for row in some])
+    floors = floors[np.isfinite(floors)]
     by_angle = {}
-    if len(np.unique(scored.view_index)) > 1:
-        for angle in [angle for angle in angles if angle >= 0]:
-            some = scored.view_angle_degrees == angle
-            by_angle[str(angle)] = _estimates(scored, some, settings)
-    warnings = warnings_of(whole, len(rows), count, scored.penalised)
-    items = {"row": rows, "scene_index": scored.scene_index, "view_index": scored.view_index}
-    items["view_angle_degrees"] = scored.view_angle_degrees
-    items |= {name: runs.mean(axis=0) for name, runs in scored.scores.items()}
+    if len(np.unique(view)) > 1:
+        for degrees in np.unique(angle[angle >= 0]).tolist():
+            some = angle == degrees
+            of_angle = {name: runs[:, some] for name, runs in scores.items()}
+            by_angle[str(degrees)] = _estimates(of_angle, scene[some], settings)
+    warnings = warnings_of(whole, len(rows), count, list(bad))
+    items = {
+        "row": rows,
+        "scene_index": scene,
+        "view_index": view,
+        "view_angle_degrees": angle,
+        **{name: runs.mean(axis=0) for name, runs in scores.items()},
+    }
     counts = {
         "rows": len(rows),
         "rows_in_truth": count,
-        "scenes": len(np.unique(scored.scene_index)),
+        "scenes": len(np.unique(scene)),
         "runs": len(files),
-        "rows_penalised": len(scored.penalised),
+        "rows_penalised": len(bad),
     }
-    floor = scored.floor if np.isfinite(scored.floor) else None
+    floor = float(np.mean(floors)) if len(floors) else None
     return ScoreFile(
         task="rooms",
         method=files[0].method,
         comparable=not warnings,
-        alignment=files[0].alignment,
-        metrics=metrics,
+        alignment=alignment,
+        metrics=_estimates(scores, scene, settings),
         by_view_angle=by_angle,
         items=items,
         meta=meta_of(files, truth_path, fingerprint, settings, counts, warnings, floor),
     )
 
 
-def _estimates(scored: RoomScores, some: Array, settings: Settings) -> dict[str, Score]:
-    """Return every score of some items: views averaged within scenes, then scenes."""
-    scene = scored.scene_index[some]
-    names = list(scored.scores)
-    runs = np.stack([scored.scores[name][:, some] for name in names], axis=-1)  # (R, M, K)
+def score_rows(
+    paths: Sequence[Path],
+    truth_path: Path,
+    rows: Array,
+    alignment: str,
+    processes: int | None = None,
+    progress: Progress = lambda done: None,
+) -> tuple[dict[str, Array], dict[int, ScoringError]]:
+    """Score these M rows in each of R submissions; the numbers do not depend on `processes`.
+
+    Returns the scores by name, (R, M), and for each row with values that are not finite, or normals
+    of length 0, what is wrong; such values have the worst score.
+    """
+    alignments = tuple(a for a in get_args(Alignment) if a in (*ALIGNMENTS, alignment))
+    job = _Job(tuple(map(str, paths)), str(truth_path), alignments)
+    chunks = [rows[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
+    table: list[list[dict[str, float]]] = []
+    bad: dict[int, ScoringError] = {}
+    for scored, problems in _in_processes(job, chunks, processes):
+        table += scored
+        bad |= problems
+        progress(len(scored))
+    names = list(table[0][0])
+    return {name: np.array([[run[name] for run in row] for row in table]).T for name in names}, bad
+
+
+def view_angles(scene_index: Array, view_index: Array, world_from_camera: Array) -> Array:
+    """Return by how much each view is turned from its scene's first one, (N,) whole degrees.
+
+    About the vertical axis, from 0 to 180; -1 where the scene's first view is not in the file.
+    `scene_index` and `view_index` are (N,), `world_from_camera` is (N, 4, 4).
+    """
+    back = world_from_camera[:, :3, 2]
+    azimuth = np.degrees(np.arctan2(back[:, 0], back[:, 2]))
+    first = {int(scene_index[i]): azimuth[i] for i in np.flatnonzero(view_index == 0)}
+    from_first = np.array([first.get(int(scene), np.nan) for scene in scene_index])
+    turned = np.abs((azimuth - from_first + 180.0) % 360.0 - 180.0)
+    return np.where(np.isfinite(turned), np.rint(turned), -1).astype(np.int64)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What a process must know to score rows; small, as it is sent along with each chunk."""
+
+    paths: tuple[str, ...]
+    truth_path: str
+    alignments: tuple[Alignment, ...]
+
+
+class _RowScorer:
+    """The files of a job, open in one process, and where each row lies in each submission."""
+
+    def __init__(self, job: _Job) -> None:
+        self._alignments = job.alignments
+        with ExitStack() as opening:  # closes what is open already where a later file is refused
+            self._truth = opening.enter_context(RoomsFile(job.truth_path))
+            self._files = [opening.enter_context(open_predictions(path)) for path in job.paths]
+            self._stack = opening.pop_all()
+        self._entries = [{row: i for i, row in enumerate(f.rows.tolist())} for f in self._files]
+
+    def close(self) -> None:
+        """Close the files."""
+        self._stack.close()
+
+    def score(self, rows: Array) -> tuple[list[list[dict[str, float]]], dict[int, ScoringError]]:
+        """Return for each row, for each file its scores; and what is not finite, by row.
+
+        Values that are not finite are penalised; the caller decides whether that shall count.
+        """
+        table, bad = [], {}
+        for row in rows.tolist():
+            view = _true_view(self._truth, row)
+            line = []
+            for file, entries in zip(self._files, self._entries, strict=True):
+                assert isinstance(file, RoomPredictions)
+                i = entries[row]
+                depth, normal = file.depth(i), file.normal(i) if file.has_normals else None
+                score = functools.partial(
+                    score_view, depth, normal, view, alignments=self._alignments
+                )
+                try:
+                    scores = score()
+                except (NonFiniteError, NoDirectionError) as error:
+                    bad[row] = ScoringError(f"{file.path}: row {row}", error)
+                    scores = score(non_finite="penalise")
+                line.append(scores)
+            table.append(line)
+        return table, bad
+
+
+def _in_processes(job: _Job, chunks: Sequence[Array], processes: int | None) -> Iterator[Any]:
+    """Yield what `_RowScorer.score` gives for the chunks, in their order."""
+    count = min(processes or os.cpu_count() or 1, len(chunks))
+    if count == 1 or (processes is None and len(chunks) * CHUNK <= FEW):
+        with closing(_RowScorer(job)) as scorer:
+            yield from map(scorer.score, chunks)
+        return
+    # Spawned, as forked processes would share open files and threads' locks.
+    with ProcessPoolExecutor(count, multiprocessing.get_context("spawn")) as pool:
+        yield from pool.map(functools.partial(_score_in_worker, job), chunks)
+
+
+def _score_in_worker(job: _Job, rows: Array) -> Any:
+    return _scorer_of_this_process(job).score(rows)
+
+
+@functools.cache
+def _scorer_of_this_process(job: _Job) -> _RowScorer:
+    """Open the files of a job when its first chunk comes; a worker process has only one job."""
+    scorer = _RowScorer(job)
+    atexit.register(scorer.close)
+    return scorer
+
+
+def _true_view(truth: RoomsFile, row: int) -> TrueView:
+    return TrueView(
+        truth.read("depth", row),
+        truth.read("normal", row),
+        truth.read("object_id", row),
+        float(truth.read("camera/fov_y_degrees", row)),
+    )
+
+
+def _estimates(scores: dict[str, Array], scene: Array, settings: Settings) -> dict[str, Score]:
+    """Return the mean of every score (R, M): views are averaged within scenes (M,), then scenes."""
+    runs = np.stack(list(scores.values()), axis=-1)  # (R, M, K)
     means = cluster_means(runs.mean(axis=0), scene)
     low, high = bootstrap_interval(means, settings.seed, settings.resamples, CONFIDENCE)
     value = means.mean(axis=0)
@@ -98,5 +249,5 @@ def _estimates(scored: RoomScores, some: Array, settings: Settings) -> dict[str,
             len(means),
             float(each[:, k].std(ddof=1)) if len(each) > 1 else None,
         )
-        for k, name in enumerate(names)
+        for k, name in enumerate(scores)
     }

@@ -1,5 +1,6 @@
-"""What scoring rooms and scoring questions share: settings, rows that match, what is recorded."""
+"""What scoring rooms and scoring questions share: settings, rows to score, what is recorded."""
 
+import importlib.metadata
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,30 +10,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.statistics import RESAMPLES
-from metrics.scoring.item_scores import NonFinite
+from metrics.scoring.image_scores import NonFinite
 from metrics.scoring.records import Meta, Submission
-from metrics.scoring.room_rows import ScoringError
 from metrics.submissions.missing_rows import match_problems
-from metrics.submissions.problems import Problem
+from metrics.submissions.problems import Problem, first_error
 from metrics.submissions.reader import QuestionPredictions, RoomPredictions
-from scenegen.common.row_file import and_more, writer_name
+from scenegen.common.errors import SceneGenError
+from scenegen.common.row_file import writer_name
 
 Array = NDArray[Any]
 Progress = Callable[[int], Any]
 Kind = TypeVar("Kind", RoomPredictions, QuestionPredictions)
 CONFIDENCE = 0.95
+LIBRARIES = ("numpy", "pykdtree", "scipy")  # whose releases scores may depend on
+
+
+class ScoringError(SceneGenError):
+    """Predictions that cannot be scored against this truth."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How to score.
+    """How scores are computed.
 
     Attributes:
-        seed, resamples: of the bootstrap.
+        seed, resamples: seed and number of samples of the bootstrap.
         allow_partial: score the rows that are there; the result is not comparable.
-        non_finite: "error", or "penalise" (see `item_scores.score_view`); if that was needed, the
-            result is not comparable.
-        processes: for rooms; None for as many as there are cores. Changes no number.
+        non_finite: "error", or "penalise" (see `image_scores.score_view`); where a value had to be
+            penalised, the result is not comparable.
+        processes: how many processes score rooms; None for one a core. Changes no number.
     """
 
     seed: int = 0
@@ -52,22 +58,21 @@ def matched_rows(
     rows = np.arange(count)
     for file in files:
         problems = match_problems(file, truth_path, fingerprint, count)
-        advice = ""
         if partial:
             problems = [problem for problem in problems if problem.rule != "complete"]
-        elif any(problem.rule == "complete" for problem in problems):
-            advice = "; to score the rest, not comparably, say --allow-partial"
-        refuse(file.path, problems, advice)
+        refuse(file.path, problems)
         rows = np.intersect1d(rows, file.rows)
     if not rows.size:
-        raise ScoringError(f"{files[0].path}: answers no row of {truth_path}")
+        raise ScoringError(files[0].path, "no row that all runs answer", f"rows of {truth_path}")
     return rows, len(rows) == count
 
 
-def refuse(path: Path, problems: Sequence[Problem], advice: str = "") -> None:
-    """Raise ScoringError with the problems, if there are any."""
+def refuse(path: Path, problems: Sequence[Problem]) -> None:
+    """Raise ScoringError with the first of the problems, if there are any."""
+    incomplete = any(problem.rule == "complete" for problem in problems)
+    advice = "to score the rest, not comparably, say --allow-partial" if incomplete else ""
     if problems:
-        raise ScoringError(f"{path}: {and_more([str(one) for one in problems])}{advice}")
+        raise first_error(ScoringError, path, problems, advice)
 
 
 def known(value: float) -> float | None:
@@ -76,7 +81,7 @@ def known(value: float) -> float | None:
 
 
 def warnings_of(whole: bool, scored: int, count: int, penalised: Sequence[int]) -> list[str]:
-    """Say why the scores are not comparable, if they are not."""
+    """Return why the scores are not comparable, if they are not."""
     found = []
     if not whole:
         found.append(f"not comparable: only {scored} of {count} rows were answered by all runs")
@@ -101,7 +106,7 @@ def meta_of(
         truth_path=str(truth_path),
         submissions=tuple(Submission(str(file.path), file.sha256, file.run) for file in files),
         writer=writer_name(),
-        versions={"numpy": np.__version__},
+        versions={name: importlib.metadata.version(name) for name in LIBRARIES},
         seed=settings.seed,
         resamples=settings.resamples if resampled else 0,
         confidence=CONFIDENCE,

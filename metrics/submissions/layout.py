@@ -1,4 +1,4 @@
-"""The submission format, as data: reader, writer and `describe_format` all go by these tables."""
+"""The submission format as tables, which the reader, the writers and `describe_format` share."""
 
 import unicodedata
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _DIRECTION_CONTROLS = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u206
 
 @dataclass(frozen=True)
 class Attribute:
-    """A root attribute, a text; `tasks` says where it belongs."""
+    """A root attribute, which is a text, and the tasks whose submissions may have it."""
 
     name: str
     meaning: str
@@ -36,9 +36,9 @@ class Dataset:
     """A dataset with one entry for each of the M rows.
 
     Attributes:
-        shape: of an entry; H and W are those of the truth's images.
-        kinds: NumPy kinds that a reader takes: "iu" or "f".
-        dtype: what our writer stores.
+        shape: of an entry; H and W are the height and width of the truth's images.
+        kinds: NumPy kinds that a reader accepts: "iu" or "f".
+        dtype: the type that our writer stores.
     """
 
     task: str
@@ -62,14 +62,14 @@ class Dataset:
         return f"({', '.join(['M', *map(str, self.shape)])}{'' if self.shape else ','})"
 
     def column(self, height: int = 0, width: int = 0) -> Column:
-        """Return how our writer stores it."""
+        """Return the column that our writer stores for images of this size."""
         sizes: dict[str | int, int] = {"H": height, "W": width}
         shape = tuple(sizes[s] if isinstance(s, str) else s for s in self.shape)
         return Column(self.name, shape, self.dtype, len(shape) > 1, self.attributes)
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """What it says of itself in a file that our writer wrote."""
+        """The HDF5 attributes that our writer gives it."""
         return {
             "unit": self.unit,
             "frame": self.frame,
@@ -83,101 +83,49 @@ ATTRIBUTES = (
     Attribute("format_version", f"version of this layout; 1.x is read ({FORMAT_VERSION} now)"),
     Attribute("task", "what is predicted", choices=TASKS),
     Attribute("method", "name of the method; tables show it", longest=LONGEST_NAME),
-    Attribute(
-        "run",
-        "which training run, such as its seed: runs of one method are averaged",
-        required=False,
-        may_be_empty=True,
-        longest=LONGEST_NAME,
-    ),
-    Attribute(
-        "truth_fingerprint",
-        "the attribute `fingerprint` of the truth file; empty if that has none, as the released"
-        " 3D-IQTT",
-        may_be_empty=True,
-    ),
-    Attribute(
-        "truth_path",
-        "where the truth lay; looked up from the submission's folder, then the working directory",
-        required=False,
-        may_be_empty=True,
-    ),
-    Attribute(
-        "alignment",
-        "what the method cannot know, and the truth may decide for it",
-        required=False,
-        tasks=("rooms",),
-        choices=ALIGNMENTS,
-    ),
+    Attribute("run", "which training run, such as its seed: runs of one method are averaged",
+              required=False, may_be_empty=True, longest=LONGEST_NAME),
+    Attribute("truth_fingerprint", "the attribute `fingerprint` of the truth file; empty if that"
+              " has none, as the released 3D-IQTT", may_be_empty=True),
+    Attribute("truth_path", "where the truth lay; looked up from the submission's folder, then the"
+              " working directory", required=False, may_be_empty=True),
+    Attribute("alignment", "what the method cannot know, and the truth may decide for it",
+              required=False, tasks=("rooms",), choices=ALIGNMENTS),
     Attribute("writer", "the program that wrote the file", required=False, may_be_empty=True),
     Attribute("notes", "anything else", required=False, may_be_empty=True),
-)
+)  # fmt: skip
 DATASETS = (
     Dataset("rooms", "row", (), "iu", "int64", "1", "-", "row of the truth file; in any order"),
-    Dataset(
-        "rooms",
-        "depth",
-        ("H", "W"),
-        "f",
-        "float32",
-        "scene unit",
-        "camera",
-        "planar depth, -z in the camera frame (not the distance along the ray), of the ray through"
-        " the pixel's centre; finite wherever the truth shows a surface, and above 0 to lie in"
-        " front of the camera",
-    ),
-    Dataset(
-        "rooms",
-        "normal",
-        ("H", "W", 3),
-        "f",
-        "float32",
-        "1",
-        "camera",
-        "surface normal, x right, y up, z towards the viewer; faces the viewer; of any length but"
-        " 0 wherever the truth has a normal",
-        required=False,
-    ),
+    Dataset("rooms", "depth", ("H", "W"), "f", "float32", "scene unit", "camera",
+            "planar depth, -z in the camera frame (not the distance along the ray), of the ray"
+            " through the pixel's centre; finite wherever the truth shows a surface, and above 0 to"
+            " lie in front of the camera"),
+    Dataset("rooms", "normal", ("H", "W", 3), "f", "float32", "1", "camera",
+            "surface normal, x right, y up, z towards the viewer; faces the viewer; of any length"
+            " but 0 wherever the truth has a normal", required=False),
     Dataset("iqtt", "question", (), "iu", "int64", "1", "-", "index in the test file; any order"),
-    Dataset(
-        "iqtt",
-        "answer",
-        (),
-        "iu",
-        "int8",
-        "1",
-        "-",
-        "which of the three shows the reference: 0, 1 or 2; -1 abstains, which counts as wrong",
-        required=False,
-    ),
-    Dataset(
-        "iqtt",
-        "scores",
-        (3,),
-        "f",
-        "float64",
-        "1",
-        "-",
-        "one for each of the three; the highest wins, a tie for it counts as an abstention; if"
-        " `answer` is there too, both must say the same",
-        required=False,
-    ),
-)
+    Dataset("iqtt", "answer", (), "iu", "int8", "1", "-",
+            "which of the three shows the reference: 0, 1 or 2; -1 abstains, which counts as wrong",
+            required=False),
+    Dataset("iqtt", "scores", (3,), "f", "float64", "1", "-",
+            "one for each of the three; the highest wins, a tie for it counts as an abstention; if"
+            " `answer` is there too, both must say the same", required=False),
+)  # fmt: skip
 ID_NAMES = {"rooms": "row", "iqtt": "question"}
 
 
 def datasets(task: str) -> tuple[Dataset, ...]:
-    """The datasets of a task's submissions."""
+    """Return the datasets of a task's submissions."""
     return tuple(dataset for dataset in DATASETS if dataset.task == task)
 
 
 def attributes(task: str) -> tuple[Attribute, ...]:
-    """The root attributes of a task's submissions."""
+    """Return the root attributes of a task's submissions."""
     return tuple(attribute for attribute in ATTRIBUTES if task in attribute.tasks)
 
 
 def text_fault(attribute: Attribute, text: str) -> tuple[str, str] | None:
-    """Say what was found and what was expected, where a text does not suit a root attribute."""
+    """Return what was found and what was expected where a text does not suit an attribute."""
     if attribute.choices and text not in attribute.choices:
         return f"{text!r:.60}", " or ".join(map(repr, attribute.choices))
     if not text.strip() and not attribute.may_be_empty:
@@ -190,13 +138,13 @@ def text_fault(attribute: Attribute, text: str) -> tuple[str, str] | None:
 
 
 def _unprintable(character: str) -> bool:
-    """Whether a character would do something to a terminal or a page instead of showing."""
+    """Return whether a character would control a terminal or a page instead of being shown."""
     category = unicodedata.category(character)
     return category in ("Cc", "Cs", "Zl", "Zp") or character in _DIRECTION_CONTROLS
 
 
 def describe_format() -> str:
-    """The submission format, for a person to read."""
+    """Return a description of the submission format for a person to read."""
     lines = [
         f"Submission format {FORMAT_VERSION}: one HDF5 file for one run of one method on one test"
         " file.",

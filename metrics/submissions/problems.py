@@ -1,17 +1,28 @@
-"""What can be wrong with a submission, as data: found by the reader, the writer and `validate`."""
+"""What can be wrong with a submission, as data that readers, writers and `validate` share."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from typing import Self, TypeVar
 
 from scenegen.common.errors import SceneGenError
 
+Error = TypeVar("Error", bound=SceneGenError)
 MOST_IDS = 5
 HINT = "hint"
 
 
 class PredictionError(SceneGenError):
     """A prediction that would make a submission invalid."""
+
+
+class JsonError(SceneGenError):
+    """A JSON file that is not what it should be; `where` is empty for the whole of it."""
+
+    def inside(self, place: object) -> Self:
+        """Return the same error with the file before `where`."""
+        where = f"{place}: {self.where}" if self.where else place
+        return type(self)(where, self.found, self.expected, self.hint)
 
 
 @dataclass(frozen=True)
@@ -22,15 +33,15 @@ class Problem:
         dataset: which dataset or root attribute; "file" or "truth" for those.
         rule: in a word or two, such as "type", "shape", "finite"; "hint" for a hint.
         expected: what the format asks for.
-        got: what was found instead.
-        ids: the first few rows of the truth (or indices of questions) concerned; empty where all
-            are.
+        found: what is there instead.
+        ids: the first few rows of the truth, or indices of questions, that are concerned; empty
+            where all are.
     """
 
     dataset: str
     rule: str
     expected: str
-    got: str
+    found: str
     ids: tuple[int, ...] = ()
 
     @property
@@ -38,15 +49,26 @@ class Problem:
         """Whether the submission is valid all the same."""
         return self.rule == HINT
 
+    @property
+    def found_in_rows(self) -> str:
+        """What was found, and in which rows."""
+        return self.found + (f" (ids {', '.join(map(str, self.ids))})" if self.ids else "")
+
     def __str__(self) -> str:
         """Everything in one line."""
-        return f"{self.dataset}: {self.got}{_told(self.ids)}, expected {self.expected}"
+        return f"{self.dataset}: {self.found_in_rows}, expected {self.expected}"
+
+
+def first_error(
+    kind: type[Error], place: object, problems: Sequence[Problem], advice: str = ""
+) -> Error:
+    """Return the first problem as an error of this kind; its hint says how many more there are."""
+    first, more = problems[0], len(problems) - 1
+    hints = [f"and {more} more problem{'s' * (more > 1)}"] if more else []
+    hint = "; ".join([*hints, *([advice] if advice else [])])
+    return kind(f"{place}: {first.dataset}", first.found_in_rows, first.expected, hint)
 
 
 def first_ids(ids: Iterable[int]) -> tuple[int, ...]:
-    """The first few of some ids, as Python's own integers."""
+    """Return the first few of some ids, as Python's own integers."""
     return tuple(int(i) for i in islice(ids, MOST_IDS))
-
-
-def _told(ids: tuple[int, ...]) -> str:
-    return f" (ids {', '.join(map(str, ids))})" if ids else ""

@@ -1,26 +1,24 @@
 """Read submissions: the one file through which any model meets the benchmark.
 
-The format is in `prediction_layout`, and `describe_format` prints it. Opening checks everything
-that needs no truth, but for the pixels, which are read one row at a time.
+`layout` has the format, and `describe_format` prints it. Opening checks everything that needs no
+truth, except for the pixels, which are read one row at a time.
 """
 
 import hashlib
 import os
 from functools import cached_property
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.submissions.answers_json import looks_like_json, read_answers
-from metrics.submissions.array_checks import Ids, Inspection, as_doubles, inspect
-from metrics.submissions.problems import Problem
-from metrics.submissions.texts import READ_ERRORS
+from metrics.submissions.inspection import Inspection, inspect
+from metrics.submissions.problems import Problem, first_error
+from metrics.submissions.rules import Ids, as_doubles
 from scenegen.common.errors import FileFormatError
-from scenegen.common.row_file import and_more, checking, open_file, reason
+from scenegen.common.row_file import checking, open_file, reading
 
 Array = NDArray[np.float64]
 BLOCK_BYTES = 1 << 20
@@ -33,8 +31,8 @@ class Predictions:
         path: where it lies.
         task: "rooms" or "iqtt".
         method, run, notes: what it says of itself; run and notes may be empty.
-        truth_fingerprint: of the truth that it answers; None where it does not say.
-        truth_path: where that lay when it was written; empty where it does not say.
+        truth_fingerprint: of the truth that it answers; None where it names none.
+        truth_path: where the truth lay when the submission was written; empty where not recorded.
         rows: (M,) int64: which row of the truth, or which question, each entry answers; every one
             at least 0 and there once.
     """
@@ -71,17 +69,12 @@ class Predictions:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
 
 class RoomPredictions(Predictions):
-    """Predicted depth of rooms, and normals perhaps.
+    """Predicted depth of rooms, and optionally normals.
 
     Attributes, besides those of `Predictions`:
         height, width: of an image, pixels.
@@ -117,15 +110,12 @@ class RoomPredictions(Predictions):
         Raises FileFormatError where there are none, or they are damaged.
         """
         if not self.has_normals:
-            raise FileFormatError(f"{self.path}: normal: the submission has none")
+            raise FileFormatError(f"{self.path}: normal", "none")
         return self._read("normal", index)
 
     def _read(self, name: str, index: int) -> Array:
-        try:
+        with reading(f"{self.path}: {name}, row {self.rows[index]}"):
             return as_doubles(self._datasets[name][index])
-        except READ_ERRORS as error:
-            where = f"{self.path}: {name}, row {self.rows[index]}"
-            raise FileFormatError(f"{where}: cannot be read ({reason(error)})") from error
 
 
 class QuestionPredictions(Predictions):
@@ -156,40 +146,39 @@ class QuestionPredictions(Predictions):
         """Scores (M, 3), finite; None where only answers are given. Raises FileFormatError."""
         if self._scores is None:
             return None
-        try:
+        with reading(f"{self.path}: scores"):
             return as_doubles(self._scores[()])
-        except READ_ERRORS as error:
-            text = f"{self.path}: scores: cannot be read ({reason(error)})"
-            raise FileFormatError(text) from error
 
 
 def open_predictions(path: str | Path) -> RoomPredictions | QuestionPredictions:
-    """Open a submission of either task, HDF5 or JSON, and check all that needs no truth.
+    """Open a submission of either task, HDF5 or JSON, and check what can be checked without truth.
 
     Raises:
         OSError: no such file, or a folder.
-        FileFormatError: not a submission, of a newer format, or broken; tells the first problem
-            and how many follow. `metrics.submissions.validation.validate` tells all.
+        FileFormatError: not a submission, of a newer format, or broken; with the first problem and
+            how many follow. `metrics.submissions.validation.validate` returns all.
     """
     opened, problems = inspect_predictions(path)
     if opened is None or problems:
         if opened is not None:
             opened.close()
-        raise FileFormatError(f"{path}: {and_more([str(problem) for problem in problems])}")
+        raise first_error(FileFormatError, path, problems)
     return opened
 
 
 def inspect_predictions(
     path: str | Path,
 ) -> tuple[RoomPredictions | QuestionPredictions | None, list[Problem]]:
-    """Open what can be opened of a submission, and say everything that is wrong with it.
+    """Open what can be opened of a submission, and return everything that is wrong with it.
 
     Raises:
         OSError: no such file, or a folder.
         FileFormatError: neither HDF5 nor JSON.
     """
     path = Path(path)
-    if looks_like_json(path):
+    if _looks_like_json(path):
+        from metrics.submissions.answers_json import read_answers
+
         texts, rows, answers, problems = read_answers(path)
         return QuestionPredictions(path, texts, rows, answers) if len(rows) else None, problems
     file = open_file(path, "submission")
@@ -210,24 +199,34 @@ def find_truth(predictions: Predictions, given: str | Path | None = None) -> Pat
     """Return where the truth of a submission lies.
 
     That is `given`, or the path recorded in the submission, taken from the submission's folder and
-    then from the working directory. Of a test file without answers it is the file of answers beside
-    it (iqtt-test-answers.h5). Whether it is the right truth, only its fingerprint tells.
+    then from the working directory. For a test file without answers it is the file of answers
+    beside it (iqtt-test-answers.h5). Only the fingerprint tells whether it is the right truth.
 
-    Raises FileFormatError where nothing lies there; says where it looked.
+    Raises FileFormatError where nothing lies there, with the places that were looked at.
     """
+    advice = "give it with --truth" if given is None else ""
     if given is None and not predictions.truth_path:
-        raise FileFormatError(f"{predictions.path}: names no truth; give it with --truth")
+        raise FileFormatError(predictions.path, "no path of a truth", "one", advice)
     recorded = Path(predictions.truth_path)
     places = [predictions.path.parent / recorded, recorded] if given is None else [Path(given)]
     for place in places:
         if os.path.isfile(place):
             return _with_answers(place) if predictions.task == "iqtt" else place
     looked = " and ".join(dict.fromkeys(str(place) for place in places))
-    advice = "; give it with --truth" if given is None else ""
-    raise FileFormatError(f"{predictions.path}: truth not found: looked for {looked}{advice}")
+    raise FileFormatError(f"{predictions.path}: truth", f"nothing at {looked}", "a file", advice)
 
 
 def _with_answers(path: Path) -> Path:
     from iqtt.files.reader import answers_beside
 
     return answers_beside(path) or path
+
+
+def _looks_like_json(path: Path) -> bool:
+    """Return whether a file is to be read as JSON: by its first character, or else its name."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        start = file.read(64)
+    text = start.removeprefix(b"\xef\xbb\xbf").lstrip()
+    return text[:1] in (b"[", b"{") or (path.suffix == ".json" and start[1:4] != b"HDF")

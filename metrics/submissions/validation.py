@@ -1,13 +1,15 @@
-"""Everything that is wrong with a submission, at once: `bench validate`."""
+"""`validate` returns everything that is wrong with a submission, for `bench validate`."""
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from metrics.submissions.hints.hints import answer_hints, room_hints
+from metrics.submissions.hints.questions import answer_hints
+from metrics.submissions.hints.rooms import room_hints
 from metrics.submissions.missing_rows import match_problems, size_problems
 from metrics.submissions.problems import MOST_IDS, Problem
 from metrics.submissions.reader import (
@@ -16,13 +18,11 @@ from metrics.submissions.reader import (
     find_truth,
     inspect_predictions,
 )
-from metrics.submissions.row_rules import EXPECTED, GOT, depth_faults, normal_faults
+from metrics.submissions.rules import EXPECTED, FOUND, Array, depth_faults, normal_faults
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.rooms.reader import RoomsFile
 
 __all__ = ["Problem", "validate"]
-
-Array = NDArray[Any]
 
 
 def validate(
@@ -32,15 +32,15 @@ def validate(
 ) -> list[Problem]:
     """Return everything that is wrong with a submission, and hints; empty where all is well.
 
-    Reads one row at a time, of a submission and its truth. Problems come in the order in which
-    one would mend them; hints (`Problem.is_hint`) come last, and leave a submission valid.
+    Rows are read one at a time. Problems come in the order in which one would mend them; hints
+    (`Problem.is_hint`) come last, and leave a submission valid.
 
     Args:
         path: the submission, HDF5 or JSON.
         truth_path: its truth; by default the one that the submission names (`find_truth`).
-        progress: told after every row, 1 each time.
+        progress: called with 1 after every row.
 
-    Raises OSError where `path` is no file. What is wrong inside is told, never raised.
+    Raises OSError where `path` is no file. What is wrong inside is returned, never raised.
     """
     try:
         predictions, problems = inspect_predictions(path)
@@ -55,8 +55,8 @@ def validate(
                 return problems + _against_rooms(predictions, truth, progress)
             return problems + _against_questions(predictions, truth)
         except (SceneGenError, OSError) as error:
-            got = _short(error, path)
-            return [*problems, Problem("truth", "readable", "the file that is predicted", got)]
+            found = _short(error, path)
+            return [*problems, Problem("truth", "readable", "the file that is predicted", found)]
 
 
 def _against_rooms(
@@ -68,30 +68,56 @@ def _against_rooms(
             problems += size_problems(predictions, truth)
         if any(problem.rule in ("match", "shape") for problem in problems):
             return problems
-        tally = _Tally()
+        tallies: dict[tuple[str, str], _Tally] = defaultdict(_Tally)
         for i, row in enumerate(predictions.rows.tolist()):
             if 0 <= row < len(truth):
-                _check_row(predictions, i, row, truth, tally)
+                for name, rule, pixels, why in _faults(predictions, i, row, truth):
+                    tallies[name, rule].add(row, pixels, why)
             progress(1)
-        return [*problems, *tally.problems(), *room_hints(predictions, truth)]
+        counted = [tally.problem(*key) for key, tally in sorted(tallies.items())]
+        return [*problems, *counted, *room_hints(predictions, truth)]
 
 
-def _check_row(
-    predictions: RoomPredictions, i: int, row: int, truth: RoomsFile, tally: "_Tally"
-) -> None:
+def _faults(
+    predictions: RoomPredictions, i: int, row: int, truth: RoomsFile
+) -> Iterator[tuple[str, str, int, str]]:
+    """Yield dataset, rule, number of pixels, and why a row cannot be read where that is so."""
     mask = np.isfinite(truth.read("depth", row))
-    reads: list[tuple[str, Callable[[int], Array], Callable[[Array, Array], dict[str, Array]]]]
-    reads = [("depth", predictions.depth, depth_faults)]
+    rules: list[tuple[str, Callable[[int], Array], Callable[[Array, Array], dict[str, Array]]]]
+    rules = [("depth", predictions.depth, depth_faults)]
     if predictions.has_normals:
-        reads.append(("normal", predictions.normal, normal_faults))
-    for name, read, faults in reads:
+        rules.append(("normal", predictions.normal, normal_faults))
+    for name, read, faults in rules:
         try:
             values = read(i)
         except FileFormatError as error:
-            tally.add(name, "readable", row, 1, str(error).rsplit(": ", maxsplit=1)[-1])
+            place = f"{predictions.path}: {name}, row {row}: "
+            yield name, "readable", 1, str(error).removeprefix(place)
             continue
         for rule, at in faults(values, mask).items():
-            tally.add(name, rule, row, int(np.count_nonzero(at)))
+            yield name, rule, int(np.count_nonzero(at)), ""
+
+
+@dataclass
+class _Tally:
+    """How often a rule is broken; of the rows only the first few are kept."""
+
+    pixels: int = 0
+    rows: int = 0
+    why: str = ""
+    ids: list[int] = field(default_factory=list)
+
+    def add(self, row: int, pixels: int, why: str) -> None:
+        self.pixels, self.rows, self.why = self.pixels + pixels, self.rows + 1, self.why or why
+        if self.rows <= MOST_IDS:
+            self.ids.append(row)
+
+    def problem(self, dataset: str, rule: str) -> Problem:
+        found, expected = f"{self.rows} rows {self.why}", "rows that can be read"
+        if rule != "readable":
+            found = f"{FOUND[rule]} at {self.pixels} pixels of {self.rows} rows"
+            expected = EXPECTED[rule]
+        return Problem(dataset, rule, expected, found, tuple(self.ids))
 
 
 def _against_questions(predictions: QuestionPredictions, truth_path: Path) -> list[Problem]:
@@ -104,30 +130,8 @@ def _against_questions(predictions: QuestionPredictions, truth_path: Path) -> li
         return problems + answer_hints(predictions, truth.read("answers", slice(None)))
 
 
-class _Tally:
-    """Counts of broken rules: pixels, rows, and the first few rows."""
-
-    def __init__(self) -> None:
-        self._found: dict[tuple[str, str], list[Any]] = {}
-
-    def add(self, dataset: str, rule: str, row: int, pixels: int, why: str = "") -> None:
-        entry = self._found.setdefault((dataset, rule), [0, 0, [], why])
-        entry[0] += pixels
-        entry[1] += 1
-        if len(entry[2]) < MOST_IDS:
-            entry[2].append(row)
-
-    def problems(self) -> Iterator[Problem]:
-        for (dataset, rule), (pixels, rows, ids, why) in sorted(self._found.items()):
-            if rule == "readable":
-                got, expected = f"{rows} rows {why}", "rows that can be read"
-            else:
-                got, expected = f"{GOT[rule]} at {pixels} pixels of {rows} rows", EXPECTED[rule]
-            yield Problem(dataset, rule, expected, got, tuple(ids))
-
-
 def _short(error: Exception, path: str | Path) -> str:
-    """What an error says, without the submission's own name before it."""
+    """Return the text of an error without the submission's own name before it."""
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename}: {error.strerror}"
     return str(error).removeprefix(f"{path}: ")

@@ -7,7 +7,7 @@ import pytest
 from baselines.trivial import empty_room, write_chance, write_room_baseline
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
-from metrics.scoring.scoring import score
+from metrics.scoring.evaluate import score
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
 

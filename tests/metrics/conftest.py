@@ -9,7 +9,7 @@ import pytest
 from hypothesis import settings
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.submissions.hints.hints import room_hints
+from metrics.submissions.hints.rooms import room_hints
 from metrics.submissions.reader import open_predictions
 from scenegen.camera import pixel_directions
 from scenegen.rooms.reader import RoomsFile
@@ -125,6 +125,6 @@ def hints(hint_truth: Path, tmp_path: Path) -> Callable[..., list[str]]:
                 if normal is not None:
                     file["normal"] = normal
             with open_predictions(path) as found:
-                return [f"{one.dataset}: {one.got}" for one in room_hints(found, rooms)]
+                return [f"{one.dataset}: {one.found}" for one in room_hints(found, rooms)]
 
     return told

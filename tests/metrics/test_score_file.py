@@ -11,10 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from metrics.measures.answers import iqtt_accuracy
-from metrics.measures.statistics import Estimate, cluster_bootstrap
-from metrics.score_file import JsonError, Score, read_scores, score, to_json, write_scores
-from scenegen.common.errors import SceneGenError
+from metrics.score_file import JsonError, Score, read_scores, to_json, write_scores
 
 
 def test_what_is_written_reads_back_to_the_same_bits(tmp_path):
@@ -49,11 +46,14 @@ def test_scores_are_means_over_scenes_not_images(tmp_path):
     assert scores.metrics["chamfer"].value == pytest.approx(0.3)
     write_scores(scores, tmp_path / "s.json")
     over_images = {"chamfer": replace(scores.metrics["chamfer"], value=0.2)}
-    with pytest.raises(JsonError, match=r"value 0\.2, expected 0\.3.*, the mean of items\.chamfer"):
+    with pytest.raises(JsonError) as caught:
         write_scores(replace(scores, metrics=over_images), tmp_path / "s.json", overwrite=True)
+    assert caught.value.where.endswith("s.json: metrics.chamfer.value")
+    assert (caught.value.found, caught.value.expected[:3]) == ("0.2", "0.3")
     empty = {name: column[:0] for name, column in scores.items.items()}
-    with pytest.raises(JsonError, match="items: found none, expected at least one entry"):
+    with pytest.raises(JsonError) as caught:
         write_scores(replace(scores, items=empty), tmp_path / "s.json", overwrite=True)
+    assert caught.value.where.endswith("s.json: items")
 
 
 def test_view_angles_may_be_unknown(tmp_path):
@@ -63,8 +63,10 @@ def test_view_angles_may_be_unknown(tmp_path):
     found = read_scores(tmp_path / "s.json").items["view_angle_degrees"]
     assert found.tolist() == [0, 35, -1, -1]
     below = {**items, "view_angle_degrees": np.array([0, 35, -2, -1])}
-    with pytest.raises(JsonError, match=r"view_angle_degrees\[2\]: found -2, expected a whole"):
+    with pytest.raises(JsonError) as caught:
         write_scores(replace(scores, items=below), tmp_path / "s.json", overwrite=True)
+    assert caught.value.where.endswith("items.view_angle_degrees[2]")
+    assert caught.value.found == "-2"
 
 
 def test_questions_are_read_back(tmp_path):
@@ -128,20 +130,6 @@ def test_numpy_numbers_are_taken(tmp_path):
     assert found.meta.counts == {"images": 4}
 
 
-def test_scores_from_estimates():
-    found = cluster_bootstrap([0.1, 0.2, 0.4], [0, 1, 2], seed=0)
-    made = score("chamfer", found, std=0.01)
-    assert made == Score(found.value, found.low, found.high, "scene unit", 3, 0.01)
-    assert score("rmse", cluster_bootstrap([0.1], [0], seed=0)) == Score(
-        0.1, None, None, "scene unit", 1
-    )
-    accuracy = iqtt_accuracy([0, 1, 1], [0, 1, 2])
-    assert score("iqtt_accuracy", accuracy).n == 3
-    assert score("iqtt_accuracy", accuracy).unit == "fraction"
-    with pytest.raises(SceneGenError, match="is no score"):
-        score("cd", Estimate(0.0, 0.0, 0.0, 1))
-
-
 def test_what_the_reader_would_refuse_is_not_written(tmp_path):
     scores = made_scores.simple_rooms()
     path = tmp_path / "s.json"
@@ -155,8 +143,9 @@ def test_what_the_reader_would_refuse_is_not_written(tmp_path):
         "a grouping": replace(scores, by_view_angle={"x": {}}),
     }
     for what, broken in wrong.items():
-        with pytest.raises(JsonError, match=r"s\.json: "):
+        with pytest.raises(JsonError) as caught:
             write_scores(broken, path, overwrite=True)
+        assert caught.value.where.startswith(f"{path}"), what
         assert path.read_text() == "before", what
         assert os.listdir(tmp_path) == ["s.json"], what
 
@@ -179,8 +168,10 @@ def test_huge_and_odd_files_are_not_read(tmp_path):
     path = tmp_path / "s.json"
     with path.open("wb") as file:
         file.truncate(2**40)
-    with pytest.raises(JsonError, match="found 1099511627776 bytes, expected at most 268435456"):
+    with pytest.raises(JsonError) as caught:
         read_scores(path)
+    assert (caught.value.found, caught.value.expected) == (f"{2**40} bytes", f"at most {2**28}")
     os.mkfifo(tmp_path / "fifo")
-    with pytest.raises(JsonError, match="expected a regular file"):
+    with pytest.raises(JsonError) as caught:
         read_scores(tmp_path / "fifo")
+    assert caught.value.expected == "a regular file"

@@ -1,4 +1,4 @@
-"""Score files that are broken, one way at a time: one clear line each, and never a traceback."""
+"""Score files that are broken in one way at a time: one clear line each, never a traceback."""
 
 import copy
 import json
@@ -28,15 +28,15 @@ def changed(document, place, value):
 
 
 def told(path, text):
-    """What a reader says about a file with this text."""
+    """The place, what was found and what was expected, as a reader says about this text."""
     path.write_bytes(text if isinstance(text, bytes) else text.encode("utf-8", "surrogatepass"))
     with pytest.raises(JsonError) as caught:
         read_scores(path)
-    line = str(caught.value)
-    assert line.startswith(f"{path}: ")
-    assert line.isprintable()
-    assert len(line) < 400 + len(str(path))
-    return line.removeprefix(f"{path}: ")
+    error = caught.value
+    assert error.where.startswith(f"{path}")
+    assert str(error).isprintable()
+    assert len(str(error)) < 400 + len(str(path))
+    return error.where.removeprefix(f"{path}").removeprefix(": "), error.found, error.expected
 
 
 def every_place(document):
@@ -68,123 +68,124 @@ def test_any_value_anywhere_is_refused_in_one_line_or_can_be_written_again(docum
     assert len(refused) > 4 * len(taken)
 
 
+ROW = "items/row"
+HIGH = ROOMS["metrics"]["chamfer"]["high"]
+# What is put where, then where the reader finds fault (if not there), what it found and expected.
 WRONG = [
-    ("format", GONE, "found no key 'format', expected a file of format 'pix2shape-bench/scores'"),
-    ("format", "pix2shape-bench/rooms", "format: found 'pix2shape-bench/rooms', expected 'pix2sha"),
-    ("format_version", "2.0", "format_version: found '2.0', expected 1.x"),
-    ("task", "room", "task: found 'room', expected 'rooms' or 'iqtt'"),
-    ("task", ["rooms"], "task: found a list of 1, expected 'rooms' or 'iqtt'"),
-    ("method", 3, "method: found 3, expected a text"),
-    ("method", "x" * 201, "method: found a text of 201 characters, expected at most 200"),
-    ("method", "\ud800", "method: found half of a surrogate pair, expected valid Unicode"),
-    ("comparable", 1, "comparable: found 1, expected true or false"),
-    ("comparable", GONE, "comparable: found no such key, expected it to be there"),
-    ("alignment", "affine", "alignment: found 'affine', expected 'none' or 'median_scale' or"),
-    ("metrics", {}, "metrics: found an object of 0, expected at least one score"),
-    ("metrics/chamfer", [], "metrics.chamfer: found a list of 0, expected an object"),
-    (
-        "metrics/cd",
-        {},
-        "metrics.cd: found no score of task 'rooms', expected a name listed in docs",
-    ),
-    ("metrics/iqtt_accuracy", {}, "metrics.iqtt_accuracy: found no score of task 'rooms'"),
-    ("metrics/chamfer/value", None, "metrics.chamfer.value: found null, expected a finite number"),
-    ("metrics/chamfer/value", -0.1, "metrics.chamfer.value: found -0.1, expected a number from 0"),
-    ("metrics/chamfer/value", 0.3, "metrics: found chamfer.value 0.3, expected 0.2"),
-    ("metrics/chamfer/value", 10**400, "chamfer.value: found a huge whole number, expected a fin"),
-    (
-        "metrics/f_score_0.05/value",
-        1.5,
-        "f_score_0.05.value: found 1.5, expected a number from 0 t",
-    ),
-    ("metrics/chamfer/unit", "m", "metrics.chamfer.unit: found 'm', expected 'scene unit'"),
-    (
-        "metrics/chamfer/low",
-        None,
-        "metrics.chamfer: found one end, expected both ends of the inter",
-    ),
-    ("metrics/chamfer/low", 9.0, "metrics.chamfer: found low 9.0 and high 0.2"),
-    ("metrics/chamfer/n", 0, "metrics.chamfer.n: found 0, expected a whole number from 1 to 4"),
-    ("metrics/chamfer/n", 2.0, "metrics.chamfer.n: found 2.0, expected a whole number from 1 to 4"),
-    ("metrics/chamfer/std", -1, "metrics.chamfer.std: found -1, expected a number from 0"),
-    ("metrics/chamfer/std", True, "metrics.chamfer.std: found true, expected a finite number"),
-    ("metrics/chamfer/more", 1, "metrics.chamfer.more: found this key, expected no key but value"),
-    ("by_view_angle/5.0", {}, "by_view_angle.5.0: found '5.0', expected whole degrees as key"),
-    ("by_distractor", {}, "by_distractor: found this key, expected no key but format,"),
-    ("items/row", GONE, "items: found none of that name, expected the column 'row'"),
-    ("items/row", [0, 1, 2], "items: found a column scene_index of 4, expected columns of equal"),
-    ("items/row", [0, 1, 2, 2], "items: found row 2 twice, expected each row once"),
-    ("items/row", [0, 1, 2, -3], "items.row[3]: found -3, expected a whole number from 0 to"),
-    ("items/row", [0, 1, 2, 3.0], "items.row[3]: found 3.0, expected a whole number"),
-    ("items/row", [0, 1, 2, 10**30], "items.row[3]: found a huge whole number, expected a whole"),
-    ("items/chamfer", [0.1, 0.2], "items: found a column chamfer of 2, expected columns of equal"),
-    ("items/chamfer", [0.1, 0.3, 0.2, "x"], "items.chamfer[3]: found 'x', expected a number"),
-    ("items/chamfer", [0.1, 0.3, 0.2, True], "items.chamfer[3]: found true, expected a number"),
-    ("items/chamfer", [0.1, -0.3, 0.2, 0.2], "items.chamfer[1]: found -0.3, expected a number fro"),
-    ("items/f_score_0.05", [0.5, 0.25, 1, 1.5], "5[3]: found 1.5, expected a number from 0 to 1"),
-    ("items/chamfer", 0.1, "items.chamfer: found 0.1, expected a list of numbers"),
-    (
-        "items/note",
-        [0, 0, 0, 0],
-        "items.note: found no score of task 'rooms', expected a name list",
-    ),
-    ("meta/truth_fingerprint", " ", "meta.truth_fingerprint: found ' ', expected a text that is n"),
-    ("meta/seed", 1.5, "meta.seed: found 1.5, expected a whole number from"),
-    ("meta/seed", True, "meta.seed: found true, expected a whole number from"),
-    ("meta/confidence", 1, "meta.confidence: found 1, expected a number between 0 and 1"),
-    ("meta/submissions", [], "meta.submissions: found a list of 0, expected at least one submiss"),
-    ("meta/submissions/0/sha256", "AB", "meta.submissions[0].sha256: found 'AB', expected 64 hexa"),
-    ("meta/submissions/0", 1, "meta.submissions[0]: found 1, expected an object"),
-    ("meta/counts/images", "4", "meta.counts.images: found '4', expected a whole number from 0 to"),
-    ("meta/warnings", "none", "meta.warnings: found 'none', expected a list"),
-    ("\x1b[31m\n", 1, "\ufffd[31m : found this key, expected no key but"),
+    ("format", GONE, "", "no such key", "to be there"),
+    ("format", "pix2shape-bench/rooms", "", "'pix2shape-bench/rooms'", "'pix2shape-bench/scores'"),
+    ("format_version", "2.0", "", "'2.0'", "1"),
+    ("task", "room", "", "'room'", "'rooms' or 'iqtt'"),
+    ("task", ["rooms"], "", "a list of 1", "'rooms' or 'iqtt'"),
+    ("method", 3, "", "3", "string"),
+    ("method", "m" * 201, "", f"{'m' * 201!r:.60}", "at most 200"),
+    ("method", "\ud800", "", r"'\ud800'", "unicode"),
+    ("comparable", 1, "", "1", "boolean"),
+    ("comparable", GONE, "", "no such key", "to be there"),
+    ("alignment", "affine", "", "'affine'", "'none', 'median_scale', 'scale' or 'scale_shift'"),
+    ("metrics", {}, "", "an object of 0", "at least 1"),
+    ("metrics/chamfer", [], "", "a list of 0", "an object"),
+    ("metrics/cd", ROOMS["metrics"]["chamfer"], "", "no score of task 'rooms'", "docs/scores.md"),
+    ("metrics/iqtt_accuracy", ROOMS["metrics"]["chamfer"], "", "no score of task 'rooms'", "docs"),
+    ("metrics/chamfer/value", None, "", "null", "number"),
+    ("metrics/chamfer/value", -0.1, "", "-0.1", "equal to 0"),
+    ("metrics/chamfer/value", 0.3, "", "0.3", "0.2, the mean of items.chamfer"),
+    ("metrics/chamfer/value", 10**400, "", "a huge whole number", "number"),
+    ("metrics/f_score_0.05/value", 1.5, "", "1.5", "at most 1"),
+    ("metrics/chamfer/unit", "m", "", "'m'", "'scene unit'"),
+    ("metrics/chamfer/low", None, "metrics.chamfer", "one end of an interval", "both"),
+    ("metrics/chamfer/low", 9.0, "metrics.chamfer", f"low 9.0 and high {HIGH}", "at most high"),
+    ("metrics/chamfer/n", 0, "", "0", "equal to 1"),
+    ("metrics/chamfer/n", 5, "", "5", "at most 4"),
+    ("metrics/chamfer/n", 2.0, "", "2.0", "integer"),
+    ("metrics/chamfer/std", -1, "", "-1", "equal to 0"),
+    ("metrics/chamfer/std", True, "", "true", "number"),
+    ("metrics/chamfer/more", 1, "", "this key", "no key of this name"),
+    ("by_view_angle/5.0", {}, "", "'5.0'", "[0-9]{1,3}"),
+    ("by_distractor", {}, "", "this key", "no key of this name"),
+    (ROW, GONE, "", "no such key", "to be there"),
+    (ROW, [0, 1, 2], "items.scene_index", "4 entries", "3, as in row"),
+    (ROW, [0, 1, 2, 2], "", "2 twice", "each once"),
+    (ROW, [0, 1, 2, -3], "items.row[3]", "-3", "whole number from 0"),
+    (ROW, [0, 1, 2, 3.0], "items.row[3]", "3.0", "whole number from 0"),
+    (ROW, [0, 1, 2, None], "items.row[3]", "null", "whole number from 0"),
+    (ROW, [0, 1, 2, 2**53 + 1], "items.row[3]", "9007199254740993", "to 9.0072e+15"),
+    (ROW, [0, 1, 2, 10**30], "items.row[3]", "a huge whole number", "whole number from 0"),
+    ("items/chamfer", [0.1, 0.2], "", "2 entries", "4, as in row"),
+    ("items/chamfer", [0.1, 0.3, 0.2, "x"], "items.chamfer[3]", "'x'", "finite number"),
+    ("items/chamfer", [0.1, 0.3, 0.2, "1"], "items.chamfer[3]", "'1'", "finite number"),
+    ("items/chamfer", [0.1, 0.3, 0.2, True], "items.chamfer[3]", "true", "finite number"),
+    ("items/chamfer", [0.1, 0.3, 0.2, [1]], "items.chamfer[3]", "a list of 1", "finite number"),
+    ("items/chamfer", [0.1, 10**400], "items.chamfer[1]", "a huge whole number", "finite number"),
+    ("items/chamfer", [0.1, -0.3, 0.2, 0.2], "items.chamfer[1]", "-0.3", "number from 0"),
+    ("items/f_score_0.05", [0.5, 0.25, 1, 1.5], "items.f_score_0.05[3]", "1.5", "from 0 to 1"),
+    ("items/chamfer", 0.1, "", "0.1", "a list of numbers"),
+    ("items/note", [0, 0, 0, 0], "", "no score of task 'rooms'", "docs/scores.md"),
+    ("meta/truth_fingerprint", " ", "", "' '", "string"),
+    ("meta/seed", 1.5, "", "1.5", "integer"),
+    ("meta/seed", True, "", "true", "integer"),
+    ("meta/seed", 2**60, "", f"{2**60}", "9007199254740992"),
+    ("meta/confidence", 1, "", "1", "less than 1"),
+    ("meta/submissions", [], "", "a list of 0", "at least 1"),
+    ("meta/submissions/0/sha256", "AB", "meta.submissions[0].sha256", "'AB'", "{64}"),
+    ("meta/submissions/0", 1, "meta.submissions[0]", "1", "an object"),
+    ("meta/counts/images", "4", "", "'4'", "integer"),
+    ("meta/warnings", "none", "", "'none'", "a list"),
+    ("\x1b[31m\n", 1, "\ufffd[31m", "this key", "no key of this name"),
 ]
 
 
-@pytest.mark.parametrize(("place", "value", "expected"), WRONG)
-def test_each_fault_has_its_line(place, value, expected, tmp_path):
-    assert expected in told(tmp_path / "s.json", json.dumps(changed(ROOMS, place, value)))
+@pytest.mark.parametrize(("place", "value", "where", "found", "expected"), WRONG)
+def test_each_fault_is_told_by_its_place(place, value, where, found, expected, tmp_path):
+    error = told(tmp_path / "s.json", json.dumps(changed(ROOMS, place, value)))
+    assert error[:2] == (where or place.replace("/", "."), found)
+    assert expected in error[2]
 
 
-def test_runs_and_single_answers_agree(tmp_path):
-    path = tmp_path / "s.json"
-    one = changed(ROOMS, "meta/submissions", ROOMS["meta"]["submissions"][:1])
-    assert "std: found 0.002, expected null, as there is one run" in told(path, json.dumps(one))
-    twice = changed(ROOMS, "meta/submissions", ROOMS["meta"]["submissions"][:1] * 2)
-    assert "expected each submission once" in told(path, json.dumps(twice))
-    answers = changed(IQTT, "items/iqtt_accuracy", [1, 0, 1, 0.5])
-    assert "found an iqtt_accuracy of 0.5, expected 0 or 1 for one run" in told(
-        path, json.dumps(answers)
-    )
-    aligned = json.dumps(changed(IQTT, "alignment", "scale"))
-    assert "alignment: found 'scale', expected 'none'" in told(path, aligned)
+SAME = ROOMS["meta"]["submissions"][:1]
+
+
+@pytest.mark.parametrize(
+    ("document", "place", "value", "where", "found"),
+    [
+        (ROOMS, "meta/submissions", SAME, "metrics.chamfer.std", "0.002"),
+        (ROOMS, "meta/submissions", SAME * 2, "meta.submissions", "the same sha256 twice"),
+        (IQTT, "items/iqtt_accuracy", [1, 0, 1, 0.5], "items.iqtt_accuracy", "0.5"),
+        (IQTT, "alignment", "scale", "alignment", "'scale'"),
+        (IQTT, "meta/chamfer_floor", 0.1, "meta.chamfer_floor", "this key"),
+    ],
+)
+def test_runs_and_questions_agree(document, place, value, where, found, tmp_path):
+    error = told(tmp_path / "s.json", json.dumps(changed(document, place, value)))
+    assert error[:2] == (where, found)
+
+
+def meta_with(seed):
+    return json.dumps(ROOMS).replace('"seed": 0', f'"seed": {seed}')
 
 
 TEXTS = {
-    "empty": (b"", "no JSON"),
-    "a number": (b"3", "found 3, expected an object"),
-    "a list": (b"[]", "found a list of 0, expected an object"),
-    "cut": (json.dumps(ROOMS)[:500], "found no JSON"),
-    "more after it": (json.dumps(ROOMS) + "{}", "no JSON (Extra data"),
-    "NaN": (
-        json.dumps(ROOMS).replace('"seed": 0', '"seed": NaN'),
-        "found NaN, expected finite num",
-    ),
-    "infinity": (json.dumps(ROOMS).replace('"seed": 0', '"seed": -Infinity'), "found -Infinity"),
-    "1e999": (
-        json.dumps(ROOMS).replace("[0.1, 0.3,", "[1e999, 0.3,"),
-        "items.chamfer[0]: found inf",
-    ),
-    "a key twice": ('{"task": 1, "task": 1}', "found the key 'task' twice, expected each key once"),
-    "not UTF-8": (b'{"format": "\xff"}', "found bytes that are not UTF-8"),
-    "UTF-16": (json.dumps(ROOMS).encode("utf-16"), "found bytes that are not UTF-8"),
-    "deep": (b"[" * 100_000, "found JSON that is nested too deeply"),
-    "deep objects": (b'{"a":' * 100_000, "found JSON that is nested too deeply"),
-    "many digits": (b'{"format": ' + b"9" * 10_000 + b"}", "found no JSON (Exceeds the limit"),
-    "HDF5": (b"\x89HDF\r\n\x1a\n" + bytes(100), "found an HDF5 file, expected JSON"),
+    "empty": (b"", "", "no JSON"),
+    "a number": (b"3", "", "3"),
+    "a list": (b"[]", "", "a list of 0"),
+    "cut": (json.dumps(ROOMS)[:500], "", "no JSON"),
+    "more after it": (json.dumps(ROOMS) + "{}", "", "no JSON (Extra data"),
+    "NaN": (meta_with("NaN"), "", "NaN"),
+    "infinity": (meta_with("-Infinity"), "", "-Infinity"),
+    "1e999": (json.dumps(ROOMS).replace("[0.1, 0.3,", "[1e999, 0.3,"), "items.chamfer[0]", "inf"),
+    "a key twice": ('{"task": 1, "task": 1}', "", "the key 'task' twice"),
+    "too many keys": (json.dumps(dict.fromkeys(map(str, range(10_001)))), "", "an object of 10001"),
+    "not UTF-8": (b'{"format": "\xff"}', "", "bytes that are not UTF-8"),
+    "UTF-16": (json.dumps(ROOMS).encode("utf-16"), "", "bytes that are not UTF-8"),
+    "deep": (b"[" * 100_000, "", "JSON that is nested too deeply"),
+    "deep objects": (b'{"a":' * 100_000, "", "JSON that is nested too deeply"),
+    "many digits": (b'{"format": ' + b"9" * 10_000 + b"}", "", "no JSON (Exceeds the limit"),
+    "HDF5": (b"\x89HDF\r\n\x1a\n" + bytes(100), "", "an HDF5 file"),
 }
 
 
-@pytest.mark.parametrize(("text", "expected"), TEXTS.values(), ids=TEXTS)
-def test_text_that_is_no_score_file(text, expected, tmp_path):
-    assert expected in told(tmp_path / "s.json", text)
+@pytest.mark.parametrize(("text", "where", "found"), TEXTS.values(), ids=TEXTS)
+def test_text_that_is_no_score_file(text, where, found, tmp_path):
+    error = told(tmp_path / "s.json", text)
+    assert error[0] == where
+    assert error[1].startswith(found)

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import h5py
 import numpy as np
-from broken_answers import ANSWERS_MATCH, ANSWERS_OPEN, JSON_MATCH, JSON_OPEN
 from h5_edits import (
     attribute,
     claims,
@@ -30,19 +29,20 @@ from h5_edits import (
 )
 from submissions import (
     Build,
-    changed,
+    answers_edited,
+    answers_kept,
+    as_json,
     compound,
     edited,
     elsewhere,
     fifo,
     folder_itself,
     halved_precision,
+    huge_json,
     linked_to_fifo,
     missing,
-    normalised,
     other_truth,
     raw,
-    ray_distance,
     referenced,
     rows_kept,
     shuffled,
@@ -52,8 +52,6 @@ from submissions import (
     truth_itself,
     unknown_filter,
     virtual,
-    with_truth,
-    world_normals,
 )
 
 
@@ -119,9 +117,9 @@ OPEN = [
     ("no depth", ["depth", "no such dataset", "'normal'"], edited(gone("depth"))),
     ("depth under another name", ["depth", "no such dataset", "'depths'"], edited(
         lambda file: file.move("depth", "depths"))),
-    ("depth is a group", ["depth: a group"], edited(grouped("depth"))),
-    ("row is a group", ["row: a group"], edited(grouped("row"))),
-    ("depth is a named type", ["depth: a datatype"], edited(
+    ("depth is a group", ["depth", "a group"], edited(grouped("depth"))),
+    ("row is a group", ["row", "a group"], edited(grouped("row"))),
+    ("depth is a named type", ["depth", "a datatype"], edited(
         linked("depth", np.dtype("f4")))),
     ("depth is one number", ["depth", "shape ()"], edited(replaced("depth", lambda v: 1.5))),
     ("depth is nothing", ["depth", "shape None"], edited(
@@ -142,9 +140,9 @@ OPEN = [
         replaced("depth", lambda v: v.astype("c8")))),
     ("depth is compound", ["depth", "type compound"], edited(compound)),
     ("depth is references", ["depth", "type reference"], edited(referenced)),
-    ("fewer depths than rows", ["depth: 5 rows", "expected 8"], edited(
+    ("fewer depths than rows", ["depth", "5 rows", "expected 8"], edited(
         replaced("depth", lambda v: v[:5]))),
-    ("more normals than rows", ["normal: 16 rows", "expected 8"], edited(
+    ("more normals than rows", ["normal", "16 rows", "expected 8"], edited(
         replaced("normal", lambda v: np.tile(v, (2, 1, 1, 1))))),
     ("normals of two components", ["normal", "shape (8, 32, 32, 2)"], edited(
         replaced("normal", lambda v: v[..., :2]))),
@@ -159,7 +157,7 @@ OPEN = [
         replaced("row", lambda v: [str(i) for i in v]))),
     ("rows in two columns", ["row", "shape (8, 1)"], edited(
         replaced("row", lambda v: v[:, None]))),
-    ("no row at all", ["row: no rows"], edited(rows_kept(0))),
+    ("no row at all", ["row", "no rows"], edited(rows_kept(0))),
     ("a row twice", ["row", "more than once", "ids 2)"], edited(put("row", 5, 2))),
     ("all rows the same", ["row", "more than once", "ids 0)"], edited(
         values("row", lambda v: 0 * v))),
@@ -177,25 +175,26 @@ OPEN = [
         claims("depth", (8, 10**5, 10**5), chunks=(1, 1000, 1000)))),
     ("chunks of a gigabyte", ["depth", "MiB to unpack"], edited(
         claims("depth", (8, 32, 32), chunks=(250_000, 32, 32), maxshape=(None, 32, 32)))),
-    ("an external link", ["depth: a link to the file 'other.h5'"], edited(
+    ("an external link", ["depth", "a link to the file 'other.h5'"], edited(
         linked("depth", h5py.ExternalLink("other.h5", "/depth")))),
-    ("an external link to a fifo", ["depth: a link to the file", "pipe.h5"], linked_to_fifo),
-    ("a soft link to nowhere", ["depth: a link"], edited(
+    ("an external link to a fifo", ["depth", "a link to the file", "pipe.h5"], linked_to_fifo),
+    ("a soft link to nowhere", ["depth", "a link"], edited(
         linked("depth", h5py.SoftLink("/nowhere")))),
-    ("a soft link to itself", ["depth: a link"], edited(linked("depth", h5py.SoftLink("/depth")))),
+    ("a soft link to itself", ["depth", "a link"], edited(
+        linked("depth", h5py.SoftLink("/depth")))),
     ("values in a raw file", ["depth", "in another file"], elsewhere),
     ("a virtual dataset", ["depth", "in another file"], edited(virtual)),
 ]  # fmt: skip
 
 MATCH = [
     ("other rooms", ["truth_fingerprint", "0123456789ab"], other_truth),
-    ("truth not there", ["truth not found", "gone/rooms.h5", "--truth"], edited(
+    ("truth not there", ["truth", "nothing at", "gone/rooms.h5", "--truth"], edited(
         attribute("truth_path", "gone/rooms.h5"))),
-    ("truth not named", ["names no truth", "--truth"], edited(attribute("truth_path", ""))),
+    ("truth not named", ["no path of a truth", "--truth"], edited(attribute("truth_path", ""))),
     ("truth is something else", ["other.h5", "not a rooms file"], truth_is_no_rooms_file),
     ("images too small", ["depth", "16x16", "expected 32x32"], edited(smaller)),
-    ("rows missing", ["row: 3 of 8 missing", "ids 5, 6, 7)"], edited(rows_kept(5))),
-    ("a row unknown", ["row: 1 that the truth does not have", "ids 8)"], edited(put("row", 3, 8))),
+    ("rows missing", ["row", "3 of 8 missing", "ids 5, 6, 7)"], edited(rows_kept(5))),
+    ("a row unknown", ["row", "1 that the truth does not", "ids 8)"], edited(put("row", 3, 8))),
     ("counted from 1", ["row", "does not have", "ids 8)"], edited(
         values("row", lambda v: v + 1))),
 ]  # fmt: skip
@@ -219,24 +218,87 @@ VALUES = [
     ("an unknown filter", ["depth", "cannot be read"], edited(unknown_filter)),
 ]  # fmt: skip
 
+# `submissions/hints` has the tests of each hint; here is one of each kind for the commands.
 HINTS = [
-    ("ray distance", ["distance along the ray"], with_truth(ray_distance)),
-    ("disparity", ["disparity (1/depth)"], changed("depth", lambda v: 1 / v)),
-    ("z instead of depth", ["which is negative"], changed("depth", np.negative)),
-    ("millimetres", ["1,000 times", "millimetres"], changed("depth", lambda v: 1000 * v)),
-    ("a room of edge 2", ["2 times the truth"], changed("depth", lambda v: 2 * v)),
-    ("depth from 0 to 1", ["normalised to 0..1"], changed("depth", normalised)),
-    ("upside down", ["upside down"], changed("depth", lambda v: v[:, ::-1])),
-    ("mirrored", ["mirrored"], changed("depth", lambda v: v[:, :, ::-1])),
-    ("transposed", ["transposed"], changed("depth", lambda v: v.swapaxes(1, 2))),
-    ("rows shuffled", ["rows look shuffled"], edited(shuffled)),
-    ("flipped normals", ["facing away"], changed("normal", np.negative)),
-    ("world normals", ["world frame"], with_truth(world_normals)),
-    ("normals of OpenCV", ["OpenCV"], changed("normal", lambda v: v * [1, -1, -1])),
-    ("normals with y down", ["y down"], changed("normal", lambda v: v * [1, -1, 1])),
-    ("normals from 0 to 1", ["0..1 for -1..1"], changed("normal", lambda v: (v + 1) / 2)),
-    ("normals from 0 to 255", ["0..255 for -1..1"], changed(
-        "normal", lambda v: np.rint(127.5 * (v + 1)))),
+    ("upside down", ["depth", "upside down"], edited(values("depth", lambda v: v[:, ::-1]))),
+    ("rows shuffled", ["row", "rows look shuffled"], edited(shuffled)),
+    ("flipped normals", ["normal", "facing away"], edited(values("normal", np.negative))),
+]
+
+ANSWERS_OPEN = [
+    ("no questions", ["question", "no such dataset"], answers_edited(gone("question"))),
+    ("neither answer nor scores", ["answer", "neither"], answers_edited(gone("answer", "scores"))),
+    ("answer and scores disagree", ["answer", "other than scores say", "ids 2)"], answers_edited(
+        put("answer", 2, 0))),
+    ("an answer of 3", ["answer", "1 outside -1 to 2, such as 3", "ids 4)"], answers_edited(
+        in_all(gone("scores"), put("answer", 4, 3)))),
+    ("an answer of -2", ["answer", "such as -2"], answers_edited(
+        in_all(gone("scores"), put("answer", 4, -2)))),
+    ("answers are floats", ["answer", "float32", "expected integers"], answers_edited(
+        replaced("answer", lambda v: v.astype("f4")))),
+    ("answers are letters", ["answer", "type text"], answers_edited(
+        replaced("answer", lambda v: list("abccba")))),
+    ("a score of NaN", ["scores", "NaN", "ids 1)"], answers_edited(
+        put("scores", (1, 2), np.nan))),
+    ("an infinite score", ["scores", "infinite", "ids 5)"], answers_edited(
+        put("scores", (5, 0), np.inf))),
+    ("scores for four", ["scores", "shape (6, 4)", "(M, 3)"], answers_edited(
+        replaced("scores", lambda v: np.zeros((6, 4))))),
+    ("scores are an external link", ["scores", "a link"], answers_edited(
+        linked("scores", h5py.ExternalLink("other.h5", "/scores")))),
+    ("fewer answers than questions", ["answer", "4 rows", "expected 6"], answers_edited(
+        replaced("answer", lambda v: v[:4]))),
+    ("a question twice", ["question", "more than once"], answers_edited(put("question", 3, 0))),
+]  # fmt: skip
+
+ANSWERS_MATCH = [
+    ("questions missing", ["question", "2 of 6 missing", "ids 4, 5)"], answers_edited(
+        answers_kept(4))),
+    ("a question unknown", ["question", "does not have", "ids 77)"], answers_edited(
+        put("question", 3, 77))),
+    ("other questions", ["truth_fingerprint"], answers_edited(
+        attribute("truth_fingerprint", "f" * 64))),
+]  # fmt: skip
+
+JSON_OPEN = [
+    ("JSON: malformed", ["no JSON"], as_json("[0, 1, 2")),
+    ("JSON: empty", ["no JSON"], as_json("")),
+    ("JSON: nested deeply", ["nested too deeply"], as_json("[" * 200_000)),
+    ("JSON: nested", ["expected 0, 1, 2"], as_json([[0], [1], [2], [0], [1], [2]])),
+    ("JSON: NaN", ["NaN"], as_json("[0, 1, NaN, 0, 1, 2]")),
+    ("JSON: infinity", ["inf"], as_json("[0, 1, 1e999, 0, 1, 2]")),
+    ("JSON: floats", ["1.0", "ids 1)"], as_json("[0, 1.0, 2, 0, 1, 2]")),
+    ("JSON: booleans", ["true", "ids 0)"], as_json("[true, 1, 2, 0, 1, 2]")),
+    ("JSON: null", ["null"], as_json("[null, 1, 2, 0, 1, 2]")),
+    ("JSON: texts", ["'0'", "ids 0, 1"], as_json(["0", "1", "2", "0", "1", "2"])),
+    ("JSON: out of range", ["outside -1 to 2, such as 3", "ids 5)"], as_json([0, 1, 2, 0, 1, 3])),
+    ("JSON: a huge number", ["ids 0)"], as_json([10**30, 1, 2, 0, 1, 2])),
+    ("JSON: a number of 5000 digits", ["no JSON"], as_json("[" + "1" * 5000 + "]")),
+    ("JSON: no answers", ["no rows"], as_json([])),
+    ("JSON: no answers in an object", ["no rows"], as_json({})),
+    ("JSON: a number", ["7", "a list or an object"], as_json(7)),
+    ("JSON: a key twice", ["the key '1' twice"], as_json('{"0": 1, "1": 2, "1": 0}')),
+    ("JSON: a key that is no number", ["the key 'one'"], as_json({"one": 1})),
+    ("JSON: a key with zeros", ["the key '01'"], as_json({"01": 1})),
+    ("JSON: a negative key", ["the key '-1'"], as_json({"-1": 1})),
+    ("JSON: a key beyond all", ["the key '99999999999'"], as_json({"99999999999": 1})),
+    ("JSON: an unknown key", ["model", "this key"], as_json({"answers": [0] * 6, "model": "x"})),
+    ("JSON: answers are a text", ["'012012'", "a list or"], as_json({"answers": "012012"})),
+    ("JSON: method is a number", ["method", "7"], as_json({"answers": [0] * 6, "method": 7})),
+    ("JSON: method is null", ["method", "null"], as_json({"answers": [0] * 6, "method": None})),
+    ("JSON: method is empty", ["method", "empty"], as_json({"answers": [0] * 6, "method": ""})),
+    ("JSON: method of half a character", ["method", r"\ud800"], as_json(
+        '{"answers": [0, 0, 0, 0, 0, 0], "method": "\\ud800"}')),
+    ("JSON: not UTF-8", ["not UTF-8"], raw(b'["\xff\xfe"]', "answers.json")),
+    ("JSON: binary", ["no JSON"], raw(b"\x00\x01\x02" * 100, "answers.json")),
+    ("JSON: 40 MB", ["40000000 bytes"], huge_json),
+]  # fmt: skip
+
+JSON_MATCH = [
+    ("JSON: too few", ["question", "2 of 6 missing", "ids 4, 5)"], as_json([0, 1, 2, 0])),
+    ("JSON: too many", ["1 that the truth does not have", "ids 6)"], as_json([0] * 7)),
+    ("JSON: a question left out", ["1 of 6 missing", "ids 3)"], as_json(
+        {"answers": {"0": 0, "1": 1, "2": 2, "4": -1, "5": 1}, "method": "m"})),
 ]  # fmt: skip
 
 

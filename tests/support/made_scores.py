@@ -3,8 +3,8 @@
 import numpy as np
 
 from metrics.measures.answers import CHANCE
-from metrics.measures.statistics import Estimate, cluster_means
-from metrics.score_file import Meta, Score, ScoreFile, Submission, score
+from metrics.measures.statistics import cluster_means
+from metrics.score_file import Meta, Score, ScoreFile, Submission
 from metrics.scoring.metric_names import metric
 
 TRUTH = "0123456789abcdef" * 4
@@ -33,7 +33,7 @@ def make_meta(method, runs=1, truth=TRUTH, **other):
 def make_score(name, values, clusters, std=None):
     means = cluster_means(values, clusters)
     mean = float(means.mean())
-    return score(name, Estimate(mean, 0.9 * mean, 1.1 * mean, len(means)), std)
+    return Score(mean, 0.9 * mean, 1.1 * mean, metric(name).unit, len(means), std)
 
 
 def rooms_scores(method, columns, scenes, runs=1, rows=None, **other):

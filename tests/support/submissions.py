@@ -12,10 +12,9 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from h5_edits import linked, replaced, values
+from h5_edits import attribute, in_all, linked, replaced
 
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
-from scenegen.camera import pixel_directions
 from scenegen.rooms.reader import RoomsFile
 
 Build = Callable[[Path, Path], Path]
@@ -84,18 +83,6 @@ def answers_edited(edit: Callable[[h5py.File], object]) -> Build:
     return edited(edit, good_answers)
 
 
-def with_truth(change) -> Build:
-    """A good file, changed by a function of the file and the opened truth."""
-
-    def build(folder, truth):
-        path = good_rooms(folder, truth)
-        with h5py.File(path, "r+") as file, RoomsFile(truth) as rooms:
-            change(file, rooms)
-        return path
-
-    return build
-
-
 def raw(content: bytes, name: str = "predictions.h5") -> Build:
     def build(folder, truth):
         (folder / name).write_bytes(content)
@@ -147,11 +134,8 @@ def huge_json(folder, truth):
 
 def linked_to_fifo(folder, truth):
     """Whoever opened what the link names would wait for ever."""
-    path = good_rooms(folder, truth)
     os.mkfifo(folder / "pipe.h5")
-    with h5py.File(path, "r+") as file:
-        linked("depth", h5py.ExternalLink("pipe.h5", "/depth"))(file)
-    return path
+    return edited(linked("depth", h5py.ExternalLink("pipe.h5", "/depth")))(folder, truth)
 
 
 def elsewhere(folder, truth):
@@ -198,72 +182,35 @@ def compound(file):
     file["depth"] = np.zeros((8, 32, 32), kind)
 
 
-def other_truth(folder, truth):
-    """Predictions for other rooms of the same number and size."""
-    path = good_rooms(folder, truth)
-    with h5py.File(path, "r+") as file:
-        file.attrs["truth_fingerprint"] = "0123456789ab" + "0" * 52
-    return path
+# Predictions for other rooms of the same number and size.
+other_truth = edited(attribute("truth_fingerprint", "0123456789ab" + "0" * 52))
 
 
 def truth_is_no_rooms_file(folder, truth):
-    path = good_rooms(folder, truth)
     with h5py.File(folder / "other.h5", "w") as file:
         file["x"] = 1
-    with h5py.File(path, "r+") as file:
-        file.attrs["truth_path"] = "other.h5"
-    return path
+    return edited(attribute("truth_path", "other.h5"))(folder, truth)
 
 
-def smaller(file):
-    for name in ("depth", "normal"):
-        replaced(name, lambda v: v[:, ::2, ::2])(file)
+def each(names, change):
+    """The same change of several datasets."""
+    return in_all(*(replaced(name, change) for name in names))
+
+
+smaller = each(("depth", "normal"), lambda v: v[:, ::2, ::2])
 
 
 def rows_kept(count):
-    def edit(file):
-        for name in ("row", "depth", "normal"):
-            replaced(name, lambda v: v[:count])(file)
-
-    return edit
+    return each(("row", "depth", "normal"), lambda v: v[:count])
 
 
 def answers_kept(count):
-    def edit(file):
-        for name in ("question", "answer", "scores"):
-            replaced(name, lambda v: v[:count])(file)
-
-    return edit
-
-
-def stretch(rooms):
-    fov = rooms.read("camera/fov_y_degrees", 0)
-    return np.linalg.norm(pixel_directions(32, 32, fov), axis=-1)
-
-
-def ray_distance(file, rooms):
-    file["depth"][...] = file["depth"][()] * stretch(rooms)
-
-
-def world_normals(file, rooms):
-    rotation = rooms.read("camera/world_from_camera", slice(None))[:, :3, :3]
-    file["normal"][...] = np.einsum("nij,nhwj->nhwi", rotation, file["normal"][()])
-
-
-def changed(name, change):
-    """A mistake that needs no truth."""
-    return with_truth(lambda file, rooms: values(name, change)(file))
-
-
-def normalised(depth):
-    low, high = depth.min((1, 2), keepdims=True), depth.max((1, 2), keepdims=True)
-    return (depth - low) / (high - low)
+    return each(("question", "answer", "scores"), lambda v: v[:count])
 
 
 def shuffled(file):
     order = np.random.default_rng(1).permutation(8)
-    for name in ("depth", "normal"):
-        values(name, lambda v: v[order])(file)
+    each(("depth", "normal"), lambda v: v[order])(file)
 
 
 def halved_precision(depth):

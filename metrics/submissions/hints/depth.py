@@ -1,4 +1,4 @@
-"""Known mistakes in depth: another quantity, another scale, another orientation of the image."""
+"""Hints on depth that is another quantity, or has another scale or image orientation."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,18 +12,18 @@ from metrics.submissions.problems import HINT, Problem
 
 Array = NDArray[Any]
 Remedy = Callable[[Sample], Array]
-BETTER = 0.5  # to which part a remedy must bring the error
-SHARE = 0.6  # of the images in which it must
-CORRELATED = 0.6
-SWAPPED = 0.8
-SAME_SCALE = 1.5  # factors within which scales are taken for the same
+BETTER = 0.5  # fraction of the error that may remain after a remedy
+SHARE = 0.6  # fraction of the images in which a remedy must help so much
+CORRELATED = 0.6  # least correlation with the truth of depth in another scale
+SWAPPED = 0.8  # least correlation with 1 / truth of disparity
+SAME_SCALE = 1.5  # factor within which two scales count as the same
 FEWEST = 3  # images that can share a scale
-OTHER_UNIT = 10.0
+OTHER_UNIT = 10.0  # least factor that looks like another unit of length
 UNITS = {1000.0: "millimetres for metres", 100.0: "centimetres for metres"}
 
 
 def depth_hints(samples: Sequence[Sample], alignment: str) -> list[Problem]:
-    """Hints on depth from sampled images; `alignment` is what the submission claims."""
+    """Return hints on depth from sampled images; `alignment` is what the submission claims."""
     with np.errstate(all="ignore"):  # whatever comes out not finite satisfies no rule
         usable = [_Image.of(sample) for sample in samples]
         images = [image for image in usable if image is not None]
@@ -40,7 +40,7 @@ class _Image:
 
     Attributes:
         predicted, true: depth, (N,).
-        spread: median distance of the truth from its own median: what a constant would score.
+        spread: median distance of the truth from its median, which is what a constant scores.
         scale: median of predicted / true.
     """
 
@@ -52,21 +52,21 @@ class _Image:
 
     @staticmethod
     def of(sample: Sample) -> "_Image | None":
-        """The pixels of a sample; None of a flat truth, which tells nothing."""
+        """Return the pixels of a sample; None where the truth is flat, so that none can differ."""
         predicted, true = sample.depth[sample.mask], sample.true_depth[sample.mask]
         spread = _error(true, np.median(true))
         scale = float(np.median(predicted / true))
         return _Image(sample, predicted, true, spread, scale) if spread > 0.0 else None
 
     def correlation(self, quantity: Array) -> float:
-        """Of the prediction with a quantity (N,); 0 where either is constant."""
+        """Return the correlation of the prediction with values (N,); 0 where one is constant."""
         a, b = _centred(self.predicted), _centred(quantity)
         below = float(np.sqrt((a * a).sum() * (b * b).sum()))
         return float((a * b).sum()) / below if below > 0.0 else 0.0
 
 
 def _swapped(images: Sequence[_Image]) -> str | None:
-    """Near and far the wrong way round: disparity, or z itself."""
+    """Return what the predictions look like where near and far are swapped."""
     if np.mean([image.correlation(1.0 / image.true) >= SWAPPED for image in images]) < SHARE:
         return None
     if np.mean([np.median(image.predicted) < 0.0 for image in images]) > SHARE:
@@ -75,7 +75,7 @@ def _swapped(images: Sequence[_Image]) -> str | None:
 
 
 def _shape(images: Sequence[_Image]) -> str | None:
-    """The remedy that explains the predictions, whatever their scale, if there is one."""
+    """Return the remedy that explains the predictions in any scale, if there is one."""
     rivals = _simple_errors(images)
     best, found = np.inf, None
     for text, remedy in _REMEDIES.items():
@@ -91,13 +91,13 @@ def _shape(images: Sequence[_Image]) -> str | None:
 
 
 def _mended(sample: Sample, remedy: Remedy) -> Array:
-    """The values (N,) that a remedy puts where both depths are finite; infinite for none."""
+    """Return the values (N,) of a remedy where both depths are finite; infinite for NaN."""
     values = remedy(sample)[sample.mask]
     return np.where(np.isfinite(values), values, np.inf)
 
 
 def _simple_errors(images: Sequence[_Image]) -> Array:
-    """For each image the least error as it is, and after the file's best scale, or line."""
+    """Return for each image the least error: as given, or after one scale or line for all."""
     predicted = np.concatenate([image.predicted for image in images])
     true = np.concatenate([image.true for image in images])
     scaled = predicted / np.median(predicted / true)
@@ -116,7 +116,7 @@ def _simple_errors(images: Sequence[_Image]) -> Array:
 
 
 def _scale(images: Sequence[_Image], alignment: str) -> str | None:
-    """Values within 0 to 1, or a factor that all images share; unless alignment takes it out."""
+    """Return what the scale looks like, such as normalised or another unit, unless aligned away."""
     if alignment == "scale_shift":
         return None
     scales = np.array([image.scale for image in images])
@@ -147,7 +147,7 @@ def _error(a: Array, b: Any) -> float:
 
 
 def _centred(values: Array) -> Array:
-    """Values (N,) about their mean, of a size whose squares neither vanish nor overflow."""
+    """Return values (N,) minus their mean, scaled so that squares do not vanish or overflow."""
     centred = values - values.mean()
     size = float(np.abs(centred).max())
     # What is left of a constant by rounding is no signal.

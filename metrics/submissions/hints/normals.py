@@ -1,4 +1,4 @@
-"""Known mistakes in normals: another frame, another direction, another encoding."""
+"""Hints on normals in another frame, of another direction, or in another encoding."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -10,13 +10,13 @@ from metrics.submissions.hints.samples import Sample
 from metrics.submissions.problems import HINT, Problem
 
 Array = NDArray[Any]
-BETTER = 0.5  # to which part a remedy must bring the mean angle
-SHARE = 0.6  # of the images in which it must
-CLOSE_DEGREES = 30.0
+BETTER = 0.5  # fraction of the mean angle that may remain after a remedy
+SHARE = 0.6  # fraction of the images in which a remedy must help so much
+CLOSE_DEGREES = 30.0  # largest mean angle after a remedy
 
 
 def normal_hints(samples: Sequence[Sample]) -> list[Problem]:
-    """The remedy that explains the predicted normals, if there is one."""
+    """Return a hint on the remedy that explains the predicted normals, if there is one."""
     with np.errstate(all="ignore"):  # whatever comes out not finite satisfies no rule
         pairs = [(s, s.normal) for s in samples if s.normal is not None]
         as_given = np.array([_mean_angle(s, normal) for s, normal in pairs])
@@ -31,7 +31,7 @@ def normal_hints(samples: Sequence[Sample]) -> list[Problem]:
 
 
 def _mean_angle(sample: Sample, normal: Array) -> float:
-    """Mean angle to the true normals, in degrees; NaN where there is none to compare."""
+    """Return the mean angle to the true normals, in degrees; NaN where few can be compared."""
     mask = sample.mask & sample.true_normal.any(axis=-1)
     p, t = normal[mask], sample.true_normal[mask]
     p = p / np.abs(p).max(axis=-1, keepdims=True)

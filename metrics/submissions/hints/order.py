@@ -1,4 +1,4 @@
-"""Rows in another order than the truth's: each prediction fits another row than its own."""
+"""Hints on rows in another order than the truth's, so that predictions fit other rows."""
 
 import warnings
 from contextlib import suppress
@@ -14,18 +14,18 @@ from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
-TRUTHS = 4096  # rows of the truth among which the right one is sought
-PREDICTIONS = 64
-SIDE = 8  # pixels of each side by which rows are compared, at most twice as many
+TRUTHS = 4096  # rows of the truth among which the right one is searched
+PREDICTIONS = 64  # rows of the submission that are searched for
+SIDE = 8  # pixels per side by which rows are compared, at most twice as many
 # Measured: of good predictions for other rooms 3 to 16% are so clear, among 8 to 4000 rows.
-CLEAR = 0.7  # the part of the second best row's error to which the best one's must fall
-FIT = 0.5  # the part of what a constant would score to which the best row's error must fall
-SHARE = 0.5  # of the predictions
-FEWEST = 4  # rows
+CLEAR = 0.7  # largest error of the best row, as a fraction of the second best one's
+FIT = 0.5  # largest error of the best row, as a fraction of what a constant would score
+SHARE = 0.5  # fraction of the predictions that must fit other rows
+FEWEST = 4  # rows without which there is no hint
 
 
 def order_hints(predictions: RoomPredictions, truth: RoomsFile) -> list[Problem]:
-    """Say whether most predictions clearly fit another row of the truth, each its own one."""
+    """Return a hint where most predictions clearly fit another row, each a different one."""
     rows = predictions.rows
     entries = np.flatnonzero((rows >= 0) & (rows < len(truth)))
     candidates = np.unique(rows[entries])[:TRUTHS]
@@ -54,7 +54,7 @@ def order_hints(predictions: RoomPredictions, truth: RoomsFile) -> list[Problem]
 
 
 def _other_row(predicted: Array, known: Array, own: int) -> int | None:
-    """Which of the known images (N, P) a prediction (P,) clearly shows, if it is not its own."""
+    """Return which of the images (N, P) a prediction (P,) clearly shows, unless it is its own."""
     errors = np.nanmean(np.abs(known - predicted), axis=1)
     if not np.isfinite(errors).all():
         return None

@@ -1,4 +1,4 @@
-"""A sample of predictions beside their truth, for the tests of `hints`."""
+"""Samples of predicted images beside their truth, at which hints look."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -14,12 +14,12 @@ from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 ROWS = 24
-SIDE = 32  # about so many pixels of each side are looked at, at most twice as many
+SIDE = 32  # pixels per side that hints look at, at most twice as many
 
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Predicted and true pixels of one image, on a grid that mirrors onto itself.
+    """Predicted and true pixels of one image, on a grid that is its own mirror image.
 
     Attributes:
         depth: predicted planar depth, (h, w).
@@ -41,7 +41,7 @@ class Sample:
 
 
 def sample_rooms(predictions: RoomPredictions, truth: RoomsFile) -> list[Sample]:
-    """Read some rows, spread evenly over a submission; those that can be used."""
+    """Return the usable ones of some rows that are spread evenly over a submission."""
     entries = np.flatnonzero((predictions.rows >= 0) & (predictions.rows < len(truth)))
     if len(entries) == 0:
         return []
@@ -51,7 +51,7 @@ def sample_rooms(predictions: RoomPredictions, truth: RoomsFile) -> list[Sample]
 
 
 def mirrored_grid(count: int, about: int) -> Array:
-    """Indices (n,), `about` to twice as many, spread over range(count) and symmetric in it."""
+    """Return `about` to twice as many indices, spread over range(count) and symmetric in it."""
     if count <= 2 * about:
         return np.arange(count)
     first = np.floor(np.linspace(0, count - 1, about)).astype(np.int64)

@@ -16,8 +16,8 @@ from metrics.report.charts import histogram, intervals
 from metrics.report.html import render
 from metrics.report.page import html_report
 from metrics.report.pictures import view_pictures
+from metrics.scoring.evaluate import score
 from metrics.scoring.records import Submission
-from metrics.scoring.scoring import score
 from scenegen.rooms.preview import NOTHING
 
 HOSTILE = "</title></style><script>alert(1)</script>\"'><img src=http://x.y>&"

@@ -9,7 +9,7 @@ import pytest
 from h5_edits import damaged_chunk, put, values
 from pix2shape_models import edited, made, of_questions, reordered, tiny, told, written
 
-from metrics.scoring.scoring import score
+from metrics.scoring.evaluate import score
 from metrics.submissions.validation import validate
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError

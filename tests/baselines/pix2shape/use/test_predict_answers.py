@@ -11,7 +11,7 @@ from h5_edits import attribute, damaged_chunk, gone, put
 from pix2shape_models import edited, made, of_questions, released
 
 from iqtt.files.reader import open_questions
-from metrics.scoring.scoring import score
+from metrics.scoring.evaluate import score
 from metrics.submissions.validation import validate
 from scenegen.common.errors import FileFormatError, SceneGenError
 

@@ -1,11 +1,8 @@
-"""Hints on whole submissions: what spoils them, and those on answers."""
+"""Hints on whole submissions of rooms: what must not spoil them."""
 
 import h5py
 import numpy as np
 import pytest
-
-from metrics.submissions.hints.hints import answer_hints
-from metrics.submissions.reader import QuestionPredictions
 
 
 def test_rooms_of_another_file_get_no_hint(hints, make_rooms, tmp_path):
@@ -39,25 +36,3 @@ def test_a_truth_with_holes(hints, hint_truth, room_arrays, tmp_path):
     assert hints(depth, normal, truth=path) == []
     told = hints(depth * stretch, -normal, truth=path)
     assert ["along the ray" in told[0], "away" in told[1]] == [True, True]
-
-
-def answered(scores, rows=None):
-    """A submission with these scores (Q, 3)."""
-    found = QuestionPredictions.__new__(QuestionPredictions)
-    found.rows = np.arange(len(scores)) if rows is None else rows
-    found.__dict__["scores"] = scores
-    return found
-
-
-def test_scores_that_are_distances():
-    rng = np.random.default_rng(7)
-    right = rng.integers(0, 3, 300)
-    scores = rng.random((300, 3))
-    assert answer_hints(answered(scores), right) == []
-    scores[np.arange(300), right] += 0.5
-    assert answer_hints(answered(scores), right) == []
-    (hint,) = answer_hints(answered(-scores), right)
-    assert hint.is_hint
-    assert "distances" in hint.got
-    assert answer_hints(answered(-scores[:3]), right) == [], "too few to tell"
-    assert answer_hints(answered(None, np.arange(3)), right) == []

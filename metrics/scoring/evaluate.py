@@ -1,4 +1,4 @@
-"""Submissions -> scores with intervals: the whole of `bench score` but for its printing."""
+"""`score` turns submissions into scores with intervals: start reading here."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -6,9 +6,8 @@ from pathlib import Path
 
 from metrics.scoring.questions import score_questions
 from metrics.scoring.records import ScoreFile
-from metrics.scoring.room_rows import ScoringError
 from metrics.scoring.rooms import score_rooms
-from metrics.scoring.runs import Progress, Settings
+from metrics.scoring.runs import Progress, ScoringError, Settings
 from metrics.submissions.reader import (
     QuestionPredictions,
     RoomPredictions,
@@ -33,7 +32,7 @@ def score(
         paths: submissions of one method, task and alignment.
         truth: where the truth lies, unless the submissions say so.
         settings: None for the defaults.
-        progress: is told how many more rows were scored.
+        progress: called with the number of rows that were scored since it was last called.
 
     Raises:
         OSError: a file that is not there.
@@ -70,9 +69,14 @@ def _check_alike(files: Sequence[RoomPredictions | QuestionPredictions]) -> None
             ours, theirs = (getattr(one, name, None) for one in (first, file))
             if ours != theirs:
                 raise ScoringError(
-                    f"{file.path}: {name} {theirs!r}, but {first.path} has {ours!r}: only runs of"
-                    f" one method are averaged; score others by themselves, then `bench compare`"
+                    f"{file.path}: {name}",
+                    repr(theirs),
+                    f"{ours!r} as in {first.path}",
+                    "only runs of one method are averaged; score others by themselves, then"
+                    " `bench compare`",
                 )
         if file.sha256 in seen:
-            raise ScoringError(f"{file.path}: the same bytes as {seen[file.sha256]}")
+            raise ScoringError(
+                file.path, f"the same bytes as in {seen[file.sha256]}", "each submission once"
+            )
         seen[file.sha256] = file.path

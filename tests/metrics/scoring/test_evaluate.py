@@ -1,6 +1,7 @@
 """Submissions against truths: what is averaged over what, and what is refused."""
 
 import shutil
+from importlib.metadata import version
 
 import h5py
 import numpy as np
@@ -12,10 +13,10 @@ from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.score_file import read_scores, to_json, write_scores
+from metrics.scoring.evaluate import score
 from metrics.scoring.metric_names import metric
-from metrics.scoring.room_rows import ScoringError, view_angles
-from metrics.scoring.runs import Settings
-from metrics.scoring.scoring import score
+from metrics.scoring.rooms import view_angles
+from metrics.scoring.runs import ScoringError, Settings
 from scenegen.camera import Camera, back_project
 from scenegen.rooms.reader import RoomsFile
 
@@ -88,6 +89,31 @@ def test_processes_change_no_digit(folder):
     assert score(paths).metrics["chamfer"].value > 0.005
 
 
+def test_files_are_opened_once_however_many_rows_they_have(folder, monkeypatch):
+    """Not once for each chunk of rows, or the cost would grow with the square of their number."""
+    opened = []
+    real = h5py.File
+
+    def counted(name, *arguments, **options):
+        opened.append(name)
+        return real(name, *arguments, **options)
+
+    monkeypatch.setattr(h5py, "File", counted)
+    counts = []
+    for chunk in (8, 1):
+        opened.clear()
+        monkeypatch.setattr("metrics.scoring.rooms.CHUNK", chunk)
+        score([folder / "empty-room.h5"], settings=Settings(processes=1))
+        counts.append(len(opened))
+    assert counts[0] == counts[1]
+
+
+def test_provenance_names_the_libraries_that_compute(folder, questions):
+    for path in (folder / "oracle.h5", questions / "chance-0.h5"):
+        versions = score([path]).meta.versions
+        assert versions == {name: version(name) for name in ("numpy", "pykdtree", "scipy")}
+
+
 def test_the_seed_moves_intervals_only(folder):
     first, second = (
         score([folder / "empty-room.h5"], settings=Settings(seed=seed)).metrics["chamfer"]
@@ -146,8 +172,11 @@ def test_missing_rows_are_refused_or_stamped(folder, tmp_path):
     ):
         for row in (1, 4, 6):
             out.add(row, rooms[row].depth)
-    with pytest.raises(ScoringError, match=r"5 of 8 missing.*--allow-partial"):
+    with pytest.raises(ScoringError) as caught:
         score([path])
+    assert caught.value.where == f"{path}: row"
+    assert caught.value.found.startswith("5 of 8 missing")
+    assert "--allow-partial" in caught.value.hint
     found = score([path], settings=Settings(allow_partial=True))
     assert not found.comparable
     assert found.items["row"].tolist() == [1, 4, 6]
@@ -166,8 +195,10 @@ def test_what_is_not_finite_is_refused_with_its_rows_or_penalised(folder, tmp_pa
         file["depth"] = depth
         file["depth"].attrs.update(attributes)
         row = int(file["row"][5])
-    with pytest.raises(ScoringError, match=rf"row {row}; 1 rows.*--non-finite penalise"):
+    with pytest.raises(ScoringError) as caught:
         score([path])
+    assert caught.value.where == f"{path}: row {row}"
+    assert "--non-finite penalise" in caught.value.hint
     found = score([path], settings=Settings(non_finite="penalise"))
     assert not found.comparable
     assert found.meta.counts["rows_penalised"] == 1
@@ -180,15 +211,36 @@ def test_what_is_not_finite_is_refused_with_its_rows_or_penalised(folder, tmp_pa
 
 def test_another_truth_is_refused(folder, make_rooms, tmp_path):
     other = make_rooms(tmp_path / "other.h5", 8, seed=99)
-    with pytest.raises(ScoringError, match="fingerprint"):
+    with pytest.raises(ScoringError) as caught:
         score([folder / "oracle.h5"], other)
+    assert caught.value.where.endswith("oracle.h5: truth_fingerprint")
 
 
 def test_only_runs_of_one_method_are_averaged(folder):
-    with pytest.raises(ScoringError, match=r"method 'oracle'.*bench compare"):
+    with pytest.raises(ScoringError) as caught:
         score([folder / "empty-room.h5", folder / "oracle.h5"])
-    with pytest.raises(ScoringError, match="the same bytes"):
+    assert caught.value.where.endswith("oracle.h5: method")
+    assert "bench compare" in caught.value.hint
+    with pytest.raises(ScoringError) as caught:
         score([folder / "oracle.h5", folder / "oracle.h5"])
+    assert caught.value.expected == "each submission once"
+
+
+def test_runs_must_have_something_in_common(folder, tmp_path):
+    """Normals in all of them or in none, and some rows."""
+    truth, paths = folder / "rooms.h5", {}
+    with RoomsFile(truth) as rooms:
+        for name, rows, normals in (("a", (0, 1), True), ("b", (0, 1), False), ("c", (2,), False)):
+            paths[name] = tmp_path / f"{name}.h5"
+            with RoomPredictionWriter(
+                paths[name], truth, method="m", run=name, allow_partial=True
+            ) as out:
+                for row in rows:
+                    out.add(row, rooms[row].depth, rooms[row].normal if normals else None)
+    for first, second, where in (("a", "b", "b.h5: normal"), ("b", "c", "b.h5")):
+        with pytest.raises(ScoringError) as caught:
+            score([paths[first], paths[second]], settings=Settings(allow_partial=True))
+        assert caught.value.where == f"{tmp_path}/{where}"
 
 
 def test_answers_are_scored_by_kind_angle_and_place(questions):

@@ -1,4 +1,4 @@
-"""All scores of one image: predicted depth and normals against the truth's."""
+"""All scores of one image: predicted depth and normals against the true ones."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,10 +22,10 @@ ALIGNMENTS: tuple[Alignment, ...] = ("none", "scale", "scale_shift")
 
 @dataclass(frozen=True, eq=False)
 class TrueView:
-    """What is true of one image.
+    """The true depth, normals and objects of one image.
 
     Attributes:
-        depth: planar, (H, W), scene units; the scored pixels are those where it is finite.
+        depth: planar depth, (H, W), scene units; the pixels where it is finite are scored.
         normal: (H, W, 3), camera frame, unit, facing the viewer.
         object_id: (H, W).
         fov_y_degrees: vertical field of view.
@@ -59,8 +59,8 @@ def score_view(
         depth: predicted planar depth, (H, W), scene units.
         normal: predicted normals, (H, W, 3), camera frame; None where the method gives none.
         truth: what it is compared with.
-        alignments: after which the scores of depth are given as well; points are never aligned.
-        non_finite: what becomes of values that are not finite at a scored pixel. "penalise" scores
+        alignments: the alignments after which depth is scored; points are never aligned.
+        non_finite: what to do with values that are not finite at a scored pixel. "penalise" scores
             them at the worst: depth as 0 (at the camera), a normal as opposite to the true one.
 
     Raises NonFiniteError with the count and the first pixel, unless they are penalised, and
@@ -87,12 +87,12 @@ def score_view(
 
 
 def chamfer_floor(truth: TrueView) -> float:
-    """The Chamfer distance of the true surface to itself, seen at the corners between pixels.
+    """Return the Chamfer distance between two samples of the true surface, in scene units.
 
-    What remains between two samples of one surface at this resolution: a method whose surfels lie
-    on the true surface, but not on the truth's rays, scores about this. A corner counts where its
-    four pixels show one object; its depth is the plane's through them, for which 1 / depth is
-    linear across the image. Scene units; NaN where no corner counts.
+    One sample is at the pixels' centres, the other at the corners between them. A method whose
+    surfels lie on the true surface, but not on the truth's rays, scores about this. A corner counts
+    where its four pixels show one object; its depth is that of the plane through them, for which
+    1 / depth is linear across the image. NaN where no corner counts.
     """
     ids, mask = truth.object_id, truth.mask
     quads = [(slice(i, ids.shape[0] - 1 + i), slice(j, ids.shape[1] - 1 + j)) for i, j in _QUAD]

@@ -1,0 +1,77 @@
+"""Milliseconds that `bench score` takes for one row, in test sets of more and more rows.
+
+    OMP_NUM_THREADS=1 python -m benchmarks.score_rows [--rows 1000 10000 100000] [--side 8]
+
+The cost of a row should not depend on how many other rows the test set has. Images are as small as
+the format allows, so that the work around the measures shows beside the measures themselves. The
+truth repeats a few rendered rooms; the predictions are the truth with noise.
+
+One process scores 1,000 rows of each test set, spread evenly. Opening the files is so divided among
+fewer rows than in real use: for large test sets the figures are rather too high. Processor time
+leaves out what other programs take of a busy machine.
+"""
+
+import argparse
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from metrics.prediction_writer import RoomPredictionWriter
+from metrics.scoring.rooms import score_rows
+from scenegen.common.row_file import Table, new_file
+from scenegen.description.specs import DatasetSpec
+from scenegen.layout import columns
+from scenegen.rooms.make import make_dataset
+from scenegen.rooms.reader import RoomsFile
+
+ROOMS = 8  # rendered, and repeated as often as needed
+SCORED = 1000  # rows of each test set
+
+
+def write_truth(path: Path, rendered: Path, count: int) -> None:
+    """Write a rooms file of `count` rows, each a scene of its own, by repeating rendered rows."""
+    with RoomsFile(rendered) as rooms, new_file(path) as file:
+        file.attrs.update({**rooms.attributes, "count": count})
+        fields = columns(rooms.spec)
+        rows = [{field.name: rooms.read(field.name, i) for field in fields} for i in range(ROOMS)]
+        table = Table(file, fields, count, "none")
+        for i in range(count):
+            table.append({**rows[i % ROOMS], "scene_index": i})
+
+
+def write_predictions(path: Path, truth: Path) -> None:
+    """Write the truth with 1% of noise, and its normals, as a submission."""
+    rng = np.random.default_rng(0)
+    with RoomsFile(truth) as rooms, RoomPredictionWriter(path, truth, method="noise") as out:
+        for row in range(len(rooms)):
+            depth = rooms.read("depth", row)
+            out.add(row, depth * rng.uniform(0.99, 1.01, depth.shape), rooms.read("normal", row))
+
+
+def main() -> None:
+    """Print a line for each number of rows."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rows", type=int, nargs="+", default=[1_000, 10_000, 100_000])
+    parser.add_argument("--side", type=int, default=8, help="pixels")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        spec = DatasetSpec(height=arguments.side, width=arguments.side, min_visible_pixels=1)
+        make_dataset(folder / "rendered.h5", spec, ROOMS, command="benchmark")
+        print(f"{'rows':>8}  {'ms a row':>8}  {'of processor time':>17}")
+        for count in arguments.rows:
+            truth, predictions = folder / f"rooms-{count}.h5", folder / f"predictions-{count}.h5"
+            write_truth(truth, folder / "rendered.h5", count)
+            write_predictions(predictions, truth)
+            rows = np.unique(np.linspace(0, count - 1, SCORED).astype(np.int64))
+            start, cpu = time.perf_counter(), time.process_time()
+            score_rows([predictions], truth, rows, "none", 1)
+            spent = (time.perf_counter() - start, time.process_time() - cpu)
+            wall, own = (1e3 * seconds / len(rows) for seconds in spent)
+            print(f"{count:8d}  {wall:8.2f}  {own:17.2f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

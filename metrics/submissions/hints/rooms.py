@@ -1,0 +1,23 @@
+"""Hints on a submission of rooms: depth, normals, and the order of rows."""
+
+from metrics.submissions.hints.depth import depth_hints
+from metrics.submissions.hints.normals import normal_hints
+from metrics.submissions.hints.order import order_hints
+from metrics.submissions.hints.samples import sample_rooms
+from metrics.submissions.problems import Problem
+from metrics.submissions.reader import RoomPredictions
+from scenegen.rooms.reader import RoomsFile
+
+
+def room_hints(predictions: RoomPredictions, truth: RoomsFile) -> list[Problem]:
+    """Return hints on a submission whose images have the size of the truth's.
+
+    They rest on 24 images for depth and normals, and on a few pixels of at most 4096 rows of the
+    truth for the order of rows. Values that are not finite are ignored. Raises FileFormatError
+    where the truth is damaged.
+    """
+    samples = sample_rooms(predictions, truth)
+    found = depth_hints(samples, predictions.alignment)
+    if predictions.has_normals:
+        found += normal_hints(samples)
+    return found + order_hints(predictions, truth)

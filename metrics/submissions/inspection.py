@@ -1,0 +1,337 @@
+"""What an HDF5 submission holds, and everything that is wrong with it before any truth is known.
+
+Nothing here raises on broken content, or follows a link out of the file. Ids and answers are read
+whole, pixels not at all.
+"""
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import h5py
+import numpy as np
+
+from metrics.measures.answers import answers_from_scores
+from metrics.submissions.layout import (
+    ATTRIBUTES,
+    DATA_FORMATS,
+    FORMAT_NAME,
+    FORMAT_VERSION,
+    ID_NAMES,
+    MOST_ROWS,
+    Attribute,
+    Dataset,
+    datasets,
+    text_fault,
+)
+from metrics.submissions.problems import Problem
+from metrics.submissions.rules import (
+    Array,
+    Ids,
+    agreement_problems,
+    answer_problems,
+    as_doubles,
+    id_problems,
+    score_problems,
+)
+from scenegen.common.errors import FileFormatError
+from scenegen.common.row_file import reading
+from scenegen.description.specs import MAX_PIXELS
+
+MOST_BYTES = 256 * 2**20  # to be unpacked for one row
+CHUNK_SLOTS = 10_007
+LEAST_CACHE = 1 << 20
+BLOCK_ROWS = 65_536
+
+
+@dataclass
+class Inspection:
+    """What was found in a submission.
+
+    Attributes:
+        texts: its root attributes.
+        task: "rooms" or "iqtt"; None where it is neither.
+        ids: (M,) int64, rows of the truth or indices of questions; None where they are unusable.
+        found: the datasets that can be used, by name.
+        answers: (M,) int64, of an iqtt submission; None where they are unusable.
+        problems: all that is wrong.
+    """
+
+    texts: dict[str, str] = field(default_factory=dict)
+    task: str | None = None
+    ids: Ids | None = None
+    found: dict[str, h5py.Dataset] = field(default_factory=dict)
+    answers: Ids | None = None
+    problems: list[Problem] = field(default_factory=list)
+
+
+def inspect(file: h5py.File) -> Inspection:
+    """Check attributes, layout, ids and answers of an open file; never raise on its content."""
+    result = Inspection()
+    result.texts, result.problems = read_texts(file)
+    result.task = result.texts.get("task")
+    if result.task is None:
+        return result
+    count = None
+    for dataset in datasets(result.task):
+        item, problems = open_dataset(file, dataset, count)
+        result.problems += problems
+        if item is not None:
+            result.found[dataset.name] = item
+            count = int(item.shape[0]) if dataset.name in ID_NAMES.values() else count
+    if result.task == "iqtt":
+        _require_answers(file, result)
+    _take_ids(result, ID_NAMES[result.task])
+    if result.task == "iqtt" and result.ids is not None:
+        _take_answers(result, result.ids)
+    return result
+
+
+def read_texts(file: h5py.File) -> tuple[dict[str, str], list[Problem]]:
+    """Return the root attributes that are as they should be, and what is wrong with the others.
+
+    If the file has another format or version, that is the only problem returned.
+    """
+    wrong = _format_problem(file)
+    if wrong is not None:
+        return {}, [wrong]
+    texts, problems = {}, []
+    for attribute in ATTRIBUTES:
+        found = _checked(file, attribute)
+        if isinstance(found, Problem):
+            problems.append(found)
+        elif found is not None:
+            texts[attribute.name] = found
+    task = texts.get("task")
+    theirs = {a.name for a in ATTRIBUTES if task is None or task in a.tasks}
+    problems = [problem for problem in problems if problem.dataset in theirs]
+    if task == "rooms" and texts.get("truth_fingerprint") == "":
+        expected = "the attribute 'fingerprint' of the rooms file"
+        problems.append(Problem("truth_fingerprint", "value", expected, "an empty text"))
+    return {name: text for name, text in texts.items() if name in theirs}, problems
+
+
+def _format_problem(file: h5py.File) -> Problem | None:
+    head = {}
+    for attribute in ATTRIBUTES[:2]:
+        text = _read(file, attribute.name)
+        if isinstance(text, Problem):
+            return text
+        head[attribute.name] = text
+    name, version = head["format"], head["format_version"]
+    if name is None:
+        return Problem("format", "present", repr(FORMAT_NAME), "no such root attribute")
+    if name != FORMAT_NAME:
+        what = f", a file of {DATA_FORMATS[name]}, not a submission" if name in DATA_FORMATS else ""
+        return Problem("format", "value", repr(FORMAT_NAME), f"{name!r:.60}{what}")
+    major = FORMAT_VERSION.split(".", maxsplit=1)[0]
+    if version is None or version.split(".", maxsplit=1)[0] != major:
+        found = "no such root attribute" if version is None else f"version {version!r:.20}"
+        return Problem("format_version", "value", f"{major}.x", found)
+    return None
+
+
+def _checked(file: h5py.File, attribute: Attribute) -> str | Problem | None:
+    """Return a root attribute; None where there is none and none is needed."""
+    text = _read(file, attribute.name)
+    if isinstance(text, str):
+        fault = text_fault(attribute, text)
+        return text if fault is None else Problem(attribute.name, "value", fault[1], fault[0])
+    if text is None and attribute.required:
+        return Problem(attribute.name, "present", attribute.meaning, "no such root attribute")
+    return text
+
+
+def _read(file: h5py.File, name: str) -> str | Problem | None:
+    try:
+        with reading(name):
+            if name not in file.attrs:
+                return None
+            stored = file.attrs.get_id(name)
+            if stored.shape != () or h5py.check_string_dtype(stored.dtype) is None:
+                return Problem(name, "type", "a text", f"{stored.dtype} of shape {stored.shape}")
+            value = file.attrs[name]
+    except FileFormatError as error:
+        return _unreadable(name, "a text", error)
+    try:
+        return value.decode() if isinstance(value, bytes) else str(value)
+    except UnicodeDecodeError:
+        return Problem(name, "type", "a text", "bytes that are not UTF-8")
+
+
+def _unreadable(name: str, expected: str, error: FileFormatError) -> Problem:
+    return Problem(name, "readable", expected, str(error).removeprefix(f"{name}: "))
+
+
+def open_dataset(
+    file: h5py.File, dataset: Dataset, count: int | None
+) -> tuple[h5py.Dataset | None, list[Problem]]:
+    """Open a dataset that should have `count` rows, or any number if that is None.
+
+    Returns None with what is wrong with it, or without a problem where it is not there and need
+    not be.
+    """
+    name = dataset.name
+    try:
+        with reading(name):
+            link = file.get(name, getlink=True)
+            if link is None:
+                return None, [_missing(file, dataset)] if dataset.required else []
+            problems = _link_problems(link, name) or _problems(file[name], dataset, count)
+            return None if problems else _open_with_cache(file, name), problems
+    except FileFormatError as error:
+        return None, [_unreadable(name, dataset.kind, error)]
+
+
+def names(file: h5py.File) -> str:
+    """Return the names of the first few objects in a file, for a message."""
+    first = [f"{name!r:.40}" for name in itertools.islice(file, 9)]
+    return ", ".join(first[:8] + ["..."] * (len(first) > 8)) or "none at all"
+
+
+def _missing(file: h5py.File, dataset: Dataset) -> Problem:
+    expected = f"{dataset.shown_shape} {dataset.kind}"
+    found = f"no such dataset; found {names(file)}"
+    return Problem(dataset.name, "present", expected, found)
+
+
+def _link_problems(link: Any, name: str) -> list[Problem]:
+    if isinstance(link, h5py.HardLink):
+        return []
+    where = f" to the file {link.filename!r:.60}" if isinstance(link, h5py.ExternalLink) else ""
+    return [Problem(name, "link", "a dataset in the submission itself", f"a link{where}")]
+
+
+def _problems(item: Any, dataset: Dataset, count: int | None) -> list[Problem]:
+    """Return what is wrong with type, shape and storage."""
+    name = dataset.name
+    if not isinstance(item, h5py.Dataset):
+        return [Problem(name, "type", "a dataset", f"a {type(item).__name__.lower()}")]
+    problems = []
+    if item.dtype.kind not in dataset.kinds:
+        problems.append(Problem(name, "type", dataset.kind, f"type {_type_name(item.dtype)}"))
+    shape: tuple[int, ...] = item.shape or ()
+    if not _fits(shape, dataset):
+        problems.append(Problem(name, "shape", dataset.shown_shape, f"shape {item.shape}"))
+    elif count is not None and shape[0] != count:
+        problems.append(Problem(name, "count", f"{count}, one for each id", f"{shape[0]} rows"))
+    elif shape[0] > MOST_ROWS:
+        problems.append(Problem(name, "count", f"at most {MOST_ROWS:,}", f"{shape[0]} rows"))
+    elif math.prod(shape[1:3]) > MAX_PIXELS:
+        found = f"images of {shape[1]}x{shape[2]}"
+        problems.append(Problem(name, "shape", f"at most {MAX_PIXELS:,} pixels", found))
+    return problems or _storage_problems(item, name)
+
+
+def _fits(shape: tuple[int, ...], dataset: Dataset) -> bool:
+    """Return whether a shape has the right axes; only the first one may be empty."""
+    sizes = shape[1:]
+    if not shape or len(sizes) != len(dataset.shape) or 0 in sizes:
+        return False
+    return all(isinstance(e, str) or e == s for e, s in zip(dataset.shape, sizes, strict=True))
+
+
+def _storage_problems(item: h5py.Dataset, name: str) -> list[Problem]:
+    if item.external or item.is_virtual:
+        expected = "values in the submission itself"
+        return [Problem(name, "link", expected, "values that lie in another file")]
+    size = _slab_bytes(item)
+    if size > MOST_BYTES:
+        found = f"chunks {item.chunks}, so that a row takes {size >> 20} MiB to unpack"
+        expected = f"at most {MOST_BYTES >> 20} MiB (store one row to a chunk)"
+        return [Problem(name, "chunks", expected, found)]
+    if item.size and item.id.get_storage_size() == 0:
+        return [Problem(name, "written", "values", f"shape {item.shape}, but nothing was written")]
+    return []
+
+
+def _slab_bytes(item: h5py.Dataset) -> int:
+    """Return the bytes of all chunks that one row touches; 0 for a dataset without chunks."""
+    if item.chunks is None:
+        return 0
+    padded = [-(-s // c) * c for s, c in zip(item.shape[1:], item.chunks[1:], strict=True)]
+    return int(item.chunks[0] * math.prod(padded) * item.dtype.itemsize)
+
+
+def _open_with_cache(file: h5py.File, name: str) -> h5py.Dataset:
+    """Open a dataset so that chunks of many rows are not unpacked anew for each of them.
+
+    It must not be open already: an open dataset keeps the cache that it has.
+    """
+    size = _slab_bytes(file[name])
+    access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
+    access.set_chunk_cache(CHUNK_SLOTS, max(size, LEAST_CACHE), 1.0)
+    return h5py.Dataset(h5py.h5d.open(file.id, name.encode(), access))
+
+
+def _type_name(dtype: np.dtype[Any]) -> str:
+    if h5py.check_string_dtype(dtype) is not None:
+        return "text"
+    if h5py.check_ref_dtype(dtype) is not None:
+        return "reference"
+    return "compound" if dtype.names else str(dtype)
+
+
+def _require_answers(file: h5py.File, result: Inspection) -> None:
+    known = {problem.dataset for problem in result.problems} | set(result.found)
+    if not {"answer", "scores"} & known:
+        found = f"neither; found {names(file)}"
+        result.problems.append(Problem("answer", "present", "answer, or scores", found))
+
+
+def _take_ids(result: Inspection, name: str) -> None:
+    values = _taken(result, name, "integers", lambda item: item[()])
+    if values is None:
+        return
+    if values.dtype == np.uint64 and values.size and values.max() > np.iinfo(np.int64).max:
+        found = f"numbers up to {values.max()}"
+        result.problems.append(Problem(name, "range", "rows of the truth", found))
+        return
+    ids = values.astype(np.int64)
+    result.problems += id_problems(ids, name)
+    result.ids = ids if len(ids) else None
+
+
+def _take_answers(result: Inspection, ids: Ids) -> None:
+    """Read the answers, and those that follow from scores, which must agree."""
+    before = len(result.problems)
+    answers = _taken(result, "answer", "numbers", lambda item: item[()])
+    if answers is not None:
+        result.problems += answer_problems(answers, ids)
+        answers = answers.astype(np.int64)
+    from_scores = None
+    if len(result.problems) == before:
+        from_scores = _taken(result, "scores", "numbers", lambda item: _answers(result, item, ids))
+    if len(result.problems) > before:
+        return
+    if answers is not None and from_scores is not None:
+        result.problems += agreement_problems(answers, from_scores, ids)
+    result.answers = from_scores if answers is None else answers
+
+
+def _answers(result: Inspection, scores: h5py.Dataset, ids: Ids) -> Ids:
+    """Return the answers (M,) of scores (M, 3), up to the first score that is not finite."""
+    answers = np.empty(len(ids), np.int64)
+    for start in range(0, len(ids), BLOCK_ROWS):
+        rows = slice(start, start + BLOCK_ROWS)
+        block = as_doubles(scores[rows])
+        problems = score_problems(block, ids[rows])
+        result.problems += problems
+        if problems:
+            break
+        answers[rows] = answers_from_scores(block)
+    return answers
+
+
+def _taken(
+    result: Inspection, name: str, expected: str, read: Callable[[h5py.Dataset], Array]
+) -> Array | None:
+    """Return what `read` makes of a dataset; None where there is none, or it is damaged."""
+    try:
+        with reading(name):
+            return read(result.found[name]) if name in result.found else None
+    except FileFormatError as error:
+        result.problems.append(_unreadable(name, expected, error))
+        return None

@@ -1,0 +1,309 @@
+"""Writers of submissions that cannot be invalid; `metrics.prediction_writer` is their public door.
+
+Rooms are written row by row, answers to questions all at once; the same rules as in `validate` are
+checked before anything is written.
+"""
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import Any, Self
+
+import h5py
+import numpy as np
+from numpy.typing import ArrayLike
+
+from metrics.measures.answers import ABSTAINED, CANDIDATES, answers_from_scores
+from metrics.measures.depth import Alignment
+from metrics.submissions.layout import (
+    ATTRIBUTES,
+    FORMAT_NAME,
+    FORMAT_VERSION,
+    ID_NAMES,
+    attributes,
+    datasets,
+    text_fault,
+)
+from metrics.submissions.problems import PredictionError, first_error, first_ids
+from metrics.submissions.rules import (
+    EXPECTED,
+    FOUND,
+    Array,
+    agreement_problems,
+    answer_problems,
+    depth_faults,
+    faces_away,
+    normal_faults,
+    score_problems,
+)
+from scenegen.common.row_file import Table, new_file, writer_name
+from scenegen.rooms.reader import RoomsFile
+
+
+class RoomPredictionWriter:
+    """Writes predicted depth, and optionally normals, of the rooms of a file; a context manager.
+
+    The file appears under its name when the block ends without an error and every row was given.
+    Memory stays flat. Not to be shared between threads.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        truth: str | Path,
+        *,
+        method: str,
+        run: str = "",
+        alignment: Alignment = "none",
+        notes: str = "",
+        overwrite: bool = False,
+        allow_partial: bool = False,
+    ) -> None:
+        """Check the texts; the files are opened when the block begins.
+
+        Args:
+            path: where to write.
+            truth: the rooms file that is predicted, recorded as given.
+            method, run: who predicts; runs of one method are averaged.
+            alignment: what the method cannot know, as in `metrics.measures.depth.align`.
+            notes: any text.
+            overwrite: whether an existing file may be replaced.
+            allow_partial: whether rows may be missing; scores of such a file are not comparable.
+
+        Raises:
+            PredictionError: a text does not suit.
+        When the block begins also OSError for either path, FileFormatError for the truth.
+        """
+        given = {"method": method, "run": run, "alignment": alignment, "notes": notes}
+        self._texts = _checked_texts("rooms", {**given, "truth_path": str(truth)})
+        _check_elsewhere(path, truth)
+        self._path, self._truth_path = Path(path), Path(truth)
+        self._overwrite, self._allow_partial = overwrite, allow_partial
+        self._context: AbstractContextManager[None] | None = None
+        self._table: Table | None = None
+        self._written = 0
+
+    def __enter__(self) -> Self:
+        self._context = self._opened()
+        self._context.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        context, self._context = self._context, None
+        assert context is not None, "a block ends after it began"
+        context.__exit__(*error)
+
+    def add(self, row: int, depth: ArrayLike, normal: ArrayLike | None = None) -> None:
+        """Write the prediction for one row of the truth; rows may come in any order.
+
+        Args:
+            row: of the truth file.
+            depth: (H, W) floats: planar depth, scene units, camera frame.
+            normal: (H, W, 3) floats: camera frame, facing the viewer, of any length but 0. For
+                all rows or for none.
+
+        Raises PredictionError, naming the row, what was found and what was expected.
+        """
+        if self._context is None:
+            raise PredictionError(self._path, "not open", "rows to be added inside the with block")
+        row = self._checked_row(row)
+        where = f"{self._path}: row {row}"
+        mask = np.isfinite(self._truth.read("depth", row))
+        values = {"depth": _checked_floats(depth, mask.shape, f"{where}: depth")}
+        _refuse(depth_faults(values["depth"], mask), f"{where}: depth")
+        if self._texts["alignment"] != "scale_shift" and faces_away(values["depth"], mask):
+            expected = "planar depth, which is positive in front of the camera"
+            raise PredictionError(f"{where}: depth", "most of it at or below 0", expected)
+        if normal is not None:
+            values["normal"] = _checked_floats(normal, (*mask.shape, 3), f"{where}: normal")
+            _refuse(normal_faults(values["normal"], mask), f"{where}: normal")
+        if self._table is None:
+            self._table = self._new_table(values)
+        with_normal = "normal" in self._columns
+        if with_normal != ("normal" in values):
+            found, expected = ("none", "one") if with_normal else ("one", "none")
+            raise PredictionError(f"{where}: normal", found, f"{expected}, as in the first row")
+        self._table.append(values)
+        self._order[self._written] = row
+        self._given[row] = True
+        self._written += 1
+
+    @contextmanager
+    def _opened(self) -> Iterator[None]:
+        with (
+            RoomsFile(self._truth_path) as self._truth,
+            new_file(self._path, self._overwrite) as self._file,
+        ):
+            count = len(self._truth)
+            self._given, self._order = np.zeros(count, np.bool_), np.zeros(count, np.int64)
+            self._written, self._table = 0, None
+            yield
+            self._finish(self._file)
+
+    def _new_table(self, values: Mapping[str, Array]) -> Table:
+        height, width = values["depth"].shape
+        columns = [d.column(height, width) for d in datasets("rooms") if d.name in values]
+        self._columns = [column.name for column in columns]
+        return Table(self._file, columns, len(self._given))
+
+    def _checked_row(self, row: Any) -> int:
+        count = len(self._given)
+        whole = isinstance(row, int | np.integer) and not isinstance(row, bool)
+        if not whole or not 0 <= row < count:
+            expected = f"a row of {self._truth_path}, from 0 to {count - 1}"
+            raise PredictionError(f"{self._path}: row", f"{row!r:.40}", expected)
+        if self._given[row]:
+            raise PredictionError(f"{self._path}: row {row}", "it twice", "each row once")
+        return int(row)
+
+    def _finish(self, file: h5py.File) -> None:
+        missing = np.flatnonzero(~self._given)
+        if self._written == 0 or (len(missing) and not self._allow_partial):
+            shown = ", ".join(map(str, first_ids(missing)))
+            raise PredictionError(
+                f"{self._path}: row",
+                f"{len(missing)} of {len(self._given)} missing, such as {shown}",
+                "every one" if self._written else "at least one",
+                "nothing was written",
+            )
+        for name in self._columns if len(missing) else ():
+            file[name].resize(self._written, axis=0)
+        file.attrs.update({**self._texts, "truth_fingerprint": self._truth.fingerprint})
+        _write_columns(file, "rooms", {ID_NAMES["rooms"]: self._order[: self._written]})
+
+
+def write_answers(
+    path: str | Path,
+    questions_file: str | Path,
+    *,
+    method: str,
+    answer: ArrayLike | None = None,
+    scores: ArrayLike | None = None,
+    run: str = "",
+    notes: str = "",
+    overwrite: bool = False,
+) -> None:
+    """Write answers to all questions of a file, in its order.
+
+    Args:
+        path: where to write.
+        questions_file: such as iqtt-test.h5, recorded as given.
+        method, run, notes, overwrite: as for `RoomPredictionWriter`.
+        answer: (Q,) integers: 0, 1 or 2, or -1 to abstain, which counts as wrong.
+        scores: (Q, 3) floats: the highest wins, a tie for it abstains. Either or both; both must
+            say the same.
+
+    Raises:
+        PredictionError: naming the questions, what was found and what was expected.
+        OSError, FileFormatError, SpecError: either file, as `iqtt.QuestionsFile`.
+    """
+    texts = _checked_texts(
+        "iqtt", {"method": method, "run": run, "notes": notes, "truth_path": str(questions_file)}
+    )
+    _check_elsewhere(path, questions_file)
+    count, fingerprint = _questions(questions_file)
+    if count == 0:
+        raise PredictionError(questions_file, "no questions", "at least one")
+    values = _checked_answers(answer, scores, count, f"{path}")
+    with new_file(path, overwrite) as file:
+        file.attrs.update({**texts, "truth_fingerprint": fingerprint})
+        _write_columns(file, "iqtt", {ID_NAMES["iqtt"]: np.arange(count), **values})
+
+
+def _checked_answers(
+    answer: ArrayLike | None, scores: ArrayLike | None, count: int, where: str
+) -> dict[str, Array]:
+    """Return the datasets to write. Raises PredictionError."""
+    ids = np.arange(count)
+    values: dict[str, Array] = {}
+    problems = []
+    if scores is not None:
+        shape = (count, CANDIDATES)
+        values["scores"] = _checked_floats(scores, shape, f"{where}: scores", np.float64)
+        problems += score_problems(values["scores"], ids)
+    if answer is not None:
+        found = values["answer"] = np.asarray(answer)
+        if found.shape != (count,) or found.dtype.kind not in "iu":
+            expected = f"integers of shape ({count},), {ABSTAINED} to {CANDIDATES - 1}"
+            what = f"{found.dtype} of shape {found.shape}"
+            raise PredictionError(f"{where}: answer", what, expected)
+        problems += answer_problems(found, ids)
+    if not values:
+        raise PredictionError(where, "neither answer nor scores", "either")
+    if len(values) == 2 and not problems:
+        from_scores = answers_from_scores(values["scores"])
+        problems = agreement_problems(values["answer"].astype(np.int64), from_scores, ids)
+    if problems:
+        raise first_error(PredictionError, where, problems)
+    return values
+
+
+def _questions(path: str | Path) -> tuple[int, str]:
+    """Return how many questions a file holds, with or without images, and its fingerprint."""
+    from iqtt.files.reader import AnswersFile, QuestionsFile
+    from iqtt.files.tables import NoImagesError
+
+    try:
+        with QuestionsFile(path) as questions:
+            return len(questions), questions.fingerprint or ""
+    except NoImagesError:
+        with AnswersFile(path) as answers:
+            return len(answers), answers.fingerprint or ""
+
+
+def _check_elsewhere(path: str | Path, truth: str | Path) -> None:
+    """Raise PredictionError where a submission would replace the file that it predicts."""
+    if os.path.exists(path) and os.path.exists(truth) and os.path.samefile(path, truth):
+        raise PredictionError(path, "the file that is predicted", "another one to write to")
+
+
+def _checked_texts(task: str, given: Mapping[str, str]) -> dict[str, str]:
+    """Return the root attributes, except for the fingerprint. Raises PredictionError."""
+    for attribute in attributes(task):
+        if attribute.name not in given:
+            continue
+        text = given[attribute.name]
+        fault = (
+            text_fault(attribute, text) if isinstance(text, str) else (f"{text!r:.40}", "a text")
+        )
+        if fault is not None:
+            raise PredictionError(attribute.name, *fault)
+    ours = {"format": FORMAT_NAME, "format_version": FORMAT_VERSION, "task": task}
+    texts = {**ours, "writer": writer_name(), **given}
+    return {a.name: texts[a.name] for a in ATTRIBUTES if a.name in texts}
+
+
+def _checked_floats(
+    values: ArrayLike, shape: tuple[int, ...], where: str, dtype: type[Any] = np.float32
+) -> Array:
+    """Return the array as it is stored. Raises PredictionError for another shape, or no floats."""
+    try:
+        array = np.asarray(values)
+    except Exception as error:
+        what = f"{type(values).__name__}, which is no array ({error!s:.80})"
+        raise PredictionError(where, what, f"floats {shape}") from error
+    if array.shape != shape:
+        raise PredictionError(where, f"shape {array.shape}", str(shape))
+    if array.dtype.kind != "f":
+        raise PredictionError(where, f"type {array.dtype}", "floats")
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused as infinite
+        return array.astype(dtype)
+
+
+def _refuse(faults: Mapping[str, Array], where: str) -> None:
+    for rule, at in faults.items():
+        first = tuple(int(i) for i in np.argwhere(at)[0])
+        found = f"{FOUND[rule]} at {np.count_nonzero(at)} pixels, the first at {first}"
+        raise PredictionError(where, found, EXPECTED[rule])
+
+
+def _write_columns(file: h5py.File, task: str, values: Mapping[str, Array]) -> None:
+    """Write datasets that are small enough to be kept in memory."""
+    for dataset in datasets(task):
+        if dataset.name in values:
+            data = values[dataset.name].astype(dataset.dtype)
+            stored = file.create_dataset(
+                dataset.name, data=data, compression="gzip", shuffle=data.itemsize > 1
+            )
+            stored.attrs.update(dataset.attributes)

@@ -1,0 +1,28 @@
+"""Hints on answers: scores that are distances."""
+
+from pathlib import Path
+
+import numpy as np
+
+from metrics.submissions.hints.questions import answer_hints
+from metrics.submissions.reader import QuestionPredictions
+
+
+def answered(scores, rows=None):
+    """A submission with these scores (Q, 3)."""
+    rows = np.arange(len(scores)) if rows is None else rows
+    return QuestionPredictions(Path("answers.h5"), {}, rows, 0 * rows, scores)
+
+
+def test_scores_that_are_distances():
+    rng = np.random.default_rng(7)
+    right = rng.integers(0, 3, 300)
+    scores = rng.random((300, 3))
+    assert answer_hints(answered(scores), right) == []
+    scores[np.arange(300), right] += 0.5
+    assert answer_hints(answered(scores), right) == []
+    (hint,) = answer_hints(answered(-scores), right)
+    assert hint.is_hint
+    assert "distances" in hint.found
+    assert answer_hints(answered(-scores[:3]), right) == [], "too few to tell"
+    assert answer_hints(answered(None, np.arange(3)), right) == []

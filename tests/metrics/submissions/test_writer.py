@@ -1,0 +1,389 @@
+"""The writers of submissions: what they write, and that they write nothing invalid."""
+
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from iqtt.files.reader import AnswersFile
+from metrics.prediction_writer import PredictionError, RoomPredictionWriter, write_answers
+from metrics.submissions.reader import open_predictions
+from metrics.submissions.validation import validate
+from scenegen.common.errors import FileFormatError, SceneGenError
+from scenegen.rooms.reader import RoomsFile
+
+SIZE = (32, 32)
+
+
+@pytest.fixture
+def writer(truths, tmp_path):
+    """Make a writer to predictions.h5."""
+
+    def make(**settings):
+        settings = {"method": "mine", **settings}
+        return RoomPredictionWriter(tmp_path / "predictions.h5", truths.rooms, **settings)
+
+    return make
+
+
+def noise(seed, *shape):
+    return np.random.default_rng(seed).random(shape) + 1.0
+
+
+def fill(writer, *rows):
+    with writer as out:
+        for row in rows:
+            out.add(*row)
+
+
+def test_round_trip_in_any_order(writer, truths, tmp_path):
+    order = [5, 0, 7, 2, 1, 6, 3, 4]
+    depth, normal = noise(1, 8, *SIZE), noise(2, 8, *SIZE, 3)
+    settings = {"run": "seed 4", "alignment": "scale", "notes": "a\nb"}
+    with writer(**settings) as out:
+        for row in order:
+            out.add(row, depth[row], normal[row])
+    path = tmp_path / "predictions.h5"
+    with open_predictions(path) as found:
+        assert found.rows.tolist() == order
+        for i, row in enumerate(order):
+            assert np.array_equal(found.depth(i), depth[row].astype("f4"))
+            assert np.array_equal(found.normal(i), normal[row].astype("f4"))
+        assert (found.method, found.run, found.alignment) == ("mine", "seed 4", "scale")
+        assert found.notes == "a\nb"
+        assert found.truth_path == str(truths.rooms)
+    assert [problem for problem in validate(path) if not problem.is_hint] == []
+
+
+def test_what_plain_h5py_sees(writer, truths, tmp_path):
+    with writer() as out:
+        for row in range(8):
+            out.add(np.int64(row), noise(row, *SIZE).astype("f4"), noise(row, *SIZE, 3).tolist())
+    with h5py.File(tmp_path / "predictions.h5") as file, RoomsFile(truths.rooms) as rooms:
+        root = dict(file.attrs)
+        assert root["format"] == "pix2shape-bench/predictions"
+        assert (root["format_version"], root["task"], root["run"]) == ("1.0", "rooms", "")
+        assert (root["method"], root["alignment"]) == ("mine", "none")
+        assert root["truth_fingerprint"] == rooms.fingerprint
+        assert root["writer"].startswith("pix2shape-bench ")
+        assert set(file) == {"row", "depth", "normal"}
+        for name, dtype, unit, frame in (
+            ("row", "int64", "1", "-"),
+            ("depth", "float32", "scene unit", "camera"),
+            ("normal", "float32", "1", "camera"),
+        ):
+            dataset = file[name]
+            assert (dataset.dtype, dataset.compression, dataset.shuffle) == (dtype, "gzip", True)
+            assert (dataset.attrs["unit"], dataset.attrs["frame"]) == (unit, frame)
+            assert dataset.attrs["shape"].startswith("(M,")
+            assert len(dataset.attrs["meaning"]) > 10
+        assert file["depth"].chunks == (1, *SIZE)
+        assert file["normal"].chunks == (1, *SIZE, 3)
+
+
+def test_the_same_rows_give_the_same_bytes(truths, tmp_path):
+    for name in ("a.h5", "b.h5"):
+        with RoomPredictionWriter(tmp_path / name, truths.rooms, method="m") as out:
+            for row in range(8):
+                out.add(row, noise(row, *SIZE))
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+
+
+GOOD_NORMAL = np.ones((*SIZE, 3))
+
+
+def spoiled(value, at=(3, 4), base=None):
+    array = (noise(0, *SIZE) if base is None else base).copy()
+    array[at] = value
+    return array
+
+
+# What is added after a good row 0; then the place of the error, and words of what was found there.
+REFUSED = {
+    "row beyond": ((8, noise(0, *SIZE)), "row", "8"),
+    "negative row": ((-1, noise(0, *SIZE)), "row", "-1"),
+    "row is a float": ((1.0, noise(0, *SIZE)), "row", "1.0"),
+    "row is true": ((True, noise(0, *SIZE)), "row", "True"),
+    "row is a text": (("1", noise(0, *SIZE)), "row", "'1'"),
+    "row given": ((0, noise(0, *SIZE)), "row 0", "twice"),
+    "shape": ((1, noise(0, 16, 16)), "row 1: depth", "(16, 16)"),
+    "batch of one": ((1, noise(0, 1, *SIZE)), "row 1: depth", "(1, 32, 32)"),
+    "whole numbers": ((1, np.ones(SIZE, "u2")), "row 1: depth", "uint16"),
+    "objects": ((1, np.full(SIZE, None)), "row 1: depth", "object"),
+    "ragged": ((1, [[1.0, 2.0], [3.0]]), "row 1: depth", "no array"),
+    "NaN": ((1, spoiled(np.nan)), "row 1: depth", "1 pixels, the first at (3, 4)"),
+    "infinite": ((1, spoiled(np.inf)), "row 1: depth", "(3, 4)"),
+    "beyond float32": ((1, spoiled(1e39)), "row 1: depth", "(3, 4)"),
+    "negative z": ((1, -noise(0, *SIZE)), "row 1: depth", "at or below 0"),
+    "all zero": ((1, np.zeros(SIZE)), "row 1: depth", "at or below 0"),
+    "normal shape": ((1, noise(0, *SIZE), np.ones((3, *SIZE))), "row 1: normal", "(3, 32, 32)"),
+    "normal NaN": (
+        (1, noise(0, *SIZE), spoiled(np.nan, (5, 6, 0), GOOD_NORMAL)), "row 1: normal", "(5, 6)"
+    ),
+    "normal zero": (
+        (1, noise(0, *SIZE), spoiled(0.0, (5, 6), GOOD_NORMAL)), "row 1: normal", "length 0"
+    ),
+    "no normal": ((1, noise(0, *SIZE), None), "row 1: normal", "none"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_refused_at_write_time(writer, tmp_path, kind):
+    arguments, where, found = REFUSED[kind]
+    if len(arguments) == 2:
+        arguments = (*arguments, GOOD_NORMAL)
+    with pytest.raises(PredictionError) as caught:
+        fill(writer(), (0, noise(0, *SIZE), GOOD_NORMAL), arguments)
+    assert caught.value.where == f"{tmp_path / 'predictions.h5'}: {where}"
+    assert found in caught.value.found
+    assert caught.value.expected
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_normals_after_none(writer):
+    with pytest.raises(PredictionError) as caught:
+        fill(writer(), (0, noise(0, *SIZE)), (1, noise(0, *SIZE), GOOD_NORMAL))
+    assert caught.value.where.endswith("row 1: normal")
+
+
+def test_a_refused_row_may_be_mended(writer, tmp_path):
+    with writer() as out:
+        for row in range(8):
+            with pytest.raises(PredictionError):
+                out.add(row, spoiled(np.nan))
+            out.add(row, noise(row, *SIZE))
+    assert validate(tmp_path / "predictions.h5") == []
+
+
+def test_anything_goes_where_the_truth_shows_nothing(truths, tmp_path):
+    """And nothing else is asked of normals there."""
+    truth = tmp_path / "rooms.h5"
+    truth.write_bytes(truths.rooms.read_bytes())
+    with h5py.File(truth, "r+") as file:
+        file["depth"][:, 3, 4] = np.nan
+        file["normal"][:, 3, 4] = 0.0
+    path = tmp_path / "predictions.h5"
+    with RoomPredictionWriter(path, truth, method="m") as out:
+        for row, odd in enumerate([np.inf, np.nan, -1.0, -np.inf, 0.0, 1e39, 1e30, 1.0]):
+            out.add(row, spoiled(odd), spoiled(odd if row % 2 else 0.0, (3, 4), GOOD_NORMAL))
+    assert validate(path) == []
+    other = tmp_path / "other.h5"
+    with pytest.raises(PredictionError), RoomPredictionWriter(other, truth, method="m") as out:
+        out.add(0, spoiled(np.nan, (3, 5)))
+
+
+def test_shifted_depth_may_have_any_sign(writer, tmp_path):
+    with writer(alignment="scale_shift") as out:
+        for row in range(8):
+            out.add(row, noise(row, *SIZE) - 5.0)
+    assert [p for p in validate(tmp_path / "predictions.h5") if not p.is_hint] == []
+
+
+def test_some_depth_may_lie_behind_the_camera(writer):
+    with writer() as out:
+        for row in range(8):
+            out.add(row, spoiled(-1.0, np.s_[:10]))
+
+
+@pytest.mark.parametrize(
+    ("partial", "rows", "found"),
+    [(False, (0, 2, 3, 5, 7), "3 of 8 missing, such as 1, 4, 6"), (True, (), "8 of 8 missing")],
+)
+def test_missing_rows_are_an_error(writer, tmp_path, partial, rows, found):
+    """Where some may be missing, there must be one at least."""
+    with pytest.raises(PredictionError) as caught:
+        fill(writer(allow_partial=partial), *((row, noise(row, *SIZE)) for row in rows))
+    assert caught.value.where == f"{tmp_path / 'predictions.h5'}: row"
+    assert caught.value.found.startswith(found)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_missing_rows_where_that_is_allowed(writer, tmp_path):
+    with writer(allow_partial=True) as out:
+        for row in (6, 1):
+            out.add(row, noise(row, *SIZE), GOOD_NORMAL)
+    path = tmp_path / "predictions.h5"
+    with open_predictions(path) as found:
+        assert found.rows.tolist() == [6, 1]
+        assert np.array_equal(found.depth(1), noise(1, *SIZE).astype("f4"))
+        assert found.normal(1).shape == (*SIZE, 3)
+    (problem,) = validate(path)
+    assert (problem.dataset, problem.rule, problem.ids) == ("row", "complete", (0, 2, 3, 4, 5))
+
+
+def test_an_error_of_the_author_leaves_nothing(writer, tmp_path):
+
+    class Failing:
+        def __array__(self, dtype=None, copy=None):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fill(writer(), (0, noise(0, *SIZE)), (1, Failing()))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_inside_the_block(writer):
+    out = writer(allow_partial=True)
+    with pytest.raises(PredictionError):
+        out.add(0, noise(0, *SIZE))
+    with out:
+        out.add(0, noise(0, *SIZE))
+    with pytest.raises(PredictionError):
+        out.add(1, noise(0, *SIZE))
+
+
+def test_an_existing_file_is_kept(writer, tmp_path):
+    (tmp_path / "predictions.h5").write_text("precious")
+    with pytest.raises(FileExistsError), writer():
+        pass
+    assert (tmp_path / "predictions.h5").read_text() == "precious"
+    with writer(overwrite=True, allow_partial=True) as out:
+        out.add(0, noise(0, *SIZE))
+    with open_predictions(tmp_path / "predictions.h5") as found:
+        assert len(found) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "found"),
+    [
+        ("method", "", "an empty text"),
+        ("method", "a\nb", r"the character '\n'"),
+        ("method", 3, "3"),
+        ("method", "m" * 201, "201 characters"),
+        ("run", 7, "7"),
+        ("alignment", "affine", "'affine'"),
+        ("notes", "\x1b[2J", r"the character '\x1b'"),
+    ],
+)
+def test_texts_are_checked_first(writer, name, value, found):
+    with pytest.raises(PredictionError) as caught:
+        writer(**{name: value})
+    assert (caught.value.where, caught.value.found) == (name, found)
+
+
+def test_the_truth_must_be_there(tmp_path, truths):
+    with pytest.raises(FileNotFoundError):
+        RoomPredictionWriter(tmp_path / "p.h5", tmp_path / "no.h5", method="m").__enter__()
+    with pytest.raises(FileFormatError):
+        RoomPredictionWriter(tmp_path / "p.h5", truths.iqtt, method="m").__enter__()
+
+
+def test_memory_stays_flat(writer):
+    """What a row leaves behind is its number, not its pixels."""
+    import tracemalloc
+
+    with writer(allow_partial=True) as out:
+        out.add(0, noise(0, *SIZE), GOOD_NORMAL)
+        tracemalloc.start()
+        before = tracemalloc.get_traced_memory()[0]
+        for row in range(1, 8):
+            out.add(row, noise(row, *SIZE), GOOD_NORMAL)
+        kept = tracemalloc.get_traced_memory()[0] - before
+        tracemalloc.stop()
+    assert kept < 7 * 32 * 32 * 4
+
+
+# ---- answers to questions ----
+
+
+@pytest.mark.parametrize("name", ["iqtt-test.h5", "iqtt-test-answers.h5", "iqtt-val.h5"])
+def test_answers(truths, tmp_path, name):
+    file = truths.iqtt.with_name(name)
+    scores = np.random.default_rng(3).random((6, 3)) + 1.0
+    answer = scores.argmax(axis=1).tolist()
+    path = tmp_path / "answers.h5"
+    write_answers(path, file, method="m", run="1", notes="n", answer=answer, scores=scores)
+    assert validate(path) == []
+    with open_predictions(path) as found, AnswersFile(truths.iqtt.with_name(
+        "iqtt-val.h5" if "val" in name else "iqtt-test-answers.h5"
+    )) as truth:  # fmt: skip
+        assert found.rows.tolist() == list(range(6))
+        assert found.answers.tolist() == answer
+        assert np.array_equal(found.scores, scores)
+        assert (found.method, found.run, found.notes) == ("m", "1", "n")
+        assert found.truth_path == str(file)
+        assert found.truth_fingerprint == truth.fingerprint
+    with h5py.File(path) as stored:
+        assert set(stored) == {"question", "answer", "scores"}
+        assert all(stored[n].attrs["meaning"] and stored[n].attrs["unit"] for n in stored)
+
+
+def test_answers_to_a_file_as_released(truths, tmp_path):
+    """It has no fingerprint, so that only the number of questions is held against it."""
+    file = tmp_path / "iqtt-val.h5"
+    with h5py.File(truths.iqtt.with_name("iqtt-val.h5")) as ours, h5py.File(file, "w") as released:
+        released["questions"], released["answers"] = ours["questions"][()], ours["answers"][()]
+    write_answers(tmp_path / "a.h5", file, method="m", answer=[0, 1, 2, -1, 0, 1])
+    with open_predictions(tmp_path / "a.h5") as found:
+        assert found.truth_fingerprint is None
+        assert found.answers.tolist() == [0, 1, 2, -1, 0, 1]
+    assert validate(tmp_path / "a.h5") == []
+
+
+EYE = np.eye(3)[[0, 1, 2, 0, 1, 2]]
+
+
+@pytest.mark.parametrize(
+    ("given", "where", "found"),
+    [
+        ({}, "", "neither answer nor scores"),
+        ({"answer": [0, 1, 2]}, ": answer", "shape (3,)"),
+        ({"answer": [0.0] * 6}, ": answer", "float64"),
+        ({"answer": [True] * 6}, ": answer", "bool"),
+        ({"answer": [0, 1, 2, 3, 0, 1]}, ": answer", "such as 3 (ids 3)"),
+        ({"answer": [0, 1, 2, 0, -2, 1]}, ": answer", "such as -2 (ids 4)"),
+        ({"answer": np.array([0, 1, 2, 0, 255, 1], "u1")}, ": answer", "such as 255"),
+        ({"scores": np.zeros((6, 4))}, ": scores", "(6, 4)"),
+        ({"scores": np.zeros((6, 3), int)}, ": scores", "int64"),
+        ({"scores": EYE * [1, 1, np.nan]}, ": scores", "(ids 0, 1, 2"),
+        ({"scores": EYE, "answer": [0, 1, 2, 0, 1, 1]}, ": answer", "(ids 5)"),
+        ({"scores": 0 * EYE, "answer": [0] * 6}, ": answer", "at 6 questions"),
+    ],
+)
+def test_answers_refused(truths, tmp_path, given, where, found):
+    with pytest.raises(PredictionError) as caught:
+        write_answers(tmp_path / "answers.h5", truths.iqtt, method="m", **given)
+    assert caught.value.where == f"{tmp_path / 'answers.h5'}{where}"
+    assert found in caught.value.found
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_answers_to_a_training_file(truths, tmp_path):
+    with pytest.raises(SceneGenError):
+        write_answers(tmp_path / "a.h5", truths.iqtt.with_name("iqtt-train.h5"), method="m",
+                      answer=[0])  # fmt: skip
+
+
+def test_answers_to_no_questions(tmp_path):
+    with h5py.File(tmp_path / "iqtt-val.h5", "w") as file:
+        file["questions"] = np.zeros((0, 4, 32, 32, 3), "u1")
+    with pytest.raises(PredictionError) as caught:
+        write_answers(tmp_path / "a.h5", tmp_path / "iqtt-val.h5", method="m", answer=[])
+    assert caught.value.found == "no questions"
+
+
+def test_answers_keep_an_existing_file(truths, tmp_path):
+    (tmp_path / "a.h5").write_text("precious")
+    given = {"method": "m", "answer": [0] * 6}
+    with pytest.raises(FileExistsError):
+        write_answers(tmp_path / "a.h5", truths.iqtt, **given)
+    write_answers(tmp_path / "a.h5", truths.iqtt, overwrite=True, **given)
+    assert validate(tmp_path / "a.h5") == []
+
+
+def test_a_submission_never_replaces_what_it_is_about(truths, tmp_path):
+    """Not under another name of the file either."""
+    for task in ("rooms", "iqtt"):
+        truth = shutil.copy(truths.of(task), tmp_path / f"{task}.h5")
+        before = Path(truth).read_bytes()
+        link = tmp_path / f"{task}-link.h5"
+        link.symlink_to(truth)
+        for path in (truth, link):
+            with pytest.raises(PredictionError):  # noqa: PT012
+                if task == "iqtt":
+                    write_answers(path, truth, method="m", answer=[0] * 6, overwrite=True)
+                else:
+                    RoomPredictionWriter(path, truth, method="m", overwrite=True)
+        assert Path(truth).read_bytes() == before
