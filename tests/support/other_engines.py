@@ -14,7 +14,9 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 from scenegen.camera import pixel_directions
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
-from scenegen.objects.shapes import UnitShape, scene_mesh, unit_shape
+from scenegen.objects.basic_shapes import unit_shape
+from scenegen.objects.scene_mesh import scene_mesh
+from scenegen.objects.solids import UnitShape
 from scenegen.rendering import renderer
 from scenegen.rendering.ground_truth import GroundTruth
 
@@ -53,7 +55,7 @@ truth = renderer.render(pack(spec, scenes))
 if scalar:
     import mitsuba
     assert mitsuba.variant() == "scalar_rgb"
-    assert "scenegen.rendering.wavefront" not in sys.modules
+    assert "scenegen.rendering.pixels" not in sys.modules
 pickle.dump(truth, sys.stdout.buffer)
 """
 

@@ -14,8 +14,8 @@ from scenegen.camera import Camera, back_project, transform_points
 from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.ground_truth import GroundTruth
+from scenegen.rendering.numpy_renderer import Cast, render_in_numpy
 from scenegen.rendering.packing import SceneBatch, pack
-from scenegen.rendering.reference import Cast, render_reference
 from scenegen.rendering.renderer import render
 from scenegen.rendering.shading import shade
 
@@ -166,7 +166,7 @@ def test_highlights_agree_with_another_engine(
     change: dict[str, Any], scenes_of: Scenes, embree_cast: Cast
 ) -> None:
     batch = pack(replace(GLOSSY, **change), scenes_of(GLOSSY, 4))
-    ours, theirs = render(batch), render_reference(batch, embree_cast)
+    ours, theirs = render(batch), render_in_numpy(batch, embree_cast)
     edges = np.stack([grey_dilation(ids, 3) != grey_erosion(ids, 3) for ids in ours.object_id])
     same = (ours.object_id == theirs.object_id) & ~edges
     assert same.mean() > 0.8
@@ -181,7 +181,7 @@ def test_rays_that_meet_nothing_are_no_trouble_to_the_reference(embree_cast: Cas
     scene = SceneSpec(0, (camera,), (item,), (lamp,), (0.1,) * 3, (0.5, 0.5), None, (0.2, 0.3, 0.4))
     spec = replace(GLOSSY, height=16, width=16, objects=(1, 1))
     ours, theirs = (f(pack(spec, [scene])) for f in
-                    (render, lambda batch: render_reference(batch, embree_cast)))  # fmt: skip
+                    (render, lambda batch: render_in_numpy(batch, embree_cast)))  # fmt: skip
     assert (ours.object_id == -1).mean() > 0.5
     np.testing.assert_allclose(ours.image, theirs.image, atol=1e-4)
 

@@ -51,7 +51,7 @@ def test_without_llvm_the_work_is_done_when_fetched(
         return truth
 
     monkeypatch.setattr(renderer, "select_variant", lambda device: "scalar_rgb")
-    monkeypatch.setattr(renderer, "render_reference", reference)
+    monkeypatch.setattr(renderer, "render_in_numpy", reference)
     batch = pack(TINY, scenes)
     fetch = launch(batch)
     assert made == []

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.catalogue import built_in_shape
-from scenegen.objects.shapes import unit_shape
 from scenegen.objects.solids import UnitShape
 
 Array = NDArray[Any]

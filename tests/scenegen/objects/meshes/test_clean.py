@@ -1,6 +1,5 @@
 """Every defect of real meshes, made small, and what is left of the surface."""
 
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -194,28 +193,30 @@ def test_an_open_sheet_that_stands_is_a_model() -> None:
 
 
 @pytest.mark.parametrize(
-    ("vertices", "faces", "words"),
+    ("vertices", "faces", "where", "found"),
     [
-        (np.empty((0, 3)), np.empty((0, 3), int), "0 vertices but no faces"),
-        (BOX.vertices, np.empty((0, 3), int), "8 vertices but no faces"),
-        (np.empty((0, 3)), BOX.faces, "no face is left that has an area .12 faces out of range"),
-        (BOX.vertices * np.nan, BOX.faces, "12 faces not finite"),
-        (BOX.vertices * 0, BOX.faces, "12 degenerate faces"),
-        (BOX.vertices * (1, 0, 0), BOX.faces, "12 degenerate faces"),
-        (BOX.vertices * 1e-200, BOX.faces, "12 degenerate faces"),
-        (BOX.vertices * (1, 0, 1), BOX.faces, "lies flat: it has no height"),
-        (BOX.vertices * (1, 1e-5, 1), BOX.faces, "lies flat: it has no height"),
-        (BOX.vertices, np.zeros((2_000_001, 3), int), "has 2000001 faces, at most 2000000"),
+        (np.empty((0, 3)), np.empty((0, 3), int), "faces", "0 vertices"),
+        (BOX.vertices, np.empty((0, 3), int), "faces", "8 vertices"),
+        (np.empty((0, 3)), BOX.faces, "faces", "12 faces out of range"),
+        (BOX.vertices * np.nan, BOX.faces, "faces", "12 faces not finite"),
+        (BOX.vertices * 0, BOX.faces, "faces", "12 degenerate faces"),
+        (BOX.vertices * (1, 0, 0), BOX.faces, "faces", "12 degenerate faces"),
+        (BOX.vertices * 1e-200, BOX.faces, "faces", "12 degenerate faces"),
+        (BOX.vertices * (1, 0, 1), BOX.faces, "height", "none"),
+        (BOX.vertices * (1, 1e-5, 1), BOX.faces, "height", "none"),
+        (BOX.vertices, np.zeros((2_000_001, 3), int), "faces", "2000001"),
     ],
 )
 def test_what_cannot_be_used_is_refused_with_a_reason(
-    vertices: Array, faces: Array, words: str
+    vertices: Array, faces: Array, where: str, found: str
 ) -> None:
-    with pytest.raises(BadMeshError, match=words):
+    with pytest.raises(BadMeshError) as refused:
         clean_mesh(vertices, faces)
+    assert refused.value.where == where
+    assert found in refused.value.found
 
 
-def test_many_faces_and_many_parts_take_seconds() -> None:
+def test_many_faces_and_many_parts() -> None:
     """A terrain of 200,000 faces, and 4,000 boxes, each triangle with corners of its own."""
     side = np.arange(317)
     x, z = np.meshgrid(side, side)
@@ -226,10 +227,8 @@ def test_many_faces_and_many_parts_take_seconds() -> None:
     )
     place = np.random.default_rng(0).uniform(-50, 50, (4000, 1, 1, 3))
     boxes = (BOX.triangles + place).reshape(-1, 3)
-    started = time.process_time()
     one = clean_mesh(terrain[faces].reshape(-1, 3), np.arange(faces.size))
     two = clean_mesh(boxes, np.arange(len(boxes)))
-    assert time.process_time() - started < 10
     assert (len(one.faces), len(one.vertices)) == (2 * 316**2, 317**2)
     assert (len(two.faces), len(two.vertices)) == (48_000, 32_000)
     centered = boxes - (boxes.min(axis=0) + boxes.max(axis=0)) / 2

@@ -207,7 +207,7 @@ def test_off_with_its_first_line_as_it_comes(head: str) -> None:
     rows = [f"{x} {y} {z} 9 9 9 1" for x, y, z in POINTS]
     rows += [" ".join(map(str, (len(face), *face, 255, 0, 0))) for face in sorted(PYRAMID)]
     pyramid_of(*parse_mesh((head + "\n# between\n".join(rows)).encode(), ".off"))
-    with pytest.raises(BadMeshError, match="tells of 5 vertices and 5 faces, found 5 and 4"):
+    with pytest.raises(BadMeshError, match="5 vertices and 4 faces"):
         parse_mesh((head + "\n".join(rows[:-1])).encode(), ".off")
 
 
@@ -216,10 +216,10 @@ def test_a_binary_stl_may_start_like_a_text_and_have_more_at_its_end() -> None:
     for changed in (b"solid facet" + data[11:], data + b"more"):
         vertices, faces = parse_mesh(changed, ".stl")
         np.testing.assert_allclose(vertices[faces], SPHERE.triangles, atol=1e-6)
-    with pytest.raises(BadMeshError, match="cut short: 319 of 320 triangles"):
+    with pytest.raises(BadMeshError, match="319 triangles"):
         parse_mesh(data[:-1], ".stl")
     text = SPHERE.export(file_type="stl_ascii").replace("\n", "\r\n")
     vertices, faces = parse_mesh((text + text.replace("solid", "solid two")).encode(), ".stl")
     assert len(faces) == 2 * len(SPHERE.faces)
-    with pytest.raises(BadMeshError, match="cut short: 959 corners"):
+    with pytest.raises(BadMeshError, match="959 corners"):
         parse_mesh(text[: text.rindex("vertex")].encode(), ".stl")

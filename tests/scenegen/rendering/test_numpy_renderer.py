@@ -15,8 +15,9 @@ from scenegen.camera import Camera, pixel_directions
 from scenegen.description.scenes import SHAPE_NAMES, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.ground_truth import GroundTruth
+from scenegen.rendering.numpy_renderer import Cast, render_in_numpy
 from scenegen.rendering.packing import pack
-from scenegen.rendering.reference import Cast, render_reference, sample_positions
+from scenegen.rendering.pixel_samples import sample_positions
 from scenegen.rendering.renderer import render
 
 Array = NDArray[Any]
@@ -79,7 +80,7 @@ def test_each_shape_agrees_in_depth_normal_and_image(
     batch = pack(spec, scenes_of(spec, 3))
     truth = render(batch)
     assert (truth.object_id > 0).mean() > 0.02
-    compare(truth, render_reference(batch, embree_cast))
+    compare(truth, render_in_numpy(batch, embree_cast))
 
 
 def test_normals_face_the_viewer_inside_open_shapes_too(embree_cast: Cast) -> None:
@@ -95,7 +96,7 @@ def test_normals_face_the_viewer_inside_open_shapes_too(embree_cast: Cast) -> No
     faces = cast_whole_scene(scene, spec)[2]
     inside = ((faces * rays).sum(axis=-1) > 0) & ~near_silhouettes(truth.object_id)[0]
     assert inside.sum() > 100
-    expected = render_reference(batch, embree_cast).normal[0]
+    expected = render_in_numpy(batch, embree_cast).normal[0]
     assert (abs(truth.normal[0] - expected).max(axis=-1)[inside] < 1e-3).mean() > 0.95
 
 
@@ -108,7 +109,7 @@ def test_scenes_without_a_room_agree_and_show_their_background(
     ]
     batch = pack(replace(SMALL, shadows=True), floating)
     truth = render(batch)
-    compare(truth, render_reference(batch, embree_cast))
+    compare(truth, render_in_numpy(batch, embree_cast))
     missed = truth.object_id == -1
     assert set(np.unique(truth.object_id)) == {-1, 1, 2, 3}
     assert np.isnan(truth.depth[missed]).all()
@@ -123,7 +124,7 @@ def test_shadows_agree_and_are_there(scenes_of: Scenes, embree_cast: Cast) -> No
     assert dark.mean() > 0.01
     assert (shadowed.image <= lit.image).all()
     assert lit.depth.tobytes() == shadowed.depth.tobytes()
-    expected = render_reference(pack(replace(SMALL, shadows=True), scenes), embree_cast)
+    expected = render_in_numpy(pack(replace(SMALL, shadows=True), scenes), embree_cast)
     wrong = abs(shadowed.image - expected.image).max(axis=-1) > 1e-3
     assert wrong.mean() < 2e-3, "but for some pixels on the shadows' borders"
 
@@ -138,7 +139,7 @@ def test_samples_start_at_the_centre_and_cover_the_pixel() -> None:
 
 def test_supersampling_agrees_sample_by_sample(scenes_of: Scenes, embree_cast: Cast) -> None:
     batch = pack(replace(SMALL, spp=5), scenes_of(SMALL, 2))
-    compare(render(batch), render_reference(batch, embree_cast))
+    compare(render(batch), render_in_numpy(batch, embree_cast))
 
 
 def test_supersampling_converges_and_leaves_the_truth_alone(scenes_of: Scenes) -> None:
