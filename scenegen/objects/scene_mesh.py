@@ -47,9 +47,7 @@ def room_mesh() -> trimesh.Trimesh:
 
 
 def world_from_object(
-    position: tuple[float, float, float],
-    rotation: tuple[float, float, float, float],
-    scale: float,
+    position: tuple[float, float, float], rotation: tuple[float, float, float, float], scale: float
 ) -> NDArray[np.float64]:
     """Return the matrix, (4, 4), that maps a unit shape to its place in the world."""
     matrix = np.eye(4)

@@ -1,5 +1,6 @@
 """A Mitsuba material with the diffuse and Phong lobes of the shading equation, for path tracing."""
 
+from functools import cache
 from typing import Any
 
 import drjit
@@ -21,13 +22,9 @@ def phong_bsdf(reflectance: Array, specular: float, shininess: float) -> Any:
     return _phong_class(mi.variant())(reflectance, specular, shininess)
 
 
-_classes: dict[str, Any] = {}
-
-
-def _phong_class(variant: str) -> Any:
+@cache
+def _phong_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
     """Return the material's class, which must derive from the base class of the variant."""
-    if variant in _classes:
-        return _classes[variant]
 
     class Phong(mi.BSDF):  # type: ignore[misc]
         """The material. Sampling chooses lobes by their share of light at normal incidence."""
@@ -101,5 +98,4 @@ def _phong_class(variant: str) -> Any:
             """Return a name for messages."""
             return "Phong[]"
 
-    _classes[variant] = Phong
     return Phong

@@ -1,4 +1,4 @@
-"""What stands against the code under test, another ray caster for one; and a folder of models."""
+"""Fixtures that check the code under test by other means, and a folder of models."""
 
 from collections.abc import Callable
 from functools import cache

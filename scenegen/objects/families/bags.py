@@ -21,15 +21,7 @@ from scenegen.objects.families.parts.walls import hollow
 
 def bag(rng: Generator) -> list[Part]:
     """Build a bag of a random kind."""
-    kinds = (
-        _hand_bag,
-        _hand_bag,
-        _hand_bag,
-        _paper_bag,
-        _paper_bag,
-        _rucksack,
-        _rucksack,
-    )
+    kinds = (_hand_bag, _hand_bag, _hand_bag, _paper_bag, _paper_bag, _rucksack, _rucksack)
     return pick(rng, (*kinds, _travel_bag, _case, _sack))(rng)
 
 
@@ -78,10 +70,7 @@ def _paper_bag(rng: Generator) -> list[Part]:
     wall = line((1.0, 0.0), (narrow, height))
     thick = 0.05
     body = loft(
-        hollow(wall, thick),
-        size=(1.0, depth),
-        corner=pick(rng, (0.0, 0.0, 0.12)),
-        segments=24,
+        hollow(wall, thick), size=(1.0, depth), corner=pick(rng, (0.0, 0.0, 0.12)), segments=24
     )
     rise, half = span(rng, 0.3, 1.0), narrow * span(rng, 0.25, 0.6)
     path = _arch(rng, half, height - 0.25, rise + 0.25)

@@ -24,18 +24,7 @@ from scenegen.objects.families.parts.sweeps import tube
 
 def can(rng: Generator) -> list[Part]:
     """Build a can of a random kind."""
-    kinds = (
-        _drink,
-        _drink,
-        _food,
-        _food,
-        _fish,
-        _oil,
-        _spray,
-        _paint,
-        _churn,
-        _crushed,
-    )
+    kinds = (_drink, _drink, _food, _food, _fish, _oil, _spray, _paint, _churn, _crushed)
     return pick(rng, kinds)(rng)
 
 

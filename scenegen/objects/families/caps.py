@@ -131,10 +131,7 @@ def _bowler(rng: Generator) -> list[Part]:
     over = reverse((under[0] + (0.0, THICK), under[1]))
     edge_of = polyline((outer, rise), (outer, rise + THICK))
     flat = join(under, edge_of, over, line((0.9, THICK), (0.9, 0.0)))
-    return [
-        loft(shell(wall, THICK), size=size, closed=True),
-        loft(flat, size=size, closed=True),
-    ]
+    return [loft(shell(wall, THICK), size=size, closed=True), loft(flat, size=size, closed=True)]
 
 
 def _sun_hat(rng: Generator) -> list[Part]:

@@ -80,10 +80,7 @@ def _tub(rng: Generator) -> list[Part]:
     size = radius - 0.02
     half = (radius + deep) / 2
     seat = loft(
-        cushion,
-        base=(size - 1.0, half - 1.0, 0.3 - 1.0),
-        at=(0.0, deep - half + 0.05),
-        segments=32,
+        cushion, base=(size - 1.0, half - 1.0, 0.3 - 1.0), at=(0.0, deep - half + 0.05), segments=32
     )
     x, z = 0.7 * radius, 0.55 * radius
     if chance(rng, 0.3):

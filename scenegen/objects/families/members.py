@@ -7,16 +7,7 @@ import numpy as np
 
 from scenegen.common.errors import SpecError
 from scenegen.description.scenes import FAMILY_NAMES
-from scenegen.objects.families import (
-    bags,
-    bottles,
-    cans,
-    caps,
-    chairs,
-    lamps,
-    tables,
-    vessels,
-)
+from scenegen.objects.families import bags, bottles, cans, caps, chairs, lamps, tables, vessels
 from scenegen.objects.families.parts.assembly import assemble
 from scenegen.objects.families.parts.surfaces import Part
 from scenegen.objects.solids import UnitShape

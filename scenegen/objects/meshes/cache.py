@@ -166,11 +166,7 @@ def _read_entry(entry: Path) -> CachedModel | None:
 
 
 def _is_whole(model: CachedModel) -> bool:
-    kinds = (
-        (model.vertices, np.float32),
-        (model.faces, np.int32),
-        (model.hull_points, np.float64),
-    )
+    kinds = ((model.vertices, np.float32), (model.faces, np.int32), (model.hull_points, np.float64))
     if any(a.ndim != 2 or a.shape[1] != 3 or a.dtype != kind for a, kind in kinds):
         return False
     if model.refusal is not None:

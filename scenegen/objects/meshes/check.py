@@ -88,16 +88,10 @@ def _check(file: ModelFile, up: str, cache: MeshCache) -> ModelCheck:
     return ModelCheck(file.name, True, "", len(model.faces), model.mended, seconds)
 
 
-_OWN_CACHE: list[MeshCache] = []  # of this worker process
-
-
-def _start(cache_dir: Path | None) -> None:
-    warnings.simplefilter("ignore")  # the caller has already warned about the cache
-    _OWN_CACHE[:] = [MeshCache(cache_dir)]
-
-
-def _check_here(file: ModelFile, up: str) -> ModelCheck:
-    return _check(file, up, _OWN_CACHE[0])
+def _check_in_worker(file: ModelFile, up: str, cache_dir: Path | None) -> ModelCheck:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the caller has already warned about the cache
+        return _check(file, up, MeshCache(cache_dir))
 
 
 def _in_processes(
@@ -117,17 +111,13 @@ def _in_processes(
 
 
 def _until_one_dies(
-    waiting: deque[ModelFile],
-    up: str,
-    cache_dir: Path | None,
-    jobs: int,
-    lost: list[ModelFile],
+    waiting: deque[ModelFile], up: str, cache_dir: Path | None, jobs: int, lost: list[ModelFile]
 ) -> Iterator[ModelCheck]:
     """Check the files that wait. If a process dies, stop and put the unfinished ones in `lost`."""
     running: dict[Future[ModelCheck], ModelFile] = {}
     # Spawned, as forking a process that has threads, such as a renderer's, is not safe.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, context, _start, (cache_dir,)) as pool:
+    with ProcessPoolExecutor(jobs, context) as pool:
         try:
             pool.submit(time.perf_counter).result()
         except BrokenProcessPool as error:  # before any model was read
@@ -136,8 +126,8 @@ def _until_one_dies(
         try:
             while waiting or running:
                 while waiting and len(running) < 2 * jobs:
-                    running[pool.submit(_check_here, waiting[0], up)] = waiting[0]
-                    waiting.popleft()
+                    file = waiting.popleft()
+                    running[pool.submit(_check_in_worker, file, up, cache_dir)] = file
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     record = future.result()
                     del running[future]

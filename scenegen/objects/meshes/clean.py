@@ -37,11 +37,6 @@ class CleanMesh:
     faces: Array
     mended: Mapping[str, int]
 
-    @property
-    def triangles(self) -> Array:
-        """The corners of the faces, (F, 3, 3) float32."""
-        return np.asarray(self.vertices[self.faces])
-
 
 def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
     """Mend a mesh and normalise it.

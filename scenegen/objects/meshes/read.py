@@ -53,18 +53,17 @@ def read_bytes(path: str | Path) -> bytes:
     return data
 
 
-def read_mesh(path: str | Path) -> tuple[Array, Array]:
+def parse_mesh(data: bytes, suffix: str) -> tuple[Array, Array]:
     """Return vertices (V, 3), perhaps not finite, and triangles (F, 3), perhaps out of range.
+
+    Args:
+        data: the content of a mesh file.
+        suffix: the file's suffix, such as ".obj", in upper or lower case.
 
     Raises:
         BadMeshError: the file is not what its suffix says, is too large or cut short, or needs
             other files.
     """
-    return parse_mesh(read_bytes(path), Path(path).suffix)
-
-
-def parse_mesh(data: bytes, suffix: str) -> tuple[Array, Array]:
-    """Return the mesh in a file's bytes as `read_mesh` does."""
     reader = _READERS.get(suffix.lower())
     if reader is None:
         raise BadMeshError("suffix", repr(suffix), f"one of {', '.join(_READERS)}")

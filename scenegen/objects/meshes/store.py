@@ -18,27 +18,22 @@ MOST_FACES_KEPT = 3_000_000  # of all shapes in memory; a face takes about 100 b
 
 
 class MeshStore:
-    """The unit shapes of a folder's models. Safe for threads; pickled without the shapes.
+    """The unit shapes of a folder's models. Several threads may share it.
 
     Attributes:
         folder: the listing of the models.
-        cache_dir: folder of the disk cache of cleaned models; None for no cache.
         problems: reasons, by name, why models were refused so far.
     """
 
     def __init__(self, folder: ModelFolder, cache_dir: str | Path | None) -> None:
         self.folder = folder
-        self.cache_dir = None if cache_dir is None else Path(cache_dir)
         self.problems: dict[str, str] = {}
         self._files = {file.name: file for files in folder.models.values() for file in files}
-        self._cache = MeshCache(self.cache_dir)
+        self._cache = MeshCache(cache_dir)
         self._digests: dict[str, str] = {}
         self._shapes: OrderedDict[str, UnitShape] = OrderedDict()
         self._faces = 0
         self._lock = threading.Lock()
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return MeshStore, (self.folder, self.cache_dir)
 
     def shape(self, name: str) -> UnitShape:
         """Return the model named "class/id" as a unit shape with flat faces, resting on its base.

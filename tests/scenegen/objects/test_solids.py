@@ -1,4 +1,4 @@
-"""Profiles, winding, hulls and rest, on bodies small enough to know by heart."""
+"""Profiles, winding, hulls and resting directions of bodies with known answers."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_a_prism_falls_over_once_its_middle_leaves_its_base(lean: float, stays: 
 
 
 def test_rest_is_about_the_centre_of_mass_not_of_the_corners() -> None:
-    """Many corners at one end would draw their mean there, but add no weight."""
+    """Many corners at one end move their mean but not the centre of mass."""
     crowd = np.array([(0.5 + 1e-3 * np.cos(a), 2.0, 0.5 + 1e-3 * np.sin(a)) for a in range(60)])
     crowd += [1.1, 0, 0]
     body = np.concatenate([CUBE, crowd])  # a cube under a thin leaning spire

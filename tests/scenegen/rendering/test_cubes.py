@@ -1,4 +1,4 @@
-"""Cubes cast without a structure: the same truth as by the generic kernel and by Embree."""
+"""The fast ray caster for cubes gives the same truth as the general one and as Embree."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from other_engines import bits
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial.transform import Rotation
 
@@ -37,7 +38,7 @@ def cubes_scene(
     distance: float = 8.0,
     lights: int = 2,
 ) -> SceneSpec:
-    """Cubes of all colours around a point; offsets in edges, distance of the camera in scales."""
+    """Cubes of random colours; offsets are in edge lengths, the camera's distance in scales."""
     rng = np.random.default_rng(seed)
     w, x, y, z = turn or rng.normal(size=4)
     rotation = Rotation.from_quat((x, y, z, w))
@@ -67,10 +68,6 @@ def fast(batch: SceneBatch) -> SceneBatch:
     return replace(batch, cubes_only=True)
 
 
-def bits(truth: GroundTruth, row: int) -> tuple[bytes, ...]:
-    return tuple(getattr(truth, name)[row].tobytes() for name in vars(truth))
-
-
 def edges(truth: GroundTruth) -> Array:
     """Pixels within one pixel of another cube or of another face."""
     near = maximum_filter(truth.object_id, (0, 3, 3)) != minimum_filter(truth.object_id, (0, 3, 3))
@@ -79,7 +76,7 @@ def edges(truth: GroundTruth) -> Array:
 
 
 def check_same(ours: GroundTruth, theirs: GroundTruth, size: float, slips: float = 0.0) -> None:
-    """Everywhere but at edges, and there but for a few pixels; `slips`: of theirs, everywhere."""
+    """Check agreement, except for a few pixels on edges and a share `slips` of all pixels."""
     on_edge = edges(theirs)
     same = ours.object_id == theirs.object_id
     close = np.isclose(ours.depth, theirs.depth, rtol=1e-6, atol=4e-6 * size, equal_nan=True)

@@ -1,4 +1,4 @@
-"""Scenes as arrays: each number in its slot, and nothing in the others."""
+"""Packed scenes: each number is in its slot, and unused slots are empty."""
 
 from dataclasses import replace
 
@@ -99,7 +99,7 @@ def test_rows_are_a_part_of_every_array(start: int, count: int) -> None:
 
 @pytest.mark.parametrize("views", [(2,), (0, 2), (-1,), (0, -1), (1, 5)])
 def test_views_that_a_scene_lacks_are_refused(views: tuple[int, ...]) -> None:
-    """-1 would be Python's last one."""
+    """-1 must not mean the last view."""
     with pytest.raises(SpecError) as refused:
         pack(SPEC, [FULL], views)
     error = refused.value

@@ -1,4 +1,4 @@
-"""The shading equation against numbers worked out by hand, and against its own symmetries."""
+"""The shading equation against numbers worked out by hand, and its symmetries."""
 
 import numpy as np
 import pytest

@@ -11,10 +11,7 @@ Corner = tuple[float, float, float]
 
 
 def box(
-    low: Corner,
-    high: Corner,
-    shift: Point = (0.0, 0.0),
-    taper: Point = (1.0, 1.0),
+    low: Corner, high: Corner, shift: Point = (0.0, 0.0), taper: Point = (1.0, 1.0)
 ) -> list[Corner]:
     """Return the eight corners of a box between two points.
 

@@ -29,10 +29,7 @@ def polyline(*corners: Point) -> Curve:
     """Return straight pieces from corner to corner, with a crease at each corner."""
     points = np.array(corners, float)
     along = np.diff(points, axis=0)
-    return (
-        np.repeat(points, 2, axis=0)[1:-1],
-        np.repeat(along, 2, axis=0),
-    )
+    return (np.repeat(points, 2, axis=0)[1:-1], np.repeat(along, 2, axis=0))
 
 
 def arc(center: Point, radius: float | Point, low: float, high: float, segments: int = 8) -> Curve:

@@ -86,7 +86,7 @@ def test_every_part_is_closed_and_faces_outwards(family: str) -> None:
 
 @FAMILIES
 def test_parts_hang_together(family: str) -> None:
-    """The boxes about the parts overlap, from part to part."""
+    """The bounding boxes of the parts form one connected group."""
     for shape in spread(family):
         parts = pieces(shape)
         low = np.array([part.min(axis=(0, 1)) for part in parts])
@@ -97,7 +97,7 @@ def test_parts_hang_together(family: str) -> None:
 
 @FAMILIES
 def test_normals_are_unit_and_belong_to_their_faces(family: str) -> None:
-    """Facets turn by up to 16 degrees from their corners' normals; few, and tiny, do by more."""
+    """Faces deviate from their corner normals by at most 16 degrees, except few and tiny ones."""
     wide, total = 0.0, 0.0
     for shape in spread(family):
         assert np.isfinite(shape.triangles).all()
@@ -187,7 +187,7 @@ def view_rays() -> tuple[Array, Array]:
 
 
 def least_difference(family: str, step: int) -> tuple[float, float]:
-    """Least and median over members of the part of the pixels that differ from the likest other.
+    """Return least and median share of pixels in which members differ from their most similar one.
 
     Pixels are those that either covers in small depth images; depths differ by over 0.03.
     """

@@ -41,7 +41,7 @@ def volume(part: Part) -> float:
 
 
 def reach(part: Part, directions: Array) -> Array:
-    """Support of the body that holds a part."""
+    """Return how far the part's convex body reaches along directions."""
     disc = part.hull_discs[:, None] * np.hypot(directions[:, 0], directions[:, 2])
     return np.asarray((part.hull_points @ directions.T + disc).max(axis=0))
 
@@ -171,7 +171,7 @@ def test_boxes_are_flat_and_moves_are_rigid() -> None:
 
 
 def test_walls_are_as_thick_as_asked() -> None:
-    """A bucket, with half a torus as its rim, and a dome: outside, less inside."""
+    """Volumes of a bucket with half a torus as its rim, and of a dome: outside minus inside."""
     polygon = 20 * math.sin(2 * math.pi / 40)
     bucket = loft(hollow(line((1.0, 0.0), (1.0, 2.0)), 0.2))
     rim = 2 * math.pi * 0.9 * math.pi * 0.1**2 / 2

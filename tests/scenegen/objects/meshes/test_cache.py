@@ -1,4 +1,4 @@
-"""Cleaned models on disk: found again, made again where damaged, and no danger to each other."""
+"""The cache of cleaned models: hits, damaged entries, and several processes at once."""
 
 import multiprocessing
 import subprocess
@@ -64,7 +64,7 @@ def test_a_model_is_cleaned_once(ball: Path, tmp_path: Path, made: list[int]) ->
 def test_what_a_model_was_made_from_is_in_its_name(
     ball: Path, tmp_path: Path, made: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Up axis, kind of file, bytes, and the version of the cleaning; not where the file lies."""
+    """The key depends on up axis, suffix, content and cleaning version, but not on the path."""
     store = MeshCache(tmp_path / "cache")
     store.load(ball, "y")
     copy = tmp_path / "copy.PLY"
@@ -88,7 +88,7 @@ def damages(whole: bytes) -> list[bytes]:
 
 
 def test_damaged_entries_are_made_again(ball: Path, tmp_path: Path, made: list[int]) -> None:
-    """Cut short, or with one bit turned anywhere."""
+    """Entries may be cut short or have one bit flipped anywhere."""
     store = MeshCache(tmp_path / "cache")
     digest, fresh = store.load(ball, "y")
     entry = tmp_path / "cache" / f"{digest}.npz"
@@ -104,7 +104,7 @@ def test_damaged_entries_are_made_again(ball: Path, tmp_path: Path, made: list[i
 def test_entries_of_another_kind_are_made_again(
     ball: Path, tmp_path: Path, made: list[int]
 ) -> None:
-    """Whole as files, but not what they should be; none may run code."""
+    """Readable files with wrong content; none may run code."""
     store = MeshCache(tmp_path / "cache")
     digest, fresh = store.load(ball, "y")
     entry = tmp_path / "cache" / f"{digest}.npz"

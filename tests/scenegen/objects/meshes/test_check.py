@@ -1,4 +1,4 @@
-"""The check of a whole folder: its records, its table and JSON, and that no model stops it."""
+"""The check of a whole folder: its records, table and JSON; no model may stop it."""
 
 import json
 import os

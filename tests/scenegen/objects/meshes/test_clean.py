@@ -1,4 +1,4 @@
-"""Every defect of real meshes, made small, and what is left of the surface."""
+"""Cleaning: every defect of real meshes on a small example, and the surface that is left."""
 
 from collections.abc import Callable
 from typing import Any
@@ -22,26 +22,25 @@ def clean_of(mesh: trimesh.Trimesh, up: str = "y") -> CleanMesh:
 
 
 def check_whole(mesh: CleanMesh) -> None:
-    """Check what every clean mesh promises."""
+    """Check what holds for every clean mesh."""
     vertices = mesh.vertices.astype(float)
     assert mesh.vertices.dtype == np.float32
     assert mesh.faces.dtype == np.int32
-    assert mesh.triangles.dtype == np.float32
-    assert mesh.triangles.shape == (len(mesh.faces), 3, 3)
     assert np.linalg.norm(vertices, axis=1).max() == pytest.approx(1, abs=1e-6)
     np.testing.assert_allclose(vertices.min(axis=0) + vertices.max(axis=0), 0, atol=2e-6)
     assert len(np.unique(mesh.vertices, axis=0)) == len(vertices), "merged"
     assert set(mesh.faces.ravel().tolist()) == set(range(len(vertices))), "all used"
     assert len({frozenset(face) for face in mesh.faces.tolist()}) == len(mesh.faces), "no doubles"
     assert all(len(set(face)) == 3 for face in mesh.faces.tolist())
-    edges = np.roll(mesh.triangles, -1, axis=1).astype(float) - mesh.triangles
+    triangles = vertices[mesh.faces]
+    edges = np.roll(triangles, -1, axis=1) - triangles
     area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
     assert (area / np.linalg.norm(edges, axis=2).max(axis=1) >= clean.NARROWEST).all()
     assert not np.signbit(mesh.vertices[mesh.vertices == 0]).any()
 
 
 def first_hits(triangles: Array, seed: int = 0, count: int = 3000) -> Array:
-    """Distances by Embree along rays from around the unit sphere into it; inf where none."""
+    """Return Embree's distances along rays into the unit sphere; inf where nothing is hit."""
     rng = np.random.default_rng(seed)
     origins, targets = rng.standard_normal((2, count, 3))
     origins *= 2 / np.linalg.norm(origins, axis=1, keepdims=True)
@@ -71,7 +70,7 @@ def same_surface(a: Array, b: Array) -> None:
 
 
 def soup(mesh: trimesh.Trimesh) -> tuple[Array, Array]:
-    """Each triangle with corners of its own."""
+    """Return a mesh whose triangles share no vertices."""
     corners = np.asarray(mesh.triangles.reshape(-1, 3))
     return corners, np.arange(len(corners)).reshape(-1, 3)
 
@@ -142,10 +141,7 @@ DEFECTS: dict[str, tuple[Callable[[Array, Array], tuple[Array, Array]], dict[str
         lambda v, f: (np.concatenate([v, [(9e9, 0, 0)]]), np.vstack([f, [0, 162, 162]])),
         {"degenerate_faces": 1, "unused_vertices": 1},
     ),
-    "loose vertices": (
-        lambda v, f: (np.concatenate([v, [(99, 0, 0)]]), f),
-        {"unused_vertices": 1},
-    ),
+    "loose vertices": (lambda v, f: (np.concatenate([v, [(99, 0, 0)]]), f), {"unused_vertices": 1}),
     "not finite": (with_nan, {"faces_not_finite": 2, "unused_vertices": 3}),
     "out of range": (
         lambda v, f: (v, np.vstack([f, [0, 1, 162], [-1, 0, 1], [0, 1, 2**40]])),
@@ -163,7 +159,7 @@ def test_defects_are_mended_and_counted(
     check_whole(mesh)
     assert {name: count for name, count in mesh.mended.items() if count} == expected
     assert len(mesh.faces) == 320
-    same_surface(mesh.triangles, unit_triangles(BALL))
+    same_surface(mesh.vertices[mesh.faces], unit_triangles(BALL))
 
 
 def test_what_is_clean_stays_as_it_is_to_the_bit() -> None:
@@ -233,5 +229,6 @@ def test_many_faces_and_many_parts() -> None:
     assert (len(two.faces), len(two.vertices)) == (48_000, 32_000)
     centered = boxes - (boxes.min(axis=0) + boxes.max(axis=0)) / 2
     same_surface(
-        two.triangles, (centered / np.linalg.norm(centered, axis=1).max()).reshape(-1, 3, 3)
+        two.vertices[two.faces],
+        (centered / np.linalg.norm(centered, axis=1).max()).reshape(-1, 3, 3),
     )

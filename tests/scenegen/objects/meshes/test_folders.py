@@ -1,4 +1,4 @@
-"""Listings of ShapeNet, in both versions, and of plain folders; splits; what is wrong with them."""
+"""Listings of ShapeNet (both versions) and of plain folders, their splits, and refusals."""
 
 import hashlib
 import json
@@ -102,7 +102,7 @@ def test_one_name_for_two_synsets(make: Make) -> None:
 
 
 def test_splits_by_hash() -> None:
-    """Seventy, ten and twenty in a hundred, by a rule that may never change."""
+    """70, 10 and 20 percent, by a rule that must never change."""
     for model_id in ("a", "caf\u00e9", "1a2b3c", ""):
         tenth = int(hashlib.sha256(model_id.encode()).hexdigest()[:16], 16) % 10
         assert object_split(model_id) == (["train"] * 7 + ["val"] + ["test"] * 2)[tenth]
@@ -121,7 +121,7 @@ def test_a_split_is_a_part(make: Make) -> None:
 
 
 def test_the_official_splits_go_before_the_hash(shapenet: Callable[..., Path]) -> None:
-    """A model that the list lacks is in no split; leading zeros may have been lost."""
+    """A model missing from the list is in no split; synsets may have lost leading zeros."""
     root = shapenet(1)
     rows = ["id,synsetId,subSynsetId,modelId,split", f"1,{MUG},{MUG},a,test", f"2,{MUG[1:]},,b,VAL"]
     rows += [f"3,{BOWL},0,a,train", f"4,{PLANE},0,p,", "5,,,,", "short"]
@@ -138,7 +138,7 @@ def test_the_official_splits_go_before_the_hash(shapenet: Callable[..., Path]) -
 
 
 def test_plain_folders(make: Make) -> None:
-    """Any depth and suffix, ids without suffix but where two would be one, and nothing hidden."""
+    """Files of any depth; ids lack the suffix unless two would be equal; no hidden files."""
     root = make(
         "mug/b.obj", "mug/a.PLY", "mug/deep/er/c.stl", "mug/twin.glb", "mug/twin.off", "mug/t.mtl",
         "mug/v1.2.obj", "mug/.hidden.obj", ".git/x.obj", "caf\u00e9 \u6f22/z z.obj", "none/x.txt",

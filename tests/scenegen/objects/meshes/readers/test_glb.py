@@ -1,4 +1,4 @@
-"""GLB files: nodes and their transforms, against trimesh's reader; and what nobody should send."""
+"""GLB files: transforms of nodes against trimesh's reader, and hostile files."""
 
 import base64
 import json
@@ -78,7 +78,7 @@ def test_glb_by_hand() -> None:
 
 
 def test_glb_indices_do_not_reach_into_the_next_part() -> None:
-    """Whether it is another primitive of the mesh or another node's."""
+    """The next part may be another primitive of the mesh or of another node."""
     indices = np.array([0, 1, 2, 0, 1, 4], "<u2").tobytes()
     part = {"attributes": {"POSITION": 0}, "indices": 1}
     view = {"buffer": 0, "byteOffset": len(TRIANGLES), "byteLength": len(indices)}

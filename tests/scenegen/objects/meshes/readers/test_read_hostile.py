@@ -1,4 +1,4 @@
-"""Files of meshes that are too large, damaged, or no files at all: a reason, and soon."""
+"""Mesh files that are too large, damaged or no files at all are refused, with bounded effort."""
 
 import os
 from pathlib import Path
@@ -13,7 +13,7 @@ from known_meshes import CORNERS, OBJ, SPHERE
 from scenegen.objects.meshes import limits
 from scenegen.objects.meshes.clean import clean_mesh
 from scenegen.objects.meshes.errors import BadMeshError
-from scenegen.objects.meshes.read import parse_mesh, read_mesh
+from scenegen.objects.meshes.read import parse_mesh, read_bytes
 
 
 def refusal(data: bytes, suffix: str) -> BadMeshError:
@@ -85,7 +85,7 @@ def test_files_that_are_no_files(
     (tmp_path / "big.obj").write_text(OBJ["plain"])
     monkeypatch.setattr(limits, "MOST_BYTES", 50)
     with pytest.raises(BadMeshError) as refused:
-        read_mesh(tmp_path / name)
+        read_bytes(tmp_path / name)
     assert (refused.value.where, refused.value.found) == ("file", found)
 
 
