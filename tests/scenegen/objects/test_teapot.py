@@ -27,10 +27,6 @@ def borders() -> dict[tuple[float, ...], list[tuple[int, int]]]:
     return found
 
 
-def test_there_are_32_bicubic_patches() -> None:
-    assert patches().shape == (32, 4, 4, 3)
-
-
 def test_every_border_is_shared_or_known_to_be_open() -> None:
     alone = {users[0] for users in borders().values() if len(users) == 1}
     open_rings = {(i, 0) for i in RIM} | {(i, 1) for i in LID}
