@@ -224,3 +224,23 @@ def test_refusals(shapenet: Callable[..., Path], make: Make) -> None:
         assert refused.value.where.endswith(where), arguments
         assert found in refused.value.found, arguments
         assert refused.value.expected or refused.value.hint, arguments
+
+
+def test_files_and_folders_that_cannot_be_read(
+    shapenet: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = shapenet(1)
+    with pytest.raises(MeshFolderError):
+        open_objects(root / ("x" * 5000))
+    (root / "all.csv").mkdir()
+    with pytest.raises(MeshFolderError) as refused:
+        open_shapenet(root)
+    assert refused.value.where.endswith("all.csv")
+
+    def locked(path: Path) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("os.scandir", locked)
+    with pytest.raises(MeshFolderError) as refused:
+        open_objects(root)
+    assert "Permission denied" in refused.value.found
