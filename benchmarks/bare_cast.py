@@ -20,12 +20,12 @@ from benchmarks.scenes import read_depth, read_scenes
 from benchmarks.timing import repeat
 from scenegen.camera import pixel_size
 from scenegen.description.specs import DatasetSpec
-from scenegen.objects.shapes import unit_shape
+from scenegen.objects.basic_shapes import unit_shape
 from scenegen.rendering.backend import select_variant
-from scenegen.rendering.kernel import Scenes, closest_hit
 from scenegen.rendering.packing import SceneBatch, pack
+from scenegen.rendering.pixels import upload_scenes
+from scenegen.rendering.rays import Scenes, closest_hit
 from scenegen.rendering.unit_scene import mitsuba_shape
-from scenegen.rendering.wavefront import _upload
 
 Array = NDArray[Any]
 BATCHES = (64, 256)
@@ -44,7 +44,7 @@ def unit_scene(rooms: str, count: int, repeats: int) -> dict[str, Any]:
         casts = [
             partial(
                 cast_at_unit_scene,
-                _upload(batch, variant)[0],
+                upload_scenes(batch, variant)[0],
                 camera_table(batch),
                 len(batch),
                 spec,

@@ -27,7 +27,7 @@ from benchmarks.timing import repeat
 from scenegen.camera import Camera, pixel_directions
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
-from scenegen.objects.shapes import room_mesh, world_from_object
+from scenegen.objects.scene_mesh import room_mesh, world_from_object
 from scenegen.rendering.backend import select_variant
 
 Array = NDArray[Any]

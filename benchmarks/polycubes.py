@@ -18,7 +18,8 @@ from iqtt.questions.sampling import make_pools
 from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import Question, cube_centres, pack_questions
 from iqtt.render import render_questions
-from scenegen.objects.shapes import unit_shape, welded
+from scenegen.objects.basic_shapes import unit_shape
+from scenegen.objects.scene_mesh import welded
 from scenegen.rendering.backend import select_variant
 from scenegen.rendering.renderer import launch_fields
 
@@ -42,7 +43,7 @@ def cast(questions: int, repeats: int, blocks: bool) -> dict[str, Any]:
     """Time pack, launch and fetch of colour and ids, by the cubes' kernel or the general one."""
     spec = SplitSpec()
     batch = pack_questions(spec, _questions(spec, questions))
-    batch = replace(batch, blocks=blocks)
+    batch = replace(batch, cubes_only=blocks)
     names = ("image", "object_id")
     seconds = repeat(lambda: launch_fields(batch, names)(), repeats)  # noqa: PLW0108
     return {"seconds": seconds, "images": 4 * questions, "note": "pixels of one batch"}

@@ -12,7 +12,7 @@ from iqtt.questions.sampling import Shapes
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.polycube import box_centre
 from scenegen.description.specs import DatasetSpec
-from scenegen.objects.shapes import unit_shape
+from scenegen.objects.basic_shapes import unit_shape
 from scenegen.rendering.packing import SceneBatch
 
 Array = NDArray[Any]
@@ -109,7 +109,7 @@ def pack_views(
         attenuation=np.tile((0.0, 1.0), (batch, 1)),
         has_room=np.zeros(batch, bool),
         background=np.tile(spec.background, (batch, 1)),
-        blocks=True,
+        cubes_only=True,
     )
 
 

@@ -11,7 +11,7 @@ from scenegen.common.command_line import CACHE_DIR, OVERWRITE, UP, Names, progre
 
 if TYPE_CHECKING:
     from scenegen.objects.meshes.check import ModelCheck
-    from scenegen.objects.meshes.folders import ModelFolder
+    from scenegen.objects.meshes.listing import ModelFolder
 
 
 @click.command("check-objects")

@@ -52,7 +52,7 @@ class DatasetSpec:
         source: what objects are: "shapes" for basic shapes, "families" for the built-in object
             classes, else the kind of folder that their meshes come from.
         shapes: names to draw from, each with the same probability: basic shapes, or classes.
-        object_split: which objects of a class are drawn from (see `meshes.folders.object_split`).
+        object_split: which objects of a class are drawn from (see `meshes.listing.object_split`).
         listing: digest of the names of a folder's models; empty for what is built in.
         object_radius: smallest and largest bounding radius of an object, scene units.
         pose: "resting" puts every object down in a position where it would stay; "any" turns it

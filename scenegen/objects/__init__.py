@@ -1,1 +1,11 @@
-"""TODO."""
+"""The objects that one can put into a room: unit shapes, and catalogues of named models.
+
+- `solids.UnitShape` is what every object is made of: a surface and a convex body, of radius 1.
+- `basic_shapes` makes boxes, spheres, teapots and the like, `families` makes everyday objects, and
+  `meshes` reads models from files.
+- `catalogue` says which models a data set draws from; `sources` turns the command line's options
+  on objects into such a catalogue.
+- `scene_mesh` gives a whole scene as one mesh, for export and for other ray casters.
+
+Start with `catalogue.objects_of`. These files import `common` and `description`, and no renderer.
+"""

@@ -1,4 +1,4 @@
-"""What the objects of a data set are: names of classes and models, and how they look."""
+"""The catalogue of a data set's objects: its classes, the models of each, and their shapes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,23 +9,22 @@ import numpy as np
 from scenegen.common.errors import SpecError
 from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
 from scenegen.description.specs import DatasetSpec
+from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.families.members import MEMBERS, member_shape
 from scenegen.objects.meshes.errors import BadMeshError
-from scenegen.objects.meshes.folders import object_split
+from scenegen.objects.meshes.listing import object_split
 from scenegen.objects.meshes.store import MeshStore
-from scenegen.objects.shapes import unit_shape
 from scenegen.objects.solids import UnitShape
 
 
 @dataclass(frozen=True, eq=False)
 class Objects:
-    """What a data set's scenes are made of.
+    """The models that a data set's scenes are made of.
 
     Attributes:
-        models: by class, names as in `scenes.PlacedObject.shape`.
-        shape: the unit shape of such a name. Raises BadMeshError where its file cannot be used.
-        digest: of the file that the shape was made from and of how it is cleaned; empty for what
-            the program makes.
+        models: names of models, as in `scenes.PlacedObject.shape`, by class.
+        shape: returns the unit shape of a name; raises BadMeshError if its file cannot be used.
+        digest: returns the content hash of a model's file; empty for built-in objects.
     """
 
     models: Mapping[str, Sequence[str]]
@@ -34,16 +33,14 @@ class Objects:
 
 
 def objects_of(spec: DatasetSpec) -> Objects:
-    """Return the built-in objects that a request draws from.
+    """Return the built-in objects of a data set.
 
-    Raises SpecError where they are meshes in a folder, of which the request does not know where
-    it lies.
+    Raises:
+        SpecError: the objects are meshes in a folder, and the spec does not hold its path.
     """
     if spec.source not in ("shapes", "families"):
-        raise SpecError(
-            f"objects: they are meshes ({spec.source}); say where they lie with"
-            f" --{'objects' if spec.source == 'folder' else 'shapenet'}-root"
-        )
+        option = f"--{'objects' if spec.source == 'folder' else 'shapenet'}-root"
+        raise SpecError("objects", f"meshes ({spec.source})", f"their folder, by {option}")
     return _built_in(spec.source, spec.shapes, spec.object_split)
 
 
@@ -54,7 +51,7 @@ def mesh_objects(store: MeshStore) -> Objects:
 
 
 def changed_meshes(objects: Objects, scene: SceneSpec) -> list[str]:
-    """Return which of a scene's models are no longer made from the file they were made from."""
+    """Return the names of a scene's models whose files have changed since it was rendered."""
     wrong = []
     for item in scene.objects:
         try:
@@ -67,22 +64,22 @@ def changed_meshes(objects: Objects, scene: SceneSpec) -> list[str]:
 
 
 def built_in_shape(name: str) -> UnitShape:
-    """Return a basic shape, or a member of a built-in family. Raises SpecError for another name."""
+    """Return a basic shape or a member of a family. Raises SpecError for any other name."""
     if name in SHAPE_NAMES:
         return unit_shape(name)
     family, _, member = name.partition("/")
     if not member.isdecimal() or len(member) > 4:
-        raise SpecError(f"object: found {name!r}, expected a basic shape, or class/number")
+        raise SpecError("object", repr(name), "a basic shape, or family/number")
     return member_shape(family, int(member))
 
 
 def outline(shape_of: Callable[[str], UnitShape], name: str) -> UnitShape:
-    """Return a unit shape without its triangles: what placement needs, small enough to be kept."""
+    """Return a unit shape without its triangles. Placement needs no more, and it can be cached."""
     return _known(shape_of, name)[0]
 
 
 def face_count(shape_of: Callable[[str], UnitShape], name: str) -> int:
-    """Return the number of a unit shape's triangles, also where these are not in memory."""
+    """Return the number of a unit shape's triangles without keeping them in memory."""
     return _known(shape_of, name)[1]
 
 

@@ -1,4 +1,4 @@
-"""Unit shapes from polyhedra and profiles: surfaces, normals, hulls, and how they come to rest."""
+"""The type of all shapes, `UnitShape`, and its making from polyhedra and from turned profiles."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 
 Array = NDArray[Any]
 SEGMENTS = 512  # around an axis
-STRIPS = 16  # along a straight profile: long slivers would make rays three times as expensive
+STRIPS = 16  # along a straight profile; with long slivers rays take three times as long
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,14 +17,15 @@ class UnitShape:
     """A shape of bounding radius 1 about its origin.
 
     Attributes:
-        name: as in `scenes.SHAPE_NAMES`.
+        name: as in `scenes.PlacedObject.shape`.
         triangles: corners, (F, 3, 3), counter-clockwise seen from outside.
-        normals: unit normals at those corners, (F, 3, 3).
-        hull_points, hull_discs, rounding: a convex body that contains the shape, for placement:
-            the hull of horizontal discs about the points (V, 3) with radii (V,), grown by a ball.
-        resting_directions: unit directions, (S, 3), each of which may point down when the shape
-            lies still; empty where all may.
-        is_sphere: whether it is rendered as the exact unit sphere.
+        normals: unit normals of the smooth surface at those corners, (F, 3, 3).
+        hull_points, hull_discs, rounding: a convex body that contains the shape, for placement. It
+            is the convex hull of horizontal discs with centres (V, 3) and radii (V,), extended by
+            the distance `rounding` in all directions.
+        resting_directions: unit directions, (S, 3), of the shape's frame that may point down when
+            it lies at rest; empty if all may.
+        is_sphere: whether it is rendered as the exact unit sphere instead of its triangles.
     """
 
     name: str
@@ -37,7 +38,7 @@ class UnitShape:
     is_sphere: bool = False
 
     def support(self, directions: Array) -> Array:
-        """Return how far the convex body reaches along unit directions: (M, 3) -> (M,)."""
+        """Return how far the convex body reaches along unit directions, (M, 3) -> (M,)."""
         reach = self.hull_points @ directions.T
         if self.hull_discs.any():
             reach += self.hull_discs[:, None] * np.hypot(directions[:, 0], directions[:, 2])
@@ -45,7 +46,7 @@ class UnitShape:
 
 
 def polyhedron(name: str, points: Array) -> UnitShape:
-    """Return the convex hull of points, centred and scaled to bounding radius 1, faces flat."""
+    """Return the convex hull of points, (V, 3), with flat faces, centred and scaled to radius 1."""
     points = points - (points.min(0) + points.max(0)) / 2
     points = points / np.linalg.norm(points, axis=1).max()
     hull = ConvexHull(points)
@@ -64,9 +65,13 @@ def revolution(
     resting: Array | None = None,
     is_sphere: bool = False,
 ) -> UnitShape:
-    """Turn profile pieces, each (radius, height) points and normals of shape (n, 2), about y.
+    """Turn profile pieces about the y axis and scale the result to bounding radius 1.
 
-    The result is scaled by the largest distance from the origin, rounding included.
+    Args:
+        pieces: (points, normals), both (n, 2) with the columns (radius, height).
+        hull_rings: (radius, height) of the discs of the convex body.
+        rounding: by which the convex body extends beyond the discs' hull.
+        resting: resting directions; by default those of the discs' hull.
     """
     angle = np.linspace(0, 2 * np.pi, SEGMENTS + 1)
 
@@ -111,9 +116,9 @@ def face_outwards(triangles: Array, normals: Array) -> tuple[Array, Array]:
 
 
 def resting_directions(points: Array) -> Array:
-    """Outward normals of the hull's faces on which the body stays when put down.
+    """Return outward normals, (S, 3), of the faces of the points' hull on which it can rest.
 
-    It stays where the plumb line from its centre of mass meets the face that it stands on.
+    It rests on a face if the perpendicular from its centre of mass meets that face.
     """
     hull = ConvexHull(points)
     corners, normal = points[hull.simplices], hull.equations[:, :3]
@@ -124,14 +129,14 @@ def resting_directions(points: Array) -> Array:
     foot = center - (normal @ center + hull.equations[:, 3])[:, None] * normal
     edges = np.roll(corners, -1, axis=1) - corners
     sides = np.einsum("fki,fi->fk", np.cross(edges, foot[:, None] - corners), normal)
-    stays = (sides > -1e-9).all(axis=1) | (sides < 1e-9).all(axis=1)  # whichever way it is wound
+    stays = (sides > -1e-9).all(axis=1) | (sides < 1e-9).all(axis=1)  # either winding
     return np.asarray(np.unique(np.round(normal[stays], 9), axis=0))
 
 
 def arc(
     center: tuple[float, float], radius: float, low: float, high: float, segments: int
 ) -> tuple[Array, Array]:
-    """Profile and normals of an arc, angles in degrees from the radial direction."""
+    """Return profile and normals of an arc, angles in degrees from the radial direction."""
     angle = np.radians(np.linspace(low, high, segments + 1))
     normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     normals[np.abs(normals) < 1e-15] = 0.0
@@ -139,7 +144,7 @@ def arc(
 
 
 def line(start: tuple[float, float], end: tuple[float, float]) -> tuple[Array, Array]:
-    """Profile and normals of a straight piece whose outside is on its right."""
+    """Return profile and normals of a straight piece whose outside is on its right."""
     along = np.subtract(end, start)
     normal = np.array([along[1], -along[0]]) / np.linalg.norm(along)
     fraction = np.linspace(0.0, 1.0, STRIPS + 1)[:, None]

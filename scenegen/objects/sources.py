@@ -1,4 +1,4 @@
-"""From what a person says about objects to what the generator needs: settings, and the models."""
+"""Turn the command line's options on objects into `DatasetSpec` settings and a catalogue."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,20 +10,22 @@ from scenegen.description.presets import PRESETS
 from scenegen.description.specs import BUILT_IN, DatasetSpec
 from scenegen.objects.catalogue import Objects, mesh_objects, objects_of
 from scenegen.objects.meshes.cache import default_cache_dir
-from scenegen.objects.meshes.folders import ModelFolder, open_objects, open_shapenet
+from scenegen.objects.meshes.folders import open_objects
+from scenegen.objects.meshes.listing import ModelFolder
+from scenegen.objects.meshes.shapenet import open_shapenet
 from scenegen.objects.meshes.store import MeshStore
 
-NOTES_SHOWN = 5  # refused models told of after a run
+NOTES_SHOWN = 5  # refused models that are named after a run
 
 
 @dataclass(frozen=True, eq=False)
 class ObjectSource:
-    """What `render` was told about objects.
+    """The objects that the options of `scenegen render` ask for.
 
     Attributes:
-        settings: of the `DatasetSpec`.
-        objects: None where they are built in.
-        store: of meshes, if they come from a folder.
+        settings: arguments of `DatasetSpec`.
+        objects: the catalogue; None if the objects are built in.
+        store: the meshes, if they come from a folder.
     """
 
     settings: dict[str, Any] = field(default_factory=dict)
@@ -31,12 +33,12 @@ class ObjectSource:
     store: MeshStore | None = None
 
     def notes(self) -> list[str]:
-        """Return lines on the models that were refused so far."""
+        """Return lines that name the models refused so far, with reasons."""
         problems = list(self.store.problems.items()) if self.store else []
         lines = [f"note: {name} was passed over: {why}" for name, why in problems[:NOTES_SHOWN]]
         if len(problems) > NOTES_SHOWN:
             more = len(problems) - NOTES_SHOWN
-            lines.append(f"note: and {more} more; `scenegen check-objects` tells of all")
+            lines.append(f"note: and {more} more; `scenegen check-objects` lists all")
         return lines
 
 

@@ -1,10 +1,11 @@
-"""Newell's teapot as bicubic Bezier patches.
+"""Newell's teapot (the "Utah teapot") as bicubic Bezier patches.
 
-Numbers: M. Newell, "The Utilization of Procedure Models in Digital Image Synthesis", PhD thesis,
+The control points are from M. Newell, "The Utilization of Procedure Models in Digital Image
+Synthesis", PhD thesis,
 University of Utah, 1975, with the bottom F. Crow published in "The Origins of the Teapot", IEEE
-CG&A 7(1), 1987. They are z up. Where the published net is a surface of revolution, it is kept as
-its profile: rows of (radius, tangent, z), a quarter turn having the control points (r, 0), (r, -t),
-(t, -r), (0, -r). Handle and spout are halves (y <= 0), mirrored in y.
+CG&A 7(1), 1987, with z up. Surfaces of revolution are stored as profiles: rows (r, t, z), for which
+a quarter turn has the control points (r, 0), (r, -t), (t, -r), (0, -r) at the height z. Handle and
+spout are stored as halves (y <= 0) and mirrored.
 """
 
 from typing import Any
@@ -53,13 +54,13 @@ HALVES = (
 
 
 def patches() -> NDArray[np.float64]:
-    """Return the 32 control nets, y up, all wound the same way round: (32, 4, 4, 3)."""
+    """Return the 32 control nets, y up, all with the same orientation, (32, 4, 4, 3)."""
     quarters = []
     for profile in PROFILES:
         quarter = np.array([((r, 0, z), (r, -t, z), (t, -r, z), (0, -r, z)) for r, t, z in profile])
         for cos, sin in ((1, 0), (0, -1), (-1, 0), (0, 1)):
             quarters.append(quarter @ np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]]))
-    # A mirrored net is run through backwards, so that it keeps its outside outside.
+    # Mirroring turns a net inside out, so its columns are reversed as well.
     halves = np.array(HALVES, float)
     mirrored = (halves * (1, -1, 1))[:, :, ::-1]
     z_up = np.concatenate([quarters, halves, mirrored])
@@ -67,11 +68,11 @@ def patches() -> NDArray[np.float64]:
 
 
 def tessellate(divisions: int) -> tuple[Array, Array]:
-    """Return the corners and corner normals of divisions^2 quads a patch, outside out.
+    """Return the corners and corner normals of divisions^2 quadrilaterals a patch.
 
     Returns:
-        corners, normals: (Q, 4, 3); a quad's corners run counter-clockwise seen from outside.
-        Normals come from the patch's derivatives, slightly inside where those vanish (the poles).
+        corners, normals: (Q, 4, 3); corners run counter-clockwise seen from outside. Normals come
+        from the patch's derivatives, taken slightly inside its edges as these vanish at the poles.
     """
     nets = patches()
     t = np.linspace(0, 1, divisions + 1)
@@ -90,7 +91,7 @@ def tessellate(divisions: int) -> tuple[Array, Array]:
 
 
 def turned_quads(divisions: int) -> int:
-    """Return how many of `tessellate`'s quads, the first ones, belong to surfaces of revolution."""
+    """Return how many of the first quadrilaterals of `tessellate` are surfaces of revolution."""
     return 4 * len(PROFILES) * divisions**2
 
 

@@ -1,8 +1,8 @@
-"""Which Mitsuba variant can render here, found without ever loading one that would abort.
+"""Choose the Mitsuba variant that renders, and find an LLVM library for it.
 
-Dr.Jit needs LLVM to compile its wavefronts on CPUs. Old ones (14 and 15 do) abort the process when
-they meet an instruction they cannot select, so an LLVM is asked for its version before Dr.Jit is
-told of it. The wheel `karellen-llvm-core`, a dependency on Linux x86-64, brings one that works.
+Dr.Jit needs LLVM to compile its kernels for CPUs. Versions 14 and 15 abort the process at some
+instructions, so a library's version is checked before Dr.Jit gets its path. The wheel
+`karellen-llvm-core`, a dependency on Linux x86-64, brings a version that works.
 """
 
 import ctypes

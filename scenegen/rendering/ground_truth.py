@@ -1,4 +1,4 @@
-"""What a renderer returns: images with their exact ground truth."""
+"""The pixels that a renderer returns, and what they mean: radiance, depth, normal, object id."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,13 +11,17 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class GroundTruth:
-    """Pixels of B images. Frames and pixel conventions are those of `camera.py`.
+    """The pixels of B images. Frames and pixel conventions are those of `scenegen.camera`.
+
+    All but the image come from one ray through the centre of each pixel, without filtering.
 
     Attributes:
         image: linear RGB radiance, (B, H, W, 3); as uint8, 255 is radiance 1.
-        depth: planar depth, (B, H, W) float32, scene units, NaN where the ray meets nothing.
-        normal: (B, H, W, 3) float32, camera frame, unit, facing the viewer; zero where nothing.
-        object_id: (B, H, W) int8, -1 nothing, 0 room, k the k-th object counting from 1.
+        depth: planar depth, the distance along the viewing axis (-z of the camera frame), in scene
+            units, (B, H, W) float32; NaN where the ray hits nothing.
+        normal: unit normal in the camera frame, facing the viewer, (B, H, W, 3) float32; zero
+            where the ray hits nothing.
+        object_id: (B, H, W) int8; -1 nothing, 0 the room, k the k-th object, counting from 1.
     """
 
     image: Array
@@ -27,7 +31,7 @@ class GroundTruth:
 
 
 def encode_image(radiance: Array, dtype: str) -> Array:
-    """Store linear radiance: uint8 rounds 255 times it, clipped to 0..1; floats keep it."""
+    """Return linear radiance as stored: uint8 clips it to 0..1 and rounds 255 times the value."""
     if dtype == "uint8":
         return np.rint(np.clip(radiance, 0.0, 1.0) * 255.0).astype(np.uint8)
     return np.asarray(radiance).astype(dtype)
@@ -41,7 +45,7 @@ def decode_image(image: Array) -> Array:
 
 
 def visible_pixels(object_id: Array, slots: int) -> NDArray[np.int32]:
-    """Count the pixels of each object in each image: (B, H, W) -> (B, slots)."""
+    """Count the pixels of each object in each image, (B, H, W) -> (B, slots)."""
     counts = np.empty((len(object_id), slots), np.int32)
     for row, ids in zip(counts, object_id.reshape(len(object_id), -1), strict=True):
         row[:] = np.bincount(ids + np.intp(1), minlength=slots + 2)[2 : slots + 2]

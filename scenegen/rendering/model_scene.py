@@ -1,10 +1,10 @@
-"""The models of a batch in one Mitsuba scene, each with a structure of its own.
+"""The models of a batch in one Mitsuba scene, each with an acceleration structure of its own.
 
-Models come by the thousand, so there is no scene of them all. Their meshes are kept while memory
-allows, and a batch's scene refers to those of its models, on a compact lattice. Where a model lies
-differs from batch to batch, and an image's bits must not: so rays start from points of a grid so
-fine that it is below float32's own near the origin, and so coarse that adding and subtracting a
-place of the lattice is exact.
+There are thousands of models, too many for one scene. Their meshes are cached, and the scene of a
+batch refers to those that it shows, on a compact lattice. A model's place on the lattice differs
+from batch to batch, but the bits of an image must not. So rays start from the points of a grid that
+is fine compared with the precision needed, and coarse enough that adding and subtracting a place of
+the lattice is exact in float32.
 """
 
 from collections import OrderedDict
@@ -22,29 +22,34 @@ from scenegen.rendering.unit_scene import SPHERE, UnitScene, mitsuba_shape, norm
 Array = NDArray[Any]
 ShapeOf = Callable[[str], UnitShape]
 SPACING = 2.25  # distance between the models' origins; their bounding radius is 1
-SIDE = 14  # of the lattice: coordinates below 16, of which float32 holds every GRID-th
+SIDE = 14  # of the lattice: coordinates stay below 16, where float32 resolves GRID
 MOST_MODELS = SIDE**3
 GRID = 2.0**-20
-MOST_FACES_KEPT = 8_000_000  # of all models together; about 100 bytes each
+MOST_FACES_KEPT = 8_000_000  # of all cached models; a face takes about 100 bytes
 
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """A model's mesh in a group, and its normals as in `normal_table`."""
+    """A model's mesh in a Mitsuba shape group, and its normals as from `normal_table`."""
 
     group: Any
     normals: Array
 
 
-class _Models:
-    """The models in use lately, of all variants, up to MOST_FACES_KEPT."""
+class ModelCache:
+    """A cache of the models used most recently, of all variants, up to MOST_FACES_KEPT."""
 
     def __init__(self) -> None:
         self.kept: OrderedDict[tuple[str, ShapeOf, str], _Model] = OrderedDict()
         self.faces = 0
 
+    def clear(self) -> None:
+        """Empty the cache."""
+        self.kept.clear()
+        self.faces = 0
+
     def get(self, variant: str, shape_of: ShapeOf, name: str) -> _Model:
-        """Return a model, made anew unless it is kept."""
+        """Return a model from the cache, or make it."""
         key = (variant, shape_of, name)
         if key not in self.kept:
             shape = shape_of(name)
@@ -59,31 +64,25 @@ class _Models:
         return self.kept[key]
 
 
-_models = _Models()
-
-
-def forget_models() -> None:
-    """Let go of all models that are kept."""
-    _models.kept.clear()
-    _models.faces = 0
+MODELS = ModelCache()
 
 
 def model_scene(variant: str, shape_of: ShapeOf, names: Sequence[str]) -> UnitScene:
     """Build the scene of these models, at most MOST_MODELS, for a Mitsuba variant."""
     mi.set_variant(variant)
-    models = [_models.get(variant, shape_of, name) for name in names]
+    models = [MODELS.get(variant, shape_of, name) for name in names]
     side = next(n for n in range(1, SIDE + 1) if n**3 >= len(names))
     cell = np.stack(np.unravel_index(np.arange(len(names)), (side, side, side)), axis=1)
     offset = (cell - (side - 1) / 2) * SPACING
     contents: dict[str, Any] = {"type": "scene"}
     for i, (model, place) in enumerate(zip(models, offset.tolist(), strict=True)):
-        contents[f"group{i}"] = model.group  # the scene wants to know what is referred to
+        contents[f"group{i}"] = model.group  # the scene must contain what instances refer to
         contents[f"model{i}"] = {
             "type": "instance",
             "shapegroup": model.group,
             "to_world": mi.ScalarTransform4f().translate(place),
         }
     first_triangle, normals = stacked([model.normals for model in models])
-    if not names:  # of images without objects, whose unused slots refer to the first model
+    if not names:  # images without objects: their unused slots refer to a first model
         offset, first_triangle = np.zeros((1, 3)), np.full(1, SPHERE, np.uint32)
     return UnitScene(mi.load_dict(contents), offset, first_triangle, GRID, normals)

@@ -1,8 +1,8 @@
-"""Many views of many scenes as one batch of arrays: what the wavefront reads.
+"""Pack many views of many scenes into one batch of arrays, the input of the renderers.
 
-Each object is cast in its own frame, where its unit shape lies in a structure that is built once.
-So scenes need no lattice and no space between them: a ray meets no object but its own scene's, by
-construction, and an image's bits cannot depend on the rest of its batch.
+Each object is cast in its own frame, against a structure of its unit shape that is built once. So
+the scenes of a batch need not be placed apart: a ray can only hit objects of its own scene, and an
+image's bits cannot depend on the rest of its batch.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.errors import SpecError
-from scenegen.common.records import check
 from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
@@ -28,14 +27,14 @@ class SceneBatch:
     """B images, each with K object slots and L light slots (unused ones have radius or colour 0).
 
     Attributes:
-        spec: gives image size, sample count, shadows, and K, L and the shapes.
+        spec: the data set's spec: image size, sample count, shadows, K, L and the shapes.
         index, view: number of each image's scene, and of the view in it, (B,) integers.
         world_from_camera: (B, 4, 4).
         fov_y_degrees: (B,).
         object_count, light_count: (B,) integers.
-        names: what the objects are called, as in `scenes.PlacedObject.shape`, each once.
-        shape_of: the unit shape of such a name.
-        shape: index into names, (B, K); -1 for an unused slot.
+        names: the objects' names, as in `scenes.PlacedObject.shape`, each once.
+        shape_of: returns the unit shape of a name.
+        shape: index into `names`, (B, K); -1 for an unused slot.
         world_from_object: (B, K, 4, 4) similarities; zero for an unused slot.
         object_scale: (B, K) bounding radius, scene units.
         reflectance: rho by object id, (B, 1 + K, 3); [:, 0] is the room's.
@@ -43,10 +42,10 @@ class SceneBatch:
         light_position, light_color: (B, L, 3), world.
         ambient: (B, 3).
         has_room: (B,) bool.
-        background: radiance of rays that meet nothing, (B, 3).
+        background: radiance of rays that hit nothing, (B, 3).
         attenuation: (k_l, k_q), (B, 2).
-        blocks: whether each image shows boxes only, of one size and orientation, and no room; they
-            are then cast faster, to the same truth within rounding. It is said, not found out, so
+        cubes_only: whether each image shows only boxes of one size and orientation, and no room.
+            They are then cast faster, with the same result within rounding. The caller sets it, so
             that an image's bits cannot depend on the rest of its batch.
     """
 
@@ -70,13 +69,13 @@ class SceneBatch:
     attenuation: Array
     has_room: Array
     background: Array
-    blocks: bool = False
+    cubes_only: bool = False
 
     def __len__(self) -> int:
         return len(self.fov_y_degrees)
 
     def rows(self, start: int, end: int) -> "SceneBatch":
-        """Return some of the images, with no more names than they need."""
+        """Return the images start .. end - 1, with only the names that they need."""
         arrays: dict[str, Any] = {
             field.name: value[start:end]
             for field in fields(self)
@@ -94,13 +93,14 @@ def pack(
     views: Sequence[int] = (0,),
     objects: Objects | None = None,
 ) -> SceneBatch:
-    """Gather these views of each scene into arrays, scene after scene.
+    """Pack these views of each scene into arrays, scene after scene.
 
     Args:
-        objects: None for `objects_of(spec)`.
+        objects: the catalogue of models; None for `objects_of(spec)`.
 
-    Raises SpecError where a scene has more objects or lights, or other shapes, than `spec` allows,
-    or has no such view.
+    Raises:
+        SpecError: a scene has more objects or lights, or other shapes, than `spec` allows, or lacks
+            one of the views.
     """
     batch, slots, light_slots = len(scenes), spec.object_slots, spec.light_slots
     items = [item for scene in scenes for item in scene.objects]
@@ -113,15 +113,15 @@ def pack(
     ):
         if count.max(initial=0) > most:
             worst = scenes[int(count.argmax())].index
-            raise SpecError(f"scene {worst}: found {count.max()} {name}, the spec allows {most}")
+            raise SpecError(f"scene {worst}", f"{count.max()} {name}", f"at most {most}")
     for scene in scenes:
-        known = f"views from 0 to {len(scene.cameras) - 1}"
-        ok = 0 <= min(views) <= max(views) < len(scene.cameras)
-        check(ok, f"scene {scene.index}", ", ".join(map(str, views)), known)
+        if not 0 <= min(views) <= max(views) < len(scene.cameras):
+            known = f"views from 0 to {len(scene.cameras) - 1}"
+            raise SpecError(f"scene {scene.index}", ", ".join(map(str, views)), known)
     unknown = {item.name for item in items} - set(spec.shapes)
     if unknown:
-        raise SpecError(f"scene shapes: found {sorted(unknown)}, the spec has {spec.shapes}")
-    # Basic shapes are all there whether used or not, so that their structure is built only once.
+        raise SpecError("scene shapes", sorted(unknown), f"some of {spec.shapes}")
+    # All basic shapes are listed, used or not, so that their Mitsuba scene is built only once.
     basic = spec.source == "shapes"
     names = spec.shapes if basic else tuple(sorted({item.shape for item in items}))
     number = {name: i for i, name in enumerate(names)}
@@ -154,7 +154,7 @@ def pack(
     cameras = [scene.cameras[view] for scene in scenes for view in views]
 
     def each(values: Array) -> Array:
-        """Repeat what a scene's views share."""
+        """Repeat what the views of a scene share."""
         return np.repeat(values, len(views), axis=0)
 
     return SceneBatch(

@@ -1,12 +1,12 @@
-"""Images by Mitsuba's path tracer: shadows and indirect light on the scenes of a batch.
+"""Path-traced images, for `--shading path`: shadows and indirect light, by Mitsuba.
 
-Only the colour is made here; the ground truth is the wavefront's, to the bit. A scene is traced by
-itself, sample by sample at the places of `reference.sample_positions`, and a pixel's samples are
-added in order, so that the same command gives the same bytes.
+Only the colour is computed here; depth, normals and ids come from `pixels` as usual, bit for bit.
+Scenes are traced one at a time, with samples at `pixel_samples.sample_positions`, and a pixel's
+samples are added in a fixed order, so that the same command gives the same bytes.
 
-A point light of the shading equation with colour L, k_l and k_q becomes one of intensity
-pi L D^2 / (k_l D + k_q D^2), D being its distance from the camera's target: there it is as bright.
-Ambient light becomes an environment of that radiance.
+A point light of colour L in the shading equation becomes one of intensity
+pi L D^2 / (k_l D + k_q D^2), where D is its distance from the camera's target, so that it is as
+bright there as by the shading equation. Ambient light becomes an environment of that radiance.
 """
 
 import math
@@ -19,19 +19,19 @@ from numpy.typing import NDArray
 
 from scenegen.camera import pixel_size
 from scenegen.common.seeding import Purpose, item_seed
-from scenegen.objects.shapes import room_mesh
+from scenegen.objects.scene_mesh import room_mesh
 from scenegen.rendering.ground_truth import encode_image
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.phong import phong_bsdf
-from scenegen.rendering.reference import sample_positions
+from scenegen.rendering.pixel_samples import sample_positions
 from scenegen.rendering.unit_scene import triangle_mesh
 
 Array = NDArray[Any]
-dr: Any = drjit  # their stubs are not exact enough to be of use here
+dr: Any = drjit  # typed Any, as its stubs are not exact enough
 mi: Any = mitsuba
-MAX_DEPTH = 8  # segments of a path: 2 are direct light
+MAX_DEPTH = 8  # segments of a path; direct light needs 2
 RAYS_AT_ONCE = 2**21
-LEAST_WEIGHT = 1e-3  # of a light among those that samples choose from
+LEAST_WEIGHT = 1e-3  # least sampling weight of a light
 
 
 def trace_images(batch: SceneBatch, variant: str) -> Array:
@@ -55,7 +55,7 @@ def _trace_one(batch: SceneBatch, b: int, integrator: Any) -> Array:
     for start in range(0, spec.spp, at_once):
         some = places[start : start + at_once]
         count = len(some)
-        # Multi-jittered samples are less noisy, but come in full rectangles only.
+        # Multi-jittered samples are less noisy, but need a count that fills a rectangle.
         kind = "independent" if count % math.isqrt(count) else "multijitter"
         sampler = mi.load_dict({"type": kind, "sample_count": count})
         sampler.set_samples_per_wavefront(count)

@@ -1,5 +1,6 @@
-"""The shading equation's diffuse and Phong lobes as a Mitsuba material, for the path tracer."""
+"""A Mitsuba material with the diffuse and Phong lobes of the shading equation, for path tracing."""
 
+from functools import cache
 from typing import Any
 
 import drjit
@@ -8,29 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
-dr: Any = drjit  # their stubs are not exact enough to be of use here
+dr: Any = drjit  # typed Any, as its stubs are not exact enough
 mi: Any = mitsuba
 
 
 def phong_bsdf(reflectance: Array, specular: float, shininess: float) -> Any:
     """Return a two-sided material with f cos(theta) = (rho cos(theta) + k_s (r . l)^m) / pi.
 
-    Under a point light this is what `shading.shade` computes. The lobe sends on at most
-    2 k_s / (m + 1) of what it receives. Its class is made for the variant in force.
+    Under a point light this gives what `shading.shade` computes. The Phong lobe reflects at most
+    2 k_s / (m + 1) of the light it receives. The material is of the current Mitsuba variant.
     """
     return _phong_class(mi.variant())(reflectance, specular, shininess)
 
 
-_classes: dict[str, Any] = {}
-
-
-def _phong_class(variant: str) -> Any:
-    """Return the material's class, which has to derive from the variant's own base class."""
-    if variant in _classes:
-        return _classes[variant]
+@cache
+def _phong_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
+    """Return the material's class, which must derive from the base class of the variant."""
 
     class Phong(mi.BSDF):  # type: ignore[misc]
-        """Lobes are chosen by their share of the reflected light at normal incidence."""
+        """The material. Sampling chooses lobes by their share of light at normal incidence."""
 
         def __init__(self, reflectance: Array, specular: float, shininess: float) -> None:
             mi.BSDF.__init__(self, mi.Properties())
@@ -44,7 +41,7 @@ def _phong_class(variant: str) -> Any:
             self.m_flags = self.m_components[0] | self.m_components[1]
 
         def _oriented(self, si: Any, wo: Any) -> tuple[Any, Any, Any]:
-            """Return incoming, outgoing and mirrored direction, on the side of the viewer."""
+            """Return incoming, outgoing and mirrored direction, flipped to the viewer's side."""
             side = dr.mulsign(mi.Float(1), si.wi.z)
             wi, wo = (mi.Vector3f(w.x, w.y, w.z * side) for w in (si.wi, wo))
             return wi, wo, mi.Vector3f(-wi.x, -wi.y, wi.z)
@@ -64,16 +61,16 @@ def _phong_class(variant: str) -> Any:
             return dr.select(active & (wo.z > 0), value, 0)
 
         def pdf(self, _ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            """Return the density of `sample` per solid angle."""
+            """Return the probability density of `sample` per solid angle."""
             _, wo, mirrored = self._oriented(si, wo)
             return dr.select(active, self._density(wo, mirrored), 0)
 
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            """Return both."""
+            """Return `eval` and `pdf`."""
             return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
-            """Draw a direction from either lobe; weigh it by both."""
+            """Draw a direction from one of the lobes, weighted by the density of both."""
             side = dr.mulsign(mi.Float(1), si.wi.z)
             mirrored = mi.Vector3f(-si.wi.x, -si.wi.y, si.wi.z * side)
             cosine = dr.power(sample2.y, 1 / (self.shininess + 1))
@@ -93,13 +90,12 @@ def _phong_class(variant: str) -> Any:
             return found, dr.select(active, value, 0)
 
         def traverse(self, callback: Any) -> None:
-            """Show the parameters."""
+            """Expose the parameters."""
             for name in ("rho", "specular", "shininess", "lobe_share"):
                 callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
 
         def to_string(self) -> str:
-            """Name it."""
+            """Return a name for messages."""
             return "Phong[]"
 
-    _classes[variant] = Phong
     return Phong

@@ -1,4 +1,4 @@
-"""Batches of scenes -> images with exact ground truth, on the best backend there is."""
+"""Render a batch of scenes on the best backend: the entry point of this folder."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields
@@ -13,24 +13,24 @@ from scenegen.objects.catalogue import face_count
 from scenegen.objects.solids import UnitShape
 from scenegen.rendering.backend import HOW_TO_GET_LLVM, select_variant
 from scenegen.rendering.ground_truth import GroundTruth
+from scenegen.rendering.numpy_renderer import face_viewer, render_in_numpy, smooth_normals
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.reference import face_viewer, render_reference, smooth_normals
 
 Array = NDArray[Any]
-MOST_FACES = 2_000_000  # of one scene's models
-MOST_MODELS = 2000  # of one scene; `model_scene` has room for some more
+MOST_FACES = 2_000_000  # of the models in one Mitsuba scene
+MOST_MODELS = 2000  # in one Mitsuba scene; must not exceed `model_scene.MOST_MODELS`
 
 
 def render(batch: SceneBatch, device: str = "auto") -> GroundTruth:
-    """Render a batch and wait for it. Raises BackendError where `device` cannot be used."""
+    """Render a batch and wait for it. Raises BackendError if `device` cannot be used."""
     return launch(batch, device)()
 
 
 def launch(batch: SceneBatch, device: str = "auto") -> Callable[[], GroundTruth]:
     """Start to render a batch; the returned function waits for the pixels and returns them.
 
-    Between the two calls the caller's thread is free, except on the scalar fallback, which does
-    its work in the second.
+    The caller can do other work in between. The scalar fallback does all its work in the second
+    call.
     """
     fetch = launch_fields(batch, tuple(field.name for field in fields(GroundTruth)), device)
     return lambda: GroundTruth(**fetch())
@@ -39,7 +39,7 @@ def launch(batch: SceneBatch, device: str = "auto") -> Callable[[], GroundTruth]
 def launch_fields(
     batch: SceneBatch, names: Sequence[str], device: str = "auto"
 ) -> Callable[[], dict[str, Array]]:
-    """As `launch`, for some fields of `GroundTruth` by name; the others cost nothing."""
+    """Start to render some fields of `GroundTruth`; the others are not computed. See `launch`."""
     variant = select_variant(device)
     if batch.spec.shading == "path" and "image" in names:
         return _with_traced_image(batch, names, variant, device)
@@ -49,22 +49,20 @@ def launch_fields(
             return _scalar_cast(batch.shape_of(name), origins, directions)
 
         def fetch() -> dict[str, Array]:
-            truth = render_reference(batch, cast)
+            truth = render_in_numpy(batch, cast)
             return {name: getattr(truth, name) for name in names}
 
         return fetch
-    from scenegen.rendering.wavefront import (
-        launch_wavefront,  # imports drjit, which no other path needs
-    )
+    from scenegen.rendering.pixels import launch_pixels  # imports drjit; not needed above
 
     first, *others = parts(batch)
-    fetch_first = launch_wavefront(first, variant, names)
+    fetch_first = launch_pixels(first, variant, names)
     if not others:
         return fetch_first
 
     def fetch_all() -> dict[str, Array]:
         found = [fetch_first()]
-        found += [launch_wavefront(part, variant, names)() for part in others]
+        found += [launch_pixels(part, variant, names)() for part in others]
         return {name: np.concatenate([one[name] for one in found]) for name in names}
 
     return fetch_all
@@ -74,24 +72,24 @@ def _with_traced_image(
     batch: SceneBatch, names: Sequence[str], variant: str, device: str
 ) -> Callable[[], dict[str, Array]]:
     if variant == "scalar_rgb":
-        raise BackendError(f"shading path: needs the fast path; {HOW_TO_GET_LLVM}")
-    from scenegen.rendering.model_scene import forget_models  # imports drjit, as above
+        raise BackendError("shading path", "no LLVM", hint=HOW_TO_GET_LLVM)
+    from scenegen.rendering.model_scene import MODELS  # imports drjit, as above
     from scenegen.rendering.path_tracer import trace_images
 
     fetch = launch_fields(batch, [name for name in names if name != "image"], device)
 
     def fetch_all() -> dict[str, Array]:
         found = fetch()
-        forget_models()  # Dr.Jit would trace every path through every one of them
+        MODELS.clear()  # otherwise Dr.Jit compiles every one of them into the path kernel
         return {**found, "image": trace_images(batch, variant)}
 
     return fetch_all
 
 
 def parts(batch: SceneBatch) -> list[SceneBatch]:
-    """Cut a batch where its models together would have too many faces for one scene.
+    """Cut a batch such that the models of each part do not have too many faces for one scene.
 
-    An image's bits do not depend on the rest of its batch, so nobody can tell.
+    An image's bits do not depend on the rest of its batch, so this changes no pixel.
     """
     if batch.spec.source == "shapes":
         return [batch]
@@ -118,20 +116,16 @@ def _scalar_scene(shape: UnitShape) -> Any:
 
 
 def _scalar_cast(shape: UnitShape, origins: Array, directions: Array) -> tuple[Array, Array]:
-    """Cast rays one by one (a `reference.Cast`); slow, but there wherever Mitsuba is."""
+    """Cast rays one by one with Mitsuba's scalar variant, as a `numpy_renderer.Cast`."""
     import mitsuba as mi
 
     mi.set_variant("scalar_rgb")
     scene = _scalar_scene(shape)
     t = np.full(len(origins), np.inf)
-    triangle, u, v = (
-        np.zeros(len(origins), np.int64),
-        np.zeros(len(origins)),
-        np.zeros(len(origins)),
-    )
-    for i, (origin, direction) in enumerate(
-        zip(origins.tolist(), directions.tolist(), strict=True)
-    ):
+    triangle = np.zeros(len(origins), np.int64)
+    u, v = np.zeros((2, len(origins)))
+    rays = zip(origins.tolist(), directions.tolist(), strict=True)
+    for i, (origin, direction) in enumerate(rays):
         hit = scene.ray_intersect_preliminary(mi.Ray3f(origin, direction), False)
         if hit.is_valid():
             t[i], triangle[i] = hit.t, hit.prim_index

@@ -1,4 +1,7 @@
-"""The unit shapes of a data set, each once, in one Mitsuba scene that is built once per process."""
+"""The basic shapes of a data set in one Mitsuba scene, which is built once per process.
+
+`model_scene` does the same for models, of which there are too many for one scene.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,26 +12,26 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.objects.shapes import unit_shape
+from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.solids import UnitShape
 
 Array = NDArray[Any]
 LATTICE = 4.0  # distance between the shapes' origins; their bounding radius is 1
-OVERLAP = 4e-6  # of neighbouring triangles; the least without slips is 2e-6
-SPHERE = 0xFFFFFFFF  # instead of the first triangle, where a shape is the exact sphere
+OVERLAP = 4e-6  # of neighbouring triangles; rays slip between them if it is below 2e-6
+SPHERE = 0xFFFFFFFF  # stands for the first triangle of the exact sphere
 
 
 @dataclass(frozen=True, eq=False)
 class UnitScene:
-    """Shapes on a compact centred lattice, ready to be cast at.
+    """Shapes on a compact lattice around the origin, ready for casting rays.
 
     Attributes:
         scene: the Mitsuba scene.
-        offset: where each shape's origin lies, (S, 3).
-        first_triangle: each shape's first row of `normals`, or SPHERE, (S,) uint32.
-        grid: distance between the points that rays may start from, 0 if they start anywhere.
-        normals: face normal and three corner normals of each triangle, (1 + F, 12) as flat
-            floats of the variant; row 0 belongs to no triangle.
+        offset: position of each shape's origin, (S, 3).
+        first_triangle: each shape's first row in `normals`, or SPHERE, (S,) uint32.
+        grid: spacing of the grid from whose points rays start; 0 if they may start anywhere.
+        normals: face normal and three corner normals of each triangle, (1 + F, 12) as a flat array
+            of the variant; row 0 belongs to no triangle.
     """
 
     scene: Any
@@ -56,8 +59,9 @@ def unit_scene(variant: str, shapes: tuple[str, ...]) -> UnitScene:
 
 
 def normal_table(shape: UnitShape) -> Array:
-    """Return face normal and three corner normals of each triangle, (F, 12) float32; of the exact
-    sphere none, (0, 12).
+    """Return face normal and three corner normals of each triangle, (F, 12) float32.
+
+    The exact sphere has none, (0, 12).
     """
     if shape.is_sphere:
         return np.zeros((0, 12), np.float32)
@@ -70,14 +74,14 @@ def normal_table(shape: UnitShape) -> Array:
 
 
 def stacked(tables: Sequence[Array]) -> tuple[Array, Any]:
-    """Return the first row of each table in all of them together, and these as flat floats."""
+    """Join tables of normals; return the first row of each, or SPHERE, and the whole, flat."""
     sizes = np.array([len(table) for table in tables])
     first = np.where(sizes > 0, 1 + np.cumsum(sizes) - sizes, SPHERE).astype(np.uint32)
     return first, mi.Float(np.concatenate([np.zeros((1, 12), np.float32), *tables]).ravel())
 
 
 def mitsuba_shape(shape: UnitShape, place: Array) -> Any:
-    """Return the unit shape, moved to `place`, as Mitsuba geometry of the variant in force."""
+    """Return the unit shape, moved to `place`, as geometry of the current Mitsuba variant."""
     if shape.is_sphere:
         return {"type": "sphere", "center": place.tolist(), "radius": 1.0}
     return triangle_mesh(shape.name, overlapping(shape.triangles) + place)
@@ -86,7 +90,7 @@ def mitsuba_shape(shape: UnitShape, place: Array) -> Any:
 def triangle_mesh(
     name: str, triangles: Array, normals: Array | None = None, bsdf: Any = None
 ) -> Any:
-    """Return triangles (F, 3, 3), with normals at their corners or flat, as Mitsuba's mesh."""
+    """Return triangles, (F, 3, 3), as a Mitsuba mesh, with corner normals or flat."""
     count = 3 * len(triangles)
     properties = mi.Properties()
     if bsdf is not None:
@@ -102,15 +106,15 @@ def triangle_mesh(
 
 
 def overlapping(triangles: Array) -> Array:
-    """Move the edges of triangles, (F, 3, 3), outwards by OVERLAP, each in its plane.
+    """Move the edges of triangles, (F, 3, 3), outwards by OVERLAP, within their planes.
 
-    A ray that meets an edge within rounding would otherwise slip through now and then: the test of
-    either triangle may find it outside. No corner moves further than four times that.
+    Otherwise a ray that meets a shared edge may slip through, as rounding can put it outside both
+    triangles. No corner moves by more than four times OVERLAP.
     """
     edges = triangles[:, _NEXT] - triangles  # from each corner to the next
     length = np.sqrt(np.einsum("fki,fki->fk", edges, edges))
     along = edges / np.maximum(length, 1e-30)[..., None]
-    # From a corner to its two neighbours; the edges that they are not on move along their sum.
+    # Moving a corner against the sum of its two edges' directions moves both edges outwards.
     outward = along[:, _BEFORE] - along
     first, second = edges[:, 0].T, edges[:, 1].T
     double_area = np.sqrt(sum(c * c for c in _cross(first, second)))
@@ -124,5 +128,5 @@ _NEXT, _BEFORE = [1, 2, 0], [2, 0, 1]
 
 
 def _cross(a: Array, b: Array) -> tuple[Array, Array, Array]:
-    """Cross product by components, several times as fast as NumPy's."""
+    """Return the cross product by components, several times faster than NumPy's."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

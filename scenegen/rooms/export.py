@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scenegen.camera import transform_vectors
 from scenegen.common.new_file import written_beside
 from scenegen.objects.catalogue import Objects, built_in_shape
-from scenegen.objects.shapes import scene_mesh
+from scenegen.objects.scene_mesh import scene_mesh
 from scenegen.objects.solids import UnitShape
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import Room

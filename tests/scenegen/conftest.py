@@ -1,4 +1,4 @@
-"""What stands against the code under test, another ray caster for one; and a folder of models."""
+"""Fixtures that check the code under test by other means, and a folder of models."""
 
 from collections.abc import Callable
 from functools import cache
@@ -48,7 +48,8 @@ def gap_between() -> Callable[[Array, Array], float]:
 @pytest.fixture(scope="session")
 def unit_corners() -> Callable[[str], Array]:
     """Corners of a unit shape's mesh, each once."""
-    from scenegen.objects.shapes import unit_shape, welded
+    from scenegen.objects.basic_shapes import unit_shape
+    from scenegen.objects.scene_mesh import welded
 
     return cache(lambda name: np.asarray(welded(unit_shape(name)).vertices))
 
@@ -101,13 +102,13 @@ def model_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def embree_cast() -> Callable[[str, Array, Array], tuple[Array, Array]]:
-    """A `reference.Cast` by trimesh and Embree; the sphere in closed form."""
+    """A `numpy_renderer.Cast` by trimesh and Embree; the sphere in closed form."""
     from trimesh import Trimesh
     from trimesh.ray.ray_pyembree import RayMeshIntersector
     from trimesh.triangles import points_to_barycentric
 
-    from scenegen.objects.shapes import unit_shape
-    from scenegen.rendering.reference import face_viewer, smooth_normals
+    from scenegen.objects.basic_shapes import unit_shape
+    from scenegen.rendering.numpy_renderer import face_viewer, smooth_normals
 
     @cache
     def intersector(name: str) -> Any:

@@ -1,9 +1,9 @@
-"""Meshes known by heart, and files that hold them."""
+"""Small meshes with known triangles, and the text of files that hold them."""
 
 import trimesh
 
 CORNERS = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n"
-# A pyramid with a square base: what each of the texts below says in its own way.
+# A pyramid with a square base, which each of the texts below describes.
 PYRAMID = {(0, 1, 2, 3), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)}
 OBJ = {
     "plain": CORNERS + "f 1 2 3 4\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n",

@@ -1,4 +1,4 @@
-"""Rooms with models in them, of built-in families and of a folder of meshes."""
+"""Scenes with models of the built-in families or of a folder of meshes."""
 
 from dataclasses import replace
 from pathlib import Path

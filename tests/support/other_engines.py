@@ -1,4 +1,4 @@
-"""The same rooms by other ways: one mesh under Embree's rays, and another process."""
+"""Other ways to render the same scenes: Embree on one mesh, and another process."""
 
 import pickle
 import subprocess
@@ -9,16 +9,29 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import grey_dilation, grey_erosion
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from scenegen.camera import pixel_directions
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
-from scenegen.objects.shapes import UnitShape, scene_mesh, unit_shape
+from scenegen.objects.basic_shapes import unit_shape
+from scenegen.objects.scene_mesh import scene_mesh
+from scenegen.objects.solids import UnitShape
 from scenegen.rendering import renderer
 from scenegen.rendering.ground_truth import GroundTruth
 
 Array = NDArray[Any]
+
+
+def bits(truth: GroundTruth, row: int) -> tuple[bytes, ...]:
+    """Return the bytes of all fields of one image."""
+    return tuple(getattr(truth, name)[row].tobytes() for name in vars(truth))
+
+
+def near_silhouettes(object_id: Array) -> Array:
+    """Return a mask of the pixels within one pixel, corners included, of another object id."""
+    return np.stack([grey_dilation(ids, 3) != grey_erosion(ids, 3) for ids in object_id])
 
 
 def cast_whole_scene(
@@ -53,7 +66,7 @@ truth = renderer.render(pack(spec, scenes))
 if scalar:
     import mitsuba
     assert mitsuba.variant() == "scalar_rgb"
-    assert "scenegen.rendering.wavefront" not in sys.modules
+    assert "scenegen.rendering.pixels" not in sys.modules
 pickle.dump(truth, sys.stdout.buffer)
 """
 

@@ -1,8 +1,8 @@
-"""Bottles: body, shoulder, neck and closure."""
+"""Bottles: a body, a shoulder, a neck and a closure."""
 
 import math
 
-import numpy as np
+from numpy.random import Generator
 
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.profiles import (
@@ -18,12 +18,11 @@ from scenegen.objects.families.parts.profiles import (
 from scenegen.objects.families.parts.surfaces import Part, loft
 from scenegen.objects.families.parts.sweeps import tube
 
-Generator = np.random.Generator
-HEIGHT = 3.0  # of a bottle without its closure
+HEIGHT = 3.0  # of every bottle, without its closure
 
 
 def bottle(rng: Generator) -> list[Part]:
-    """A bottle: body, shoulder, neck and closure; round, flat or square."""
+    """Build a bottle with a round, flat or square cross-section."""
     outline = pick(rng, ("round", "round", "round", "flat", "square"))
     radius = math.exp(span(rng, math.log(0.36), math.log(1.0)))
     neck = radius * span(rng, 0.22, 0.6)
@@ -43,7 +42,7 @@ def bottle(rng: Generator) -> list[Part]:
     if outline == "round":
         parts = [loft(join(body, stem), segments=32)]
     else:
-        # A round neck on a body whose section turns round up to there.
+        # The cross-section turns round towards the top of the body, where the neck is round.
         most = max(radius, upper, float(body[0][:, 0].max()))
         depth = span(rng, 0.4, 0.75) if outline == "flat" else span(rng, 0.75, 1.0)
         depth = max(depth, 0.4 + 0.6 * neck / most)
@@ -59,7 +58,7 @@ def bottle(rng: Generator) -> list[Part]:
 
 
 def _body(rng: Generator, radius: float, least: float, high: float) -> tuple[Curve, float]:
-    """The side from the base up to `high`, and its radius there, at least `least`."""
+    """Return the profile from the base up to `high`, and its radius there (at least `least`)."""
     foot = max(radius * span(rng, 0.8, 1.05), least)
     edge = min(foot * span(rng, 0.05, 0.3), 0.3 * high, foot - 0.9 * least)
     base = arc((foot - edge, edge), edge, -90, 0, 5)
@@ -87,7 +86,7 @@ def _body(rng: Generator, radius: float, least: float, high: float) -> tuple[Cur
 
 
 def _neck(rng: Generator, radius: float, low: float) -> tuple[Curve, tuple[float, float]]:
-    """The neck's side, lip and mouth, a hole; and the mouth's (outer radius, height)."""
+    """Return the profile of neck, lip and opening, and the mouth's (outer radius, height)."""
     narrow = radius * span(rng, 0.8, 1.0)
     lip = radius * span(rng, 0.03, 0.16)
     high = HEIGHT - 2 * lip
@@ -111,7 +110,7 @@ def _neck(rng: Generator, radius: float, low: float) -> tuple[Curve, tuple[float
 
 
 def _closure(rng: Generator, mouth: tuple[float, float]) -> list[Part]:
-    """Nothing, a cork, a cap, a stopper or a pump (towards +z) on the mouth."""
+    """Build a cork, a cap, a stopper or a pump (facing +z) on the mouth, or nothing."""
     radius, high = mouth
     style = pick(rng, ("open", "open", "cork", "cap", "cap", "stopper", "pump"))
     if style == "open":

@@ -1,13 +1,13 @@
-"""Caps and hats: hollow crowns, peaks and brims. The peak points to +z."""
+"""Caps and hats: hollow crowns with peaks or brims. The peak points to +z."""
 
 import math
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from scenegen.objects.families.parts.draws import chance, pick, span
-from scenegen.objects.families.parts.plates import plate
 from scenegen.objects.families.parts.profiles import (
     Curve,
     arc,
@@ -21,18 +21,19 @@ from scenegen.objects.families.parts.surfaces import Part, loft
 from scenegen.objects.families.parts.walls import shell
 
 Array = NDArray[Any]
-Generator = np.random.Generator
-THICK = 0.04  # of cloth; a crown is about 2 long
+
+
+THICK = 0.04  # thickness of the cloth; a crown is about 2 long
 
 
 def cap(rng: Generator) -> list[Part]:
-    """A baseball cap more often than not; else a cadet's cap, a woolly hat, a bowler, a sun hat."""
+    """Build a baseball cap (half of all), a cadet cap, a woolly hat, a bowler or a sun hat."""
     kinds = (_baseball, _baseball, _baseball, _baseball, _cadet, _woolly, _bowler, _sun_hat)
     return pick(rng, kinds)(rng)
 
 
 def _dome(rng: Generator, height: float) -> Curve:
-    """A crown's outside from the band to the top."""
+    """Return the profile of a crown's outside, from the band to the top."""
     steep, flat = span(rng, 0.35, 0.75), span(rng, 0.4, 0.95)
     band = span(rng, 0.02, 0.25) * height
     lean = span(rng, 0.97, 1.06)
@@ -45,7 +46,7 @@ def _dome(rng: Generator, height: float) -> Curve:
 
 
 def _oval(rng: Generator) -> tuple[float, float]:
-    """Half width and half length of a head's section at r = 1."""
+    """Draw the half width (x) and half length (z) of a head's cross-section."""
     return 1.0, span(rng, 1.0, 1.22)
 
 
@@ -65,7 +66,7 @@ def _baseball(rng: Generator) -> list[Part]:
 
 
 def _cadet(rng: Generator) -> list[Part]:
-    """An upright band, a flat top that may be wider, and a peak."""
+    """Build a cadet cap: an upright band, a flat top that may be wider, and a peak."""
     height = span(rng, 0.55, 1.0)
     size = _oval(rng)
     wide, band = span(rng, 0.85, 1.4), span(rng, 0.3, 0.6) * height
@@ -83,7 +84,7 @@ def _cadet(rng: Generator) -> list[Part]:
 
 
 def _woolly(rng: Generator) -> list[Part]:
-    """A close hat with a turned-up band, and a bobble at times."""
+    """Build a close-fitting knitted hat, often with a turned-up band or a bobble."""
     height = span(rng, 1.0, 1.9)
     size = _oval(rng)
     wall = _dome(rng, height)
@@ -107,7 +108,7 @@ def _woolly(rng: Generator) -> list[Part]:
 
 
 def _bowler(rng: Generator) -> list[Part]:
-    """A stiff hat with a brim all round: bowler, boater, top hat."""
+    """Build a stiff hat with a brim all round: a bowler, a boater or a top hat."""
     height = span(rng, 0.6, 1.7)
     size = _oval(rng)
     brim, rise = span(rng, 0.25, 0.8), span(rng, 0.0, 0.22)
@@ -130,14 +131,11 @@ def _bowler(rng: Generator) -> list[Part]:
     over = reverse((under[0] + (0.0, THICK), under[1]))
     edge_of = polyline((outer, rise), (outer, rise + THICK))
     flat = join(under, edge_of, over, line((0.9, THICK), (0.9, 0.0)))
-    return [
-        loft(shell(wall, THICK), size=size, closed=True),
-        loft(flat, size=size, closed=True),
-    ]
+    return [loft(shell(wall, THICK), size=size, closed=True), loft(flat, size=size, closed=True)]
 
 
 def _sun_hat(rng: Generator) -> list[Part]:
-    """A soft hat whose brim slopes down."""
+    """Build a soft sun hat whose brim slopes down."""
     height, brim, drop = span(rng, 0.7, 1.1), span(rng, 0.25, 0.65), span(rng, 0.1, 0.5)
     size = _oval(rng)
     top = span(rng, 0.72, 0.98)
@@ -156,10 +154,11 @@ def _sun_hat(rng: Generator) -> list[Part]:
 
 
 def _peak(rng: Generator, ahead: float) -> Part:
-    """A peak on the front half of a band of radius 1 about z = `ahead`.
+    """Build a cap's peak on the front half of a band of radius 1 about z = `ahead`.
 
-    Its edges are (sin a, cos a) and, further to +z, a crescent. It is arched: every upright line
-    meets it at heights that fall with x squared and, evenly, with z; its corners are at y = 0.
+    Seen from above it is a crescent: its inner edge follows the band, its outer edge reaches
+    further to +z. It is arched: its height falls with x squared and linearly with z, down to the
+    corners at y = 0.
     """
     half = math.radians(span(rng, 55, 80))
     reach, sharp = span(rng, 0.5, 1.0), span(rng, 0.5, 1.1)
@@ -179,4 +178,38 @@ def _peak(rng: Generator, ahead: float) -> Part:
     y = y - y.min() + 0.012
     up = np.stack([2 * fall * x, np.ones_like(x), slope + 0 * x], axis=-1)
     grid = np.stack([x, y, z + ahead], axis=-1)
-    return plate(grid, up, THICK)
+    return _plate(grid, up, THICK)
+
+
+def _plate(grid: Array, up: Array, thickness: float) -> Part:
+    """Build a sheet over a grid of points: it extends upwards by `thickness`, with vertical sides.
+
+    Args:
+        grid: points of the lower side, (rows, columns, 3); rows go along +z, columns along +x, and
+            the points of each column lie on a line.
+        up: normals of the upper side, (rows, columns, 3). The vertical sides are flat shaded.
+    """
+    lift = np.array([0.0, thickness, 0.0])
+    top = grid + lift
+    faces = [_sheet(top, up), _sheet(grid[:, ::-1], -up[:, ::-1])]
+    # The border runs such that the outside is on its right, seen from above.
+    border = np.concatenate([grid[0, :-1], grid[:-1, -1], grid[-1, :0:-1], grid[:0:-1, 0]])
+    after = np.roll(border, -1, axis=0)
+    along = after - border
+    out = np.stack([along[:, 2], 0 * along[:, 1], -along[:, 0]], axis=1)
+    out /= np.sqrt((out * out).sum(axis=1, keepdims=True))
+    quads = np.stack([border, border + lift, after + lift, after], axis=1)
+    side = quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
+    faces.append((side, np.repeat(out[:, None], 6, axis=1).reshape(-1, 3, 3)))
+    ends = np.concatenate([grid[0], grid[-1], top[0], top[-1]])
+    triangles, normals = (np.concatenate(several) for several in zip(*faces, strict=True))
+    return Part(triangles, normals, ends, np.zeros(len(ends)))
+
+
+def _sheet(points: Array, normals: Array) -> tuple[Array, Array]:
+    """Return two triangles, with normals, for each cell of (rows, columns, 3) points."""
+    normals = normals / np.sqrt((normals * normals).sum(axis=-1, keepdims=True))
+    i = np.arange(len(points) - 1)[:, None, None]
+    j = np.arange(points.shape[1] - 1)[:, None]
+    rows, columns = i + np.array([0, 1, 1, 0, 1, 0]), j + np.array([0, 0, 1, 0, 1, 1])
+    return points[rows, columns].reshape(-1, 3, 3), normals[rows, columns].reshape(-1, 3, 3)

@@ -1,4 +1,4 @@
-"""The members of every class, by number: one shape each, the same on every machine."""
+"""The numbered members of each family: one unit shape per number, the same on every machine."""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -7,22 +7,13 @@ import numpy as np
 
 from scenegen.common.errors import SpecError
 from scenegen.description.scenes import FAMILY_NAMES
-from scenegen.objects.families import (
-    bags,
-    bottles,
-    cans,
-    caps,
-    chairs,
-    lamps,
-    tables,
-    vessels,
-)
+from scenegen.objects.families import bags, bottles, cans, caps, chairs, lamps, tables, vessels
 from scenegen.objects.families.parts.assembly import assemble
 from scenegen.objects.families.parts.surfaces import Part
 from scenegen.objects.solids import UnitShape
 
-MEMBERS = 1000  # of each class
-# Append only: a class's place is part of its members' seeds.
+MEMBERS = 1000  # in each family
+# Append only: a family's position in this table is part of its members' seeds.
 _BUILDERS: dict[str, Callable[[np.random.Generator], list[Part]]] = {
     "bowl": vessels.bowl,
     "mug": vessels.mug,
@@ -35,22 +26,23 @@ _BUILDERS: dict[str, Callable[[np.random.Generator], list[Part]]] = {
     "table": tables.table,
 }
 _PLACE = {name: place for place, name in enumerate(_BUILDERS)}
-_ENTROPY = 0x5E1F_0B7E  # never changes: it is part of every member's seed
+_ENTROPY = 0x5E1F_0B7E  # part of every member's seed, so it must never change
 
 
 @lru_cache(maxsize=256)
 def member_shape(family: str, member: int) -> UnitShape:
-    """Return a member of a class, upright (+y), its front towards +z, of bounding radius 1.
+    """Return a family's member as a unit shape: +y is up, the front faces +z.
 
-    Its random choices come from the class and the number alone: no data set's seed has a part.
+    The member's random choices depend on the family and the number alone, not on the seed of a
+    data set.
 
     Raises:
-        SpecError: for a class that is not in FAMILY_NAMES, or a number not in 0 .. MEMBERS - 1.
+        SpecError: for a family that is not in FAMILY_NAMES, or a number not in 0 .. MEMBERS - 1.
     """
     if family not in _BUILDERS:
-        raise SpecError(f"family: found {family!r}, expected one of {', '.join(FAMILY_NAMES)}")
+        raise SpecError("family", repr(family), f"one of {', '.join(FAMILY_NAMES)}")
     if not 0 <= member < MEMBERS:
-        raise SpecError(f"{family}: found member {member}, expected 0 to {MEMBERS - 1}")
+        raise SpecError(family, f"member {member}", f"0 to {MEMBERS - 1}")
     key = np.random.SeedSequence(_ENTROPY, spawn_key=(_PLACE[family], member))
     rng = np.random.Generator(np.random.PCG64(key))
     return assemble(f"{family}/{member:04d}", _BUILDERS[family](rng))

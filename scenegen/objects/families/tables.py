@@ -1,23 +1,22 @@
-"""Tables: a top on legs, columns or panels. The long side is along x."""
+"""Tables: a top on legs, columns, panels or a frame. The long side is along x."""
 
 import math
 from collections.abc import Callable
 
-import numpy as np
+from numpy.random import Generator
 
-from scenegen.objects.families.parts import table_legs
-from scenegen.objects.families.parts.boxes import boxes
-from scenegen.objects.families.parts.draws import pick, span
-from scenegen.objects.families.parts.profiles import bezier, join, line, polyline
+from scenegen.objects.families.parts.boxes import box, boxes
+from scenegen.objects.families.parts.draws import chance, pick, span
+from scenegen.objects.families.parts.moves import buried
+from scenegen.objects.families.parts.profiles import bezier, fillet, join, line, polyline
 from scenegen.objects.families.parts.surfaces import Part, loft
-
-Generator = np.random.Generator
+from scenegen.objects.families.parts.sweeps import tube
 
 
 def table(rng: Generator) -> list[Part]:
-    """A table: dining, side, coffee, console, desk or bar."""
+    """Build a table of any height and outline, from a coffee table to a bar table."""
     height = math.exp(span(rng, math.log(0.5), math.log(2.6)))
-    depth = math.exp(span(rng, math.log(0.38), 0.0))  # half of it; half the width is 1
+    depth = math.exp(span(rng, math.log(0.38), 0.0))  # half the depth; half the width is 1
     thick = span(rng, 0.04, 0.22)
     outline = pick(rng, ("square", "square", "rounded", "round", "oval"))
     if outline == "round":
@@ -26,16 +25,16 @@ def table(rng: Generator) -> list[Part]:
     under = height - thick + 0.02
     round_top = outline in ("round", "oval")
     kinds: tuple[Callable[[Generator, float, float, float], list[Part]], ...] = (
-        table_legs.four,
-        table_legs.four,
-        table_legs.four,
+        _four,
+        _four,
+        _four,
         _column,
-        table_legs.panels,
-        table_legs.trestle,
-        table_legs.hairpins,
+        _panels,
+        _trestle,
+        _hairpins,
     )
     if round_top:
-        kinds = (table_legs.four, table_legs.four, _column, _column, _drum, _crossed)
+        kinds = (_four, _four, _column, _column, _drum, _crossed)
     x, z = (0.68, 0.68 * depth) if round_top else (0.93, depth - 0.07)
     return [top, *pick(rng, kinds)(rng, x, z, under)]
 
@@ -53,7 +52,7 @@ def _top(rng: Generator, outline: str, depth: float, height: float, thick: float
 
 
 def _column(rng: Generator, x: float, z: float, top: float) -> list[Part]:
-    """One column, or two along a long table, on a plate, a bell or feet."""
+    """Build one column, or two under a long table, on a plate, a bell or feet."""
     thin, reach = span(rng, 0.06, 0.22), min(z, x) * span(rng, 0.6, 0.95)
     at = [(0.0, 0.0)] if x < 1.7 * z else [(0.55 * x, 0.0), (-0.55 * x, 0.0)]
     style = pick(rng, ("plate", "bell", "feet", "urn"))
@@ -98,7 +97,7 @@ def _column(rng: Generator, x: float, z: float, top: float) -> list[Part]:
 def _foot(
     x: float, angle: float, reach: float, half: float, rise: float
 ) -> list[tuple[float, float, float]]:
-    """A bar from the column down to the floor."""
+    """Return the corners of a bar from the column down to the floor."""
     c, s = math.cos(angle), math.sin(angle)
     corners = []
     for inner, outer in ((0.04, 0.0), (rise, 0.07)):
@@ -109,7 +108,7 @@ def _foot(
 
 
 def _drum(rng: Generator, x: float, z: float, top: float) -> list[Part]:
-    """A broad turned body under a round top."""
+    """Build a broad turned body under a round top."""
     foot, waist, head = (span(rng, low, 1.25) for low in (0.5, 0.25, 0.4))
     r = min(x, z)
     y = span(rng, 0.25, 0.75) * top
@@ -118,7 +117,7 @@ def _drum(rng: Generator, x: float, z: float, top: float) -> list[Part]:
 
 
 def _crossed(rng: Generator, x: float, z: float, top: float) -> list[Part]:
-    """Legs that lean past one another: each foot is opposite its head."""
+    """Build legs that lean past one another, so that each foot is opposite its upper end."""
     count, r = pick(rng, (3, 4)), min(x, z)
     thin, twist = span(rng, 0.04, 0.09), span(rng, 1.6, 2.8)
     angles = [2 * math.pi * i / count + 0.4 for i in range(count)]
@@ -128,3 +127,131 @@ def _crossed(rng: Generator, x: float, z: float, top: float) -> list[Part]:
         ((hx - fx) / top, (hz - fz) / top) for (fx, fz), (hx, hz) in zip(feet, heads, strict=True)
     ]
     return [loft(line((thin, 0.0), (thin, top)), at=feet, lean=lean, segments=16)]
+
+
+def _four(rng: Generator, x: float, z: float, top: float) -> list[Part]:
+    """Build four legs, sometimes with an apron, rails or a shelf."""
+    thin = span(rng, 0.04, 0.12)
+    x, z = x - thin, z - thin
+    corners = [(sx * x, sz * z) for sx in (1.0, -1.0) for sz in (1.0, -1.0)]
+    style = pick(rng, ("straight", "straight", "tapered", "splayed", "turned", "bent"))
+    out = span(rng, 0.06, 0.25) if style == "splayed" else 0.0
+    feet = [(cx * (1.0 + out), cz + math.copysign(out * x, cz)) for cx, cz in corners]
+    lean = [
+        ((cx - fx) / top, (cz - fz) / top) for (cx, cz), (fx, fz) in zip(corners, feet, strict=True)
+    ]
+    corner = pick(rng, (0.0, 0.0, 1.0))
+    if style == "turned":
+        at, bulge = span(rng, 0.3, 0.8) * top, 1.8 * thin
+        side = join(
+            line((0.6 * thin, 0.0), (0.7 * thin, 0.5 * at)),
+            bezier((0.7 * thin, 0.5 * at), (bulge, 0.7 * at), (bulge, at), (0.7 * thin, at), 6),
+            line((0.7 * thin, at), (thin, top)),
+        )
+        legs = loft(side, at=feet, segments=16)
+    elif style == "bent":  # a cabriole leg: thin at the foot, thick at the knee
+        side = bezier(
+            (0.7 * thin, 0.0),
+            (0.3 * thin, 0.4 * top),
+            (1.7 * thin, 0.6 * top),
+            (1.6 * thin, top),
+            9,
+        )
+        legs = loft(side, at=feet, segments=16)
+    else:
+        foot = thin if style == "straight" else span(rng, 0.35, 0.8) * thin
+        legs = loft(line((foot, 0.0), (thin, top)), at=feet, lean=lean, corner=corner, segments=16)
+    boards = []
+    if chance(rng, 0.55):
+        drop, half = span(rng, 0.1, 0.3) * min(1.0, top), 0.3 * thin
+        boards += [box((-x, top - drop, s * z - half), (x, top, s * z + half)) for s in (1, -1)]
+        boards += [box((s * x - half, top - drop, -z), (s * x + half, top, z)) for s in (1, -1)]
+        if chance(rng, 0.4):  # the front of a drawer
+            wide = span(rng, 0.2, 0.6) * x
+            boards.append(
+                box((-wide, top - 0.85 * drop, z - thin), (wide, top - 0.1 * drop, z + 0.9 * thin))
+            )
+    low = span(rng, 0.12, 0.5) * top
+    share = 1.0 - low / top
+    a, b = x + out * x * share, z + out * x * share
+    kind = pick(rng, ("none", "none", "none", "shelf", "rails", "h"))
+    if kind == "shelf":
+        boards.append(box((-a, low - 0.03, -b), (a, low + 0.03, b)))
+    half = 0.35 * thin  # so thin that the hull of legs and top contains it
+    if kind in ("rails", "h"):
+        boards += [
+            box((s * a - half, low - half, -b), (s * a + half, low + half, b)) for s in (1, -1)
+        ]
+    if kind == "rails":
+        boards += [
+            box((-a, low - half, s * b - half), (a, low + half, s * b + half)) for s in (1, -1)
+        ]
+    if kind == "h":
+        boards.append(box((-a, low - half, -half), (a, low + half, half)))
+    return [legs, buried(boxes(boards))] if boards else [legs]
+
+
+def _panels(rng: Generator, x: float, z: float, top: float) -> list[Part]:
+    """Build upright boards at both ends, with a board, a shelf or drawers between."""
+    half = span(rng, 0.03, 0.1)
+    a, b = x * span(rng, 0.75, 1.0) - half, z * span(rng, 0.8, 1.0)
+    boards = [box((s * a - half, 0.0, -b), (s * a + half, top, b)) for s in (1, -1)]
+    kind = pick(rng, ("back", "shelf", "drawers", "drawers"))
+    if kind == "back":
+        boards.append(
+            box((-a, span(rng, 0.1, 0.6) * top, -0.6 * b - 0.03), (a, top, -0.6 * b + 0.03))
+        )
+    elif kind == "shelf":
+        y = span(rng, 0.15, 0.6) * top
+        boards.append(box((-a, y - 0.03, -b + 0.01), (a, y + 0.03, b - 0.01)))
+    else:
+        inner, low = a - span(rng, 0.4, 0.7) * a, span(rng, 0.05, 0.5) * top
+        side = pick(rng, (1.0, -1.0))
+        left, right = sorted((side * inner, side * (a - 0.5 * half)))
+        boards.append(box((left, low, -b + 0.02), (right, top, b - 0.03)))
+        count = 1 + int(3 * rng.random())
+        gap = (top - low) / count
+        for i in range(count):
+            y = low + i * gap
+            boards.append(
+                box((left + 0.03, y + 0.1 * gap, 0.0), (right - 0.03, y + 0.9 * gap, b + 0.01))
+            )
+    return [boxes(boards)]
+
+
+def _trestle(rng: Generator, x: float, z: float, top: float) -> list[Part]:
+    """Build two frames, each an A or an X seen from the side, and a beam between them."""
+    half, a = span(rng, 0.05, 0.1), x * span(rng, 0.65, 0.95) - 0.1
+    crossed = chance(rng, 0.5)
+    boards = []
+    for sx in (1, -1):
+        for sz in (1, -1):
+            foot, head = sz * (z - half), sz * (-(z - half) if crossed else 0.15 * z)
+            bar = box(
+                (sx * a - half, 0.0, foot - half),
+                (sx * a + half, top, foot + half),
+                (0.0, head - foot),
+            )
+            boards.append(bar)
+    y = 0.5 * top if crossed else span(rng, 0.2, 0.6) * top
+    boards.append(box((-a, y - half, -half), (a, y + half, half)))
+    if not crossed:
+        reach = z - half - (0.85 * z - half) * y / top
+        boards += [
+            box((s * a - 0.8 * half, y - half, -reach), (s * a + 0.8 * half, y + half, reach))
+            for s in (1, -1)
+        ]
+    return [boxes(boards)]
+
+
+def _hairpins(rng: Generator, x: float, z: float, top: float) -> list[Part]:
+    """Build a bent rod at each end, a loop that stands on the floor."""
+    bar, a = span(rng, 0.025, 0.05), x * span(rng, 0.8, 0.97)
+    b, foot = 0.95 * z, span(rng, 0.4, 1.0) * z
+    path = fillet([(b, top), (foot, bar), (-foot, bar), (-b, top)], 0.3 * foot, 6)
+    return [
+        tube(
+            path, pick(rng, (bar, 2.5 * bar)), bar, origin=(s * a, 0.0, 0.0), across=(0.0, 0.0, 1.0)
+        )
+        for s in (1, -1)
+    ]

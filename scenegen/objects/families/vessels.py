@@ -1,8 +1,9 @@
-"""Bowls and mugs: thin walls about a hollow. Handles are towards +x."""
+"""Bowls and mugs: vessels with thin walls. Handles point to +x."""
 
 import math
 
 import numpy as np
+from numpy.random import Generator
 
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.profiles import (
@@ -18,11 +19,9 @@ from scenegen.objects.families.parts.surfaces import Part, loft
 from scenegen.objects.families.parts.sweeps import tube
 from scenegen.objects.families.parts.walls import hollow
 
-Generator = np.random.Generator
-
 
 def bowl(rng: Generator) -> list[Part]:
-    """A bowl on a foot: round, oval or square; deep or flat, flared or drawn in."""
+    """Build a round, oval or square bowl, deep or flat, sometimes on a foot or with two handles."""
     outline = pick(rng, ("round", "round", "round", "oval", "square"))
     height = math.exp(span(rng, math.log(0.35), math.log(1.25)))
     bottom = span(rng, 0.25, 0.65)
@@ -51,7 +50,7 @@ def bowl(rng: Generator) -> list[Part]:
         size, corner = (pick(rng, (1.0, span(rng, 1.1, 1.5))), 1.0), span(rng, 0.3, 0.65)
     parts = [loft(profile, size=size, corner=corner)]
     if chance(rng, 0.25):
-        # Ears: level hoops at both ends, a little below the rim, sunk into the wall.
+        # Two horizontal loop handles at the ends, a little below the rim, sunk into the wall.
         reach, half = span(rng, 0.15, 0.3), span(rng, 0.18, 0.32)
         at = int(len(wall[0]) * span(rng, 0.72, 0.9))
         radius, level = (float(v) for v in wall[0][at])
@@ -79,7 +78,7 @@ def bowl(rng: Generator) -> list[Part]:
 
 
 def mug(rng: Generator) -> list[Part]:
-    """A cup with one handle, espresso to tankard."""
+    """Build a cup with one handle, from an espresso cup to a tankard."""
     height = math.exp(span(rng, math.log(1.0), math.log(3.0)))
     foot, belly = span(rng, 0.55, 1.0), span(rng, 0.75, 1.2)
     thickness = span(rng, 0.06, 0.12)
@@ -107,7 +106,7 @@ def mug(rng: Generator) -> list[Part]:
 
 
 def _handle(rng: Generator, wall: Curve, thickness: float, height: float) -> Part:
-    """A handle in the plane z = 0, its ends sunk into the wall."""
+    """Build a handle in the plane z = 0 whose ends are sunk into the wall."""
     top, low = span(rng, 0.74, 0.88) * height, span(rng, 0.12, 0.38) * height
     radii = np.interp([top, low], wall[0][:, 1], wall[0][:, 0]) - 0.55 * thickness
     at_top, at_low = float(radii[0]), float(radii[1])

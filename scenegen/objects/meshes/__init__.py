@@ -1,5 +1,14 @@
-"""Folders of meshes that nobody here made, turned into unit shapes.
+"""Meshes from files: folders of models listed, read, cleaned, cached, and turned into unit shapes.
 
-Going down: `check` tries every model of a folder, `store` hands out shapes, `cache` keeps cleaned
-models on disk, `clean` mends, `read` reads files, `folders` lists what is there.
+The files come from strangers, so every size is bounded (`limits`) and a model that cannot be used
+is refused with a reason (`errors.BadMeshError`).
+
+- `listing`, `folders` and `shapenet` find out which models there are, without opening them.
+- `read`, with one file format each in `readers`, gives vertices and triangles.
+- `clean` mends and normalises these, `hull` computes a convex body for placement.
+- `cache` keeps cleaned models on disk, `store` keeps unit shapes in memory.
+- `check` tries every model of a folder, for `scenegen check-objects`.
+
+Start with `folders.open_models` and `store.MeshStore`. Of the rest of `scenegen` these files import
+`common`, `description` and `objects.solids`.
 """

@@ -1,7 +1,7 @@
-"""Cleaned models on disk, one file each, named after the content that they were made from.
+"""A cache of cleaned models on disk, one file each, named by the hash of the original's content.
 
-Several processes may fill one folder: each writes under a name of its own, then renames. What
-cannot be read back whole is made again. A folder that cannot be written to costs time, not the run.
+Several processes may share a folder: each writes to a temporary name and then renames. A damaged
+entry is made again. If the folder cannot be written to, a warning is given and nothing is cached.
 """
 
 import errno
@@ -26,19 +26,17 @@ from scenegen.objects.meshes.hull import hull_points
 from scenegen.objects.meshes.read import parse_mesh, read_bytes
 
 Array = NDArray[Any]
-CLEANING_VERSION = 1  # to be raised when the same file would give other triangles or hull points
+CLEANING_VERSION = 1  # raise it when a file would give other triangles or hull points than before
 
 
 @dataclass(frozen=True, eq=False)
 class CachedModel:
-    """A model ready for use, or the reason why it is not.
+    """A cleaned model, or the reason why it cannot be used.
 
     Attributes:
-        vertices: (V, 3) float32.
-        faces: (F, 3) int32.
-        hull_points: (H, 3) float64.
-        mended: counts, as `CleanMesh.mended`.
-        refusal: why it cannot be used; the arrays are then empty.
+        vertices, faces, mended: as in `CleanMesh`.
+        hull_points: as from `hull.hull_points`, (H, 3) float64.
+        refusal: the reason why it cannot be used; the arrays are then empty.
     """
 
     vertices: Array
@@ -49,32 +47,32 @@ class CachedModel:
 
 
 def default_cache_dir() -> Path:
-    """Return `pix2shape-bench/meshes` in the user's cache folder, XDG_CACHE_HOME if that is set."""
+    """Return `pix2shape-bench/meshes` in XDG_CACHE_HOME or, if that is not set, in ~/.cache."""
     base = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    if not base.is_absolute():  # as the XDG specification has it
+    if not base.is_absolute():  # the XDG specification says to ignore relative paths
         base = Path("~/.cache").expanduser()
     return base / "pix2shape-bench" / "meshes"
 
 
 def content_hash(data: bytes, suffix: str, up: str) -> str:
-    """Return the SHA-256, as hex, over cleaning version, file type, up axis and file bytes."""
+    """Return the SHA-256, as hex, of cleaning version, file suffix, up axis and file content."""
     digest = hashlib.sha256(f"{CLEANING_VERSION} {suffix.lower()} {up}\n".encode())
     digest.update(data)
     return digest.hexdigest()
 
 
 class MeshCache:
-    """Cleaned models in a folder; without one, each is cleaned whenever it is asked for."""
+    """Cleaned models in a folder. Without a folder, each is cleaned whenever it is loaded."""
 
     def __init__(self, folder: str | Path | None) -> None:
         self.folder = None if folder is None else Path(folder)
         self._lock = threading.Lock()
 
     def load(self, path: Path, up: str) -> tuple[str, CachedModel]:
-        """Return a file's content hash and its model, from the cache if it is there.
+        """Return a file's content hash and its cleaned model, from the cache if it is there.
 
         Raises:
-            BadMeshError: the file cannot be read, or cannot be used.
+            BadMeshError: the file cannot be read, or the model cannot be used.
         """
         data = read_bytes(path)
         digest = content_hash(data, path.suffix, up)
@@ -89,7 +87,7 @@ class MeshCache:
         return digest, model
 
     def try_out(self) -> None:
-        """Make the folder, so that the warning, if there is to be one, comes before the work."""
+        """Create the folder, so that a warning about it comes before the work."""
         if self.folder is None:
             return
         try:
@@ -124,17 +122,18 @@ class MeshCache:
             folder, self.folder = self.folder, None
         if folder is not None:
             warnings.warn(
-                f"{folder}: cleaned models cannot be kept there ({error.strerror}); "
-                "each process cleans them anew, choose another --cache-dir",
+                f"{folder}: cannot be written to ({error.strerror}), so models are cleaned again in"
+                " every process; choose another --cache-dir",
                 stacklevel=2,
             )
 
 
 def make_model(data: bytes, suffix: str, up: str) -> CachedModel:
-    """Read and clean a file's bytes; what is wrong with them is told in the result.
+    """Read and clean a file's content. If it cannot be used, the result says why.
 
     Raises:
-        BadMeshError: for reasons that may not lie in the file, and are not to be remembered.
+        BadMeshError: for reasons that may not lie in the file and so must not be cached, such as
+            too little memory.
     """
     try:
         mesh = clean_mesh(*parse_mesh(data, suffix), up)
@@ -143,15 +142,14 @@ def make_model(data: bytes, suffix: str, up: str) -> CachedModel:
         none = np.empty((0, 3), np.float32)
         return CachedModel(none, none.astype(np.int32), none.astype(np.float64), {}, str(error))
     except MemoryError as error:
-        raise BadMeshError("needs more memory than there is; simplify it") from error
+        raise BadMeshError("memory", "too little", hint="simplify the model") from error
     except Exception as error:  # one bad model must not stop a run of a million
-        raise BadMeshError(
-            f"cannot be cleaned ({type(error).__name__}: {error}); please report the file"
-        ) from error
+        found = f"{type(error).__name__}: {error}"
+        raise BadMeshError("cleaning", found, hint="please report the file") from error
 
 
 def _read_entry(entry: Path) -> CachedModel | None:
-    """Return what an entry holds; None if it is not there or not whole."""
+    """Return the model of a cache entry; None if it is missing or damaged."""
     try:
         with entry.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             about = json.loads(arrays["about"].tobytes())
@@ -162,17 +160,13 @@ def _read_entry(entry: Path) -> CachedModel | None:
                 about["mended"],
                 about["refusal"],
             )
-    except Exception:  # whatever is wrong with it, it is made again
+    except Exception:  # whatever the damage is, the entry is made again
         return None
     return model if _is_whole(model) else None
 
 
 def _is_whole(model: CachedModel) -> bool:
-    kinds = (
-        (model.vertices, np.float32),
-        (model.faces, np.int32),
-        (model.hull_points, np.float64),
-    )
+    kinds = ((model.vertices, np.float32), (model.faces, np.int32), (model.hull_points, np.float64))
     if any(a.ndim != 2 or a.shape[1] != 3 or a.dtype != kind for a, kind in kinds):
         return False
     if model.refusal is not None:

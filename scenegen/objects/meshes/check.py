@@ -1,4 +1,4 @@
-"""Every model of a folder tried once: which can be used, what was mended, why others cannot be."""
+"""Try every model of a folder: which can be used, what was mended, why others are refused."""
 
 import multiprocessing
 import time
@@ -13,24 +13,23 @@ from pathlib import Path
 from scenegen.common.errors import SceneGenError
 from scenegen.objects.meshes.cache import MeshCache
 from scenegen.objects.meshes.errors import BadMeshError
-from scenegen.objects.meshes.folders import ModelFile, ModelFolder
+from scenegen.objects.meshes.listing import ModelFile, ModelFolder
 
-_ENDED = "reading it ended the process (too little memory, or a crash); simplify the file"
-# What makes a model count as mended; seams and loose vertices are everywhere and harmless.
+# These count as mended; seams and unused vertices do not, as most files have some.
 DEFECTS = ("faces_out_of_range", "faces_not_finite", "degenerate_faces", "double_faces")
 
 
 @dataclass(frozen=True)
 class ModelCheck:
-    """What became of one model.
+    """The result of trying one model.
 
     Attributes:
         name: "class/id".
         ok: whether it can be used.
-        reason: why not; empty if it can.
-        faces: triangles after cleaning.
-        mended: counts, as `CleanMesh.mended`.
-        seconds: taken, with reading it or its cached form.
+        reason: why it cannot be used; empty if it can.
+        faces: number of triangles after cleaning.
+        mended: counts as in `CleanMesh.mended`.
+        seconds: time to read and clean it, or to load it from the cache.
     """
 
     name: str
@@ -42,7 +41,7 @@ class ModelCheck:
 
     @property
     def was_mended(self) -> bool:
-        """Whether faces had to be dropped."""
+        """Whether faces had to be removed."""
         return any(self.mended.get(name, 0) for name in DEFECTS)
 
 
@@ -55,15 +54,15 @@ def check_models(
     """Load every model, cleaning those that are not in the cache yet.
 
     Args:
-        cache_dir: where cleaned models are kept; nowhere if None.
-        jobs: processes; with more than one, a model that takes its process down is refused too.
+        cache_dir: folder of the cache of cleaned models; None for no cache.
+        jobs: number of processes. With more than one, a model that crashes its process is refused.
         progress: called with 1 after each model.
 
     Returns:
-        One record per model, in the listing's order.
+        One record per model, in the order of the listing.
 
     Raises:
-        SceneGenError: with more than one job, where processes cannot be started.
+        SceneGenError: with more than one job, if processes cannot be started.
     """
     files = [file for name in folder.classes for file in folder.models[name]]
     cache = MeshCache(cache_dir)
@@ -89,22 +88,16 @@ def _check(file: ModelFile, up: str, cache: MeshCache) -> ModelCheck:
     return ModelCheck(file.name, True, "", len(model.faces), model.mended, seconds)
 
 
-_OWN_CACHE: list[MeshCache] = []  # one in each process
-
-
-def _start(cache_dir: Path | None) -> None:
-    warnings.simplefilter("ignore")  # that the cache cannot be used, the caller has been told
-    _OWN_CACHE[:] = [MeshCache(cache_dir)]
-
-
-def _check_here(file: ModelFile, up: str) -> ModelCheck:
-    return _check(file, up, _OWN_CACHE[0])
+def _check_in_worker(file: ModelFile, up: str, cache_dir: Path | None) -> ModelCheck:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the caller has already warned about the cache
+        return _check(file, up, MeshCache(cache_dir))
 
 
 def _in_processes(
     files: Sequence[ModelFile], up: str, cache_dir: Path | None, jobs: int
 ) -> Iterator[ModelCheck]:
-    """Keep processes busy; where one dies, try what was under way again, each on its own."""
+    """Check the files in processes. If one dies, try the models it was working on one by one."""
     waiting = deque(files)
     while waiting:
         lost: list[ModelFile] = []
@@ -113,33 +106,28 @@ def _in_processes(
             guilty: list[ModelFile] = []
             yield from _until_one_dies(deque([file]), up, cache_dir, 1, guilty)
             if guilty:
-                yield ModelCheck(file.name, False, _ENDED, 0)
+                reason = "the process that read it died (too little memory, or a crash)"
+                yield ModelCheck(file.name, False, f"{reason}; simplify the model", 0)
 
 
 def _until_one_dies(
-    waiting: deque[ModelFile],
-    up: str,
-    cache_dir: Path | None,
-    jobs: int,
-    lost: list[ModelFile],
+    waiting: deque[ModelFile], up: str, cache_dir: Path | None, jobs: int, lost: list[ModelFile]
 ) -> Iterator[ModelCheck]:
-    """Work off what waits; if a process dies, stop and name what was under way in `lost`."""
+    """Check the files that wait. If a process dies, stop and put the unfinished ones in `lost`."""
     running: dict[Future[ModelCheck], ModelFile] = {}
-    # Not forked: threads of the caller, such as a renderer's, must not come along.
+    # Spawned, as forking a process that has threads, such as a renderer's, is not safe.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, context, _start, (cache_dir,)) as pool:
+    with ProcessPoolExecutor(jobs, context) as pool:
         try:
             pool.submit(time.perf_counter).result()
-        except BrokenProcessPool as error:  # before it saw a model
-            raise SceneGenError(
-                "check_models: its processes cannot start; call it from under "
-                '`if __name__ == "__main__":`, or with jobs=1'
-            ) from error
+        except BrokenProcessPool as error:  # before any model was read
+            hint = 'call it inside `if __name__ == "__main__":`, or with jobs=1'
+            raise SceneGenError("check_models", "processes that end at once", hint=hint) from error
         try:
             while waiting or running:
                 while waiting and len(running) < 2 * jobs:
-                    running[pool.submit(_check_here, waiting[0], up)] = waiting[0]
-                    waiting.popleft()
+                    file = waiting.popleft()
+                    running[pool.submit(_check_in_worker, file, up, cache_dir)] = file
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     record = future.result()
                     del running[future]

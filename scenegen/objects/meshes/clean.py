@@ -1,7 +1,7 @@
-"""Meshes mended and brought to one size: what comes out is what is rendered, to the bit.
+"""Mend a mesh and normalise its size. The result is rendered as it is, bit for bit.
 
-The surface is never moved by more than the rounding to single precision. Only faces without an
-area, or narrower than NARROWEST, and second copies of faces go.
+The surface moves by no more than the rounding to single precision. Only faces without area or
+narrower than NARROWEST, and second copies of faces, are removed.
 """
 
 from collections.abc import Mapping
@@ -11,56 +11,52 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.objects.meshes import limits
 from scenegen.objects.meshes.errors import BadMeshError
-from scenegen.objects.meshes.limits import MOST_FACES
 
-__all__ = ["MOST_FACES", "BadMeshError", "CleanMesh", "clean_mesh"]
 Array = NDArray[Any]
-MOST_COORDINATE = 1e30  # beyond it, and if not finite, a coordinate is taken for noise
-NARROWEST = 1e-6  # height of a triangle over its longest edge, in bounding radii
-LOWEST = 1e-4  # height of a model that lies flat, in bounding radii
-_COLLINEAR = 1e-10  # height over the longest edge, divided by that edge
-_ROUNDS = 8
+MOST_COORDINATE = 1e30  # faces with a larger coordinate, or one that is not finite, are dropped
+NARROWEST = 1e-6  # least height of a triangle over its longest edge, in bounding radii
+LOWEST = 1e-4  # least height of a model, in bounding radii
+_COLLINEAR = 1e-10  # least height over the longest edge, divided by that edge
+_ROUNDS = 8  # of dropping slivers and normalising again
 
 
 @dataclass(frozen=True, eq=False)
 class CleanMesh:
-    """A mesh y up, the centre of its box at the origin, its farthest vertex at distance 1.
+    """A mesh with y up, its bounding box centred at 0 and its farthest vertex at distance 1.
 
     Attributes:
-        vertices: (V, 3) float32, each once, all used.
-        faces: (F, 3) int32; every one has an area, and no two the same vertices.
-        mended: how many of what were found: unused_vertices, merged_vertices,
-            faces_out_of_range, faces_not_finite, degenerate_faces, double_faces.
+        vertices: (V, 3) float32, all different, all used.
+        faces: (F, 3) int32; each has an area, and no two have the same vertices.
+        mended: counts of what was removed: unused_vertices, merged_vertices, faces_out_of_range,
+            faces_not_finite, degenerate_faces, double_faces.
     """
 
     vertices: Array
     faces: Array
     mended: Mapping[str, int]
 
-    @property
-    def triangles(self) -> Array:
-        """Corners, (F, 3, 3) float32."""
-        return np.asarray(self.vertices[self.faces])
-
 
 def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
     """Mend a mesh and normalise it.
 
     Args:
-        vertices: (V, 3), any scale and place, may be not finite.
-        faces: (F, 3) indices, may be out of range.
+        vertices: (V, 3), of any scale and place; may be not finite.
+        faces: (F, 3) indices; may be out of range.
         up: the axis, "y" or "z", that points up in the file.
 
     Raises:
-        BadMeshError: above MOST_FACES faces; no face left that has an area; no height to stand.
+        BadMeshError: there are more than MOST_FACES faces, none with an area, or the mesh is flat
+            on the floor.
     """
     vertices = np.asarray(vertices, np.float64).reshape(-1, 3)
     faces = np.asarray(faces, np.int64).reshape(-1, 3)
-    if len(faces) > MOST_FACES:
-        raise BadMeshError(f"has {len(faces)} faces, at most {MOST_FACES} are used; simplify it")
+    if len(faces) > limits.MOST_FACES:
+        expected = f"at most {limits.MOST_FACES}"
+        raise BadMeshError("faces", len(faces), expected, "simplify the model")
     if not len(faces):
-        raise BadMeshError(f"has {len(vertices)} vertices but no faces")
+        raise BadMeshError("faces", f"none, but {len(vertices)} vertices")
     found: dict[str, int] = {}
 
     def keep(good: Any, name: str) -> None:
@@ -75,9 +71,10 @@ def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
     keep(_heights(vertices[faces]) > 0, "degenerate_faces")
     turned = vertices if up == "y" else vertices[:, [0, 2, 1]] * (1, 1, -1)
     points = np.empty((0, 3), np.float32)
-    for _ in range(_ROUNDS):  # a sliver that stuck out has its say in the size no longer
+    for _ in range(_ROUNDS):  # dropping a sliver that stuck out changes the size
         if not len(faces):
-            raise BadMeshError(f"no face is left that has an area ({_told(found)})")
+            told = ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in found.items() if n)
+            raise BadMeshError("faces", f"none with an area ({told})")
         points = _normalised(turned, faces)
         wide = _heights(points[faces].astype(np.float64), NARROWEST) > 0
         keep(wide, "degenerate_faces")
@@ -85,8 +82,9 @@ def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
             break
     if np.ptp(points[faces.ravel(), 1]) < LOWEST:
         raise BadMeshError(
-            "lies flat: it has no height and would be one with the floor; "
-            "if it stands in other programs, its up axis is another (--up)"
+            "height",
+            "none, so the model would be part of the floor",
+            hint="if it stands upright in other programs, another axis points up (--up)",
         )
     used = np.zeros(len(points), bool)
     used[faces] = True
@@ -98,23 +96,22 @@ def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
     return CleanMesh(points, faces.astype(np.int32), found)
 
 
-def _told(found: Mapping[str, int]) -> str:
-    return ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in found.items() if n)
-
-
 def _normalised(vertices: Array, faces: Array) -> Array:
-    """Return all vertices, float32, such that those of the faces fill the unit sphere."""
+    """Return all vertices, float32, scaled such that those of the faces fill the unit sphere."""
     used = vertices[faces.ravel()]
     low, high = used.min(axis=0), used.max(axis=0)
     center, extent = low / 2 + high / 2, (high - low).max()
     radius = np.sqrt((((used - center) / extent) ** 2).sum(axis=1).max())
-    points = np.zeros(vertices.shape, np.float32)  # of vertices that no face uses: anything
+    points = np.zeros(vertices.shape, np.float32)  # vertices that no face uses stay 0
     points[faces.ravel()] = (used - center) / extent / radius
-    return np.asarray(points + np.float32(0))  # no -0.0, which would differ from 0.0 in its bits
+    return np.asarray(points + np.float32(0))  # turns -0.0 into 0.0, which has other bits
 
 
 def _heights(triangles: Array, narrowest: float = 0.0) -> Array:
-    """Return heights over longest edges, (F, 3, 3) -> (F,); 0 on a line and below `narrowest`."""
+    """Return triangles' heights over their longest edges, (F, 3, 3) -> (F,).
+
+    The height is 0 where it is below `narrowest` or the corners lie on a line.
+    """
     edges = np.roll(triangles, -1, axis=1) - triangles
     lengths = np.sqrt(np.einsum("fki,fki->fk", edges, edges))
     longest = lengths.max(axis=1, initial=0.0)
@@ -126,7 +123,7 @@ def _heights(triangles: Array, narrowest: float = 0.0) -> Array:
 
 
 def _merged(points: Array, used: Array) -> tuple[Array, Array]:
-    """Return the different ones of the used points, (V, 3), and each old point's number there."""
+    """Return the used points without duplicates, and the new number of each old point."""
     rows = np.flatnonzero(used)
     rows = rows[np.lexsort(points[rows].T)]
     ordered = points[rows]
@@ -138,9 +135,9 @@ def _merged(points: Array, used: Array) -> tuple[Array, Array]:
 
 
 def _first_copies(faces: Array) -> Array:
-    """Mark faces, (F, 3), but for those with the same vertices as an earlier one."""
+    """Return a mask of the faces, (F, 3), that do not repeat an earlier one's vertices."""
     corners = np.sort(faces, axis=1)
-    order = np.lexsort(corners.T)  # stable: the earliest of equals comes first
+    order = np.lexsort(corners.T)  # a stable sort: the earliest of equal faces comes first
     ordered = corners[order]
     first = np.ones(len(faces), bool)
     first[order[1:]] = (ordered[1:] != ordered[:-1]).any(axis=1)

@@ -1,4 +1,4 @@
-"""What can be wrong with a folder of meshes, or with one of them."""
+"""The two errors that a folder of meshes can cause."""
 
 from scenegen.common.errors import SceneGenError
 
@@ -8,4 +8,4 @@ class MeshFolderError(SceneGenError):
 
 
 class BadMeshError(SceneGenError):
-    """A model cannot be used; the text says why, and is fit for a report."""
+    """A model cannot be used. The text says why; reports and notes show it to users."""

@@ -1,120 +1,66 @@
-"""Folders of models as listings: which classes there are, and which files. Nothing is loaded.
-
-ShapeNetCore has its models up along +y; in version 1 they face +x, in version 2 -z.
-"""
+"""Folders of mesh files with one sub-folder per class; `open_models` also recognises ShapeNet."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from scenegen.objects.meshes.disk import existing, folders, meshes
 from scenegen.objects.meshes.errors import MeshFolderError
-from scenegen.objects.meshes.listing import ModelFile, ModelFolder, make_listing, object_split
-from scenegen.objects.meshes.taxonomy import is_synset, official_splits, synset_names
+from scenegen.objects.meshes.listing import (
+    ModelFolder,
+    existing,
+    make_listing,
+    mesh_files,
+    object_split,
+    subfolders,
+)
+from scenegen.objects.meshes.shapenet import open_shapenet, shapenet_version
 
-__all__ = [
-    "MeshFolderError",
-    "ModelFile",
-    "ModelFolder",
-    "object_split",
-    "open_models",
-    "open_objects",
-    "open_shapenet",
-]
-_INSIDE = {"shapenet-v1": "model.obj", "shapenet-v2": "models/model_normalized.obj"}
-_DEPTH = 8  # folders below a class's that are looked into
+_DEPTH = 8  # levels of folders below a class's folder that are searched
 
 
 def open_models(
     root: str | Path, classes: Sequence[str] | None = None, up: str = "y", split: str = "all"
 ) -> ModelFolder:
-    """List a folder that is either ShapeNet's or a plain one; with z up it is taken for plain.
+    """List a folder that is either ShapeNet or a plain one; with up="z" it is always plain.
 
     Raises:
-        MeshFolderError: as `open_shapenet`.
+        MeshFolderError: as `open_shapenet` and `open_objects`.
     """
     path = existing(root)
-    if up == "y" and any(is_synset(name) for name in folders(path)) and _version(path):
+    if up == "y" and shapenet_version(path):
         return open_shapenet(path, classes, split)
     return open_objects(path, classes, up, split)
-
-
-def open_shapenet(
-    root: str | Path, classes: Sequence[str] | None = None, split: str = "all"
-) -> ModelFolder:
-    """List ShapeNetCore, version 1 or 2, whichever lies there.
-
-    Splits are the official ones where `all.csv` lies in the root (models that it does not name are
-    in none of them), else those of `object_split`.
-
-    Args:
-        classes: names such as "mug", or synsets such as "03797390"; all that are there if None.
-        split: "all", "train", "val" or "test".
-
-    Raises:
-        MeshFolderError: no such folder; not ShapeNet; an unknown class or split; nothing left.
-    """
-    root = existing(root)
-    kind = _version(root)
-    if kind is None:
-        raise MeshFolderError(
-            f"{root}: found no ShapeNet, expected <synset>/<id>/model.obj (version 1) or "
-            "<synset>/<id>/models/model_normalized.obj (version 2), synset being 8 digits; "
-            "name the folder that holds the synsets, or say --objects-root for a plain folder"
-        )
-    aliases, shown = synset_names(root), {}
-    for synset in sorted(name for name in folders(root) if is_synset(name)):
-        first = aliases.get(synset, (synset,))[0]
-        shown[first if first not in shown else f"{first} {synset}"] = synset
-    official = official_splits(root)
-
-    def name_of(asked: str) -> str:
-        also = (n for n, synset in shown.items() if asked in (synset, *aliases.get(synset, ())))
-        return asked if asked in shown else next(also, asked)
-
-    def models_of(name: str) -> Iterator[tuple[str, Path]]:
-        folder = root / shown[name]
-        return ((model_id, folder / model_id / _INSIDE[kind]) for model_id in folders(folder))
-
-    def split_of(name: str, model_id: str) -> str | None:
-        if official is None:
-            return object_split(model_id)
-        return official.get((shown[name], model_id))
-
-    asked = None if classes is None else [name_of(name) for name in classes]
-    return make_listing(root, kind, "y", sorted(shown), asked, split, models_of, split_of)
 
 
 def open_objects(
     root: str | Path, classes: Sequence[str] | None = None, up: str = "y", split: str = "all"
 ) -> ModelFolder:
-    """List a folder of OBJ, PLY, STL, GLB and OFF files, one class per sub-folder.
+    """List a folder of OBJ, PLY, STL, GLB and OFF files with one sub-folder per class.
 
-    A model's id is its path below its class's folder, without suffix (with it, where two files
-    differ in nothing else). Hidden files, and links to folders inside a class, are passed over.
+    A model's id is its path below its class's folder without the suffix, or with it where two files
+    differ in nothing else. Hidden files, and links to folders inside a class, are ignored.
 
     Args:
-        classes: names of sub-folders; all that hold meshes if None.
+        classes: names of sub-folders; None for all that hold meshes.
         up: the axis, "y" or "z", that points up in the files.
         split: "all", or "train", "val" or "test" by `object_split` of the ids.
 
     Raises:
-        MeshFolderError: as `open_shapenet`.
+        MeshFolderError: there is no such folder, class, axis or split, or no model is left.
     """
     root = existing(root)
     if up not in ("y", "z"):
-        raise MeshFolderError(f"up: found {up!r}, expected y or z")
-    names = sorted(folders(root))
+        raise MeshFolderError("up", repr(up), "y or z")
+    names = sorted(subfolders(root))
     if not names:
-        here = sum(1 for _ in meshes(root, 0))
-        raise MeshFolderError(
-            f"{root}: found no sub-folders{f' but {here} meshes' if here else ''}, expected one "
-            "sub-folder per class; put the meshes into sub-folders named after their classes"
-        )
+        here = sum(1 for _ in mesh_files(root, 0))
+        found = f"no sub-folders{f' but {here} meshes' if here else ''}"
+        hint = "put the meshes into sub-folders named after their classes"
+        raise MeshFolderError(root, found, "one sub-folder per class", hint)
 
     def models_of(name: str) -> Iterator[tuple[str, Path]]:
         folder = root / name
-        files = [(path.relative_to(folder), path) for path in meshes(folder, _DEPTH)]
+        files = [(path.relative_to(folder), path) for path in mesh_files(folder, _DEPTH)]
         ids = [below.with_suffix("").as_posix() for below, _ in files]
         times = Counter(ids)
         for model_id, (below, path) in zip(ids, files, strict=True):
@@ -123,14 +69,3 @@ def open_objects(
     return make_listing(
         root, "folder", up, names, classes, split, models_of, lambda _, i: object_split(i)
     )
-
-
-def _version(root: Path) -> str | None:
-    """Return the kind of ShapeNet by the first model found in either place."""
-    for synset in sorted(folders(root)):
-        if is_synset(synset):
-            for model_id in sorted(folders(root / synset)):
-                for kind, inside in _INSIDE.items():
-                    if (root / synset / model_id / inside).is_file():
-                        return kind
-    return None

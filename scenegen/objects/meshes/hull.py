@@ -1,4 +1,4 @@
-"""A convex body of few points around a mesh, for placement."""
+"""A convex body of few points around a mesh. Placement tests these bodies for overlap."""
 
 from typing import Any
 
@@ -7,47 +7,48 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 Array = NDArray[Any]
-MOST_POINTS = 400  # placement asks for their support again and again
+MOST_POINTS = 400  # of the body, as placement loops over all of them many times
 _DIRECTIONS = 300
 _MOST_GROWTH = 1.03
-_BLOCK = 512  # points at once, so that products stay in the processor's cache
+_BLOCK = 512  # points at once, so that matrix products fit into the processor's cache
 
 
 def hull_points(vertices: Array) -> Array:
-    """Return corners of a convex body that holds all vertices, (V, 3) -> (H, 3) float64.
+    """Return corners of a convex body that contains all vertices, (V, 3) -> (H, 3) float64.
 
-    It is their convex hull, within 1e-9; where that has more than MOST_POINTS corners, a body some
-    percent larger, of fewer. Along -y it reaches exactly as far as the vertices.
+    The body is their convex hull within 1e-9. If that has more than MOST_POINTS corners, the body
+    has fewer, and is a few percent larger. It reaches exactly as far down (-y) as the vertices.
     """
     points = np.asarray(vertices, np.float64)
     lowest = points[[int(points[:, 1].argmin())]]
     try:
-        # Joggled by some 1e-11: Qhull takes minutes for 20,000 points on a circle otherwise.
+        # QJ moves points by some 1e-11; without, 20,000 points on a circle take Qhull minutes.
         body = points[ConvexHull(points, qhull_options="QJ Pp").vertices]
         if len(body) > MOST_POINTS:
             body = _coarser(body, float(lowest[0, 1]))
         else:
             body = body[ConvexHull(body).vertices]
-    except QhullError:  # flat
+    except QhullError:  # the points lie in a plane
         body = _flat_hull(points)
     return np.concatenate([body, lowest])
 
 
 def _flat_hull(points: Array) -> Array:
-    """Return the corners of the hull of points in a plane."""
+    """Return the corners of the convex hull of points that lie in a plane."""
     centered = points - points.mean(axis=0)
     axes = np.linalg.svd(centered, full_matrices=False)[2]
     return np.asarray(points[ConvexHull(centered @ axes[:2].T).vertices])
 
 
 def _coarser(points: Array, floor: float) -> Array:
-    """Return corners of a body that holds the points, of the extreme ones in many directions.
+    """Return corners of a body that contains the points, made from extreme points only.
 
-    Their hull is blown up about its middle until it holds all others, then cut off at the height
-    `floor`, under which there is none. Where that takes much (of a leaning sheet), all stay.
+    The hull of the points that are extreme in many directions is scaled about its middle until it
+    contains all others, and cut off at the height `floor`, the lowest point's. If it would have to
+    grow by more than _MOST_GROWTH (as for a leaning sheet), all points are returned.
     """
     blocks = np.array_split(points, 1 + len(points) // _BLOCK)
-    # More of them across a body's long sides than at its ends, as if it were as long every way.
+    # Scaled by the extents, so that a long body gets as many points on its sides as at its ends.
     directions = _even_directions(_DIRECTIONS) / np.maximum(np.ptp(points, axis=0), 1e-9)
     some = _extreme(blocks, directions)
     middle = some.mean(axis=0)
@@ -68,7 +69,7 @@ def _coarser(points: Array, floor: float) -> Array:
 
 
 def _extreme(blocks: list[Array], directions: Array) -> Array:
-    """Return, each once, the points of all blocks that reach farthest along the directions."""
+    """Return the points of all blocks that reach farthest along the directions, each once."""
     best = np.full(len(directions), -np.inf)
     chosen = np.zeros((len(directions), 3))
     for block in blocks:

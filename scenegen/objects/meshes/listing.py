@@ -1,18 +1,20 @@
-"""A listing of models, by class and split."""
+"""The listing of a folder's models, by class and split. No model file is opened for it."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from scenegen.description.specs import SPLITS
-from scenegen.objects.meshes.disk import SUFFIXES
 from scenegen.objects.meshes.errors import MeshFolderError
+
+SUFFIXES = (".obj", ".ply", ".stl", ".glb", ".off")
 
 
 @dataclass(frozen=True)
 class ModelFile:
-    """One model: its name, "class/id", and where it lies."""
+    """One model: its name, "class/id", and its path."""
 
     name: str
     path: Path
@@ -20,13 +22,13 @@ class ModelFile:
 
 @dataclass(frozen=True)
 class ModelFolder:
-    """A listing of models.
+    """The models of a folder.
 
     Attributes:
         kind: "shapenet-v1", "shapenet-v2" or "folder".
         up: the axis, "y" or "z", that points up in the files.
         classes: sorted, or in the order asked for.
-        models: by class, sorted by name; only those of the split.
+        models: the models of the split by class, sorted by name.
     """
 
     kind: str
@@ -35,16 +37,16 @@ class ModelFolder:
     models: Mapping[str, tuple[ModelFile, ...]]
 
     def digest(self) -> str:
-        """Return the SHA-256, as hex, of kind, up and all names in order; not of the paths."""
+        """Return the SHA-256, as hex, of kind, up and all names in order, but not of the paths."""
         names = (file.name for name in self.classes for file in self.models[name])
         return hashlib.sha256("\n".join([self.kind, self.up, *names]).encode()).hexdigest()
 
 
 def object_split(model_id: str) -> str:
-    """Return "train" (70%), "val" (10%) or "test" (20%) for an id, the same for ever.
+    """Return "train" (70%), "val" (10%) or "test" (20%) for a model's id. The rule never changes.
 
-    The first 8 bytes of the id's SHA-256 (UTF-8), as a big-endian number modulo 10: 0 to 6 is
-    train, 7 val, 8 and 9 test.
+    The first 8 bytes of the SHA-256 of the id (UTF-8) are read as a big-endian number and taken
+    modulo 10: 0 to 6 is train, 7 is val, 8 and 9 are test.
     """
     digest = hashlib.sha256(model_id.encode()).digest()
     tenth = int.from_bytes(digest[:8], "big") % 10
@@ -65,49 +67,100 @@ def make_listing(
 
     Args:
         known: all classes, sorted.
-        asked: the ones wanted, of `known`; all that are not empty if None.
+        asked: the classes to take, among `known`; None for all that are not empty.
         models_of: gives (id, path) of a class's models.
         split_of: gives the split of (class, id).
 
     Raises:
-        MeshFolderError: an unknown class or split; a class that was asked for, or all, is empty.
+        MeshFolderError: the class or split is unknown, or a class that was asked for, or every
+            class, is empty.
     """
     if split not in SPLITS:
-        raise MeshFolderError(f"object split: found {split!r}, expected one of {', '.join(SPLITS)}")
-    on_disk = {_valid(name): name for name in known}  # what was asked for may be what was stored
+        raise MeshFolderError("object split", repr(split), f"one of {', '.join(SPLITS)}")
+    on_disk = {_valid(name): name for name in known}  # classes may be asked for by their valid name
     asked = None if asked is None else [on_disk.get(name, name) for name in asked]
     unknown = [name for name in asked or () if name not in known]
     if unknown or (asked is not None and not asked):
-        raise MeshFolderError(
-            f"{root}: found no class {', '.join(unknown) or '(none was named)'}; "
-            f"there are {', '.join(on_disk)}"
-        )
+        found = f"no class {', '.join(unknown)}" if unknown else "no class named"
+        raise MeshFolderError(root, found, f"some of {', '.join(on_disk)}")
     models, others = {}, 0
     for name in dict.fromkeys(known if asked is None else asked):
-        found = sorted((_valid(model_id), path) for model_id, path in models_of(name))
+        found_models = sorted((_valid(model_id), path) for model_id, path in models_of(name))
         files = tuple(
             ModelFile(f"{_valid(name)}/{model_id}", path)
-            for model_id, path in found
+            for model_id, path in found_models
             if split == "all" or split_of(name, model_id) == split
         )
-        others += len(found) - len(files)
+        others += len(found_models) - len(files)
         if files:
             models[_valid(name)] = files
         elif asked is not None:
-            some = f", {len(found)} in others" if found else f" (of {', '.join(SUFFIXES)})"
-            raise MeshFolderError(
-                f"{root}: class {name} has no models in split {split!r}{some}; "
-                "leave the class out or choose another split"
-            )
+            raise _no_models(f"{root}: class {name}", split, len(found_models))
     if not models:
-        raise MeshFolderError(
-            f"{root}: found no models in split {split!r}, {others} in others; choose another split"
-            if others
-            else f"{root}: found no models, expected files of {', '.join(SUFFIXES)} in sub-folders"
-        )
+        raise _no_models(root, split, others)
     return ModelFolder(kind, up, tuple(models), models)
 
 
+def _no_models(where: object, split: str, in_other_splits: int) -> MeshFolderError:
+    if in_other_splits:
+        found = f"no models in split {split!r}, {in_other_splits} in other splits"
+        return MeshFolderError(where, found, hint="choose another split, or leave the class out")
+    return MeshFolderError(where, "no models", f"files of {', '.join(SUFFIXES)} in sub-folders")
+
+
 def _valid(name: str) -> str:
-    """Return a name that is not UTF-8 on disk in a form that can be stored and printed."""
+    """Return a file name that is not valid UTF-8 in a form that can be stored and printed."""
     return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+
+
+def existing(root: str | Path) -> Path:
+    """Return the path of a folder. Raises MeshFolderError where there is none."""
+    path = Path(root).expanduser()
+    try:
+        if path.is_dir():
+            return path
+        problem = "is not a folder" if path.exists() else "no such folder"
+    except OSError as error:
+        problem = f"cannot be reached ({error.strerror})"
+    raise MeshFolderError(f"{path}: {problem}", hint="name the folder that holds the models")
+
+
+def subfolders(path: Path) -> Iterator[str]:
+    """Yield the names of sub-folders, and of links to folders, except hidden ones.
+
+    Raises:
+        MeshFolderError: where the folder cannot be listed.
+    """
+    return (entry.name for entry in _entries(path) if _is_folder(entry, follow=True))
+
+
+def mesh_files(path: Path, depth: int) -> Iterator[Path]:
+    """Yield the files with a mesh suffix, down to `depth` levels below, following no links.
+
+    Raises:
+        MeshFolderError: where a folder cannot be listed.
+    """
+    for entry in _entries(path):
+        if _is_folder(entry, follow=False):
+            if depth:
+                yield from mesh_files(Path(entry.path), depth - 1)
+        elif entry.name.lower().endswith(SUFFIXES):
+            yield Path(entry.path)
+
+
+def _entries(path: Path) -> list[os.DirEntry[str]]:
+    try:
+        with os.scandir(path) as entries:
+            return [entry for entry in entries if not entry.name.startswith(".")]
+    except OSError as error:
+        hint = "give read permission, or move the folder away"
+        raise MeshFolderError(
+            path, f"an error ({error.strerror})", "a readable folder", hint
+        ) from error
+
+
+def _is_folder(entry: os.DirEntry[str], follow: bool) -> bool:
+    try:
+        return entry.is_dir(follow_symlinks=follow)
+    except OSError:  # a link to itself
+        return False

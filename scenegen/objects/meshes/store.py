@@ -1,4 +1,4 @@
-"""Unit shapes of a folder's models, made when first asked for."""
+"""The unit shapes of a folder's models, made when first used and kept in memory for a while."""
 
 import threading
 from collections import OrderedDict
@@ -10,43 +10,36 @@ from numpy.typing import NDArray
 
 from scenegen.objects.meshes.cache import CachedModel, MeshCache
 from scenegen.objects.meshes.errors import BadMeshError
-from scenegen.objects.meshes.folders import ModelFile, ModelFolder
+from scenegen.objects.meshes.listing import ModelFolder
 from scenegen.objects.solids import UnitShape
 
 Array = NDArray[Any]
-MOST_FACES_KEPT = 3_000_000  # of all shapes in memory together; about 100 bytes each
+MOST_FACES_KEPT = 3_000_000  # of all shapes in memory; a face takes about 100 bytes
 
 
 class MeshStore:
-    """The shapes of a folder. May be used by several threads; pickles as folder and cache.
+    """The unit shapes of a folder's models. Several threads may share it.
 
     Attributes:
-        folder: the listing.
-        cache_dir: where cleaned models are kept; nowhere if None.
-        problems: reasons by name, of the models refused so far.
+        folder: the listing of the models.
+        problems: reasons, by name, why models were refused so far.
     """
 
     def __init__(self, folder: ModelFolder, cache_dir: str | Path | None) -> None:
         self.folder = folder
-        self.cache_dir = None if cache_dir is None else Path(cache_dir)
         self.problems: dict[str, str] = {}
         self._files = {file.name: file for files in folder.models.values() for file in files}
-        self._cache = MeshCache(self.cache_dir)
+        self._cache = MeshCache(cache_dir)
         self._digests: dict[str, str] = {}
         self._shapes: OrderedDict[str, UnitShape] = OrderedDict()
         self._faces = 0
         self._lock = threading.Lock()
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return MeshStore, (self.folder, self.cache_dir)
-
     def shape(self, name: str) -> UnitShape:
-        """Return a model, "class/id", as a unit shape: flat faces, resting on its base.
-
-        Its hull points are the corners of its convex hull.
+        """Return the model named "class/id" as a unit shape with flat faces, resting on its base.
 
         Raises:
-            BadMeshError: no such model, or it cannot be used.
+            BadMeshError: there is no such model, or it cannot be used.
         """
         with self._lock:
             shape = self._shapes.get(name)
@@ -65,7 +58,7 @@ class MeshStore:
         return shape
 
     def digest(self, name: str) -> str:
-        """Return the first 16 hex digits of the content hash of the file behind a model's shape.
+        """Return the first 16 hex digits of the content hash of a model's file.
 
         Raises:
             BadMeshError: as `shape`.
@@ -75,24 +68,19 @@ class MeshStore:
         return self._digests[name][:16]
 
     def _load(self, name: str) -> tuple[str, CachedModel]:
-        file = self._file(name)
+        if name not in self._files:
+            example = next(iter(self._files), "mug/1")
+            expected = f"class/id of this folder and split, such as {example}"
+            raise BadMeshError("model", repr(name), expected)
         try:
             if name in self.problems:
                 raise BadMeshError(self.problems[name])
-            digest, model = self._cache.load(file.path, self.folder.up)
+            digest, model = self._cache.load(self._files[name].path, self.folder.up)
         except BadMeshError as error:
             self.problems[name] = str(error)
-            raise BadMeshError(f"{name}: {error}") from error
+            raise error.inside(name) from error
         self._digests[name] = digest
         return digest, model
-
-    def _file(self, name: str) -> ModelFile:
-        if name not in self._files:
-            raise BadMeshError(
-                f"{name}: no such model in this folder and split; names are class/id, "
-                f"such as {next(iter(self._files), 'mug/1')}"
-            )
-        return self._files[name]
 
 
 def _unit_shape(name: str, model: CachedModel) -> UnitShape:

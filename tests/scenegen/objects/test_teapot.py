@@ -1,4 +1,4 @@
-"""Newell's patches: a wrong number in the table opens a crack, breaks a mirror or bends a seam."""
+"""The teapot's patches: a wrong number opens a crack, breaks a symmetry or bends a seam."""
 
 from collections import defaultdict
 
@@ -15,7 +15,7 @@ TUBE_ENDS = {(24, 0), (28, 0), (25, 1), (29, 1), (26, 0), (30, 0), (27, 1), (31,
 
 
 def borders() -> dict[tuple[float, ...], list[tuple[int, int]]]:
-    """(patch, side) by the border's control points, whichever way they are run through.
+    """Return (patch, side) by the border's control points, in either direction.
 
     Sides 0 and 1 are the first and last row, 2 and 3 the first and last column.
     """
@@ -25,10 +25,6 @@ def borders() -> dict[tuple[float, ...], list[tuple[int, int]]]:
             key = min(tuple(curve.ravel()), tuple(curve[::-1].ravel()))
             found[key].append((i, side))
     return found
-
-
-def test_there_are_32_bicubic_patches() -> None:
-    assert patches().shape == (32, 4, 4, 3)
 
 
 def test_every_border_is_shared_or_known_to_be_open() -> None:
@@ -47,7 +43,7 @@ def test_poles_are_points_and_every_other_shared_border_has_two_sides() -> None:
 
 
 def test_the_surface_is_smooth_across_all_borders() -> None:
-    """Corners at one place have one normal, so seams neither crease nor turn inside out.
+    """Corners at the same place have the same normal, so seams have no creases.
 
     The handle's lower end only happens to touch the body, at one point.
     """
@@ -78,7 +74,7 @@ def test_it_is_its_own_mirror_image() -> None:
 
 
 def test_known_extremes() -> None:
-    """Height of the knob, foot of the bottom, width of the belly, back of the handle."""
+    """The height of the knob, the bottom, the width of the belly and the back of the handle."""
     points = tessellate(64)[0].reshape(-1, 3)
     low, high = points.min(axis=0), points.max(axis=0)
     np.testing.assert_allclose(low, [-3.0, 0.0, -2.0], atol=1e-12)

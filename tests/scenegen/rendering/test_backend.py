@@ -1,4 +1,4 @@
-"""An LLVM that would abort the process is never used, and whoever has none is told so once."""
+"""The choice of LLVM: one that would abort is never used, and a missing one costs one warning."""
 
 import ctypes
 import ctypes.util
@@ -58,7 +58,7 @@ print(mitsuba.variant(), *(f"{w.category.__name__}: {w.message}" for w in found)
 
 @pytest.fixture(autouse=True)
 def forgetful(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """What was found is remembered for the process: forget it before and after."""
+    """Clear what is cached for the process before and after each test."""
     monkeypatch.setenv(LLVM_VARIABLE, "")  # so that it is restored, whatever is written to it
     monkeypatch.delenv(LLVM_VARIABLE)
     monkeypatch.delitem(sys.modules, "drjit", raising=False)  # other tests may have imported it

@@ -1,4 +1,4 @@
-"""How radiance is stored, and how visible objects are counted."""
+"""The storage of radiance, and the count of visible pixels."""
 
 import numpy as np
 import pytest

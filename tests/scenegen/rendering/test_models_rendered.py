@@ -1,4 +1,4 @@
-"""Images of models: the same bits in any company, and what another engine sees."""
+"""Images of models: the same bits in any batch, and agreement with Embree."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,24 +9,20 @@ import numpy as np
 import pytest
 from model_rooms import FAMILIES, folder_objects, folder_spec, some_scenes
 from numpy.typing import NDArray
-from other_engines import cast_whole_scene, render_elsewhere
+from other_engines import bits, cast_whole_scene, render_elsewhere
 from scipy.ndimage import maximum_filter, minimum_filter
 
+from scenegen.common.errors import BackendError
 from scenegen.description.presets import preset_spec
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.rendering import renderer
-from scenegen.rendering.ground_truth import GroundTruth
 from scenegen.rendering.packing import SceneBatch, pack
 from scenegen.rendering.renderer import parts, render
 
 Array = NDArray[Any]
 Scenes = Callable[[DatasetSpec, int], list[SceneSpec]]
-
-
-def bits(truth: GroundTruth, row: int) -> tuple[bytes, ...]:
-    return tuple(getattr(truth, name)[row].tobytes() for name in vars(truth))
 
 
 def all_bits(spec: DatasetSpec, scenes: list[SceneSpec], objects: Objects) -> list[Any]:
@@ -36,7 +32,7 @@ def all_bits(spec: DatasetSpec, scenes: list[SceneSpec], objects: Objects) -> li
 
 @pytest.mark.parametrize("source", ["families", "folder"])
 def test_an_image_is_the_same_alone_and_in_any_company(source: str, model_folder: Path) -> None:
-    """Where a model lies in a batch's scene depends on the batch; nothing that is seen may."""
+    """A model's place in the Mitsuba scene depends on the batch, but no pixel may."""
     spec = FAMILIES if source == "families" else folder_spec(model_folder)
     objects = objects_of(spec) if source == "families" else folder_objects(model_folder)
     scenes = some_scenes(spec, objects, 40)
@@ -53,7 +49,7 @@ def test_an_image_is_the_same_alone_and_in_any_company(source: str, model_folder
 
 
 def one_of_each(count: int) -> SceneSpec:
-    """A scene that names so many members of a class, for its company alone."""
+    """A scene with this many bowls, only to fill a batch."""
     (scene,) = some_scenes(replace(FAMILIES, objects=(1, 1)), objects_of(FAMILIES), 1)
     (item,) = scene.objects
     crowd = tuple(replace(item, shape=f"bowl/{i:04d}") for i in range(count))
@@ -154,8 +150,9 @@ def test_path_tracing_is_refused_where_only_the_slow_path_is(
     spec = DatasetSpec(height=16, width=16, shading="path", spp=1, min_visible_pixels=0)
     batch = pack(spec, scenes_of(spec, 1))
     monkeypatch.setattr(renderer, "select_variant", lambda device: "scalar_rgb")
-    with pytest.raises(renderer.BackendError, match="shading path: needs the fast path"):
+    with pytest.raises(BackendError) as refused:
         renderer.launch(batch)
+    assert refused.value.where == "shading path"
 
 
 def test_rows_of_a_batch_are_the_batch_of_those_scenes(scenes_of: Scenes) -> None:

@@ -1,4 +1,4 @@
-"""Path-traced images: the same truth to the bit, and light that can be worked out."""
+"""Path-traced images: the same ground truth bit for bit, and light with known answers."""
 
 import importlib
 from collections.abc import Callable
@@ -34,7 +34,7 @@ OPEN = SceneSpec(0, (CAMERA,), (BALL,), (LAMP,), BLACK, (0.0, 1.0), None)
 
 
 def images(scene: SceneSpec, **settings: Any) -> tuple[Array, Array, Array]:
-    """The path tracer's image, the shading equation's, and where inside the first object."""
+    """Return the traced image, the shading equation's, and a mask inside the first object."""
     spec = replace(PATH, **{"spp": 64, **settings})
     traced = render(pack(spec, [scene])).image[0]
     paper = render(pack(replace(spec, shading="paper"), [scene]))
@@ -63,7 +63,7 @@ def test_only_the_colour_is_traced(settings: dict[str, Any], scenes_of: Scenes) 
 def test_models_kept_from_other_batches_are_let_go(scenes_of: Scenes) -> None:
     """Dr.Jit traces paths through every mesh that is alive: with hundreds, for minutes."""
     spec = replace(PATH, source="families", shapes=FAMILY_NAMES, spp=1)
-    kept = importlib.import_module("scenegen.rendering.model_scene")._models.kept
+    kept = importlib.import_module("scenegen.rendering.model_scene").MODELS.kept
     scenes = scenes_of(spec, 4)
     render(pack(replace(spec, shading="paper"), scenes))
     assert len(kept) > 3
@@ -94,7 +94,7 @@ def test_the_same_request_gives_the_same_bytes_in_any_batch(
 
 
 def test_noise_is_another_for_every_seed_scene_and_view() -> None:
-    """All show one picture, and no two the same noise."""
+    """The images show the same scene, each with different noise."""
     views = (CAMERA, CAMERA)
     room = replace(OPEN, cameras=views, room_reflectance=(0.7,) * 3, ambient=(0.1,) * 3)
     spec = replace(PATH, spp=16)
@@ -112,7 +112,7 @@ def test_noise_is_another_for_every_seed_scene_and_view() -> None:
 def test_direct_light_of_an_open_convex_object_is_the_shading_equation(
     shape: str, gloss: tuple[float, float]
 ) -> None:
-    """With k_l = 0 there is no other falloff than the inverse square, and nothing to bounce."""
+    """With k_l = 0 light falls off with the inverse square, and nothing else reflects light."""
     item = replace(BALL, shape=shape, specular=gloss[0], shininess=gloss[1])
     traced, paper, inside = images(replace(OPEN, objects=(item,)), specular=(0.0, 1.0))
     assert inside.mean() > 0.15
@@ -133,7 +133,7 @@ def test_several_lights_add_up() -> None:
 def test_at_the_target_a_light_is_as_bright_as_in_the_shading_equation(
     attenuation: tuple[float, float],
 ) -> None:
-    """A tiny ball at the target, where falloffs that differ elsewhere meet."""
+    """A tiny ball at the target, where both fall-offs agree."""
     tiny = replace(BALL, scale=0.004)
     camera = Camera(CAMERA.position, TARGET, 0.4)
     scene = replace(OPEN, objects=(tiny,), cameras=(camera,), attenuation=attenuation)
@@ -143,7 +143,7 @@ def test_at_the_target_a_light_is_as_bright_as_in_the_shading_equation(
 
 
 def test_ambient_light_alone_leaves_an_open_object_its_reflectance() -> None:
-    """The furnace: every point of an open convex object sees L_a all around."""
+    """The furnace test: every point of a convex object sees L_a all around."""
     scene = replace(OPEN, lights=(), ambient=(0.5, 0.25, 0.125), background=(0.25, 0.5, 1.0))
     traced, _, inside = images(scene, spp=256)
     expected = np.array(BALL.reflectance) * scene.ambient
@@ -163,7 +163,7 @@ def test_a_glossy_object_in_the_furnace_reflects_both_lobes() -> None:
 
 
 def test_rooms_have_shadows_and_light_in_them() -> None:
-    """Behind a ball, seen from the light, the floor is dark but for what bounces there."""
+    """The floor behind a ball, seen from the light, is lit by indirect light only."""
     ball = replace(BALL, position=(0.5, 0.3, 0.5), scale=0.15)
     camera, lamp = (
         Camera((1.5, 1.2, 1.5), (0.5, 0.1, 0.5), 30.0),
@@ -183,7 +183,7 @@ def test_rooms_have_shadows_and_light_in_them() -> None:
 
 
 def test_a_glossy_room_scene_is_the_same_picture_as_the_papers(scenes_of: Scenes) -> None:
-    """Upright, and every light where it should be."""
+    """The image is upright, and the lights are in their places."""
     spec = replace(PATH, specular=(0.3, 0.5), shininess=(5.0, 9.0), lights=(1, 2), spp=64)
     scenes = scenes_of(spec, 3)
     traced = render(pack(spec, scenes)).image
@@ -210,7 +210,7 @@ def test_any_number_of_samples_will_do(
 def test_samples_in_several_goes_make_the_same_picture(
     spp: int, monkeypatch: pytest.MonkeyPatch, variant: str
 ) -> None:
-    """As where all do not fit into memory at once; each sample is drawn once."""
+    """Samples are split if they do not fit into memory; none is drawn twice."""
     scene = replace(OPEN, room_reflectance=(0.5,) * 3, ambient=(0.2,) * 3)
     batch = pack(replace(PATH, spp=spp), [scene])
     best = render(pack(replace(PATH, spp=512), [scene])).image  # in one go: shares no noise

@@ -1,4 +1,4 @@
-"""The path tracer's material: the shading equation's lobes, sampled as its density says."""
+"""The path tracer's material has the lobes of the shading equation and samples its own density."""
 
 import importlib
 from types import ModuleType
@@ -60,7 +60,7 @@ def drawn(bsdf: Any, wi: Array) -> tuple[Array, Array, Array]:
 
 
 def hemisphere(heights: int = 600, azimuths: int = 720) -> tuple[Array, float]:
-    """Directions of cells of one solid angle, their heights uniform, and that angle."""
+    """Return directions of cells with equal solid angle, uniform in height, and that angle."""
     z = (np.arange(heights) + 0.5) / heights
     turn = (np.arange(azimuths) + 0.5) * (2 * np.pi / azimuths)
     around = np.sqrt(1 - z**2)[:, None]
@@ -168,7 +168,7 @@ def test_the_extremes_of_what_may_be_asked_for_stay_finite(
 
 
 def test_materials_keep_to_themselves(phong: ModuleType) -> None:
-    """Two of one class, alive together."""
+    """Two materials of the same class exist at once."""
     wi, wo = toward(0.3), toward(0.4)[None]
     first, second = phong.phong_bsdf(RHO, 0.5, 3.0), phong.phong_bsdf(0.1 * RHO, 0.1, 9.0)
     before = call(first, wi, wo)[0]

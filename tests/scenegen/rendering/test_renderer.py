@@ -1,4 +1,4 @@
-"""Which way an image is made, and that the slow way makes the same image."""
+"""The choice of backend, and that the scalar fallback gives the same images."""
 
 from collections.abc import Callable
 
@@ -51,7 +51,7 @@ def test_without_llvm_the_work_is_done_when_fetched(
         return truth
 
     monkeypatch.setattr(renderer, "select_variant", lambda device: "scalar_rgb")
-    monkeypatch.setattr(renderer, "render_reference", reference)
+    monkeypatch.setattr(renderer, "render_in_numpy", reference)
     batch = pack(TINY, scenes)
     fetch = launch(batch)
     assert made == []
@@ -60,7 +60,7 @@ def test_without_llvm_the_work_is_done_when_fetched(
 
 
 def test_the_cpu_is_what_auto_means_here(scenes: list[SceneSpec]) -> None:
-    """Bit for bit; the next process, and another machine of the kind, must do so too."""
+    """Both give the same bits."""
     batch = pack(TINY, scenes)
     first, second = render(batch, "auto"), render(batch, "cpu")
     for name in vars(first):

@@ -1,4 +1,4 @@
-"""Rays at the very edges between triangles: none slips through, wherever its model lies."""
+"""No ray slips through the edges between triangles, wherever a model is placed."""
 
 import importlib
 from collections.abc import Callable
@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.catalogue import built_in_shape
-from scenegen.objects.shapes import unit_shape
 from scenegen.objects.solids import UnitShape
 
 Array = NDArray[Any]
@@ -29,7 +29,7 @@ def unit(variant: str) -> ModuleType:
 
 @pytest.fixture(scope="module")
 def models(variant: str) -> ModuleType:
-    """Return the module of models' scenes, likewise."""
+    """Return the module of models' scenes, whose import needs it, too."""
     return importlib.import_module("scenegen.rendering.model_scene")
 
 
@@ -125,7 +125,7 @@ def test_degenerate_triangles_stay_finite(unit: ModuleType) -> None:
 def test_places_of_models_are_exact_in_single_precision(
     count: Any, variant: str, models: ModuleType
 ) -> None:
-    """Below 16 with the models around them, so that every point of the grid is a float there."""
+    """Coordinates stay below 16, so that every point of the grid is a float32."""
     count = models.MOST_MODELS if count == "most" else count
     found = models.model_scene(variant, unit_shape, ["tetrahedron"] * count)
     assert abs(found.offset).max() + 1.0002 < 2.0**24 * found.grid

@@ -9,7 +9,7 @@ import trimesh
 from scenegen import open_rooms
 from scenegen.camera import pixel_directions, transform_vectors
 from scenegen.description.scenes import SHAPE_NAMES
-from scenegen.objects.shapes import scene_mesh
+from scenegen.objects.scene_mesh import scene_mesh
 from scenegen.rooms.export import PNG_DEPTH_UNIT, export_paths, export_room
 
 

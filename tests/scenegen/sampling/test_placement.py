@@ -13,7 +13,7 @@ from scipy.stats import chisquare, kstest
 from scenegen.camera import Camera
 from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scenes import SHAPE_NAMES
-from scenegen.objects.shapes import unit_shape
+from scenegen.objects.basic_shapes import unit_shape
 from scenegen.sampling.placement import (
     GAP,
     SEPARATORS,

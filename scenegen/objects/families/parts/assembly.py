@@ -1,4 +1,4 @@
-"""Parts to a unit shape: centred, of bounding radius 1, standing upright."""
+"""Join parts into a unit shape: centred, of bounding radius 1, standing upright."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -14,7 +14,7 @@ UPRIGHT = np.array([[0.0, -1.0, 0.0]])
 
 
 def assemble(name: str, parts: Sequence[Part]) -> UnitShape:
-    """Return the union of parts as a shape: its box is centred, its farthest corner at 1."""
+    """Return the parts as one unit shape: its box centred at 0, its farthest corner at 1."""
     triangles = np.concatenate([part.triangles for part in parts])
     normals = np.concatenate([part.normals for part in parts])
     corners = triangles.reshape(-1, 3)

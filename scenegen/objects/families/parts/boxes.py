@@ -1,4 +1,4 @@
-"""Boxes with flat sides: upright, tapered or leaning."""
+"""Boxes with flat sides, which may be tapered or lean."""
 
 from collections.abc import Sequence
 
@@ -11,12 +11,15 @@ Corner = tuple[float, float, float]
 
 
 def box(
-    low: Corner,
-    high: Corner,
-    shift: Point = (0.0, 0.0),
-    taper: Point = (1.0, 1.0),
+    low: Corner, high: Corner, shift: Point = (0.0, 0.0), taper: Point = (1.0, 1.0)
 ) -> list[Corner]:
-    """Eight corners of an upright box; its top is moved by (x, z), its half sizes multiplied."""
+    """Return the eight corners of a box between two points.
+
+    Args:
+        low, high: opposite corners, before shift and taper.
+        shift: how far the top moves, (x, z).
+        taper: factors of the top's half sizes, (x, z).
+    """
     x, z = (low[0] + high[0]) / 2, (low[2] + high[2]) / 2
     half_x, half_z = (high[0] - low[0]) / 2, (high[2] - low[2]) / 2
     corners = []
@@ -35,7 +38,7 @@ _SIDES = np.array(
 
 
 def boxes(corners: Sequence[Sequence[Corner]]) -> Part:
-    """Boxes with flat sides from `box` corners, as one part."""
+    """Return boxes, each given by its `box` corners, as one flat-shaded part."""
     points = np.array(corners)
     quads = points[:, _SIDES].reshape(-1, 4, 3)
     triangles = quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)

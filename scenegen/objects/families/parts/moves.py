@@ -1,4 +1,4 @@
-"""Parts turned, shifted, or left out of the placement body."""
+"""Turn parts, shift them, or leave them out of the convex body that placement uses."""
 
 import math
 from typing import Any
@@ -12,11 +12,11 @@ Array = NDArray[Any]
 
 
 def moved(part: Part, offset: tuple[float, float, float], turn: Array | None = None) -> Part:
-    """Turn a part by a rotation (3, 3), if any, then shift it."""
+    """Return a part rotated by the matrix `turn`, (3, 3), if given, and then shifted."""
     shift = np.array(offset)
     if turn is None:
         return Part(part.triangles + shift, part.normals, part.hull_points + shift, part.hull_discs)
-    # A disc that tips over is held as a polygon about it.
+    # Discs must be horizontal: one that tips over is replaced by a polygon that contains it.
     flat = part.hull_discs > 0.0
     discs = part.hull_discs[flat]
     largest = discs.max(initial=0.0)
@@ -34,23 +34,23 @@ def moved(part: Part, offset: tuple[float, float, float], turn: Array | None = N
 
 
 def _turned(vectors: Array, turn: Array) -> Array:
-    """Rotate vectors (..., 3); sums in a fixed order, for a product's last bits are the BLAS's."""
+    """Rotate vectors, (..., 3), summing in a fixed order: a BLAS product's last bits may vary."""
     x, y, z = (vectors[..., i : i + 1] * turn[:, i] for i in range(3))
     return np.asarray(x + y + z)
 
 
 def turn_about_x(angle: float) -> Array:
-    """The rotation that takes y towards z by an angle, radians: (3, 3)."""
+    """Return the rotation matrix about x that turns y towards z by an angle in radians, (3, 3)."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
 
 def turn_about_z(angle: float) -> Array:
-    """The rotation that takes x towards y by an angle, radians: (3, 3)."""
+    """Return the rotation matrix about z that turns x towards y by an angle in radians, (3, 3)."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def buried(part: Part) -> Part:
-    """A part that lies in the convex hull of the others, and adds nothing to the placement body."""
+    """Return a part without hull points, for one that lies in the convex hull of the others."""
     return Part(part.triangles, part.normals, np.empty((0, 3)), np.empty(0))

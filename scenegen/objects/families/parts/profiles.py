@@ -1,8 +1,8 @@
-"""Curves in a plane: profiles that are turned or lofted, and centre lines of tubes.
+"""Plane curves: profiles to be turned or lofted, and centre lines of tubes.
 
-A curve is (points, tangents), both (n, 2); tangents point along it and have any length but 0.
-Joined curves keep both rows where they meet, so that a corner is a sharp crease.
-A profile's columns are (radius, height); its outside is on the right of its direction.
+A curve is (points, tangents), both (n, 2); tangents point along the curve and are not zero. Joined
+curves keep both rows where they meet, so that a corner is a sharp crease. The columns of a profile
+are (radius, height), and its outside is on the right of its direction.
 """
 
 import math
@@ -18,7 +18,7 @@ Point = tuple[float, float]
 
 
 def line(start: Point, end: Point, strips: int = 1) -> Curve:
-    """A straight piece."""
+    """Return a straight piece, cut into `strips` equal parts."""
     along = np.array([[end[0] - start[0], end[1] - start[1]]])
     points = np.array([start]) + np.linspace(0.0, 1.0, strips + 1)[:, None] * along
     points[-1] = end
@@ -26,19 +26,17 @@ def line(start: Point, end: Point, strips: int = 1) -> Curve:
 
 
 def polyline(*corners: Point) -> Curve:
-    """Straight pieces from corner to corner, all creased."""
+    """Return straight pieces from corner to corner, with a crease at each corner."""
     points = np.array(corners, float)
     along = np.diff(points, axis=0)
-    return (
-        np.repeat(points, 2, axis=0)[1:-1],
-        np.repeat(along, 2, axis=0),
-    )
+    return (np.repeat(points, 2, axis=0)[1:-1], np.repeat(along, 2, axis=0))
 
 
 def arc(center: Point, radius: float | Point, low: float, high: float, segments: int = 8) -> Curve:
-    """An arc of a circle, or of an ellipse of two radii; degrees from the first axis.
+    """Return an arc of a circle, or of an ellipse if two radii are given.
 
-    It runs from low to high, counter-clockwise if low < high.
+    It runs from the angle low to the angle high, in degrees from the first axis; counter-clockwise
+    if low < high.
     """
     a, b = radius if isinstance(radius, tuple) else (radius, radius)
     angle = np.radians(np.linspace(low, high, segments + 1))
@@ -51,10 +49,10 @@ def arc(center: Point, radius: float | Point, low: float, high: float, segments:
 
 
 def bezier(a: Point, b: Point, c: Point, d: Point, segments: int = 10) -> Curve:
-    """A cubic from a to d that leaves towards b and arrives from c; b != a and c != d.
+    """Return a cubic Bezier curve with the control points a, b, c, d; b != a and c != d.
 
-    Points are dense where it bends: a step has its share of the length, and twice that of the
-    turning.
+    Points are denser where the curve bends: they divide length plus twice the turning evenly, each
+    measured as a share of its total.
     """
     corners = np.array([a, b, c, d], float)
     _, tangents = _cubic(corners, _FINE)
@@ -73,18 +71,18 @@ _FINE = np.linspace(0.0, 1.0, 49)
 
 
 def _cubic(corners: Array, t: Array) -> Curve:
-    """Points of a Bezier curve and a third of its derivative."""
+    """Return points of a Bezier curve at the parameters t, and a third of its derivative there."""
     s = 1.0 - t
     weights = np.stack([s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t], axis=1)
     slopes = np.stack([s * s, 2 * s * t, t * t], axis=1)
-    # Sums in a fixed order: a matrix product's last bits depend on the machine.
+    # Summed in a fixed order, as the last bits of a matrix product depend on the machine.
     points = sum(weights[:, i : i + 1] * corners[i] for i in range(4))
     steps = np.diff(corners, axis=0)
     return np.asarray(points), np.asarray(sum(slopes[:, i : i + 1] * steps[i] for i in range(3)))
 
 
 def fillet(corners: Sequence[Point], radius: float, segments: int = 6) -> Curve:
-    """A polyline whose inner corners are rounded by arcs of this radius, which must fit."""
+    """Return a polyline whose inner corners are rounded by arcs of this radius, which must fit."""
     points, tangents = [], []
     start = np.array(corners[0], float)
     for i in range(1, len(corners) - 1):
@@ -109,19 +107,19 @@ def fillet(corners: Sequence[Point], radius: float, segments: int = 6) -> Curve:
     tangents.append((last - start)[None])
     joined, along = np.concatenate(points), np.concatenate(tangents)
     step = np.abs(np.diff(joined, axis=0)).max(axis=1)
-    keep = np.concatenate([[True], step > 1e-9])  # a bend ends where the next straight begins
+    keep = np.concatenate([[True], step > 1e-9])  # a bend may end just where the next one begins
     return joined[keep], along[keep]
 
 
 def reverse(curve: Curve) -> Curve:
-    """The same curve from its end."""
+    """Return the same curve in the opposite direction."""
     return curve[0][::-1], -curve[1][::-1]
 
 
 def inset(curve: Curve, distance: float) -> Curve:
-    """The parallel curve on the left (a profile's inside), mitred at creases.
+    """Return the parallel curve on the left (the inside of a profile), mitred at creases.
 
-    No bend to the left may be tighter than the distance.
+    No bend to the left may have a radius below the distance.
     """
     points, tangents = curve
     along = tangents / np.hypot(tangents[:, :1], tangents[:, 1:])
@@ -134,7 +132,7 @@ def inset(curve: Curve, distance: float) -> Curve:
 
 
 def tightest(curve: Curve) -> float:
-    """The least radius of curvature between neighbouring points, about; creases do not count."""
+    """Return, approximately, the smallest radius of curvature; creases do not count."""
     points, tangents = curve
     along = tangents / np.hypot(tangents[:, :1], tangents[:, 1:])
     u, v = along[:-1], along[1:]
@@ -144,7 +142,7 @@ def tightest(curve: Curve) -> float:
 
 
 def wave(low: Point, high: Point, depth: float, count: int) -> Curve:
-    """A straight piece with as many grooves; it begins and ends on the ridge, along the line."""
+    """Return a straight piece with `count` cosine grooves, beginning and ending on a ridge."""
     t = np.linspace(0.0, 1.0, 5 * count + 1)
     points, tangents = line(low, high, 5 * count)
     phase = 2 * np.pi * count * t
@@ -154,13 +152,16 @@ def wave(low: Point, high: Point, depth: float, count: int) -> Curve:
 
 
 def join(*curves: Curve) -> Curve:
-    """One curve after the other; each must begin where the one before it ends."""
+    """Join curves, each of which must begin where the one before it ends."""
     return np.concatenate([c[0] for c in curves]), np.concatenate([c[1] for c in curves])
 
 
 def hull_rows(points: Array) -> list[int]:
-    """Rows of (n, 2) points that are corners of their convex hull, to 1e-13."""
-    points = np.round(points, 13)  # else rounding makes corners along straight pieces
+    """Return the indices of points, (n, 2), that are corners of their convex hull, within 1e-13.
+
+    This is Andrew's monotone chain algorithm.
+    """
+    points = np.round(points, 13)  # otherwise rounding errors make corners along straight pieces
     order = np.lexsort((points[:, 1], points[:, 0]))
     repeats = (np.diff(points[order], axis=0) == 0.0).all(axis=1)
     once = np.delete(order, np.flatnonzero(repeats) + 1).tolist()

@@ -1,7 +1,7 @@
-"""Closed parts with exact normals: lofted rounded rectangles, circles among them.
+"""Closed parts with exact normals, lofted from rounded rectangles (of which circles are a case).
 
-Every part comes with the rows of a convex body that contains it: horizontal discs about points,
-as in `UnitShape`. Frame: y up.
+Every part comes with a convex body that contains it, as the hull of horizontal discs; see
+`UnitShape`. Frame: y up.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scenegen.objects.families.parts.profiles import Curve, Point, hull_rows
 
 Array = NDArray[Any]
-SEGMENTS = 40  # around an axis, a multiple of 4
+SEGMENTS = 40  # around an axis; a multiple of 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +23,9 @@ class Part:
 
     Attributes:
         triangles: corners, (F, 3, 3).
-        normals: of the smooth surface at those corners, (F, 3, 3), unit.
-        hull_points, hull_discs: the hull of horizontal discs about (V, 3), radii (V,), holds it.
+        normals: unit normals of the smooth surface at those corners, (F, 3, 3).
+        hull_points, hull_discs: centres (V, 3) and radii (V,) of horizontal discs whose convex
+            hull contains the part.
     """
 
     triangles: Array
@@ -44,15 +45,16 @@ def loft(
     segments: int = SEGMENTS,
     closed: bool = False,
 ) -> Part:
-    """Stack horizontal rounded rectangles along a profile (r, y); ends off the axis get flat lids.
+    """Stack horizontal rounded rectangles along a profile (r, y), with flat lids at open ends.
 
-    At (r, y) the half sizes are base[:2] + size * r and the corners' radius base[2] + corner * r,
-    between 0 and the half sizes. The defaults turn the profile about an axis.
+    At (r, y) the half sizes are base[:2] + size * r, and the radius of the corners is
+    base[2] + corner * r, which must be between 0 and the half sizes. With the defaults the result
+    is a surface of revolution.
 
     Args:
-        at, lean: where the centre is, (x, z), at y = 0, and how it moves per unit of y. Several of
-            either (or both, as many) make as many copies, in one part.
-        closed: the profile ends where it begins (a ring); no lids.
+        at, lean: the centre (x, z) at y = 0, and how far it moves per unit of y. Several values of
+            either, or as many of both, make copies within the same part.
+        closed: whether the profile ends where it begins (a ring), and so needs no lids.
     """
     rate = np.array([*size, corner])
     points, tangents = profile
@@ -63,7 +65,7 @@ def loft(
 
     both_sides = np.concatenate([points, points * (-1.0, 1.0)])
     discs = rows[[i for i in hull_rows(both_sides) if i < len(points)]]
-    inner = np.abs(discs[:, :2] - discs[:, 2:3]).max(axis=0) > 1e-12  # of one disc, two or four
+    inner = np.abs(discs[:, :2] - discs[:, 2:3]).max(axis=0) > 1e-12  # one, two or four discs a row
     signs = np.array(
         [(x, z) for x in (1.0, -1.0)[: 1 + inner[0]] for z in (1.0, -1.0)[: 1 + inner[1]]]
     )
@@ -89,7 +91,10 @@ def loft(
 
 
 def _with_lids(rows: Array) -> Array:
-    """Add rows from the axis to the first row and from the last to the axis, where they are off."""
+    """Add rows that lead from the axis to the first row and from the last row back to the axis.
+
+    An end that already lies on the axis gets none.
+    """
     parts = [rows]
     for end, way in ((rows[0], 1.0), (rows[-1], -1.0)):
         if end[:2].max() > 0.0:
@@ -100,7 +105,10 @@ def _with_lids(rows: Array) -> Array:
 
 
 def outline(segments: int, is_round: bool) -> tuple[Array, Array]:
-    """Directions of a rounded rectangle's corner arcs, and the quadrant of each: (n, 2) twice."""
+    """Return the directions around a rounded rectangle's corners, and their quadrants' signs.
+
+    Both are (n, 2).
+    """
     quarter = segments // 4
     steps = np.arange(quarter + (not is_round))
     angle = np.add.outer(np.arange(4) * quarter, steps).ravel() * (2 * np.pi / segments)
@@ -111,16 +119,25 @@ def outline(segments: int, is_round: bool) -> tuple[Array, Array]:
 
 
 def section(sizes: Array, outward: Array, quadrant: Array) -> Array:
-    """Points of rounded rectangles (m, 3) in the plane, (m, n, 2); linear in the sizes."""
+    """Return the outlines of m rounded rectangles, (m, n, 2); linear in the sizes.
+
+    Args:
+        sizes: half width, half depth and corner radius of each, (m, 3).
+        outward, quadrant: as `outline` returns them.
+    """
     radius = sizes[:, None, 2:]
     return np.asarray(quadrant * (sizes[:, None, :2] - radius) + outward * radius)
 
 
 def strips(grid: Array, normals: Array) -> tuple[Array, Array]:
-    """Triangles and unit normals between the rows of (copies, rows, around, 3), closed around.
+    """Return the triangles and unit normals between neighbouring rows of closed outlines.
 
-    Left out are strips of no width (creases repeat a row) and triangles that shrink to a line
-    (rows on an axis, arcs of radius 0). The copies are alike but for where they are.
+    Strips without width (a crease repeats a row) and triangles without area (rows on an axis, arcs
+    of radius 0) are left out.
+
+    Args:
+        grid: points, (copies, rows, around, 3); the copies differ in place only.
+        normals: of any length, same shape.
     """
     copies, rows, count = grid.shape[:3]
     first = grid[0]

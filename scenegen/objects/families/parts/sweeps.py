@@ -1,4 +1,4 @@
-"""Tubes of constant section along plane curves: handles, straps, arms."""
+"""Tubes of constant cross-section along plane curves: handles, straps, lamp arms."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from scenegen.objects.families.parts.surfaces import Part, outline, section, str
 
 Array = NDArray[Any]
 Vector = tuple[float, float, float]
-_HALF = np.tan(np.pi / 8)  # an octagon about a unit circle has corners (1, _HALF)
+_HALF = np.tan(np.pi / 8)  # an octagon around a unit circle has the corner (1, _HALF)
 
 
 def tube(
@@ -25,14 +25,15 @@ def tube(
     segments: int = 16,
     thin: bool = False,
 ) -> Part:
-    """Sweep a rounded rectangle along a curve in the plane of two unit vectors; ends are flat.
+    """Sweep a rounded rectangle along a curve in the plane of two unit vectors, with flat ends.
 
     Args:
-        path: in the plane: distances along `across` and `up` from the origin.
-        half_width: of the section, perpendicular to the plane.
-        half_height: in the plane, and below the curve's least radius; default half_width, round.
-        corner: the section's corner radius; default, the smaller half size.
-        thin: whether the placement body may be rougher (by 0.41 of the corner's radius).
+        path: the curve, as distances along `across` and `up` from the origin.
+        half_width: of the cross-section, perpendicular to the plane.
+        half_height: of the cross-section, in the plane; smaller than the curve's least radius of
+            curvature. By default half_width.
+        corner: the cross-section's corner radius; by default the smaller half size.
+        thin: whether the hull may be coarser, by 0.41 of the corner radius, to save points.
     """
     height = half_width if half_height is None else half_height
     radius = min(half_width, height) if corner is None else corner
@@ -52,8 +53,8 @@ def tube(
     grid = np.concatenate([[first, body[0]], body, [body[-1], last]])
     normals = np.concatenate([[back, back], normals, [front, front]])
 
-    # The section lies in a rectangle, or that less its corners; each corner runs along the curve
-    # in a plane of its own, where the hull of its way is enough.
+    # The cross-section lies in a rectangle or, closer, in an octagon. Each of its corners moves
+    # along the curve in a plane of its own, so the hull of that plane curve is enough.
     cut = 0.0 if thin else (1.0 - _HALF) * radius
     normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
     hull = []

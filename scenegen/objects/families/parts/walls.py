@@ -1,4 +1,4 @@
-"""Profiles of thin walls: vessels, shades, shells."""
+"""Profiles of thin walls, for vessels, lamp shades and the crowns of hats."""
 
 import math
 
@@ -16,9 +16,12 @@ from scenegen.objects.families.parts.profiles import (
 
 
 def hollow(wall: Curve, thickness: float) -> Curve:
-    """Outside, round rim, inside and inner floor of a vessel; the wall goes up, and has no floor.
+    """Return a vessel's profile: outside, round rim, inside and inner floor.
 
-    Where the wall bends so tightly that its parallel would turn back, the inner floor begins.
+    Args:
+        wall: the outside, from the bottom up, without a floor.
+        thickness: of wall and floor. Where the wall bends so tightly that its parallel curve would
+            turn back, the inner floor begins higher.
     """
     inner, tangents = inset(wall, thickness)
     tip, along = wall[0][-1], wall[1][-1] / math.hypot(*wall[1][-1])
@@ -31,7 +34,7 @@ def hollow(wall: Curve, thickness: float) -> Curve:
     floor = wall[0][0, 1] + thickness
     usable = np.append(ahead, True) & (inner[:, 1] >= floor)
     first = len(usable) - int(usable[::-1].argmin()) if not usable.all() else 0
-    if first and ahead[first - 1]:  # begin between two rows, where the inside crosses the floor
+    if first and ahead[first - 1]:  # begin between two rows, where the inside meets the floor
         first -= 1
         (low, high), (before, after) = inner[first : first + 2], tangents[first : first + 2]
         share = (floor - low[1]) / (high[1] - low[1])
@@ -44,14 +47,14 @@ def hollow(wall: Curve, thickness: float) -> Curve:
 
 
 def ring(wall: Curve, thickness: float) -> Curve:
-    """A closed profile: the wall, and its inside back down, with flat edges; for `closed` lofts."""
+    """Return a closed profile, for `closed` lofts: the wall and its inside, with flat edges."""
     inner = reverse(inset(wall, min(thickness, 0.7 * tightest(wall))))
     ends = [_corner(wall, -1), _corner(inner, 0), _corner(inner, -1), _corner(wall, 0)]
     return join(wall, polyline(*ends[:2]), inner, polyline(*ends[2:]))
 
 
 def shell(wall: Curve, thickness: float) -> Curve:
-    """As `ring`, for a dome whose wall ends on the axis."""
+    """Return a closed profile as `ring` does, for a dome whose wall ends on the axis."""
     inner = reverse(inset(wall, min(thickness, 0.7 * tightest(wall))))
     inner[0][0, 0] = 0.0
     return join(wall, inner, polyline(_corner(inner, -1), _corner(wall, 0)))

@@ -1,7 +1,7 @@
-"""GLB files: the triangles of a scene's nodes, placed by their transforms.
+"""GLB files (binary glTF 2.0): the triangles of a scene's nodes, placed by their transforms.
 
-Nothing outside the file is looked for, images are not touched, and what a few bytes could blow up
-to (meshes used a million times, nodes that hold each other) is counted before it is made.
+Other files are not opened and images not decoded. What a few bytes could make huge (a mesh used a
+million times, nodes that contain each other) is counted before it is built.
 """
 
 import base64
@@ -14,28 +14,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.rotations import rotation_matrix
+from scenegen.objects.meshes import limits
 from scenegen.objects.meshes.errors import BadMeshError
-from scenegen.objects.meshes.limits import MOST_FACES
 
 Array = NDArray[Any]
 _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_MOST_NODES = 100_000
 _COMPRESSED = {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"}
 
 
 def read_glb(data: bytes) -> tuple[Array, Array]:
-    """Return vertices (V, 3) and triangles (F, 3) of the file's scene, or of all its nodes.
+    """Return vertices (V, 3) and triangles (F, 3) of the default scene, or else of all nodes.
 
     Raises:
-        BadMeshError: no GLB file of version 2; broken; compressed; in need of other files;
-            above MOST_FACES faces.
+        BadMeshError: the file is no GLB file of version 2, is broken or compressed, needs other
+            files, or has more than MOST_FACES faces.
     """
     document, binary = _chunks(data)
     used = _COMPRESSED & set(document.get("extensionsRequired", ()))
     if used:
-        raise BadMeshError(f"the GLB file is compressed by {', '.join(used)}; export it without")
+        raise BadMeshError("GLB file", f"compression by {', '.join(used)}", "none")
     buffers = [_buffer(one, binary) for one in document.get("buffers", ())]
     known: dict[tuple[int, int], tuple[Array, Array]] = {}
     vertices, faces, first, count = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0, 0
@@ -44,9 +43,10 @@ def read_glb(data: bytes) -> tuple[Array, Array]:
             if (mesh, i) not in known:
                 known[mesh, i] = _primitive(document, buffers, one)
             points, triangles = known[mesh, i]
-            count += max(1, len(triangles), len(points) // 3)  # an empty one costs time, too
-            if count > MOST_FACES:
-                raise BadMeshError(f"has more than {MOST_FACES} faces; simplify it")
+            count += max(1, len(triangles), len(points) // 3)  # even an empty one costs time
+            if count > limits.MOST_FACES:
+                expected = f"at most {limits.MOST_FACES}"
+                raise BadMeshError("faces", "more", expected, "simplify the model")
             if not len(points):
                 continue
             vertices.append(points @ matrix[:3, :3].T + matrix[:3, 3])
@@ -57,12 +57,12 @@ def read_glb(data: bytes) -> tuple[Array, Array]:
 
 def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
     if data[:4] != b"glTF" or len(data) < 20:
-        raise BadMeshError("is no GLB file: it does not start with glTF")
+        raise BadMeshError("GLB file", "another start", "glTF")
     _, version, length = struct.unpack_from("<4sII", data)
     if version != 2:
-        raise BadMeshError(f"is a GLB file of version {version}, expected 2; export it anew")
+        raise BadMeshError("GLB file", f"version {version}", "version 2", "export it again")
     if length > len(data):
-        raise BadMeshError(f"the GLB file is cut short: {len(data)} of {length} bytes")
+        raise BadMeshError("GLB file", f"{len(data)} bytes", length, "it is cut short")
     chunks: dict[bytes, bytes] = {}
     at = 12
     while at + 8 <= length:
@@ -71,7 +71,7 @@ def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
         at += 8 + size
     document = json.loads(chunks.get(b"JSON", b"null"))
     if not isinstance(document, dict):
-        raise BadMeshError("the GLB file has no JSON part")
+        raise BadMeshError("GLB file", "no JSON chunk")
     return document, chunks.get(b"BIN\0", b"")
 
 
@@ -80,15 +80,13 @@ def _buffer(one: dict[str, Any], binary: bytes) -> bytes:
     if uri is None:
         return binary
     if not uri.startswith("data:") or ";base64," not in uri:
-        raise BadMeshError(
-            f"keeps its geometry in another file, {uri[:80]!r}, which is not looked for; "
-            "export it as one GLB file"
-        )
+        found, hint = f"geometry in another file, {uri[:80]!r}", "export it as one GLB file"
+        raise BadMeshError("GLB file", found, "geometry inside", hint)
     return base64.b64decode(uri.partition(";base64,")[2])
 
 
 def _placed_meshes(document: dict[str, Any]) -> Iterator[tuple[int, Array]]:
-    """Give mesh and world transform of each node that has one."""
+    """Yield mesh number and world transform of each node that has a mesh."""
     nodes = document.get("nodes", [])
     scenes = document.get("scenes", [])
     if scenes:
@@ -101,8 +99,9 @@ def _placed_meshes(document: dict[str, Any]) -> Iterator[tuple[int, Array]]:
     while waiting:
         index, above = waiting.pop()
         seen += 1
-        if seen > min(len(nodes), _MOST_NODES):  # a node may have one parent only
-            raise BadMeshError("the GLB file's nodes hold each other, or are far too many")
+        if seen > min(len(nodes), limits.MOST_NODES):  # a node has one parent at most
+            expected = f"at most {limits.MOST_NODES}, none inside itself"
+            raise BadMeshError("GLB file's nodes", "more", expected)
         node = nodes[index]
         matrix = above @ _transform(node)
         if "mesh" in node:
@@ -123,7 +122,7 @@ def _transform(node: dict[str, Any]) -> Array:
 def _primitive(
     document: dict[str, Any], buffers: list[bytes], one: dict[str, Any]
 ) -> tuple[Array, Array]:
-    """Return points and triangles of a primitive; none of those that are points or lines."""
+    """Return points and triangles of a primitive; none if it consists of points or lines."""
     mode, attributes = one.get("mode", _TRIANGLES), one.get("attributes", {})
     none = np.empty((0, 3)), np.empty((0, 3), np.int64)
     if mode not in (_TRIANGLES, _STRIP, _FAN) or "POSITION" not in attributes:
@@ -133,7 +132,7 @@ def _primitive(
         order = _accessor(document, buffers, one["indices"]).reshape(-1).astype(np.int64)
     else:
         order = np.arange(len(points))
-    # An index beyond its own points would fall among those of the next primitive.
+    # An index beyond its own points would refer to the points of the next primitive.
     order = np.where(order < len(points), order, -(1 << 40))
     if mode == _TRIANGLES:
         return points, order[: len(order) // 3 * 3].reshape(-1, 3)
@@ -142,18 +141,19 @@ def _primitive(
 
 
 def _accessor(document: dict[str, Any], buffers: list[bytes], index: int) -> Array:
-    """Return a table, (n, width); numbers that stand for fractions are made such."""
+    """Return an accessor as a table, (n, width); normalised integers become fractions."""
     one = document["accessors"][index]
     kind, width, count = np.dtype(_TYPES[one["componentType"]]), _WIDTHS[one["type"]], one["count"]
     if "sparse" in one or "bufferView" not in one:
-        raise BadMeshError("the GLB file has sparse or empty tables; export it without")
+        raise BadMeshError("GLB file", "sparse or empty tables", hint="export it without them")
     view = document["bufferViews"][one["bufferView"]]
     data = buffers[view["buffer"]]
     start = view.get("byteOffset", 0) + one.get("byteOffset", 0)
     row = kind.itemsize * width
     stride = view.get("byteStride", row)
     if min(start, count, stride - row) < 0 or start + stride * (count - 1) + row > len(data):
-        raise BadMeshError("the GLB file is cut short or broken: a table is longer than its data")
+        found, hint = "a table longer than its data", "it is cut short, or broken"
+        raise BadMeshError("GLB file", found, hint=hint)
     table = np.ndarray((count, width), kind, data, start, (stride, kind.itemsize))
     if one.get("normalized") and kind.kind in "iu":
         return np.maximum(table / np.iinfo(kind).max, -1.0)

@@ -1,50 +1,108 @@
-"""PLY files, text and binary of either byte order, as polygons."""
+"""PLY files: text, and binary of either byte order."""
 
 import struct
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.objects.meshes import limits
 from scenegen.objects.meshes.errors import BadMeshError
-from scenegen.objects.meshes.readers.ply_header import Element, Property, read_header
 from scenegen.objects.meshes.readers.polygons import Polygons
 
 Array = NDArray[Any]
+_TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
+    "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
+    "int64": "i8", "uint64": "u8", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+}  # fmt: skip
+_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _CODES = {
     "i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q",
     "f4": "f", "f8": "d",
 }  # fmt: skip
 
 
-def read_ply(data: bytes) -> Polygons:
-    """Read vertices and faces. Raises BadMeshError where the file is broken or has neither."""
-    order, elements, body = read_header(data)
+@dataclass(frozen=True)
+class Property:
+    """A column: its name, the type of its values, and of their count if it holds lists."""
+
+    name: str
+    type: str
+    count_type: str | None = None
+
+
+@dataclass(frozen=True)
+class Element:
+    """A table of the file."""
+
+    name: str
+    rows: int
+    properties: tuple[Property, ...]
+
+
+def read_ply(data: bytes) -> tuple[Array, Array]:
+    """Return vertices (V, 3) and triangles (F, 3).
+
+    Raises:
+        BadMeshError: the file is no PLY file, is broken, has no vertices or too many faces.
+    """
+    order, elements, body = _read_header(data)
     take = _text_rows(body) if not order else _binary_rows(body, order)
     vertices, sizes, corners = None, np.empty(0, np.int64), np.empty(0, np.int64)
     for element in elements:
         columns = take(element)
         if element.name == "vertex":
             if not {"x", "y", "z"} <= set(columns):
-                raise BadMeshError("the PLY file's vertices have no x, y and z")
+                raise BadMeshError("PLY file's vertices", ", ".join(columns), "x, y and z")
             vertices = np.stack([np.asarray(columns[axis], np.float64) for axis in "xyz"], axis=1)
         elif element.name == "face":
             lists = columns.get("vertex_indices", columns.get("vertex_index"))
             if not isinstance(lists, tuple):
-                raise BadMeshError("the PLY file's faces have no list named vertex_indices")
+                raise BadMeshError("PLY file's faces", ", ".join(columns), "vertex_indices")
             sizes, corners = lists
         if vertices is not None and len(sizes):
             break
     if vertices is None:
-        raise BadMeshError("the PLY file has no vertices")
-    return Polygons(vertices, sizes, corners)
+        raise BadMeshError("PLY file", "no vertices")
+    return Polygons(vertices, sizes, corners).triangulated()
 
 
-Rows = Callable[[Element], dict[str, Any]]  # columns: arrays, or (sizes, values) of lists
+def _read_header(data: bytes) -> tuple[str, list[Element], bytes]:
+    """Return the byte order ("" for text), the tables, and the bytes that follow the header."""
+    end = data.find(b"end_header", 0, limits.MOST_HEADER_BYTES)
+    if not data.startswith(b"ply") or end < 0:
+        raise BadMeshError("PLY file", "no header", "ply ... end_header")
+    order, elements = None, []
+    for line in data[:end].decode("latin-1").splitlines():
+        words = line.split()
+        try:
+            if words[:1] == ["format"]:
+                order = _ORDERS[words[1]]
+            elif words[:1] == ["element"]:
+                elements.append(Element(words[1], int(words[2]), ()))
+            elif words[:1] == ["property"]:
+                *types, name = words[2:] if words[1] == "list" else words[1:]
+                types = [_TYPES[word] for word in types]
+                one = Property(name, types[-1], types[0] if words[1] == "list" else None)
+                last = elements[-1]
+                elements[-1] = Element(last.name, last.rows, (*last.properties, one))
+        except (IndexError, KeyError, ValueError):
+            raise BadMeshError("PLY file's header", f"a broken line, {line[:80]!r}") from None
+    if order is None or any(not 0 <= e.rows <= len(data) for e in elements):
+        found = "no format, or more rows than the file has bytes"
+        raise BadMeshError("PLY file's header", found)
+    body = data[end + len("end_header") :]
+    return order, elements, body[2:] if body.startswith(b"\r\n") else body[1:]
 
 
-def _text_rows(body: bytes) -> Rows:
+# Takes the next table; returns its columns, arrays or (sizes, values) of lists, by name.
+TakeTable = Callable[[Element], dict[str, Any]]
+
+
+def _text_rows(body: bytes) -> TakeTable:
     lines = iter(body.splitlines())
 
     def take(element: Element) -> dict[str, Any]:
@@ -57,7 +115,7 @@ def _text_rows(body: bytes) -> Rows:
                 at += bool(one.count_type)
                 found = words[at : at + count]
                 if len(found) != count:
-                    raise BadMeshError(f"the PLY file has a line that is too short: {row[:80]!r}")
+                    raise BadMeshError("PLY file", f"a line that is too short, {row[:80]!r}")
                 values[column].extend(map(float, found))
                 sizes[column].append(count)
                 at += count
@@ -74,7 +132,7 @@ def _text_rows(body: bytes) -> Rows:
         except BadMeshError:
             raise
         except (IndexError, OverflowError, ValueError) as error:
-            raise BadMeshError(f"the PLY file has a line that makes no sense: {error}") from error
+            raise BadMeshError("PLY file", f"a line that cannot be read ({error})") from error
 
     return guarded
 
@@ -83,11 +141,11 @@ def _filled(lines: Iterator[bytes], count: int) -> Iterator[bytes]:
     for _ in range(count):
         row = next((line for line in lines if line.strip()), None)
         if row is None:
-            raise BadMeshError("the PLY file is cut short")
+            raise BadMeshError("PLY file", "too few lines", hint="it is cut short")
         yield row
 
 
-def _binary_rows(body: bytes, order: str) -> Rows:
+def _binary_rows(body: bytes, order: str) -> TakeTable:
     at = 0
 
     def take(element: Element) -> dict[str, Any]:
@@ -95,7 +153,7 @@ def _binary_rows(body: bytes, order: str) -> Rows:
         try:
             columns, at = _binary_columns(body, at, order, element)
         except (struct.error, ValueError) as error:
-            raise BadMeshError(f"the PLY file is cut short or broken: {error}") from error
+            raise BadMeshError("PLY file", error, hint="it is cut short, or broken") from error
         return columns
 
     return take
@@ -104,7 +162,7 @@ def _binary_rows(body: bytes, order: str) -> Rows:
 def _binary_columns(
     body: bytes, at: int, order: str, element: Element
 ) -> tuple[dict[str, Any], int]:
-    """Read a table at once where all its lists are as long as in the first row, else by rows."""
+    """Read a whole table at once if all its lists are as long as in its first row, else by rows."""
     lengths, _ = _binary_row(body, at, order, element) if element.rows else ({}, at)
     fields: list[Any] = []
     for i, one in enumerate(element.properties):

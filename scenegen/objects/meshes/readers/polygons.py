@@ -1,4 +1,4 @@
-"""Triangles from polygons of any number of corners, convex or not."""
+"""Triangulation of polygons with any number of corners, convex or not."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,22 +7,21 @@ import mapbox_earcut
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.objects.meshes import limits
 from scenegen.objects.meshes.errors import BadMeshError
-from scenegen.objects.meshes.limits import MOST_FACES
 
 Array = NDArray[Any]
-NOWHERE = -1  # the vertex of a corner that could not be read
-_MOST_WORK = 1e10  # squares of corners of polygons whose ears are clipped: some 20 seconds
-_SMALL_AREA = 1e-9  # of a polygon, by the sum of its corners' squared distances from the middle
+NOWHERE = -1  # stands for a vertex index that could not be read
+_SMALL_AREA = 1e-9  # of a polygon whose squared distances from the middle add up to 1
 
 
 @dataclass(frozen=True, eq=False)
 class Polygons:
-    """Faces as a file has them.
+    """Faces as they are in a file.
 
     Attributes:
-        vertices: (V, 3), may be not finite.
-        sizes: corners of each polygon, (P,).
+        vertices: (V, 3); may be not finite.
+        sizes: number of corners of each polygon, (P,).
         corners: indices into the vertices, polygon after polygon, (C,); may be out of range.
     """
 
@@ -31,17 +30,19 @@ class Polygons:
     corners: Array
 
     def triangulated(self) -> tuple[Array, Array]:
-        """Return vertices and triangles (F, 3).
+        """Return vertices (V, 3) and triangles (F, 3).
 
-        A polygon that is out of range is one triangle out of range, one of fewer than three
-        corners a triangle without an area: nobody can keep them, so they are counted as defects.
+        A polygon with an index out of range becomes one triangle out of range, and one with fewer
+        than three corners a triangle without area, so that cleaning counts them as defects.
 
         Raises:
-            BadMeshError: too many triangles, or polygons that would take too long.
+            BadMeshError: there are more than MOST_FACES triangles, or polygons that would take too
+                long to cut.
         """
         count = int(np.maximum(self.sizes - 2, 1).sum())
-        if count > MOST_FACES:
-            raise BadMeshError(f"has {count} faces, at most {MOST_FACES} are used; simplify it")
+        if count > limits.MOST_FACES:
+            expected = f"at most {limits.MOST_FACES}"
+            raise BadMeshError("faces", count, expected, "simplify the model")
         start = np.cumsum(self.sizes) - self.sizes
         known = (self.corners >= 0) & (self.corners < len(self.vertices))
         corners = np.where(known, self.corners, NOWHERE)
@@ -61,22 +62,23 @@ class Polygons:
             fans, others = _fans(self.vertices, faces)
             parts.extend(fans)
             work += float(size) ** 2 * len(others)
-            if work > _MOST_WORK:
-                raise BadMeshError(f"has faces of {size} corners; split them in a mesh program")
-            parts.extend(_clip_ears(self.vertices[face], face) for face in others)
+            if work > limits.MOST_EAR_CLIPPING:
+                found, hint = f"faces of {size} corners", "split them in a mesh editor"
+                raise BadMeshError("faces", found, "smaller ones", hint)
+            parts.extend(clip_ears(self.vertices[face], face) for face in others)
         return self.vertices, np.concatenate(parts)
 
 
 def _fans(vertices: Array, faces: Array) -> tuple[list[Array], Array]:
-    """Cut polygons of one size, (P, n), into fans of triangles; return these and the other ones.
+    """Cut polygons of n corners, (P, n), into fans of triangles; return these and the rest.
 
-    A fan is right if all its triangles face one way: then it covers the polygon once. Of four
-    corners, one of any two that are neighbours has such a fan, if the sides do not cross.
+    A fan whose triangles all face the same way covers its polygon exactly once. A quadrilateral
+    whose sides do not cross has such a fan at its first or at its second corner.
     """
     size = faces.shape[1]
     if size == 3:
         return [faces], faces[:0]
-    good = _faces_one_way(vertices[faces])
+    good = faces_one_way(vertices[faces])
     fans, others = [_fan(faces[good])], faces[~good]
     if size == 4:
         return [*fans, _fan(np.roll(others, -1, axis=1))], others[:0]
@@ -88,8 +90,8 @@ def _fan(faces: Array) -> Array:
     return np.stack([first, faces[:, 1:-1], faces[:, 2:]], axis=2).reshape(-1, 3)
 
 
-def _faces_one_way(points: Array) -> Array:
-    """Whether all of a fan's triangles agree with the polygon's normal: (P, n, 3) -> (P,)."""
+def faces_one_way(points: Array) -> Array:
+    """Return whether all triangles of each fan face the same way, (P, n, 3) -> (P,)."""
     spokes = points[:, 1:] - points[:, :1]
     cross = np.cross(spokes[:, :-1], spokes[:, 1:])
     normal = cross.sum(axis=1, keepdims=True)
@@ -97,21 +99,21 @@ def _faces_one_way(points: Array) -> Array:
     return np.asarray((facing >= -1e-9 * (normal**2).sum(axis=2)).all(axis=1))
 
 
-def _clip_ears(points: Array, face: Array) -> Array:
-    """Cut one polygon, (n, 3), in the plane that it lies in, or nearly."""
+def clip_ears(points: Array, face: Array) -> Array:
+    """Cut one polygon, (n, 3), by ear clipping in the plane that fits it best."""
     centered = points - points.mean(axis=0)
     centered /= np.sqrt((centered**2).sum())
     if not np.isfinite(centered).all():
         return _fan(face[None])
     normal = np.cross(centered, np.roll(centered, -1, axis=0)).sum(axis=0)
-    if np.linalg.norm(normal) < _SMALL_AREA:  # its sides cross such that areas cancel
+    if np.linalg.norm(normal) < _SMALL_AREA:  # its sides cross so that areas cancel
         normal = np.linalg.svd(centered, full_matrices=False)[2][2]
     normal /= np.linalg.norm(normal)
-    # Two axes across the normal, from the coordinate axis that is farthest from it.
+    # Two axes perpendicular to the normal, from the coordinate axis least parallel to it.
     u = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
     u /= np.linalg.norm(u)
     flat = np.ascontiguousarray(centered @ np.stack([u, np.cross(normal, u)], axis=1))
     ears = mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], np.uint32))
-    if not len(ears):  # all on a line; its triangles are then dropped and counted
+    if not len(ears):  # all corners lie on a line; cleaning drops and counts the triangles
         return _fan(face[None])
     return np.asarray(face[np.asarray(ears, np.int64)].reshape(-1, 3))

@@ -1,9 +1,8 @@
-"""Cleaned models on disk: found again, made again where damaged, and no danger to each other."""
+"""The cache of cleaned models: hits, damaged entries, and several processes at once."""
 
 import multiprocessing
 import subprocess
 import sys
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +64,7 @@ def test_a_model_is_cleaned_once(ball: Path, tmp_path: Path, made: list[int]) ->
 def test_what_a_model_was_made_from_is_in_its_name(
     ball: Path, tmp_path: Path, made: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Up axis, kind of file, bytes, and the version of the cleaning; not where the file lies."""
+    """The key depends on up axis, suffix, content and cleaning version, but not on the path."""
     store = MeshCache(tmp_path / "cache")
     store.load(ball, "y")
     copy = tmp_path / "copy.PLY"
@@ -89,7 +88,7 @@ def damages(whole: bytes) -> list[bytes]:
 
 
 def test_damaged_entries_are_made_again(ball: Path, tmp_path: Path, made: list[int]) -> None:
-    """Cut short, or with one bit turned anywhere."""
+    """Entries may be cut short or have one bit flipped anywhere."""
     store = MeshCache(tmp_path / "cache")
     digest, fresh = store.load(ball, "y")
     entry = tmp_path / "cache" / f"{digest}.npz"
@@ -105,7 +104,7 @@ def test_damaged_entries_are_made_again(ball: Path, tmp_path: Path, made: list[i
 def test_entries_of_another_kind_are_made_again(
     ball: Path, tmp_path: Path, made: list[int]
 ) -> None:
-    """Whole as files, but not what they should be; none may run code."""
+    """Readable files with wrong content; none may run code."""
     store = MeshCache(tmp_path / "cache")
     digest, fresh = store.load(ball, "y")
     entry = tmp_path / "cache" / f"{digest}.npz"
@@ -126,32 +125,33 @@ def test_entries_of_another_kind_are_made_again(
 def test_refusals_are_kept_with_their_reasons(tmp_path: Path, made: list[int]) -> None:
     bad = tmp_path / "bad.obj"
     bad.write_text("v 0 0 0\n")
+    reasons = set()
     for _ in range(3):
-        with pytest.raises(BadMeshError, match="has 1 vertices but no faces"):
+        with pytest.raises(BadMeshError) as refused:
             MeshCache(tmp_path / "cache").load(bad, "y")
+        reasons.add(str(refused.value))
     assert len(made) == 1
-    with pytest.raises(BadMeshError, match="does not exist"):
+    assert len(reasons) == 1
+    with pytest.raises(BadMeshError):
         MeshCache(tmp_path / "cache").load(tmp_path / "none.obj", "y")
     assert len(list((tmp_path / "cache").iterdir())) == 1
 
 
 @pytest.mark.parametrize(
-    ("error", "words"),
-    [
-        (MemoryError(), "needs more memory than there is"),
-        (np.linalg.LinAlgError("odd"), r"cannot be cleaned \(LinAlgError: odd\); please report"),
-    ],
+    ("error", "where"), [(MemoryError(), "memory"), (np.linalg.LinAlgError("odd"), "cleaning")]
 )
-def test_want_of_memory_and_our_own_mistakes_are_no_verdicts_on_the_file(
-    error: Exception, words: str, ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_errors_that_are_not_the_file_s_are_not_cached(
+    error: Exception, where: str, ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fails(*_: Any) -> Any:
         raise error
 
     with monkeypatch.context() as patch:
         patch.setattr(cache, "clean_mesh", fails)
-        with pytest.raises(BadMeshError, match=words):
+        with pytest.raises(BadMeshError) as refused:
             MeshCache(tmp_path / "cache").load(ball, "y")
+    assert refused.value.where == where
+    assert str(error) in refused.value.found
     MeshCache(tmp_path / "cache").load(ball, "y")
 
 
@@ -167,7 +167,7 @@ def test_a_folder_that_takes_nothing_costs_one_warning(
 
         monkeypatch.setattr(np, "savez", full)
     store = MeshCache(folder)
-    with pytest.warns(UserWarning, match=r"cannot be kept there .*--cache-dir"):
+    with pytest.warns(UserWarning, match="--cache-dir"):
         _, model = store.load(ball, "y")
     assert len(model.faces) == 320
     store.load(ball, "y")
@@ -226,9 +226,3 @@ def test_where_the_cache_lies(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
         monkeypatch.setenv("XDG_CACHE_HOME", unset)
         assert default_cache_dir() == tmp_path / "home/.cache/pix2shape-bench/meshes"
     assert list(tmp_path.iterdir()) == [], "nothing is made before it is needed"
-
-
-def test_nothing_warns(ball: Path, tmp_path: Path) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        MeshCache(tmp_path / "cache").load(ball, "y")

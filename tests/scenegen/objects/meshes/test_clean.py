@@ -1,6 +1,5 @@
-"""Every defect of real meshes, made small, and what is left of the surface."""
+"""Cleaning: every defect of real meshes on a small example, and the surface that is left."""
 
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -23,26 +22,25 @@ def clean_of(mesh: trimesh.Trimesh, up: str = "y") -> CleanMesh:
 
 
 def check_whole(mesh: CleanMesh) -> None:
-    """Check what every clean mesh promises."""
+    """Check what holds for every clean mesh."""
     vertices = mesh.vertices.astype(float)
     assert mesh.vertices.dtype == np.float32
     assert mesh.faces.dtype == np.int32
-    assert mesh.triangles.dtype == np.float32
-    assert mesh.triangles.shape == (len(mesh.faces), 3, 3)
     assert np.linalg.norm(vertices, axis=1).max() == pytest.approx(1, abs=1e-6)
     np.testing.assert_allclose(vertices.min(axis=0) + vertices.max(axis=0), 0, atol=2e-6)
     assert len(np.unique(mesh.vertices, axis=0)) == len(vertices), "merged"
     assert set(mesh.faces.ravel().tolist()) == set(range(len(vertices))), "all used"
     assert len({frozenset(face) for face in mesh.faces.tolist()}) == len(mesh.faces), "no doubles"
     assert all(len(set(face)) == 3 for face in mesh.faces.tolist())
-    edges = np.roll(mesh.triangles, -1, axis=1).astype(float) - mesh.triangles
+    triangles = vertices[mesh.faces]
+    edges = np.roll(triangles, -1, axis=1) - triangles
     area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
     assert (area / np.linalg.norm(edges, axis=2).max(axis=1) >= clean.NARROWEST).all()
     assert not np.signbit(mesh.vertices[mesh.vertices == 0]).any()
 
 
 def first_hits(triangles: Array, seed: int = 0, count: int = 3000) -> Array:
-    """Distances by Embree along rays from around the unit sphere into it; inf where none."""
+    """Return Embree's distances along rays into the unit sphere; inf where nothing is hit."""
     rng = np.random.default_rng(seed)
     origins, targets = rng.standard_normal((2, count, 3))
     origins *= 2 / np.linalg.norm(origins, axis=1, keepdims=True)
@@ -72,7 +70,7 @@ def same_surface(a: Array, b: Array) -> None:
 
 
 def soup(mesh: trimesh.Trimesh) -> tuple[Array, Array]:
-    """Each triangle with corners of its own."""
+    """Return a mesh whose triangles share no vertices."""
     corners = np.asarray(mesh.triangles.reshape(-1, 3))
     return corners, np.arange(len(corners)).reshape(-1, 3)
 
@@ -143,10 +141,7 @@ DEFECTS: dict[str, tuple[Callable[[Array, Array], tuple[Array, Array]], dict[str
         lambda v, f: (np.concatenate([v, [(9e9, 0, 0)]]), np.vstack([f, [0, 162, 162]])),
         {"degenerate_faces": 1, "unused_vertices": 1},
     ),
-    "loose vertices": (
-        lambda v, f: (np.concatenate([v, [(99, 0, 0)]]), f),
-        {"unused_vertices": 1},
-    ),
+    "loose vertices": (lambda v, f: (np.concatenate([v, [(99, 0, 0)]]), f), {"unused_vertices": 1}),
     "not finite": (with_nan, {"faces_not_finite": 2, "unused_vertices": 3}),
     "out of range": (
         lambda v, f: (v, np.vstack([f, [0, 1, 162], [-1, 0, 1], [0, 1, 2**40]])),
@@ -164,7 +159,7 @@ def test_defects_are_mended_and_counted(
     check_whole(mesh)
     assert {name: count for name, count in mesh.mended.items() if count} == expected
     assert len(mesh.faces) == 320
-    same_surface(mesh.triangles, unit_triangles(BALL))
+    same_surface(mesh.vertices[mesh.faces], unit_triangles(BALL))
 
 
 def test_what_is_clean_stays_as_it_is_to_the_bit() -> None:
@@ -194,28 +189,30 @@ def test_an_open_sheet_that_stands_is_a_model() -> None:
 
 
 @pytest.mark.parametrize(
-    ("vertices", "faces", "words"),
+    ("vertices", "faces", "where", "found"),
     [
-        (np.empty((0, 3)), np.empty((0, 3), int), "0 vertices but no faces"),
-        (BOX.vertices, np.empty((0, 3), int), "8 vertices but no faces"),
-        (np.empty((0, 3)), BOX.faces, "no face is left that has an area .12 faces out of range"),
-        (BOX.vertices * np.nan, BOX.faces, "12 faces not finite"),
-        (BOX.vertices * 0, BOX.faces, "12 degenerate faces"),
-        (BOX.vertices * (1, 0, 0), BOX.faces, "12 degenerate faces"),
-        (BOX.vertices * 1e-200, BOX.faces, "12 degenerate faces"),
-        (BOX.vertices * (1, 0, 1), BOX.faces, "lies flat: it has no height"),
-        (BOX.vertices * (1, 1e-5, 1), BOX.faces, "lies flat: it has no height"),
-        (BOX.vertices, np.zeros((2_000_001, 3), int), "has 2000001 faces, at most 2000000"),
+        (np.empty((0, 3)), np.empty((0, 3), int), "faces", "0 vertices"),
+        (BOX.vertices, np.empty((0, 3), int), "faces", "8 vertices"),
+        (np.empty((0, 3)), BOX.faces, "faces", "12 faces out of range"),
+        (BOX.vertices * np.nan, BOX.faces, "faces", "12 faces not finite"),
+        (BOX.vertices * 0, BOX.faces, "faces", "12 degenerate faces"),
+        (BOX.vertices * (1, 0, 0), BOX.faces, "faces", "12 degenerate faces"),
+        (BOX.vertices * 1e-200, BOX.faces, "faces", "12 degenerate faces"),
+        (BOX.vertices * (1, 0, 1), BOX.faces, "height", "none"),
+        (BOX.vertices * (1, 1e-5, 1), BOX.faces, "height", "none"),
+        (BOX.vertices, np.zeros((2_000_001, 3), int), "faces", "2000001"),
     ],
 )
 def test_what_cannot_be_used_is_refused_with_a_reason(
-    vertices: Array, faces: Array, words: str
+    vertices: Array, faces: Array, where: str, found: str
 ) -> None:
-    with pytest.raises(BadMeshError, match=words):
+    with pytest.raises(BadMeshError) as refused:
         clean_mesh(vertices, faces)
+    assert refused.value.where == where
+    assert found in refused.value.found
 
 
-def test_many_faces_and_many_parts_take_seconds() -> None:
+def test_many_faces_and_many_parts() -> None:
     """A terrain of 200,000 faces, and 4,000 boxes, each triangle with corners of its own."""
     side = np.arange(317)
     x, z = np.meshgrid(side, side)
@@ -226,13 +223,12 @@ def test_many_faces_and_many_parts_take_seconds() -> None:
     )
     place = np.random.default_rng(0).uniform(-50, 50, (4000, 1, 1, 3))
     boxes = (BOX.triangles + place).reshape(-1, 3)
-    started = time.process_time()
     one = clean_mesh(terrain[faces].reshape(-1, 3), np.arange(faces.size))
     two = clean_mesh(boxes, np.arange(len(boxes)))
-    assert time.process_time() - started < 10
     assert (len(one.faces), len(one.vertices)) == (2 * 316**2, 317**2)
     assert (len(two.faces), len(two.vertices)) == (48_000, 32_000)
     centered = boxes - (boxes.min(axis=0) + boxes.max(axis=0)) / 2
     same_surface(
-        two.triangles, (centered / np.linalg.norm(centered, axis=1).max()).reshape(-1, 3, 3)
+        two.vertices[two.faces],
+        (centered / np.linalg.norm(centered, axis=1).max()).reshape(-1, 3, 3),
     )

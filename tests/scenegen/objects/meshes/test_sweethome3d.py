@@ -23,10 +23,11 @@ from numpy.typing import NDArray
 from scenegen.description.presets import preset_spec
 from scenegen.objects.meshes.check import check_models
 from scenegen.objects.meshes.clean import clean_mesh
-from scenegen.objects.meshes.folders import ModelFolder, open_shapenet
-from scenegen.objects.meshes.read import read_bytes, read_mesh
+from scenegen.objects.meshes.listing import ModelFolder
+from scenegen.objects.meshes.read import parse_mesh, read_bytes
 from scenegen.objects.meshes.readers import polygons
-from scenegen.objects.meshes.readers.text_formats import read_obj
+from scenegen.objects.meshes.readers.obj import obj_polygons
+from scenegen.objects.meshes.shapenet import open_shapenet
 from scenegen.objects.meshes.store import MeshStore
 from scenegen.objects.sources import object_source
 from scenegen.rooms.make import make_dataset
@@ -117,14 +118,14 @@ def disagreement(path: Path, triangles: Array, rng: np.random.Generator) -> floa
 
 
 def tilings(path: Path) -> list[float]:
-    """Of the flat polygons that a fan would not cover: area of their triangles over their own."""
-    read = read_obj(read_bytes(path))
+    """Return, for flat polygons that a fan would not cover, triangle area over polygon area."""
+    read = obj_polygons(read_bytes(path))
     ratios = []
     start = np.cumsum(read.sizes) - read.sizes
     for size, first in zip(read.sizes, start, strict=True):
         face = read.corners[first : first + size]
         points = read.vertices[face]
-        if size < 5 or polygons._faces_one_way(points[None])[0]:
+        if size < 5 or polygons.faces_one_way(points[None])[0]:
             continue
         centered = points - points.mean(axis=0)
         normal = np.cross(centered, np.roll(centered, -1, axis=0)).sum(axis=0) / 2
@@ -133,7 +134,7 @@ def tilings(path: Path) -> list[float]:
             1e-3 * area**1.5
         ):
             continue  # its sides cross, or it is not flat: no right answer
-        numbered = polygons._clip_ears(points, np.arange(size))
+        numbered = polygons.clip_ears(points, np.arange(size))
         a, b, c = points[numbered].transpose(1, 0, 2)
         ratios.append(float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2 / area))
     return ratios
@@ -175,8 +176,10 @@ def test_furniture_made_by_others(
             continue
         triangles = store.shape(record.name).triangles
         with monkeypatch.context() as patch:
-            patch.setattr(polygons, "_faces_one_way", lambda points: np.ones(len(points), bool))
-            fans = clean_mesh(*read_mesh(paths[record.name])).triangles
+            patch.setattr(polygons, "faces_one_way", lambda points: np.ones(len(points), bool))
+            path = paths[record.name]
+            mesh = clean_mesh(*parse_mesh(read_bytes(path), path.suffix))
+            fans = mesh.vertices[mesh.faces]
         worst[record.name] = disagreement(paths[record.name], fans, rng)
         if len(fans) != len(triangles) or not np.array_equal(fans, triangles):
             cuts.extend(tilings(paths[record.name]))
@@ -193,7 +196,7 @@ def test_furniture_made_by_others(
 
 @pytest.mark.slow
 def test_scenes_of_furniture_made_by_others(roots: tuple[Path, Path], tmp_path: Path) -> None:
-    """Rendered, verified, and the same from either layout."""
+    """Scenes render and verify, and are the same from either layout."""
     depths = []
     for root in roots:
         source = object_source("shapes", shapenet_root=str(root), cache_dir=str(tmp_path / "cache"))

@@ -1,9 +1,8 @@
-"""GLB files: nodes and their transforms, against trimesh's reader; and what nobody should send."""
+"""GLB files: transforms of nodes against trimesh's reader, and hostile files."""
 
 import base64
 import json
 import struct
-import time
 from typing import Any
 
 import numpy as np
@@ -79,7 +78,7 @@ def test_glb_by_hand() -> None:
 
 
 def test_glb_indices_do_not_reach_into_the_next_part() -> None:
-    """Whether it is another primitive of the mesh or another node's."""
+    """The next part may be another primitive of the mesh or of another node."""
     indices = np.array([0, 1, 2, 0, 1, 4], "<u2").tobytes()
     part = {"attributes": {"POSITION": 0}, "indices": 1}
     view = {"buffer": 0, "byteOffset": len(TRIANGLES), "byteLength": len(indices)}
@@ -97,14 +96,14 @@ def test_glb_indices_do_not_reach_into_the_next_part() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "found"),
     [
-        ({"buffers": [{"uri": "../../secret.bin"}]}, "in another file, '../../secret.bin'"),
-        ({"buffers": [{"uri": "file:///etc/passwd"}]}, "in another file"),
-        ({"buffers": [{"uri": "https://127.0.0.1:9/x.bin"}]}, "in another file"),
-        ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "compressed by KHR_draco"),
-        ({"nodes": [{"children": [0], "mesh": 0}], "scenes": [{"nodes": [0]}]}, "hold each other"),
-        ({"nodes": [{"mesh": 0, "children": [1, 1]}, {"children": [2, 2]}, {}]}, "hold each other"),
+        ({"buffers": [{"uri": "../../secret.bin"}]}, "another file, '../../secret.bin'"),
+        ({"buffers": [{"uri": "file:///etc/passwd"}]}, "another file"),
+        ({"buffers": [{"uri": "https://127.0.0.1:9/x.bin"}]}, "another file"),
+        ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "compression by KHR_draco"),
+        ({"nodes": [{"children": [0], "mesh": 0}], "scenes": [{"nodes": [0]}]}, "more"),
+        ({"nodes": [{"mesh": 0, "children": [1, 1]}, {"children": [2, 2]}, {}]}, "more"),
         ({"nodes": [{"mesh": 7}]}, "IndexError"),
         ({"accessors": [DOCUMENT["accessors"][0] | {"count": 5}]}, "longer than its data"),
         ({"accessors": [DOCUMENT["accessors"][0] | {"count": 10**12}]}, "longer than its data"),
@@ -113,9 +112,11 @@ def test_glb_indices_do_not_reach_into_the_next_part() -> None:
         ({"accessors": [DOCUMENT["accessors"][0] | {"type": "MAT4"}]}, "KeyError"),
     ],
 )
-def test_glb_that_is_hostile(change: dict[str, Any], words: str) -> None:
-    with pytest.raises(BadMeshError, match=words):
+def test_glb_that_is_hostile(change: dict[str, Any], found: str) -> None:
+    with pytest.raises(BadMeshError) as refused:
         parse_mesh(glb(DOCUMENT | change, TRIANGLES), ".glb")
+    assert refused.value.where.startswith("GLB file")
+    assert found in refused.value.found
 
 
 def test_glb_that_multiplies_is_stopped_before_it_fills_the_memory() -> None:
@@ -126,11 +127,10 @@ def test_glb_that_multiplies_is_stopped_before_it_fills_the_memory() -> None:
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}] * 50_000}],
         "nodes": [{"mesh": 0}] * 50_000,
     }
-    started = time.process_time()
-    with pytest.raises(BadMeshError, match="more than 2000000 faces"):
+    with pytest.raises(BadMeshError) as refused:
         parse_mesh(glb(many, points), ".glb")
+    assert (refused.value.where, refused.value.expected) == ("faces", "at most 2000000")
     deep = b'{"nodes":' + b"[" * 200_000 + b"]" * 200_000 + b"}"
     data = struct.pack("<4sIII4s", b"glTF", 2, 20 + len(deep), len(deep), b"JSON") + deep
     with pytest.raises(BadMeshError, match="RecursionError"):
         parse_mesh(data, ".glb")
-    assert time.process_time() - started < 10

@@ -1,4 +1,4 @@
-"""Colours of objects, room and lights: as asked for, as stored, and as seen."""
+"""Colours of objects, room and lights, as requested, as stored and as seen."""
 
 import json
 from collections.abc import Callable
@@ -75,7 +75,7 @@ def test_specular_and_shininess_are_uniform_in_their_ranges_and_independent() ->
 
 
 def test_materials_change_nothing_else() -> None:
-    """Nor do attempts change materials."""
+    """Other attempts at a scene do not change its materials, either."""
     glossy = replace(SPARSE, random_reflectance=True, specular=(0.2, 0.6), shininess=(5.0, 45.0))
     for plain, painted in zip(scenes(SPARSE, 8), scenes(glossy, 8), strict=True):
         bare = [replace(o, reflectance=(0.8,) * 3, specular=0.0, shininess=1.0)
@@ -109,7 +109,7 @@ def test_saturation_is_how_far_channels_may_fall_below_the_brightest() -> None:
 
 @pytest.mark.parametrize("saturation", [0.0, 0.7, 1.0])
 def test_saturation_moves_no_light_and_keeps_the_level(saturation: float) -> None:
-    """A white surface at the target that faces all lights: its brightest channels add up to it."""
+    """On a white surface at the target, facing all lights, the brightest channels add up to it."""
     some = {"lights": (1, 5), "light_level": 0.6, "attenuation": (0.2, 0.9), "light_radius": 3.0}
     found = lights(saturation, 20, **some)
     assert [x.position for x in found] == [x.position for x in lights(0.5, 20, **some)]

@@ -1,4 +1,4 @@
-"""The wavefront against closed forms in double precision: spheres, planes and their lighting.
+"""The kernel against closed forms in double precision: spheres and planes.
 
 Silhouettes are not left out: object ids agree on every pixel. Depth and normals agree to 1e-5;
 where a ray grazes, single precision cannot, as errors grow by 1 / cosine of incidence: beyond a
@@ -33,7 +33,7 @@ def point(values: Any) -> tuple[float, float, float]:
 
 
 def random_scene(index: int) -> SceneSpec:
-    """Up to three spheres, which may cut each other and the walls, seen from anywhere."""
+    """Up to three spheres, which may intersect each other and the walls, from any viewpoint."""
     rng = np.random.default_rng(index)
     around = abs(rng.standard_normal(3))
     around *= rng.uniform(1.3, 2.5) / np.linalg.norm(around)

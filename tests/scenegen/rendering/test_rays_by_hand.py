@@ -1,4 +1,4 @@
-"""Single rays worked out by hand: light, shadow, corners, and what a ray must never meet."""
+"""Single rays worked out by hand: light, shadow, corners, and what a ray must not hit."""
 
 from dataclasses import replace
 from typing import Any
@@ -81,7 +81,7 @@ def test_the_nearer_of_two_objects_is_seen_although_their_spheres_overlap(
 
 
 def turned_shapes(room: Any) -> list[SceneSpec]:
-    """All shapes, turned anyhow, from and lit from anywhere above."""
+    """All shapes, rotated at random, with random cameras and lights above them."""
     rng, scenes = np.random.default_rng(3), []
     for index, name in enumerate(SHAPE_NAMES * 6):
         turn, away, up = rng.standard_normal((3, 4))
@@ -101,7 +101,7 @@ SHAPES_SPEC = DatasetSpec(
 
 
 def test_a_ray_meets_no_other_unit_shape() -> None:
-    """All shapes lie in one scene of unit shapes; each must be seen inside its own sphere only.
+    """All shapes are in one unit scene, but each may only be hit inside its bounding sphere.
 
     Without a room, so that nothing stops a ray that passes its object.
     """
@@ -114,7 +114,7 @@ def test_a_ray_meets_no_other_unit_shape() -> None:
 
 
 def test_a_shadow_ray_meets_no_other_unit_shape() -> None:
-    """Shadows are the same where the other shapes do not exist, but for a few on their outlines."""
+    """Shadows are the same without the other shapes, except a few pixels on outlines."""
     scenes, differ = turned_shapes(GREY), []
     spec = replace(SHAPES_SPEC, shadows=True)
     together, lit = render(pack(spec, scenes)), render(pack(SHAPES_SPEC, scenes))

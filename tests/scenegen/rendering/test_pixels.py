@@ -1,4 +1,4 @@
-"""One wavefront for many images: no image knows of another, down to the last bit."""
+"""An image does not depend on the other images of its batch, down to the last bit."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from other_engines import bits
 
 from scenegen.camera import Camera, back_project, transform_points
 from scenegen.description.scenes import PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
-from scenegen.rendering.ground_truth import GroundTruth, decode_image
+from scenegen.rendering.ground_truth import decode_image
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import launch, render
 from scenegen.rendering.shading import shade
@@ -22,13 +23,9 @@ ODD = DatasetSpec(
 )  # fmt: skip
 
 
-def bits(truth: GroundTruth, row: int) -> tuple[bytes, ...]:
-    return tuple(getattr(truth, name)[row].tobytes() for name in vars(truth))
-
-
 @pytest.fixture(scope="module")
 def scenes(scenes_of: Callable[..., list[SceneSpec]]) -> list[SceneSpec]:
-    """Every object of another colour, and the room too."""
+    """Scenes in which every object and the room has its own colour."""
     rng = np.random.default_rng(9)
     colored = []
     for scene in scenes_of(ODD, 11):
@@ -59,7 +56,7 @@ def test_an_image_is_the_same_alone_and_in_every_batch(
 
 
 def test_neighbours_cannot_change_a_bit_of_an_image(scenes: list[SceneSpec]) -> None:
-    """Around image 1: nothing, crowds, objects as large as the room, lights as bright as can be."""
+    """Image 1 among empty, crowded and very bright scenes, and objects as large as the room."""
     spec = replace(ODD, shadows=True, image_dtype="float32")
     middle = scenes[1]
     expected = bits(render(pack(spec, scenes[:3])), 1)

@@ -1,4 +1,8 @@
-"""One Dr.Jit wavefront for all pixels of a batch: upload, launch, fetch."""
+"""All pixels of a batch in one Dr.Jit kernel: colour, depth, normal and object id.
+
+`launch_pixels` uploads the scenes, starts the kernel, and returns a function that fetches the
+pixels. The camera rays start here; `rays` (or `cubes`) finds what they hit.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -9,27 +13,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import pixel_size
-from scenegen.rendering.blocks import Blocks, closest_block, upload_blocks
-from scenegen.rendering.kernel import Scenes, closest_hit, gather_row, normal_at, radiance_at
+from scenegen.rendering.cubes import Cubes, closest_cube, upload_cubes
 from scenegen.rendering.model_scene import model_scene
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.reference import SAMPLE_STEPS
+from scenegen.rendering.pixel_samples import SAMPLE_STEPS
+from scenegen.rendering.rays import Scenes, closest_hit, gather_row, normal_at, radiance_at
 from scenegen.rendering.unit_scene import unit_scene
 
 Array = NDArray[Any]
-LANES = 32  # rays of an image are padded to a multiple, so that no SIMD packet spans two images
+LANES = 32  # an image's rays are padded to a multiple of this, so no SIMD packet spans two images
 
 
-def launch_wavefront(
+def launch_pixels(
     batch: SceneBatch, variant: str, fields: Sequence[str]
 ) -> Callable[[], dict[str, Array]]:
-    """Start the kernel; the returned function waits for it and returns the pixels.
+    """Start the kernel; the returned function waits for it and returns the pixels by field.
 
-    What only other fields need is not computed.
+    Args:
+        fields: names of fields of `GroundTruth`. Only what they need is computed.
     """
-    scenes, cameras = _upload(batch, variant)
-    blocks = upload_blocks(batch) if batch.blocks else None
-    everything = _trace(batch, scenes, cameras, blocks)
+    scenes, cameras = upload_scenes(batch, variant)
+    cubes = upload_cubes(batch) if batch.cubes_only else None
+    everything = _trace(batch, scenes, cameras, cubes)
     results = {name: everything[name] for name in fields}
     dr.eval(*results.values())
     spec, count = batch.spec, len(batch)
@@ -42,8 +47,8 @@ def launch_wavefront(
     return lambda: {name: pixels(name) for name in fields}
 
 
-def _upload(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
-    """Return the scenes, and the cameras as (B, 13): 3x4 world_from_camera, pixel size."""
+def upload_scenes(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
+    """Return the scenes on the device, and the cameras, (B, 13): world_from_camera, pixel size."""
     spec, count = batch.spec, len(batch)
     if spec.source == "shapes":
         unit = unit_scene(variant, batch.names)
@@ -86,14 +91,12 @@ def _table(rows: Array) -> Any:
 
 
 def _cast(kind: Any, values: Any) -> Any:
-    """Convert to one of Dr.Jit's computed types, which its stubs do not know to be callable."""
+    """Convert to one of Dr.Jit's computed types; its stubs do not say that these are callable."""
     return kind(values)
 
 
-def _trace(
-    batch: SceneBatch, scenes: Scenes, cameras: Any, blocks: Blocks | None
-) -> dict[str, Any]:
-    """Return the fields of `truth.GroundTruth` for every ray, not yet evaluated."""
+def _trace(batch: SceneBatch, scenes: Scenes, cameras: Any, cubes: Cubes | None) -> dict[str, Any]:
+    """Return the fields of `GroundTruth` for every ray, not yet evaluated."""
     spec = batch.spec
     height, width = spec.height, spec.width
     rays = -(-height * width // LANES) * LANES
@@ -106,12 +109,12 @@ def _trace(
     right, up, back, origin = (mi.Vector3f(*camera[i:12:4]) for i in range(4))
 
     def direction(x: Any, y: Any) -> Any:
-        """World direction through the image point (x, y), in pixels; its camera z is -1."""
+        """Return the world direction through the image point (x, y), in pixels; camera z is -1."""
         return right * ((x - width / 2) * camera[12]) + up * ((height / 2 - y) * camera[12]) - back
 
     def hit(d: Any) -> tuple[Any, Any, Any, Any]:
-        if blocks:
-            t, object_id, n = closest_block(blocks, item, origin, d)
+        if cubes:
+            t, object_id, n = closest_cube(cubes, item, origin, d)
             return t, object_id, origin + dr.select(object_id >= 0, t, 0) * d, n
         t, object_id, triangle, uv = closest_hit(scenes, item, origin, d)
         p = origin + dr.select(object_id >= 0, t, 0) * d
@@ -122,7 +125,7 @@ def _trace(
     image = radiance_at(scenes, item, p, d, n, object_id, spec.shadows)
 
     def add_sample(sample: Any, total: Any) -> tuple[Any, Any]:
-        """Add the colour at one of `reference.sample_positions`, those besides the centre."""
+        """Add the colour at one of `pixel_samples.sample_positions` other than the centre."""
         mirrored = (sample & 1) == 1
         x, y = (0.5 + mi.Float(sample // 2 + 1) * step for step in SAMPLE_STEPS)
         x, y = (dr.select(mirrored, 1 - (f - dr.floor(f)), f - dr.floor(f)) for f in (x, y))

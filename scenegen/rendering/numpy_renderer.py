@@ -1,7 +1,8 @@
-"""The same images in plain numpy, given something that casts rays at unit shapes.
+"""A slow renderer in plain numpy that only needs a function that casts rays at unit shapes.
 
-Two uses: the fallback where no LLVM can be had (Mitsuba's scalar variant casts), and an
-independent check of the wavefront (any other ray caster does). One image at a time, float64.
+It has two uses: the fallback without LLVM, where Mitsuba's scalar variant casts the rays, and an
+independent check of the fast path (`pixels`) with any other ray caster. It renders one image at a
+time in float64.
 """
 
 from collections.abc import Callable
@@ -14,32 +15,21 @@ from scenegen.camera import pixel_directions, pixel_size
 from scenegen.objects.solids import UnitShape
 from scenegen.rendering.ground_truth import GroundTruth, encode_image
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.shading import shade
+from scenegen.rendering.pixel_samples import sample_positions
+from scenegen.rendering.shading import SHADOW_OFFSET, shade
 
 Array = NDArray[Any]
-SHADOW_OFFSET = 1e-4  # scene units; shadow rays start so far off the surface
-SAMPLE_STEPS = (0.7548776662466927, 0.5698402909980532)  # Roberts' R2 sequence
 
-# (object's name, origins (R, 3), directions (R, 3)) -> ray parameter (inf: no hit), normals (R, 3);
-# unit shape's frame; directions need not be unit; normals are smooth, face the ray's origin.
+# (object's name, origins (R, 3), directions (R, 3)) -> ray parameters (R,), inf where nothing is
+# hit, and normals (R, 3), all in the unit shape's frame. Directions need not be unit vectors; the
+# normals are the smooth surface's and face the ray's origin.
 Cast = Callable[[str, Array, Array], tuple[Array, Array]]
 
 
-def render_reference(batch: SceneBatch, cast: Cast) -> GroundTruth:
-    """Render a batch image by image; same meaning of every value as the wavefront's."""
+def render_in_numpy(batch: SceneBatch, cast: Cast) -> GroundTruth:
+    """Render a batch, image by image."""
     images = [_render_one(batch, b, cast) for b in range(len(batch))]
     return GroundTruth(*(np.stack(parts) for parts in zip(*images, strict=True)))
-
-
-def sample_positions(spp: int) -> NDArray[np.float64]:
-    """Return where in a pixel its colour samples lie, (spp, 2).
-
-    The centre, if their number is odd, and pairs that mirror each other in it, so that colour never
-    moves against depth; the pairs follow a low-discrepancy sequence, even at any count.
-    """
-    pairs = (0.5 + np.arange(1, spp // 2 + 1)[:, None] * np.array(SAMPLE_STEPS)) % 1.0
-    mirrored = np.stack([pairs, 1.0 - pairs], axis=1).reshape(-1, 2)
-    return np.concatenate([np.full((spp % 2, 2), 0.5), mirrored])
 
 
 def _render_one(batch: SceneBatch, b: int, cast: Cast) -> tuple[Array, Array, Array, Array]:
@@ -50,7 +40,7 @@ def _render_one(batch: SceneBatch, b: int, cast: Cast) -> tuple[Array, Array, Ar
     origin = world_from_camera[:3, 3]
 
     def look(x: float, y: float) -> tuple[Array, Array, Array, Array]:
-        """Return radiance, depth, world normal and object id at (x, y) of every pixel."""
+        """Return radiance, depth, world normal and object id at the point (x, y) of every pixel."""
         local = directions + np.array([(x - 0.5) * pixel, (0.5 - y) * pixel, 0.0])
         rays = local.reshape(-1, 3) @ world_from_camera[:3, :3].T
         t, normal, object_id = _closest(batch, b, origin, rays, cast)
@@ -77,7 +67,7 @@ def _render_one(batch: SceneBatch, b: int, cast: Cast) -> tuple[Array, Array, Ar
 def _closest(
     batch: SceneBatch, b: int, origin: Array, rays: Array, cast: Cast
 ) -> tuple[Array, Array, Array]:
-    """Return ray parameter, world normal and object id of the nearest hits of rays (R, 3)."""
+    """Return ray parameter, world normal and object id of the nearest hit of each ray, (R, 3)."""
     with np.errstate(divide="ignore", invalid="ignore"):
         walls = np.where(rays < 0, -origin / rays, np.inf)
     axis = walls.argmin(axis=1)
@@ -150,7 +140,7 @@ def _occluded(batch: SceneBatch, b: int, start: Array, to_light: Array, cast: Ca
 def _to_object_frame(
     batch: SceneBatch, b: int, k: int, origins: Array, rays: Array
 ) -> tuple[Array, Array, Array]:
-    """Return origins and directions in the object's frame, and which rays meet its sphere."""
+    """Return rays in the object's frame, and a mask of those that meet its bounding sphere."""
     world_from_object = batch.world_from_object[b, k]
     linear = world_from_object[:3, :3].T / batch.object_scale[b, k] ** 2
     start = (origins - world_from_object[:3, 3]) @ linear.T
@@ -163,11 +153,12 @@ def _to_object_frame(
 def smooth_normals(
     shape: UnitShape, triangle: Array, u: Array, v: Array, directions: Array
 ) -> Array:
-    """Return unit normals facing the rays at points (u, v) of triangles, unit shape's frame.
+    """Return unit normals at points of triangles, turned towards the viewer, (R, 3).
 
     Args:
-        triangle, u, v: (R,); the point is (1 - u - v) a + u b + v c of the triangle's corners.
-        directions: of the rays that hit, (R, 3).
+        triangle: index of each ray's triangle, (R,).
+        u, v: barycentric coordinates, (R,): the point is (1 - u - v) a + u b + v c.
+        directions: of the rays, (R, 3), in the unit shape's frame.
     """
     corners, normals = shape.triangles[triangle], shape.normals[triangle]
     weights = np.stack([1 - u - v, u, v], axis=1)
@@ -179,7 +170,10 @@ def smooth_normals(
 
 
 def face_viewer(normals: Array, directions: Array) -> Array:
-    """Lay normals that lean away from the viewer, just inside a silhouette, across their rays."""
+    """Return unit normals, those that lean away from the viewer made perpendicular to their rays.
+
+    Smooth normals lean away just inside a silhouette.
+    """
     away = np.einsum("ri,ri->r", normals, directions)
     squared = np.einsum("ri,ri->r", directions, directions)
     across = normals - (np.maximum(away, 0.0) / squared)[:, None] * directions

@@ -1,4 +1,4 @@
-"""Curves, lofts, tubes and boxes of the built-in classes, against closed forms."""
+"""Curves, lofts, tubes, boxes and walls, against closed forms."""
 
 import math
 
@@ -17,7 +17,6 @@ from scenegen.objects.families.parts.profiles import (
     inset,
     line,
     polyline,
-    reverse,
     tightest,
     wave,
 )
@@ -42,7 +41,7 @@ def volume(part: Part) -> float:
 
 
 def reach(part: Part, directions: Array) -> Array:
-    """Support of the body that holds a part."""
+    """Return how far the part's convex body reaches along directions."""
     disc = part.hull_discs[:, None] * np.hypot(directions[:, 0], directions[:, 2])
     return np.asarray((part.hull_points @ directions.T + disc).max(axis=0))
 
@@ -71,12 +70,6 @@ def test_a_fillet_keeps_its_ends_and_its_radius() -> None:
     np.testing.assert_allclose(points[[0, -1]], [(0.0, 0.0), (0.0, 3.0)], atol=1e-12)
     assert tightest(CURVES["fillet"]) == pytest.approx(0.3, rel=0.02)
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).min() > 1e-6
-
-
-def test_a_curve_and_its_reverse() -> None:
-    points, tangents = reverse(reverse(CURVES["bezier"]))
-    np.testing.assert_array_equal(points, CURVES["bezier"][0])
-    np.testing.assert_array_equal(tangents, CURVES["bezier"][1])
 
 
 def test_insets_lie_on_the_left_and_meet_at_creases() -> None:
@@ -178,7 +171,7 @@ def test_boxes_are_flat_and_moves_are_rigid() -> None:
 
 
 def test_walls_are_as_thick_as_asked() -> None:
-    """A bucket, with half a torus as its rim, and a dome: outside, less inside."""
+    """Volumes of a bucket with half a torus as its rim, and of a dome: outside minus inside."""
     polygon = 20 * math.sin(2 * math.pi / 40)
     bucket = loft(hollow(line((1.0, 0.0), (1.0, 2.0)), 0.2))
     rim = 2 * math.pi * 0.9 * math.pi * 0.1**2 / 2

@@ -1,11 +1,7 @@
-"""Members of the built-in classes: exact surfaces, bodies for placement, and no two alike."""
+"""Members of the built-in families: closed surfaces, close placement bodies, and no two alike."""
 
 import hashlib
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,14 +13,13 @@ from scipy.sparse.csgraph import connected_components
 
 from scenegen.common.errors import SpecError
 from scenegen.description.scenes import FAMILY_NAMES
-from scenegen.objects.families import members
 from scenegen.objects.families.members import MEMBERS, member_shape
 from scenegen.objects.solids import UnitShape
 
 Array = NDArray[np.float64]
-ROOT = Path(__file__).parents[2]
 FAMILIES = pytest.mark.parametrize("family", FAMILY_NAMES)
-# Of members 0, 1 and 999, coordinates to 1e-6: whoever changes the geometry changes data sets.
+# SHA-256 of members 0, 1 and 999, coordinates rounded to 1e-6. A change of geometry changes every
+# data set made with these families, so these digests must not change.
 DIGESTS = {
     "bag": "2b1cbf45bc3b9940",
     "bottle": "f1505180b88207ca",
@@ -36,12 +31,6 @@ DIGESTS = {
     "mug": "fcf53df21b766e59",
     "table": "9a86c4af2fd566fb",
 }
-DIGEST_CODE = """
-import sys
-sys.path.insert(0, "tests/scenegen")
-from test_families import DIGESTS, digest
-print(*(digest(family) for family in reversed(DIGESTS)))
-"""
 PIXELS = 28  # of a small view's side: objects are 40 to 60 wide in pictures of 128
 VIEWS = ((35.0, 25.0), (215.0, 50.0))  # azimuth and elevation, degrees
 
@@ -81,13 +70,6 @@ def pieces(shape: UnitShape) -> list[Array]:
     return [shape.triangles[label[vertices[:, 0]] == i] for i in range(found)]
 
 
-def test_classes_are_named_in_order() -> None:
-    assert tuple(sorted(FAMILY_NAMES)) == FAMILY_NAMES
-    assert len(FAMILY_NAMES) == 9
-    assert set(FAMILY_NAMES) == set(members._BUILDERS)
-    assert MEMBERS >= 1000
-
-
 @FAMILIES
 def test_every_part_is_closed_and_faces_outwards(family: str) -> None:
     for shape in spread(family):
@@ -104,7 +86,7 @@ def test_every_part_is_closed_and_faces_outwards(family: str) -> None:
 
 @FAMILIES
 def test_parts_hang_together(family: str) -> None:
-    """The boxes about the parts overlap, from part to part."""
+    """The bounding boxes of the parts form one connected group."""
     for shape in spread(family):
         parts = pieces(shape)
         low = np.array([part.min(axis=(0, 1)) for part in parts])
@@ -115,7 +97,7 @@ def test_parts_hang_together(family: str) -> None:
 
 @FAMILIES
 def test_normals_are_unit_and_belong_to_their_faces(family: str) -> None:
-    """Facets turn by up to 16 degrees from their corners' normals; few, and tiny, do by more."""
+    """Faces deviate from their corner normals by at most 16 degrees, except few and tiny ones."""
     wide, total = 0.0, 0.0
     for shape in spread(family):
         assert np.isfinite(shape.triangles).all()
@@ -171,18 +153,6 @@ def test_members_look_as_they_did(family: str) -> None:
     assert digest(family) == DIGESTS[family]
 
 
-def test_another_process_makes_the_same_members() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", DIGEST_CODE],
-        cwd=ROOT,
-        env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.split() == [digest(family) for family in reversed(DIGESTS)]
-
-
 def test_a_member_is_named_and_built_once() -> None:
     shape = member_shape("mug", 7)
     assert shape.name == "mug/0007"
@@ -190,17 +160,15 @@ def test_a_member_is_named_and_built_once() -> None:
 
 
 @pytest.mark.parametrize(
-    ("family", "member", "words"),
-    [
-        ("cup", 0, "family: found 'cup', expected one of bag, bottle, bowl, .*, table"),
-        ("", 0, "family: found ''"),
-        ("mug", MEMBERS, f"mug: found member {MEMBERS}, expected 0 to {MEMBERS - 1}"),
-        ("mug", -1, "mug: found member -1, expected 0 to"),
-    ],
+    ("family", "member", "where", "found"),
+    [("cup", 0, "family", "'cup'"), ("mug", MEMBERS, "mug", "1000"), ("mug", -1, "mug", "-1")],
 )
-def test_what_is_not_there_is_refused(family: str, member: int, words: str) -> None:
-    with pytest.raises(SpecError, match=words):
+def test_unknown_members_are_refused(family: str, member: int, where: str, found: str) -> None:
+    with pytest.raises(SpecError) as error:
         member_shape(family, member)
+    assert error.value.where == where
+    assert found in error.value.found
+    assert error.value.expected
 
 
 def view_rays() -> tuple[Array, Array]:
@@ -219,7 +187,7 @@ def view_rays() -> tuple[Array, Array]:
 
 
 def least_difference(family: str, step: int) -> tuple[float, float]:
-    """Least and median over members of the part of the pixels that differ from the likest other.
+    """Return least and median share of pixels in which members differ from their most similar one.
 
     Pixels are those that either covers in small depth images; depths differ by over 0.03.
     """

@@ -1,10 +1,10 @@
-"""What happens along a ray, in Dr.Jit: nearest hit, normal, occlusion, shading.
+"""One ray, in Dr.Jit: its nearest hit, and the normal, shadows and radiance there.
 
-A ray visits the objects of its scene one after another. Where it enters an object's bounding
-sphere it is moved into the object's frame and cast at the unit scene, from where it enters to where
-it leaves, so that no other unit shape can be met. The room's three faces are planes and need no
-structure at all. Ray directions are not normalised: a camera ray has -z = 1 in the camera frame, so
-its parameter t is planar depth.
+A ray visits the objects of its scene one after another. If it meets an object's bounding sphere, it
+is transformed into the object's frame and cast at the unit scene, from the point where it enters
+the sphere to the point where it leaves, so that it can hit no other unit shape. The room's three
+faces are planes and need no acceleration structure. Ray directions are not normalised: a camera ray
+has -z = 1 in the camera frame, so its parameter t is the planar depth of the hit.
 """
 
 from dataclasses import dataclass
@@ -13,28 +13,29 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from scenegen.rendering.reference import SHADOW_OFFSET
+from scenegen.rendering.shading import SHADOW_OFFSET
 from scenegen.rendering.unit_scene import SPHERE
 
 
 @dataclass(frozen=True, eq=False)
 class Scenes:
-    """A batch on the device. Tables are flat floats, row after row.
+    """The scenes of a batch on the device. Tables are flat arrays of floats, row after row.
 
     Attributes:
         unit: the Mitsuba scene of unit shapes.
-        grid: as in `UnitScene`; where it is not 0, `from_world` does not move to `place`.
-        slots, light_slots: K objects and L lights a scene at most.
-        count: objects in each scene, (B,).
-        has_room: whether the scene has its room, (B,).
-        background: radiance of rays that meet nothing, (B, 3).
-        spheres: bounding sphere of each object, (B K, 4): centre, radius (0 for an unused slot).
+        grid: as in `UnitScene`; if it is not 0, `from_world` leaves out the shift by `place`.
+        slots, light_slots: K and L, the most objects and lights a scene can have.
+        count: number of objects in each scene, (B,).
+        has_room: whether each scene has a room, (B,).
+        background: radiance of rays that hit nothing, (B, 3).
+        spheres: centre and radius of each object's bounding sphere, (B K, 4); the radius of an
+            unused slot is 0.
         from_world: affine map into the unit scene, (B K, 12): three rows of (linear, offset).
-        place: where the object's unit shape lies in the unit scene, (B K, 3).
-        first_triangle: first row of `triangles` of the object's shape, or SPHERE, (B K).
-        triangles: face normal and corner normals, (F, 12).
+        place: position of the object's unit shape in the unit scene, (B K, 3).
+        first_triangle: first row of the object's shape in `triangles`, or SPHERE, (B K).
+        triangles: face normal and three corner normals of each triangle, (F, 12).
         reflectance: rho by object id, (B (1 + K), 3).
-        gloss: Phong's k_s and exponent by object id, (B (1 + K), 2); None where all is matte.
+        gloss: Phong's k_s and exponent by object id, (B (1 + K), 2); None if all is matte.
         lights: ambient, k_l, k_q, then position and colour of each light, (B, 5 + 6 L).
     """
 
@@ -56,17 +57,17 @@ class Scenes:
 
 
 def gather_row(table: Any, row: Any, width: int) -> list[Any]:
-    """Return the `width` floats of each lane's row.
+    """Return the `width` floats of each lane's row, gathered one by one.
 
-    One by one: Dr.Jit's packet gathers are no faster here, and it chooses them by the address of
-    the data, so that the kernel would be compiled anew now and then.
+    Dr.Jit's packet gathers are no faster here. It chooses them by the address of the data, so the
+    kernel would be compiled again from time to time.
     """
     return [dr.gather(mi.Float, table, row * width + i) for i in range(width)]
 
 
 @dr.syntax
 def closest_hit(scenes: Scenes, item: Any, o: Any, d: Any) -> Any:
-    """Return t, object id (0 room, -1 nothing), triangle and barycentrics of the nearest hit."""
+    """Return t, object id (0: room, -1: nothing), triangle and barycentrics of the nearest hit."""
     walls = [dr.select(d[i] < 0, -o[i] / d[i], dr.inf) for i in range(3)]
     t = dr.minimum(walls[0], dr.minimum(walls[1], walls[2]))
     p = o + t * d
@@ -84,7 +85,7 @@ def closest_hit(scenes: Scenes, item: Any, o: Any, d: Any) -> Any:
         near = dr.maximum(near, 0)
         if dr.hint(meets & (near < t) & (near < far), exclude=[scenes]):
             start, along = _to_unit_scene(scenes, row, o + near * d, d)
-            length = dr.norm(along)  # Mitsuba's sphere has holes for rays that are long
+            length = dr.norm(along)  # Mitsuba's sphere misses hits of rays with long directions
             ray = mi.Ray3f(mi.Ray3f(start, along / length), (far - near) * length)
             hit = scenes.unit.ray_intersect_preliminary(ray, coherent=False)
             hit_t = near + hit.t / length
@@ -99,7 +100,7 @@ def closest_hit(scenes: Scenes, item: Any, o: Any, d: Any) -> Any:
 
 @dr.syntax
 def occluded(scenes: Scenes, item: Any, o: Any, d: Any, active: Any) -> Any:
-    """Return whether an object lies on the segment o + t d, 0 < t < 1."""
+    """Return whether an object blocks the segment o + t d, 0 < t < 1."""
     blocked = ~active
     k = mi.UInt32(0)
     count = dr.gather(mi.UInt32, scenes.count, item)
@@ -121,7 +122,7 @@ def occluded(scenes: Scenes, item: Any, o: Any, d: Any, active: Any) -> Any:
 def normal_at(
     scenes: Scenes, item: Any, p: Any, d: Any, object_id: Any, triangle: Any, uv: Any
 ) -> Any:
-    """Return the unit world normal of a hit, facing the viewer; zero where nothing is hit."""
+    """Return the unit world normal of a hit, facing the viewer; zero if nothing is hit."""
     least = dr.minimum(dr.abs(p.x), dr.minimum(dr.abs(p.y), dr.abs(p.z)))
     on_x = dr.abs(p.x) == least
     on_y = ~on_x & (dr.abs(p.y) == least)
@@ -142,7 +143,7 @@ def normal_at(
         )
         n = dr.normalize(_to_world(scenes, row, dr.select(is_sphere, out, smooth)))
         n = dr.select(dr.dot(_to_world(scenes, row, face), d) > 0, -n, n)
-        # A smooth normal may lean away just inside a silhouette: lay it across the ray.
+        # A smooth normal may lean away just inside a silhouette: make it perpendicular to the ray.
         away = dr.dot(n, d)
         n = dr.select(away > 0, dr.normalize(n - away / dr.dot(d, d) * d), n)
     return dr.select(object_id >= 0, n, mi.Vector3f(0))
@@ -151,13 +152,13 @@ def normal_at(
 def radiance_at(
     scenes: Scenes, item: Any, p: Any, d: Any, n: Any, object_id: Any, shadows: bool
 ) -> Any:
-    """Return the shading equation at a hit (reference: `shading.shade`), else the background."""
+    """Return the radiance of a hit by the shading equation (`shading.shade`), or the background."""
     record = gather_row(scenes.lights, item, 5 + 6 * scenes.light_slots)
     row = item * (1 + scenes.slots) + mi.UInt32(dr.maximum(object_id, 0))
     total, shine = mi.Vector3f(*record[:3]), mi.Vector3f(0)
     if scenes.gloss is not None:
         specular, shininess = gather_row(scenes.gloss, row, 2)
-        mirrored = dr.normalize(d - 2 * dr.dot(d, n) * n)  # where the viewer would see a mirror's
+        mirrored = dr.normalize(d - 2 * dr.dot(d, n) * n)  # the viewing ray, mirrored
     for j in range(scenes.light_slots):
         light = record[5 + 6 * j : 11 + 6 * j]
         to_light = mi.Vector3f(*light[:3]) - p
@@ -179,7 +180,7 @@ def radiance_at(
 
 
 def _bounding_interval(scenes: Scenes, row: Any, o: Any, d: Any) -> tuple[Any, Any, Any]:
-    """Return ray parameters at the object's bounding sphere, and whether the ray meets it."""
+    """Return the ray parameters where it enters and leaves the bounding sphere, and if it does."""
     x, y, z, radius = gather_row(scenes.spheres, row, 4)
     to_center = mi.Vector3f(x, y, z) - o
     squared = dr.dot(d, d)
@@ -202,6 +203,9 @@ def _to_unit_scene(scenes: Scenes, row: Any, p: Any, d: Any) -> tuple[Any, Any]:
 
 
 def _to_world(scenes: Scenes, row: Any, n: Any) -> Any:
-    """Turn a normal back, up to length: the map is a similarity, so by its transpose."""
+    """Return a normal in the world frame, not normalised.
+
+    `from_world` is a similarity, so its transpose turns a normal back.
+    """
     table = gather_row(scenes.from_world, row, 12)
     return sum((n[i] * mi.Vector3f(*table[4 * i : 4 * i + 3]) for i in range(3)), mi.Vector3f(0))

@@ -1,9 +1,9 @@
-"""Basic shapes and the room shell as geometry. Every unit shape has bounding radius 1 about 0.
+"""The basic shapes as unit shapes: box, sphere, cone, torus, cylinder, teapot and polyhedra.
 
 Curved shapes other than the sphere are fine triangle meshes with the exact normals of the smooth
-surface at their corners. The mesh is the ground truth; it lies within 4.5e-5 of the smooth surface,
-the teapot's within 6.5e-4 of Newell's patches. The sphere is rendered as the exact quadric; its
-mesh is for export.
+surface at their corners. The mesh is the ground truth. It lies within 4.5e-5 of the smooth surface,
+and the teapot's within 6.5e-4 of Newell's patches. The sphere is rendered as an exact quadric; its
+mesh is for export only.
 """
 
 from collections.abc import Callable
@@ -11,13 +11,10 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from scenegen.common.errors import SpecError
-from scenegen.common.rotations import rotation_matrix
-from scenegen.description.scenes import SceneSpec
 from scenegen.objects import teapot
 from scenegen.objects.solids import (
     UnitShape,
@@ -36,50 +33,8 @@ Array = NDArray[Any]
 def unit_shape(name: str) -> UnitShape:
     """Return the unit shape of that name. Raises SpecError for an unknown one."""
     if name not in _BUILDERS:
-        raise SpecError(f"shape: found {name!r}, expected one of {', '.join(_BUILDERS)}")
+        raise SpecError("shape", repr(name), f"one of {', '.join(_BUILDERS)}")
     return _BUILDERS[name]()
-
-
-def welded(shape: UnitShape) -> trimesh.Trimesh:
-    """Return a unit shape as a mesh whose triangles share corners."""
-    triangles = shape.triangles
-    mesh = trimesh.Trimesh(
-        triangles.reshape(-1, 3), np.arange(triangles.size // 3).reshape(-1, 3), process=False
-    )
-    mesh.merge_vertices()
-    return mesh
-
-
-def scene_mesh(
-    scene: SceneSpec, shape_of: Callable[[str], UnitShape] = unit_shape
-) -> trimesh.Trimesh:
-    """Return room and objects as one mesh, world frame, for export and for other engines."""
-    parts = [] if scene.room_reflectance is None else [room_mesh()]
-    for item in scene.objects:
-        mesh = welded(shape_of(item.shape))
-        mesh.apply_transform(world_from_object(item.position, item.rotation, item.scale))
-        parts.append(mesh)
-    return trimesh.util.concatenate(parts)
-
-
-def room_mesh() -> trimesh.Trimesh:
-    """Return the floor y = 0 and the walls x = 0 and z = 0 of the unit box, facing inwards."""
-    faces = np.array([[0, 1, 2], [0, 2, 3]])
-    floor = np.array([[0, 0, 0], [0, 0, 1], [1, 0, 1], [1, 0, 0]], float)
-    planes = [floor, floor[:, [1, 2, 0]], floor[:, [2, 0, 1]]]  # turning the axes keeps the winding
-    return trimesh.util.concatenate([trimesh.Trimesh(p, faces, process=False) for p in planes])
-
-
-def world_from_object(
-    position: tuple[float, float, float],
-    rotation: tuple[float, float, float, float],
-    scale: float,
-) -> NDArray[np.float64]:
-    """Return the (4, 4) similarity of a placed object."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = scale * rotation_matrix(rotation)
-    matrix[:3, 3] = position
-    return matrix
 
 
 def _box() -> UnitShape:
@@ -151,7 +106,7 @@ def _dodecahedron() -> UnitShape:
 
 
 def _golden_points() -> Array:
-    """Vertices of an icosahedron: the cyclic permutations of (0, +-1, +-golden ratio)."""
+    """Return the vertices of an icosahedron: cyclic permutations of (0, +-1, +-golden ratio)."""
     golden = (1 + 5**0.5) / 2
     first = np.array([(0, s, t * golden) for s in (-1, 1) for t in (-1, 1)])
     return np.concatenate([np.roll(first, k, axis=1) for k in range(3)])
@@ -161,7 +116,7 @@ def _teapot() -> UnitShape:
     corners, normals = teapot.tessellate(divisions=32)
     center = (corners.min((0, 1)) + corners.max((0, 1))) / 2
     scale = 1 / np.linalg.norm(corners - center, axis=-1).max()
-    # For placement: the turned parts as discs, which may stick out a hair, the others as points.
+    # The hull for placement: slightly too large discs for turned parts, points for the others.
     points = corners.reshape(-1, 3)
     on_hull = ConvexHull(points).vertices
     turned_points = 4 * teapot.turned_quads(divisions=32)
