@@ -4,7 +4,7 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
-from baselines.pix2shape.network.networks import NetworkSpec
+from baselines.pix2shape.network.architecture import NetworkSpec
 from scenegen.common.errors import SpecError
 from scenegen.common.records import LARGEST, check, from_json, normalise, to_json
 

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from baselines.pix2shape.network.config import ModelConfig
-from baselines.pix2shape.network.networks import Critic, Decoder, Encoder, Statistics
+from baselines.pix2shape.network.architecture import Critic, Decoder, Encoder, Statistics
 from baselines.pix2shape.network.surfels import Scene, render
 
 T = TypeVar("T")

@@ -21,7 +21,7 @@ from baselines.pix2shape.training.batches import Source
 from baselines.pix2shape.training.loop import train
 from baselines.pix2shape.training.state import CHECKPOINT, State, load_state, new_state, save_state
 from baselines.pix2shape.training.steps import draw
-from baselines.pix2shape.weights.weights import Card, save_weights
+from baselines.pix2shape.weights.storage import Card, save_weights
 from iqtt.files.reader import open_questions
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check

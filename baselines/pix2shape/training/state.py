@@ -10,7 +10,7 @@ from torch.optim import Adam
 
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
-from baselines.pix2shape.weights.weights import (
+from baselines.pix2shape.weights.storage import (
     Card,
     load_card,
     load_into,

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from baselines.pix2shape.data.rooms import Batch
 from baselines.pix2shape.network.model import Pix2Shape, mapped, shaded
-from baselines.pix2shape.network.networks import CAMERA
+from baselines.pix2shape.network.architecture import CAMERA
 from baselines.pix2shape.training.losses import (
     absolute_loss,
     contrast_loss,

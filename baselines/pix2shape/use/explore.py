@@ -18,7 +18,7 @@ from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape, Views, mapped
 from baselines.pix2shape.network.surfels import Scene
 from baselines.pix2shape.pictures import drawn, image_tiles, sheet
-from baselines.pix2shape.weights.weights import Card
+from baselines.pix2shape.weights.storage import Card
 from scenegen.camera import Camera
 from scenegen.common.errors import SpecError
 from scenegen.common.seeding import Purpose, item_seed

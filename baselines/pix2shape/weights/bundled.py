@@ -4,7 +4,7 @@ from pathlib import Path
 
 from baselines.pix2shape.data.rooms import is_question_file
 from baselines.pix2shape.network.model import Pix2Shape
-from baselines.pix2shape.weights.weights import Card, load_model
+from baselines.pix2shape.weights.storage import Card, load_model
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
 

@@ -94,7 +94,7 @@ def test_who_interrupts_is_told_how_to_go_on(folder, monkeypatch):
 
 
 def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
-    from baselines.pix2shape.weights.weights import bundled
+    from baselines.pix2shape.weights import bundled
 
     monkeypatch.setattr(bundled, "FOLDER", folder / "none")
     assert bundled.names() == []
@@ -117,7 +117,7 @@ def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
 
 
 def test_weights_that_come_with_the_package_load(folder):
-    from baselines.pix2shape.weights.weights import bundled
+    from baselines.pix2shape.weights import bundled
 
     for name in sorted(set(bundled.names()) - {"iqtt"}):
         model, card = bundled.open_weights(name)

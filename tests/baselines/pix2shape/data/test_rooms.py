@@ -21,7 +21,7 @@ from torch.utils.data import DataLoader, default_collate  # noqa: E402
 
 from baselines.pix2shape.data.rooms import Draws, RoomImages  # noqa: E402
 from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
-from baselines.pix2shape.network.networks import NetworkSpec  # noqa: E402
+from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.surfels import render  # noqa: E402
 
 KNOWN = {"light_position", "light_color", "ambient", "attenuation", "reflectance"}

@@ -17,11 +17,11 @@ from lightning_fabric import Fabric  # noqa: E402
 
 from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
 from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
-from baselines.pix2shape.network.networks import NetworkSpec  # noqa: E402
+from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.training import loop as training  # noqa: E402
 from baselines.pix2shape.training.loop import train  # noqa: E402
 from baselines.pix2shape.training.state import CHECKPOINT, load_state, new_state, save_state  # noqa: E402
-from baselines.pix2shape.weights.weights import Card, load_tensors, save_tensors  # noqa: E402
+from baselines.pix2shape.weights.storage import Card, load_tensors, save_tensors  # noqa: E402
 
 TINY = ModelConfig(
     networks=NetworkSpec(size=32, width=0.05, z_scene=24), iterations=3, batch=4, critic_steps=1,
@@ -36,7 +36,7 @@ from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.data.rooms import RoomImages
 from baselines.pix2shape.training.state import new_state, save_state
 from baselines.pix2shape.training.loop import train
-from baselines.pix2shape.weights.weights import Card
+from baselines.pix2shape.weights.storage import Card
 
 torch.set_num_threads(1)
 fabric = Fabric(accelerator="cpu", devices=2, strategy="ddp")

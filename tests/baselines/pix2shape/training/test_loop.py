@@ -23,12 +23,12 @@ from lightning_fabric import Fabric  # noqa: E402
 from baselines.pix2shape.data.questions import QuestionImages, for_questions  # noqa: E402
 from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
 from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
-from baselines.pix2shape.network.networks import NetworkSpec  # noqa: E402
+from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.training import loop as training  # noqa: E402
 from baselines.pix2shape.training.batches import question_sizes  # noqa: E402
 from baselines.pix2shape.training.loop import TrainingError, train  # noqa: E402
 from baselines.pix2shape.training.state import State, load_state, new_state, save_state  # noqa: E402
-from baselines.pix2shape.weights.weights import Card  # noqa: E402
+from baselines.pix2shape.weights.storage import Card  # noqa: E402
 
 TINY = ModelConfig(
     networks=NetworkSpec(size=32, width=0.05, z_scene=24), iterations=6, batch=4, critic_steps=1,

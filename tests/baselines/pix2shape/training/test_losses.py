@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 torch = pytest.importorskip("torch")
-from baselines.pix2shape.network.networks import NetworkSpec, Statistics  # noqa: E402
+from baselines.pix2shape.network.architecture import NetworkSpec, Statistics  # noqa: E402
 from baselines.pix2shape.training.losses import (  # noqa: E402
     absolute_loss,
     contrast_loss,

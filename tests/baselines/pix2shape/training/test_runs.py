@@ -24,7 +24,7 @@ from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
 from baselines.pix2shape.training import runs  # noqa: E402
 from baselines.pix2shape.training.runs import Machine, train_run  # noqa: E402
 from baselines.pix2shape.training.state import load_state  # noqa: E402
-from baselines.pix2shape.weights.weights import Card, load_card, load_model  # noqa: E402
+from baselines.pix2shape.weights.storage import Card, load_card, load_model  # noqa: E402
 
 HERE = Machine("cpu", workers=0, every=2)
 CONFIG = tiny(seed=3)

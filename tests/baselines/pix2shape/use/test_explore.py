@@ -33,7 +33,7 @@ from baselines.pix2shape.use.explore import (  # noqa: E402
     sample_sheet,
     turned,
 )
-from baselines.pix2shape.weights.weights import Card  # noqa: E402
+from baselines.pix2shape.weights.storage import Card  # noqa: E402
 
 SPEC = DatasetSpec(height=32, width=32)
 CLASSES = ("bag", "bowl", "mug")

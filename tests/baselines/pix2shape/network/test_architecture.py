@@ -7,7 +7,7 @@ import pytest
 torch = pytest.importorskip("torch")
 from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.network.model import Pix2Shape, Views, shaded  # noqa: E402
-from baselines.pix2shape.network.networks import (  # noqa: E402
+from baselines.pix2shape.network.architecture import (  # noqa: E402
     DECODER_CHANNELS,
     ENCODER_CHANNELS,
     ConditionalNorm,

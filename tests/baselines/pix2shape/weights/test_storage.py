@@ -19,8 +19,8 @@ from safetensors.torch import load_file, save_file  # noqa: E402
 
 from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.network.model import Pix2Shape  # noqa: E402
-from baselines.pix2shape.network.networks import NetworkSpec  # noqa: E402
-from baselines.pix2shape.weights.weights import (  # noqa: E402
+from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
+from baselines.pix2shape.weights.storage import (  # noqa: E402
     LARGEST_JSON,
     Card,
     load_model,
