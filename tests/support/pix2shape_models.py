@@ -17,8 +17,8 @@ SIZE = 32  # pixels a side that the networks take
 
 def tiny(size: int = SIZE, **settings: Any) -> Any:
     """Return a configuration of the smallest networks; networks' own settings among the others."""
-    from baselines.pix2shape.network.config import ModelConfig
     from baselines.pix2shape.network.architecture import NetworkSpec
+    from baselines.pix2shape.network.config import ModelConfig
 
     own = {name: settings.pop(name) for name in ("classes", "camera") if name in settings}
     networks = NetworkSpec(size=size, width=0.05, **own)

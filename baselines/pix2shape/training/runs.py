@@ -1,4 +1,4 @@
-"""A training run: a folder with checkpoints, TensorBoard's logs, a picture, and the weights."""
+"""A training run and its folder: checkpoint, TensorBoard logs, a picture, and the weights."""
 
 import errno
 from collections.abc import Callable
@@ -30,17 +30,17 @@ from scenegen.rooms.reader import RoomsFile
 
 WEIGHTS, PICTURE, LOGS = "weights.safetensors", "pictures.png", "logs"
 LOG_EVERY = 20  # iterations
-PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and so many at once
+PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and batch size for that
 
 
 @dataclass(frozen=True)
 class Machine:
-    """Where training happens; one process gives the same anywhere, to rounding.
+    """Where and how training runs; none of this changes what is learned, up to rounding.
 
     Attributes:
-        accelerator, devices, precision: Lightning Fabric's.
-        workers: processes that read.
-        every: iterations between checkpoints, and pictures.
+        accelerator, devices, precision: as in Lightning Fabric.
+        workers: processes that read the data.
+        every: iterations between checkpoints, and between pictures.
     """
 
     accelerator: str = "auto"
@@ -62,16 +62,16 @@ def train_run(
 ) -> Path | None:
     """Train a model, from the start or from the folder's checkpoint.
 
-    Return the weights' path; None on all processes but the first.
+    Returns the path of the weights; None on all processes but the first.
 
     Args:
-        config: None to go on from the checkpoint, with its labels and classes.
-        labels: answers that training on questions may use.
-        conditional: whether the networks are told the class of the only object.
-        progress: called after every iteration.
+        config: None goes on from the checkpoint, with its labels and classes.
+        labels: number of answers that training on questions may use.
+        conditional: whether the networks are told the class of a room's only object.
+        progress: called with the state and the losses after every iteration.
 
-    Raises SpecError where folder, configuration and data do not go together; TrainingError;
-    FileFormatError, OSError.
+    Raises SpecError where configuration and data do not fit; FileExistsError where a new run finds
+    a checkpoint; TrainingError; FileFormatError, OSError.
     """
     folder = Path(folder)
     if config is None:
@@ -134,7 +134,7 @@ def _save_weights(folder: Path, model: Pix2Shape, card: Card, source: Source) ->
 
 @torch.no_grad()
 def fit_prior(model: Pix2Shape, source: Source) -> None:
-    """Give the prior the distribution of codes of the first images."""
+    """Fit the prior to the codes of the first images."""
     device = next(model.parameters()).device
     loader = DataLoader(source, batch_size=BATCH, sampler=range(min(len(source), PRIOR_ITEMS)))
     learning = model.training
@@ -161,10 +161,10 @@ def _sources(
 
 
 def _new_card(config: ModelConfig, data: str | Path, labels: int, conditional: bool) -> Card:
-    """Return the configuration as the data wants it, and what the data is."""
+    """Return the card of a new run: its configuration suits the data, which it describes."""
     if is_question_file(data):
         if conditional:
-            raise SpecError(f"{data}: questions have no classes to condition on")
+            raise SpecError(data, "questions, which have no classes", "rooms for --conditional")
         check(config.depth == 0, "depth", config.depth, "0 for questions, which have no depth maps")
         config = for_questions(config, data, "unlabeled")
         config = replace(config, questions=config.questions if labels else 0.0)
@@ -196,7 +196,7 @@ def _new_card(config: ModelConfig, data: str | Path, labels: int, conditional: b
 
 
 def _fingerprint(data: str | Path, labels: int) -> str:
-    """Return that of rooms, or of the parts of a question file that are used."""
+    """Return the fingerprint of rooms, or those of the parts of a question file that are used."""
     if not is_question_file(data):
         with RoomsFile(data) as rooms:
             return rooms.fingerprint
@@ -208,10 +208,12 @@ def _fingerprint(data: str | Path, labels: int) -> str:
 
 
 def _check_same(card: Card, data: str | Path) -> None:
-    """Refuse to go on with other data."""
+    """Raise SpecError where a run would go on with other data."""
     found = _fingerprint(data, card.labels)
     if found != card.fingerprint:
         raise SpecError(
-            f"{data}: fingerprint {found[:12]}, the run was trained on {card.fingerprint[:12]};"
-            " resume with the same data"
+            data,
+            f"fingerprint {found[:12]}",
+            f"{card.fingerprint[:12]}, on which the run was trained",
+            "resume with the same data",
         )

@@ -1,4 +1,4 @@
-"""What a model has learned, as pictures: samples, the way between two images, unseen views."""
+"""Pictures of what a model has learned: samples, interpolations between images, other views."""
 
 import math
 from collections.abc import Sequence
@@ -27,36 +27,35 @@ from scenegen.description.specs import DatasetSpec
 from scenegen.sampling.scenes import sample_cameras, sample_lights
 
 Array = NDArray[Any]
-ROW = 8  # tiles side by side
+ROW = 8  # tiles in a row of a sheet
 
 
 def known_rooms(data: str | Path, card: Card) -> RoomImages:
-    """Open rooms whose images a model shall see. Raises as `RoomImages`, SpecError."""
+    """Open rooms for a model to encode. Raises as `RoomImages`, and SpecError for other classes."""
     _check_camera(card.config)
     rooms = RoomImages(data, replace(card.config, depth=0.0))
     if card.classes and rooms.classes != card.classes:
-        raise SpecError(
-            f"{data}: classes {', '.join(rooms.classes)}, the model knows {', '.join(card.classes)}"
-        )
+        known = f"{', '.join(card.classes)}, as the model knows"
+        raise SpecError(data, f"classes {', '.join(rooms.classes)}", known)
     return rooms
 
 
 def sample_sheet(
     model: Pix2Shape, card: Card, count: int, seed: int, label: str | None = None
 ) -> Image.Image:
-    """Draw codes from the model's prior, seen by cameras and lights as of the training data.
+    """Draw codes from the model's prior; cameras and lights are drawn as for the training data.
 
-    Lines of images, depths and normals.
+    The sheet has rows of images, of depths and of normals.
 
     Args:
-        label: class, for a conditional model; None for each in turn.
+        label: class of a conditional model's samples; None takes each class in turn.
 
-    Raises SpecError for a label where there are none, or that is unknown; a model of questions.
+    Raises SpecError for a label that the model does not know, and for a model of questions.
     """
     spec = replace(rooms_spec(card), seed=seed)
     known = f"one of {', '.join(card.classes)}" if card.classes else "none: it knows no classes"
     if label is not None and label not in card.classes:
-        raise SpecError(f"class: found {label!r}, expected {known}")
+        raise SpecError("class", repr(label), known)
     one_hot = np.zeros((count, len(card.classes)))
     for i in range(count if card.classes else 0):
         one_hot[i, i % len(card.classes) if label is None else card.classes.index(label)] = 1
@@ -72,9 +71,9 @@ def sample_sheet(
 def interpolation_sheet(
     model: Pix2Shape, rooms: RoomImages, first: int, last: int, steps: int
 ) -> Image.Image:
-    """Go from one image's code to another's in equal steps, all seen from the first one's camera.
+    """Go from one image's code to another's in equal steps, seen from the first one's camera.
 
-    The first and the last tile of the first line are the two images themselves.
+    The two images themselves are the first and the last tile of the sheet's first row.
     """
     _check_camera(model.config)
     batch = rooms.as_batch(default_collate([rooms[first], rooms[last]]))
@@ -91,10 +90,10 @@ def interpolation_sheet(
 def rotation_frames(
     model: Pix2Shape, rooms: RoomImages, rows: Sequence[int], degrees: Sequence[float]
 ) -> list[Image.Image]:
-    """Turn the camera about the vertical axis through its target, away from the images' views.
+    """Turn the camera about the vertical axis through its target; return a sheet for each angle.
 
-    The turn goes to the side that stays farther within the room's open octant. A frame for each
-    angle: lines of input images, images, depths and normals.
+    The camera turns to the side where it stays longer in front of the room's two walls. A sheet
+    has rows of the input images, and of images, depths and normals at the angle.
     """
     _check_camera(model.config)
     batch = rooms.as_batch(default_collate([rooms[row] for row in rows]))
@@ -113,7 +112,7 @@ def rotation_frames(
 
 
 def turned(world_from_camera: Array, spec: DatasetSpec, degrees: float) -> Camera:
-    """Return a camera that was turned about the vertical axis through the target."""
+    """Return a camera turned about the vertical axis through its target."""
     x, y, z = (float(v) for v in world_from_camera[:3, 3] - spec.camera_target)
     azimuth = math.atan2(z, x)
     sign = 1 if azimuth < math.pi / 4 else -1
@@ -130,7 +129,7 @@ def known_views(
     lights: Sequence[Sequence[Light]],
     one_hot: Array,
 ) -> Views:
-    """Return what is known of views that were never rendered: cameras, lights, materials."""
+    """Return the cameras, lights and reflectance of views that were never rendered."""
     most = max(1, *map(len, lights))
     position, color = np.zeros((len(cameras), most, 3)), np.zeros((len(cameras), most, 3))
     for i, (camera, own) in enumerate(zip(cameras, lights, strict=True)):
@@ -151,14 +150,14 @@ def known_views(
 
 
 def rooms_spec(card: Card) -> DatasetSpec:
-    """Return the request that the training rooms answer. Raises SpecError for other models."""
+    """Return the spec of the training rooms. Raises SpecError for a model of questions."""
     _check_camera(card.config)
     return DatasetSpec.from_json(card.data)
 
 
 def _check_camera(config: ModelConfig) -> None:
     if not config.networks.camera:
-        raise SpecError("weights: a model of questions, expected one of rooms")
+        raise SpecError("weights", "a model of questions", "one of rooms")
 
 
 def _tensor(values: Array) -> Tensor:

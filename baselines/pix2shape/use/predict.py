@@ -1,4 +1,4 @@
-"""Predictions of a trained model, written as any submission is; no truth is read but cameras."""
+"""Submissions of a trained model. Of the truth only the cameras of rooms are read."""
 
 import warnings
 from collections.abc import Callable, Iterator
@@ -40,13 +40,17 @@ def predict_file(
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> None:
-    """Write the submission of some weights, to rooms or to questions.
+    """Write a submission for rooms or questions.
 
     Args:
-        weights: a path, or a name of bundled ones.
+        weights: a path, or the name of bundled weights.
+        data: rooms or questions.
+        out: submission to write.
         device: "auto", "cpu" or "cuda".
+        run: name of this run among several of the method.
+        progress: called with the number of rows just done and of all rows.
 
-    Raises as `load_model`, `predict_rooms` and `answer_file`.
+    Raises as `open_weights`, `predict_rooms` and `answer_file`.
     """
     model, _ = open_weights(weights)
     model.to(chosen_device(device))
@@ -58,7 +62,7 @@ def predict_file(
 
 
 def chosen_device(name: str, count: int = 1) -> torch.device:
-    """Return a device by name; "auto" is a GPU where there is one. Raises SpecError."""
+    """Return a device by name; "auto" is a GPU if there is one. Raises SpecError."""
     if name == "cuda" and not torch.cuda.is_available():
         raise SpecError("device", "no GPU that this torch can use", hint="say --device cpu")
     if name != "cpu" and torch.cuda.is_available():
@@ -114,9 +118,11 @@ def answer_file(
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> None:
-    """Write answers to the questions of a file: the answer whose z_scene is nearest.
+    """Write answers to the questions of a file, from images alone.
 
-    Raises SpecError where the model is not one for questions; else as `iqtt.QuestionsFile`.
+    An answer's score is minus the distance of its z_scene from the reference's, as in the paper.
+
+    Raises SpecError where the model does not suit questions; else as `iqtt.QuestionsFile`.
     """
     spec = model.config.networks
     if spec.condition:
@@ -146,18 +152,18 @@ def answer_file(
 def enlarged(depth: Tensor, fov_y_degrees: float, size: int) -> tuple[Tensor, Tensor]:
     """Return depth, (B, size, size), and normals, (B, 3, size, size), of smaller depth maps.
 
-    Inverse depth is what is interpolated: planes stay planes.
+    Inverse depth is interpolated, as it is affine on planes: planes stay planes.
     """
     normals = normals_from_depth(depth, fov_y_degrees)
     factor = size // depth.shape[1]
     if factor == 1:
         return depth, normals
-    # The outer pixels' centres lie within the image: continue to its border, and cut that off.
+    # The outer pixels' centres lie within the image: extrapolate beyond its border, then crop.
     wide = functional.interpolate(
         extrapolated(1 / depth)[:, None], scale_factor=factor, mode="bilinear"
     )
     inverse = wide[:, 0, factor:-factor, factor:-factor]
-    least = 0.5 / depth.amax(dim=(1, 2), keepdim=True)  # a surface may end beyond the last centre
+    least = 0.5 / depth.amax(dim=(1, 2), keepdim=True)  # keeps extrapolated depth finite
     normals = functional.interpolate(normals, scale_factor=factor, mode="bilinear")
     return 1 / torch.maximum(inverse, least), functional.normalize(normals, dim=1)
 

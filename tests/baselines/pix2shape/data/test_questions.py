@@ -18,8 +18,8 @@ torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
 from baselines.pix2shape.data.questions import QuestionImages, for_questions  # noqa: E402
-from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
+from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.network.surfels import render  # noqa: E402
 
 SPEC = SplitSpec(

@@ -20,8 +20,8 @@ torch = pytest.importorskip("torch")
 from torch.utils.data import DataLoader, default_collate  # noqa: E402
 
 from baselines.pix2shape.data.rooms import Draws, RoomImages  # noqa: E402
-from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
+from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.network.surfels import render  # noqa: E402
 
 KNOWN = {"light_position", "light_color", "ambient", "attenuation", "reflectance"}

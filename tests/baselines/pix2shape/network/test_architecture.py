@@ -5,8 +5,6 @@ import itertools
 import pytest
 
 torch = pytest.importorskip("torch")
-from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
-from baselines.pix2shape.network.model import Pix2Shape, Views, shaded  # noqa: E402
 from baselines.pix2shape.network.architecture import (  # noqa: E402
     DECODER_CHANNELS,
     ENCODER_CHANNELS,
@@ -17,6 +15,8 @@ from baselines.pix2shape.network.architecture import (  # noqa: E402
     NetworkSpec,
     Statistics,
 )
+from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
+from baselines.pix2shape.network.model import Pix2Shape, Views, shaded  # noqa: E402
 from baselines.pix2shape.network.surfels import Scene  # noqa: E402
 
 SMALL = NetworkSpec(size=32, width=0.05)

@@ -8,9 +8,9 @@ import pytest
 from scenegen.common.errors import SpecError
 
 torch = pytest.importorskip("torch")
+from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.config import CONFIGS, ModelConfig, model_config  # noqa: E402
 from baselines.pix2shape.network.model import Pix2Shape, Views  # noqa: E402
-from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.surfels import Scene, render  # noqa: E402
 
 TINY = ModelConfig(networks=NetworkSpec(size=32, width=0.05))

@@ -16,8 +16,8 @@ torch = pytest.importorskip("torch")
 from lightning_fabric import Fabric  # noqa: E402
 
 from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
-from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
+from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.training import loop as training  # noqa: E402
 from baselines.pix2shape.training.loop import train  # noqa: E402
 from baselines.pix2shape.training.state import CHECKPOINT, load_state, new_state, save_state  # noqa: E402

@@ -22,8 +22,8 @@ from lightning_fabric import Fabric  # noqa: E402
 
 from baselines.pix2shape.data.questions import QuestionImages, for_questions  # noqa: E402
 from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
-from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
+from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.training import loop as training  # noqa: E402
 from baselines.pix2shape.training.batches import question_sizes  # noqa: E402
 from baselines.pix2shape.training.loop import TrainingError, train  # noqa: E402

@@ -9,9 +9,9 @@ import pytest
 
 torch = pytest.importorskip("torch")
 from baselines.pix2shape.data.rooms import Batch  # noqa: E402
+from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.network.model import Pix2Shape, Views  # noqa: E402
-from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.surfels import Scene, pixel_rays  # noqa: E402
 from baselines.pix2shape.training.losses import (  # noqa: E402
     absolute_loss,

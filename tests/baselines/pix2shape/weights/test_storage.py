@@ -17,9 +17,9 @@ from scenegen.common.errors import FileFormatError
 torch = pytest.importorskip("torch")
 from safetensors.torch import load_file, save_file  # noqa: E402
 
+from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.network.model import Pix2Shape  # noqa: E402
-from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.weights.storage import (  # noqa: E402
     LARGEST_JSON,
     Card,
