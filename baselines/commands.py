@@ -5,7 +5,6 @@ import click
 from baselines.pix2shape.commands import EXAMPLE, predict_to
 from scenegen.common.command_line import OVERWRITE, progress_bar
 
-
 BASELINES = """\b
 Baselines:
   constant    one depth everywhere, the mean of the training rooms

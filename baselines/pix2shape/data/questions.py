@@ -97,10 +97,10 @@ def for_questions(config: ModelConfig, path: str | Path, part: str | None) -> Mo
             raise SpecError(path, "a released file", "one that `iqtt make-split` wrote")
         distance = float(np.linalg.norm(questions.spec.camera.world_from_camera[:3, 3]))
         radius = questions.spec.max_radius
-    codes = {"z_scene": spec.z - Z_VIEW, "z_view": Z_VIEW, "standardised": True}
+    spec = replace(spec, camera=False, classes=0, standardised=True)
     return replace(
         config,
-        networks=replace(spec, camera=False, classes=0, **codes),
+        networks=replace(spec, z_scene=spec.z - Z_VIEW, z_view=Z_VIEW),
         depth_middle=distance,
         depth_reach=min(0.9, radius / distance),
         opacity=True,

@@ -159,8 +159,8 @@ def load_into(
     for name, value in wanted.items():
         found = tensors[name]
         if found.shape != value.shape:
-            shapes = [f"shape {tuple(one.shape)}" for one in (found, value)]
-            raise FileFormatError(f"{path}: {name}", *shapes, other)
+            shape, expected = (f"shape {tuple(one.shape)}" for one in (found, value))
+            raise FileFormatError(f"{path}: {name}", shape, expected, other)
         kinds = [(v.is_floating_point(), v.is_complex()) for v in (found, value)]
         if kinds[0] != kinds[1] or (found.element_size() == 1 and value.element_size() > 1):
             raise FileFormatError(f"{path}: {name}", found.dtype, value.dtype)
