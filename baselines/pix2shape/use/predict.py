@@ -133,7 +133,7 @@ def answer_file(
     with open_questions(data) as questions:
         check_reducible(data, questions.height, questions.width, spec.size)
         scores = []
-        for rows in _batches(len(questions), BATCH // 4):
+        for rows in _batches(len(questions), 4):
             images = [
                 channels_first(image, spec.size)
                 for row in rows
@@ -214,5 +214,7 @@ def _codes(
         yield model.encoder(image, condition[rows].to(device)).cpu()
 
 
-def _batches(count: int, size: int = BATCH) -> Iterator[Array]:
+def _batches(count: int, items: int = 1) -> Iterator[Array]:
+    """Yield the rows of batch after batch, where each row has so many images."""
+    size = BATCH // items
     return (np.arange(first, min(first + size, count)) for first in range(0, count, size))

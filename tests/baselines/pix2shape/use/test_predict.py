@@ -40,7 +40,6 @@ def model() -> Any:
 def few_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither 8 nor 9 rows, nor 3 scenes, fill whole batches."""
     monkeypatch.setattr(predict, "BATCH", 2)
-    monkeypatch.setattr(predict._batches, "__defaults__", (2,))
 
 
 def predicted(model: Any, path: Path, out: Path) -> Fields:

@@ -22,7 +22,8 @@ LARGEST = 25_000_000  # bytes in all
 def test_they_are_small_and_each_has_its_card() -> None:
     assert sum(path.stat().st_size for path in FOLDER.iterdir()) <= LARGEST
     for name in names():
-        _, card = open_weights(name)
+        model, card = open_weights(name)
+        assert card.config == model.config
         assert card.iteration == card.config.iterations
         assert card.config.depth == 0, "they learned without depth maps"
 
