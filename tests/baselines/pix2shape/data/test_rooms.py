@@ -18,7 +18,7 @@ from scenegen.description.presets import VESSELS
 from scenegen.rooms.reader import RoomsFile
 
 torch = pytest.importorskip("torch")
-from torch.utils.data import DataLoader, default_collate  # noqa: E402
+from torch.utils.data import default_collate  # noqa: E402
 
 from baselines.pix2shape.data.rooms import Draws, RoomImages  # noqa: E402
 from baselines.pix2shape.network.surfels import render  # noqa: E402
@@ -164,16 +164,6 @@ def test_other_classes_and_other_files_are_refused(vessels_path, tmp_path):
     (tmp_path / "text.h5").write_text("no rooms")
     with pytest.raises(FileFormatError, match=r"text\.h5"):
         RoomImages(tmp_path / "text.h5", tiny())
-
-
-@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
-def test_a_loader_with_workers(rooms_path):
-    source = RoomImages(rooms_path, tiny(depth=1.0))
-    source[0]  # open here, before the workers are forked
-    draws = Draws(len(source), 3, seed=4)
-    loader = DataLoader(source, batch_sampler=draws, num_workers=2)
-    for rows, items in islice(zip(draws, loader, strict=False), 4):
-        assert same(items, default_collate([source[row] for row in rows]))
 
 
 @settings(deadline=None, max_examples=40)

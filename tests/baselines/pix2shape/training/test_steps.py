@@ -1,6 +1,5 @@
 """One step: the losses that are asked for, their weighted sum, and gradients where they belong."""
 
-import itertools
 import math
 from dataclasses import replace
 from typing import Any
@@ -77,8 +76,7 @@ def test_the_total_is_the_weighted_sum():
     """Whichever are on: each has the value that it has alone."""
     weights = {name: 0.3 + 0.1 * place for place, name in enumerate(LOSSES)}
     alone = {name: step(only(**{name: 1.0}))[1][name].item() for name in LOSSES}
-    subsets = itertools.chain(itertools.combinations(LOSSES, 2), [(), LOSSES])
-    for chosen in subsets:
+    for chosen in ((), LOSSES[::2], LOSSES[1::2], LOSSES[:4], LOSSES):
         total, losses = step(only(**{name: weights[name] for name in chosen}))
         assert set(losses) == set(chosen)
         found = {name: value.item() for name, value in losses.items()}
@@ -249,13 +247,13 @@ def test_consistency_teaches_both_depths_with_the_codes_own_class():
     assert other.grad.any()
 
 
-def test_images_are_compared_by_the_norm_or_by_absolute_differences():
+@pytest.mark.parametrize(("absolute", "loss"), [(0, reconstruction_loss), (1, absolute_loss)])
+def test_images_are_compared_by_the_norm_or_by_absolute_differences(absolute, loss):
     batch = some_batch()
-    for absolute, expected in ((False, reconstruction_loss), (True, absolute_loss)):
-        model = model_of(replace(only(reconstruction=1.0), absolute_differences=absolute))
-        found = generator_step(model, batch, draw(8, 8, 3))[1]["reconstruction"]
-        again = model.image(model.encode(batch.image, batch.views), batch.views)
-        assert found.item() == pytest.approx(expected(batch.image, again).item(), rel=1e-5)
+    model = model_of(replace(only(reconstruction=1.0), absolute_differences=bool(absolute)))
+    found = generator_step(model, batch, draw(8, 8, 3))[1]["reconstruction"]
+    again = model.image(model.encode(batch.image, batch.views), batch.views)
+    assert found.item() == pytest.approx(loss(batch.image, again).item(), rel=1e-5)
 
 
 def test_noise_is_the_seeds():
