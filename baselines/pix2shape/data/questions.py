@@ -25,6 +25,8 @@ class QuestionImages(Dataset[dict[str, Any]]):
     paper, and the answer where the file has one. Shapes, cameras and rotations are never read.
     """
 
+    classes: tuple[str, ...] = ()  # as RoomImages has; the networks are told none
+
     def __init__(self, path: str | Path, part: str | None, config: ModelConfig) -> None:
         """Check the file. Raises as `QuestionsFile`, and SpecError where it tells no lights."""
         self._size = config.networks.size
@@ -40,15 +42,15 @@ class QuestionImages(Dataset[dict[str, Any]]):
                     "some, with the group `truth` that tells the lights",
                     "`iqtt make-split` writes it",
                 )
-            self._spec = questions.spec
+            self.spec = questions.spec
             fields = ["questions", "light_position", "light_color"]
             self.has_answers = questions.has_answers
         self._rows = QuestionsDataset(
             path, part, [*fields, "answers"] if self.has_answers else fields
         )
         self.fingerprint = self._rows.fingerprint
-        self.fov_y_degrees = self._spec.camera.fov_y_degrees
-        self._camera = self._spec.camera.world_from_camera
+        self.fov_y_degrees = self.spec.camera.fov_y_degrees
+        self._camera = self.spec.camera.world_from_camera
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -63,10 +65,10 @@ class QuestionImages(Dataset[dict[str, Any]]):
             "condition": np.empty((4, 0)),
             "light_position": (stored["light_position"] - place) @ self._camera[:3, :3],
             "light_color": stored["light_color"],
-            "ambient": np.tile(self._spec.ambient, (4, 1)),
+            "ambient": np.tile(self.spec.ambient, (4, 1)),
             "attenuation": np.tile((0.0, 1.0), (4, 1)),
-            "reflectance": np.tile(self._spec.reflectance, (4, 1)),
-            "background": np.tile(self._spec.background, (4, 1)),
+            "reflectance": np.tile(self.spec.reflectance, (4, 1)),
+            "background": np.tile(self.spec.background, (4, 1)),
         }
         item: dict[str, Any] = {name: np.float32(value) for name, value in known.items()}
         if self.has_answers:

@@ -52,7 +52,8 @@ def sample_sheet(
 
     Raises SpecError for a label that the model does not know, and for a model of questions.
     """
-    spec = replace(rooms_spec(card), seed=seed)
+    _check_camera(card.config)
+    spec = replace(DatasetSpec.from_json(card.data), seed=seed)
     known = f"one of {', '.join(card.classes)}" if card.classes else "none: it knows no classes"
     if label is not None and label not in card.classes:
         raise SpecError("class", repr(label), known)
@@ -75,7 +76,6 @@ def interpolation_sheet(
 
     The two images themselves are the first and the last tile of the sheet's first row.
     """
-    _check_camera(model.config)
     batch = rooms.as_batch(default_collate([rooms[first], rooms[last]]))
     with torch.no_grad():
         code = model.encode(batch.image, batch.views)
@@ -95,7 +95,6 @@ def rotation_frames(
     The camera turns to the side where it stays longer in front of the room's two walls. A sheet
     has rows of the input images, and of images, depths and normals at the angle.
     """
-    _check_camera(model.config)
     batch = rooms.as_batch(default_collate([rooms[row] for row in rows]))
     with torch.no_grad():
         code = model.encode(batch.image, batch.views)
@@ -147,12 +146,6 @@ def known_views(
         np.tile(spec.room_reflectance, count),
     )
     return Views(_tensor(condition), Scene(spec.fov_y_degrees, *map(_tensor, known)))
-
-
-def rooms_spec(card: Card) -> DatasetSpec:
-    """Return the spec of the training rooms. Raises SpecError for a model of questions."""
-    _check_camera(card.config)
-    return DatasetSpec.from_json(card.data)
 
 
 def _check_camera(config: ModelConfig) -> None:
