@@ -26,6 +26,12 @@ DEVICE = click.option(
 )
 
 
+def _number(*names: str, least: int, default: int, text: str, most: int | None = None) -> Any:
+    """Return an option that takes a whole number and shows its default."""
+    kind = click.IntRange(least, most)
+    return click.option(*names, type=kind, default=default, show_default=True, help=text)
+
+
 class Setting(click.ParamType):  # type: ignore[type-arg]
     """`name=value`, where the value is written as in JSON."""
 
@@ -60,12 +66,11 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
     " weights.json of a run lists all settings.",
 )
 @click.option("--seed", type=click.IntRange(0), help="Seed of every random choice  [0].")
-@click.option(
+@_number(
     "--labels",
-    type=click.IntRange(0),
+    least=0,
     default=0,
-    show_default=True,
-    help="Number of labelled questions whose answers may be learned from.",
+    text="Number of labelled questions whose answers may be learned from.",
 )
 @click.option(
     "--conditional",
@@ -73,24 +78,10 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
     help="Tell the networks the class of the object, in rooms of one object each.",
 )
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint of --out.")
-@click.option(
-    "--workers",
-    type=click.IntRange(0),
-    default=1,
-    show_default=True,
-    help="Processes that read the data.",
-)
-@click.option(
-    "--every",
-    type=click.IntRange(1),
-    default=500,
-    show_default=True,
-    help="Iterations between checkpoints.",
-)
+@_number("--workers", least=0, default=1, text="Processes that read the data.")
+@_number("--every", least=1, default=500, text="Iterations between checkpoints.")
 @DEVICE
-@click.option(
-    "--devices", type=click.IntRange(1), default=1, show_default=True, help="Number of devices."
-)
+@_number("--devices", least=1, default=1, text="Number of devices.")
 @click.option(
     "--precision",
     type=click.Choice(["32", "bf16"]),
@@ -203,22 +194,9 @@ def predict_to(out: str, weights: str | None, data: str, **how: Any) -> str:
 @click.command(epilog=f"{EXAMPLE}pix2shape sample --weights shapes --out samples.png")
 @click.option("--weights", default="shapes", show_default=True, help=f"{A_MODEL}.")
 @click.option("--out", default="samples.png", show_default=True, help=PICTURE)
-@click.option(
-    "--n",
-    "count",
-    type=click.IntRange(1, 256),
-    default=16,
-    show_default=True,
-    help="Number of samples.",
-)
+@_number("--n", "count", least=1, most=256, default=16, text="Number of samples.")
 @click.option("--class", "label", help="Class that a conditional model samples  [each in turn].")
-@click.option(
-    "--seed",
-    type=click.IntRange(0),
-    default=0,
-    show_default=True,
-    help="Seed of codes, cameras and lights.",
-)
+@_number("--seed", least=0, default=0, text="Seed of codes, cameras and lights.")
 def sample(weights: str, out: str, count: int, label: str | None, seed: int) -> None:
     """Draw samples of the model's prior, as images, depths and normals."""
     needs_torch()
@@ -240,9 +218,7 @@ def sample(weights: str, out: str, count: int, label: str | None, seed: int) -> 
 @click.option(
     "--items", type=Items(), default="0,1", show_default=True, help="The two rows to go between."
 )
-@click.option(
-    "--steps", type=click.IntRange(2, 64), default=8, show_default=True, help="Number of codes."
-)
+@_number("--steps", least=2, most=64, default=8, text="Number of codes.")
 @click.option("--out", default="interpolation.png", show_default=True, help=PICTURE)
 def interpolate(weights: str | None, data: str, items: list[int], steps: int, out: str) -> None:
     """Draw the way from one room's code to another's, seen from the first room's camera."""
@@ -262,20 +238,14 @@ def interpolate(weights: str | None, data: str, items: list[int], steps: int, ou
 @click.option(
     "--items", type=Items(), default="0-5", show_default=True, help="Rows of the rooms to turn."
 )
-@click.option(
+@_number(
     "--degrees",
-    type=click.IntRange(0, 90),
+    least=0,
+    most=90,
     default=80,
-    show_default=True,
-    help="How far the camera turns about the vertical axis.",
+    text="How far the camera turns about the vertical axis.",
 )
-@click.option(
-    "--frames",
-    type=click.IntRange(2, 200),
-    default=33,
-    show_default=True,
-    help="Number of pictures on the way there.",
-)
+@_number("--frames", least=2, most=200, default=33, text="Number of pictures on the way there.")
 @click.option("--out", default="rotation.gif", show_default=True, help="GIF or WebP to write.")
 def rotate(
     weights: str | None, data: str, items: list[int], degrees: int, frames: int, out: str

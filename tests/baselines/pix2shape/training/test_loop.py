@@ -165,6 +165,8 @@ def test_some_of_the_contrasted_questions_are_labelled(train_path, fabric, monke
             rows = images.image.view(8, -1)[:known].numpy()
             assert [told[row.tobytes()] for row in rows] == answers[:known].tolist()
         assert len({images.image.numpy().tobytes() for images, _ in asked}) == len(asked)
+    losses = run(new_state(config), labelled, fabric, 2)  # a file with answers, but no labels
+    assert all("contrast" in one and "questions" not in one for one in losses)
     assert run(new_state(replace(config, contrast=0.0)), source, fabric, 1)
     assert asked[-1] is None, "nothing is compared without a label"
 
@@ -179,15 +181,6 @@ def test_one_place_for_every_hundred_labels_up_to_a_quarter(labels, expected, tr
     assert question_sizes(config, source, labels) == (expected, 32 - expected)
     plain = replace(config, contrast=0.0)
     assert question_sizes(plain, source, labels) == (32 if labels else 0, 0)
-
-
-def test_no_answer_is_looked_at_without_labels(train_path, fabric):
-    """Though the file of the images has them."""
-    plain = replace(TINY, questions=1.0, contrast=1.0, batch=8, question_batch=8)
-    config = for_questions(plain, train_path, "labeled")
-    labelled = QuestionImages(train_path, "labeled", config)
-    losses = run(new_state(config), labelled, fabric, 2)
-    assert all("contrast" in one and "questions" not in one for one in losses)
 
 
 def test_views_of_questions_are_not_compared(train_path, fabric):

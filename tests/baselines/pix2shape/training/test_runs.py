@@ -124,22 +124,14 @@ def test_a_kill_before_the_first_checkpoint(rooms_path, folder, unbroken):
     assert same(folder / "weights.safetensors", unbroken / "weights.safetensors")
 
 
-def test_a_finished_run_goes_no_further(rooms_path, folder, unbroken):
+def test_a_finished_run_is_neither_trained_on_nor_replaced(rooms_path, folder, unbroken):
     shutil.copytree(unbroken, folder)
     (folder / "weights.safetensors").unlink()
     train_run(folder, rooms_path, None, HERE, progress=lambda *_: pytest.fail("trained on"))
     assert same(folder / "weights.safetensors", unbroken / "weights.safetensors")
-
-
-def test_a_run_is_not_replaced(rooms_path, folder, unbroken):
-    shutil.copytree(unbroken, folder)
-    with pytest.raises(FileExistsError, match="holds a checkpoint; say --resume"):
+    with pytest.raises(FileExistsError, match="--resume"):
         train_run(folder, rooms_path, CONFIG, HERE)
     assert same(folder / "checkpoint.safetensors", unbroken / "checkpoint.safetensors")
-
-
-def test_it_goes_on_with_its_own_data(rooms_path, folder, unbroken):
-    shutil.copytree(unbroken, folder)
     path = edited(rooms_path, folder.parent / "other.h5", attribute("fingerprint", "0" * 64))
     with pytest.raises(SceneGenError) as error:
         train_run(folder, path, None, HERE)

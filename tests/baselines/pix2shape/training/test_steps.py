@@ -85,13 +85,6 @@ def test_the_total_is_the_weighted_sum():
         assert total.item() == pytest.approx(expected, rel=1e-5, abs=1e-7)
 
 
-def test_what_is_not_there_is_not_named():
-    config = only(reconstruction=1.0, depth=1.0, questions=1.0)
-    batch = replace(some_batch(), depth=None)
-    losses = generator_step(model_of(config), batch, draw(8, 8, 3))[1]
-    assert set(losses) == {"reconstruction"}
-
-
 @pytest.mark.parametrize(
     ("weights", "learn"),
     [

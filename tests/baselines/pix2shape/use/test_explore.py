@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from pix2shape_models import edited, made, tiny
 
 from scenegen.camera import Camera
-from scenegen.common.errors import SpecError
 from scenegen.description.presets import PAPER_VIEWS
 from scenegen.description.specs import DatasetSpec
 from scenegen.rooms.reader import RoomsFile
@@ -28,7 +27,6 @@ from baselines.pix2shape.pictures import drawn, image_tiles, sheet  # noqa: E402
 from baselines.pix2shape.use import explore  # noqa: E402
 from baselines.pix2shape.use.explore import (  # noqa: E402
     interpolation_sheet,
-    known_rooms,
     known_views,
     rotation_frames,
     sample_sheet,
@@ -153,23 +151,6 @@ def test_samples_are_seen_as_training_images_were(conditional, monkeypatch):
     assert seen[1][2].condition[:, 3:].tolist() == [[0, 1, 0]] * 5
     sample_sheet(conditional, card, 5, 7)
     assert not torch.isclose(seen[2][1], seen[1][1]).any(), "codes are the seed's"
-
-
-@pytest.mark.parametrize(("classes", "label"), [(3, "sofa"), (0, "mug")])
-def test_labels_that_are_not_known_are_refused(classes, label, model, conditional):
-    chosen = conditional if classes else model
-    with pytest.raises(SpecError) as error:
-        sample_sheet(chosen, card_of(chosen, classes=CLASSES[:classes]), 2, 0, label)
-    assert (error.value.where, error.value.found) == ("class", repr(label))
-
-
-def test_a_model_of_questions_is_refused(several_path):
-    model = made(tiny(camera=False))
-    card = Card(model.config, data="{}")
-    for call in (lambda: sample_sheet(model, card, 2, 0), lambda: known_rooms(several_path, card)):
-        with pytest.raises(SpecError) as error:
-            call()
-        assert (error.value.where, error.value.found) == ("weights", "a model of questions")
 
 
 def test_an_interpolation_ends_in_the_two_reconstructions(model, several_path):

@@ -22,7 +22,6 @@ torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
 from baselines.pix2shape.data.rooms import RoomImages, channels_first  # noqa: E402
-from baselines.pix2shape.network.surfels import normals_from_depth  # noqa: E402
 from baselines.pix2shape.use import predict  # noqa: E402
 from baselines.pix2shape.use.predict import answer_file, enlarged, predict_file, predict_rooms  # noqa: E402
 
@@ -89,16 +88,6 @@ def test_each_row_is_the_input_views_code_seen_from_the_rows_camera(model, sever
         np.testing.assert_allclose(found["depth"][row], depth[0], rtol=1e-4)
         np.testing.assert_allclose(found["normal"][row], normal[0].permute(1, 2, 0), atol=1e-3)
     assert len({found["depth"][row].tobytes() for row in range(9)}) == 9
-
-
-def test_rows_may_come_in_any_order(model, several_path, tmp_path):
-    order = [4, 8, 0, 2, 3, 7, 1, 6, 5]
-    path = edited(several_path, tmp_path / "mixed.h5", of_rows(order))
-    found = predicted(model, path, tmp_path / "p.h5")
-    expected = predicted(model, several_path, tmp_path / "q.h5")
-    assert found["row"].tolist() == list(range(9))
-    np.testing.assert_allclose(found["depth"], expected["depth"][order], rtol=1e-4)
-    np.testing.assert_allclose(found["normal"], expected["normal"][order], atol=1e-3)
 
 
 def test_without_view_0_the_first_stored_view_is_the_input(model, several_path, tmp_path):
@@ -171,13 +160,6 @@ def test_planes_stay_planes_when_enlarged(size):
     expected, slant = plane(size)
     np.testing.assert_allclose(depth, expected, rtol=2e-6)
     np.testing.assert_allclose(normal[0].permute(1, 2, 0).numpy() - slant, 0, atol=1e-5)
-
-
-def test_depth_of_the_files_own_size_is_left_alone():
-    depth = 1 + torch.rand(2, 32, 32)
-    again, normal = enlarged(depth, 50.0, 32)
-    assert torch.equal(again, depth)
-    assert torch.equal(normal, normals_from_depth(depth, 50.0))
 
 
 def test_enlarged_depth_stays_near_what_was_predicted():
@@ -345,11 +327,3 @@ def test_questions_that_cannot_be_read_on_leave_what_was_there(answerer, truths,
         answer_file(answerer, path, tmp_path / "a.h5", overwrite=True)
     assert (tmp_path / "a.h5").read_text() == "mine"
     assert len(list(tmp_path.iterdir())) == 2
-
-
-def test_scores_that_are_not_finite_are_not_written(answerer, tmp_path):
-    path = released(tmp_path / "released.h5", [1, 2])
-    path = edited(path, tmp_path / "bad.h5", put("questions", (1, 2, 5, 5), np.nan))
-    with pytest.raises(SceneGenError, match="scores"):
-        answer_file(answerer, path, tmp_path / "a.h5")
-    assert not (tmp_path / "a.h5").exists()
