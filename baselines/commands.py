@@ -1,20 +1,40 @@
-"""`bench baseline`: parse, one library call, print. Heavy imports happen inside it."""
+"""`bench baseline`: reads the options and makes one library call. Heavy imports happen inside."""
 
 import click
 
+from baselines.pix2shape.commands import EXAMPLE, predict_to
 from scenegen.common.command_line import OVERWRITE, progress_bar
 
+BASELINES = """\b
+Baselines:
+  constant    one depth everywhere, the mean of the training rooms
+  mean-depth  the mean depth of the training rooms at each pixel
+  empty-room  the room's walls and floor, which it is told, without objects
+  chance      random answers to questions
+  oracle      the truth itself, which must score perfectly
+  pix2shape   the reference model, with trained weights
 
-@click.command()
+"""
+
+
+@click.command(
+    epilog=f"{BASELINES}{EXAMPLE}bench baseline empty-room --data rooms.h5 --out empty-room.h5"
+)
 @click.argument(
     "name",
     type=click.Choice(["constant", "mean-depth", "empty-room", "chance", "oracle", "pix2shape"]),
 )
-@click.option("--data", required=True, help="Rooms file; questions for chance or pix2shape.")
-@click.option("--train", help="Rooms file that constant and mean-depth learn their means from.")
+@click.option("--data", required=True, help="Rooms; or questions, for chance and pix2shape.")
+@click.option("--train", help="Rooms that constant and mean-depth take their means from.")
 @click.option("--out", default="predictions.h5", show_default=True, help="Submission to write.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of chance.")
-@click.option("--weights", help="Of pix2shape.  [the bundled ones that suit the data]")
+@click.option(
+    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of chance's answers."
+)
+@click.option(
+    "--weights",
+    help="Weights of pix2shape: a .safetensors file or a bundled name"
+    "  [the bundled ones that suit the data].",
+)
 @OVERWRITE
 def baseline(
     name: str,
@@ -25,13 +45,16 @@ def baseline(
     weights: str | None,
     overwrite: bool,
 ) -> None:
-    """Write a submission of ours: those that learn little or nothing, which every model has to
-    beat; the reference model, pix2shape; the oracle, which is the truth itself.
-    """
+    """Write the submission of a baseline for rooms or questions."""
     if weights is not None and name != "pix2shape":
         raise click.UsageError(f"--weights: {name} has none; they are pix2shape's")
+    if train is not None and name == "pix2shape":
+        raise click.UsageError("--train: pix2shape is trained already; see pix2shape train")
     if name == "pix2shape":
-        _reference_model(weights, data, out, train, overwrite)
+        weights = predict_to(out, weights, data, overwrite=overwrite)
+        click.echo(
+            f"{out}: {name}, weights {weights}, on {data}; score it with `bench score {out}`"
+        )
         return
     from baselines.trivial import write_chance, write_room_baseline
     from scenegen.rooms.reader import RoomsFile
@@ -46,23 +69,6 @@ def baseline(
                 name, data, out, train=train, overwrite=overwrite, progress=bar.update
             )
     click.echo(f"{out}: {name} on {data}; score it with `bench score {out}`")
-
-
-def _reference_model(
-    weights: str | None, data: str, out: str, train: str | None, overwrite: bool
-) -> None:
-    from baselines.pix2shape.commands import needs_torch, show_progress
-
-    if train is not None:
-        raise click.UsageError("--train: pix2shape is trained already; see pix2shape train")
-    needs_torch()
-    from baselines.pix2shape.use.predict import predict_file
-    from baselines.pix2shape.weights.bundled import suited
-
-    weights = weights or suited(data)
-    with show_progress("row") as bar:
-        predict_file(weights, data, out, overwrite=overwrite, progress=bar)
-    click.echo(f"{out}: pix2shape, weights {weights}, on {data}; score it with `bench score {out}`")
 
 
 COMMANDS = (baseline,)

@@ -1,9 +1,10 @@
-"""Submissions that any model has to beat, and the one that none can: no learning, few lines.
+"""Trivial submissions, which any model should beat, and the oracle, which none can.
 
-`constant` and `mean_depth` learn from a training file and never see the test file's truth.
+`constant` and `mean-depth` take their means from a training file and never see the test file's
+truth; `empty-room` is told the test file's cameras and the room's exact walls, but no objects.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,6 @@ from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 ROOM_BASELINES = ("constant", "mean-depth", "empty-room", "oracle")
-QUESTION_BASELINES = ("chance",)
 Progress = Callable[[int], Any]
 
 
@@ -34,21 +34,21 @@ def write_room_baseline(
 ) -> None:
     """Write the submission of a baseline for a rooms file.
 
-    - constant: the mean of all depths of the training file, at every pixel.
-    - mean-depth: the training file's mean depth of each pixel.
-    - empty-room: depth and normals of the room without objects, from the known camera.
+    - constant: one depth at every pixel, the mean of all depths of the training file.
+    - mean-depth: at each pixel the mean of the training file's depths there.
+    - empty-room: depth and normals of the room without objects, computed from the known camera.
     - oracle: the truth itself, which must score perfectly.
 
-    Raises SpecError for an unknown name, and where a training file is missing, not wanted, of
-    another image size, or the test file itself.
+    Raises SpecError for an unknown name, and where a training file is missing, not used by the
+    baseline, of another image size, or made with the test file's seed; else as `RoomsFile`.
     """
     learns = name in ("constant", "mean-depth")
     if name not in ROOM_BASELINES:
-        raise SpecError(f"baseline: found {name!r}, expected one of {', '.join(ROOM_BASELINES)}")
+        raise SpecError("baseline", repr(name), f"one of {', '.join(ROOM_BASELINES)}")
     if learns and train is None:
-        raise SpecError(f"train: {name} learns its means from a training file; name one")
+        raise SpecError("train", "none", f"a training file, whose means {name} predicts")
     if not learns and train is not None:
-        raise SpecError(f"train: {name} learns nothing; leave the training file out")
+        raise SpecError("train", train, "none", f"{name} learns nothing")
     with RoomsFile(data) as rooms:
         learned = _mean_depth(rooms, train) if train is not None else np.empty(0)
         if name == "constant":
@@ -65,7 +65,7 @@ def write_room_baseline(
 
 
 def write_chance(data: str | Path, out: str | Path, seed: int = 0, overwrite: bool = False) -> None:
-    """Write answers to the questions of a file, drawn by chance."""
+    """Write random answers to the questions of a file; each of the three is equally likely."""
     with open_questions(data) as questions:
         count = len(questions)
     answers = item_rng(seed, 0, Purpose.ANSWERS).integers(3, size=count)
@@ -75,7 +75,8 @@ def write_chance(data: str | Path, out: str | Path, seed: int = 0, overwrite: bo
 def empty_room(rooms: RoomsFile, row: int) -> tuple[Array, Array]:
     """Return planar depth, (H, W), and normals, (H, W, 3), of the room's three planes.
 
-    They go on beyond the room's edges, so that there is a depth wherever an object may be.
+    Depth is in scene units and normals are in the camera frame. The planes are continued beyond
+    the room's edges, so that every pixel has a depth.
     """
     world_from_camera = rooms.read("camera/world_from_camera", row)
     size = rooms.spec.height, rooms.spec.width
@@ -89,26 +90,28 @@ def empty_room(rooms: RoomsFile, row: int) -> tuple[Array, Array]:
 
 
 def _mean_depth(rooms: RoomsFile, train: str | Path) -> Array:
-    """Return the training file's mean depth of each pixel, (H, W); of all where none is known."""
+    """Return the training file's mean depth at each pixel, (H, W), scene units.
+
+    A pixel that never shows a surface gets the mean of all pixels.
+    """
     with RoomsFile(train) as training:
-        if training.fingerprint == rooms.fingerprint:
-            raise SpecError(f"train: {train} holds the test file's own rooms; render others")
-        if training.spec.seed == rooms.spec.seed:
+        same_rooms = training.fingerprint == rooms.fingerprint
+        if same_rooms or training.spec.seed == rooms.spec.seed:
             raise SpecError(
-                f"train: {train} has the test file's seed, {rooms.spec.seed}: its cameras and"
-                f" places are the same, whatever the preset; render with another --seed"
+                "train",
+                f"the test file's seed, {rooms.spec.seed}, and so its cameras and places",
+                "another seed",
+                "render training rooms with another --seed",
             )
-        sizes = [(one.spec.height, one.spec.width) for one in (training, rooms)]
+        sizes = [f"images of {one.spec.height}x{one.spec.width}" for one in (training, rooms)]
         if sizes[0] != sizes[1]:
-            raise SpecError(f"train: found images of {sizes[0]}, the test file's are {sizes[1]}")
-        total, count = np.zeros(sizes[0]), np.zeros(sizes[0])
-        for depth in _depths(training):
+            raise SpecError("train", sizes[0], f"{sizes[1]}, as in the test file")
+        shape = training.spec.height, training.spec.width
+        total, count = np.zeros(shape), np.zeros(shape)
+        for row in range(len(training)):
+            depth = training.read("depth", row)
             known = np.isfinite(depth)
             total += np.where(known, depth, 0.0)
             count += known
     overall = total.sum() / max(count.sum(), 1.0)
     return np.where(count > 0, total / np.maximum(count, 1.0), overall)
-
-
-def _depths(rooms: RoomsFile) -> Iterator[Array]:
-    return (rooms.read("depth", row) for row in range(len(rooms)))

@@ -1,1 +1,15 @@
-"""Measurements; nothing here is imported by the packages."""
+"""Measurements of speed and of results. The packages import nothing of this.
+
+`make bench` runs the first five, each of which prints one table:
+
+    render      images of rooms a second, beside plain Mitsuba and the bare ray cast
+    models      the same for scenes of modelled objects, and the cost of `--shading path`
+    questions   images of questions a second, beside plain Mitsuba
+    nearest     milliseconds of the scorer's nearest neighbours, beside other libraries
+    surfels     milliseconds of the reference model's renderer, beside the plain way to write it
+    score_rows  milliseconds of `bench score` for one row, in test sets of more and more rows
+    results     the tables of docs/results.md, from score files
+    digests     what two checkouts of the code write, compared part by part
+
+`report` runs jobs in processes of their own and prints their table; `jobs/` is what they run.
+"""

@@ -1,6 +1,6 @@
-"""Milliseconds per pair for nearest neighbours both ways, on rooms and predictions of them.
+"""Milliseconds a pair of the scorer's nearest neighbours both ways, on rooms and predictions.
 
-    OMP_NUM_THREADS=1 PYTHONPATH=. python benchmarks/nearest.py [--sizes 128 256] [--rounds 5]
+    OMP_NUM_THREADS=1 python -m benchmarks.nearest [--sizes 128 256] [--rounds 5]
 
 Ours starts from the depth images; the others are given the points. "error" is the largest
 difference of any method from scipy in double precision.
@@ -11,7 +11,6 @@ import importlib.util
 import os
 import runpy
 import statistics
-import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -19,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.jobs.timing import repeat
 from metrics.measures.chamfer_hausdorff import NearestDistances, nearest_distances
 from metrics.measures.image_search import nearest_distances_on_image
 from scenegen.camera import back_project
@@ -30,7 +30,7 @@ ROOMS = Path(__file__).resolve().parents[1] / "tests" / "metrics" / "conftest.py
 
 
 def predictions(truth: Array, seed: int) -> Iterator[tuple[str, Array]]:
-    """Named predictions of a true depth image, good ones first."""
+    """Yield names and predictions of a true depth image, good ones first."""
     rng = np.random.default_rng(seed)
     row, column = np.mgrid[: truth.shape[0], : truth.shape[1]] / truth.shape[0]
     wave = np.sin(5.0 * column + 1.0) * np.cos(4.0 * row)
@@ -51,15 +51,13 @@ def predictions(truth: Array, seed: int) -> Iterator[tuple[str, Array]]:
 
 
 def installed_methods() -> dict[str, Method]:
-    """The methods to compare with, those that are installed."""
+    """Return the installed methods to compare with, by name."""
     methods: dict[str, Method] = {}
     if importlib.util.find_spec("pykdtree"):
         methods["pykdtree"] = partial(nearest_distances, backend="pykdtree")
     methods["scipy"] = partial(nearest_distances, backend="scipy")
     if importlib.util.find_spec("point_cloud_utils"):
         methods["pcu"] = _point_cloud_utils
-    if importlib.util.find_spec("open3d"):
-        methods["open3d"] = _open3d
     return methods
 
 
@@ -70,35 +68,13 @@ def _point_cloud_utils(a: Array, b: Array) -> NearestDistances:
     return NearestDistances(search(a, b)[0].ravel(), search(b, a)[0].ravel())
 
 
-def _open3d(a: Array, b: Array) -> NearestDistances:
-    import open3d
-
-    first, second = (
-        open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points)) for points in (a, b)
-    )
-    return NearestDistances(
-        np.asarray(first.compute_point_cloud_distance(second)),
-        np.asarray(second.compute_point_cloud_distance(first)),
-    )
-
-
-def milliseconds(run: Callable[[], object], rounds: int) -> float:
-    """Median of several timed calls."""
-    times = []
-    for _ in range(rounds):
-        start = time.perf_counter()
-        run()
-        times.append(time.perf_counter() - start)
-    return statistics.median(times) * 1e3
-
-
 def largest_difference(a: NearestDistances, b: NearestDistances) -> float:
-    """The largest difference between two results for one pair of clouds."""
+    """Return the largest difference between two results for one pair of clouds."""
     return float(max(np.abs(a.forward - b.forward).max(), np.abs(a.reverse - b.reverse).max()))
 
 
 def bench_pair(predicted: Array, truth: Array, rounds: int) -> tuple[list[float], float]:
-    """Milliseconds of ours and of each installed method, and the largest difference from scipy."""
+    """Return milliseconds of ours and of each method, and the largest difference from scipy."""
     inside = np.isfinite(truth)
     a, b = (back_project(depth, FOV)[inside] for depth in (predicted, truth))
     runs: list[Callable[[], NearestDistances]] = [
@@ -107,7 +83,7 @@ def bench_pair(predicted: Array, truth: Array, rounds: int) -> tuple[list[float]
     ]
     expected = nearest_distances(a, b, "scipy")
     error = max(largest_difference(run(), expected) for run in runs)
-    return [milliseconds(run, rounds) for run in runs], error
+    return [1e3 * statistics.median(repeat(run, rounds)) for run in runs], error
 
 
 def main() -> None:

@@ -1,22 +1,31 @@
-"""What the measurements say: the machine, the table, the ratios."""
+"""Run the jobs of a benchmark, each in a process of its own, and print one Markdown table.
 
+This process imports nothing heavy: a child's peak of memory is never counted lower than what its
+parent held when it started the child. Everything is written to a temporary folder.
+"""
+
+import argparse
+import json
 import os
 import platform
+import site
 import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-GOALS = (
-    ("end to end / fastest (a)", "b", "a", 8.0),
-    ("end to end / (c)", "b", "c", 0.5),
-    ("rendering stage / (c)", "stage", "c", 0.75),
-)
+# Key of the row, its first cell, "module:function" of `jobs`, and the function's arguments.
+Job = tuple[str, str, str, dict[str, Any]]
 
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the table. `result` holds seconds of each repeat, images, note and peak_mib."""
+    """A row of the table. `result` holds seconds of each repeat, images, note and peak_mib."""
 
     what: str
     result: dict[str, Any]
@@ -37,7 +46,7 @@ class Row:
         return float(self.result["images"] / choose(self.result["seconds"]))
 
     def cells(self) -> list[str]:
-        """Return the line's cells."""
+        """Return the row's cells."""
         if "error" in self.result:
             return [self.what, "-", "-", "-", "-", "-", self.result["error"].replace("|", "/")]
         repeats = len(self.result["seconds"])
@@ -52,43 +61,90 @@ class Row:
         ]
 
 
-def print_machine(machine: dict[str, Any]) -> None:
-    """Print what the figures depend on."""
+class Session:
+    """Starts processes one after another, with `folder` for all that they write."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        # Dr.Jit keeps compiled kernels in the home folder: start from none, and leave none behind.
+        self._environment = {
+            **os.environ,
+            "HOME": str(folder),
+            "PYTHONUSERBASE": site.getuserbase(),
+        }
+
+    def run(self, job: str, **arguments: Any) -> dict[str, Any]:
+        """Return what a job of `benchmarks.jobs` returns; {"error": text} where it fails."""
+        shown = " ".join(str(v) for k, v in arguments.items() if k not in ("rooms", "folder"))
+        print(f"{job} {shown} ...", end=" ", file=sys.stderr, flush=True)
+        command = [sys.executable, "-m", "benchmarks.jobs", job, json.dumps(arguments)]
+        seconds, done = self.timed(command)
+        print(f"{seconds:.0f} s", file=sys.stderr)
+        if done.returncode:
+            lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+            print(done.stderr, file=sys.stderr)
+            return {"error": lines[-1]}
+        result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+        return result
+
+    def timed(self, command: list[str]) -> tuple[float, subprocess.CompletedProcess[str]]:
+        """Return how many seconds a command takes, and how it ended."""
+        start = time.perf_counter()
+        done = subprocess.run(
+            command, env=self._environment, capture_output=True, text=True, check=False
+        )
+        return time.perf_counter() - start, done
+
+
+def print_report(
+    description: str,
+    jobs: Callable[[str, bool], Iterator[Job]],
+    head: str,
+    notes: str,
+    print_ratios: Callable[[dict[str, Row]], None],
+    last: Callable[[Session], None] = lambda session: None,
+) -> None:
+    """Read the command line, run the jobs, and print machine, table and ratios.
+
+    Args:
+        description: first line of `--help`.
+        jobs: (folder, quick) -> the jobs in order; those with an empty key make no row.
+        head: of the table's first column.
+        notes: below the table.
+        print_ratios: prints what the rows, by key, say about each other.
+        last: prints something more.
+    """
+    parser = argparse.ArgumentParser(description=description.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="measure fewer images")
+    quick = parser.parse_args().quick
+    with tempfile.TemporaryDirectory(prefix="bench-") as folder:
+        session = Session(Path(folder))
+        _print_machine(session.run("rooms:machine"))
+        rows = {}
+        for key, what, job, arguments in jobs(folder, quick):
+            result = session.run(job, **arguments)
+            if key:
+                rows[key] = Row(what, result)
+        cells = [head, "images/s, median", "best", "ms/image", "images", "MiB", "remarks"]
+        print("| " + " | ".join(cells) + " |")
+        print("| --- |" + " ---: |" * (len(cells) - 2) + " --- |")
+        for row in rows.values():
+            print("| " + " | ".join(row.cells()) + " |")
+        print(f"\n{notes}\n\nRatios of the best repeats:\n")  # noise only ever adds time
+        print_ratios(rows)
+        last(session)
+
+
+def _print_machine(machine: dict[str, Any]) -> None:
     versions = ", ".join(f"{name} {text}" for name, text in machine.get("versions", {}).items())
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     load = os.getloadavg()[0]
-    print(f"{cpu_model()}, {cores} cores (load before: {load:.1f}), {platform.system()}")
+    print(f"{_processor()}, {cores} cores (load before: {load:.1f}), {platform.system()}")
     print(f"Python {platform.python_version()}, {versions}; variant {machine.get('variant')}\n")
 
 
-def cpu_model() -> str:
-    """Return the processor's name."""
+def _processor() -> str:
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.exists() else []
     names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
     return names[0] if names else platform.processor() or platform.machine()
-
-
-def print_table(rows: dict[str, Row], what: str, notes: str) -> None:
-    """Print the rows as Markdown; `what` heads the first column, `notes` follow the table."""
-    head = [what, "images/s, median", "best", "ms/image", "images", "MiB", "remarks"]
-    print("| " + " | ".join(head) + " |")
-    print("| --- |" + " ---: |" * (len(head) - 2) + " --- |")
-    for row in rows.values():
-        print("| " + " | ".join(row.cells()) + " |")
-    print(f"\n{notes}")
-
-
-def print_ratios(rows: dict[str, Row]) -> None:
-    """Print what the rows say of each other, by their best repeats: noise only ever adds time."""
-    best = {key: row.best for key, row in rows.items()}
-    for meshes in ("same", "coarse"):
-        rates = [rate for key, rate in best.items() if key.startswith("a ") and meshes in key]
-        best[f"a, {meshes} meshes"] = max(rates)
-    best["c, unit scene"], best["c, lattice"] = best["c1"], best["c2"]
-    print("\nRatios of the best repeats:\n")
-    for what, over, under, goal in GOALS:
-        for key in [key for key in best if key.startswith(f"{under}, ")]:
-            if best[over] and best[key]:
-                _, which = key.split(", ")
-                print(f"- {what}, {which}: {best[over] / best[key]:.2f}; goal {goal}")

@@ -1,4 +1,4 @@
-"""Milliseconds an image of the differentiable surfel renderer, and of the plain way to write it.
+"""Milliseconds an image of the reference model's renderer, and of the plain way to write it.
 
     python -m benchmarks.surfels [--size 128] [--batch 16] [--rounds 10]
 
@@ -18,7 +18,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from baselines.pix2shape.network.surfels import Scene, back_project, render
-from benchmarks.timing import repeat
+from benchmarks.jobs.timing import repeat
 from scenegen.camera import transform_points
 from scenegen.description.presets import preset_spec
 from scenegen.rendering.packing import pack

@@ -1,6 +1,6 @@
 """Submit predictions for a file of rooms: python examples/submit.py rooms.h5 predictions.h5"""
 
-import sys
+import argparse
 
 import numpy as np
 
@@ -11,15 +11,21 @@ from metrics.prediction_writer import RoomPredictionWriter
 def predict(image):
     """Radiance (H, W, 3) to planar depth (H, W) and normals (H, W, 3): put your model here."""
     depth = np.full(image.shape[:2], 1.6)  # scene units: the room's edge is 1
-    normal = np.broadcast_to([0.0, 0.0, 1.0], image.shape)  # camera frame, facing the viewer
-    return depth, normal
+    return depth, np.broadcast_to([0.0, 0.0, 1.0], image.shape)  # camera frame, facing the viewer
 
 
-truth, out = sys.argv[1:]
-with (
-    scenegen.open_rooms(truth) as rooms,
-    RoomPredictionWriter(out, truth, method="constant", run="seed 0") as predictions,
-):
-    for room in rooms:
-        predictions.add(room.index, *predict(room.radiance))
+parser = argparse.ArgumentParser(description=__doc__)
+parser.add_argument("rooms")
+parser.add_argument("predictions")
+arguments = parser.parse_args()
+truth, out = arguments.rooms, arguments.predictions
+try:
+    with (
+        scenegen.open_rooms(truth) as rooms,
+        RoomPredictionWriter(out, truth, method="constant", run="seed 0") as predictions,
+    ):
+        for room in rooms:
+            predictions.add(room.index, *predict(room.radiance))
+except (OSError, scenegen.SceneGenError) as error:
+    parser.exit(2, f"Error: {error}\n")
 print(f"now: bench score {out}")

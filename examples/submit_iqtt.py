@@ -1,11 +1,12 @@
 """Submit answers: python examples/submit_iqtt.py iqtt-split/iqtt-test.h5 answers.h5"""
 
-import sys
+import argparse
 
 import numpy as np
 
 import iqtt
 from metrics.prediction_writer import write_answers
+from scenegen import SceneGenError
 
 
 def score(reference, candidates):
@@ -13,8 +14,15 @@ def score(reference, candidates):
     return -np.abs(candidates.mean((1, 2, 3)) - reference.mean())
 
 
-questions, out = sys.argv[1:]
-with iqtt.open_questions(questions) as file:
-    scores = [score(question.radiance[0], question.radiance[1:]) for question in file]
-write_answers(out, questions, method="mean brightness", scores=scores)
+parser = argparse.ArgumentParser(description=__doc__)
+parser.add_argument("questions")
+parser.add_argument("answers")
+arguments = parser.parse_args()
+questions, out = arguments.questions, arguments.answers
+try:
+    with iqtt.open_questions(questions) as file:
+        scores = [score(question.radiance[0], question.radiance[1:]) for question in file]
+    write_answers(out, questions, method="mean brightness", scores=scores)
+except (OSError, SceneGenError) as error:
+    parser.exit(2, f"Error: {error}\n")
 print(f"now: bench score {out}")

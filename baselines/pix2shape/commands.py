@@ -1,38 +1,44 @@
-"""`pix2shape ...`: parse, one library call, print. Heavy imports happen inside the commands."""
+"""`pix2shape ...`: each command reads its options and makes one library call.
+
+Heavy imports happen inside the commands, so that `--help` is quick and works without torch.
+"""
 
 import importlib.util
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import click
 
-from scenegen.common.command_line import OVERWRITE, Items, UserError
+from scenegen.common.command_line import OVERWRITE, Items, UserError, progress_bar
 
 PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
+EXAMPLE = "\b\nExample:\n  "  # click keeps the line breaks of a paragraph that begins with \b
+A_MODEL = "A .safetensors file with its .json beside it, or the name of bundled weights"
 
-WEIGHTS = click.option(
-    "--weights",
-    help="A .safetensors file with its .json beside, or the name of bundled weights."
-    "  [those that suit the data]",
-)
-DATA = click.option("--data", required=True, help="Rooms, or questions.")
+WEIGHTS = click.option("--weights", help=f"{A_MODEL}  [those that suit the data].")
+ROOMS = click.option("--data", required=True, help="Rooms whose images are encoded.")
+PICTURE = "Picture to write."
 DEVICE = click.option(
     "--device",
     type=click.Choice(["auto", "cpu", "cuda"]),
     default="auto",
     show_default=True,
-    help="auto: a GPU where there is one.",
+    help="Where to compute; auto takes a GPU if there is one.",
 )
 
 
+def _number(*names: str, least: int, default: int, text: str, most: int | None = None) -> Any:
+    """Return an option that takes a whole number and shows its default."""
+    kind = click.IntRange(least, most)
+    return click.option(*names, type=kind, default=default, show_default=True, help=text)
+
+
 class Setting(click.ParamType):  # type: ignore[type-arg]
-    """`name=value`, the value as JSON."""
+    """`name=value`, where the value is written as in JSON."""
 
     name = "NAME=VALUE"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse."""
+        """Return name and value."""
         import json
 
         name, _, text = str(value).partition("=")
@@ -42,38 +48,47 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
             self.fail(f"found {value!r}, expected a number, such as batch=8", param, ctx)
 
 
-@click.command()
+@click.command(epilog=f"{EXAMPLE}pix2shape train --data rooms.h5 --out run")
 @click.option("--data", required=True, help="Rooms, or iqtt-train.h5, to train on.")
 @click.option("--out", required=True, help="Folder of the run.")
 @click.option(
     "--config",
     type=click.Choice(["compact", "paper"]),
-    help="compact: 40 minutes on a CPU; paper: the paper's.  [compact]",
+    help="compact trains rooms in 40 minutes on a CPU: 64 pixels, an eighth of the paper's width,"
+    " no adversarial loss. paper has the paper's size and losses and needs a GPU  [compact].",
 )
 @click.option(
     "--set",
     "settings",
     type=Setting(),
     multiple=True,
-    help="Change one setting, such as batch=8; weights.json lists all.",
+    help="Change one setting of the configuration, such as batch=8 or networks.size=128; the"
+    " weights.json of a run lists all settings.",
 )
-@click.option("--seed", type=click.IntRange(0), help="Of weights and every random choice.  [0]")
-@click.option("--labels", type=click.IntRange(0), default=0, help="Answers to learn from.  [0]")
-@click.option("--conditional", is_flag=True, help="Tell the networks the class of the one object.")
-@click.option("--resume", is_flag=True, help="Go on from the folder's checkpoint.")
+@click.option("--seed", type=click.IntRange(0), help="Seed of every random choice  [0].")
+@_number(
+    "--labels",
+    least=0,
+    default=0,
+    text="Number of labelled questions whose answers may be learned from.",
+)
 @click.option(
-    "--workers", type=click.IntRange(0), default=1, show_default=True, help="Processes that read."
+    "--conditional",
+    is_flag=True,
+    help="Tell the networks the class of the object, in rooms of one object each.",
 )
-@click.option(
-    "--every",
-    type=click.IntRange(1),
-    default=500,
-    show_default=True,
-    help="Iterations between checkpoints.",
-)
+@click.option("--resume", is_flag=True, help="Go on from the checkpoint of --out.")
+@_number("--workers", least=0, default=1, text="Processes that read the data.")
+@_number("--every", least=1, default=500, text="Iterations between checkpoints.")
 @DEVICE
-@click.option("--devices", type=click.IntRange(1), default=1, show_default=True)
-@click.option("--precision", type=click.Choice(["32", "bf16"]), default="32", show_default=True)
+@_number("--devices", least=1, default=1, text="Number of devices.")
+@click.option(
+    "--precision",
+    type=click.Choice(["32", "bf16"]),
+    default="32",
+    show_default=True,
+    help="Numbers of the networks; losses and the renderer always have 32 bits.",
+)
 def train(
     data: str,
     out: str,
@@ -89,10 +104,11 @@ def train(
     devices: int,
     precision: str,
 ) -> None:
-    """Train the model; `tensorboard --logdir OUT/logs` shows how it goes, OUT/pictures.png too."""
-    needs_torch()
-    from tqdm import tqdm
+    """Train the model on rooms or questions; weights and checkpoint are written to a folder.
 
+    OUT/pictures.png and `tensorboard --logdir OUT/logs` show how training goes.
+    """
+    needs_torch()
     from baselines.pix2shape.network.config import model_config
     from baselines.pix2shape.training.runs import Machine, train_run
     from baselines.pix2shape.use.predict import chosen_device
@@ -103,16 +119,16 @@ def train(
         raise click.UsageError(f"--resume goes on with the run's own {own}; leave them out")
     accelerator = "gpu" if chosen_device(device, devices).type == "cuda" else "cpu"
     numbers = {"32": "32-true", "bf16": "bf16-mixed"}[precision]
-    bars: list[Any] = []
+    bar = progress_bar(None, "it")
 
     def show(state: Any, losses: dict[str, float]) -> None:
         last = state.model.config.iterations
-        if not bars:
-            bars.append(tqdm(total=last, initial=state.iteration - 1, unit="it", disable=None))
         told = {name: f"{value:.3g}" for name, value in losses.items()}
-        bars[0].set_postfix(told, refresh=False)
-        bars[0].update(1)
-        if bars[0].disable and state.iteration % every == 0:  # not a terminal: a log
+        if bar.total is None:  # the first iteration, of a resumed run too
+            bar.total, bar.initial, bar.n = last, state.iteration - 1, state.iteration - 1
+        bar.set_postfix(told, refresh=False)
+        bar.update(1)
+        if bar.disable and state.iteration % every == 0:  # no terminal, but perhaps a log
             losses_told = ", ".join(f"{name} {value}" for name, value in told.items())
             click.echo(f"{state.iteration} of {last}, {state.seconds:.0f} s: {losses_told}")
 
@@ -130,15 +146,14 @@ def train(
         click.echo(f"\nStopped; `--resume` goes on from {out}'s last checkpoint, if it got one.")
         raise
     finally:
-        for bar in bars:
-            bar.close()
-    if weights is not None:  # the first of several processes
+        bar.close()
+    if weights is not None:  # None in all processes but the first
         click.echo(f"{weights}: trained on {data}; now `pix2shape predict --weights {weights} ...`")
 
 
-@click.command()
+@click.command(epilog=f"{EXAMPLE}pix2shape predict --data rooms.h5 --out predictions.h5")
 @WEIGHTS
-@DATA
+@click.option("--data", required=True, help="Rooms or questions to predict.")
 @click.option("--out", default="predictions.h5", show_default=True, help="Submission to write.")
 @click.option("--run", default="", help="Name of this run among several of the method.")
 @DEVICE
@@ -146,30 +161,44 @@ def train(
 def predict(
     weights: str | None, data: str, out: str, run: str, device: str, overwrite: bool
 ) -> None:
-    """Predict every view of each room from its input view alone, or answer questions."""
+    """Write a submission: depth and normals of rooms, or answers to questions.
+
+    Every view of a room is predicted from one image, the room's view 0, and the cameras.
+    """
+    weights = predict_to(out, weights, data, run=run, device=device, overwrite=overwrite)
+    click.echo(f"{out}: {weights} on {data}; score it with `bench score {out}`")
+
+
+def predict_to(out: str, weights: str | None, data: str, **how: Any) -> str:
+    """Write a submission, with a progress bar; return the weights that were used.
+
+    Args:
+        weights: None for the bundled ones that suit the data.
+        how: settings of `predict_file`.
+    """
     needs_torch()
     from baselines.pix2shape.use.predict import predict_file
     from baselines.pix2shape.weights.bundled import suited
 
     weights = weights or suited(data)
-    with show_progress("row") as bar:
-        predict_file(weights, data, out, run=run, device=device, overwrite=overwrite, progress=bar)
-    click.echo(f"{out}: {weights} on {data}; score it with `bench score {out}`")
+    with progress_bar(None, "row") as bar:
+
+        def show(done: int, total: int) -> None:
+            bar.total = total
+            bar.update(done)
+
+        predict_file(weights, data, out, **how, progress=show)
+    return weights
 
 
-@click.command()
-@click.option(
-    "--weights",
-    default="shapes",
-    show_default=True,
-    help="A .safetensors file with its .json beside, or the name of bundled weights.",
-)
-@click.option("--out", default="samples.png", show_default=True, help="Picture to write.")
-@click.option("--n", "count", type=click.IntRange(1, 256), default=16, show_default=True)
-@click.option("--class", "label", help="Of a conditional model; without, each in turn.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.command(epilog=f"{EXAMPLE}pix2shape sample --weights shapes --out samples.png")
+@click.option("--weights", default="shapes", show_default=True, help=f"{A_MODEL}.")
+@click.option("--out", default="samples.png", show_default=True, help=PICTURE)
+@_number("--n", "count", least=1, most=256, default=16, text="Number of samples.")
+@click.option("--class", "label", help="Class that a conditional model samples  [each in turn].")
+@_number("--seed", least=0, default=0, text="Seed of codes, cameras and lights.")
 def sample(weights: str, out: str, count: int, label: str | None, seed: int) -> None:
-    """Draw scenes that never were: lines of images, depths and normals."""
+    """Draw samples of the model's prior, as images, depths and normals."""
     needs_torch()
     from baselines.pix2shape.pictures import check_picture, save_pictures
     from baselines.pix2shape.use.explore import sample_sheet
@@ -181,77 +210,79 @@ def sample(weights: str, out: str, count: int, label: str | None, seed: int) -> 
     click.echo(f"{out}: {count} samples")
 
 
-@click.command()
+@click.command(
+    epilog=f"{EXAMPLE}pix2shape interpolate --data rooms.h5 --items 0,5 --out interpolation.png"
+)
 @WEIGHTS
-@DATA
-@click.option("--items", type=Items(), default="0,1", show_default=True, help="Two rows.")
-@click.option("--steps", type=click.IntRange(2, 64), default=8, show_default=True)
-@click.option("--out", default="interpolation.png", show_default=True, help="Picture to write.")
+@ROOMS
+@click.option(
+    "--items", type=Items(), default="0,1", show_default=True, help="The two rows to go between."
+)
+@_number("--steps", least=2, most=64, default=8, text="Number of codes.")
+@click.option("--out", default="interpolation.png", show_default=True, help=PICTURE)
 def interpolate(weights: str | None, data: str, items: list[int], steps: int, out: str) -> None:
-    """Go from one image's scene to another's, seen from the first one's camera."""
-    needs_torch()
-    from baselines.pix2shape.pictures import check_picture, save_pictures
-    from baselines.pix2shape.use.explore import interpolation_sheet, known_rooms
-    from baselines.pix2shape.weights.bundled import open_weights, suited
-    from scenegen.rooms.preview import pick_rows
-
-    check_picture(out)
-    model, card = open_weights(weights or suited(data))
+    """Draw the way from one room's code to another's, seen from the first room's camera."""
     if len(items) != 2:
         raise click.UsageError(f"--items: found {len(items)} rows, expected two such as 0,1")
-    rooms = known_rooms(data, card)
-    items = pick_rows(len(rooms), items)
+    model, rooms, items = _model_and_rooms(weights, data, items, out)
+    from baselines.pix2shape.pictures import save_pictures
+    from baselines.pix2shape.use.explore import interpolation_sheet
+
     save_pictures([interpolation_sheet(model, rooms, items[0], items[1], steps)], out)
     click.echo(f"{out}: from row {items[0]} to row {items[1]} of {data}")
 
 
-@click.command()
+@click.command(epilog=f"{EXAMPLE}pix2shape rotate --data rooms.h5 --items 0-5 --out rotation.gif")
 @WEIGHTS
-@DATA
-@click.option("--items", type=Items(), default="0-5", show_default=True, help="Rows to turn.")
-@click.option("--degrees", type=click.IntRange(0, 90), default=80, show_default=True)
-@click.option("--frames", type=click.IntRange(2, 200), default=33, show_default=True)
+@ROOMS
+@click.option(
+    "--items", type=Items(), default="0-5", show_default=True, help="Rows of the rooms to turn."
+)
+@_number(
+    "--degrees",
+    least=0,
+    most=90,
+    default=80,
+    text="How far the camera turns about the vertical axis.",
+)
+@_number("--frames", least=2, most=200, default=33, text="Number of pictures on the way there.")
 @click.option("--out", default="rotation.gif", show_default=True, help="GIF or WebP to write.")
 def rotate(
     weights: str | None, data: str, items: list[int], degrees: int, frames: int, out: str
 ) -> None:
-    """Turn the camera around scenes that were seen from one side."""
-    needs_torch()
-    from baselines.pix2shape.pictures import check_picture, save_pictures
-    from baselines.pix2shape.use.explore import known_rooms, rotation_frames
-    from baselines.pix2shape.weights.bundled import open_weights, suited
-    from scenegen.rooms.preview import pick_rows
+    """Draw an animation in which the camera turns around rooms that the model saw in one image."""
+    model, rooms, items = _model_and_rooms(weights, data, items, out, animated=True)
+    from baselines.pix2shape.pictures import save_pictures
+    from baselines.pix2shape.use.explore import rotation_frames
 
-    check_picture(out, animated=True)
-    model, card = open_weights(weights or suited(data))
-    rooms = known_rooms(data, card)
-    items = pick_rows(len(rooms), items)
     angles = [degrees * i / (frames - 1) for i in range(frames)]
     save_pictures(rotation_frames(model, rooms, items, angles), out)
     click.echo(f"{out}: {len(items)} scenes turned by {degrees} degrees")
 
 
+def _model_and_rooms(
+    weights: str | None, data: str, items: list[int], out: str, animated: bool = False
+) -> tuple[Any, Any, list[int]]:
+    """Check the picture's name; return model, rooms and the rows, which are checked, too."""
+    needs_torch()
+    from baselines.pix2shape.pictures import check_picture
+    from baselines.pix2shape.use.explore import known_rooms
+    from baselines.pix2shape.weights.bundled import open_weights, suited
+    from scenegen.rooms.preview import pick_rows
+
+    check_picture(out, animated)
+    model, card = open_weights(weights or suited(data))
+    rooms = known_rooms(data, card)
+    return model, rooms, pick_rows(len(rooms), items)
+
+
 def needs_torch() -> None:
-    """Raise UserError where the optional packages are missing."""
+    """Raise UserError where an optional package is missing."""
     missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
     if missing:
         raise UserError(
             f"pix2shape needs {', '.join(missing)}: pip install 'pix2shape-bench[model]'"
         )
-
-
-@contextmanager
-def show_progress(unit: str) -> Iterator[Callable[[int, int], Any]]:
-    """Show a bar whose total is told with each step."""
-    from tqdm import tqdm
-
-    with tqdm(unit=unit, disable=None, leave=False) as bar:
-
-        def show(done: int, total: int) -> None:
-            bar.total = total
-            bar.update(done)
-
-        yield show
 
 
 COMMANDS = (train, predict, sample, interpolate, rotate)

@@ -1,4 +1,4 @@
-"""Pictures that a person looks at: sheets of images, depths and normals; turning views as a GIF."""
+"""Pictures for people: sheets of images, depths and normals, and animations of them."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -32,7 +32,7 @@ FRAME_SECONDS = 0.08
 
 @torch.no_grad()
 def drawn(model: Pix2Shape, code: Tensor, views: Views) -> tuple[Tiles, Tiles, Tiles]:
-    """Return images, depths (near is dark) and normals (xyz as rgb) of codes seen from views."""
+    """Return tiles of images, depths (near is dark) and normals (xyz as rgb) of codes in views."""
     depth, opacity = model.surfels(code, views.condition)
     image = shaded(depth, opacity, views)
     normals = normals_from_depth(depth, views.scene.fov_y_degrees)
@@ -43,7 +43,7 @@ def drawn(model: Pix2Shape, code: Tensor, views: Views) -> tuple[Tiles, Tiles, T
 
 
 def image_tiles(radiance: Tensor) -> Tiles:
-    """Return images of linear radiance, (B, 3, H, W), as the eye sees them."""
+    """Return tiles of images of linear radiance, (B, 3, H, W), encoded as sRGB."""
     return [srgb_bytes(np.moveaxis(image.cpu().numpy(), 0, -1)) for image in radiance]
 
 
@@ -53,7 +53,7 @@ def _normal_tiles(normals: Tensor) -> Tiles:
 
 
 def sheet(rows: Sequence[Tiles]) -> Image.Image:
-    """Return a sheet of tiles, one line a row; small tiles are enlarged by a whole factor."""
+    """Return a sheet of rows of tiles; small tiles are enlarged by a whole factor."""
     side = rows[0][0].shape[0]
     side *= -(-SMALLEST_TILE // side) if side < SMALLEST_TILE else 1
     columns, step = max(map(len, rows)), side + GAP
@@ -67,11 +67,11 @@ def sheet(rows: Sequence[Tiles]) -> Image.Image:
 
 @torch.no_grad()
 def training_sheet(model: Pix2Shape, batch: Batch, noise: Tensor, columns: int = 8) -> Image.Image:
-    """Return what training is watched by.
+    """Return the sheet that shows how training goes.
 
-    Lines: input; reconstruction, its depth, its normals; samples of the prior, their depths. Where
-    no critic ties codes to the prior, the last two lines show the inputs' codes as the next
-    input's camera sees them.
+    Its rows are inputs; reconstructions, their depths and normals; samples of the prior, and their
+    depths. Without an adversarial loss codes do not follow the prior during training; the last two
+    rows then show the inputs' codes seen by the next input's camera.
     """
     learning = model.training
     model.eval()
@@ -84,19 +84,19 @@ def training_sheet(model: Pix2Shape, batch: Batch, noise: Tensor, columns: int =
 
 
 def check_picture(path: str | Path, animated: bool = False) -> None:
-    """Raise before drawing what `save_pictures` would raise after it."""
+    """Raise now what `save_pictures` would raise once all is drawn."""
     path = Path(path)
     if not animated:
         check_picture_name(path)
     elif path.suffix.lower() not in (".gif", ".webp"):
-        raise SpecError(f"out: found {path.name!r}, expected an animation's name such as turn.gif")
+        raise SpecError("out", repr(path.name), "an animation's name such as turn.gif")
     check_writable(path, overwrite=True)
 
 
 def save_pictures(frames: Sequence[Image.Image], path: str | Path) -> None:
-    """Write one picture, or several as an animation that goes there and back.
+    """Write one picture, or several as an animation that plays forwards and backwards.
 
-    Raises SpecError for an ending that does not suit, OSError for the path.
+    Raises SpecError for a file name with another ending, OSError for the path.
     """
     check_picture(path, len(frames) > 1)
     if len(frames) == 1:

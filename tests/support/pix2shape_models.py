@@ -17,8 +17,8 @@ SIZE = 32  # pixels a side that the networks take
 
 def tiny(size: int = SIZE, **settings: Any) -> Any:
     """Return a configuration of the smallest networks; networks' own settings among the others."""
+    from baselines.pix2shape.network.architecture import NetworkSpec
     from baselines.pix2shape.network.config import ModelConfig
-    from baselines.pix2shape.network.networks import NetworkSpec
 
     own = {name: settings.pop(name) for name in ("classes", "camera") if name in settings}
     networks = NetworkSpec(size=size, width=0.05, **own)
@@ -48,7 +48,7 @@ def made(config: Any, seed: int = 0) -> Any:
 
 def written(path: Path, config: Any, **card: Any) -> Path:
     """Write the weights of such a model."""
-    from baselines.pix2shape.weights.weights import Card, save_weights
+    from baselines.pix2shape.weights.storage import Card, save_weights
 
     names = tuple(f"class {i}" for i in range(config.networks.classes))
     save_weights(path, made(config), Card(config, **{"classes": names, **card}))
@@ -71,18 +71,19 @@ def edited(path: Path, to: Path, *edits: Callable[[h5py.File], Any]) -> Path:
     return to
 
 
-def reordered(order: list[int]) -> Callable[[h5py.File], None]:
-    """Put the rows of a rooms file into another order."""
+def of_rows(rows: list[int]) -> Callable[[h5py.File], None]:
+    """Keep some rows of a rooms file, in this order; the attributes stay as they are."""
 
     def edit(file: h5py.File) -> None:
-        count = file["image"].shape[0]
-        assert sorted(order) == list(range(count))
-
-        def visit(_: str, node: Any) -> None:
-            if isinstance(node, h5py.Dataset) and node.shape[:1] == (count,):
-                node[...] = node[()][order]
-
-        file.visititems(visit)
+        count, names = file["image"].shape[0], []
+        file.visit(names.append)
+        for name in names:
+            old = file[name]
+            if isinstance(old, h5py.Dataset) and old.shape[:1] == (count,):
+                values, attributes, dtype = old[()][rows], dict(old.attrs), old.dtype
+                del file[name]
+                file.create_dataset(name, data=values, dtype=dtype).attrs.update(attributes)
+        file.attrs["count"] = len(rows)
 
     return edit
 

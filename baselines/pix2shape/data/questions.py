@@ -1,4 +1,4 @@
-"""Questions as batches for the networks: images and their lights; labels where there are any."""
+"""Question files as batches for the networks: images, their lights, and labels if there are any."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,43 +15,48 @@ from scenegen.common.errors import SpecError
 from scenegen.common.records import check
 from scenegen.rendering.ground_truth import decode_image
 
-Z_VIEW = 10  # dimensions of the code that tell the view, of the paper's 128
+Z_VIEW = 10  # of the code's 128 dimensions, those that tell the view, as in the paper
 
 
 class QuestionImages(Dataset[dict[str, Any]]):
-    """The four images of each question, each with its lights; answers where they are told.
+    """The four images of each question, a map-style dataset.
 
-    The lights are known to the model, as in the paper; shapes and rotations are not read.
+    The model is told the lights, the reflectance and the background of each image, as in the
+    paper, and the answer where the file has one. Shapes, cameras and rotations are never read.
     """
 
+    classes: tuple[str, ...] = ()  # as RoomImages has; the networks are told none
+
     def __init__(self, path: str | Path, part: str | None, config: ModelConfig) -> None:
-        """Check the file. Raises as `QuestionsFile`, and SpecError where lights are not told."""
+        """Check the file. Raises as `QuestionsFile`, and SpecError where it tells no lights."""
         self._size = config.networks.size
         if config.networks.condition:
-            raise SpecError("networks: told camera or class, expected neither, as for questions")
+            raise SpecError("networks", "a camera or class to be told", "neither, for questions")
         with open_questions(path, part) as questions:
             check_reducible(path, questions.height, questions.width, self._size)
             if questions.spec is None or not questions.has_truth or not len(questions):
+                lights = "with" if questions.has_truth else "without"
                 raise SpecError(
-                    f"{path}: found {len(questions)} questions"
-                    f" {'with' if questions.has_truth else 'without'} lights, expected some, with"
-                    " the group `truth` that tells them (iqtt make-split writes it)"
+                    path,
+                    f"{len(questions)} questions {lights} lights",
+                    "some, with the group `truth` that tells the lights",
+                    "`iqtt make-split` writes it",
                 )
-            self._spec = questions.spec
+            self.spec = questions.spec
             fields = ["questions", "light_position", "light_color"]
             self.has_answers = questions.has_answers
         self._rows = QuestionsDataset(
             path, part, [*fields, "answers"] if self.has_answers else fields
         )
         self.fingerprint = self._rows.fingerprint
-        self.fov_y_degrees = self._spec.camera.fov_y_degrees
-        self._camera = self._spec.camera.world_from_camera
+        self.fov_y_degrees = self.spec.camera.fov_y_degrees
+        self._camera = self.spec.camera.world_from_camera
 
     def __len__(self) -> int:
         return len(self._rows)
 
     def __getitem__(self, row: int) -> dict[str, Any]:
-        """Return a question: arrays of four rows, and the answer."""
+        """Return a question: float32 arrays of four rows, and the answer if there is one."""
         stored = self._rows[row]
         images = decode_image(stored["questions"])
         place = self._camera[:3, 3]
@@ -60,10 +65,10 @@ class QuestionImages(Dataset[dict[str, Any]]):
             "condition": np.empty((4, 0)),
             "light_position": (stored["light_position"] - place) @ self._camera[:3, :3],
             "light_color": stored["light_color"],
-            "ambient": np.tile(self._spec.ambient, (4, 1)),
+            "ambient": np.tile(self.spec.ambient, (4, 1)),
             "attenuation": np.tile((0.0, 1.0), (4, 1)),
-            "reflectance": np.tile(self._spec.reflectance, (4, 1)),
-            "background": np.tile(self._spec.background, (4, 1)),
+            "reflectance": np.tile(self.spec.reflectance, (4, 1)),
+            "background": np.tile(self.spec.background, (4, 1)),
         }
         item: dict[str, Any] = {name: np.float32(value) for name, value in known.items()}
         if self.has_answers:
@@ -71,7 +76,7 @@ class QuestionImages(Dataset[dict[str, Any]]):
         return item
 
     def as_batch(self, items: dict[str, Tensor]) -> Batch:
-        """Put collated questions together, four images each, one question after the other."""
+        """Return the batch of collated questions, four images each, question by question."""
         flat = {name: value.flatten(0, 1) for name, value in items.items() if name != "answer"}
         return as_batch(flat, self.fov_y_degrees)
 
@@ -79,34 +84,25 @@ class QuestionImages(Dataset[dict[str, Any]]):
 def for_questions(config: ModelConfig, path: str | Path, part: str | None) -> ModelConfig:
     """Return a configuration for the images of a question file.
 
-    As the paper has it: no camera, the code's last ten dimensions for the view. The depths that the
-    decoder gives are those of the sphere that the camera frames. Codes are standardised, or L_theta
-    would drive them apart without end, a critic or not.
+    As in the paper the networks are not told the camera, and the last ten dimensions of the code
+    are for the view. The decoder gives depths within the sphere that the camera frames. Codes are
+    standardised, as L_theta has no lower bound and would drive them apart without end.
 
-    Raises SpecError for a released file, and one that is not for training.
+    Raises SpecError for a file that is not for training, and for one of the paper's authors.
     """
     if len(parts(path)) < 2:
-        raise SpecError(f"{path}: expected training questions, such as iqtt-train.h5")
-    least = Z_VIEW + 1
-    check(
-        config.networks.z >= least, "z scene", config.networks.z, f"{least} or more, for questions"
-    )
+        raise SpecError(path, "no training questions", "a training file such as iqtt-train.h5")
+    spec = config.networks
+    check(spec.z > Z_VIEW, "z scene", spec.z, f"{Z_VIEW + 1} or more, for questions")
     with open_questions(path, part) as questions:
         if questions.spec is None:
-            raise SpecError(f"{path}: a released file, expected one of iqtt make-split")
+            raise SpecError(path, "a released file", "one that `iqtt make-split` wrote")
         distance = float(np.linalg.norm(questions.spec.camera.world_from_camera[:3, 3]))
         radius = questions.spec.max_radius
-    spec = config.networks
+    spec = replace(spec, camera=False, classes=0, standardised=True)
     return replace(
         config,
-        networks=replace(
-            spec,
-            camera=False,
-            classes=0,
-            z_scene=spec.z - Z_VIEW,
-            z_view=Z_VIEW,
-            standardised=True,
-        ),
+        networks=replace(spec, z_scene=spec.z - Z_VIEW, z_view=Z_VIEW),
         depth_middle=distance,
         depth_reach=min(0.9, radius / distance),
         opacity=True,

@@ -1,6 +1,7 @@
-"""Our files as batches for the networks: linear radiance, cameras and lights; no ground truth.
+"""Rooms files as batches for the networks: linear radiance, cameras, lights and reflectance.
 
-Only the ablation's depth supervision reads depth maps.
+The model is told the camera's position, the lights and the reflectance, as in the paper. Depth maps
+are read only for depth supervision, which is off unless it is asked for; normals never are.
 """
 
 import itertools
@@ -29,12 +30,13 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Images and what is known of them.
+    """Images and what the model is told about them.
 
     Attributes:
         image: linear radiance, (B, 3, S, S).
         views: cameras, classes and lights.
-        depth: planar, (B, S, S), NaN where nothing; None but where supervision asks for it.
+        depth: planar, scene units, (B, S, S), NaN where there is no surface; None unless depth
+            supervision is on.
     """
 
     image: Tensor
@@ -53,7 +55,7 @@ def reduced(image: Array, size: int) -> Array:
 
 
 def is_question_file(path: str | Path) -> bool:
-    """Tell files of questions from all others. Raises OSError, FileFormatError."""
+    """Return whether a file holds questions. Raises OSError, FileFormatError."""
     with open_file(path, "rooms or question file") as file:
         return any(name in file for name in ("questions", "labeled", "unlabeled"))
 
@@ -61,20 +63,19 @@ def is_question_file(path: str | Path) -> bool:
 def check_reducible(where: object, height: int, width: int, size: int) -> None:
     """Raise SpecError unless images of a size can be reduced to size x size."""
     if height != width or height % size:
-        raise SpecError(
-            f"{where}: images of {height}x{width}, expected squares of a multiple of {size} pixels,"
-            f" the size that the networks take"
-        )
+        expected = f"squares of a multiple of {size} pixels, the size that the networks take"
+        raise SpecError(where, f"images of {height}x{width}", expected)
 
 
 class RoomImages(Dataset[dict[str, Any]]):
-    """The images of a rooms file; every row is an item of its own, whichever scene it shows.
+    """The images of a rooms file, a map-style dataset; each row is one item.
 
-    What is small (cameras, lights) is read at once, images when asked for, by any process.
+    Cameras and lights are small and read at once; images are read when they are asked for, in
+    whichever process asks.
     """
 
     def __init__(self, path: str | Path, config: ModelConfig) -> None:
-        """Read and check. Raises as `RoomsFile`, and SpecError where the model cannot take it."""
+        """Read and check. Raises as `RoomsFile`, and SpecError where the model cannot take them."""
         spec = config.networks
         with RoomsFile(path) as rooms:
             check_reducible(path, rooms.spec.height, rooms.spec.width, spec.size)
@@ -88,11 +89,10 @@ class RoomImages(Dataset[dict[str, Any]]):
             self.classes: tuple[str, ...] = tuple(rooms.spec.shapes)
             self.label = rooms.read("object/shape", slice(None))[:, 0]
         if spec.classes and spec.classes != len(self.classes):
-            raise SpecError(
-                f"{path}: {len(self.classes)} classes, the networks were made for {spec.classes}"
-            )
+            expected = f"{spec.classes}, as the networks were made for"
+            raise SpecError(path, f"{len(self.classes)} classes", expected)
         if spec.classes and self.spec.objects != (1, 1):
-            raise SpecError(f"{path}: expected one object in every room, whose class is told")
+            raise SpecError(path, "rooms of several objects", "one object, whose class is told")
         wanted = ("image", "depth") if config.depth else ("image",)
         self._images = RoomsDataset(path, wanted)
         self.fingerprint = self._images.fingerprint
@@ -100,14 +100,16 @@ class RoomImages(Dataset[dict[str, Any]]):
 
     @staticmethod
     def _uniform_reflectance(path: str | Path, rooms: RoomsFile) -> Array:
-        """Return each image's one reflectance, (N, 3); known to the model, as in the paper."""
+        """Return the one reflectance of each image, (N, 3), which the model is told."""
         every = rooms.read("material/reflectance", slice(None))
         used = np.arange(every.shape[1]) <= rooms.read("object/count", slice(None))[:, None]
         shiny = rooms.read("material/specular", slice(None)).any()
         if shiny or ((every != every[:, :1]).any(axis=2) & used).any():
             raise SpecError(
-                f"{path}: rooms of several materials, expected one matte reflectance an image:"
-                f" the model is told the material, and several would tell it the shapes"
+                path,
+                "rooms of several materials",
+                "one matte reflectance in each image",
+                "the model is told the material, and several would tell it the shapes",
             )
         return every[:, 0]
 
@@ -115,7 +117,7 @@ class RoomImages(Dataset[dict[str, Any]]):
         return len(self.ambient)
 
     def __getitem__(self, row: int) -> dict[str, Any]:
-        """Return one image and what its views need, as float32 arrays."""
+        """Return one image and what the model is told about it, as float32 arrays."""
         stored = self._images[row]
         item = {"image": channels_first(decode_image(stored["image"]), self._networks.size)}
         item |= self.view(row)
@@ -124,11 +126,11 @@ class RoomImages(Dataset[dict[str, Any]]):
         return item
 
     def as_batch(self, items: dict[str, Tensor]) -> Batch:
-        """Put collated items together."""
+        """Return the batch of collated items."""
         return as_batch(items, self.spec.fov_y_degrees)
 
     def view(self, row: int, world_from_camera: Array | None = None) -> dict[str, Any]:
-        """Return what is known of a row without its image, or as another camera would see it."""
+        """Return what the model is told about a row, as its own or as another camera sees it."""
         pose = self.world_from_camera[row] if world_from_camera is None else world_from_camera
         condition = [pose[:3, 3]] if self._networks.camera else []
         if self._networks.classes:
@@ -146,36 +148,36 @@ class RoomImages(Dataset[dict[str, Any]]):
 
 
 def channels_first(radiance: Array, size: int) -> Array:
-    """Return an image as the networks take it: (H, W, 3) -> (3, S, S) float32."""
+    """Return an image as the networks take it, float32: (H, W, 3) -> (3, S, S)."""
     return np.ascontiguousarray(np.moveaxis(reduced(radiance, size), -1, 0), dtype=np.float32)
 
 
 def as_batch(items: dict[str, Tensor], fov_y_degrees: float) -> Batch:
-    """Put the collated fields of items together."""
+    """Return the batch of the collated fields of items."""
     return Batch(items["image"], as_views(items, fov_y_degrees), items.get("depth"))
 
 
 def as_views(items: dict[str, Tensor], fov_y_degrees: float) -> Views:
-    """Put the collated fields of views together."""
+    """Return the views of the collated fields of items."""
     known = {f.name: items[f.name] for f in fields(Scene) if f.name in items}
     scene = Scene(fov_y_degrees, **known)
     return Views(items["condition"], scene, items.get("background"), items.get("world_from_camera"))
 
 
 class Draws(Sampler[list[int]]):
-    """Rows of batch after batch, from one batch on to another: all rows in a new order each epoch.
+    """Rows of batch after batch without end; every epoch goes through all rows in a new order.
 
-    What a batch holds depends on its number alone, so training goes on where it was stopped.
+    The rows of a batch depend on its number alone, so that training can go on where it stopped.
     """
 
     def __init__(
         self, rows: int, batch: int, seed: int, first: int = 0, share: slice = slice(None)
     ) -> None:
-        """Count through `rows`.
+        """Draw from `rows` rows.
 
         Args:
-            first: number of the batch to begin with; they never end.
-            share: which of every batch's rows, where several processes train.
+            first: number of the batch to begin with.
+            share: which rows of every batch this process takes, where several train together.
         """
         self._rows, self._batch, self._seed = rows, batch, seed
         self._first, self._share = first, share

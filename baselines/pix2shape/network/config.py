@@ -1,10 +1,10 @@
-"""What a model is and how it is trained, as frozen data; JSON both ways."""
+"""The settings of a model and its training, as frozen dataclasses that JSON can hold."""
 
 import json
 from dataclasses import dataclass
 from typing import Any
 
-from baselines.pix2shape.network.networks import NetworkSpec
+from baselines.pix2shape.network.architecture import NetworkSpec
 from scenegen.common.errors import SpecError
 from scenegen.common.records import LARGEST, check, from_json, normalise, to_json
 
@@ -44,22 +44,25 @@ LOSSES = (
 
 @dataclass(frozen=True)
 class ModelConfig:
-    """The paper's model; the defaults are its numbers.
+    """Settings of a model and its training. The defaults are the paper's, where it states them.
 
     Attributes:
-        networks: what they look like.
-        depth_middle, depth_reach: the decoder gives depths of depth_middle (1 +- depth_reach),
-            scene units; known from the camera, not from depth maps.
-        opacity: whether the decoder also tells which rays meet nothing.
-        iterations, batch: of training, in images; Adam with `learning_rate` and `betas`.
-        decay: whether the learning rate falls to nothing over the second half.
+        networks: sizes of the networks.
+        depth_middle, depth_reach: the decoder gives depths of depth_middle * (1 +- depth_reach),
+            scene units. Both follow from the camera's distance, not from depth maps.
+        opacity: whether the decoder also says which rays meet a surface.
+        iterations, batch: length of training, and images in each batch.
         question_batch: questions whose codes L_theta and `contrast` compare in each iteration.
-        critic_steps: of the critic, for each of the others.
-        absolute_differences: whether images are compared by these, not by the paper's norm.
+        learning_rate, betas: of Adam.
+        decay: whether the learning rate falls linearly to 0 over the second half of training.
+        critic_steps: steps of the critic for each step of encoder and decoder.
+        absolute_differences: whether images are compared by absolute differences, not by the
+            paper's norm.
         adversarial, reconstruction, code_reconstruction, consistency, mutual_information,
         questions, contrast, depth:
-            weights of the losses; 0 switches one off. `depth` is the ablation's supervision.
-        seed: of weights and of every random choice of training.
+            weights of the losses of `training/losses.py`; 0 switches one off. `questions` is the
+            paper's L_theta, `depth` the supervision of its ablation.
+        seed: of the first weights and of every random choice of training.
     """
 
     networks: NetworkSpec = PAPER_NETWORKS
@@ -92,7 +95,7 @@ class ModelConfig:
         check(self.batch >= 2, "batch", self.batch, "2 or more")
         least = 8 if self.contrast else 2  # a quarter of them may be labelled
         asked = self.question_batch
-        needed = f"{least} or more" + (", where contrast is on" if self.contrast else "")
+        needed = f"{least} or more" + (", as contrast is on" if self.contrast else "")
         check(asked >= least, "question batch", asked, needed)
         check(self.critic_steps >= 1, "critic steps", self.critic_steps, "1 or more")
         check(self.learning_rate > 0, "learning rate", self.learning_rate, "a positive number")
@@ -105,22 +108,22 @@ class ModelConfig:
 
     @property
     def has_critic(self) -> bool:
-        """Whether anything is trained against encoder and decoder."""
+        """Whether the critic or the statistics network is trained."""
         return bool(self.adversarial or self.disentangles)
 
     @property
     def disentangles(self) -> bool:
-        """Whether mutual information is minimised: where a part of the code tells the view."""
+        """Whether mutual information is minimised, which needs a part of the code for the view."""
         return bool(self.mutual_information and self.networks.z_view)
 
     @property
     def batches_per_iteration(self) -> int:
-        """Batches that one iteration takes: one for each step of the critic, at least one."""
+        """Batches that one iteration takes: one for each of the critic's steps, or one."""
         return self.critic_steps if self.has_critic else 1
 
     @property
     def reconstructed_questions(self) -> int:
-        """Questions whose images fill a batch, four each."""
+        """Questions whose images, four each, fill a batch."""
         return -(-self.batch // 4)
 
     def to_json(self) -> str:
@@ -134,15 +137,17 @@ class ModelConfig:
 
 
 def model_config(name: str, /, **settings: Any) -> ModelConfig:
-    """Return a named configuration with other settings on top.
+    """Return a named configuration, with some settings changed.
 
     Args:
-        settings: values as JSON has them, by name; those of the networks as "networks.width".
+        name: "paper" (128 pixels, full width, all losses of the paper) or "compact" (64 pixels, an
+            eighth of the width, no adversarial loss).
+        settings: values as in JSON by name; a setting of the networks as "networks.width".
 
-    Raises SpecError for names and values that are none.
+    Raises SpecError for unknown names and impossible values.
     """
     if name not in CONFIGS:
-        raise SpecError(f"config: found {name!r}, expected one of {', '.join(CONFIGS)}")
+        raise SpecError("config", repr(name), f"one of {', '.join(CONFIGS)}")
     record = json.loads(ModelConfig(**CONFIGS[name]).to_json())
     for setting, value in settings.items():
         group, dot, rest = setting.rpartition(".")

@@ -1,4 +1,4 @@
-"""The model: networks and surfel renderer together."""
+"""The whole model: image -> code -> depth map and opacity -> image."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -7,15 +7,15 @@ from typing import Any, TypeVar
 import torch
 from torch import Tensor, nn
 
+from baselines.pix2shape.network.architecture import Critic, Decoder, Encoder, Statistics
 from baselines.pix2shape.network.config import ModelConfig
-from baselines.pix2shape.network.networks import Critic, Decoder, Encoder, Statistics
 from baselines.pix2shape.network.surfels import Scene, render
 
 T = TypeVar("T")
 
 
 def mapped(record: T, function: Callable[[Tensor], Tensor]) -> T:
-    """Return a dataclass with every tensor, those of nested ones too, put through a function."""
+    """Return a dataclass with a function applied to its tensors, nested dataclasses included."""
     changed: dict[str, Any] = {}
     for field in fields(record):  # type: ignore[arg-type]
         value = getattr(record, field.name)
@@ -28,13 +28,13 @@ def mapped(record: T, function: Callable[[Tensor], Tensor]) -> T:
 
 @dataclass(frozen=True, eq=False)
 class Views:
-    """A batch of views as the networks see them.
+    """What the model is told about a batch of views.
 
     Attributes:
-        condition: the camera's position, world, and the one-hot class: (B, spec.condition).
-        scene: what their images are shaded with.
-        background: radiance where there is no surface, (B, 3); None where there always is one.
-        world_from_camera: (B, 4, 4); None where views are not compared with each other.
+        condition: camera position, world frame, then the one-hot class: (B, spec.condition).
+        scene: lights and reflectance, camera frame.
+        background: radiance where there is no surface, (B, 3); None for closed rooms.
+        world_from_camera: (B, 4, 4); None for questions, whose cameras are not told.
     """
 
     condition: Tensor
@@ -44,7 +44,7 @@ class Views:
 
 
 class Prior(nn.Module):
-    """The distribution of codes, normal; standard normal until it is fitted."""
+    """The normal distribution that codes are drawn from; standard normal until it is fitted."""
 
     mean: Tensor
     factor: Tensor
@@ -59,10 +59,10 @@ class Prior(nn.Module):
         return self.mean + noise @ self.factor.T
 
     def fit(self, codes: Tensor) -> None:
-        """Take mean and covariance of codes, (N, z).
+        """Take over mean and covariance of codes, (N, z).
 
-        Where no critic ties the codes to the prior, samples are drawn so (Ghosh et al. 2020, "From
-        Variational to Deterministic Autoencoders").
+        Models without an adversarial loss need this, as nothing else ties their codes to the prior
+        (Ghosh et al. 2020, "From Variational to Deterministic Autoencoders").
         """
         centred = (codes - codes.mean(dim=0)).double()
         variance, axes = torch.linalg.eigh(centred.T @ centred / max(len(codes) - 1, 1))
@@ -71,7 +71,10 @@ class Prior(nn.Module):
 
 
 class Pix2Shape(nn.Module):
-    """Encoder, decoder, critic, statistics network and prior of one configuration."""
+    """Encoder, decoder, critic, statistics network and prior of one configuration.
+
+    S is `config.networks.size` and z the length of a code, `config.networks.z`.
+    """
 
     def __init__(self, config: ModelConfig) -> None:
         super().__init__()
@@ -88,7 +91,7 @@ class Pix2Shape(nn.Module):
         return self.encoder(image, views.condition)
 
     def surfels(self, code: Tensor, condition: Tensor) -> tuple[Tensor, Tensor | None]:
-        """Return depth maps, scene units, and opacities within 0..1: (B, z) -> two (B, S, S).
+        """Return planar depth, scene units, and opacity, 0 to 1: (B, z) -> (B, S, S) each.
 
         The opacity is None for a model of closed rooms, where every ray meets a surface.
         """

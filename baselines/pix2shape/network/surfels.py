@@ -1,9 +1,9 @@
 """The differentiable surfel renderer: depth maps and cameras in, shaded images out.
 
 Pix2Shape (IJCV 2020), section "Differentiable 3D Renderer" and appendix "Rendering Details". Each
-pixel is one surfel, so that nothing has to be searched or sorted and every step has a gradient.
-Camera frame: x right, y up, looking along -z; pixels and planar depth as in `scenegen.camera`.
-All functions work on whole batches; B images of H x W, channels first.
+pixel has one surfel, so nothing has to be searched or sorted and every step is differentiable.
+Everything is in the camera frame: x right, y up, looking along -z; pixels and planar depth as in
+`scenegen.camera`. All functions take batches of B images of H x W pixels, channels first.
 """
 
 from dataclasses import dataclass
@@ -17,17 +17,17 @@ from scenegen.camera import pixel_size
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What an image is shaded with, camera frame.
+    """The lights and materials that images are shaded with, camera frame.
 
     Attributes:
         fov_y_degrees: vertical field of view, the same for all images.
         light_position: (B, L, 3), scene units.
-        light_color: L_j, (B, L, 3); zero for lights that are not there.
+        light_color: L_j, (B, L, 3); zero for places without a light.
         ambient: L_a, (B, 3).
         attenuation: (k_l, k_q), (B, 2).
         reflectance: rho, (B, 3), or (B, 3, H, W) of each pixel.
         specular, shininess: Phong's k_s and exponent, (B, H, W) or any shape that broadcasts to
-            it; None where all is matte.
+            it; None for matte rooms.
     """
 
     fov_y_degrees: float
@@ -51,7 +51,7 @@ def pixel_rays(
 
 
 def back_project(depth: Tensor, fov_y_degrees: float) -> Tensor:
-    """Return the surfels' positions, camera frame: (B, H, W) -> (B, 3, H, W)."""
+    """Return the surfels' positions from planar depth: (B, H, W) -> (B, 3, H, W), scene units."""
     x, y = pixel_rays(depth.shape[1], depth.shape[2], fov_y_degrees, depth)
     return torch.stack([depth * x, depth * y, -depth], dim=1)
 
@@ -99,7 +99,7 @@ def shade(positions: Tensor, normals: Tensor, scene: Scene) -> Tensor:
     """
     batch, _, height, width = positions.shape
     p, n, light = positions.flatten(2), normals.flatten(2), scene.light_position
-    # Products of matrices instead of differences for each light: half the traffic of memory.
+    # Matrix products instead of a difference for each light halve the memory traffic.
     squared = (p * p).sum(dim=1, keepdim=True) + (light * light).sum(dim=2, keepdim=True)
     squared = torch.baddbmm(squared, light, p, alpha=-2).clamp(min=1e-12)  # (B, L, HW)
     distance = torch.sqrt(squared)

@@ -1,6 +1,6 @@
-"""What training reads: batch after batch, each derived from its number alone.
+"""The batches that training reads, each determined by its number alone.
 
-So training goes on where it was stopped, and every process takes its share.
+So training can go on where it was stopped, and every process can take its share of a batch.
 """
 
 from collections.abc import Iterator
@@ -18,27 +18,27 @@ from baselines.pix2shape.training.state import State
 from scenegen.common.errors import SceneGenError
 
 Source = RoomImages | QuestionImages
-LABELS_PER_PLACE = 100  # labels for each labelled question among the contrasted ones
+LABELS_PER_PLACE = 100  # labels for each labelled question among those compared
 
 
 def batch_size(config: ModelConfig, source: Source) -> int:
-    """Items of a batch: images of rooms, or questions."""
+    """Return how many items a batch has: images of rooms, or questions."""
     return config.reconstructed_questions if isinstance(source, QuestionImages) else config.batch
 
 
 def question_sizes(config: ModelConfig, source: Source, labels: int) -> tuple[int, int]:
-    """How many questions with a label, and without, have their codes compared each iteration."""
+    """Return how many questions with and without a label are compared in each iteration."""
     if not isinstance(source, QuestionImages) or not (config.contrast or config.questions):
         return 0, 0
     if not config.contrast:
         return (config.question_batch if labels else 0), 0
-    few = -(-labels // LABELS_PER_PLACE)  # or few labels would be seen again and again
+    few = -(-labels // LABELS_PER_PLACE)  # more would repeat few labels too often
     labelled = min(few, config.question_batch // 4)
     return labelled, config.question_batch - labelled
 
 
 class _Told(Dataset[Any]):
-    """A source whose errors are items: else a worker's would come as its whole traceback."""
+    """A source that returns errors; raised in a worker, they would come as a whole traceback."""
 
     def __init__(self, source: Source) -> None:
         self._source = source
@@ -67,7 +67,7 @@ def _loaded(
     fabric: Fabric,
     workers: int,
 ) -> Iterator[dict[str, Tensor]]:
-    """Read batch after batch from a number on, for ever; of each, this process's share."""
+    """Yield this process's share of batch after batch without end, beginning with batch `first`."""
     share = slice(fabric.global_rank, None, fabric.world_size)
     loader = DataLoader(
         _Told(source),
@@ -83,7 +83,7 @@ def _loaded(
 
 
 def image_batches(source: Source, fabric: Fabric, state: State, workers: int) -> Iterator[Batch]:
-    """Yield the images of batch after batch, from the state's on."""
+    """Yield batches of images without end, beginning with the state's iteration."""
     config = state.model.config
     size = batch_size(config, source)
     first = state.iteration * config.batches_per_iteration
@@ -99,7 +99,10 @@ def question_batches(
     state: State,
     workers: int,
 ) -> Iterator[tuple[Batch, Tensor]]:
-    """Yield questions whose codes are compared: the labelled ones first, -1 where no answer is."""
+    """Yield the questions whose codes are compared, labelled ones first, and their answers.
+
+    The answer is -1 for a question without a label.
+    """
     config = state.model.config
     with_label, without = question_sizes(config, source, labels)
     where = state.iteration, config.seed, fabric

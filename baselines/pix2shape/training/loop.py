@@ -1,7 +1,8 @@
-"""The training loop: Pix2Shape (IJCV 2020), Algorithm 1, on any of Lightning Fabric's devices.
+"""The training loop, on any of Lightning Fabric's devices.
 
-Everything random in iteration i derives from (seed, i), so that training goes on after a kill as if
-it had never stopped: weights, optimisers and the number of the iteration are all there is to keep.
+For questions it follows Pix2Shape (IJCV 2020), Algorithm 1, with the losses that the configuration
+switches on; docs/pix2shape.md lists the differences. Everything random in iteration i derives from
+(seed, i), so training goes on after a kill as if it had never stopped.
 """
 
 import time
@@ -32,7 +33,7 @@ from scenegen.common.seeding import Purpose, item_seed
 
 
 class TrainingError(SceneGenError):
-    """Training cannot go on."""
+    """Training cannot go on, as a loss or a gradient is not finite."""
 
 
 def train(
@@ -44,26 +45,26 @@ def train(
     labels: int = 0,
     workers: int = 0,
 ) -> Iterator[tuple[dict[str, float], Batch]]:
-    """Train from the state's iteration to the configuration's last, changing the state.
+    """Train from the state's iteration to the configuration's last one; this changes the state.
 
     Yields the losses by name and the last batch, after each iteration.
 
     Args:
-        source: of the images.
+        source: images to train on.
         fabric: launched; where several processes train, each takes its share of every batch.
         labelled: questions whose first `labels` answers may be used.
-        workers: processes that read; as many again for contrasted questions.
+        workers: processes that read images; as many again read the questions that are compared.
 
     Raises:
-        TrainingError: a loss or a gradient is not finite. The weights are those of before the step,
-            but not the batch statistics: go on from a checkpoint.
-        SpecError: no loss is switched on, there are not so many labels, or the processes cannot
-            share a batch evenly.
+        TrainingError: a loss or a gradient is not finite. The weights are as before the step, but
+            the batch statistics are not: go on from a checkpoint.
+        SpecError: no loss is switched on, there are fewer labels, or the processes cannot share a
+            batch evenly.
     """
     config, model = state.model.config, state.model
     _check_request(config, source, labelled, labels, fabric.world_size)
     fabric.to_device(model)
-    for optimiser in (state.generator, state.critic):  # moves the moments to the weights' device
+    for optimiser in (state.generator, state.critic):  # moves their moments to the model's device
         optimiser.load_state_dict(optimiser.state_dict())
     batches = image_batches(source, fabric, state, workers)
     asked = question_batches(source, labelled, labels, fabric, state, workers)
@@ -96,7 +97,8 @@ def _check_request(
 ) -> None:
     questions = isinstance(source, QuestionImages)
     if questions and config.consistency:
-        raise SpecError("consistency: expected 0 for questions, whose cameras are not told")
+        expected = "0 for questions, whose cameras are not told"
+        raise SpecError("consistency", config.consistency, expected)
     sizes = question_sizes(config, source, labels)
     for size in (batch_size(config, source), *(size for size in sizes if size)):
         even = size % processes == 0 and size >= 2 * processes
@@ -104,15 +106,15 @@ def _check_request(
         check(processes == 1 or even, "devices", processes, what)
     if labels:
         count = len(labelled) if labelled is not None and labelled.has_answers else 0
-        check(labels <= count, "labels", labels, f"at most {count}, the answers that are told")
+        check(labels <= count, "labels", labels, f"at most {count}, as many answers are told")
     weights = (config.adversarial, config.reconstruction, config.code_reconstruction)
     if not any((*weights, config.consistency, config.depth, *sizes)):
-        raise SpecError("losses: found every weight at 0, expected one above")
+        raise SpecError("losses", "every weight at 0", "one above 0")
 
 
 @contextmanager
 def _frozen(*modules: nn.Module) -> Iterator[None]:
-    """Leave out the gradients of weights that are not to change."""
+    """Compute no gradients of the weights of some networks."""
     for module in modules:
         module.requires_grad_(False)
     try:
@@ -130,13 +132,13 @@ def _update(
     numbers: dict[str, Tensor],
     losses: dict[str, float],
 ) -> None:
-    """Take one step; nothing is changed where the loss or a gradient is not finite."""
+    """Take one step, unless the loss or a gradient is not finite."""
     optimiser.zero_grad()
     fabric.backward(loss)
     gradients = [
         p.grad for group in optimiser.param_groups for p in group["params"] if p.grad is not None
     ]
-    if fabric.world_size > 1:  # DDP forbids several and double backward passes
+    if fabric.world_size > 1:  # DDP allows neither several backward passes nor second gradients
         for gradient in gradients:
             gradient.copy_(cast(Tensor, fabric.all_reduce(gradient, reduce_op="mean")))
     losses |= {name: float(value.detach()) for name, value in numbers.items()}
@@ -144,8 +146,9 @@ def _update(
     if cast(Tensor, fabric.all_reduce(sound.float(), reduce_op="mean")) != 1:
         told = ", ".join(f"{name} {value:.3g}" for name, value in losses.items())
         raise TrainingError(
-            f"iteration {state.iteration}: loss or gradients are not finite ({told}); go on from"
-            " the checkpoint, with a smaller learning rate or other weights of the losses"
+            f"iteration {state.iteration}",
+            f"a loss or gradient that is not finite ({told})",
+            hint="begin again with a smaller learning rate or other weights of the losses",
         )
     optimiser.step()
 

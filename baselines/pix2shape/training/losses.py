@@ -1,8 +1,8 @@
-"""Losses, each a function of batches of tensors to a number: the paper's, and three of ours.
+"""The losses, each a function of batches of tensors that returns a number.
 
-Pix2Shape (IJCV 2020), sections "Bi-Directional Adversarial Training", "Unsupervised Training" and
-"Semi-supervised Training for Classification". Ours are `absolute_loss`, `disagreement` and
-`contrast_loss`; docs/pix2shape.md says why.
+Most are the paper's: Pix2Shape (IJCV 2020), sections "Bi-Directional Adversarial Training",
+"Unsupervised Training" and "Semi-supervised Training for Classification". Three are our own,
+`absolute_loss`, `disagreement` and `contrast_loss`; docs/pix2shape.md says why.
 """
 
 import math
@@ -15,18 +15,22 @@ from torch.nn import functional
 from baselines.pix2shape.network.surfels import back_project
 
 HIDDEN = 0.1  # scene units behind another surface at which a surfel counts as hidden by it
-NEAR = 0.05  # scene units; what is nearer to the other camera, or behind it, does not count
-TEMPERATURE = 0.2  # of mean squared differences of standardised numbers; they are about 2 apart
-PENALTY = 10.0  # lambda of the gradient penalty
+NEAR = 0.05  # scene units; surfels nearer to the other camera than this, or behind it, are left out
+TEMPERATURE = 0.2  # divides mean squared differences of standardised codes, which are about 2
+PENALTY = 10.0  # weight lambda of the gradient penalty
 
 
 def critic_loss(real: Tensor, made: Tensor) -> Tensor:
-    """What the critic minimises: scores (B,) of (x, G_z(x)) and of (G_x(z), z), Wasserstein."""
+    """Return the Wasserstein loss that the critic minimises.
+
+    Args:
+        real, made: its scores of (x, G_z(x)) and of (G_x(z), z), (B,) each.
+    """
     return made.mean() - real.mean()
 
 
 def generator_loss(real: Tensor, made: Tensor) -> Tensor:
-    """What encoder and decoder minimise: the critic's loss with the other sign."""
+    """Return what encoder and decoder minimise: the critic's loss with the other sign."""
     return real.mean() - made.mean()
 
 
@@ -38,12 +42,12 @@ def gradient_penalty(
 ) -> Tensor:
     """Return PENALTY E (|grad D| - 1)^2 between the two joint distributions.
 
-    Gulrajani et al. (2017), for pairs: the gradient is that to image and code together.
+    As in Gulrajani et al. (2017), with one gradient norm for image and code together.
 
     Args:
         critic: (images, codes) -> scores (B,).
         real, made: images (B, 3, S, S) and codes (B, z).
-        share: of `real` in each point between, (B,).
+        share: weight of `real` in the points between `real` and `made`, (B,).
     """
     points = []
     for one, other in zip(real, made, strict=True):
@@ -57,16 +61,16 @@ def gradient_penalty(
 
 
 def reconstruction_loss(values: Tensor, again: Tensor) -> Tensor:
-    """Return E ||a - b||_2, the norm over all numbers of an image or code: two (B, ...)."""
+    """Return E ||a - b||_2, where the norm is over all numbers of an image or code, (B, ...)."""
     squared = ((values - again).flatten(1) ** 2).sum(dim=1)
     return torch.sqrt(squared + 1e-12).mean()
 
 
 def absolute_loss(values: Tensor, again: Tensor) -> Tensor:
-    """Return E ||a - b||_1 / sqrt(n) of two (B, ...) of n numbers each.
+    """Return E ||a - b||_1 / sqrt(n) of images or codes, (B, ...), of n numbers each.
 
-    As large as the norm where all numbers are equally wrong, and less dominated by the few that
-    are most wrong: pixels at outlines, which belong to two surfaces.
+    It equals the norm where all differences are equally large, and is less dominated by a few large
+    ones, such as those of pixels at outlines, whose surfel belongs to two surfaces.
     """
     differences = (values - again).flatten(1)
     return differences.abs().mean() * math.sqrt(differences.shape[1])
@@ -75,12 +79,12 @@ def absolute_loss(values: Tensor, again: Tensor) -> Tensor:
 def disagreement(
     depth: Tensor, other_depth: Tensor, other_from_camera: Tensor, fov_y_degrees: float
 ) -> Tensor:
-    """Return how far surfels of one view lie from those of another, a mean over those it sees.
+    """Return the mean distance between one view's surfels and another view's, scene units.
 
-    Of each surfel, the difference between its depth in the other camera and what that camera sees
-    in its place; surfels out of the other's sight, or behind what it sees by more than HIDDEN, are
-    left out. As in learning depth from video (Zhou et al. 2017; Bian et al. 2019), with surfels of
-    one code in place of two images' depth maps.
+    Each surfel's depth in the other camera is compared with the depth that the other view has in
+    its place. Surfels out of the other view's sight, or hidden by more than HIDDEN, are left out.
+    This is the geometric consistency of learning depth from video (Zhou et al. 2017; Bian et al.
+    2019), here between two decoded views of one code.
 
     Args:
         depth, other_depth: (B, S, S), scene units.
@@ -92,7 +96,7 @@ def disagreement(
         its_depth = -points[:, 2]
         edge = math.tan(math.radians(fov_y_degrees) / 2) * its_depth.clamp(min=NEAR)
         place = torch.stack([points[:, 0], -points[:, 1]], dim=2) / edge[..., None]
-        inverse = functional.grid_sample(  # which is affine on planes
+        inverse = functional.grid_sample(  # inverse depth is affine on planes
             1 / other_depth[:, None], place[:, None], padding_mode="border", align_corners=False
         )
     behind = its_depth - 1 / inverse[:, 0, 0]
@@ -106,12 +110,13 @@ def mutual_information(
 ) -> Tensor:
     """Return MINE's lower bound of the mutual information of two parts of a code, nats.
 
-    Belghazi et al. (2018): E_joint[T] - log E_marginal[exp T]. The statistics network climbs it,
-    the encoder descends.
+    E_joint[T] - log E_marginal[exp T], Belghazi et al. (2018). The statistics network maximises
+    it, the encoder minimises it.
 
     Args:
-        first, second: (B, n) and (B, m), paired.
-        order: permutation of the batch, (B,), that breaks the pairs.
+        statistics: T, a function of the two parts to numbers (B,).
+        first, second: the parts, (B, n) and (B, m).
+        order: permutation of the batch, (B,), that makes pairs of the marginal distribution.
     """
     joint = statistics(first, second)
     marginal = statistics(first, second[order])
@@ -119,10 +124,10 @@ def mutual_information(
 
 
 def question_loss(codes: Tensor, answers: Tensor) -> Tensor:
-    """Return the paper's L_theta for labelled mental-rotation questions.
+    """Return the paper's L_theta (equation "app-loss") for labelled mental-rotation questions.
 
-    Half the squared distance of the reference's code to the right answer's, less half of those to
-    the two wrong ones.
+    It is half the squared distance between the codes of reference and right answer, minus half the
+    squared distances between the reference and the two wrong answers.
 
     Args:
         codes: z_scene of reference and three answers, (Q, 4, n).
@@ -134,12 +139,12 @@ def question_loss(codes: Tensor, answers: Tensor) -> Tensor:
 
 
 def contrast_loss(codes: Tensor, answers: Tensor) -> Tensor:
-    """Return how badly a question's answers are told from those of the other questions, nats.
+    """Return how badly a reference's code tells its own answers from other questions' ones, nats.
 
-    One of a question's three answers shows the reference's shape, and hardly any of another
-    question's does: so of all answers of a batch, one of its own three is to be the reference's
-    nearest. That needs no label; where the right answer is known, it alone counts as the own
-    (Miech et al. 2020, MIL-NCE, "End-to-End Learning of Visual Representations").
+    One of a question's three answers shows the reference's shape, and hardly any answer of another
+    question does. So among all answers of a batch, the nearest to the reference should be one of
+    its own three. That needs no label; where the right answer is told, it alone counts as own.
+    This is MIL-NCE (Miech et al. 2020, "End-to-End Learning of Visual Representations").
 
     Args:
         codes: z_scene of reference and three answers, standardised, (Q, 4, n).
@@ -157,5 +162,5 @@ def contrast_loss(codes: Tensor, answers: Tensor) -> Tensor:
 
 
 def squared_distances(codes: Tensor) -> Tensor:
-    """Return the answers' squared distances from the reference: (Q, 4, n) -> (Q, 3)."""
+    """Return squared distances between reference and answers: codes (Q, 4, n) -> (Q, 3)."""
     return ((codes[:, 1:] - codes[:, :1]) ** 2).sum(dim=2)

@@ -1,4 +1,4 @@
-"""A training run: a folder with checkpoints, TensorBoard's logs, a picture, and the weights."""
+"""A training run and its folder: checkpoint, TensorBoard logs, a picture, and the weights."""
 
 import errno
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from baselines.pix2shape.training.batches import Source
 from baselines.pix2shape.training.loop import train
 from baselines.pix2shape.training.state import CHECKPOINT, State, load_state, new_state, save_state
 from baselines.pix2shape.training.steps import draw
-from baselines.pix2shape.weights.weights import Card, save_weights
+from baselines.pix2shape.weights.storage import Card, save_weights
 from iqtt.files.reader import open_questions
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check
@@ -30,17 +30,17 @@ from scenegen.rooms.reader import RoomsFile
 
 WEIGHTS, PICTURE, LOGS = "weights.safetensors", "pictures.png", "logs"
 LOG_EVERY = 20  # iterations
-PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and so many at once
+PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and batch size for that
 
 
 @dataclass(frozen=True)
 class Machine:
-    """Where training happens; one process gives the same anywhere, to rounding.
+    """Where and how training runs; none of this changes what is learned, up to rounding.
 
     Attributes:
-        accelerator, devices, precision: Lightning Fabric's.
-        workers: processes that read.
-        every: iterations between checkpoints, and pictures.
+        accelerator, devices, precision: as in Lightning Fabric.
+        workers: processes that read the data.
+        every: iterations between checkpoints, and between pictures.
     """
 
     accelerator: str = "auto"
@@ -62,31 +62,41 @@ def train_run(
 ) -> Path | None:
     """Train a model, from the start or from the folder's checkpoint.
 
-    Return the weights' path; None on all processes but the first.
+    Returns the path of the weights; None on all processes but the first.
 
     Args:
-        config: None to go on from the checkpoint, with its labels and classes.
-        labels: answers that training on questions may use.
-        conditional: whether the networks are told the class of the only object.
-        progress: called after every iteration.
+        config: None goes on from the checkpoint, with its labels and classes.
+        labels: number of answers that training on questions may use.
+        conditional: whether the networks are told the class of a room's only object.
+        progress: called with the state and the losses after every iteration.
 
-    Raises SpecError where folder, configuration and data do not go together; TrainingError;
-    FileFormatError, OSError.
+    Raises SpecError where configuration and data do not fit; FileExistsError where a new run finds
+    a checkpoint; TrainingError; FileFormatError, OSError.
     """
     folder = Path(folder)
     if config is None:
         state, card = load_state(folder)
         labels = card.labels
-        _check_same(card, data)
+        source, labelled = _sources(data, card.config, labels)
+        found = _fingerprint(source, labelled)
+        if found != card.fingerprint:
+            expected = f"{card.fingerprint[:12]}, on which the run was trained"
+            hint = "resume with the same data"
+            raise SpecError(data, f"fingerprint {found[:12]}", expected, hint)
     else:
         if (folder / CHECKPOINT).exists():
-            raise FileExistsError(
-                errno.EEXIST,
-                "holds a checkpoint; say --resume, or name another folder",
-                str(folder),
-            )
-        card = _new_card(config, data, labels, conditional)
-        state = new_state(card.config)
+            what = "holds a checkpoint; say --resume, or name another folder"
+            raise FileExistsError(errno.EEXIST, what, str(folder))
+        config = _suited(config, data, labels, conditional)
+        source, labelled = _sources(data, config, labels)
+        card = Card(
+            config,
+            data=source.spec.to_json(),
+            fingerprint=_fingerprint(source, labelled),
+            labels=labels,
+            classes=source.classes if config.networks.classes else (),
+        )
+        state = new_state(config)
     fabric = Fabric(
         accelerator=machine.accelerator,
         devices=machine.devices,
@@ -94,21 +104,17 @@ def train_run(
         precision=machine.precision,  # type: ignore[arg-type]
     )
     fabric.launch()
-    source, labelled = _sources(data, card.config, labels)
     folder.mkdir(parents=True, exist_ok=True)
-    logs = (
-        SummaryWriter(str(folder / LOGS), purge_step=state.iteration + 1)
-        if fabric.is_global_zero
-        else None
-    )
+    first, last = fabric.is_global_zero, card.config.iterations
+    logs = SummaryWriter(str(folder / LOGS), purge_step=state.iteration + 1) if first else None
     try:
         for losses, batch in train(
             state, source, fabric, labelled=labelled, labels=labels, workers=machine.workers
         ):
-            if not fabric.is_global_zero or logs is None:
+            if logs is None:
                 continue
             progress(state, losses)
-            done = state.iteration == card.config.iterations
+            done = state.iteration == last
             if state.iteration % LOG_EVERY == 0 or done:
                 for name, value in losses.items():
                     logs.add_scalar(name, value, state.iteration)
@@ -120,10 +126,10 @@ def train_run(
     finally:
         if logs is not None:
             logs.close()
-    if fabric.is_global_zero and not (folder / WEIGHTS).exists():
+    if first and not (folder / WEIGHTS).exists():
         _save_weights(folder, state.model, card, source)
     fabric.barrier()
-    return folder / WEIGHTS if fabric.is_global_zero else None
+    return folder / WEIGHTS if first else None
 
 
 def _save_weights(folder: Path, model: Pix2Shape, card: Card, source: Source) -> None:
@@ -134,7 +140,7 @@ def _save_weights(folder: Path, model: Pix2Shape, card: Card, source: Source) ->
 
 @torch.no_grad()
 def fit_prior(model: Pix2Shape, source: Source) -> None:
-    """Give the prior the distribution of codes of the first images."""
+    """Fit the prior to the codes of the first images."""
     device = next(model.parameters()).device
     loader = DataLoader(source, batch_size=BATCH, sampler=range(min(len(source), PRIOR_ITEMS)))
     learning = model.training
@@ -154,64 +160,35 @@ def _picture(folder: Path, logs: SummaryWriter, state: State, batch: Batch) -> N
 def _sources(
     data: str | Path, config: ModelConfig, labels: int
 ) -> tuple[Source, QuestionImages | None]:
+    """Open the images, and the labelled questions if some of their answers are used."""
     if config.networks.camera:
         return RoomImages(data, config), None
     labelled = QuestionImages(data, "labeled", config) if labels else None
     return QuestionImages(data, "unlabeled", config), labelled
 
 
-def _new_card(config: ModelConfig, data: str | Path, labels: int, conditional: bool) -> Card:
-    """Return the configuration as the data wants it, and what the data is."""
+def _fingerprint(source: Source, labelled: QuestionImages | None) -> str:
+    """Return the fingerprint of rooms, or those of the parts of a question file that are used."""
+    return " ".join(str(one.fingerprint) for one in (source, labelled) if one is not None)
+
+
+def _suited(config: ModelConfig, data: str | Path, labels: int, conditional: bool) -> ModelConfig:
+    """Return the configuration as the data needs it. Raises SpecError where they do not fit."""
+    networks = config.networks
     if is_question_file(data):
         if conditional:
-            raise SpecError(f"{data}: questions have no classes to condition on")
+            raise SpecError(data, "questions, which have no classes", "rooms for --conditional")
         check(config.depth == 0, "depth", config.depth, "0 for questions, which have no depth maps")
         config = for_questions(config, data, "unlabeled")
-        config = replace(config, questions=config.questions if labels else 0.0)
-        with open_questions(data, "unlabeled") as questions:
-            assert questions.spec is not None, "for_questions has refused such files"
-            spec = questions.spec.to_json()
         with open_questions(data, "labeled") as questions:
             check(0 <= labels <= len(questions), "labels", labels, f"0 to {len(questions)}")
-        return Card(config, data=spec, fingerprint=_fingerprint(data, labels), labels=labels)
+        return replace(config, questions=config.questions if labels else 0.0)
     check(labels == 0, "labels", labels, "0 for rooms, which ask no questions")
-    classes: tuple[str, ...] = ()
-    with RoomsFile(data) as rooms:
-        spec, mark = rooms.spec.to_json(), rooms.fingerprint
-        if conditional:
-            one = rooms.spec.objects == (1, 1)
-            check(one, "conditional", f"objects {rooms.spec.objects}", "one object in every room")
-            classes = tuple(rooms.spec.shapes)
-    networks = config.networks
     check(networks.camera, "camera", networks.camera, "true: rooms are seen by known cameras")
     check(networks.classes == 0, "classes", networks.classes, "0; --conditional tells them")
-    config = replace(
-        config,
-        networks=replace(networks, classes=len(classes)),
-        mutual_information=0.0,
-        questions=0.0,
-        contrast=0.0,
-    )
-    return Card(config, data=spec, fingerprint=mark, classes=classes)
-
-
-def _fingerprint(data: str | Path, labels: int) -> str:
-    """Return that of rooms, or of the parts of a question file that are used."""
-    if not is_question_file(data):
+    if conditional:
         with RoomsFile(data) as rooms:
-            return rooms.fingerprint
-    found = []
-    for part in ("unlabeled", "labeled") if labels else ("unlabeled",):
-        with open_questions(data, part) as questions:
-            found.append(str(questions.fingerprint))
-    return " ".join(found)
-
-
-def _check_same(card: Card, data: str | Path) -> None:
-    """Refuse to go on with other data."""
-    found = _fingerprint(data, card.labels)
-    if found != card.fingerprint:
-        raise SpecError(
-            f"{data}: fingerprint {found[:12]}, the run was trained on {card.fingerprint[:12]};"
-            " resume with the same data"
-        )
+            counts, shapes = rooms.spec.objects, rooms.spec.shapes
+        check(counts == (1, 1), "conditional", f"objects {counts}", "one object in every room")
+        networks = replace(networks, classes=len(shapes))
+    return replace(config, networks=networks, mutual_information=0.0, questions=0.0, contrast=0.0)

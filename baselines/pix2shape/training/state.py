@@ -1,4 +1,4 @@
-"""The state of training, and its checkpoint: weights, optimisers, the number of the iteration."""
+"""The state of training and its checkpoint: weights, optimisers, number of the iteration."""
 
 import errno
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from torch.optim import Adam
 
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
-from baselines.pix2shape.weights.weights import (
+from baselines.pix2shape.weights.storage import (
     Card,
     load_card,
     load_into,
@@ -28,7 +28,7 @@ MOMENTS = ("exp_avg", "exp_avg_sq", "step")  # Adam's
 
 @dataclass(eq=False)
 class State:
-    """All that training changes."""
+    """Everything that training changes."""
 
     model: Pix2Shape
     generator: Adam
@@ -38,7 +38,7 @@ class State:
 
 
 def new_state(config: ModelConfig) -> State:
-    """Return an untrained model and its optimisers; the weights are those of the seed."""
+    """Return an untrained model, whose weights the seed decides, and its optimisers."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(item_seed(config.seed, 0, Purpose.WEIGHTS))
         model = Pix2Shape(config)
@@ -59,12 +59,12 @@ def _parameters(*modules: nn.Module) -> list[nn.Parameter]:
 
 
 def save_state(folder: Path, state: State, card: Card) -> None:
-    """Write the folder's checkpoint; the one before is there until this one is complete."""
+    """Write the folder's checkpoint; the old one stays until this one is complete."""
     tensors = {f"model.{name}": value for name, value in state.model.state_dict().items()}
     notes = {"iteration": str(state.iteration), "seconds": f"{state.seconds:.3f}"}
     for kind, optimiser in (("generator", state.generator), ("critic", state.critic)):
         moments = optimiser.state_dict()["state"]
-        notes[kind] = str(len(moments))  # of what has been trained: not all losses train all
+        notes[kind] = str(len(moments))  # not every loss trains every parameter
         for index, values in moments.items():
             tensors |= {f"{kind}.{index}.{name}": value for name, value in values.items()}
     save_card(folder / CHECKPOINT, card)
@@ -89,14 +89,14 @@ def load_state(folder: Path) -> tuple[State, Card]:
         strange = [name for name in tensors if name.split(".")[0] not in ("model", *KINDS)]
         _check(not strange, f"{', '.join(strange)} not expected")
     except (KeyError, ValueError) as error:
-        raise FileFormatError(f"{path}: not a checkpoint of this release: {error}") from error
+        raise FileFormatError(path, f"{error}", "a checkpoint of this release") from error
     return state, card
 
 
 def _load_moments(optimiser: Adam, tensors: dict[str, Tensor], count: int) -> None:
-    """Set an optimiser's moments, those of `count` parameters.
+    """Set the moments of an optimiser's first `count` trained parameters.
 
-    Raises KeyError, ValueError where some are missing, unknown, of another shape or not finite.
+    Raises KeyError, ValueError where moments are missing, unknown, of another shape, not finite.
     """
     parameters = optimiser.param_groups[0]["params"]
     moments: dict[int, dict[str, Tensor]] = {}

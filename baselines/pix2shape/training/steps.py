@@ -1,7 +1,8 @@
-"""What critic and generator minimise on one batch: the losses put together.
+"""What one step minimises on a batch: the weighted sum of the losses that are switched on.
 
-Pix2Shape (IJCV 2020), Algorithm 1 and equations "rec_loss" and "app-loss". A loss whose weight is 0
-is neither computed nor named among the numbers.
+"Generator" means encoder and decoder together; they are trained against the critic. The losses
+follow Pix2Shape (IJCV 2020), Algorithm 1 and equations "rec_loss" and "app-loss". A loss whose
+weight is 0 is neither computed nor reported.
 """
 
 from dataclasses import dataclass
@@ -10,8 +11,8 @@ import torch
 from torch import Tensor
 
 from baselines.pix2shape.data.rooms import Batch
+from baselines.pix2shape.network.architecture import CAMERA
 from baselines.pix2shape.network.model import Pix2Shape, mapped, shaded
-from baselines.pix2shape.network.networks import CAMERA
 from baselines.pix2shape.training.losses import (
     absolute_loss,
     contrast_loss,
@@ -29,11 +30,11 @@ Numbers = dict[str, Tensor]
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """The random numbers of one step, B images.
+    """The random numbers of one step on B images.
 
     Attributes:
-        code: of the prior, standard normal, (B, z).
-        share: of the real pair in each of the penalty's points, (B,), uniform.
+        code: standard normal, (B, z).
+        share: uniform in 0..1, (B,); where the gradient penalty is taken.
         order: a permutation of the batch, (B,).
     """
 
@@ -47,7 +48,7 @@ class Noise:
 
 
 def draw(batch: int, z: int, seed: int) -> Noise:
-    """Return the noise of a seed; the same on every device."""
+    """Return the noise of a seed, the same for every device."""
     source = torch.Generator().manual_seed(seed)
     return Noise(
         torch.randn(batch, z, generator=source),
@@ -57,7 +58,7 @@ def draw(batch: int, z: int, seed: int) -> Noise:
 
 
 def critic_step(model: Pix2Shape, batch: Batch, noise: Noise) -> tuple[Tensor, Numbers]:
-    """Return what critic and statistics network minimise, and its parts by name."""
+    """Return what critic and statistics network minimise, and the parts to report by name."""
     config, views = model.config, batch.views
     numbers: Numbers = {}
     with torch.no_grad():
@@ -82,11 +83,11 @@ def critic_step(model: Pix2Shape, batch: Batch, noise: Noise) -> tuple[Tensor, N
 def generator_step(
     model: Pix2Shape, batch: Batch, noise: Noise, asked: tuple[Batch, Tensor] | None = None
 ) -> tuple[Tensor, Numbers]:
-    """Return what encoder and decoder minimise, and its parts by name.
+    """Return what encoder and decoder minimise, and the losses by name.
 
     Args:
-        asked: images of questions, four after four, and which answers are right, (Q,); -1 where
-            that is not known.
+        asked: four images for each of Q questions, and which answers are right, (Q,); -1 for a
+            question without a label.
     """
     config, views = model.config, batch.views
     code = model.encode(batch.image, views)
@@ -113,7 +114,7 @@ def generator_step(
             losses["code_reconstruction"] = reconstruction_loss(noise.code, found)
     if config.consistency:
         pose, fov = views.world_from_camera, views.scene.fov_y_degrees
-        assert pose is not None, "for_questions switches it off"
+        assert pose is not None, "for_questions switches consistency off"
         others = pose[noise.order]
         camera, classes = views.condition[noise.order, :CAMERA], views.condition[:, CAMERA:]
         elsewhere, _ = model.surfels(code, torch.cat([camera, classes], dim=1))

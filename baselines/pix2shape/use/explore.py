@@ -1,4 +1,4 @@
-"""What a model has learned, as pictures: samples, the way between two images, unseen views."""
+"""Pictures of what a model has learned: samples, interpolations between images, other views."""
 
 import math
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape, Views, mapped
 from baselines.pix2shape.network.surfels import Scene
 from baselines.pix2shape.pictures import drawn, image_tiles, sheet
-from baselines.pix2shape.weights.weights import Card
+from baselines.pix2shape.weights.storage import Card
 from scenegen.camera import Camera
 from scenegen.common.errors import SpecError
 from scenegen.common.seeding import Purpose, item_seed
@@ -28,36 +28,36 @@ from scenegen.sampling.cameras import sample_cameras
 from scenegen.sampling.lights import sample_lights
 
 Array = NDArray[Any]
-ROW = 8  # tiles side by side
+ROW = 8  # tiles in a row of a sheet
 
 
 def known_rooms(data: str | Path, card: Card) -> RoomImages:
-    """Open rooms whose images a model shall see. Raises as `RoomImages`, SpecError."""
+    """Open rooms for a model to encode. Raises as `RoomImages`, and SpecError for other classes."""
     _check_camera(card.config)
     rooms = RoomImages(data, replace(card.config, depth=0.0))
     if card.classes and rooms.classes != card.classes:
-        raise SpecError(
-            f"{data}: classes {', '.join(rooms.classes)}, the model knows {', '.join(card.classes)}"
-        )
+        known = f"{', '.join(card.classes)}, as the model knows"
+        raise SpecError(data, f"classes {', '.join(rooms.classes)}", known)
     return rooms
 
 
 def sample_sheet(
     model: Pix2Shape, card: Card, count: int, seed: int, label: str | None = None
 ) -> Image.Image:
-    """Draw codes from the model's prior, seen by cameras and lights as of the training data.
+    """Draw codes from the model's prior; cameras and lights are drawn as for the training data.
 
-    Lines of images, depths and normals.
+    The sheet has rows of images, of depths and of normals.
 
     Args:
-        label: class, for a conditional model; None for each in turn.
+        label: class of a conditional model's samples; None takes each class in turn.
 
-    Raises SpecError for a label where there are none, or that is unknown; a model of questions.
+    Raises SpecError for a label that the model does not know, and for a model of questions.
     """
-    spec = replace(rooms_spec(card), seed=seed)
+    _check_camera(card.config)
+    spec = replace(DatasetSpec.from_json(card.data), seed=seed)
     known = f"one of {', '.join(card.classes)}" if card.classes else "none: it knows no classes"
     if label is not None and label not in card.classes:
-        raise SpecError(f"class: found {label!r}, expected {known}")
+        raise SpecError("class", repr(label), known)
     one_hot = np.zeros((count, len(card.classes)))
     for i in range(count if card.classes else 0):
         one_hot[i, i % len(card.classes) if label is None else card.classes.index(label)] = 1
@@ -73,11 +73,10 @@ def sample_sheet(
 def interpolation_sheet(
     model: Pix2Shape, rooms: RoomImages, first: int, last: int, steps: int
 ) -> Image.Image:
-    """Go from one image's code to another's in equal steps, all seen from the first one's camera.
+    """Go from one image's code to another's in equal steps, seen from the first one's camera.
 
-    The first and the last tile of the first line are the two images themselves.
+    The two images themselves are the first and the last tile of the sheet's first row.
     """
-    _check_camera(model.config)
     batch = rooms.as_batch(default_collate([rooms[first], rooms[last]]))
     with torch.no_grad():
         code = model.encode(batch.image, batch.views)
@@ -92,12 +91,11 @@ def interpolation_sheet(
 def rotation_frames(
     model: Pix2Shape, rooms: RoomImages, rows: Sequence[int], degrees: Sequence[float]
 ) -> list[Image.Image]:
-    """Turn the camera about the vertical axis through its target, away from the images' views.
+    """Turn the camera about the vertical axis through its target; return a sheet for each angle.
 
-    The turn goes to the side that stays farther within the room's open octant. A frame for each
-    angle: lines of input images, images, depths and normals.
+    The camera turns to the side where it stays longer in front of the room's two walls. A sheet
+    has rows of the input images, and of images, depths and normals at the angle.
     """
-    _check_camera(model.config)
     batch = rooms.as_batch(default_collate([rooms[row] for row in rows]))
     with torch.no_grad():
         code = model.encode(batch.image, batch.views)
@@ -114,7 +112,7 @@ def rotation_frames(
 
 
 def turned(world_from_camera: Array, spec: DatasetSpec, degrees: float) -> Camera:
-    """Return a camera that was turned about the vertical axis through the target."""
+    """Return a camera turned about the vertical axis through its target."""
     x, y, z = (float(v) for v in world_from_camera[:3, 3] - spec.camera_target)
     azimuth = math.atan2(z, x)
     sign = 1 if azimuth < math.pi / 4 else -1
@@ -131,7 +129,7 @@ def known_views(
     lights: Sequence[Sequence[Light]],
     one_hot: Array,
 ) -> Views:
-    """Return what is known of views that were never rendered: cameras, lights, materials."""
+    """Return the cameras, lights and reflectance of views that were never rendered."""
     most = max(1, *map(len, lights))
     position, color = np.zeros((len(cameras), most, 3)), np.zeros((len(cameras), most, 3))
     for i, (camera, own) in enumerate(zip(cameras, lights, strict=True)):
@@ -151,15 +149,9 @@ def known_views(
     return Views(_tensor(condition), Scene(spec.fov_y_degrees, *map(_tensor, known)))
 
 
-def rooms_spec(card: Card) -> DatasetSpec:
-    """Return the request that the training rooms answer. Raises SpecError for other models."""
-    _check_camera(card.config)
-    return DatasetSpec.from_json(card.data)
-
-
 def _check_camera(config: ModelConfig) -> None:
     if not config.networks.camera:
-        raise SpecError("weights: a model of questions, expected one of rooms")
+        raise SpecError("weights", "a model of questions", "one of rooms")
 
 
 def _tensor(values: Array) -> Tensor:

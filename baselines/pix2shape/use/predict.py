@@ -1,5 +1,6 @@
-"""Predictions of a trained model, written as any submission is; no truth is read but cameras."""
+"""Submissions of a trained model. Of the truth only the cameras of rooms are read."""
 
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from baselines.pix2shape.training.losses import squared_distances
 from baselines.pix2shape.weights.bundled import open_weights
 from iqtt.files.reader import open_questions, parts
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
-from scenegen.common.errors import SpecError
+from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.new_file import check_writable
 from scenegen.common.records import check
 from scenegen.rendering.ground_truth import decode_image
@@ -39,13 +40,17 @@ def predict_file(
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> None:
-    """Write the submission of some weights, to rooms or to questions.
+    """Write a submission for rooms or questions.
 
     Args:
-        weights: a path, or a name of bundled ones.
+        weights: a path, or the name of bundled weights.
+        data: rooms or questions.
+        out: submission to write.
         device: "auto", "cpu" or "cuda".
+        run: name of this run among several of the method.
+        progress: called with the number of rows just done and of all rows.
 
-    Raises as `load_model`, `predict_rooms` and `answer_file`.
+    Raises as `open_weights`, `predict_rooms` and `answer_file`.
     """
     model, _ = open_weights(weights)
     model.to(chosen_device(device))
@@ -57,9 +62,9 @@ def predict_file(
 
 
 def chosen_device(name: str, count: int = 1) -> torch.device:
-    """Return a device by name; "auto" is a GPU where there is one. Raises SpecError."""
+    """Return a device by name; "auto" is a GPU if there is one. Raises SpecError."""
     if name == "cuda" and not torch.cuda.is_available():
-        raise SpecError("device: found no GPU that this torch can use; say --device cpu")
+        raise SpecError("device", "no GPU that this torch can use", hint="say --device cpu")
     if name != "cpu" and torch.cuda.is_available():
         check(count <= torch.cuda.device_count(), "devices", count, str(torch.cuda.device_count()))
     return torch.device("cuda" if name != "cpu" and torch.cuda.is_available() else "cpu")
@@ -75,26 +80,24 @@ def predict_rooms(
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> None:
-    """Write depth and normals of every view of a rooms file, each scene from its input view alone.
+    """Write depth and normals of every view of a rooms file, each scene from one image alone.
 
-    One pass of the encoder for each scene (view 0), one of the decoder for each of its views.
+    That image is the scene's view 0, or the first of its views that the file holds, which is
+    warned about. The encoder sees it once; the decoder is asked for each view of the scene.
 
-    Raises SpecError where the model is not one for such files; OSError, FileFormatError.
+    Raises SpecError where the model does not suit rooms; FileFormatError where a camera is not
+    known or the file is damaged; OSError.
     """
     spec = model.config.networks
     if not spec.camera or spec.classes:
-        what = "classes, which are part of the truth" if spec.classes else "no camera"
-        raise SpecError(f"weights: a model of {what}, expected one conditioned on the camera alone")
+        what = "is told classes, which are part of the truth" if spec.classes else "is not told it"
+        raise SpecError("weights", f"a model that {what}", "one that is told the camera alone")
     with RoomsFile(data) as rooms:
         size = rooms.spec.height
         check_reducible(data, size, rooms.spec.width, spec.size)
-        place = rooms.read("camera/world_from_camera", slice(None))[:, :3, 3]
-        condition = torch.from_numpy(place.astype(np.float32))
-        scene, view = rooms.read("scene_index", slice(None)), rooms.read("view_index", slice(None))
-        inputs = np.flatnonzero(view == 0)
-        of_scene = {int(scene[row]): k for k, row in enumerate(inputs)}
+        condition = torch.from_numpy(_camera_positions(rooms).astype(np.float32))
+        inputs, own = _input_views(rooms)
         codes = torch.cat(list(_codes(model, rooms, inputs, condition)))
-        own = torch.tensor([of_scene[int(number)] for number in scene])
         with RoomPredictionWriter(out, data, method=METHOD, run=run, overwrite=overwrite) as file:
             for rows in _batches(len(rooms)):
                 device = next(model.parameters()).device
@@ -115,22 +118,22 @@ def answer_file(
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> None:
-    """Write answers to the questions of a file: the answer whose z_scene is nearest.
+    """Write answers to the questions of a file, from images alone.
 
-    Raises SpecError where the model is not one for questions; else as `iqtt.QuestionsFile`.
+    An answer's score is minus the distance of its z_scene from the reference's, as in the paper.
+
+    Raises SpecError where the model does not suit questions; else as `iqtt.QuestionsFile`.
     """
     spec = model.config.networks
     if spec.condition:
-        raise SpecError("weights: a model that must be told the camera, expected one for questions")
+        raise SpecError("weights", "a model that is told the camera", "one for questions")
     if len(parts(data)) > 1:
-        raise SpecError(
-            f"{data}: training questions, expected those to be answered, such as iqtt-test.h5"
-        )
+        raise SpecError(data, "training questions", "questions to answer, such as iqtt-test.h5")
     device = next(model.parameters()).device
     with open_questions(data) as questions:
         check_reducible(data, questions.height, questions.width, spec.size)
         scores = []
-        for rows in _batches(len(questions), BATCH // 4):
+        for rows in _batches(len(questions), 4):
             images = [
                 channels_first(image, spec.size)
                 for row in rows
@@ -149,20 +152,52 @@ def answer_file(
 def enlarged(depth: Tensor, fov_y_degrees: float, size: int) -> tuple[Tensor, Tensor]:
     """Return depth, (B, size, size), and normals, (B, 3, size, size), of smaller depth maps.
 
-    Inverse depth is what is interpolated: planes stay planes.
+    Inverse depth is interpolated, as it is affine on planes: planes stay planes.
     """
     normals = normals_from_depth(depth, fov_y_degrees)
     factor = size // depth.shape[1]
     if factor == 1:
         return depth, normals
-    # The outer pixels' centres lie within the image: continue to its border, and cut that off.
+    # The outer pixels' centres lie within the image: extrapolate beyond its border, then crop.
     wide = functional.interpolate(
         extrapolated(1 / depth)[:, None], scale_factor=factor, mode="bilinear"
     )
     inverse = wide[:, 0, factor:-factor, factor:-factor]
-    least = 0.5 / depth.amax(dim=(1, 2), keepdim=True)  # a surface may end beyond the last centre
+    least = 0.5 / depth.amax(dim=(1, 2), keepdim=True)  # keeps extrapolated depth finite
     normals = functional.interpolate(normals, scale_factor=factor, mode="bilinear")
     return 1 / torch.maximum(inverse, least), functional.normalize(normals, dim=1)
+
+
+def _camera_positions(rooms: RoomsFile) -> Array:
+    """Return the position of each row's camera, (N, 3), world frame."""
+    poses = rooms.read("camera/world_from_camera", slice(None))
+    unknown = np.flatnonzero(~np.isfinite(poses).all(axis=(1, 2)))
+    if len(unknown):
+        raise FileFormatError(
+            f"{rooms.path}: camera/world_from_camera, row {unknown[0]}",
+            "numbers that are not finite",
+            "the camera's pose, which the model has to be told",
+            "render the file anew with `scenegen render`, or leave this row out",
+        )
+    return np.asarray(poses[:, :3, 3])
+
+
+def _input_views(rooms: RoomsFile) -> tuple[Array, Array]:
+    """Return the rows that the scenes are predicted from, (S,), and for each row its scene's
+    place among them, (N,).
+    """
+    scene, view = (rooms.read(name, slice(None)) for name in ("scene_index", "view_index"))
+    first: dict[int, int] = {}
+    for row in np.argsort(view, kind="stable"):
+        first.setdefault(int(scene[row]), int(row))
+    inputs = np.array(sorted(first.values()))
+    if late := np.count_nonzero(view[inputs]):
+        warnings.warn(
+            f"{rooms.path}: {late} of {len(inputs)} scenes have no view 0; the model's input is the"
+            " first of their other views",
+            stacklevel=3,
+        )
+    return inputs, np.searchsorted(inputs, [first[int(number)] for number in scene])
 
 
 def _codes(
@@ -179,5 +214,7 @@ def _codes(
         yield model.encoder(image, condition[rows].to(device)).cpu()
 
 
-def _batches(count: int, size: int = BATCH) -> Iterator[Array]:
+def _batches(count: int, items: int = 1) -> Iterator[Array]:
+    """Yield the rows of batch after batch, where each row has so many images."""
+    size = BATCH // items
     return (np.arange(first, min(first + size, count)) for first in range(0, count, size))

@@ -1,10 +1,10 @@
-"""The weights that come with the package, by name."""
+"""The weights that come with the package, found by name or by the data they suit."""
 
 from pathlib import Path
 
 from baselines.pix2shape.data.rooms import is_question_file
 from baselines.pix2shape.network.model import Pix2Shape
-from baselines.pix2shape.weights.weights import Card, load_model
+from baselines.pix2shape.weights.storage import Card, load_model
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
 
@@ -19,7 +19,7 @@ def names() -> list[str]:
 def suited(data: str | Path) -> str:
     """Return the name of the bundled weights that were trained on the most similar data.
 
-    Raises as `RoomsFile`, and SpecError where none are.
+    Raises as `RoomsFile`, and SpecError where this installation has no such weights.
     """
     if is_question_file(data):
         name = "iqtt"
@@ -28,16 +28,17 @@ def suited(data: str | Path) -> str:
             single = "-single" if rooms.spec.objects[1] == 1 else ""
             name = f"shapes{single}" if rooms.spec.source == "shapes" else "shapenet"
     if name not in names():
-        raise SpecError(f"weights: none are bundled for {data}; train some with pix2shape train")
+        hint = "train some with `pix2shape train`"
+        raise SpecError("weights", "none bundled", f"some that suit {data}", hint)
     return name
 
 
 def open_weights(weights: str | Path) -> tuple[Pix2Shape, Card]:
-    """Load bundled weights by name, or any by path. Raises as `load_model`, and SpecError."""
+    """Load weights by path, or bundled ones by name. Raises as `load_model`, and SpecError."""
     text = str(weights)
     if text in names():
         return load_model(FOLDER / f"{text}.safetensors")
     if Path(text).suffix != ".safetensors":
-        known = ", ".join(names()) or "the bundled ones, of which this installation has none"
-        raise SpecError(f"weights: found {text!r}, expected a .safetensors file or one of {known}")
+        known = f"or one of {', '.join(names())}" if names() else "as no weights are bundled"
+        raise SpecError("weights", repr(text), f"a .safetensors file, {known}")
     return load_model(text)

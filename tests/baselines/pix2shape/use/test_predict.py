@@ -1,4 +1,4 @@
-"""Predictions: each scene from its input view alone, nothing of the truth, and no half a file."""
+"""Submissions of a model: from input images alone, nothing of the truth, and no half a file."""
 
 from pathlib import Path
 from typing import Any
@@ -6,22 +6,24 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from h5_edits import damaged_chunk, put, values
-from pix2shape_models import edited, made, of_questions, reordered, tiny, told, written
+from h5_edits import damaged_chunk, gone, put, values
+from pix2shape_models import edited, made, of_questions, of_rows, released, tiny, told, written
 
+from iqtt.files.reader import open_questions
 from metrics.scoring.evaluate import score
+from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
+from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
 
 torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
-from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
-from baselines.pix2shape.network.surfels import normals_from_depth  # noqa: E402
+from baselines.pix2shape.data.rooms import RoomImages, channels_first  # noqa: E402
 from baselines.pix2shape.use import predict  # noqa: E402
-from baselines.pix2shape.use.predict import enlarged, predict_file, predict_rooms  # noqa: E402
+from baselines.pix2shape.use.predict import answer_file, enlarged, predict_file, predict_rooms  # noqa: E402
 
 Fields = dict[str, np.ndarray]
 TRUTH = (
@@ -36,11 +38,15 @@ def model() -> Any:
     return made(tiny())
 
 
+@pytest.fixture
+def answerer(train_questions: Path) -> Any:
+    return made(of_questions(train_questions))
+
+
 @pytest.fixture(autouse=True)
 def few_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither 8 nor 9 rows, nor 3 scenes, fill whole batches."""
-    monkeypatch.setattr(predict, "BATCH", 2)
-    monkeypatch.setattr(predict._batches, "__defaults__", (2,))
+    """Rooms and questions take several batches, and 9 rows do not fill the last one."""
+    monkeypatch.setattr(predict, "BATCH", 4)
 
 
 def predicted(model: Any, path: Path, out: Path) -> Fields:
@@ -84,14 +90,33 @@ def test_each_row_is_the_input_views_code_seen_from_the_rows_camera(model, sever
     assert len({found["depth"][row].tobytes() for row in range(9)}) == 9
 
 
-def test_rows_may_come_in_any_order(model, several_path, tmp_path):
-    order = [4, 8, 0, 2, 3, 7, 1, 6, 5]
-    path = edited(several_path, tmp_path / "mixed.h5", reordered(order))
-    found = predicted(model, path, tmp_path / "p.h5")
-    expected = predicted(model, several_path, tmp_path / "q.h5")
-    assert found["row"].tolist() == list(range(9))
-    np.testing.assert_allclose(found["depth"], expected["depth"][order], rtol=1e-4)
-    np.testing.assert_allclose(found["normal"], expected["normal"][order], atol=1e-3)
+def test_without_view_0_the_first_stored_view_is_the_input(model, several_path, tmp_path):
+    """Scene 1 has lost its view 0, and its view 2 comes before view 1; scene 2 keeps view 2."""
+    rows = [5, 0, 4, 2, 8]
+    path = edited(several_path, tmp_path / "lost.h5", of_rows(rows))
+    with pytest.warns(UserWarning, match=r"lost\.h5: 2 of 3 scenes have no view 0"):
+        found = predicted(model, path, tmp_path / "p.h5")
+    whole = predicted(model, several_path, tmp_path / "q.h5")
+    for place in (1, 3):  # the scene that has its view 0
+        np.testing.assert_allclose(found["depth"][place], whole["depth"][rows[place]], rtol=1e-4)
+    source = RoomImages(several_path, model.config)
+    for place, first in ((0, 4), (2, 4), (4, 8)):
+        pair = source.as_batch(default_collate([source[first], source[rows[place]]]))
+        with torch.no_grad():
+            code = model.encode(pair.image, pair.views)[:1]
+            depth = enlarged(model.surfels(code, pair.views.condition[1:])[0], 28.0, 64)[0]
+        np.testing.assert_allclose(found["depth"][place], depth[0], rtol=1e-4)
+
+
+def test_a_camera_that_is_not_known_is_refused(model, several_path, tmp_path):
+    edit = put("camera/world_from_camera", (4, 1, 3), np.nan)
+    path = edited(several_path, tmp_path / "bad.h5", edit)
+    with pytest.raises(FileFormatError) as error:
+        predict_rooms(model, path, tmp_path / "p.h5")
+    assert error.value.where == f"{path}: camera/world_from_camera, row 4"
+    assert error.value.found == "numbers that are not finite"
+    assert error.value.hint
+    assert not (tmp_path / "p.h5").exists()
 
 
 def test_other_views_are_not_looked_at(model, several_path, tmp_path):
@@ -137,13 +162,6 @@ def test_planes_stay_planes_when_enlarged(size):
     np.testing.assert_allclose(normal[0].permute(1, 2, 0).numpy() - slant, 0, atol=1e-5)
 
 
-def test_depth_of_the_files_own_size_is_left_alone():
-    depth = 1 + torch.rand(2, 32, 32)
-    again, normal = enlarged(depth, 50.0, 32)
-    assert torch.equal(again, depth)
-    assert torch.equal(normal, normals_from_depth(depth, 50.0))
-
-
 def test_enlarged_depth_stays_near_what_was_predicted():
     """At steps beside the border, too, where it is extrapolated."""
     torch.manual_seed(0)
@@ -157,11 +175,11 @@ def test_enlarged_depth_stays_near_what_was_predicted():
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        ("classes", "weights: a model of classes, which are part of the truth, expected one"),
-        ("questions", "weights: a model of no camera, expected one conditioned on the camera"),
-        ("rooms", "weights: a model that must be told the camera, expected one for questions"),
-        ("large", "images of 32x32, expected squares of a multiple of 64 pixels"),
-        ("large questions", "images of 32x32, expected squares of a multiple of 64 pixels"),
+        ("classes", "a model that is told classes"),
+        ("questions", "a model that is not told it"),
+        ("rooms", "a model that is told the camera"),
+        ("large", "images of 32x32"),
+        ("large questions", "images of 32x32"),
     ],
 )
 def test_models_that_do_not_suit_are_refused(kind, words, truths, train_questions, tmp_path):
@@ -174,9 +192,9 @@ def test_models_that_do_not_suit_are_refused(kind, words, truths, train_question
     }
     weights = written(tmp_path / "w.safetensors", configs[kind]())
     data = truths.iqtt if kind in ("rooms", "large questions") else truths.rooms
-    with pytest.raises(SpecError, match=words) as error:
+    with pytest.raises(SpecError) as error:
         predict_file(weights, data, tmp_path / "p.h5")
-    assert "\n" not in str(error.value)
+    assert error.value.found.startswith(words)
     assert not (tmp_path / "p.h5").exists()
 
 
@@ -213,3 +231,99 @@ def test_numbers_that_are_not_finite_are_not_written(make_rooms, model, tmp_path
     with pytest.raises(SceneGenError, match="row 2: depth: found NaN"):
         predict_rooms(model, path, tmp_path / "p.h5")
     assert not (tmp_path / "p.h5").exists()
+
+
+def answered(answerer: Any, path: Path, out: Path, **how: Any) -> tuple[list[int], np.ndarray]:
+    """Return answers and scores; where only one of them is written, from `metrics`."""
+    answer_file(answerer, path, out, overwrite=True, **how)
+    with open_predictions(out) as found, h5py.File(out) as file:
+        assert found.rows.tolist() == list(range(len(found)))
+        return found.answers.tolist(), file["scores"][()]
+
+
+def distances(answerer: Any, path: Path, part: str | None = None) -> np.ndarray:
+    """Return the distances of all answers' z_scene from the reference's, one image at a time."""
+    found = []
+    with open_questions(path, part) as questions, torch.no_grad():
+        for record in questions:
+            images = torch.from_numpy(
+                np.stack([channels_first(image, 32) for image in decode_image(record.images)])
+            )
+            codes = [answerer.encoder(image[None], image.new_empty(1, 0))[0] for image in images]
+            scene = [code.double().numpy()[: answerer.config.networks.z_scene] for code in codes]
+            found.append([np.linalg.norm(scene[k] - scene[0]) for k in (1, 2, 3)])
+    return np.array(found)
+
+
+def test_the_nearest_scene_is_the_answer(answerer, truths, tmp_path):
+    done: list[tuple[int, int]] = []
+    answers, scores = answered(
+        answerer, truths.iqtt, tmp_path / "a.h5", progress=lambda *step: done.append(step)
+    )
+    expected = distances(answerer, truths.iqtt)
+    np.testing.assert_allclose(scores, -expected, rtol=1e-4)
+    assert answers == expected.argmin(axis=1).tolist()
+    assert len(set(answers)) > 1
+    assert done == [(1, 6)] * 6
+    assert [p for p in validate(tmp_path / "a.h5") if not p.is_hint] == []
+    assert score([tmp_path / "a.h5"]).method == "pix2shape"
+
+
+def test_the_view_has_no_say(answerer, truths, tmp_path):
+    before = answered(answerer, truths.iqtt, tmp_path / "a.h5")
+    spec = answerer.config.networks
+    assert spec.z_view == 10
+    with torch.no_grad():
+        answerer.encoder.last.weight[spec.z_scene :] *= 100
+    after = answered(answerer, truths.iqtt, tmp_path / "a.h5")
+    np.testing.assert_array_equal(after[1], before[1])
+    with torch.no_grad():
+        answerer.encoder.last.weight[: spec.z_scene] *= 2
+    assert not np.array_equal(answered(answerer, truths.iqtt, tmp_path / "a.h5")[1], before[1])
+
+
+def test_the_same_image_is_the_answer_and_a_tie_abstains(answerer, tmp_path):
+    """Files as released: images and nothing beside."""
+    right = [2, 0, 1, -1, 2, -2, 0]
+    path = released(tmp_path / "released.h5", right)
+    answers, scores = answered(answerer, path, tmp_path / "a.h5")
+    assert answers == [max(answer, -1) for answer in right]
+    assert scores[3, 0] == scores[3, 2] > scores[3, 1]
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert file.attrs["truth_fingerprint"] == ""
+
+
+def test_larger_images_are_reduced(answerer, tmp_path):
+    path = released(tmp_path / "large.h5", [1, 2, 0], size=96)
+    assert answered(answerer, path, tmp_path / "a.h5")[0] == [1, 2, 0]
+
+
+def test_neither_answers_nor_lights_are_needed(answerer, truths, tmp_path):
+    folder = Path(truths.iqtt).parent
+    with h5py.File(truths.iqtt) as file:
+        assert "answers" not in file
+        assert "truth" not in file
+    expected = answered(answerer, folder / "iqtt-val.h5", tmp_path / "a.h5")
+    path = edited(folder / "iqtt-val.h5", tmp_path / "bare.h5", gone("answers", "truth"))
+    found = answered(answerer, path, tmp_path / "a.h5")
+    assert found[0] == expected[0]
+    np.testing.assert_array_equal(found[1], expected[1])
+    wrong = put("answers", slice(None), 0)
+    path = edited(folder / "iqtt-val.h5", tmp_path / "wrong.h5", wrong)
+    np.testing.assert_array_equal(answered(answerer, path, tmp_path / "a.h5")[1], expected[1])
+
+
+def test_training_questions_are_not_answered(answerer, train_questions, tmp_path):
+    with pytest.raises(SceneGenError) as error:
+        answer_file(answerer, train_questions, tmp_path / "a.h5")
+    assert (error.value.where, error.value.found) == (str(train_questions), "training questions")
+    assert not (tmp_path / "a.h5").exists()
+
+
+def test_questions_that_cannot_be_read_on_leave_what_was_there(answerer, truths, tmp_path):
+    path = edited(truths.iqtt, tmp_path / "bad.h5", damaged_chunk("questions", 5))
+    (tmp_path / "a.h5").write_text("mine")
+    with pytest.raises(FileFormatError, match=r"bad\.h5: questions, row 5: cannot be read"):
+        answer_file(answerer, path, tmp_path / "a.h5", overwrite=True)
+    assert (tmp_path / "a.h5").read_text() == "mine"
+    assert len(list(tmp_path.iterdir())) == 2

@@ -1,9 +1,9 @@
 """(c): nothing but the nearest hits of the primary rays, the limit for any renderer of the scenes.
 
-Two structures. `unit_scene`: the one that scenegen uses; every object is cast at its unit shape, in
-a structure that is never rebuilt. `lattice`: all scenes of a batch side by side in one Mitsuba
-scene, objects as instances, rays bounded by the room; it must be built for every batch. Only the
-ray parameter and an id are evaluated.
+There are two structures. `unit_scene` is scenegen's own: every object is cast at its unit shape, in
+a structure that is never rebuilt. `lattice` puts all scenes of a batch side by side into one
+Mitsuba scene, with objects as instances and rays bounded by the room; it is built for every batch.
+Only the ray parameter and an id are evaluated.
 """
 
 import time
@@ -16,8 +16,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.scenes import read_depth, read_scenes
-from benchmarks.timing import repeat
+from benchmarks.jobs.inputs import read_depth, read_scenes
+from benchmarks.jobs.timing import repeat
 from scenegen.camera import pixel_size
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.basic_shapes import unit_shape

@@ -1,6 +1,7 @@
 """Checkpoints refused when damaged; each step's own noise; several processes, one model."""
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -16,12 +17,12 @@ torch = pytest.importorskip("torch")
 from lightning_fabric import Fabric  # noqa: E402
 
 from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
+from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
-from baselines.pix2shape.network.networks import NetworkSpec  # noqa: E402
 from baselines.pix2shape.training import loop as training  # noqa: E402
 from baselines.pix2shape.training.loop import train  # noqa: E402
 from baselines.pix2shape.training.state import CHECKPOINT, load_state, new_state, save_state  # noqa: E402
-from baselines.pix2shape.weights.weights import Card, load_tensors, save_tensors  # noqa: E402
+from baselines.pix2shape.weights.storage import Card, load_tensors, save_tensors  # noqa: E402
 
 TINY = ModelConfig(
     networks=NetworkSpec(size=32, width=0.05, z_scene=24), iterations=3, batch=4, critic_steps=1,
@@ -36,7 +37,7 @@ from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.data.rooms import RoomImages
 from baselines.pix2shape.training.state import new_state, save_state
 from baselines.pix2shape.training.loop import train
-from baselines.pix2shape.weights.weights import Card
+from baselines.pix2shape.weights.storage import Card
 
 torch.set_num_threads(1)
 fabric = Fabric(accelerator="cpu", devices=2, strategy="ddp")
@@ -52,16 +53,22 @@ save_state(folder, state, Card(config, state.iteration))
 Tensors = dict[str, Any]
 
 
-@pytest.fixture
-def folder(rooms_path: Path, tmp_path: Path) -> Path:
+@pytest.fixture(scope="session")
+def trained(rooms_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with the checkpoint of a tiny model, trained for three iterations."""
+    folder = tmp_path_factory.mktemp("trained")
     fabric = Fabric(accelerator="cpu", devices=1)
     fabric.launch()
     state = new_state(TINY)
     for _ in train(state, RoomImages(rooms_path, TINY), fabric):
         pass
-    save_state(tmp_path, state, Card(TINY, state.iteration))
-    return tmp_path
+    save_state(folder, state, Card(TINY, state.iteration))
+    return folder
+
+
+@pytest.fixture
+def folder(trained: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(trained, tmp_path, dirs_exist_ok=True)
 
 
 def rewritten(folder: Path, edit: Callable[[Tensors, dict[str, str]], Any]) -> None:
@@ -71,13 +78,12 @@ def rewritten(folder: Path, edit: Callable[[Tensors, dict[str, str]], Any]) -> N
 
 
 def refused(folder: Path) -> str:
-    """Check that loading raises one line that begins with the file; return it."""
+    """Check that loading raises one line that begins with the file; return what was found."""
     with pytest.raises(FileFormatError) as error:
         load_state(folder)
-    line = str(error.value)
-    assert line.startswith(f"{folder / CHECKPOINT}: ")
-    assert "\n" not in line
-    return line
+    assert error.value.where.startswith(str(folder / CHECKPOINT))
+    assert "\n" not in str(error.value)
+    return str(error.value)
 
 
 def test_an_untrained_state_is_a_checkpoint_too(tmp_path):
@@ -98,13 +104,20 @@ def test_a_checkpoint_that_is_not_there(tmp_path):
 @pytest.mark.parametrize(
     ("edit", "words"),
     [
-        (lambda t, n: n.clear(), "release: 'iteration'"),
-        (lambda t, n: n.update(iteration="three"), "invalid literal"),
-        (lambda t, n: n.update(seconds="long"), "could not convert"),
-        (lambda t, n: t.update({"critic.x.step": torch.ones(1)}), "invalid literal"),
-        (lambda t, n: t.pop("model.critic.last.bias"), "critic.last.bias is missing"),
-        (lambda t, n: t.update({"model.more": torch.ones(1)}), "more is not expected"),
-        (lambda t, n: t["model.decoder.last.bias"].fill_(torch.nan), "is not finite"),
+        (lambda t, n: n.clear(), "'iteration'"),
+        (lambda t, n: n.update(iteration="three"), "three"),
+        (lambda t, n: n.update(iteration="-5"), "-5"),
+        (lambda t, n: n.update(seconds="long"), "long"),
+        (lambda t, n: t.update({"critic.x.step": torch.ones(1)}), "'x'"),
+        (lambda t, n: t.pop("model.critic.last.bias"), "critic.last.bias"),
+        (lambda t, n: t.update({"model.more": torch.ones(1)}), "more"),
+        (lambda t, n: t["model.decoder.last.bias"].fill_(torch.nan), "decoder.last.bias"),
+        (lambda t, n: t.pop("generator.0.exp_avg"), "0.exp_avg"),
+        (lambda t, n: [t.pop(name) for name in list(t) if name.startswith("critic.")], "moments"),
+        (lambda t, n: t.update({"generator.0.exp_avg": torch.zeros(3)}), "0.exp_avg"),
+        (lambda t, n: t["generator.0.exp_avg"].fill_(torch.nan), "0.exp_avg"),
+        (lambda t, n: t.update({"generator.9999.exp_avg": torch.zeros(3)}), "9999"),
+        (lambda t, n: t.update({"more": torch.zeros(3)}), "more"),
     ],
 )
 def test_damaged_checkpoints_are_refused(folder, edit, words):
@@ -112,37 +125,19 @@ def test_damaged_checkpoints_are_refused(folder, edit, words):
     assert words in refused(folder)
 
 
-@pytest.mark.parametrize(
-    "edit",
-    [
-        lambda t, n: t.pop("generator.0.exp_avg"),
-        lambda t, n: [t.pop(name) for name in list(t) if name.startswith("critic.")],
-        lambda t, n: t.update({"generator.0.exp_avg": torch.zeros(3)}),
-        lambda t, n: t["generator.0.exp_avg"].fill_(torch.nan),
-        lambda t, n: t.update({"generator.9999.exp_avg": torch.zeros(3)}),
-        lambda t, n: t.update({"more": torch.zeros(3)}),
-        lambda t, n: n.update(iteration="-5"),
-    ],
-    ids=["missing", "one optimiser", "shape", "nan", "index", "extra", "negative"],
-)
-def test_damaged_moments_are_refused(folder, edit):
-    rewritten(folder, edit)
-    refused(folder)
-
-
 def test_every_step_has_noise_of_its_own(rooms_path, monkeypatch):
     """Of each critic's batch, too; but the same wherever training began."""
     fabric, seeds = Fabric(accelerator="cpu", devices=1), []
     draw = training.draw
     monkeypatch.setattr(training, "draw", lambda *a: (seeds.append(a[2]), draw(*a))[1])
-    config = replace(TINY, critic_steps=2, iterations=3)
+    config = replace(TINY, critic_steps=2, iterations=2)
     for first in (0, 0, 1):
         state = new_state(config)
         state.iteration = first
         for _ in train(state, RoomImages(rooms_path, config), fabric):
             pass
-    assert len(set(seeds[:6])) == 6
-    assert seeds == [*seeds[:6], *seeds[:6], *seeds[2:6]]
+    assert len(set(seeds[:4])) == 4
+    assert seeds == [*seeds[:4], *seeds[:4], *seeds[2:4]]
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Jobs of `benchmarks.questions`: our pipeline, its parts, and one Mitsuba render an image."""
+"""iqtt's pipeline for questions, its parts, and one Mitsuba render for each of the images."""
 
 import shutil
 import tempfile
@@ -10,9 +10,9 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from benchmarks.meshes import Mesh
-from benchmarks.plain_mitsuba import mitsuba_mesh
-from benchmarks.timing import repeat, seconds_of
+from benchmarks.jobs.inputs import Mesh
+from benchmarks.jobs.plain_mitsuba import mitsuba_mesh, sensor
+from benchmarks.jobs.timing import repeat, seconds_of
 from iqtt.files.make import make_split
 from iqtt.questions.sampling import make_pools
 from iqtt.questions.specs import SplitSpec
@@ -95,29 +95,11 @@ def _image(spec: SplitSpec, question: Question, i: int) -> dict[str, Any]:
 def _render_all(spec: SplitSpec, images: list[dict[str, Any]], integrator: Any) -> None:
     for number, contents in enumerate(images):
         scene = mi.load_dict(
-            {"type": "scene", "integrator": integrator, "sensor": _sensor(spec), **contents}
+            {
+                "type": "scene",
+                "integrator": integrator,
+                "sensor": sensor(spec, spec.camera),
+                **contents,
+            }
         )
         np.array(mi.render(scene, spp=1, seed=number))
-
-
-def _sensor(spec: SplitSpec) -> dict[str, Any]:
-    camera = spec.camera
-    view = mi.ScalarTransform4f().look_at(
-        origin=list(camera.position), target=list(camera.target), up=[0, 1, 0]
-    )
-    film = {
-        "type": "hdrfilm",
-        "width": spec.width,
-        "height": spec.height,
-        "pixel_format": "rgb",
-        "component_format": "float32",
-        "rfilter": {"type": "box"},
-    }
-    return {
-        "type": "perspective",
-        "fov": camera.fov_y_degrees,
-        "fov_axis": "y",
-        "to_world": view,
-        "film": film,
-        "sampler": {"type": "independent", "sample_count": 1},
-    }

@@ -1,4 +1,4 @@
-"""Unit meshes for other renderers: as fine as scenegen's own, or coarse."""
+"""What the jobs share: the scenes of a finished rooms file, and unit meshes for other renderers."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -8,11 +8,33 @@ import numpy as np
 from numpy.typing import NDArray
 from trimesh.grouping import unique_rows
 
+from scenegen.description.scenes import SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.objects.catalogue import Objects
 from scenegen.objects.solids import UnitShape
+from scenegen.objects.sources import file_objects
+from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 COARSE_FROM = 1000  # triangles; shapes with fewer stay as they are
-COARSE_GRID = 6  # cells a unit that the corners of coarse meshes are drawn to
+COARSE_GRID = 6  # cells in a unit, to whose corners coarse meshes are rounded
+
+
+def read_scenes(rooms: str, count: int) -> tuple[DatasetSpec, list[SceneSpec]]:
+    """Return a file's spec and its first `count` scenes."""
+    with RoomsFile(rooms) as file:
+        return file.spec, [file.scene(row) for row in range(count)]
+
+
+def read_objects(spec: DatasetSpec, root: str) -> Objects:
+    """Return the objects of the scenes: built in, or the meshes of a folder."""
+    return file_objects(spec, objects_root=root or None)
+
+
+def read_depth(rooms: str, count: int) -> Array:
+    """Return the first `count` depth maps, to check that others cast the same rays."""
+    with RoomsFile(rooms) as file:
+        return np.asarray(file.read("depth", slice(0, count)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,8 +51,8 @@ def unit_meshes(
 ) -> dict[str, Mesh]:
     """Return the welded unit meshes of all shapes but the exact sphere.
 
-    Coarse ones have about a thousand triangles: what a user may accept who has to build them anew
-    for every scene. They show it, and are here for their speed alone.
+    Coarse ones have about a thousand triangles, which a user may accept who has to build them anew
+    for every scene. They look coarse, and are here for their speed alone.
     """
     shapes = {name: shape_of(name) for name in names}
     return {name: _weld(shape, coarse) for name, shape in shapes.items() if not shape.is_sphere}

@@ -1,6 +1,6 @@
-"""Weights and checkpoints: tensors as safetensors, the configuration as JSON beside them.
+"""Weights as safetensors files, and a card of the configuration as JSON beside them.
 
-Reading either runs no code from it.
+Checkpoints (`training/state.py`) are stored in the same way. Reading runs no code of the files.
 """
 
 import json
@@ -21,23 +21,23 @@ from scenegen.common.new_file import written_beside
 from scenegen.common.records import check, from_json, normalise
 
 FORMAT_VERSION = 1
-KEPT = ("encoder", "decoder", "prior")
+KEPT = ("encoder", "decoder", "prior")  # the networks that predicting and sampling need
 PARTS = (*KEPT, "critic", "statistics")
 LARGEST_JSON = 1_000_000  # bytes
 
 
 @dataclass(frozen=True)
 class Card:
-    """What is told beside weights.
+    """What is stored beside weights: where they come from.
 
     Attributes:
-        config: of the model.
-        iteration: how far it was trained.
-        data: what it was trained on, the file's spec as JSON.
-        fingerprint: of that file.
-        labels: how many answers it was given, of questions.
-        classes: names of the labels, in order, of a conditional model.
-        seconds: of training.
+        config: configuration of model and training.
+        iteration: number of training iterations done.
+        data: spec of the training file, as JSON.
+        fingerprint: that of the training file.
+        labels: number of answers that training on questions was given.
+        classes: names of the object classes, in order, of a conditional model.
+        seconds: duration of training.
     """
 
     config: ModelConfig
@@ -60,26 +60,23 @@ class Card:
 def save_weights(
     path: str | Path, model: Pix2Shape, card: Card, dtype: torch.dtype = torch.float16
 ) -> None:
-    """Write what prediction and sampling need, and the card beside; replaces both.
+    """Write the networks that predicting and sampling need, and the card; replaces both files.
 
     Args:
         path: ends in .safetensors; the card gets the same name with .json.
-        dtype: of the stored numbers; tensors beyond its range keep their own.
+        dtype: type of the stored numbers; tensors beyond its range keep their own.
     """
-    tensors = {
-        name: value.to(dtype) if value.is_floating_point() else value
-        for name, value in model.state_dict().items()
-        if name.split(".")[0] in KEPT
-    }
+    tensors: dict[str, Tensor] = {}
     for name, value in model.state_dict().items():
-        if name in tensors and not torch.isfinite(tensors[name]).all():
-            tensors[name] = value  # as it is where it is beyond half precision's range
+        if name.split(".")[0] in KEPT:
+            short = value.to(dtype) if value.is_floating_point() else value
+            tensors[name] = short if torch.isfinite(short).all() else value
     save_tensors(path, tensors, {})
     save_card(path, card)
 
 
 def save_tensors(path: str | Path, tensors: Mapping[str, Tensor], notes: dict[str, str]) -> None:
-    """Write tensors; the file appears, or is replaced, when it is complete."""
+    """Write tensors and notes; the file appears, or is replaced, when it is complete."""
     kept = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
     with written_beside(path, overwrite=True) as temporary:
         temporary.write_bytes(save(kept, metadata=notes or None))
@@ -96,77 +93,80 @@ def load_card(path: str | Path) -> Card:
     """Read the JSON beside weights. Raises OSError, FileFormatError."""
     beside = Path(path).with_suffix(".json")
     if beside.stat().st_size > LARGEST_JSON:
-        raise FileFormatError(f"{beside}: over {LARGEST_JSON} bytes, expected a configuration")
+        raise FileFormatError(beside, f"over {LARGEST_JSON} bytes", "a card of weights")
     text = beside.read_bytes()
     try:
         return from_json(Card, text, "card")
     except SpecError as error:
-        raise FileFormatError(f"{beside}: {_other_version(text) or error}") from error
+        _check_version(beside, text)
+        wrong = error.inside(beside)
+        raise FileFormatError(wrong.where, wrong.found, wrong.expected, wrong.hint) from error
 
 
-def _other_version(text: bytes) -> str | None:
-    """Say so where a card is of another version: its fields may have other names."""
+def _check_version(path: Path, text: bytes) -> None:
+    """Raise FileFormatError where a card has another version, whose fields may differ."""
     try:
         version = json.loads(text)["format_version"]
     except (ValueError, RecursionError, KeyError, TypeError):
-        return None
-    told = f"format version {version!r:.20}, this release reads {FORMAT_VERSION}"
-    return told if version != FORMAT_VERSION else None
+        return
+    if version != FORMAT_VERSION:
+        raise FileFormatError(path, f"format version {version!r:.20}", str(FORMAT_VERSION))
 
 
 def load_tensors(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     """Read tensors and notes. Raises OSError, FileFormatError."""
     path = Path(path)
-    with path.open("rb"):  # so that a missing file or a folder is told as Python tells it
+    with path.open("rb"):  # raises Python's own errors for a missing file or a folder
         pass
     try:
         with safe_open(path, "pt") as file:
             return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118
     except SafetensorError as error:
-        raise FileFormatError(f"{path}: not a safetensors file, or damaged: {error}") from error
+        raise FileFormatError(path, f"no safetensors file, or a damaged one ({error})") from error
 
 
 def load_model(path: str | Path) -> tuple[Pix2Shape, Card]:
-    """Read weights and their card: the model in evaluation mode.
+    """Read weights and their card; the model is in evaluation mode.
 
     Raises:
-        OSError: no such file.
-        FileFormatError: damaged, not of the card's configuration, or not finite.
+        OSError: a file is missing.
+        FileFormatError: a file is damaged, or the weights are not finite or do not fit the card.
     """
     card = load_card(path)
     tensors, _ = load_tensors(path)
     if any(name.startswith("model.") for name in tensors):
-        raise FileFormatError(f"{path}: a checkpoint; name the weights beside it")
+        raise FileFormatError(path, "a checkpoint", "weights", "name the weights beside it")
     return load_into(card, tensors, path, KEPT).eval(), card
 
 
 def load_into(
     card: Card, tensors: Mapping[str, Tensor], path: str | Path, parts: tuple[str, ...] = PARTS
 ) -> Pix2Shape:
-    """Return the card's model with stored tensors. Raises FileFormatError unless all parts fit.
+    """Return the card's model with stored tensors in some of its networks, `parts`.
 
-    Shapes are compared before anything is allocated.
+    Shapes are compared before anything is allocated, so that a hostile card costs no memory.
+    Raises FileFormatError unless every tensor fits.
     """
     with torch.device("meta"):
         own: dict[str, Any] = Pix2Shape(card.config).state_dict()
     wanted = {name: value for name, value in own.items() if name.split(".")[0] in parts}
     missing, unknown = sorted(wanted.keys() - tensors), sorted(tensors.keys() - own)
-    if missing or unknown:
-        what = f"{missing[0]} is missing" if missing else f"{unknown[0]} is not expected"
-        raise FileFormatError(f"{path}: weights of another configuration: {what}")
+    other = "these are weights of another configuration than the card's"
+    if missing:
+        raise FileFormatError(f"{path}: {missing[0]}", "nothing", "a tensor", other)
+    if unknown:
+        raise FileFormatError(f"{path}: {unknown[0]}", "a tensor", "nothing", other)
     for name, value in wanted.items():
         found = tensors[name]
         if found.shape != value.shape:
-            raise FileFormatError(
-                f"{path}: weights of another configuration: {name} has shape"
-                f" {tuple(found.shape)}, expected {tuple(value.shape)}"
-            )
+            shape, expected = (f"shape {tuple(one.shape)}" for one in (found, value))
+            raise FileFormatError(f"{path}: {name}", shape, expected, other)
         kinds = [(v.is_floating_point(), v.is_complex()) for v in (found, value)]
         if kinds[0] != kinds[1] or (found.element_size() == 1 and value.element_size() > 1):
-            raise FileFormatError(f"{path}: {name} is {found.dtype}, expected {value.dtype}")
+            raise FileFormatError(f"{path}: {name}", found.dtype, value.dtype)
         cast = found.to(value.dtype)
         if not torch.isfinite(cast).all() or (name.endswith("running_var") and (cast < 0).any()):
-            raise FileFormatError(f"{path}: {name} is not finite, or a variance below 0")
+            raise FileFormatError(f"{path}: {name}", "NaN, infinity or a variance below 0")
     model = Pix2Shape(card.config)
     for name, value in model.state_dict().items():
         if name in wanted:

@@ -1,4 +1,4 @@
-"""(b): `make_dataset` end to end, its rendering stage alone, and what the machine offers."""
+"""(b): scenegen's `make_dataset` end to end, its rendering stage alone, and the machine."""
 
 import importlib.metadata
 import statistics
@@ -6,11 +6,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.timing import STARTED, repeat, seconds_of
+from benchmarks.jobs.timing import STARTED, repeat, seconds_of
 
 
 def machine() -> dict[str, Any]:
-    """Return the versions that only the process that renders can tell."""
+    """Return the versions and the variant, which only a process that renders can tell."""
     from scenegen.rendering.backend import find_llvm, llvm_version, select_variant
 
     names = ("mitsuba", "drjit", "numpy", "h5py", "isal")
@@ -55,6 +55,7 @@ def from_nothing(
     rooms: str, count: int, preset: str, root: str = "", **settings: Any
 ) -> dict[str, Any]:
     """Time make_dataset once, with no model in memory; imports and compilations come before."""
+    from benchmarks.jobs.inputs import read_scenes
     from scenegen.description.presets import preset_spec
     from scenegen.objects.sources import object_source
     from scenegen.rooms.make import DEFAULT_BATCH, make_dataset
@@ -66,14 +67,9 @@ def from_nothing(
     seconds = seconds_of(
         lambda: make_dataset(rooms, spec, count, objects=source.objects, overwrite=True)
     )
-    models = len({item.shape for scene in _scenes(rooms, count) for item in scene.objects})
+    _, scenes = read_scenes(rooms, count)
+    models = len({item.shape for scene in scenes for item in scene.objects})
     return {"seconds": [seconds], "images": count, "note": f"{models:,} different models"}
-
-
-def _scenes(rooms: str, count: int) -> list[Any]:
-    from benchmarks.scenes import read_scenes
-
-    return read_scenes(rooms, count)[1]
 
 
 def make_meshes(folder: str, count: int) -> dict[str, Any]:
@@ -92,10 +88,11 @@ def make_meshes(folder: str, count: int) -> dict[str, Any]:
 
 
 def stage(rooms: str, count: int, repeats: int, root: str = "") -> dict[str, Any]:
-    """Time pack, launch and fetch of scenes that were sampled before, as make_dataset does it:
-    a batch is packed while the one before is cast.
+    """Time pack, launch and fetch of scenes that were sampled before.
+
+    As in make_dataset, a batch is packed while the one before is cast.
     """
-    from benchmarks.scenes import read_objects, read_scenes
+    from benchmarks.jobs.inputs import read_objects, read_scenes
     from scenegen.rendering.packing import pack
     from scenegen.rendering.renderer import launch
     from scenegen.rooms.make import DEFAULT_BATCH

@@ -1,4 +1,4 @@
-"""Weights and cards: the same again, and whatever else lies there told in one line."""
+"""Weights and cards: what is saved comes back, and any other file is refused in one line."""
 
 import copy
 import json
@@ -17,11 +17,10 @@ from scenegen.common.errors import FileFormatError
 torch = pytest.importorskip("torch")
 from safetensors.torch import load_file, save_file  # noqa: E402
 
+from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.network.model import Pix2Shape  # noqa: E402
-from baselines.pix2shape.network.networks import NetworkSpec  # noqa: E402
-from baselines.pix2shape.weights.weights import (  # noqa: E402
-    LARGEST_JSON,
+from baselines.pix2shape.weights.storage import (  # noqa: E402
     Card,
     load_model,
     save_card,
@@ -32,7 +31,7 @@ CARD = Card(
     ModelConfig(networks=NetworkSpec(size=32, width=0.05, classes=2), learning_rate=3e-4),
     iteration=70, data='{"seed":3}', classes=("mug", "bowl"), seconds=1.5,
 )  # fmt: skip
-BIAS = "encoder.last.bias"
+BIAS, VARIANCE = "encoder.last.bias", "decoder.norms.0.norm.running_var"
 
 
 @pytest.fixture(scope="session")
@@ -51,15 +50,14 @@ def path(tmp_path: Path, model: Pix2Shape) -> Path:
     return tmp_path / "w.safetensors"
 
 
-def refused(path: Path, *words: str, named: Path | None = None) -> str:
-    """Check that loading raises one line that names the file and has all words; return it."""
+def refused(path: Path, found: str = "", named: Path | None = None) -> None:
+    """Check that loading raises one line that names a file."""
     with pytest.raises((FileFormatError, OSError)) as error:
         load_model(path)
     line = str(error.value)
     assert str(named or path) in line
     assert "\n" not in line
-    assert [word for word in words if word not in line] == [], line
-    return line
+    assert not found or error.value.found == found
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float16])
@@ -83,102 +81,108 @@ def test_the_card_is_json_for_people(path):
     told = json.loads(path.with_suffix(".json").read_text())
     assert told["config"]["networks"]["size"] == 32
     assert (told["iteration"], told["seconds"], told["classes"]) == (70, 1.5, ["mug", "bowl"])
-    assert told["format_version"] == 1
-    assert sorted(p.name for p in path.parent.iterdir()) == ["w.json", "w.safetensors"]
 
 
 def test_saving_again_replaces_both(path, model):
-    card = replace(CARD, iteration=80)
-    with torch.no_grad():
-        model.encoder.last.bias += 1
-        save_weights(path, model, card)
-        model.encoder.last.bias -= 1
+    card, other = replace(CARD, iteration=80), copy.deepcopy(model)
+    other.encoder.last.bias.data += 1
+    save_weights(path, other, card)
     again, found = load_model(path)
     assert found == card
-    difference = again.encoder.last.bias - model.encoder.last.bias
-    assert difference.mean().item() == pytest.approx(1, rel=1e-2)
+    assert (again.encoder.last.bias - model.encoder.last.bias).mean().item() == pytest.approx(
+        1, rel=1e-2
+    )
     assert len(os.listdir(path.parent)) == 2
 
 
 def test_files_that_are_not_there(tmp_path, path):
-    refused(tmp_path / "none.safetensors", "No such file", named=tmp_path / "none.json")
+    refused(tmp_path / "none.safetensors", named=tmp_path / "none.json")
     path.unlink()
-    refused(path, "No such file")
+    refused(path)
     path.mkdir()
-    refused(path, "Is a directory")
+    refused(path)
     path.with_suffix(".json").unlink()
     path.with_suffix(".json").mkdir()
-    refused(path, "Is a directory", named=path.with_suffix(".json"))
+    refused(path, named=path.with_suffix(".json"))
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (b"", "expected JSON"),
-        (b"\xff\xfe\x00", "expected JSON"),
-        (b"{" * 100_000, "expected JSON"),
-        (b"[" * 100_000, "recursion limit exceeded"),
-        (b"[]", "expected a JSON object"),
-        (b"{}", "config: found nothing"),
-        (b" " * (LARGEST_JSON + 1), "over 1000000 bytes"),
-    ],
+    "text",
+    [b"", b"\xff\xfe\x00", b"{" * 100_000, b"[" * 100_000, b"[]", b"{}", b" " * 1_000_001],
+    ids=lambda text: str(text[:4]),
 )
-def test_cards_that_are_none(path, text, words):
+def test_cards_that_are_none(path, text):
     path.with_suffix(".json").write_bytes(text)
-    refused(path, words, named=path.with_suffix(".json"))
+    refused(path, named=path.with_suffix(".json"))
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"format_version": 2}, "format version 2, this release reads 1"),
-        ({"iteration": "70"}, "iteration: found '70', expected a whole number"),
-        ({"classes": "mug"}, "classes: found 'mug', expected a list"),
-        ({"config": {"networks": {"size": 48}}}, "size: found 48"),
-        ({"config": {"decay": 1}}, "decay: found 1, expected true or false"),
-        ({"config": None}, "expected a JSON object"),
-        ({"code": "import os"}, "unknown field 'code'"),
-        ({"config": {"networks": {"z_scene": 64}}}, "has shape"),
-        ({"config": {"networks": {"size": 64}}}, "weights of another configuration"),
-        ({"config": {"opacity": True}}, "has shape"),
-    ],
-)
-def test_cards_that_are_wrong(path, change, words):
-    beside = path.with_suffix(".json")
+def change_card(path: Path, change: dict[str, Any]) -> Path:
+    """Change a card, field by field; return its path."""
 
     def changed(raw: dict[str, Any], change: dict[str, Any]) -> dict[str, Any]:
         inner = {k: changed(raw[k], v) if isinstance(v, dict) else v for k, v in change.items()}
         return {**raw, **inner}
 
+    beside = path.with_suffix(".json")
     beside.write_text(json.dumps(changed(json.loads(beside.read_text()), change)))
-    weights = "shape" in words or "weights" in words
-    refused(path, words, named=path if weights else beside)
+    return beside
 
 
-@pytest.mark.parametrize("size", [10**13, 10**30])
-def test_a_card_of_absurd_size(path, size):
-    card = json.loads(path.with_suffix(".json").read_text())
-    card["config"]["networks"]["z_scene"] = size
-    path.with_suffix(".json").write_text(json.dumps(card))
-    refused(path, named=path.with_suffix(".json"))
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"format_version": 2},
+        {"iteration": "70"},
+        {"classes": "mug"},
+        {"classes": ["mug", "bowl", "hat", "lamp"]},
+        {"config": {"networks": {"size": 48}}},
+        {"config": {"decay": 1}},
+        {"config": None},
+        {"code": "import os"},
+        {"config": {"networks": {"z_scene": 10**13}}},
+        {"config": {"networks": {"z_scene": 10**30}}},
+    ],
+    ids=str,
+)
+def test_cards_that_are_wrong(path, change):
+    refused(path, named=change_card(path, change))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"networks": {"z_scene": 64}},
+        {"networks": {"size": 64}},
+        {"opacity": True},
+        # 3.4e9 parameters, each number within its range: refused before anything is allocated
+        {"networks": {"size": 256, "width": 4.0, "z_scene": 4096, "z_view": 4096}},
+    ],
+    ids=str,
+)
+def test_cards_of_another_configuration(path, change):
+    change_card(path, {"config": change})
+    with pytest.raises(FileFormatError) as error:
+        load_model(path)
+    assert error.value.where.startswith(f"{path}: ")
+    assert "another configuration" in error.value.hint
 
 
 @pytest.mark.parametrize("kept", [0, 7, 8, 300, 5000, -1])
 def test_truncated_files(path, kept):
     path.write_bytes(path.read_bytes()[:kept])
-    refused(path, "not a safetensors file, or damaged")
+    refused(path)
 
 
 def test_a_header_that_lies(path):
     raw = path.read_bytes()
     path.write_bytes(struct.pack("<Q", 2**62) + raw[8:])
-    refused(path, "not a safetensors file, or damaged")
+    refused(path)
     end = 8 + struct.unpack("<Q", raw[:8])[0]
     header = json.loads(raw[8:end])
     header[BIAS]["shape"] = [2**40]
     text = json.dumps(header).encode()
     path.write_bytes(struct.pack("<Q", len(text)) + text + raw[end:])
-    refused(path, "not a safetensors file, or damaged")
+    refused(path)
 
 
 class Touch:
@@ -193,44 +197,38 @@ class Touch:
 
 def test_a_pickle_is_refused_and_not_run(path, tmp_path):
     torch.save({BIAS: torch.zeros(128), "x": Touch(str(tmp_path / "owned"))}, path)
-    refused(path, "not a safetensors file, or damaged")
+    refused(path)
     assert not (tmp_path / "owned").exists()
     torch.load(path.rename(tmp_path / "w.pt"), weights_only=False)
     assert (tmp_path / "owned").exists(), "it would have run"
 
 
 @pytest.mark.parametrize(
-    ("edit", "words"),
+    ("edit", "name", "found"),
     [
-        (lambda t: t.pop(BIAS), f"{BIAS} is missing"),
-        (lambda t: t.update(more=torch.zeros(1)), "more is not expected"),
-        (lambda t: t.update({BIAS: torch.zeros(127)}), "has shape (127,), expected (128,)"),
-        (lambda t: t.update({BIAS: torch.zeros(1, 128)}), "has shape (1, 128)"),
-        (lambda t: t[BIAS].__setitem__(3, torch.nan), f"{BIAS} is not finite"),
-        (lambda t: t[BIAS].__setitem__(3, -torch.inf), f"{BIAS} is not finite"),
+        (lambda t: t.pop(BIAS), BIAS, "nothing"),
+        (lambda t: t.update(more=torch.zeros(1)), "more", "a tensor"),
+        (lambda t: t.update({BIAS: torch.zeros(127)}), BIAS, "shape (127,)"),
+        (lambda t: t.update({BIAS: torch.zeros(1, 128)}), BIAS, "shape (1, 128)"),
+        (lambda t: t[BIAS].__setitem__(3, torch.nan), BIAS, "NaN"),
+        (lambda t: t[BIAS].__setitem__(3, -torch.inf), BIAS, "NaN, infinity"),
+        (lambda t: t.update({BIAS: torch.zeros(128, dtype=torch.int32)}), BIAS, "int32"),
+        (lambda t: t.update({BIAS: torch.zeros(128, dtype=torch.bool)}), BIAS, "bool"),
+        (lambda t: t.update({BIAS: torch.zeros(128, dtype=torch.complex64)}), BIAS, "complex64"),
+        (lambda t: t.update({BIAS: torch.zeros(128).to(torch.float8_e4m3fn)}), BIAS, "float8"),
+        # finite, but not in the model's float32
+        (lambda t: t.update({BIAS: torch.full((128,), 1e300, dtype=torch.float64)}), BIAS, "NaN"),
+        (lambda t: t[VARIANCE].neg_(), VARIANCE, "variance below 0"),
     ],
 )
-def test_tensors_that_do_not_fit(path, edit, words):
+def test_tensors_that_do_not_fit(path, edit, name, found):
     tensors = load_file(path)
     edit(tensors)
     save_file(tensors, path)
-    refused(path, words)
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        torch.zeros(128, dtype=torch.int32),
-        torch.zeros(128, dtype=torch.bool),
-        torch.zeros(128, dtype=torch.complex64),
-        torch.zeros(128).to(torch.float8_e4m3fn),
-        torch.full((128,), 1e300, dtype=torch.float64),  # finite, but not in the model
-    ],
-    ids=lambda values: str(values.dtype),
-)
-def test_tensors_of_another_type(path, values):
-    save_file({**load_file(path), BIAS: values}, path)
-    refused(path, BIAS)
+    with pytest.raises(FileFormatError) as error:
+        load_model(path)
+    assert error.value.where == f"{path}: {name}"
+    assert found in error.value.found
 
 
 @pytest.mark.parametrize("kind", ["card", "weights"])
@@ -247,30 +245,9 @@ def test_a_write_that_fails_leaves_what_was_there(path, kind, model):
     assert str(path.with_suffix(".json") if kind == "card" else path) in str(error.value)
 
 
-def test_a_card_of_a_huge_model_allocates_nothing(path):
-    """3.4e9 parameters, each number within its range: refused by the shapes alone."""
-    card = json.loads(path.with_suffix(".json").read_text())
-    card["config"]["networks"].update(size=256, width=4.0, z_scene=4096, z_view=4096)
-    path.with_suffix(".json").write_text(json.dumps(card))
-    refused(path, "weights of another configuration")
-
-
 def test_a_checkpoint_is_told_from_weights(path):
     save_file({f"model.{name}": value for name, value in load_file(path).items()}, path)
-    refused(path, "a checkpoint; name the weights beside it")
-
-
-def test_classes_of_card_and_networks_must_agree(path):
-    card = json.loads(path.with_suffix(".json").read_text())
-    card["classes"] = ["mug", "bowl", "hat", "lamp"]
-    path.with_suffix(".json").write_text(json.dumps(card))
-    refused(path, "classes: found 4, expected", named=path.with_suffix(".json"))
-
-
-def test_a_variance_below_zero(path):
-    name = "decoder.norms.0.norm.running_var"
-    save_file({**load_file(path), name: -torch.ones_like(load_file(path)[name])}, path)
-    refused(path, name)
+    refused(path, "a checkpoint")
 
 
 def test_what_is_beyond_half_precision_is_kept_in_full(model, tmp_path):

@@ -1,4 +1,4 @@
-"""The clock of a measuring process. Imports nothing heavy: `STARTED` is taken before all else."""
+"""The clock of a measuring process. It imports nothing heavy, so that `STARTED` is early."""
 
 import resource
 import sys

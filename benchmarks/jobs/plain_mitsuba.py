@@ -1,13 +1,13 @@
 """(a): one `mi.load_dict` and one `mi.render` per scene, as a user would do without scenegen.
 
-What a sensible user can prepare once is prepared outside the clock: unit meshes, integrator,
-material, and a first pass over the same scenes, which compiles the kernels. No file is written, no
-object ids are made, no ambient light, and a jittered sample is no exact ground truth: all of that
-favours this side. Objects enter in three ways, of which the fastest counts:
+What a user can prepare once is prepared outside the clock: unit meshes, integrator, material, and
+a first pass over the same scenes, which compiles the kernels. No file is written, no object ids are
+made, there is no ambient light, and a jittered sample is no exact ground truth: all of that favours
+this side. Objects are loaded in three ways, of which the fastest counts:
 
-files: a PLY file a shape, loaded with `to_world` (Mitsuba's usual way);
+files: a PLY file for each shape, loaded with `to_world` (Mitsuba's usual way);
 merged: room and meshes moved with numpy and put into a single mesh;
-instances: prebuilt `shapegroup`s and an `instance` an object.
+instances: prebuilt `shapegroup`s and an `instance` for each object.
 
 Exact spheres are Mitsuba's own in all of them.
 """
@@ -21,9 +21,16 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.meshes import Mesh, join, moved, unit_meshes
-from benchmarks.scenes import read_depth, read_objects, read_scenes
-from benchmarks.timing import repeat
+from benchmarks.jobs.inputs import (
+    Mesh,
+    join,
+    moved,
+    read_depth,
+    read_objects,
+    read_scenes,
+    unit_meshes,
+)
+from benchmarks.jobs.timing import repeat
 from scenegen.camera import Camera, pixel_directions
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
@@ -38,7 +45,7 @@ NEAR = 0.01  # Mitsuba counts distances from its near plane
 
 @dataclass(frozen=True, eq=False)
 class Kit:
-    """What is made once: `objects` holds a PLY path, a `Mesh` or a shapegroup for each mesh."""
+    """What is prepared once; `objects` holds a PLY path, `Mesh` or shapegroup for each shape."""
 
     spec: DatasetSpec
     way: str
@@ -80,7 +87,7 @@ def per_scene(
 
 
 def render_all(kit: Kit, scenes: list[SceneSpec]) -> None:
-    """Do what is timed."""
+    """Load and render every scene, which is what is timed."""
     for number, scene in enumerate(scenes):
         render_scene(kit, scene, number)
 
@@ -115,7 +122,11 @@ def prepare(spec: DatasetSpec, way: str, meshes: dict[str, Mesh], stem: str) -> 
 
 def describe(kit: Kit, scene: SceneSpec) -> dict[str, Any]:
     """Return the scene as `mi.load_dict` wants it."""
-    contents = {"type": "scene", "integrator": kit.integrator, "sensor": sensor(kit, scene)}
+    contents = {
+        "type": "scene",
+        "integrator": kit.integrator,
+        "sensor": sensor(kit.spec, scene.cameras[0], NEAR),
+    }
     for j, light in enumerate(scene.lights):
         power = {"type": "rgb", "value": list(light.color)}
         contents[f"light{j}"] = {
@@ -151,26 +162,25 @@ def describe(kit: Kit, scene: SceneSpec) -> dict[str, Any]:
     return contents
 
 
-def sensor(kit: Kit, scene: SceneSpec) -> dict[str, Any]:
-    """Return camera, film and sampler: one sample a pixel, box filter."""
-    camera = scene.cameras[0]
+def sensor(spec: Any, camera: Camera, near: float = 0.01) -> dict[str, Any]:
+    """Return camera, film and sampler: one sample a pixel, box filter.
+
+    Args:
+        spec: anything with the images' height and width.
+        near: distance of the near plane, Mitsuba's default if not given.
+    """
     view = mi.ScalarTransform4f().look_at(
         origin=list(camera.position), target=list(camera.target), up=[0, 1, 0]
     )
+    film = {"type": "hdrfilm", "width": spec.width, "height": spec.height}
+    film |= {"pixel_format": "rgb", "component_format": "float32", "rfilter": {"type": "box"}}
     return {
         "type": "perspective",
         "fov": camera.fov_y_degrees,
         "fov_axis": "y",
-        "near_clip": NEAR,
+        "near_clip": near,
         "to_world": view,
-        "film": {
-            "type": "hdrfilm",
-            "width": kit.spec.width,
-            "height": kit.spec.height,
-            "pixel_format": "rgb",
-            "component_format": "float32",
-            "rfilter": {"type": "box"},
-        },
+        "film": film,
         "sampler": {"type": "independent", "sample_count": 1},
     }
 

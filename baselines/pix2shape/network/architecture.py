@@ -1,7 +1,7 @@
-"""Encoder, decoder, critic and statistics network, by the paper's architecture tables.
+"""Encoder, decoder, critic and statistics network, as in the paper's architecture tables.
 
-Pix2Shape (IJCV 2020), appendix "Architecture". Channels are the tables', times a width multiplier.
-Where a table leaves something open or cannot be meant, docs/pix2shape.md says what is done here.
+Pix2Shape (IJCV 2020), appendix "Architecture". The tables' channels are multiplied by a width.
+Where a table is incomplete or contradicts the text, docs/pix2shape.md says what is done here.
 """
 
 import itertools
@@ -13,27 +13,26 @@ from torch import Tensor, nn
 from scenegen.common.records import check, normalise
 
 SIZES = (32, 64, 128, 256)  # pixels a side
-MOST = 4096  # numbers of a code, and classes
-SLOPE = 0.2  # of the leaky ReLUs
+MOST = 4096  # dimensions of a code, and classes
+SLOPE = 0.2  # of the leaky ReLUs below 0
 ENCODER_CHANNELS = (85, 170, 340, 680, 1360)  # of 64, 32, 16, 8, 4 pixels, at 128x128
 DECODER_CHANNELS = (1344, 627, 336, 168, 84)  # of 4, 8, 16, 32, 64 pixels, at 128x128
 STATISTICS_CHANNELS = (256, 512)
-FLAT = 0.1  # of the decoder's last weights: begins with smooth surfaces, as noise hides shading
-CAMERA = 3  # numbers that tell a view: the camera's position
+FLAT = 0.1  # scales the decoder's last weights: first surfaces are smooth, as noise hides shading
+CAMERA = 3  # numbers of the condition that are the camera's position
 
 
 @dataclass(frozen=True)
 class NetworkSpec:
-    """What the networks look like.
+    """Sizes of the networks.
 
     Attributes:
-        size: pixels a side, one of SIZES.
+        size: image size, pixels a side, one of SIZES.
         width: multiplies the tables' channels; 1 is the paper's.
-        z_scene, z_view: dimensions of the latent code; z_view is 0 where the camera is known.
-        camera: whether the networks are conditioned on the camera's position.
-        classes: number of class labels they are conditioned on; 0 for none.
-        standardised: whether codes have mean 0 and variance 1, by batch normalisation; for where no
-            critic sees to it.
+        z_scene, z_view: dimensions of the code; z_view is 0 where the camera is told.
+        camera: whether the networks are told the camera's position.
+        classes: number of object classes the networks are told, one-hot; 0 for none.
+        standardised: whether batch normalisation gives codes mean 0 and variance 1.
     """
 
     size: int = 128
@@ -54,19 +53,19 @@ class NetworkSpec:
 
     @property
     def z(self) -> int:
-        """Dimensions of the whole code."""
+        """Dimensions of a code."""
         return self.z_scene + self.z_view
 
     @property
     def condition(self) -> int:
-        """Numbers that condition the networks."""
+        """Length of the condition: camera position and one-hot class."""
         return CAMERA * self.camera + self.classes
 
     def channels(self, table: tuple[int, ...]) -> list[int]:
-        """Return a table's channels, from the fewest pixels on for the decoder's.
+        """Return a table's channels for this size and width, in the table's order.
 
-        Above 128 pixels layers of half the channels are added at the large end, below 128 they are
-        left out there.
+        Images of 256 pixels get one more layer, of half the channels, at the large end; smaller
+        ones than 128 leave the largest layers out.
         """
         falling = table[0] > table[-1]
         found = sorted(table)
@@ -81,8 +80,8 @@ class NetworkSpec:
 class ConditionalNorm(nn.Module):
     """Batch normalisation whose scale and shift are learned functions of a condition.
 
-    Dumoulin et al. (2016) and Perez et al. (2017), as the paper cites them. Without a condition, an
-    ordinary batch normalisation.
+    As in Dumoulin et al. (2016) and Perez et al. (2017), which the paper cites. Without a condition
+    it is an ordinary batch normalisation.
     """
 
     def __init__(self, channels: int, condition: int, hidden: int = 64) -> None:
@@ -110,7 +109,7 @@ def _planes(condition: Tensor, like: Tensor) -> Tensor:
 
 
 def _full(values: Tensor) -> Tensor:
-    """Return bfloat16 as float32: losses are differences of what is nearly equal."""
+    """Return bfloat16 as float32, as losses are differences of nearly equal numbers."""
     return values.float() if values.dtype == torch.bfloat16 else values
 
 
@@ -143,7 +142,7 @@ class Encoder(nn.Module):
 class Decoder(nn.Module):
     """Latent code and camera -> one number per pixel. Table "Pix2Shape decoder architecture".
 
-    Normalisation is conditional in alternate layers, the first among them.
+    Every other normalisation is conditional, beginning with the first.
     """
 
     def __init__(self, spec: NetworkSpec, outputs: int = 1) -> None:
@@ -165,7 +164,9 @@ class Decoder(nn.Module):
         values = torch.cat([code, condition], dim=1)[..., None, None]
         for layer, norm in zip(self.layers, self.norms, strict=True):
             values = self.activation(norm(layer(values), condition))
-        with torch.autocast(values.device.type, enabled=False):  # half a depth's bits are noise
+        with torch.autocast(
+            values.device.type, enabled=False
+        ):  # bfloat16 has too few bits for depth
             return self.last(_full(values))
 
 
@@ -176,7 +177,7 @@ class Critic(nn.Module):
         super().__init__()
         widths = spec.channels(ENCODER_CHANNELS)
         before = [3 + spec.condition, *widths[:-1]]
-        before[-1] += spec.z  # the code joins the last strided layer
+        before[-1] += spec.z  # the code enters the last strided layer
         self.layers = nn.ModuleList(
             nn.Conv2d(a, b, 4, 2, 1) for a, b in zip(before, widths, strict=True)
         )

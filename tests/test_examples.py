@@ -1,0 +1,87 @@
+"""The examples that users copy run, and refuse bad input; the shipped sample has its scores."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from metrics.score_file import read_scores
+from metrics.scoring.evaluate import score
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES, SAMPLE = ROOT / "examples", ROOT / "examples" / "sample"
+
+
+def run(name, *arguments, folder):
+    command = [sys.executable, EXAMPLES / f"{name}.py", *arguments]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        command, capture_output=True, text=True, check=False, cwd=folder, env=environment
+    )
+
+
+@pytest.mark.parametrize("name", ["submit", "submit_iqtt"])
+def test_an_example_writes_what_can_be_scored(name, truths, tmp_path):
+    truth = truths.rooms if name == "submit" else truths.iqtt
+    done = run(name, truth, "out.h5", folder=tmp_path)
+    assert (done.returncode, done.stdout) == (0, "now: bench score out.h5\n")
+    assert score([tmp_path / "out.h5"]).metrics
+
+
+@pytest.mark.parametrize(
+    ("name", "mistake", "words"),
+    [
+        ("submit", "no arguments", "arguments are required"),
+        ("submit", "no such file", "no such file"),
+        ("submit", "a file that exists", "exists"),
+        ("submit", "not HDF5", "not a readable HDF5 file"),
+        ("submit", "questions", "not a rooms file"),
+        ("submit_iqtt", "no arguments", "arguments are required"),
+        ("submit_iqtt", "no such file", "no such file"),
+        ("submit_iqtt", "a file that exists", "exists"),
+        ("submit_iqtt", "not HDF5", "not a readable HDF5 file"),
+        ("submit_iqtt", "rooms", "not a question file"),
+    ],
+)
+def test_a_mistake_ends_in_one_line_and_exit_code_2(name, mistake, words, truths, tmp_path):
+    (tmp_path / "text.h5").write_text("mine")
+    good = truths.rooms if name == "submit" else truths.iqtt
+    arguments = {
+        "no arguments": [],
+        "no such file": ["none.h5", "out.h5"],
+        "a file that exists": [good, "text.h5"],
+        "not HDF5": ["text.h5", "out.h5"],
+        "questions": [truths.iqtt, "out.h5"],
+        "rooms": [truths.rooms, "out.h5"],
+    }[mistake]
+    done = run(name, *arguments, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    usage, line = (["", *done.stderr.splitlines()])[-2:]
+    assert words in line
+    assert usage.startswith("usage: ") == (mistake == "no arguments")
+    assert [path.name for path in tmp_path.iterdir()] == ["text.h5"]
+    assert (tmp_path / "text.h5").read_text() == "mine"
+
+
+def test_the_sample_has_its_documented_scores(tmp_path):
+    """Moved elsewhere, so that the truth is found beside the submission."""
+    for name in ("rooms.h5", "empty-room.h5"):
+        shutil.copy(SAMPLE / name, tmp_path)
+    found, told = score([tmp_path / "empty-room.h5"]), read_scores(SAMPLE / "empty-room.json")
+    assert set(found.metrics) == set(told.metrics)
+    for name, expected in told.metrics.items():
+        for part in ("value", "low", "high"):
+            wanted = pytest.approx(getattr(expected, part), rel=1e-9, abs=1e-12)
+            assert getattr(found.metrics[name], part) == wanted, (name, part)
+    assert found.meta.truth_fingerprint == told.meta.truth_fingerprint
+    assert found.meta.submissions[0].sha256 == told.meta.submissions[0].sha256
+
+
+def test_the_documents_tell_those_scores():
+    told = read_scores(SAMPLE / "empty-room.json").metrics
+    text = (ROOT / "docs" / "scores.md").read_text()
+    for name in ("chamfer", "hausdorff", "mse_depth"):
+        assert f"| `{name}` | {told[name].value:.6g} |" in text, name
