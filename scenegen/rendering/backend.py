@@ -28,6 +28,11 @@ HOW_TO_GET_LLVM = (
 )
 
 
+# Root attributes of files that name the releases which rendered them; see `versions`.
+VERSION_ATTRIBUTES = ("mitsuba_version", "drjit_version", "llvm_version")
+UNKNOWN = "unknown"
+
+
 class SlowFallbackWarning(UserWarning):
     """Rendering goes on, but without the fast path."""
 
@@ -61,13 +66,17 @@ def llvm_version(library: str) -> int:
 
     LLVMGetVersion came with LLVM 16, so whatever lacks it is too old.
     """
+    return _llvm_numbers(library)[0]
+
+
+def _llvm_numbers(library: str) -> tuple[int, ...]:
+    """Return the major, minor and patch number of an LLVM library, zeros as `llvm_version`."""
+    numbers = [ctypes.c_uint() for _ in range(3)]
     try:
-        handle = ctypes.CDLL(library)
-        numbers = [ctypes.c_uint() for _ in range(3)]
-        handle.LLVMGetVersion(*(ctypes.byref(number) for number in numbers))
+        ctypes.CDLL(library).LLVMGetVersion(*map(ctypes.byref, numbers))
     except (OSError, AttributeError):
-        return 0
-    return numbers[0].value
+        return (0, 0, 0)
+    return tuple(number.value for number in numbers)
 
 
 def find_llvm() -> str | None:
@@ -78,6 +87,33 @@ def find_llvm() -> str | None:
         if library and llvm_version(library) >= OLDEST_LLVM:
             return library
     return None
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what renders here, by the names in `VERSION_ATTRIBUTES`.
+
+    The bits of a pixel depend on them. A version is "unknown" where nothing is installed that
+    tells it. Nothing is imported for this. For the LLVM that Dr.Jit uses, call it after
+    `select_variant`.
+    """
+    return dict(
+        zip(VERSION_ATTRIBUTES, (_release("mitsuba"), _release("drjit"), _llvm()), strict=True)
+    )
+
+
+def _release(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return UNKNOWN
+
+
+def _llvm() -> str:
+    """Return the version of the LLVM that an imported Dr.Jit uses, or else would find."""
+    drjit = sys.modules.get("drjit")
+    library = None if drjit else find_llvm()
+    numbers = drjit.detail.llvm_version() if drjit else _llvm_numbers(library) if library else (0,)
+    return ".".join(map(str, numbers)) if numbers[0] > 0 else UNKNOWN
 
 
 @lru_cache(maxsize=1)

@@ -188,3 +188,30 @@ def test_a_drjit_imported_first_keeps_its_llvm(
     else:
         with pytest.raises(BackendError, match="before drjit is imported"):
             select_variant("cpu")
+
+
+def test_versions_are_told_before_and_after_drjit_is_imported() -> None:
+    code = """
+import sys
+from scenegen.rendering.backend import VERSION_ATTRIBUTES, select_variant, versions
+select_variant("auto")
+before = versions()
+assert "drjit" not in sys.modules and "mitsuba" not in sys.modules
+import mitsuba, drjit
+assert before["mitsuba_version"] == mitsuba.__version__
+assert before["drjit_version"] == drjit.__version__
+assert versions() == before and tuple(before) == VERSION_ATTRIBUTES
+print(before["llvm_version"])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    library = find_llvm()
+    assert done.stdout.split(".")[0] == (str(llvm_version(library)) if library else "unknown\n")
+
+
+def test_a_version_that_nothing_tells_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(package: str) -> str:
+        raise importlib.metadata.PackageNotFoundError(package)
+
+    monkeypatch.setattr(importlib.metadata, "version", missing)
+    monkeypatch.setenv(LLVM_VARIABLE, "/nowhere/libLLVM.so")
+    assert set(backend.versions().values()) == {"unknown"}
