@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from iqtt.shapes import congruence
 from iqtt.shapes.congruence import are_congruent, congruent_rows
 from iqtt.shapes.polycube import ROTATIONS, canonical, is_chiral, mirror
-from iqtt.shapes.sampling import Kind, all_classes, congruence, random_shapes
+from iqtt.shapes.sampling import Kind, all_classes, random_shapes
 
 TWIST = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 1]])
 OTHER_TWIST = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, -1]])
