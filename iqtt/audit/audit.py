@@ -56,8 +56,13 @@ class Audit:
 
     @property
     def passed(self) -> bool:
-        """Whether no proof failed."""
-        return all(proof.status != "FAIL" for proof in self.proofs)
+        """Whether there are questions, and no proof failed."""
+        return self.questions > 0 and all(proof.status != "FAIL" for proof in self.proofs)
+
+    @property
+    def questions(self) -> int:
+        """Number of questions in all tables."""
+        return sum(table.questions for table in self.tables)
 
     @property
     def shortcuts(self) -> tuple[Probe, ...]:

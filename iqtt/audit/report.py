@@ -79,6 +79,8 @@ def _cell(probe: Probe | None) -> str:
 def _conclusion(audit: Audit) -> str:
     failed = [proof.name for proof in audit.proofs if proof.status == "FAIL"]
     lines = [f"FAILED: {', '.join(failed)}." if failed else "No proof failed."]
+    if not audit.questions:
+        lines = ["FAILED: there are no questions."]
     if audit.probes:
         tried = sum(probe.sees != OUTLINE for probe in audit.probes)
         found = [f"{p.statistic}, {p.rule} ({p.sees})" for p in audit.shortcuts]

@@ -226,6 +226,6 @@ def test_questions_that_a_split_does_not_have():
             render_question(SPEC, pools_of(SPEC), split, index)
         count = getattr(SPEC, split)
         assert str(error.value) == f"{split} has {count} questions, none with index {index}"
-    empty = replace(SPEC, train=0, labeled=0, val=0, test=0)
+    empty = replace(SPEC, train=0, labeled=0, test=0)
     assert rendered(empty, "train", "labeled") == rendered(empty, "test") == []
     assert groups(replace(SPEC, labeled=12), "train") == {"labeled": (0, 12), "unlabeled": (12, 0)}

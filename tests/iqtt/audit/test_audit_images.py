@@ -1,5 +1,6 @@
 """Tests of the audit: each proof of images and views is seen to fail on its own damage."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from iqtt.audit.audit import audit
+from iqtt.audit.report import table
 
 Failing = Callable[..., set[str]]
 
@@ -43,7 +45,16 @@ NAMES = ("answer places", "pixel values", "framing", "distinct images", "distinc
 
 def test_released_files_pass(judged: Callable[..., dict[str, str]]) -> None:
     assert judged(plain(), np.arange(7) % 3) == dict.fromkeys(NAMES, "ok")
-    assert judged(plain(0), np.zeros(0, np.uint8))["distinct images"] == "ok"
+
+
+def test_an_audit_of_no_questions_does_not_pass(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "iqtt-val.h5", "w") as file:
+        file["questions"], file["answers"] = plain(0), np.zeros(0, np.uint8)
+    found = audit([tmp_path])
+    assert not found.passed
+    assert json.loads(found.to_json())["passed"] is False
+    assert {proof.status for proof in found.proofs} <= {"ok", "skipped"}
+    assert "there are no questions" in table(found)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -0.5, 1.01])

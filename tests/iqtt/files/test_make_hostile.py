@@ -57,7 +57,7 @@ def old(made: Path, tmp_path: Path) -> Path:
         {"seed": 2**63 - 1, "background": (0, 0, 0)},
         {"labeled": 3, "val": 6},
         {"labeled": 0},
-        {"train": 0, "labeled": 0, "val": 0, "test": 0},
+        {"train": 0, "labeled": 0, "val": 0, "test": 5},
     ],
 )
 def test_odd_requests_are_answered_in_full(changed, tmp_path):
