@@ -14,9 +14,9 @@ from benchmarks.meshes import Mesh
 from benchmarks.plain_mitsuba import mitsuba_mesh
 from benchmarks.timing import repeat, seconds_of
 from iqtt.files.make import make_split
-from iqtt.questions.sampling import make_pools
+from iqtt.questions.distractors import make_pools
+from iqtt.questions.packing import Question, cube_centres, pack_questions
 from iqtt.questions.specs import SplitSpec
-from iqtt.questions.views import Question, cube_centres, pack_questions
 from iqtt.render import render_questions
 from scenegen.objects.shapes import unit_shape, welded
 from scenegen.rendering.backend import select_variant

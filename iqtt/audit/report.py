@@ -1,10 +1,11 @@
-"""An audit for people: as aligned text, and as Markdown."""
+"""The text of an audit: aligned columns for a terminal, or Markdown."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from iqtt.audit.audit import Audit
 from iqtt.audit.probes import ERROR_RATE, LIGHT, MIRRORED, OUTLINE, WITHOUT, Probe
+from scenegen.common.text_table import aligned, piped
 
 _BLOCKS = (
     (WITHOUT, "answers alone", ("largest", "smallest", "most typical", "odd one out")),
@@ -22,7 +23,7 @@ _BLOCKS = (
 
 @dataclass(frozen=True)
 class _Block:
-    """Probes of one kind: a row for each statistic, a column for each rule."""
+    """A table of probes of one kind: a row for each statistic, a column for each rule."""
 
     title: str
     rules: tuple[str, ...]
@@ -30,27 +31,27 @@ class _Block:
 
 
 def table(audit: Audit) -> str:
-    """Return what was proved and measured as lines, columns aligned."""
+    """Return proofs and probes as text with aligned columns."""
     files = [(t.name, f"{t.questions:,} questions", t.split or "released") for t in audit.tables]
-    lines = [*_aligned(files), ""]
-    lines += _aligned([(p.status, p.name, p.detail) for p in audit.proofs])
+    lines = [*aligned(files), ""]
+    lines += aligned([(p.status, p.name, p.detail) for p in audit.proofs])
     for block in _blocks(audit.probes):
         lines += ["", block.title]
-        lines += ["  " + line for line in _aligned([("", *block.rules), *block.rows])]
+        lines += ["  " + line for line in aligned([("", *block.rules), *block.rows])]
     return "\n".join([*lines, "", _conclusion(audit)])
 
 
 def markdown(audit: Audit) -> str:
-    """Return the same as Markdown tables."""
+    """Return proofs and probes as Markdown tables."""
     files = [(t.name, f"{t.questions:,}", f"{t.probed:,}") for t in audit.tables]
-    lines = _piped([("table", "questions", "probed"), *files])
+    lines = piped([("table", "questions", "probed"), *files])
     lines += [
         "",
-        *_piped([("", "proof", "found"), *((p.status, p.name, p.detail) for p in audit.proofs)]),
+        *piped([("", "proof", "found"), *((p.status, p.name, p.detail) for p in audit.proofs)]),
     ]
     for block in _blocks(audit.probes):
         lines += ["", f"{block.title[0].upper()}{block.title[1:]}:", ""]
-        lines += _piped([("", *block.rules), *block.rows])
+        lines += piped([("", *block.rules), *block.rows])
     return "\n".join([*lines, "", _conclusion(audit)])
 
 
@@ -93,16 +94,3 @@ def _conclusion(audit: Audit) -> str:
     else:
         lines.append("No probes: no right answers are known.")
     return "\n".join(lines)
-
-
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
-
-
-def _piped(rows: Sequence[Sequence[str]]) -> list[str]:
-    head, *rest = ["| " + " | ".join(row) + " |" for row in rows]
-    return [head, "| " + " | ".join("---" for _ in rows[0]) + " |", *rest]

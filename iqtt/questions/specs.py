@@ -4,15 +4,16 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
+from iqtt.shapes.chains_and_trees import Kind
 from iqtt.shapes.polycube import MAX_CUBES
-from iqtt.shapes.sampling import Kind
 from scenegen.camera import Camera, Vector3
 from scenegen.common.records import check, check_range, from_json, normalise, to_json
 from scenegen.description.checks import IMAGE_DTYPES, MAX_LIGHTS
 from scenegen.description.specs import DatasetSpec
 
 SPLITS = ("train", "val", "test")
-DISTRACTORS = ("other", "near", "mirror", "mixed")
+DISTRACTOR_KINDS = ("other", "near", "mirror")
+DISTRACTORS = (*DISTRACTOR_KINDS, "mixed")
 KINDS = ("chain", "tree")
 MAX_QUESTIONS = 10**8  # of each of train, val and test
 PRESETS: dict[str, dict[str, int]] = {

@@ -95,7 +95,7 @@ def test_every_option_is_recorded(run, monkeypatch, tmp_path):
 )
 def test_presets_and_what_follows_from_them(run, monkeypatch, options, expected, tmp_path):
     from iqtt.files import make as module
-    from iqtt.questions.settle import Tally
+    from iqtt.questions.views import Tally
 
     asked = {}
 

@@ -9,11 +9,11 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from polycubes import are_congruent
 
 from iqtt.audit.audit import audit, question_count
 from iqtt.audit.report import markdown, table
 from iqtt.files.layout import NO_CUBE
-from iqtt.shapes.congruence import are_congruent
 from iqtt.shapes.polycube import ROTATIONS, canonical, canonical_class, is_chiral, mirror, set_ids
 from scenegen.common.errors import FileFormatError, SpecError
 

@@ -11,14 +11,15 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from polycubes import are_congruent
 
 from iqtt.files.layout import CONVENTIONS
 from iqtt.files.make import FILES, make_split
-from iqtt.questions.sampling import Pools, make_pools
-from iqtt.questions.settle import Tally
+from iqtt.questions.distractors import Pools, make_pools
 from iqtt.questions.specs import SplitSpec
+from iqtt.questions.views import Tally
 from iqtt.render import Rendered, render_question
-from iqtt.shapes.congruence import are_congruent
+from scenegen.rendering.backend import versions
 
 SECRET = 8_123_456_789_012_345
 SPEC = SplitSpec(
@@ -174,8 +175,9 @@ def test_nothing_handed_out_tells_the_test_answers(folder):
         assert set(everything(file)) == {"/", "questions"}
         assert set(file.attrs) == {
             "format", "format_version", "writer", "variant", "spec", "conventions", "split",
-            "fingerprint",
+            "fingerprint", *versions(),
         }  # fmt: skip
+        assert {name: file.attrs[name] for name in versions()} == versions()
         assert set(file["questions"].attrs) == {"unit", "shape", "frame", "meaning", "scale"}
         assert re.fullmatch("[0-9a-f]{64}", file.attrs["fingerprint"])
     with h5py.File(folder / "iqtt-test-answers.h5") as file:

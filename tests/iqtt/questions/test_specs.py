@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from polycubes import some_shapes
 from scipy.spatial.transform import Rotation
 
 from iqtt.questions.specs import PRESETS, SplitSpec, preset_spec
 from iqtt.shapes.polycube import bounding_radius, box_centre
-from iqtt.shapes.sampling import random_shapes
 from scenegen.camera import intrinsics
 from scenegen.common.errors import SpecError
 
@@ -154,12 +154,12 @@ def test_settings_that_are_not_given_follow_others():
     assert pixels == {16: 1, 64: 3, 128: 12, 256: 12}
     assert preset_spec("small", height=256, width=512).min_cube_pixels == 48
     assert preset_spec("small", height=64, min_cube_pixels=0).min_cube_pixels == 0
-    for settings, where in (
+    for request, where in (
         ({"preset": "large"}, "preset"),
         ({"preset": "v2", "train": -5}, "train"),
     ):
         with pytest.raises(SpecError) as error:
-            preset_spec(**settings)
+            preset_spec(**request)
         assert error.value.where == where
 
 
@@ -193,8 +193,9 @@ def test_no_point_of_the_bounding_sphere_leaves_the_image(height, width, fov, ra
 
 def test_chains_as_large_as_the_radius_allows_stay_inside_however_turned():
     """Corner by corner, in pixels."""
-    shapes = random_shapes(np.random.default_rng(0), 300, 9, max_radius=3.5)
-    shapes = shapes[bounding_radius(shapes) > 3.3]
+    shapes = some_shapes(np.random.default_rng(0), 600, 9)
+    radius = bounding_radius(shapes)
+    shapes = shapes[(radius > 3.3) & (radius <= 3.5)]
     assert len(shapes) > 20
     corners = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
     points = (shapes[:, :, None] + corners).reshape(len(shapes), -1, 3)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from iqtt.files.preview import BACKGROUND, RIGHT, question_sheet, save_sheet
 from iqtt.files.reader import QuestionRecord, open_questions
-from iqtt.files.show import BACKGROUND, RIGHT, question_sheet, save_sheet
 from scenegen.common.errors import SpecError
 from scenegen.rooms.preview import srgb_bytes
 
