@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 from numpy.typing import NDArray
 
@@ -15,7 +15,6 @@ from scenegen.rendering.ground_truth import visible_pixels
 from scenegen.rendering.renderer import launch_fields
 
 Array = NDArray[Any]
-Fetch = Callable[[], dict[str, Array]]
 DEFAULT_BATCH = 64  # questions in one wavefront
 SAMPLED = 512  # questions whose shapes and views are found together
 FIRST_SAMPLED = 16  # the first ones are few, so that a request that cannot be met fails soon
@@ -38,6 +37,9 @@ class Rendered:
     depth: Array | None
 
 
+Fetch: TypeAlias = Callable[[], list[Rendered]]
+
+
 def render_questions(
     spec: SplitSpec,
     pools: Pools,
@@ -57,20 +59,19 @@ def render_questions(
     """
     tally = tally or Tally()
     places = answer_positions(spec, split, first, count)
-    pending: tuple[list[Question], Fetch] | None = None
+    pending: Fetch | None = None
     starts = [0, *range(min(FIRST_SAMPLED, count), count, SAMPLED), count]
     for start, stop in itertools.pairwise(starts):
         rows = range(start, stop)
         requests = [(first + i, int(places[i]), 0) for i in rows]
         sampled = sample_questions(spec, pools, split, requests, tally, device)
         for i in range(0, len(sampled), batch):
-            questions = sampled[i : i + batch]
-            following = questions, _launch(spec, questions, device)
+            following = _launch(spec, sampled[i : i + batch], device)
             if pending is not None:
-                yield _checked(spec, pools, split, *pending, tally, device)
+                yield _checked(spec, pools, split, pending(), tally, device)
             pending = following
     if pending is not None:
-        yield _checked(spec, pools, split, *pending, tally, device)
+        yield _checked(spec, pools, split, pending(), tally, device)
 
 
 def render_question(
@@ -89,8 +90,8 @@ def render_question(
             place = int(answer_positions(spec, split, first, count)[index - first])
             tally = Tally()
             questions = sample_questions(spec, pools, split, [(index, place, 0)], tally, device)
-            fetch = _launch(spec, questions, device)
-            return _checked(spec, pools, split, questions, fetch, tally, device)[0]
+            done = _launch(spec, questions, device)()
+            return _checked(spec, pools, split, done, tally, device)[0]
     raise IndexError(f"{split} has {getattr(spec, split)} questions, none with index {index}")
 
 
@@ -105,43 +106,34 @@ def groups(spec: SplitSpec, split: str) -> dict[str, tuple[int, int]]:
 
 
 def _launch(spec: SplitSpec, questions: Sequence[Question], device: str) -> Fetch:
+    """Start to render questions; the function that is returned waits for their images."""
     names = ("image", "object_id", "depth") if spec.with_depth else ("image", "object_id")
-    return launch_fields(pack_questions(spec, questions), names, device)
+    fetch = launch_fields(pack_questions(spec, questions), names, device)
+
+    def rendered() -> list[Rendered]:
+        pixels = fetch()
+        shown = visible_pixels(pixels["object_id"], spec.cubes[1])
+        result = []
+        for i, question in enumerate(questions):
+            four = slice(4 * i, 4 * i + 4)
+            depth = pixels["depth"][four] if spec.with_depth else None
+            result.append(Rendered(question, pixels["image"][four], shown[four], depth))
+        return result
+
+    return rendered
 
 
 def _checked(
-    spec: SplitSpec,
-    pools: Pools,
-    split: str,
-    questions: list[Question],
-    fetch: Fetch,
-    tally: Tally,
-    device: str,
+    spec: SplitSpec, pools: Pools, split: str, done: list[Rendered], tally: Tally, device: str
 ) -> list[Rendered]:
-    """Wait for the images; make questions anew whose full images hide a cube after all."""
-    done = _rendered(spec, questions, fetch())
+    """Make questions anew whose full images hide a cube after all."""
     while hidden := [i for i, one in enumerate(done) if not _shows_all(spec, one)]:
-        requests = [
-            (q.index, q.shapes.answer, q.attempt + 1) for q in (questions[i] for i in hidden)
-        ]
+        again = [done[i].question for i in hidden]
+        requests = [(q.index, q.shapes.answer, q.attempt + 1) for q in again]
         anew = sample_questions(spec, pools, split, requests, tally, device)
-        for i, one in zip(
-            hidden, _rendered(spec, anew, _launch(spec, anew, device)()), strict=True
-        ):
-            questions[i], done[i] = one.question, one
+        for i, one in zip(hidden, _launch(spec, anew, device)(), strict=True):
+            done[i] = one
     return done
-
-
-def _rendered(
-    spec: SplitSpec, questions: Sequence[Question], pixels: dict[str, Array]
-) -> list[Rendered]:
-    shown = visible_pixels(pixels["object_id"], spec.cubes[1])
-    result = []
-    for i, question in enumerate(questions):
-        four = slice(4 * i, 4 * i + 4)
-        depth = pixels["depth"][four] if spec.with_depth else None
-        result.append(Rendered(question, pixels["image"][four], shown[four], depth))
-    return result
 
 
 def _shows_all(spec: SplitSpec, one: Rendered) -> bool:

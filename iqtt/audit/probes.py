@@ -25,7 +25,7 @@ fifth more on noise than those of independent guesses.
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,36 +113,29 @@ class Evidence:
     places: Sequence[Array]
 
 
-@dataclass(frozen=True, eq=False)
-class _Guess:
-    """Which of its questions a probe answered rightly, (n,) bool."""
-
-    statistic: str
-    rule: str
-    sees: str
-    hits: Array
+_Guess: TypeAlias = tuple[str, str, str, Array]
+"""Statistic, rule and kind of a probe, and which questions it answered rightly, (n,) bool."""
 
 
 def run_probes(evidence: Evidence) -> tuple[Probe, ...]:
     """Run all probes that the evidence allows; none without questions."""
     guesses = [*_by_rule(evidence), *_by_mirror(evidence), *_learned(evidence)]
     guesses += _by_place(evidence.places)
-    probes = [_probe(guess) for guess in guesses if len(guess.hits)]
+    probes = [_probe(*guess) for guess in guesses if len(guess[3])]
     faults = [probe for probe in probes if probe.sees in FAULTS]
     others = [probe for probe in probes if probe.sees not in FAULTS]
     return (*_judged(faults), *_judged(others))
 
 
-def _probe(guess: _Guess) -> Probe:
+def _probe(statistic: str, rule: str, sees: str, hits: Array) -> Probe:
     from scipy.stats import binomtest
 
-    correct, n = int(np.count_nonzero(guess.hits)), len(guess.hits)
-    chance = 1 / 2 if guess.sees == MIRRORED else 1 / 3
+    correct, n = int(np.count_nonzero(hits)), len(hits)
+    chance = 1 / 2 if sees == MIRRORED else 1 / 3
     test = binomtest(correct, n, chance, alternative="greater")
     interval = binomtest(correct, n, chance).proportion_ci(0.95, method="wilson")
-    low, high = float(interval.low), float(interval.high)
-    names = (guess.statistic, guess.rule, guess.sees)
-    return Probe(*names, correct, n, chance, low, high, float(test.pvalue), False)
+    numbers = (float(interval.low), float(interval.high), float(test.pvalue))
+    return Probe(statistic, rule, sees, correct, n, chance, *numbers, beats_chance=False)
 
 
 def _judged(probes: Sequence[Probe]) -> list[Probe]:
@@ -173,22 +166,22 @@ def _by_rule(evidence: Evidence) -> Iterator[_Guess]:
 
 
 def _by_size(title: str, values: Array, right: Array) -> Iterator[_Guess]:
-    yield _Guess(title, "largest", WITHOUT, _least(-values) == right)
-    yield _Guess(title, "smallest", WITHOUT, _least(values) == right)
+    yield (title, "largest", WITHOUT, _least(-values) == right)
+    yield (title, "smallest", WITHOUT, _least(values) == right)
 
 
 def _by_company(title: str, apart: Array, right: Array) -> Iterator[_Guess]:
     """Guess by how far each answer is from the other two; apart: distances, (N, 3, 3)."""
     far = apart.sum(axis=2)
-    yield _Guess(title, "most typical", WITHOUT, _least(far) == right)
-    yield _Guess(title, "odd one out", WITHOUT, _least(-far) == right)
+    yield (title, "most typical", WITHOUT, _least(far) == right)
+    yield (title, "odd one out", WITHOUT, _least(-far) == right)
 
 
 def _by_distance(title: str, sees: str, apart: Array, right: Array) -> Iterator[_Guess]:
     """Guess by the distances between the four images; apart: (N, 4, 4)."""
     yield from _by_company(title, apart[:, 1:, 1:], right)
-    yield _Guess(title, "nearest", sees, _least(apart[:, 0, 1:]) == right)
-    yield _Guess(title, "farthest", sees, _least(-apart[:, 0, 1:]) == right)
+    yield (title, "nearest", sees, _least(apart[:, 0, 1:]) == right)
+    yield (title, "farthest", sees, _least(-apart[:, 0, 1:]) == right)
 
 
 def _by_mirror(evidence: Evidence) -> Iterator[_Guess]:
@@ -197,8 +190,8 @@ def _by_mirror(evidence: Evidence) -> Iterator[_Guess]:
     for name, title in {**_LIGHT, **_OUTLINE}.items():
         apart = _distances(getattr(evidence.statistics, name)[rows])[:, 0]
         pair = np.take_along_axis(apart, both, axis=1)
-        yield _Guess(title, "nearest", MIRRORED, _least(pair) == 0)
-        yield _Guess(title, "farthest", MIRRORED, _least(-pair) == 0)
+        yield (title, "nearest", MIRRORED, _least(pair) == 0)
+        yield (title, "farthest", MIRRORED, _least(-pair) == 0)
 
 
 def _learned(evidence: Evidence) -> Iterator[_Guess]:
@@ -211,12 +204,12 @@ def _learned(evidence: Evidence) -> Iterator[_Guess]:
     features = {"low-resolution pixels": pixels, "all statistics": wide}
     for title, values in features.items():
         hits = choose(values, right) == right
-        yield _Guess(title, "learned", WITHOUT, hits)
+        yield (title, "learned", WITHOUT, hits)
     cubes = np.stack(list(evidence.cubes.values()), axis=2)
     told = np.isfinite(cubes).all(axis=(1, 2))
     if np.count_nonzero(told) >= LEAST_QUESTIONS:
         hits = choose(cubes[told], right[told]) == right[told]
-        yield _Guess("answers' cubes", "learned", WITHOUT, hits)
+        yield ("answers' cubes", "learned", WITHOUT, hits)
 
 
 def _by_place(places: Sequence[Array]) -> list[_Guess]:
@@ -228,8 +221,8 @@ def _by_place(places: Sequence[Array]) -> list[_Guess]:
         return np.concatenate([[3], one[:-1]]) if len(one) else one
 
     return [
-        _Guess("place", "commonest", WITHOUT, hits(np.zeros_like)),
-        _Guess("place", "after the last", WITHOUT, hits(before)),
+        ("place", "commonest", WITHOUT, hits(np.zeros_like)),
+        ("place", "after the last", WITHOUT, hits(before)),
     ]
 
 

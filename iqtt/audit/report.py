@@ -1,7 +1,6 @@
 """The text of an audit: aligned columns for a terminal, or Markdown."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from iqtt.audit.audit import Audit
 from iqtt.audit.probes import ERROR_RATE, LIGHT, MIRRORED, OUTLINE, WITHOUT, Probe
@@ -21,23 +20,13 @@ _BLOCKS = (
 )
 
 
-@dataclass(frozen=True)
-class _Block:
-    """A table of probes of one kind: a row for each statistic, a column for each rule."""
-
-    title: str
-    rules: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-
-
 def table(audit: Audit) -> str:
     """Return proofs and probes as text with aligned columns."""
     files = [(t.name, f"{t.questions:,} questions", t.split or "released") for t in audit.tables]
     lines = [*aligned(files), ""]
     lines += aligned([(p.status, p.name, p.detail) for p in audit.proofs])
-    for block in _blocks(audit.probes):
-        lines += ["", block.title]
-        lines += ["  " + line for line in aligned([("", *block.rules), *block.rows])]
+    for title, rows in _blocks(audit.probes):
+        lines += ["", title, *("  " + line for line in aligned(rows))]
     return "\n".join([*lines, "", _conclusion(audit)])
 
 
@@ -49,13 +38,13 @@ def markdown(audit: Audit) -> str:
         "",
         *piped([("", "proof", "found"), *((p.status, p.name, p.detail) for p in audit.proofs)]),
     ]
-    for block in _blocks(audit.probes):
-        lines += ["", f"{block.title[0].upper()}{block.title[1:]}:", ""]
-        lines += piped([("", *block.rules), *block.rows])
+    for title, rows in _blocks(audit.probes):
+        lines += ["", f"{title[0].upper()}{title[1:]}:", "", *piped(rows)]
     return "\n".join([*lines, "", _conclusion(audit)])
 
 
-def _blocks(probes: Sequence[Probe]) -> Iterator[_Block]:
+def _blocks(probes: Sequence[Probe]) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
+    """Yield for each kind of probes a title and a table: statistics in rows, rules in columns."""
     for sees, title, rules in _BLOCKS:
         found = {(p.statistic, p.rule): p for p in probes if p.sees == sees and p.rule in rules}
         if not found:
@@ -67,7 +56,7 @@ def _blocks(probes: Sequence[Probe]) -> Iterator[_Block]:
         may = "sees some shape, so may beat" if sees == OUTLINE else "must not beat"
         asked = " to ".join(f"{n:,}" for n in dict.fromkeys((counts[0], counts[-1])))
         full = f"{title}: {may} chance, {100 * chance:.1f}% ({asked} questions)"
-        yield _Block(full, rules, tuple(rows))
+        yield full, [("", *rules), *rows]
 
 
 def _cell(probe: Probe | None) -> str:

@@ -57,7 +57,14 @@ def sample_questions(
     done: dict[int, Question] = {}
     waiting = list(requests)
     while waiting:
-        _check_attempts(spec, split, waiting)
+        for index, _, attempt in waiting:
+            if attempt >= QUESTION_ATTEMPTS:
+                raise PlacementError(
+                    f"{split} question {index}",
+                    f"no views of {QUESTION_ATTEMPTS} choices of shapes",
+                    f"{spec.min_cube_pixels} pixels of every cube in every image",
+                    "try a smaller --min-cube-pixels, or fewer --cubes",
+                )
         drawn = draw_shapes(spec, pools, split, [(i, attempt) for i, _, attempt in waiting])
         shapes = []
         for (index, place, attempt), one in zip(waiting, drawn, strict=True):
@@ -73,18 +80,6 @@ def sample_questions(
                 again.append((index, place, attempt + 1))
         waiting = again
     return [done[index] for index, _, _ in requests]
-
-
-def _check_attempts(spec: SplitSpec, split: str, requests: Sequence[tuple[int, int, int]]) -> None:
-    """Raise PlacementError where a question has no attempt left."""
-    for index, _, attempt in requests:
-        if attempt >= QUESTION_ATTEMPTS:
-            raise PlacementError(
-                f"{split} question {index}",
-                f"no views of {QUESTION_ATTEMPTS} choices of shapes",
-                f"{spec.min_cube_pixels} pixels of every cube in every image",
-                "try a smaller --min-cube-pixels, or fewer --cubes",
-            )
 
 
 def shape_symmetries(shapes: Sequence[Shapes]) -> Array:
