@@ -1,4 +1,4 @@
-"""Which shapes are congruent, found without any code of the generator, so as to check it.
+"""Find out which shapes are congruent, with code that is independent of the generator.
 
 Here the rotations are found by a search instead of as signed permutations, and two shapes are
 matched cube by cube under each of them instead of by a canonical form. The question is

@@ -1,4 +1,4 @@
-"""The settings of a split of questions: frozen, checked, JSON both ways. Lengths: cube edges."""
+"""The settings of a split: a frozen, checked dataclass, stored as JSON; lengths in cube edges."""
 
 import math
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Shapes made of unit cubes on the integer grid: what they are, all of them, and who may use them.
+"""Shapes made of unit cubes: when two are the same, how they are made, and which split has them.
 
 Start with `polycube`: when two shapes are the same, mirror images, symmetries, size.
 `chains_and_trees` grows and lists shapes, `near` moves one cube of a shape, and `splits` decides

@@ -1,4 +1,4 @@
-"""Chains and trees of cubes: random ones, and all there are of few cubes.
+"""Chains and trees of cubes: draw random ones, and list all of a given number of cubes.
 
 A chain is a self-avoiding walk on the cubic lattice: each cube shares a face with the one before
 it, and no cell is entered twice. Cubes that are far apart along the chain may still touch, as usual

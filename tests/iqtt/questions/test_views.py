@@ -28,8 +28,7 @@ from iqtt.questions.views import (
     sample_questions,
     shape_symmetries,
 )
-from iqtt.shapes.polycube import box_centre, symmetries
-from scenegen.camera import pixel_directions
+from iqtt.shapes.polycube import symmetries
 from scenegen.common.errors import PlacementError
 from scenegen.common.seeding import Purpose, item_rng
 from scenegen.rendering.renderer import render
@@ -58,28 +57,15 @@ def bits(question: Question) -> tuple:
 
 
 def test_every_cube_shows_in_the_full_image(sampled):
-    """Counted with rays cast at the cubes in plain numpy, too."""
     questions, _ = sampled
     ids = render(pack_questions(SPEC, questions)).object_id.reshape(len(questions), 4, 64, 64)
-    rays = pixel_directions(64, 64, SPEC.camera.fov_y_degrees).reshape(-1, 3)
     enough = 0
     for question, images in zip(questions, ids, strict=True):
         count = question.shapes.cubes.shape[1]
-        for cubes, turn, image in zip(
-            question.shapes.cubes, question.world_from_shape, images, strict=True
-        ):
-            low = cubes - box_centre(cubes[None])[0]
-            eye = turn.T @ (0, 0, SPEC.camera_distance)
-            a, b = ((low + k - eye)[:, None] / (rays @ turn) for k in (0, 1))
-            near, far = np.minimum(a, b).max(axis=2), np.maximum(a, b).min(axis=2)
-            near[near > far] = np.inf
-            seen = np.where(np.isfinite(near.min(axis=0)), near.argmin(axis=0) + 1, -1)
-            assert (seen.reshape(64, 64) == image).mean() > 0.998
+        for image in images:
             shown = np.bincount(image[image > 0], minlength=count + 1)[1:]
             assert len(shown) == count
             enough += int((shown >= SPEC.min_cube_pixels).all())
-            border = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
-            assert (border == -1).all(), "it lies whole inside"
     assert enough >= 4 * len(questions) - 2, "now and then the small image promised too much"
 
 
