@@ -59,7 +59,7 @@ def normalise(record: Any) -> None:
 def check(ok: bool, name: str, found: object, expected: str) -> None:
     """Raise SpecError, saying what was found and expected, unless `ok`."""
     if not ok:
-        raise SpecError(name, found, expected)
+        raise SpecError(name, str(found) or "nothing", expected)
 
 
 def check_range(name: str, value: tuple[float, float], low: float, high: float) -> None:
