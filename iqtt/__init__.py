@@ -1,10 +1,12 @@
-"""3D-IQTT mental-rotation questions.
+"""Mental-rotation questions (3D-IQTT): make them, read them, audit them.
 
 Read a file:    `with iqtt.open_questions("iqtt-split/iqtt-val.h5") as q: q[0].images, q[0].answer`
 Train on it:    `iqtt.QuestionsDataset("iqtt-split/iqtt-train.h5", "labeled")`
 Make a split:   `iqtt.make_split("iqtt-split", iqtt.preset_spec("small", seed=1))`
 
-Names are loaded when first used, so that importing the package costs nothing.
+A question passes through `shapes` (polycubes), `questions` (what it asks and shows), `render` (its
+images) and `files`; `audit` checks files. Each may import those before it, and `scenegen`. These
+names are loaded when they are first used, so that importing the package is fast.
 """
 
 from importlib import import_module

@@ -1,4 +1,7 @@
-"""The `iqtt` commands: parse, one library call, print. Heavy imports happen inside them."""
+"""The `iqtt` commands: they parse options, call the library once, and print.
+
+Heavy modules are imported inside the commands, so that `--help` is fast.
+"""
 
 import sys
 import time
@@ -20,40 +23,51 @@ from scenegen.common.command_line import (
     progress_bar,
 )
 
-SHOWN = 8  # questions that `show` draws unless told which
+SHOWN = 8  # questions that `show` draws by default
 
 
 @click.command("make-split")
-@click.option("--out", default="iqtt-split", show_default=True, help="Folder to write.")
+@click.option("--out", default="iqtt-split", show_default=True, help="Folder for the four files.")
 @click.option(
     "--preset",
     type=click.Choice(["small", "v2", "paper"]),
     default="small",
     show_default=True,
-    help="Numbers of questions: 1,000 (100 labelled) + 200 + 200; those of the released set;"
-    " those of the paper.",
+    help="Numbers of questions. small: 1,000 for training (100 with answers), 200 for validation,"
+    " 200 for testing; v2: as in the released data; paper: as in the paper.",
 )
-@click.option("--train", type=int, help="Training questions, labelled ones included.")
-@click.option("--labeled", type=int, help="Training questions with answers [default: as preset].")
-@click.option("--val", type=int, help="Validation questions.")
-@click.option("--test", type=int, help="Test questions; their answers get a file of their own.")
+@click.option("--train", type=int, help="Number of training questions, with and without answers.")
+@click.option(
+    "--labeled",
+    type=int,
+    help="How many training questions have answers [default: the preset's share].",
+)
+@click.option("--val", type=int, help="Number of validation questions.")
+@click.option(
+    "--test", type=int, help="Number of test questions; their answers are in a separate file."
+)
 @SEED
 @click.option(
-    "--cubes", type=Range(int), default="5-11", show_default=True, help="Cubes of a shape."
+    "--cubes",
+    type=Range(int),
+    default="5-11",
+    show_default=True,
+    help="Number of cubes of a shape.",
 )
 @click.option(
     "--shapes",
     type=click.Choice(["chain", "tree"]),
     default="chain",
     show_default=True,
-    help="Chains of cubes, or shapes that may branch.",
+    help="chain: self-avoiding chains of cubes; tree: shapes that may branch.",
 )
 @click.option(
     "--distractors",
     type=click.Choice(["other", "near", "mirror", "mixed"]),
     default="mixed",
     show_default=True,
-    help="Wrong answers: other shapes, one cube moved, mirror images, or each at times.",
+    help="Wrong answers. other: different shapes; near: one cube moved; mirror: a mirror image and"
+    " a near shape; mixed: each question one of the three.",
 )
 @click.option(
     "--min-angle",
@@ -61,21 +75,31 @@ SHOWN = 8  # questions that `show` draws unless told which
     type=float,
     default=30,
     show_default=True,
-    help="Least rotation from the reference's view to an answer's, degrees.",
+    help="Smallest rotation between the reference's view and an answer's, in degrees.",
 )
 @click.option(
     "--min-cube-pixels",
     type=int,
-    help="Pixels every cube shows [default: 12 at 128x128, radius 3.5].",
+    help="Smallest number of pixels that show a cube [default: 12 at 128x128 and radius 3.5].",
 )
-@click.option("--max-radius", type=float, help="Of a shape, cube edges [default: 3.5].")
+@click.option(
+    "--max-radius", type=float, help="Largest radius of a shape, in cube edges [default: 3.5]."
+)
 @SIZE
-@click.option("--background", type=Color(), default="white", show_default=True, help="Radiance.")
-@click.option("--lights", type=Range(int), default="2", show_default=True, help="Lights an image.")
+@click.option(
+    "--background", type=Color(), default="white", show_default=True, help="Background colour."
+)
+@click.option("--lights", type=Range(int), default="2", show_default=True, help="Number of lights.")
 @IMAGE_DTYPE
-@click.option("--with-depth", is_flag=True, help="Store planar depth too.")
+@click.option("--with-depth", is_flag=True, help="Store planar depth as well.")
 @COMPRESSION
-@click.option("--batch", type=click.IntRange(1), default=64, show_default=True, help="Questions.")
+@click.option(
+    "--batch",
+    type=click.IntRange(1),
+    default=64,
+    show_default=True,
+    help="Questions rendered at once.",
+)
 @DEVICE
 @OVERWRITE
 def make_split(
@@ -88,11 +112,16 @@ def make_split(
     overwrite: bool,
     **settings: Any,
 ) -> None:
-    """Write mental-rotation questions: a reference image, and three answers of which one is right.
+    """Make a split of mental-rotation questions for training, validation and testing.
 
-    Training, validation and test files share no shape, and no mirror image of one.
+    A question has four images: a reference, and three answers of which one shows the same shape.
+    No shape, nor its mirror image, is in two of training, validation and test.
+
+    \b
+    Example:
+        iqtt make-split --out iqtt-split --preset small --seed 1
     """
-    from iqtt.files import make as split
+    from iqtt.files import make
     from iqtt.questions.specs import preset_spec
 
     chosen = {name: value for name, value in settings.items() if value is not None}
@@ -100,7 +129,7 @@ def make_split(
     count = spec.train + spec.val + spec.test
     started = time.perf_counter()
     with progress_bar(count, "question") as bar:
-        tally = split.make_split(
+        tally = make.make_split(
             out,
             spec,
             batch=batch,
@@ -124,14 +153,28 @@ def make_split(
 
 @click.command()
 @click.argument("file")
-@click.option("--out", default="questions.png", show_default=True, help="Picture to write.")
+@click.option(
+    "--out",
+    default="questions.png",
+    show_default=True,
+    help="Picture to write; its suffix names the format.",
+)
 @click.option("--items", type=Items(), help="Questions to show [default: the first 8].")
-@click.option("--part", type=click.Choice(["labeled", "unlabeled"]), help="Of a training file.")
-@click.option("--answers", is_flag=True, help="Mark the right answers.")
+@click.option(
+    "--part", type=click.Choice(["labeled", "unlabeled"]), help="Part of a training file."
+)
+@click.option(
+    "--answers", is_flag=True, help="Mark the right answers, and name the kinds of the wrong ones."
+)
 def show(file: str, out: str, items: list[int] | None, part: str | None, answers: bool) -> None:
-    """Draw questions as a person would read them."""
+    """Draw questions of FILE: the reference on the left, its three answers beside it.
+
+    \b
+    Example:
+        iqtt show iqtt-split/iqtt-val.h5 --items 0-3 --answers --out questions.png
+    """
+    from iqtt.files.preview import save_sheet
     from iqtt.files.reader import answers_beside, open_questions, parts
-    from iqtt.files.show import save_sheet
     from scenegen.common.errors import SpecError
     from scenegen.rooms.preview import pick_rows
 
@@ -139,7 +182,7 @@ def show(file: str, out: str, items: list[int] | None, part: str | None, answers
     beside = answers_beside(file) if answers else None
     with open_questions(file, chosen or None, beside) as questions:
         if answers and not (questions.has_answers or questions.has_truth):
-            raise SpecError(f"{file}: holds no answers, and no answers file lies beside it")
+            raise SpecError(file, "no answers, and no file of answers beside it", "answers")
         rows = pick_rows(len(questions), items)[: None if items else SHOWN]
         save_sheet([questions[row] for row in rows], answers, out)
     click.echo(f"{out}: {len(rows)} of {file}'s {len(questions)} questions")
@@ -148,7 +191,12 @@ def show(file: str, out: str, items: list[int] | None, part: str | None, answers
 @click.command()
 @click.argument("file")
 def info(file: str) -> None:
-    """Say what is in a file: counts, shapes, distractors, spec, sizes, versions, fingerprints."""
+    """Describe FILE: its questions, settings, versions, fingerprints and sizes.
+
+    \b
+    Example:
+        iqtt info iqtt-split/iqtt-val.h5
+    """
     from iqtt.files.info import describe
 
     click.echo(describe(file))
@@ -156,14 +204,14 @@ def info(file: str) -> None:
 
 @click.command()
 @click.argument("splits", nargs=-1, required=True, metavar="SPLIT...")
-@click.option("--json", "json_path", help="Write all numbers to this file.")
+@click.option("--json", "json_path", help="Write all numbers to this JSON file.")
 @click.option("--markdown", is_flag=True, help="Print the tables as Markdown.")
 @click.option(
     "--probed",
     type=click.IntRange(0),
     default=20_000,
     show_default=True,
-    help="Most questions that the shortcuts are tried on.",
+    help="Largest number of questions that probes try to guess.",
 )
 @OVERWRITE
 @click.pass_context
@@ -175,22 +223,27 @@ def audit(
     probed: int,
     overwrite: bool,
 ) -> None:
-    """Prove that every question of some folders or files is right, and try to answer them without
-    looking at shapes. Exits with 1 if a proof fails.
+    """Prove that the questions of files or folders are right, and try to guess their answers.
+
+    Proofs recompute what must hold, with code that is independent of the generator. Probes try to
+    find the right answers without comparing shapes. The exit code is 1 if a proof fails.
+
+    \b
+    Example:
+        iqtt audit iqtt-split --json audit.json
     """
-    from iqtt.audit import audit as audits
-    from iqtt.audit import report as audit_report
-    from scenegen.common.new_file import check_writable, written_beside
+    from iqtt.audit import report
+    from iqtt.audit.audit import audit as audit_files
+    from iqtt.audit.audit import question_count
+    from scenegen.common.new_file import check_writable, write_text
 
     if json_path:
         check_writable(Path(json_path), overwrite)
-    count = audits.question_count(splits)
-    with progress_bar(count, "question") as bar:
-        found = audits.audit(splits, probed=probed, progress=bar.update)
-    click.echo(audit_report.markdown(found) if markdown else audit_report.table(found))
+    with progress_bar(question_count(splits), "question") as bar:
+        found = audit_files(splits, probed=probed, progress=bar.update)
+    click.echo(report.markdown(found) if markdown else report.table(found))
     if json_path:
-        with written_beside(json_path, overwrite) as temporary:
-            temporary.write_text(found.to_json())
+        write_text(json_path, found.to_json(), overwrite)
     ctx.exit(0 if found.passed else 1)
 
 

@@ -14,9 +14,9 @@ from benchmarks.jobs.inputs import Mesh
 from benchmarks.jobs.plain_mitsuba import mitsuba_mesh, sensor
 from benchmarks.jobs.timing import repeat, seconds_of
 from iqtt.files.make import make_split
-from iqtt.questions.sampling import make_pools
+from iqtt.questions.distractors import make_pools
+from iqtt.questions.packing import Question, cube_centres, pack_questions
 from iqtt.questions.specs import SplitSpec
-from iqtt.questions.views import Question, cube_centres, pack_questions
 from iqtt.render import render_questions
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.scene_mesh import welded

@@ -1,4 +1,8 @@
-"""Is every question of some files right, and can it be answered without looking at shapes?"""
+"""Audit question files: prove that the answers are right, and try to guess them without shapes.
+
+`audit` reads the files, runs the proofs and the probes, and returns an `Audit`; `report` makes text
+of it.
+"""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -10,18 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.audit import proofs, shape_proofs, view_proofs
-from iqtt.audit.image_statistics import Statistics
 from iqtt.audit.probes import Evidence, Probe, run_probes
 from iqtt.audit.proofs import Proof
 from iqtt.audit.shape_proofs import Shapes
-from iqtt.audit.shape_statistics import NAMES, answer_statistics
+from iqtt.audit.statistics import SHAPE_STATISTICS, Statistics, shape_statistics
 from iqtt.audit.table import AuditTable, find_tables, read_table
 from scenegen.common.row_file import writer_name
 
 Array = NDArray[Any]
 FORMAT = {"format": "pix2shape-bench/iqtt-audit", "format_version": "1.0"}
-PROBED = 20_000  # questions whose images probes look at, by default
-CAST = 48  # questions whose images are cast again
+PROBED = 20_000  # questions that probes look at, by default
+CAST = 48  # questions whose images are ray-cast again
 _BY_CUBES = (
     *("shapes", "one right answer", "answers differ", "stored ids", "splits apart"),
     *("rotations", "angles", "visibility", "cast again"),
@@ -30,11 +33,12 @@ _BY_CUBES = (
 
 @dataclass(frozen=True)
 class AuditedTable:
-    """A table that was looked at; split and fingerprint are None for a released file.
+    """A table of questions that was audited; split and fingerprint are None for a released file.
 
     Attributes:
-        answers: "stored", "from the cubes", or "unknown".
-        probed: questions that probes looked at.
+        questions: number of questions.
+        answers: where the right answers come from: "stored", "from the cubes", or "unknown".
+        probed: number of questions that probes looked at.
     """
 
     name: str
@@ -48,7 +52,7 @@ class AuditedTable:
 
 @dataclass(frozen=True)
 class Audit:
-    """What was proved and measured."""
+    """The result of an audit."""
 
     tables: tuple[AuditedTable, ...]
     proofs: tuple[Proof, ...]
@@ -56,12 +60,17 @@ class Audit:
 
     @property
     def passed(self) -> bool:
-        """Whether no proof failed."""
-        return all(proof.status != "FAIL" for proof in self.proofs)
+        """Whether there are questions, and no proof failed."""
+        return self.questions > 0 and all(proof.status != "FAIL" for proof in self.proofs)
+
+    @property
+    def questions(self) -> int:
+        """Number of questions in all tables."""
+        return sum(table.questions for table in self.tables)
 
     @property
     def shortcuts(self) -> tuple[Probe, ...]:
-        """The probes that beat chance by what must not tell the right answer."""
+        """The probes that beat chance though they must not."""
         return tuple(probe for probe in self.probes if probe.is_shortcut)
 
     def to_json(self) -> str:
@@ -81,7 +90,7 @@ class Audit:
 
 
 def question_count(paths: Sequence[str | Path]) -> int:
-    """Return how many questions `audit` will read. Raises as it does."""
+    """Return how many questions `audit` will read. Raises as `audit`."""
     return sum(source.count for source in find_tables(paths))
 
 
@@ -91,18 +100,18 @@ def audit(
     probed: int = PROBED,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> Audit:
-    """Prove what can be proved of question files, and try to answer them without looking.
+    """Prove what can be proved of question files, and try to answer them without their shapes.
 
     Files of answers are found beside the files of questions. Images are read once, in chunks.
 
     Args:
-        paths: question files, or folders of iqtt-*.h5.
-        probed: most questions whose images probes look at, spread evenly.
-        progress: is told how many more questions were read.
+        paths: question files, or folders with files iqtt-*.h5.
+        probed: largest number of questions that probes look at, spread evenly.
+        progress: is called with the number of questions that were read since the last call.
 
     Raises:
         OSError: no such file or folder, or a folder without question files.
-        FileFormatError: a file that is none of questions, or damaged.
+        FileFormatError: a file that is no question file, or damaged.
         SpecError: no paths.
     """
     sources = find_tables(paths)
@@ -119,7 +128,11 @@ def audit(
 
 
 def _spread(counts: Sequence[int], most: int) -> list[Array]:
-    """Choose rows of tables of so many rows, evenly: `most` in all, or all there are."""
+    """Choose rows of each table, evenly: `most` rows in all, or all there are.
+
+    Args:
+        counts: number of rows of each table.
+    """
     total = sum(counts)
     rows = np.unique(np.linspace(0, max(total - 1, 0), min(most, total)).astype(np.int64))
     starts = np.cumsum([0, *counts])
@@ -130,7 +143,7 @@ def _spread(counts: Sequence[int], most: int) -> list[Array]:
 
 
 def _right(table: AuditTable, shapes: Shapes | None) -> Array:
-    """Return where the right answers stand, as told or as found, (Q,); -1 where it is unknown."""
+    """Return the positions of the right answers, as stored or as found, (Q,); -1 if unknown."""
     if table.answers is not None:
         return table.answers.astype(np.int64)
     return np.full(len(table), -1) if shapes is None else shapes.place
@@ -172,15 +185,17 @@ def _evidence(
     tables: Sequence[AuditTable], shapes: Mapping[str, Shapes], right: Sequence[Array]
 ) -> Evidence:
     """Gather the questions that were measured and whose right answer is known."""
-    told = [table for table in tables if table.name in shapes]
-    numbers = answer_statistics(told, list(shapes.values())) if told else []
+    told = [table.truth["cubes"] for table in tables if table.name in shapes]
+    classes = [one.class_name for one in shapes.values()]
+    whole = [one.whole for one in shapes.values()]
+    numbers = shape_statistics(told, classes, whole) if told else []
     described = dict(zip(shapes, numbers, strict=True))
     cubes, mirrored, places, kept = [], [], [], []
     for table, place in zip(tables, right, strict=True):
         rows = table.measured[place[table.measured] >= 0]
         kept.append(np.isin(table.measured, rows))
         places.append(place[rows])
-        unknown = np.full((len(table), 3, len(NAMES)), np.nan)
+        unknown = np.full((len(table), 3, len(SHAPE_STATISTICS)), np.nan)
         cubes.append(described.get(table.name, unknown)[rows])
         mirrored.append(_mirror_images(shapes.get(table.name), place, rows))
     joined = np.concatenate(cubes)
@@ -188,13 +203,13 @@ def _evidence(
         statistics=Statistics.join([t.statistics for t in tables]).take(np.concatenate(kept)),
         right=np.concatenate(places),
         mirrored=np.concatenate(mirrored),
-        cubes={name: joined[:, :, i] for i, name in enumerate(NAMES)},
+        cubes={name: joined[:, :, i] for i, name in enumerate(SHAPE_STATISTICS)},
         places=[place[place >= 0] for place in right],
     )
 
 
 def _mirror_images(shapes: Shapes | None, place: Array, rows: Array) -> Array:
-    """Return which answers are the right ones' mirror images, of some rows; -1 for none."""
+    """Return for some rows which answer is the right one's mirror image; -1 for none."""
     if shapes is None:
         return np.full(len(rows), -1)
     right = 1 + place[rows, None]

@@ -1,4 +1,4 @@
-"""What an audit proves of answers and images, from what `iqtt.audit.table` read."""
+"""Proofs about answers and images, from what `table` read; and how any proof is judged."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from iqtt.files.layout import NO_CUBE
 from scenegen.rendering.ground_truth import encode_image
 
 Array = NDArray[Any]
-SHOWN = 3  # questions named in a detail
+SHOWN = 3  # questions that the detail of a proof names
 
 
 @dataclass(frozen=True)
 class Proof:
-    """One rule and whether all questions keep it; `detail` says what was looked at or found."""
+    """A rule and whether all questions keep it; `detail` says what was expected and found."""
 
     name: str
     status: Literal["ok", "FAIL", "skipped"]
@@ -32,13 +32,13 @@ def judge(
     found: Callable[[int, int], str],
     looked: int | None = None,
 ) -> Proof:
-    """Return the verdict on a rule for each question.
+    """Return the verdict on a rule that each question must keep.
 
     Args:
-        rule: what is expected.
+        rule: what is expected, in words.
         wrong: for each table which questions break the rule, (Q,) bool.
-        found: says what was found in a (table, row) that does.
-        looked: how many questions were looked at, if not all.
+        found: returns, for a (table, row) that breaks it, what was found there, in words.
+        looked: number of questions that were looked at, if not all.
     """
     total = f"{sum(map(len, tables)):,}"
     total = total if looked is None else f"{looked:,} of {total}"
@@ -54,10 +54,10 @@ def judge(
 
 
 def balance(tables: Sequence[AuditTable], right: Sequence[Array]) -> Proof:
-    """Whether the right answer stands at each place equally often, in every table.
+    """Prove that the right answer is at each position equally often, in every table.
 
     Args:
-        right: its place in each question, (Q,); -1 where it is not known.
+        right: for each table the positions of the right answers, (Q,); -1 where unknown.
     """
     counts = [np.bincount(places[places >= 0], minlength=3) for places in right]
     known = [i for i in range(len(tables)) if counts[i].sum()]
@@ -72,7 +72,7 @@ def balance(tables: Sequence[AuditTable], right: Sequence[Array]) -> Proof:
 
 
 def values(tables: Sequence[AuditTable]) -> Proof:
-    """Whether all pixel values are finite and within 0..1."""
+    """Prove that all pixel values are finite and within 0..1."""
     return judge(
         "pixel values",
         "finite and within 0 to 1",
@@ -83,12 +83,12 @@ def values(tables: Sequence[AuditTable]) -> Proof:
 
 
 def framing(tables: Sequence[AuditTable]) -> Proof:
-    """Whether the shapes leave each image's border free."""
+    """Prove that no shape touches the border of an image."""
     for table in tables:
         if table.spec is None or not len(table):
             continue
         expected = encode_image(np.array(table.spec.background), table.image_dtype)
-        # Rounding a half up or down is up to the renderer.
+        # The renderer may round a half up or down.
         step = 1 if table.image_dtype == "uint8" else 1e-3
         if np.abs(table.background.astype(float) - expected).max() > step:
             detail = f"{table.name}: the border's commonest colour is {table.background.tolist()}"
@@ -105,14 +105,14 @@ def framing(tables: Sequence[AuditTable]) -> Proof:
 
 
 def visibility(tables: Sequence[AuditTable]) -> Proof:
-    """Whether every cube shows, by the counts stored, and these allow for each silhouette."""
+    """Prove, by the stored counts, that every cube shows and no silhouette is larger than them."""
     told = [table for table in tables if table.truth]
     if not told:
         return Proof("visibility", "skipped", "no shape descriptions")
     shown = [table.truth["visible_pixels"].astype(np.int64) for table in told]
     used = [(table.truth["cubes"] != NO_CUBE).any(axis=3) for table in told]
     least = [np.where(u, s, 2**31).min(axis=2) for u, s in zip(used, shown, strict=True)]
-    # A surface may have the background's colour, so a silhouette may be too small, never too large.
+    # A surface may have the colour of the background, which makes a silhouette smaller only.
     total = [np.where(u, s, 0).sum(axis=2) for u, s in zip(used, shown, strict=True)]
     needed = [table.spec.min_cube_pixels if table.spec else 0 for table in told]
     return judge(
@@ -131,28 +131,28 @@ def visibility(tables: Sequence[AuditTable]) -> Proof:
 
 
 def distinct_images(tables: Sequence[AuditTable]) -> Proof:
-    """Whether no image is stored twice, in all tables together."""
+    """Prove that no image is stored twice, in all tables together."""
     first = _first_copies(np.concatenate([table.digests.reshape(-1) for table in tables]))
     return _no_copies(tables, "distinct images", "no image stored twice", first.reshape(-1, 4))
 
 
 def distinct_questions(tables: Sequence[AuditTable]) -> Proof:
-    """Whether no question is asked twice, its answers perhaps in another order."""
+    """Prove that no question is asked twice, even with its answers in another order."""
     words = np.concatenate([table.digests for table in tables]).view(np.uint64).reshape(-1, 4, 2)
-    # A sum of hashes does not know their order.
+    # A sum of hashes does not depend on their order.
     keys = np.concatenate([words[:, 0], words[:, 1:].sum(axis=1, dtype=np.uint64)], axis=1)
     first = _first_copies(keys.view("V32").reshape(-1))
     return _no_copies(tables, "distinct questions", "no question asked twice", first[:, None])
 
 
 def _first_copies(keys: Array) -> Array:
-    """Return where each key is met first, (N,)."""
+    """Return the index of the first copy of each key, (N,)."""
     _, first, copy = np.unique(keys, return_index=True, return_inverse=True)
     return np.asarray(first[copy])
 
 
 def _no_copies(tables: Sequence[AuditTable], name: str, rule: str, first: Array) -> Proof:
-    """Judge whether each of all tables' items is its own first copy; items: (all Q, per Q)."""
+    """Prove that each item is its own first copy; first: (all questions, items a question)."""
     number = np.arange(first.size).reshape(first.shape)
     starts = np.cumsum([0, *map(len, tables)])
 

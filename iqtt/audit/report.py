@@ -1,10 +1,10 @@
-"""An audit for people: as aligned text, and as Markdown."""
+"""The text of an audit: aligned columns for a terminal, or Markdown."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from iqtt.audit.audit import Audit
 from iqtt.audit.probes import ERROR_RATE, LIGHT, MIRRORED, OUTLINE, WITHOUT, Probe
+from scenegen.common.text_table import aligned, piped
 
 _BLOCKS = (
     (WITHOUT, "answers alone", ("largest", "smallest", "most typical", "odd one out")),
@@ -20,41 +20,31 @@ _BLOCKS = (
 )
 
 
-@dataclass(frozen=True)
-class _Block:
-    """Probes of one kind: a row for each statistic, a column for each rule."""
-
-    title: str
-    rules: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-
-
 def table(audit: Audit) -> str:
-    """Return what was proved and measured as lines, columns aligned."""
+    """Return proofs and probes as text with aligned columns."""
     files = [(t.name, f"{t.questions:,} questions", t.split or "released") for t in audit.tables]
-    lines = [*_aligned(files), ""]
-    lines += _aligned([(p.status, p.name, p.detail) for p in audit.proofs])
-    for block in _blocks(audit.probes):
-        lines += ["", block.title]
-        lines += ["  " + line for line in _aligned([("", *block.rules), *block.rows])]
+    lines = [*aligned(files), ""]
+    lines += aligned([(p.status, p.name, p.detail) for p in audit.proofs])
+    for title, rows in _blocks(audit.probes):
+        lines += ["", title, *("  " + line for line in aligned(rows))]
     return "\n".join([*lines, "", _conclusion(audit)])
 
 
 def markdown(audit: Audit) -> str:
-    """Return the same as Markdown tables."""
+    """Return proofs and probes as Markdown tables."""
     files = [(t.name, f"{t.questions:,}", f"{t.probed:,}") for t in audit.tables]
-    lines = _piped([("table", "questions", "probed"), *files])
+    lines = piped([("table", "questions", "probed"), *files])
     lines += [
         "",
-        *_piped([("", "proof", "found"), *((p.status, p.name, p.detail) for p in audit.proofs)]),
+        *piped([("", "proof", "found"), *((p.status, p.name, p.detail) for p in audit.proofs)]),
     ]
-    for block in _blocks(audit.probes):
-        lines += ["", f"{block.title[0].upper()}{block.title[1:]}:", ""]
-        lines += _piped([("", *block.rules), *block.rows])
+    for title, rows in _blocks(audit.probes):
+        lines += ["", f"{title[0].upper()}{title[1:]}:", "", *piped(rows)]
     return "\n".join([*lines, "", _conclusion(audit)])
 
 
-def _blocks(probes: Sequence[Probe]) -> Iterator[_Block]:
+def _blocks(probes: Sequence[Probe]) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
+    """Yield for each kind of probes a title and a table: statistics in rows, rules in columns."""
     for sees, title, rules in _BLOCKS:
         found = {(p.statistic, p.rule): p for p in probes if p.sees == sees and p.rule in rules}
         if not found:
@@ -66,7 +56,7 @@ def _blocks(probes: Sequence[Probe]) -> Iterator[_Block]:
         may = "sees some shape, so may beat" if sees == OUTLINE else "must not beat"
         asked = " to ".join(f"{n:,}" for n in dict.fromkeys((counts[0], counts[-1])))
         full = f"{title}: {may} chance, {100 * chance:.1f}% ({asked} questions)"
-        yield _Block(full, rules, tuple(rows))
+        yield full, [("", *rules), *rows]
 
 
 def _cell(probe: Probe | None) -> str:
@@ -79,6 +69,8 @@ def _cell(probe: Probe | None) -> str:
 def _conclusion(audit: Audit) -> str:
     failed = [proof.name for proof in audit.proofs if proof.status == "FAIL"]
     lines = [f"FAILED: {', '.join(failed)}." if failed else "No proof failed."]
+    if not audit.questions:
+        lines = ["FAILED: there are no questions."]
     if audit.probes:
         tried = sum(probe.sees != OUTLINE for probe in audit.probes)
         found = [f"{p.statistic}, {p.rule} ({p.sees})" for p in audit.shortcuts]
@@ -91,16 +83,3 @@ def _conclusion(audit: Audit) -> str:
     else:
         lines.append("No probes: no right answers are known.")
     return "\n".join(lines)
-
-
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]
-
-
-def _piped(rows: Sequence[Sequence[str]]) -> list[str]:
-    head, *rest = ["| " + " | ".join(row) + " |" for row in rows]
-    return [head, "| " + " | ".join("---" for _ in rows[0]) + " |", *rest]

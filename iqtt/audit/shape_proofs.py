@@ -1,8 +1,4 @@
-"""What an audit proves of shapes and views, recomputed from the stored cubes and rotations.
-
-Nothing here is shared with the generator: congruence is `iqtt.shapes.congruence`, names are
-`iqtt.shapes.names`, and turns are found by search.
-"""
+"""Proofs about shapes, recomputed from the stored cubes with `congruence`."""
 
 import itertools
 from collections.abc import Sequence
@@ -12,31 +8,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iqtt.audit.congruence import congruent_rows, name_shapes, row_keys
 from iqtt.audit.proofs import Proof, judge
 from iqtt.audit.table import AuditTable
 from iqtt.files.layout import NO_CUBE
-from iqtt.shapes.congruence import congruent_rows
-from iqtt.shapes.names import name_shapes, row_keys
 
 Array = NDArray[Any]
-MOST_CUBES = 64  # more than any file stores; keeps names of shapes of unlike sizes apart
-ORTHONORMAL = 1e-6  # how far a rotation times its transpose may be off 1
-DEGREES = 1e-3  # how far a stored angle may be off
-_CHUNK = 8192  # questions at a time
+MOST_CUBES = 64  # more than any file has; keeps names of shapes with other numbers of cubes apart
+_CHUNK = 8192  # questions at a time: bounds the memory
 
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """What the cubes of a table say, Q questions.
+    """What the cubes of the Q questions of a table say about their shapes.
 
     Attributes:
-        whole: whether a question's shapes are in one piece, of as many cubes each, (Q,) bool; the
-            rest is told of these questions alone.
-        count: cubes of each of its shapes, (Q,).
+        whole: whether a question's four shapes are connected and have the same number of cubes,
+            (Q,) bool. The other attributes have a meaning for these questions only.
+        count: number of cubes of each of the four shapes, (Q,).
         right: which answers are congruent to the reference, (Q, 3) bool.
-        shape_name, class_name: numbers for the four shapes, (Q, 4): equal for the same shape;
-            equal for it and its mirror image; unlike for others, in all tables together. -1 unless
-            `whole`.
+        shape_name: numbers for the four shapes, (Q, 4), equal if and only if the shapes are
+            congruent, in all tables together; -1 unless `whole`.
+        class_name: the same, but equal for mirror images too.
     """
 
     whole: Array
@@ -47,12 +40,12 @@ class Shapes:
 
     @property
     def place(self) -> Array:
-        """Where the only right answer stands, (Q,); -1 unless there is exactly one."""
+        """Position of the right answer, (Q,); -1 unless there is exactly one."""
         return np.where(self.right.sum(axis=1) == 1, self.right.argmax(axis=1), -1)
 
 
 def compare_shapes(tables: Sequence[AuditTable]) -> list[Shapes]:
-    """Find which of the tables' shapes are the same; each table tells its truth."""
+    """Find out which of the tables' shapes are the same; every table must have its truth."""
     results = []
     for table in tables:
         cubes = table.truth["cubes"]
@@ -88,7 +81,7 @@ def _whole(cubes: Array) -> tuple[Array, Array]:
         wide, both = cubes[part].astype(np.int16), used[part, :, :, None] & used[part, :, None]
         apart = np.abs(wide[:, :, :, None] - wide[:, :, None]).sum(axis=4)
         differ = np.count_nonzero(both & (apart == 0), axis=(2, 3)) == count[part]
-        # Unused rows reach the first cube, so that only the used ones decide.
+        # A shape is connected if every used row reaches the first cube.
         reaches = (both & (apart <= 1)).astype(np.float32)
         for _ in range(cubes.shape[2].bit_length()):
             reaches = np.minimum(reaches @ reaches, 1)
@@ -98,7 +91,7 @@ def _whole(cubes: Array) -> tuple[Array, Array]:
 
 
 def whole_shapes(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
-    """Whether the cubes are what they should be: else the other proofs have nothing to go by."""
+    """Prove that the cubes are connected shapes of the specified size; other proofs rest on it."""
     ranges = [table.spec.cubes if table.spec else (1, MOST_CUBES) for table in tables]
     wrong = [
         ~(s.whole & (s.count >= low) & (s.count <= high))
@@ -116,7 +109,7 @@ def whole_shapes(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proo
 
 
 def one_right_answer(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
-    """Whether exactly one answer is congruent to the reference: the one that the file names."""
+    """Prove that exactly one answer is congruent to the reference: the one that the file names."""
     wrong = []
     for table, found in zip(tables, shapes, strict=True):
         named = table.truth["distractor_kind"] == -1
@@ -135,7 +128,7 @@ def one_right_answer(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> 
 
 
 def distractors_differ(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
-    """Whether no two answers of a question show the same shape."""
+    """Prove that no two answers of a question show the same shape."""
     pairs = list(itertools.combinations((1, 2, 3), 2))
     same = [
         np.stack([(s.shape_name[:, a] == s.shape_name[:, b]) & s.whole for a, b in pairs], axis=1)
@@ -151,7 +144,7 @@ def distractors_differ(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -
 
 
 def stored_ids(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
-    """Whether the stored ids are equal just where the shapes are, and where their classes are."""
+    """Prove that stored ids are equal if and only if the shapes, or their classes, are the same."""
     wrong = [np.zeros(len(table), np.bool_) for table in tables]
     whole = np.concatenate([s.whole for s in shapes])
     ends = np.cumsum([len(table) for table in tables])[:-1]
@@ -169,7 +162,7 @@ def stored_ids(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
 
 
 def _not_one_to_one(a: Array, b: Array) -> Array:
-    """Return which items of a carry more than one value of b with their own value, (N,) bool."""
+    """Return for each item whether its value in a comes with several values in b, (N,) bool."""
     order = np.lexsort((b, a))
     joins = (a[order][1:] == a[order][:-1]) & (b[order][1:] != b[order][:-1])
     bad = np.unique(a[order][1:][joins])
@@ -177,7 +170,7 @@ def _not_one_to_one(a: Array, b: Array) -> Array:
 
 
 def splits_share_nothing(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
-    """Whether no shape, nor its mirror image, is in two splits."""
+    """Prove that no shape, nor its mirror image, is in two splits."""
     names = [table.split or "" for table in tables]
     splits = sorted(set(names))
     if len(splits) < 2:

@@ -1,8 +1,7 @@
-"""What an audit reads of one table of questions: its images once, in chunks; the rest whole."""
+"""Find tables of questions, and read them for the audit: images once, in chunks."""
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit.image_statistics import Statistics, measure, silhouettes
-from iqtt.files.reader import QuestionsFile, answers_beside, open_questions, parts
+from iqtt.audit.statistics import Statistics, measure, silhouettes
+from iqtt.files.reader import QuestionsFile, answers_beside, parts
 from iqtt.questions.specs import SplitSpec
 from scenegen.common.records import check
 
 Array = NDArray[Any]
-CHUNK_PIXELS = 2**20  # of the questions in memory at once
+CHUNK_PIXELS = 2**20  # pixels of questions in memory at once
 TRUTH = (
     "cubes",
     "shape_id",
@@ -33,11 +32,11 @@ class Source:
     """Where a table of questions lies.
 
     Attributes:
-        name: short, and unlike those of the other tables: "iqtt-train.h5 labeled".
+        name: short name, such as "iqtt-train.h5 labeled"; no two tables have the same.
         part: "labeled" or "unlabeled" of a training file, else "".
-        answers: the file with the answers, where they lie apart.
-        answered: whether right answers are told, or the shapes to find them.
-        count: questions.
+        answers: the file with the answers, if it is another one.
+        answered: whether the right answers are known, from answers or from shapes.
+        count: number of questions.
     """
 
     name: str
@@ -47,27 +46,25 @@ class Source:
     answered: bool
     count: int
 
-    @contextmanager
-    def open(self) -> Iterator[QuestionsFile]:
-        """Open the table. Raises OSError, FileFormatError as `QuestionsFile`."""
-        with open_questions(self.path, self.part, self.answers) as questions:
-            yield questions
+    def open(self) -> QuestionsFile:
+        """Open the table. Raises as `QuestionsFile`."""
+        return QuestionsFile(self.path, self.part, self.answers)
 
 
 @dataclass(frozen=True, eq=False)
 class AuditTable:
-    """A table of Q questions, all but its pixels.
+    """What was read of a table of Q questions: everything except the pixels.
 
     Attributes:
-        spec, split, fingerprint: None for a released file.
-        answers: which of the three is right, (Q,); None where it is not told.
-        truth: the datasets `TRUTH` by name, (Q, ...) each; empty where shapes are not told.
-        background: the commonest colour of the images' borders, as stored, (3,).
+        spec, split, fingerprint: as in the file; None for a released file.
+        answers: which of the three is right, (Q,); None if the file does not tell.
+        truth: the datasets `TRUTH` by name, (Q, ...) each; empty if the file has no shapes.
+        background: most frequent colour of the images' borders, as stored, (3,).
         digests: hashes of the images, (Q, 4) void.
-        silhouette: pixels of each image that are not background, (Q, 4).
-        on_border: those of them on the image's border, (Q, 4).
-        unfit: values of each image that are not finite, or off the range 0..1, (Q, 4).
-        measured: rows that `statistics` are of.
+        silhouette: number of pixels of each image that are not background, (Q, 4).
+        on_border: number of those pixels on the image's border, (Q, 4).
+        unfit: number of values of each image that are not finite, or outside 0..1, (Q, 4).
+        measured: rows that `statistics` describe.
     """
 
     source: Source
@@ -87,7 +84,7 @@ class AuditTable:
 
     @property
     def name(self) -> str:
-        """Of the source."""
+        """Name of the source."""
         return self.source.name
 
     def __len__(self) -> int:
@@ -95,7 +92,7 @@ class AuditTable:
 
 
 def find_tables(paths: Sequence[str | Path]) -> list[Source]:
-    """Find the tables of question files, and in folders of every iqtt-*.h5.
+    """Find the tables of question files; of a folder, those of all its files iqtt-*.h5.
 
     A file of answers stands for the file of questions beside it.
 
@@ -120,7 +117,7 @@ def find_tables(paths: Sequence[str | Path]) -> list[Source]:
         shown = path.name if names.count(path.name) == 1 else str(path)
         for part in parts(path):
             beside = answers_beside(path)
-            with open_questions(path, part, beside) as questions:
+            with QuestionsFile(path, part, beside) as questions:
                 name = f"{shown} {part}".rstrip()
                 answered = questions.has_answers or questions.has_truth
                 sources.append(Source(name, path, part, beside, answered, len(questions)))
@@ -133,10 +130,10 @@ def read_table(
     """Read a table.
 
     Args:
-        measured: rows to take statistics of, rising.
-        progress: is told how many more questions were read.
+        measured: rows to take statistics of, in rising order.
+        progress: is called with the number of questions that were read since the last call.
 
-    Raises OSError, FileFormatError as `QuestionsFile` and its `read`.
+    Raises OSError and FileFormatError as `QuestionsFile` and its `read`.
     """
     with source.open() as questions:
         everything = slice(0, source.count)
@@ -178,7 +175,7 @@ def _border(pixels: Array) -> Array:
 
 
 def _border_color(images: Array) -> Array:
-    """Return the commonest colour on the images' borders, (3,); zero where there is no image."""
+    """Return the most frequent colour on the images' borders, (3,); zero if there is no image."""
     colors = _border(images).reshape(-1, 3)
     if not len(colors):
         return np.zeros(3, images.dtype)

@@ -1,6 +1,6 @@
-"""What an audit proves of views: how far they turn, and that images show what the file says.
+"""Proofs about views: how far they turn, and that images show what the file says.
 
-Nothing here is shared with the generator: turns are found by search, and rays cast in numpy.
+No code is shared with the generator: rotations are found by a search, and rays are cast in NumPy.
 """
 
 import math
@@ -10,26 +10,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iqtt.audit.congruence import cube_codes, cube_rotations
 from iqtt.audit.proofs import Proof, judge
 from iqtt.audit.shape_proofs import Shapes
 from iqtt.audit.table import AuditTable
 from iqtt.files.reader import QuestionsFile
 from iqtt.questions.specs import SplitSpec
-from iqtt.shapes.names import cube_codes, whole_turns
 from scenegen.camera import pixel_directions
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rendering.shading import shade
 
 Array = NDArray[Any]
-ORTHONORMAL = 1e-6  # how far a rotation times its transpose may be off 1
-STORED_DEGREES = 1e-3  # how far a stored angle may be off
-LEAST_DEGREES = 1e-6  # how far below the least an angle may be, by rounding
-GRAZING = 1e-3  # cube edges; rays that pass an edge so near may see either side
-RADIANCE = {"uint8": 0.51 / 255, "float16": 1e-3, "float32": 1e-4}  # how far a pixel may be off
+ORTHONORMAL = 1e-6  # tolerance of a rotation times its transpose
+STORED_DEGREES = 1e-3  # tolerance of a stored angle
+LEAST_DEGREES = 1e-6  # how far rounding may take an angle below the smallest allowed one
+GRAZING = 1e-3  # cube edges; rays that pass an edge at this distance may see either side
+RADIANCE = {"uint8": 0.51 / 255, "float16": 1e-3, "float32": 1e-4}  # tolerance of a pixel
 
 
 def rotations(tables: Sequence[AuditTable]) -> Proof:
-    """Whether each stored rotation is one: orthonormal and proper."""
+    """Prove that each stored matrix is a rotation: orthonormal and proper."""
     wrong = []
     for table in tables:
         matrices = table.truth["world_from_shape"]
@@ -42,7 +42,7 @@ def rotations(tables: Sequence[AuditTable]) -> Proof:
 
 
 def angles(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
-    """Whether the right answer is turned far enough away from the reference, and as far as told."""
+    """Prove that right answers are turned far enough from the reference, and as far as stored."""
     least = [table.spec.min_angle_degrees if table.spec else 0.0 for table in tables]
     found = [_angles(table, s) for table, s in zip(tables, shapes, strict=True)]
     wrong = []
@@ -62,9 +62,9 @@ def angles(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
 
 
 def _angles(table: AuditTable, shapes: Shapes) -> Array:
-    """Return the least rotation from the reference's view to the right answer's, degrees, (Q,).
+    """Return the smallest rotation from the reference's view to the right answer's, degrees, (Q,).
 
-    Infinite where there is not one right answer.
+    It is infinite where there is not exactly one right answer.
     """
     result = np.full(len(table), np.inf)
     for n in np.unique(shapes.count[shapes.place >= 0]).tolist():
@@ -73,9 +73,9 @@ def _angles(table: AuditTable, shapes: Shapes) -> Array:
         cubes = table.truth["cubes"][..., :n, :].astype(np.int64)
         views = table.truth["world_from_shape"]
         reference, target = cubes[rows, 0], cube_codes(cubes[rows, place])
-        for turn in whole_turns():
-            # The turned reference is the right answer's shape as stored: so it was turned by
-            # the answer's rotation, after this turn, and back by its own.
+        for turn in cube_rotations():
+            # Where this turn takes the stored reference to the stored right answer, the rotation
+            # between the views is: back by the reference's own, this turn, the answer's own.
             fits = (cube_codes(reference @ turn.T) == target).all(axis=1)
             some = rows[fits]
             between = views[some, place[fits]] @ turn @ views[some, 0].swapaxes(1, 2)
@@ -88,10 +88,10 @@ def _angles(table: AuditTable, shapes: Shapes) -> Array:
 def cast_again(
     tables: Sequence[AuditTable], shapes: Sequence[Shapes], sample: Sequence[Array]
 ) -> Proof:
-    """Whether some images are what rays cast at the stored cubes under the stored lights see.
+    """Prove that images are what rays cast at the stored cubes under the stored lights see.
 
     Args:
-        sample: for each table the rows to look at, rising.
+        sample: for each table the rows to look at, in rising order.
     """
     problems: list[dict[int, str]] = []
     for table, one, rows in zip(tables, shapes, sample, strict=True):
@@ -112,7 +112,7 @@ def cast_again(
 
 
 def _difference(questions: QuestionsFile, row: int, count: int) -> str:
-    """Say how a question's images differ from what its description gives; "" if they do not."""
+    """Return how a question's images differ from its shapes and lights; "" if they do not."""
     spec = questions.spec
     if spec is None:
         return ""
@@ -144,15 +144,17 @@ def _cast(
     """Cast a ray through the middle of each pixel.
 
     Args:
-        cubes: (n, 3); view: world from shape, (3, 3); lights: (L, 3) each.
+        cubes: integer coordinates, (n, 3).
+        view: rotation world_from_shape, (3, 3).
+        light_position, light_color: (L, 3) each.
 
-    Returns which cube each sees, -1 for none, (H, W); the radiance, (H, W, 3); and where no edge
-    is so near that rounding may decide, (H, W).
+    Returns which cube each ray sees, -1 for none, (H, W); the radiance, (H, W, 3); and whether no
+    edge is so near that rounding may decide, (H, W).
     """
     height, width = spec.height, spec.width
     world_from_camera = spec.camera.world_from_camera
     rays = pixel_directions(height, width, spec.camera.fov_y_degrees).reshape(-1, 3)
-    rays = rays @ world_from_camera[:3, :3].T @ view  # in the shape's frame, as all from here on
+    rays = rays @ world_from_camera[:3, :3].T @ view  # from here on, all is in the shape's frame
     eye = world_from_camera[:3, 3] @ view
     low = cubes - (cubes.min(axis=0) + cubes.max(axis=0) + 1) / 2
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -164,7 +166,7 @@ def _cast(
     every = np.arange(len(rays))
     nearest = depth[every, cube]
     hit = np.isfinite(nearest)
-    # Unsure: grazing the edge of any cube not behind, or another cube just as near.
+    # A ray is unsure if it grazes an edge of a cube in front, or if two cubes or faces are as near.
     clear = GRAZING / spec.camera_distance
     close = (np.abs(last - first) < GRAZING) & (
         np.minimum(first, last) < nearest[:, None] + GRAZING

@@ -1,6 +1,6 @@
-"""What a question file holds, as text for a person."""
+"""A description of a question file, as text: counts, settings, shapes, sizes and versions."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -11,17 +11,18 @@ from numpy.typing import NDArray
 from iqtt.files.layout import truth_columns
 from iqtt.files.reader import AnswersFile, QuestionsFile, answers_beside, parts
 from iqtt.files.tables import NoImagesError, TableFile
+from scenegen.rendering.backend import UNKNOWN, VERSION_ATTRIBUTES
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.info import setting_lines, size_text
 
 Array = NDArray[Any]
-SAMPLED = 64  # rows read for the range of the images
+SAMPLED = 64  # rows that are read for the range of the images
 
 
 def describe(path: str | Path) -> str:
-    """Return what is in a question file, ours or a released one, or in a file of answers, as lines.
+    """Describe a question file, ours or a released one, or a file of answers, in lines of text.
 
-    Raises OSError, FileFormatError as `QuestionsFile`.
+    Raises OSError and FileFormatError as `QuestionsFile`.
     """
     with ExitStack() as stack:
         tables = [stack.enter_context(table) for table in _tables(path)]
@@ -50,11 +51,12 @@ def _header(path: Path, tables: Sequence[TableFile]) -> list[str]:
     ]
     spec, attributes = tables[0].spec, tables[0].attributes
     if spec is None:
-        return [*lines, "  format        none told: as the released 3D-IQTT"]
+        return [*lines, "  format        none, as in the released 3D-IQTT"]
     return [
         *lines,
         f"  format        {attributes['format']} {attributes['format_version']}",
         f"  written by    {attributes['writer']}, {attributes.get('variant')}",
+        f"  rendered by   {_renderer(attributes)}",
         f"  command       {attributes.get('creation_command') or '-'}",
         f"  split         {tables[0].split}",
         f"  conventions   {attributes.get('conventions')}",
@@ -62,6 +64,12 @@ def _header(path: Path, tables: Sequence[TableFile]) -> list[str]:
         "  spec (* differs from the default)",
         *setting_lines(spec),
     ]
+
+
+def _renderer(attributes: Mapping[str, Any]) -> str:
+    """Return the releases that rendered a file; older files do not tell them."""
+    named = zip(("Mitsuba", "Dr.Jit", "LLVM"), VERSION_ATTRIBUTES, strict=True)
+    return ", ".join(f"{name} {attributes.get(key, UNKNOWN)}" for name, key in named)
 
 
 def _answers_told(path: Path, tables: Sequence[TableFile], total: int) -> str:
@@ -98,7 +106,7 @@ def _table_lines(table: TableFile) -> list[str]:
 
 
 def _facts(table: TableFile) -> dict[str, str]:
-    """Return counts and ranges of what a table tells, by name."""
+    """Return counts and ranges of the values of a table, by name."""
     facts = {"fingerprint": table.fingerprint} if table.fingerprint else {}
     if len(table) == 0:
         return facts

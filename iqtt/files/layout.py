@@ -1,10 +1,14 @@
-"""The HDF5 layout of question files: the released 3D-IQTT v2 layout, and a group of our own."""
+"""The HDF5 layout of question files: that of the released 3D-IQTT v2, and the group `truth`.
+
+A training file has two tables of questions, in the groups `labeled` and `unlabeled`; the other
+files have one, at the root. `truth` tells what is known of the questions of each table.
+"""
 
 from typing import Any
 
 from numpy.typing import NDArray
 
-from iqtt.questions.specs import SplitSpec
+from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec
 from iqtt.shapes.polycube import MAX_CUBES
 from scenegen.common.row_file import Column, writer_name
 
@@ -13,7 +17,6 @@ FORMAT_NAME = "pix2shape-bench/iqtt"
 FORMAT_VERSION = "1.0"
 NO_CUBE = -128
 ID_BYTES = 2 * MAX_CUBES
-KIND_NAMES = ("other", "near", "mirror")
 CONVENTIONS = (
     "unit: cube edge; world and camera: right-handed, y up, the camera on +z looks along -z; a cube"
     " at integer c fills [c, c + 1]; a shape turns about the centre of its bounding box, which lies"
@@ -23,7 +26,7 @@ CONVENTIONS = (
 
 
 def question_columns(spec: SplitSpec) -> list[Column]:
-    """Return the released dataset: four images a question."""
+    """Return the column of the images, four a question, as in the released files."""
     meaning = {
         "unit": "linear radiance, times `scale`",
         "shape": "(Q, 4, H, W, 3)",
@@ -36,7 +39,7 @@ def question_columns(spec: SplitSpec) -> list[Column]:
 
 
 def truth_columns(spec: SplitSpec) -> list[Column]:
-    """Return what is known of each question."""
+    """Return the columns of `truth`: shapes, views, lights and difficulty of each question."""
     most, lights = spec.cubes[1], spec.lights[1]
 
     def column(
@@ -72,7 +75,7 @@ def truth_columns(spec: SplitSpec) -> list[Column]:
             "int8",
             "1",
             "of each answer: -1 the right one, else an index into `names`",
-            names=list(KIND_NAMES),
+            names=list(DISTRACTOR_KINDS),
         ),
         column(
             "angle_degrees",
@@ -89,13 +92,19 @@ def truth_columns(spec: SplitSpec) -> list[Column]:
     return columns
 
 
-def root_attributes(spec: SplitSpec, variant: str, command: str) -> dict[str, Any]:
-    """Return the attributes of a file; the command only where the seed may be told."""
+def root_attributes(spec: SplitSpec, renderer: dict[str, str], command: str) -> dict[str, Any]:
+    """Return the root attributes of a file.
+
+    Args:
+        renderer: Mitsuba's variant, and the versions that `rendering.backend.versions` gives.
+        command: the command that made the file; empty where it must not be told, as it names the
+            seed.
+    """
     attributes = {
         "format": FORMAT_NAME,
         "format_version": FORMAT_VERSION,
         "writer": writer_name(),
-        "variant": variant,
+        **renderer,
         "spec": spec.to_json(),
         "conventions": CONVENTIONS,
     }
@@ -103,7 +112,7 @@ def root_attributes(spec: SplitSpec, variant: str, command: str) -> dict[str, An
 
 
 def truth_attributes(spec: SplitSpec) -> dict[str, Any]:
-    """Return camera and shading, which all images of a split share."""
+    """Return the attributes of `truth`: camera and shading, which all images of a split share."""
     return {
         "world_from_camera": spec.camera.world_from_camera,
         "fov_y_degrees": spec.camera.fov_y_degrees,

@@ -1,36 +1,27 @@
-"""Questions -> images -> the files of a split."""
+"""Make the files of a split: draw, render and write questions, the three at the same time."""
 
 import errno
-import hashlib
 import os
 import shutil
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 
-from iqtt.files.layout import (
-    question_columns,
-    root_attributes,
-    truth_attributes,
-    truth_columns,
-)
-from iqtt.files.truth_rows import truth_rows
-from iqtt.questions.sampling import Pools, make_pools
-from iqtt.questions.settle import Tally
+from iqtt.files.layout import root_attributes
+from iqtt.files.writer import QuestionsWriter
+from iqtt.questions.distractors import make_pools
 from iqtt.questions.specs import SplitSpec
+from iqtt.questions.views import Tally
 from iqtt.render import DEFAULT_BATCH, Rendered, groups, render_questions
 from scenegen.common.new_file import check_writable
-from scenegen.common.row_file import Table, new_file
-from scenegen.rendering.backend import select_variant
+from scenegen.common.row_file import new_file
+from scenegen.rendering.backend import select_variant, versions
 
 FILES = ("iqtt-train.h5", "iqtt-val.h5", "iqtt-test.h5", "iqtt-test-answers.h5")
-FINGERPRINTED = ("cubes", "world_from_shape", "light_position", "light_color")
 MOST_WAITING = 2  # batches that may wait to be written
 
 
@@ -47,36 +38,51 @@ def make_split(
 ) -> Tally:
     """Write the files of a split to a folder, where they appear when all of them are complete.
 
-    Seed and command would tell the test answers, so they are kept with those only.
+    Seed and command would tell the test answers, so only the file of the test answers has them.
+
+    Args:
+        batch: questions in one wavefront; bounds the memory, never changes a byte of the files.
+        device, compression: as in `backend.DEVICES` and `row_file.COMPRESSIONS`.
+        command: what to record as the command that made the files.
+        progress: is called with the number of questions that were written since the last call.
 
     Returns how many views were proposed and refused.
 
     Raises:
-        SpecError, TooFewShapesError: the request; before anything is rendered.
-        PlacementError: the bounded search found no question that meets it.
+        SpecError, TooFewShapesError: a setting, before anything is rendered.
+        PlacementError: the bounded search found no question that meets the spec.
         OSError: the folder, or the disk.
     """
     folder = Path(folder)
     _check_folder(folder, overwrite)
-    variant = select_variant(device)
-    run = _Run(spec, make_pools(spec), batch, device, compression, progress)
-    public = root_attributes(spec.public(), variant, "")
-    private = root_attributes(spec, variant, command)
+    renderer = {"variant": select_variant(device), **versions()}
+    pools, tally = make_pools(spec), Tally()
+    public = root_attributes(spec.public(), renderer, "")
+    private = root_attributes(spec, renderer, command)
+
+    def write(split: str, images_file: h5py.File, truth_file: h5py.File) -> None:
+        for part, (first, count) in groups(spec, split).items():
+            writer = QuestionsWriter(images_file, truth_file, spec, split, part, count, compression)
+            rendered = render_questions(
+                spec, pools, split, first, count, batch=batch, device=device, tally=tally
+            )
+            _append_all(writer, rendered, progress)
+            writer.close()
+
     temporary = (folder if folder.is_dir() else folder.parent) / f".iqtt-{os.getpid()}.partial"
     temporary.mkdir()
     try:
         for split in ("train", "val"):
             with new_file(temporary / f"iqtt-{split}.h5") as file:
                 file.attrs.update({**public, "split": split})
-                for group in groups(spec, split):
-                    _write_table(run, split, group, file, file)
+                write(split, file, file)
         with (
             new_file(temporary / "iqtt-test.h5") as test,
             new_file(temporary / "iqtt-test-answers.h5") as answers,
         ):
             test.attrs.update({**public, "split": "test"})
             answers.attrs.update({**private, "split": "test"})
-            _write_table(run, "test", "", test, answers)
+            write("test", test, answers)
         _check_folder(folder, overwrite, temporary.name)
         if folder.is_dir():
             for name in FILES:
@@ -90,73 +96,28 @@ def make_split(
         raise OSError(error.errno, error.strerror, str(folder / told.name)) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-    return run.tally
+    return tally
 
 
-@dataclass(frozen=True, eq=False)
-class _Run:
-    """What all tables of a split share."""
-
-    spec: SplitSpec
-    pools: Pools
-    batch: int
-    device: str
-    compression: str
-    progress: Callable[[int], Any]
-    tally: Tally = field(default_factory=Tally)
-
-
-def _write_table(
-    run: _Run, split: str, group: str, images_file: h5py.File, truth_file: h5py.File
+def _append_all(
+    writer: QuestionsWriter, batches: Iterable[list[Rendered]], progress: Callable[[int], Any]
 ) -> None:
-    """Write the questions of an HDF5 group to one file, what is known of them to another."""
-    spec = run.spec
-    first, count = groups(spec, split)[group]
-    known = truth_file.require_group(f"truth/{group}")
-    known.attrs.update(truth_attributes(spec))
-    into = images_file.require_group(group or "/")
-    images = Table(into, question_columns(spec), count, run.compression)
-    truth = Table(known, truth_columns(spec), count, run.compression)
-    digest = hashlib.sha256(f"{spec.public().to_json()} {split} {group}".encode())
-    answers = np.zeros(count, np.uint8)
-
-    def write(rendered: Sequence[Rendered]) -> int:
-        for one, row in zip(rendered, truth_rows(spec, rendered), strict=True):
-            answers[images.rows] = one.question.shapes.answer
-            for name in FINGERPRINTED:
-                digest.update(np.ascontiguousarray(row[name]).tobytes())
-            digest.update(bytes([one.question.shapes.answer]))
-            images.append({"questions": one.images})
-            truth.append(row)
-        return len(rendered)
-
+    """Write batches in a thread of its own, while the next ones are rendered."""
     with ThreadPoolExecutor(1) as pool:
         writing: deque[Future[int]] = deque()
-        for rendered in render_questions(
-            spec,
-            run.pools,
-            split,
-            first,
-            count,
-            batch=run.batch,
-            device=run.device,
-            tally=run.tally,
-        ):
-            writing.append(pool.submit(write, rendered))
+        for rendered in batches:
+            writing.append(pool.submit(writer.append, rendered))
             if len(writing) > MOST_WAITING:
-                run.progress(writing.popleft().result())
+                progress(writing.popleft().result())
         while writing:
-            run.progress(writing.popleft().result())
-    if group != "unlabeled":
-        dataset = truth_file.require_group(group or "/").create_dataset("answers", data=answers)
-        dataset.attrs["meaning"] = "which of images 1 to 3 shows the reference's shape, from 0"
-    name = f"fingerprint_{group}" if group else "fingerprint"
-    for file in (images_file, truth_file):
-        file.attrs[name] = digest.hexdigest()
+            progress(writing.popleft().result())
 
 
 def _check_folder(folder: Path, overwrite: bool, own: str = "") -> None:
-    """Raise the OSError that would end in a lost run; `own` is a name in the folder to ignore."""
+    """Raise an OSError where the folder cannot be written to: better before rendering than after.
+
+    `own` is the name of a file of this run, which may lie in the folder.
+    """
     if not folder.is_dir():
         if folder.is_symlink() and not folder.exists():
             raise FileNotFoundError(errno.ENOENT, "is a link to nothing", str(folder))

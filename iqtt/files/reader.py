@@ -1,4 +1,4 @@
-"""Read question files, ours and the released 3D-IQTT v2: typed records, and a map-style dataset."""
+"""Read question files, ours and the released 3D-IQTT v2: records by row, map-style dataset."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -9,15 +9,14 @@ from typing import Any
 from numpy.typing import NDArray
 
 from iqtt.files.layout import question_columns
-from iqtt.files.tables import TableFile, read_root, table_parts
-from iqtt.files.truth import QuestionTruth
+from iqtt.files.tables import QuestionTruth, TableFile, read_root, table_parts
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.row_file import checking, open_file
 from scenegen.description.specs import IMAGE_DTYPES
 from scenegen.rendering.ground_truth import decode_image
 
 Array = NDArray[Any]
-TOLERANCE = 0.01  # by which images of released files may leave 0..1
+TOLERANCE = 0.01  # how far the images of released files may leave 0..1
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,10 +24,11 @@ class QuestionRecord:
     """One question.
 
     Attributes:
-        index: its row.
+        index: row of the question.
         images: the reference, then three answers, (4, H, W, 3), as stored.
-        answer: which of the three shows the reference's shape, 0 to 2; None where it is not told.
-        truth: shapes, views and lights; None where they are not told.
+        answer: which of the three shows the reference's shape, 0 to 2; None if the file does not
+            tell.
+        truth: shapes, views and lights; None if the file does not tell them.
     """
 
     index: int
@@ -65,14 +65,14 @@ def parts(path: str | Path) -> tuple[str, ...]:
 
 
 def answers_beside(path: str | Path) -> Path | None:
-    """Return where the answers of a test file lie: iqtt-test-answers.h5 beside iqtt-test.h5."""
+    """Return the file of answers beside a test file, such as iqtt-test-answers.h5, if any."""
     path = Path(path)
     beside = path.with_name(f"{path.stem}-answers{path.suffix}")
     return beside if beside.is_file() else None
 
 
 class AnswersFile(TableFile):
-    """An open file that holds answers, and what is known of the questions, images or not."""
+    """An open file with answers and what is known of the questions; it may lack the images."""
 
     CONTENT = "answers"
 
@@ -84,7 +84,7 @@ class QuestionsFile(TableFile):
     """An open question file: a sequence of `QuestionRecord`s.
 
     Attributes:
-        height, width: of an image, pixels.
+        height, width: size of an image, pixels.
         image_dtype: "uint8", "float16" or "float32".
     """
 
@@ -96,16 +96,16 @@ class QuestionsFile(TableFile):
         """Open a question file and check the layout of one of its tables.
 
         Args:
-            path: ours, or a released one; both may be read without the other's groups.
+            path: a file of ours, or a released one.
             part: "labeled" or "unlabeled" of a training file.
-            answers: a file such as iqtt-test-answers.h5, for a file that holds no answers.
+            answers: a file such as iqtt-test-answers.h5, for a file without answers.
 
         Raises:
             OSError: no such file, or a folder.
             FileFormatError: not HDF5, not a question file, of a newer format, or damaged; or the
                 answers belong to another file.
-            SpecError: `part` is not given where there are two, or names none of them; `answers`
-                are given where the file has its own.
+            SpecError: `part` is not given where there are two, or names none of them; or `answers`
+                is given for a file that has its own.
         """
         super().__init__(path, part)
         self._beside: AnswersFile | None = None
@@ -130,7 +130,7 @@ class QuestionsFile(TableFile):
         return (self[i] for i in range(len(self)))
 
     def close(self) -> None:
-        """Close the file, and that of its answers; idempotent."""
+        """Close the file, and the file of its answers; idempotent."""
         super().close()
         if self._beside is not None:
             self._beside.close()
@@ -147,11 +147,9 @@ class QuestionsFile(TableFile):
             expected, kinds = f"(Q, {', '.join(map(str, column.shape))})", (column.dtype,)
             good = shape[1:] == column.shape
         if not good:
-            raise FileFormatError(f"{self.path}: questions: shape {shape}, expected {expected}")
+            raise FileFormatError(f"{self.path}: questions", f"shape {shape}", expected)
         if kind not in kinds:
-            raise FileFormatError(
-                f"{self.path}: questions: type {kind}, expected {' or '.join(kinds)}"
-            )
+            raise FileFormatError(f"{self.path}: questions", f"type {kind}", " or ".join(kinds))
         self.height, self.width = shape[2:4]
         self.image_dtype = kind
         if self.spec is None and kind != "uint8" and shape[0]:
@@ -161,7 +159,7 @@ class QuestionsFile(TableFile):
         return shape[0]
 
     def _check_range(self) -> None:
-        """Refuse files that count from 0 to 255 in floating point; one row tells."""
+        """Refuse floating-point images with values from 0 to 255; the first row is looked at."""
         first = self.read("questions", 0)
         low, high = first.min(), first.max()
         if not (low >= -TOLERANCE and high <= 1 + TOLERANCE):  # so NaN is refused too
@@ -170,15 +168,13 @@ class QuestionsFile(TableFile):
             )
 
     def _join(self, answers: str | Path) -> None:
-        """Take in answers and truth of another file, if they are those of this one."""
+        """Add answers and truth of another file, if they belong to the questions of this one."""
         if self.has_answers:
-            raise SpecError(f"answers: found {answers}, expected none: {self.path} has its own")
+            raise SpecError("answers", answers, f"none, as {self.path} has its own")
         self._beside = beside = AnswersFile(answers, self.part)
         if (len(beside), beside.fingerprint) != (len(self), self.fingerprint):
-            raise FileFormatError(
-                f"{answers}: answers of another file: found {_identity(beside)},"
-                f" expected {_identity(self)}, as in {self.path}"
-            )
+            expected = f"{_identity(self)}, as in {self.path}"
+            raise FileFormatError(f"{answers}: answers", _identity(beside), expected)
         self._datasets |= beside._datasets
         self._stored |= beside._stored
         self.kind_names = beside.kind_names
@@ -202,8 +198,8 @@ class QuestionsDataset:
 
         Args:
             path, part, answers: as for `QuestionsFile`.
-            fields: of an item: "questions", "answers", or a dataset of the truth such as "cubes";
-                by default the questions, and the answers where there are any.
+            fields: what an item has: "questions", "answers", or a dataset of the truth such as
+                "cubes"; by default the questions, and the answers if there are any.
 
         Raises as `QuestionsFile`, and SpecError for an unknown field.
         """

@@ -1,19 +1,22 @@
-"""Question tables in HDF5 files: opened, checked and read by row, whoever wrote them.
+"""One table of questions in an HDF5 file, ours or a released one: open it, check it, read rows.
 
 A training file holds two tables, its parts "labeled" and "unlabeled"; other files one, at the root.
+`reader` has what users open: files of questions, and files of answers.
 """
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, ClassVar, Self
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from iqtt.files.layout import FORMAT_NAME, FORMAT_VERSION, truth_columns
-from iqtt.files.truth import QuestionTruth, question_truth
 from iqtt.questions.specs import SPLITS, SplitSpec
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.records import check
 from scenegen.common.row_file import (
     and_more,
     check_version,
@@ -23,22 +26,53 @@ from scenegen.common.row_file import (
     reading,
 )
 
+Array = NDArray[Any]
 PARTS = ("labeled", "unlabeled")
 RELEASED = ("questions", "answers")
+
+
+@dataclass(frozen=True, eq=False)
+class QuestionTruth:
+    """What a file tells of the four images of a question: the reference, then three answers.
+
+    Attributes:
+        cubes: integer coordinates, (4, n, 3) int8.
+        shape_id: identifier of the shape of each image, 32 bytes; equal if a rotation takes one
+            shape to the other.
+        class_id: the same, but equal for mirror images too.
+        world_from_shape: rotation of each shape about the centre of its box, (4, 3, 3).
+        light_position: positions of each image's point lights, (L, 3) each, world, cube edges.
+        light_color: radiance of each image's point lights, RGB, (L, 3) each.
+        distractor_kind: kind of each answer, such as "near"; None for the right one.
+        angle_degrees: smallest rotation from the reference's view to the right answer's.
+        visible_pixels: number of pixels that show each cube, (4, n).
+        depth: planar depth, (4, H, W), cube edges, NaN on the background; None if not stored.
+    """
+
+    cubes: Array
+    shape_id: tuple[bytes, ...]
+    class_id: tuple[bytes, ...]
+    world_from_shape: Array
+    light_position: tuple[Array, ...]
+    light_color: tuple[Array, ...]
+    distractor_kind: tuple[str | None, ...]
+    angle_degrees: float
+    visible_pixels: Array
+    depth: Array | None
 
 
 class TableFile:
     """An open file and one of its tables. Use it as a context manager, or close it.
 
     Attributes:
-        path: where it lies.
+        path: path of the file.
         part: which of its tables: "labeled" or "unlabeled", or "" for the only one.
         attributes: all root attributes.
-        spec: the request that it answers, without the seed where readers shall not know it; None
+        spec: the settings it was made with, without the seed unless it is a file of answers; None
             for a released file.
         split: "train", "val" or "test"; None for a released file.
-        kind_names: what `distractor_kind` counts through, where it is told.
-        fingerprint: SHA-256 of request, shapes, views and answers of this part; None for a
+        kind_names: names of the kinds that `distractor_kind` counts; empty where it is not told.
+        fingerprint: SHA-256 of settings, shapes, views and answers of this table; None for a
             released file.
     """
 
@@ -67,31 +101,30 @@ class TableFile:
 
     @property
     def fields(self) -> tuple[str, ...]:
-        """What `read` gives."""
+        """The names that `read` takes."""
         return tuple(self._datasets)
 
     @property
     def has_answers(self) -> bool:
-        """Whether it is told which answers are right."""
+        """Whether the file tells which answers are right."""
         return "answers" in self._datasets
 
     @property
     def has_truth(self) -> bool:
-        """Whether shapes, views and lights are told."""
+        """Whether the file tells shapes, views and lights."""
         return "cubes" in self._datasets
 
     def __len__(self) -> int:
         return self._count
 
     def check_field(self, name: str) -> None:
-        """Raise SpecError unless `read` knows that name."""
-        if name not in self._datasets:
-            raise SpecError(f"field: found {name!r}, expected some of {', '.join(self.fields)}")
+        """Raise SpecError unless `read` takes this name."""
+        check(name in self._datasets, "field", repr(name), f"one of {', '.join(self.fields)}")
 
     def read(self, name: str, rows: int | slice) -> Any:
         """Read rows of one dataset, such as "questions", "answers" or "cubes", as stored.
 
-        Answers come as uint8, whatever the file has.
+        Answers come as uint8, whatever integers the file has.
 
         Raises:
             IndexError: a row beyond the file.
@@ -103,14 +136,17 @@ class TableFile:
             return self._datasets[name][rows]
 
     def truth(self, row: int) -> QuestionTruth | None:
-        """Return what is known of one question; None where nothing is. Raises as `read`."""
+        """Return what the file tells of one question beside images and answer; None if nothing.
+
+        Raises as `read`.
+        """
         if not self.has_truth:
             return None
         values = {name: self.read(name, row) for name in self.fields if name not in RELEASED}
         try:
-            return question_truth(values, self.kind_names)
+            return _question_truth(values, self.kind_names)
         except FileFormatError as error:
-            raise FileFormatError(f"{self.path}: row {row}: {error}") from error
+            raise error.inside(f"{self.path}: row {row}") from error
 
     def stored_bytes(self) -> dict[str, tuple[int, int]]:
         """Return for each dataset of this table its bytes on disk and in memory."""
@@ -123,12 +159,7 @@ class TableFile:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _chosen(self, part: str | None) -> str:
@@ -137,18 +168,18 @@ class TableFile:
             return parts[0]
         if part is None or part not in parts:
             named = " or ".join(parts) or "none, as there is one table only"
-            raise SpecError(f"{self.path}: part: found {part or 'none'}, expected {named}")
+            raise SpecError(f"{self.path}: part", part or "none", named)
         return part
 
     def _open_content(self) -> int:
-        """Check and take in the datasets beside the truth; return the number of questions."""
+        """Check and open questions and answers; return the number of questions."""
         raise NotImplementedError
 
     def _dataset(self, name: str) -> h5py.Dataset:
-        """Return a dataset of this part, its size noted."""
+        """Return a dataset of this part, and note its size."""
         dataset = self._file[f"{self.part}/{name}"]
         if not isinstance(dataset, h5py.Dataset):
-            raise FileFormatError(f"{self.path}: {name}: a group, expected a dataset")
+            raise FileFormatError(f"{self.path}: {name}", "a group", "a dataset")
         self._stored[name] = (dataset.id.get_storage_size(), dataset.nbytes)
         return dataset
 
@@ -159,8 +190,9 @@ class TableFile:
         count = found[0] if count is None and found else count
         if found not in ((count,), (count, 1)) or dataset.dtype.kind not in "iu":
             raise FileFormatError(
-                f"{self.path}: answers: shape {found}, type {dataset.dtype}, expected"
-                f" ({'Q' if count is None else count},) whole numbers"
+                f"{self.path}: answers",
+                f"shape {found}, type {dataset.dtype}",
+                f"shape ({'Q' if count is None else count},), whole numbers",
             )
         answers = dataset[()].reshape(-1)
         wrong = np.flatnonzero((answers < 0) | (answers > 2))
@@ -177,7 +209,7 @@ class TableFile:
         if self.spec is None or group is None:
             return
         columns = truth_columns(self.spec)
-        problems = [f"{name}: expected a group"]
+        problems = ["expected a group"]
         if isinstance(group, h5py.Group):
             problems = column_problems(group, columns, self._count)
         if problems:
@@ -193,11 +225,11 @@ class TableFile:
         name = f"fingerprint_{self.part}".rstrip("_")
         found = self.attributes.get(name)
         if not isinstance(found, str):
-            raise FileFormatError(f"{self.path}: attribute {name!r}: found {found!r:.40}")
+            raise FileFormatError(f"{self.path}: attribute {name!r}", f"{found!r:.40}", "a text")
         return found
 
     def place(self, name: str, rows: int | slice) -> str:
-        """Return the file, the data set and the rows, to begin an error with."""
+        """Return file, dataset and rows as text, for an error's `where`."""
         where = f"row {rows}"
         if isinstance(rows, slice):
             first, end, _ = rows.indices(len(self))
@@ -206,13 +238,13 @@ class TableFile:
 
 
 class NoImagesError(FileFormatError):
-    """The file holds the answers to questions that lie in another one."""
+    """The file holds answers but no images; these are in another file."""
 
 
 def table_parts(file: h5py.File, path: Path, content: str) -> tuple[str, ...]:
-    """Return the parts of a file that hold a dataset; ("",) for one at the root.
+    """Return the parts of a file that hold a dataset; ("",) if it is at the root.
 
-    Raises FileFormatError where there is none, and says what to open instead.
+    Raises FileFormatError where there is none; its hint says what to open instead.
     """
     parts = tuple(part for part in PARTS if f"{part}/{content}" in file)
     if parts or content in file:
@@ -220,37 +252,68 @@ def table_parts(file: h5py.File, path: Path, content: str) -> tuple[str, ...]:
     if content == "questions" and any(name in file for name in ("answers", "labeled/answers")):
         images = path.name.replace("-answers", "")
         what = images if images != path.name else "the file of questions"
-        raise NoImagesError(
-            f"{path}: holds answers but no images; open {what} instead, with this file for answers"
-        )
+        hint = f"open {what} instead, with this file for answers"
+        raise NoImagesError(path, "answers but no images", "questions", hint)
     if content == "answers" and "questions" in file:
-        raise FileFormatError(f"{path}: holds questions but no answers")
-    raise FileFormatError(
-        f"{path}: not a question file: found no dataset {content!r}, 'labeled/{content}' or"
-        f" 'unlabeled/{content}'"
-    )
+        raise FileFormatError(path, "questions but no answers", "answers")
+    expected = f"a dataset {content!r}, 'labeled/{content}' or 'unlabeled/{content}'"
+    raise FileFormatError(path, "no question file", expected)
 
 
 def read_root(path: Path, attributes: dict[str, Any]) -> tuple[SplitSpec | None, str | None]:
-    """Return spec and split of a file of ours; None of a file without format, as released."""
+    """Return spec and split of a file of ours; None for a file without `format`, as released."""
     found = attributes.get("format")
     if found is None:
         return None, None
     if not isinstance(found, str) or found != FORMAT_NAME:
-        raise FileFormatError(
-            f"{path}: not a question file: found format {found!r:.60}, expected {FORMAT_NAME!r},"
-            " or none, as in the released 3D-IQTT"
-        )
+        expected = f"{FORMAT_NAME!r}, or none, as in the released 3D-IQTT"
+        raise FileFormatError(f"{path}: attribute 'format'", f"{found!r:.60}", expected)
     check_version(path, attributes, FORMAT_VERSION)
     for name in ("spec", "writer"):
         if name not in attributes:
-            raise FileFormatError(f"{path}: root attribute {name!r} is missing")
+            raise FileFormatError(f"{path}: attribute {name!r}", "none", "a text")
     split = attributes.get("split")
     if not isinstance(split, str) or split not in SPLITS:
-        raise FileFormatError(
-            f"{path}: attribute 'split': found {split!r:.40}, expected one of {', '.join(SPLITS)}"
-        )
+        expected = f"one of {', '.join(SPLITS)}"
+        raise FileFormatError(f"{path}: attribute 'split'", f"{split!r:.40}", expected)
     try:
         return SplitSpec.from_json(str(attributes["spec"])), split
     except SpecError as error:
-        raise FileFormatError(f"{path}: attribute 'spec': {error}") from error
+        where = f"{path}: attribute 'spec': {error.where}"
+        raise FileFormatError(where, error.found, error.expected, error.hint) from error
+
+
+def _question_truth(values: Mapping[str, Any], kind_names: Sequence[str]) -> QuestionTruth:
+    """Return the record of one row of `layout.truth_columns`, without the padding.
+
+    Raises FileFormatError where a count or a kind is beyond its range.
+    """
+    cube_slots, light_slots = values["cubes"].shape[1], values["light_position"].shape[1]
+    _check_range("cube_count", values["cube_count"], 1, cube_slots)
+    _check_range("light_count", values["light_count"], 0, light_slots)
+    _check_range("distractor_kind", values["distractor_kind"], -1, len(kind_names) - 1)
+    cubes = int(values["cube_count"])
+
+    def per_image(name: str) -> tuple[Array, ...]:
+        pairs = zip(values[name], values["light_count"], strict=True)
+        return tuple(lights[:count] for lights, count in pairs)
+
+    return QuestionTruth(
+        cubes=values["cubes"][:, :cubes],
+        shape_id=tuple(row.tobytes() for row in values["shape_id"]),
+        class_id=tuple(row.tobytes() for row in values["class_id"]),
+        world_from_shape=values["world_from_shape"],
+        light_position=per_image("light_position"),
+        light_color=per_image("light_color"),
+        distractor_kind=tuple(
+            None if kind < 0 else kind_names[kind] for kind in values["distractor_kind"]
+        ),
+        angle_degrees=float(values["angle_degrees"]),
+        visible_pixels=values["visible_pixels"][:, :cubes],
+        depth=values.get("depth"),
+    )
+
+
+def _check_range(name: str, found: Array, low: int, high: int) -> None:
+    if found.min() < low or found.max() > high:
+        raise FileFormatError(name, found.tolist(), f"{low} to {high}")

@@ -1,18 +1,20 @@
-"""What a split is asked to be, frozen and checked; JSON both ways. Lengths are in cube edges."""
+"""The settings of a split: a frozen, checked dataclass, stored as JSON; lengths in cube edges."""
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
+from iqtt.shapes.chains_and_trees import Kind
 from iqtt.shapes.polycube import MAX_CUBES
-from iqtt.shapes.sampling import Kind
 from scenegen.camera import Camera, Vector3
-from scenegen.common.records import check, from_json, normalise, to_json
+from scenegen.common.records import check, check_range, from_json, normalise, to_json
 from scenegen.description.specs import IMAGE_DTYPES, MAX_LIGHTS, DatasetSpec
 
 SPLITS = ("train", "val", "test")
-DISTRACTORS = ("other", "near", "mirror", "mixed")
+DISTRACTOR_KINDS = ("other", "near", "mirror")
+DISTRACTORS = (*DISTRACTOR_KINDS, "mixed")
 KINDS = ("chain", "tree")
+MAX_QUESTIONS = 10**8  # of each of train, val and test
 PRESETS: dict[str, dict[str, int]] = {
     # training questions in all, labelled ones among them, validation, test
     "small": {"train": 1_000, "labeled": 100, "val": 200, "test": 200},
@@ -23,25 +25,28 @@ PRESETS: dict[str, dict[str, int]] = {
 
 @dataclass(frozen=True)
 class SplitSpec:
-    """The request that the files of a split answer.
+    """The settings of a split; with a seed they decide every bit of its files.
 
     Attributes:
-        seed: of every random choice; None where a file keeps it to itself (see `public`).
-        train, labeled, val, test: numbers of questions; the labelled are part of train.
-        cubes: fewest and most cubes of a shape; each number is as likely.
-        shapes: "chain" (self-avoiding chains) or "tree" (they may branch).
-        distractors: "other", "near", "mirror", or "mixed" (each question one of the three).
-        height, width: of an image, pixels.
-        image_dtype: "uint8", "float16" or "float32" (radiance 0..1).
-        min_angle_degrees: least rotation between the reference's view and any answer's.
-        min_cube_pixels: every cube shows at least so many pixels in every image.
-        max_radius: of a shape's bounding sphere, cube edges; the camera frames just that sphere.
-        lights: fewest and most point lights; the first one is within 60 degrees of the camera.
-        background, ambient, reflectance: RGB. With the light_level, the radiance that all lights
-            together give a white surface that faces them at the origin, the defaults keep every
-            surface darker than the background.
-        fov_degrees: across the shorter side of the image.
-        with_depth: whether planar depth is stored too.
+        seed: seed of every random choice, 0 to 2**63 - 1; None in files that must not tell it
+            (see `public`).
+        train, val, test: numbers of questions; at least one question in all.
+        labeled: how many of the training questions have answers.
+        cubes: fewest and most cubes of a shape; every number in between is equally likely.
+        shapes: "chain" for self-avoiding chains of cubes, "tree" for shapes that may branch.
+        distractors: kind of the wrong answers: "other", "near", "mirror", or "mixed", where every
+            question draws one of the three.
+        height, width: size of an image, pixels.
+        image_dtype: "uint8", "float16" or "float32"; radiance lies within 0..1.
+        min_angle_degrees: smallest rotation allowed between the reference's view and an answer's.
+        min_cube_pixels: number of pixels that every cube shows at least, in every image.
+        max_radius: largest bounding sphere of a shape, cube edges; the camera frames this sphere.
+        lights: fewest and most point lights; the first is within 60 degrees of the camera.
+        background, ambient, reflectance: RGB, 0..1.
+        light_level: radiance that all lights together give a white surface at the origin that
+            faces them. With the defaults every surface stays darker than the background.
+        fov_degrees: field of view across the shorter side of the image.
+        with_depth: whether the files hold planar depth too.
     """
 
     seed: int | None = 0
@@ -72,88 +77,55 @@ class SplitSpec:
             object.__setattr__(self, "seed", int(self.seed))
         check(self.seed is None or 0 <= self.seed < 2**63, "seed", self.seed, "0 to 2**63 - 1")
         for name in ("train", "val", "test"):
-            count = getattr(self, name)
-            check(0 <= count <= 10**8, name, count, "from 0 to 100,000,000 questions")
-        check(
-            0 <= self.labeled <= self.train,
-            "labeled",
-            self.labeled,
-            f"from 0 to the {self.train} training questions",
-        )
-        low, high = self.cubes
-        check(
-            3 <= low <= high <= MAX_CUBES,
-            "cubes",
-            f"{low}-{high}",
-            f"a number or a rising range within 3-{MAX_CUBES}",
-        )
-        check(self.shapes in KINDS, "shapes", self.shapes, f"one of {', '.join(KINDS)}")
-        check(
-            self.distractors in DISTRACTORS,
-            "distractors",
-            self.distractors,
-            f"one of {', '.join(DISTRACTORS)}",
-        )
+            _check_within(name, getattr(self, name), 0, MAX_QUESTIONS, " questions")
+        count = self.train + self.val + self.test
+        check(count > 0, "train, val and test", count, "at least 1 question in all")
+        _check_within("labeled", self.labeled, 0, self.train, " training questions")
+        check_range("cubes", self.cubes, 3, MAX_CUBES)
+        check_range("lights", self.lights, 1, MAX_LIGHTS)
+        for name, value, known in (
+            ("shapes", self.shapes, KINDS),
+            ("distractors", self.distractors, DISTRACTORS),
+            ("image dtype", self.image_dtype, IMAGE_DTYPES),
+        ):
+            check(value in known, name, repr(value), f"one of {', '.join(known)}")
         sides = f"{self.height}x{self.width}"
-        check(
-            min(self.height, self.width) >= 16 and max(self.height, self.width) <= 4096,
-            "size",
-            sides,
-            "from 16 to 4096 pixels a side",
-        )
-        check(
-            self.image_dtype in IMAGE_DTYPES,
-            "image dtype",
-            self.image_dtype,
-            f"one of {', '.join(IMAGE_DTYPES)}",
-        )
-        check(
-            0 <= self.min_angle_degrees <= 90,
-            "min angle",
-            self.min_angle_degrees,
-            "from 0 to 90 degrees",
-        )
-        check(1.5 <= self.max_radius <= 10, "max radius", self.max_radius, "from 1.5 to 10 edges")
-        check(5 <= self.fov_degrees <= 90, "fov", self.fov_degrees, "from 5 to 90 degrees")
+        small, large = min(self.height, self.width), max(self.height, self.width)
+        check(small >= 16 and large <= 4096, "size", sides, "from 16 to 4096 pixels a side")
+        _check_within("min angle", self.min_angle_degrees, 0, 90, " degrees")
+        _check_within("max radius", self.max_radius, 1.5, 10, " cube edges")
+        _check_within("fov", self.fov_degrees, 5, 90, " degrees")
+        _check_within("light level", self.light_level, 0, 100)
         most = max(1, int(0.2 * self.pixels_per_edge**2))
-        check(
-            0 <= self.min_cube_pixels <= most,
-            "min cube pixels",
-            self.min_cube_pixels,
-            f"from 0 to {most}, a fifth of a cube's face at {sides}",
-        )
-        check(
-            1 <= self.lights[0] <= self.lights[1] <= MAX_LIGHTS,
-            "lights",
-            f"{self.lights[0]}-{self.lights[1]}",
-            f"a number or a rising range within 1-{MAX_LIGHTS}",
-        )
-        check(0 <= self.light_level <= 100, "light level", self.light_level, "from 0 to 100")
+        face = f" pixels, a fifth of a cube's face at {sides}"
+        _check_within("min cube pixels", self.min_cube_pixels, 0, most, face)
         for name in ("background", "ambient", "reflectance"):
             color = getattr(self, name)
             check(all(0 <= c <= 1 for c in color), name, color, "channels from 0 to 1")
 
     @property
     def camera_distance(self) -> float:
-        """Where the bounding sphere just fits the image, with 2% to spare; cube edges."""
+        """Distance from camera to origin at which the bounding sphere fits the image with 2% to
+        spare; cube edges.
+        """
         return 1.02 * self.max_radius / math.sin(math.radians(self.fov_degrees) / 2)
 
     @property
     def light_distance(self) -> float:
-        """Of the lights from the origin: far enough that near parts of a shape are hardly brighter;
-        cube edges.
+        """Distance from the lights to the origin, cube edges: so far that the near parts of a shape
+        are hardly brighter than the others.
         """
         return 2 * self.camera_distance
 
     @property
     def pixels_per_edge(self) -> float:
-        """Pixels along an edge, face on, at the camera's distance from the origin."""
+        """Length in pixels of a cube edge at the origin that is parallel to the image."""
         half = math.tan(math.radians(self.fov_degrees) / 2) * self.camera_distance
         return min(self.height, self.width) / 2 / half
 
     @property
     def camera(self) -> Camera:
-        """The one camera of all images: on +z, looking at the origin."""
+        """The camera of all images; it lies on +z and looks at the origin."""
         if self.height <= self.width:
             fov_y = self.fov_degrees
         else:
@@ -163,11 +135,11 @@ class SplitSpec:
 
     @property
     def kind(self) -> Kind:
-        """`shapes`, as the type that the generators take."""
-        return "chain" if self.shapes == "chain" else "tree"
+        """The setting `shapes`, with the type that `iqtt.shapes` expects."""
+        return cast(Kind, self.shapes)
 
     def render_spec(self, shrink: int = 1) -> DatasetSpec:
-        """Return the renderer's settings, the image `shrink` times smaller."""
+        """Return the renderer's settings for images that are `shrink` times smaller."""
         return DatasetSpec(
             height=max(8, self.height // shrink),
             width=max(8, self.width // shrink),
@@ -179,11 +151,11 @@ class SplitSpec:
         )
 
     def public(self) -> "SplitSpec":
-        """Return the spec without its seed, from which the test answers could be made again."""
+        """Return the spec without its seed: with it, the test answers could be made again."""
         return replace(self, seed=None)
 
     def to_json(self) -> str:
-        """Return the request as one line of JSON with sorted keys."""
+        """Return the settings as one line of JSON with sorted keys."""
         return to_json(self, sort_keys=True)
 
     @classmethod
@@ -193,12 +165,12 @@ class SplitSpec:
 
 
 def preset_spec(preset: str, **settings: Any) -> SplitSpec:
-    """Return a preset's numbers of questions with other settings on top.
+    """Return the spec of a preset, some settings replaced.
 
-    Two settings that are not given follow others: `labeled` keeps the preset's share of `train`,
+    Two settings that are not given follow from others: `labeled` is the preset's share of `train`,
     and `min_cube_pixels` the default's share of a cube's face.
 
-    Raises SpecError.
+    Raises SpecError for an unknown preset or a setting out of range.
     """
     check(preset in PRESETS, "preset", preset, f"one of {', '.join(PRESETS)}")
     numbers = dict(PRESETS[preset])
@@ -211,3 +183,7 @@ def preset_spec(preset: str, **settings: Any) -> SplitSpec:
         edge = side / 128 * SplitSpec.max_radius / radius
         chosen["min_cube_pixels"] = max(1, round(SplitSpec.min_cube_pixels * edge**2))
     return SplitSpec(**chosen)
+
+
+def _check_within(name: str, value: float, low: float, high: float, unit: str = "") -> None:
+    check(low <= value <= high, name, value, f"from {low:,} to {high:,}{unit}")

@@ -1,4 +1,4 @@
-"""Images of polycubes: from cubes, rotations and lights to batches for the renderer."""
+"""The views of a question: rotations under which every cube shows, and the lights of each image."""
 
 import math
 from collections.abc import Sequence
@@ -8,124 +8,257 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.questions.sampling import Shapes
+from iqtt.questions.distractors import Pools, Shapes, arrange, draw_shapes, question_key
+from iqtt.questions.packing import Question, cube_centres, pack_views
 from iqtt.questions.specs import SplitSpec
-from iqtt.shapes.polycube import box_centre
-from scenegen.description.specs import DatasetSpec
-from scenegen.objects.basic_shapes import unit_shape
-from scenegen.rendering.packing import SceneBatch
+from iqtt.shapes.polycube import ROTATIONS, symmetries
+from scenegen.common.errors import PlacementError
+from scenegen.common.rotations import rotation_matrix
+from scenegen.common.seeding import Purpose, item_rng
+from scenegen.rendering.ground_truth import visible_pixels
+from scenegen.rendering.renderer import launch_fields
 
 Array = NDArray[Any]
-CUBE_SCALE = math.sqrt(3) / 2  # the unit box has bounding radius 1, so edge 2 / sqrt(3)
+SHRINK = 2  # how many times smaller the images are by which visibility is first judged
+MARGIN = 1.5  # in them a cube needs so many times the pixels, so that full images seldom fall short
+VIEWS = 60  # rotations proposed for one image before the question gets other shapes
+PROPOSED = 2  # least number of views of one image that are judged at once
+PROPOSALS_AT_ONCE = 256  # views of all images that are judged at once, roughly
+QUESTION_ATTEMPTS = 50  # choices of shapes for one question
+CROWDED = 10  # from so many cubes on, a shape may well have no view that shows them all
+FIRST_LIGHT_COSINE = 0.5  # cosine of the widest angle between the first light and the camera
 
 
-@dataclass(frozen=True, eq=False)
-class Question:
-    """A question ready to render: its shapes, how each image turns and lights them.
+@dataclass
+class Tally:
+    """Counts the views that were proposed, and those that were refused because they hide a cube."""
 
-    Attributes:
-        index: of the question in its split.
-        attempt: how many choices of shapes were given up before.
-        shapes: the reference's and the answers'.
-        world_from_shape: rotations about the shapes' box centres, which lie at the world's origin,
-            (4, 3, 3).
-        light_position, light_color: (4, L, 3), world, cube edges; zero in unused slots.
-        light_count: lights of each image, (4,).
-        angle_degrees: smallest rotation from the reference's view to the right answer's.
-    """
-
-    index: int
-    attempt: int
-    shapes: Shapes
-    world_from_shape: Array
-    light_position: Array
-    light_color: Array
-    light_count: Array
-    angle_degrees: float
+    proposed: int = 0
+    refused: int = 0
 
 
-def cube_centres(shapes: Sequence[Array], slots: int) -> Array:
-    """Return where each shape's cubes lie about its box centre, (S, slots, 3), cube edges.
+def sample_questions(
+    spec: SplitSpec,
+    pools: Pools,
+    split: str,
+    requests: Sequence[tuple[int, int, int]],
+    tally: Tally,
+    device: str = "auto",
+) -> list[Question]:
+    """Draw shapes, views and lights of questions until every cube shows in every image.
 
     Args:
-        shapes: (n, 3) integers each; rows of the result beyond a shape's n are zero.
-        slots: the most cubes a shape may have.
+        requests: (index, position of the right answer, attempt to begin with) of each question,
+            which depends on these alone, not on the other requests.
+        tally: counts the views that are proposed and refused.
+
+    Raises PlacementError where the bounded search finds no question.
     """
-    counts = np.array([len(cubes) for cubes in shapes])
-    centres = np.zeros((len(shapes), slots, 3))
-    for count in np.unique(counts).tolist():
-        rows = np.flatnonzero(counts == count)
-        cubes = np.stack([shapes[i] for i in rows.tolist()])
-        # A cube's own centre is half an edge from its corner.
-        centres[rows, :count] = cubes + 0.5 - box_centre(cubes)[:, None]
-    return centres
+    done: dict[int, Question] = {}
+    waiting = list(requests)
+    while waiting:
+        for index, _, attempt in waiting:
+            if attempt >= QUESTION_ATTEMPTS:
+                raise PlacementError(
+                    f"{split} question {index}",
+                    f"no views of {QUESTION_ATTEMPTS} choices of shapes",
+                    f"{spec.min_cube_pixels} pixels of every cube in every image",
+                    "try a smaller --min-cube-pixels, or fewer --cubes",
+                )
+        drawn = draw_shapes(spec, pools, split, [(i, attempt) for i, _, attempt in waiting])
+        shapes = []
+        for (index, place, attempt), one in zip(waiting, drawn, strict=True):
+            rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.ANSWERS, attempt)
+            shapes.append(arrange(one, place, rng))
+        symmetric = shape_symmetries(shapes)
+        turns = find_views(spec, split, waiting, shapes, symmetric, tally, device)
+        again = []
+        for i, (index, place, attempt) in enumerate(waiting):
+            if np.isfinite(turns[i]).all():
+                done[index] = _lit(spec, split, index, attempt, shapes[i], turns[i], symmetric[i])
+            else:
+                again.append((index, place, attempt + 1))
+        waiting = again
+    return [done[index] for index, _, _ in requests]
 
 
-def pack_views(
+def shape_symmetries(shapes: Sequence[Shapes]) -> Array:
+    """Return which of ROTATIONS leave each shape of each question as it is, (Q, 4, 24)."""
+    found = np.zeros((len(shapes), 4, len(ROTATIONS)), bool)
+    sizes = np.array([one.cubes.shape[1] for one in shapes])
+    for size in np.unique(sizes).tolist():
+        rows = np.flatnonzero(sizes == size)
+        cubes = np.concatenate([shapes[i].cubes for i in rows.tolist()])
+        found[rows] = symmetries(cubes).reshape(len(rows), 4, -1)
+    return found
+
+
+def find_views(
     spec: SplitSpec,
-    render_spec: DatasetSpec,
+    split: str,
+    requests: Sequence[tuple[int, int, int]],
+    shapes: Sequence[Shapes],
+    symmetric: Array,
+    tally: Tally,
+    device: str,
+) -> Array:
+    """Return rotations under which every cube shows, (Q, 4, 3, 3); NaN where none was found.
+
+    Rotations of answers that are too near to the reference's view are not proposed. The right shape
+    is seen twice and a wrong one once, and a crowded shape often hides a cube; for that alone, the
+    less crowded answers would be right more often. So from CROWDED cubes on, the shape of each
+    answer needs a view as the reference too, and the answers keep away from all three such views.
+    The view of the right answer's shape is the one that is used.
+    """
+    questions, slots = len(shapes), spec.cubes[1]
+    turns = np.empty((questions, 6, VIEWS, 3, 3))  # the three answers as references, as answers
+    for i, (index, _, attempt) in enumerate(requests):
+        rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.VIEW, attempt)
+        turns[i] = draw_rotations(rng, (6, VIEWS))
+    centres = cube_centres([cubes for one in shapes for cubes in one.cubes[1:]], slots)
+    centres = np.tile(centres.reshape(questions, 3, slots, 3), (1, 2, 1, 1))
+    counts = np.array([one.cubes.shape[1] for one in shapes])
+    right = np.array([one.answer for one in shapes])
+    found = np.full((questions, 6, 3, 3), np.nan)
+
+    def choose(some: slice, allowed: Array) -> None:
+        """Find rotations of some images of all questions; allowed: (Q, 3, VIEWS)."""
+        chosen = _first_good(
+            spec,
+            turns[:, some].reshape(-1, VIEWS, 3, 3),
+            allowed.reshape(-1, VIEWS),
+            centres[:, some].reshape(-1, slots, 3),
+            np.repeat(counts, 3),
+            tally,
+            device,
+        ).reshape(-1, 3)
+        question, image = np.nonzero(chosen >= 0)
+        best = turns[question, some.start + image, chosen[question, image]]
+        found[question, some.start + image] = best
+
+    needed = (np.arange(3) == right[:, None]) | (counts >= CROWDED)[:, None]
+    choose(slice(0, 3), np.repeat(needed[..., None], VIEWS, axis=2))
+    seen = np.isfinite(found[:, :3]).all(axis=(2, 3))
+    allowed = np.repeat((seen | ~needed).all(axis=1)[:, None], 3, axis=1)[..., None]
+    for reference in range(3):
+        far = far_enough(spec, found[:, reference], turns[:, 3:], symmetric[:, 1:])
+        allowed = allowed & (far | ~seen[:, reference, None, None])
+    choose(slice(3, 6), allowed)
+    return np.concatenate([found[np.arange(questions), right][:, None], found[:, 3:]], axis=1)
+
+
+def far_enough(spec: SplitSpec, reference: Array, turns: Array, symmetric: Array) -> Array:
+    """Return whether each rotation is far enough from the reference's, (Q, 3, VIEWS) bool.
+
+    Args:
+        reference: rotations of the references, (Q, 3, 3).
+        turns: rotations of the answers, (Q, 3, VIEWS, 3, 3).
+        symmetric: symmetries of the answers, (Q, 3, 24), as in `rotation_angle_degrees`.
+    """
+    relative = np.swapaxes(reference, 1, 2)[:, None, None] @ turns
+    nearest = np.full(turns.shape[:3], -np.inf)
+    for rotation, has in zip(ROTATIONS, np.moveaxis(symmetric, 2, 0), strict=True):
+        trace = (relative[has] * rotation).sum(axis=(-2, -1))
+        nearest[has] = np.maximum(nearest[has], trace)
+    return np.asarray((nearest - 1) / 2 <= math.cos(math.radians(spec.min_angle_degrees)))
+
+
+def _first_good(
+    spec: SplitSpec,
+    turns: Array,
+    allowed: Array,
     centres: Array,
     counts: Array,
-    world_from_shape: Array,
-    lights: tuple[Array, Array, Array] | None = None,
-) -> SceneBatch:
-    """Return a batch with one image for each of V views; `render_spec` says how large.
+    tally: Tally,
+    device: str,
+) -> Array:
+    """Return for each of R images its first allowed rotation that shows every cube, or -1, (R,).
 
     Args:
-        centres: of the cubes, as `cube_centres` gives them, (V, slots, 3).
-        counts: cubes of each shape, (V,).
-        world_from_shape: (V, 3, 3).
-        lights: positions and colours, (V, L, 3), and numbers, (V,); None for darkness.
+        turns: proposed rotations, (R, VIEWS, 3, 3).
+        allowed: which of them may be chosen, (R, VIEWS).
+        centres: centres of the cubes, (R, slots, 3).
+        counts: numbers of cubes, (R,).
     """
-    batch, slots = len(centres), render_spec.object_slots
-    used = np.arange(slots) < counts[:, None]
-    world_from_object = np.zeros((batch, slots, 4, 4))
-    world_from_object[..., :3, :3] = CUBE_SCALE * world_from_shape[:, None]
-    world_from_object[..., :3, 3] = centres @ np.swapaxes(world_from_shape, 1, 2)
-    world_from_object[..., 3, 3] = 1.0
-    world_from_object[~used] = 0.0
-    reflectance = np.zeros((batch, 1 + slots, 3))
-    reflectance[:, 1:][used] = spec.reflectance
-    camera, dark = spec.camera, np.zeros((batch, render_spec.light_slots, 3))
-    position, color, light_count = lights or (dark, dark, np.zeros(batch))
-    return SceneBatch(
-        spec=render_spec,
-        names=render_spec.shapes,
-        shape_of=unit_shape,
-        index=np.zeros(batch, np.int64),
-        view=np.zeros(batch, np.int32),
-        world_from_camera=np.repeat(camera.world_from_camera[None], batch, axis=0),
-        fov_y_degrees=np.full(batch, camera.fov_y_degrees),
-        object_count=counts.astype(np.int32),
-        light_count=light_count.astype(np.int32),
-        shape=np.where(used, 0, -1).astype(np.int8),
-        world_from_object=world_from_object,
-        object_scale=np.where(used, CUBE_SCALE, 0.0),
-        reflectance=reflectance,
-        gloss=np.zeros((*reflectance.shape[:2], 2)),
-        light_position=position,
-        light_color=color,
-        ambient=np.tile(spec.ambient, (batch, 1)),
-        attenuation=np.tile((0.0, 1.0), (batch, 1)),
-        has_room=np.zeros(batch, bool),
-        background=np.tile(spec.background, (batch, 1)),
-        cubes_only=True,
-    )
+    small = spec.render_spec(SHRINK)
+    scale = (small.height * small.width) / (spec.height * spec.width)
+    enough = math.ceil(MARGIN * spec.min_cube_pixels * scale)
+    rank = np.cumsum(allowed, axis=1) - 1
+    chosen = np.full(len(turns), -1)
+    tried = 0
+    while (waiting := np.flatnonzero((chosen < 0) & (rank[:, -1] >= tried))).size:
+        # The first good one is taken, so how many are judged at once does not change the result.
+        upto = tried + max(PROPOSED, PROPOSALS_AT_ONCE // len(waiting))
+        ranks = rank[waiting]
+        row, proposal = np.nonzero(allowed[waiting] & (ranks >= tried) & (ranks < upto))
+        row = waiting[row]
+        batch = pack_views(spec, small, centres[row], counts[row], turns[row, proposal])
+        ids = launch_fields(batch, ("object_id",), device)()["object_id"]
+        shown = visible_pixels(ids, small.object_slots)
+        unused = np.arange(small.object_slots) >= counts[row][:, None]
+        good = ((shown >= enough) | unused).all(axis=1)
+        first_rows, first = np.unique(row[good], return_index=True)
+        chosen[first_rows] = proposal[good][first]
+        tried = upto
+    took = chosen >= 0
+    refused = np.where(took, rank[np.arange(len(rank)), chosen], rank[:, -1] + 1)
+    tally.refused += int(refused.sum())
+    tally.proposed += int(refused.sum() + took.sum())
+    return chosen
 
 
-def pack_questions(spec: SplitSpec, questions: Sequence[Question]) -> SceneBatch:
-    """Return a batch with the four images of each question, one question after another."""
-    render_spec = spec.render_spec()
-    shapes = [cubes for question in questions for cubes in question.shapes.cubes]
-    return pack_views(
-        spec,
-        render_spec,
-        cube_centres(shapes, render_spec.object_slots),
-        np.array([len(cubes) for cubes in shapes]),
-        np.concatenate([question.world_from_shape for question in questions]),
-        (
-            np.concatenate([question.light_position for question in questions]),
-            np.concatenate([question.light_color for question in questions]),
-            np.concatenate([question.light_count for question in questions]),
-        ),
-    )
+def _lit(
+    spec: SplitSpec,
+    split: str,
+    index: int,
+    attempt: int,
+    shapes: Shapes,
+    turns: Array,
+    symmetric: Array,
+) -> Question:
+    """Return the question with its lights, which have a random generator of their own."""
+    rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.LIGHTS, attempt)
+    angle = rotation_angle_degrees(turns[0], turns[1 + shapes.answer], symmetric[0])
+    return Question(index, attempt, shapes, turns, *draw_lights(spec, rng, 4), angle)
+
+
+def rotation_angle_degrees(a: Array, b: Array, symmetric: Array) -> float:
+    """Return the angle of the smallest rotation from view a to view b of a shape, degrees.
+
+    Args:
+        a, b: rotations world_from_shape, (3, 3).
+        symmetric: which of ROTATIONS leave the shape as it is, (24,) bool. Rotations by these
+            cannot be seen, so they do not count.
+    """
+    # These are the traces of b g^T a^T, for all symmetries g of the shape.
+    traces = ROTATIONS[symmetric].reshape(-1, 9) @ (a.T @ b).ravel()
+    return math.degrees(math.acos(min(1.0, max(-1.0, (float(traces.max()) - 1) / 2))))
+
+
+def draw_rotations(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
+    """Draw rotations that are uniform on SO(3), (*shape, 3, 3)."""
+    quaternion = rng.standard_normal((4, *shape))
+    return rotation_matrix(quaternion / np.sqrt((quaternion * quaternion).sum(axis=0)))
+
+
+def draw_lights(
+    spec: SplitSpec, rng: np.random.Generator, images: int
+) -> tuple[Array, Array, Array]:
+    """Draw light positions and colours, (images, L, 3) each, and their numbers, (images,).
+
+    They are uniform on a sphere around the shape; the first one is uniform on the part within 60
+    degrees of the camera, so that what the camera sees is lit. Unused slots are zero.
+    """
+    most, distance = spec.lights[1], spec.light_distance
+    count = rng.integers(spec.lights[0], most, images, endpoint=True)
+    # A uniform z and a uniform angle about the z axis are uniform on the sphere, and on its caps.
+    z = rng.uniform(-1.0, 1.0, (images, most))
+    z[:, 0] = FIRST_LIGHT_COSINE + (1 - FIRST_LIGHT_COSINE) * (z[:, 0] + 1) / 2
+    around = rng.uniform(0.0, 2 * math.pi, (images, most))
+    r = np.sqrt(1 - z * z)
+    direction = np.stack([r * np.cos(around), r * np.sin(around), z], axis=2)
+    color = rng.uniform(0.5, 1.0, (images, most, 3))
+    level = spec.light_level * distance**2 / count
+    color *= level[:, None, None] / color.max(axis=2, keepdims=True)
+    used = (np.arange(most) < count[:, None])[..., None]
+    return np.where(used, distance * direction, 0.0), np.where(used, color, 0.0), count

@@ -1,36 +1,39 @@
-"""Shapes that differ from another by one moved cube, and what such a move must not break.
+"""Shapes with one cube moved, and the tests that a moved shape must pass: connected, a chain.
 
-A move is one integer: which cube leaves, which of the others it joins, and on which face. So a
-caller draws moves from each question's own generator, and `move_cubes` makes the moves of many
-questions together without any of them depending on its neighbours.
+A move is one integer: which cube leaves, which of the others it joins, and on which face. So each
+question's own generator draws its moves, and `move_cubes` makes the moves of many questions at
+once without any of them depending on another.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.shapes.polycube import MAX_CUBES, Cubes, bounding_radius, canonical, set_ids
-from iqtt.shapes.sampling import STEPS, Kind, check_request
+from iqtt.shapes.chains_and_trees import STEPS, Kind, check_request
+from iqtt.shapes.polycube import MAX_CUBES, Cubes, bounding_radius
 
 _CHUNK = 8192  # shapes at a time: bounds the memory of comparing every cube with every other
 
 
 def is_connected(cubes: Cubes) -> NDArray[np.bool_]:
-    """Whether each shape hangs together by whole faces, (S,) bool.
+    """Return whether each shape is connected by whole faces, (S,) bool.
 
-    :param cubes: (S, n, 3); the cubes of a shape differ from each other.
+    Args:
+        cubes: (S, n, 3); the cubes of a shape differ from each other.
     """
     parts = [_reaches_all(_touching(part)) for part in _parts(cubes)]
     return np.concatenate([np.zeros(0, dtype=np.bool_), *parts])
 
 
 def is_chain(cubes: Cubes) -> NDArray[np.bool_]:
-    """Whether some order of each shape's cubes makes it a self-avoiding walk, (S,) bool.
+    """Return whether some order of each shape's cubes makes it a self-avoiding walk, (S,) bool.
 
-    Exact: follows all walks through the cubes at once (a Hamiltonian path, where one exists). The
-    rows may come in any order; a disconnected shape is no chain.
+    The answer is exact: all walks through the cubes are followed at once (a chain is a shape with
+    a Hamiltonian path). Rows may come in any order; a disconnected shape is no chain.
 
-    :param cubes: (S, n, 3); the cubes of a shape differ from each other.
-    :raises ValueError: there are more than ``MAX_CUBES`` cubes.
+    Args:
+        cubes: (S, n, 3); the cubes of a shape differ from each other.
+
+    Raises ValueError for more than MAX_CUBES cubes.
     """
     if cubes.shape[1] > MAX_CUBES:
         raise ValueError(f"a shape has 1 to {MAX_CUBES} cubes, not {cubes.shape[1]}")
@@ -38,25 +41,23 @@ def is_chain(cubes: Cubes) -> NDArray[np.bool_]:
     return np.concatenate([np.zeros(0, dtype=np.bool_), *parts])
 
 
-def move_count(cubes: int) -> int:
-    """The number of moves of a shape of this many cubes; many come to the same or are invalid."""
-    return 6 * cubes * (cubes - 1)
-
-
 def move_cubes(
     cubes: Cubes, moves: NDArray[np.integer], kind: Kind = "chain", max_radius: float = np.inf
 ) -> tuple[Cubes, NDArray[np.bool_]]:
-    """Take one cube of each shape to a face of another of its cubes.
+    """Move one cube of each shape to a face of another of its cubes.
 
-    A move is valid where the cube comes to a free cell other than its own, and the shape is then
-    a chain (``kind="chain"``, checked by `is_chain`) or connected (``"tree"``) and keeps within
-    the radius. The moved shape may still be congruent to the old one: compare ids.
+    A move is valid where the cube comes to a free cell other than its own, the shape is then a
+    chain (kind "chain") or connected (kind "tree"), and it keeps within the radius. The moved shape
+    may still be congruent to the old one: compare ids.
 
-    :param cubes: (S, n, 3), n >= 2.
-    :param moves: (S,) integers, each from 0 to below ``move_count(n)``.
-    :return: the moved shapes, (S, n, 3), in the frame of the old ones and with the moved cube
-        in its old row (so rows no longer are in walking order), and which are valid, (S,) bool.
-    :raises ValueError: a move is out of range, or as `is_chain` and `check_request`.
+    Args:
+        cubes: (S, n, 3), n >= 2.
+        moves: (S,) integers, each from 0 to 6 n (n - 1) - 1.
+
+    Returns the moved shapes, (S, n, 3), in the frame of the old ones, the moved cube in its old row
+    (so rows are no longer in walking order); and which are valid, (S,) bool.
+
+    Raises ValueError for a move out of range, and as `is_chain` and `check_request`.
     """
     size = cubes.shape[1]
     check_request(size, kind)
@@ -68,25 +69,9 @@ def move_cubes(
     moved = cubes.copy()
     moved[rows, leaving] = cell
     valid = free & (bounding_radius(moved) <= max_radius)
-    # The dearest test last, and only where it can still matter.
+    # The most expensive test comes last, and only where it can still matter.
     valid[valid] = is_chain(moved[valid]) if kind == "chain" else is_connected(moved[valid])
     return moved, valid
-
-
-def near_shapes(cubes: Cubes, kind: Kind = "chain", max_radius: float = np.inf) -> Cubes:
-    """Every shape that differs from this one by one moved cube, each once, none congruent to it.
-
-    Mirror images of this shape and of each other count as different.
-
-    :param cubes: (n, 3).
-    :return: (K, n, 3) as `move_cubes` gives them; K may be 0.
-    """
-    moves = np.arange(move_count(len(cubes)))
-    repeated = np.broadcast_to(cubes, (len(moves), *cubes.shape))
-    moved, valid = move_cubes(repeated, moves, kind, max_radius)
-    candidates = np.concatenate([cubes[None], moved[valid]])
-    _, first = np.unique(set_ids(canonical(candidates)), return_index=True)
-    return candidates[np.sort(first)[1:]]  # the first of all is the shape itself
 
 
 def _parts(cubes: Cubes) -> list[Cubes]:
@@ -94,7 +79,7 @@ def _parts(cubes: Cubes) -> list[Cubes]:
 
 
 def _touching(cubes: Cubes) -> NDArray[np.bool_]:
-    """Which cubes of each shape share a face, (S, n, n) bool."""
+    """Return which cubes of each shape share a face, (S, n, n) bool."""
     x, y, z = np.moveaxis(cubes.astype(np.int32), 2, 0)
     apart = abs(x[:, :, None] - x[:, None])
     apart += abs(y[:, :, None] - y[:, None])
@@ -103,7 +88,7 @@ def _touching(cubes: Cubes) -> NDArray[np.bool_]:
 
 
 def _reaches_all(touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Whether every cube can be reached from the first, (S,)."""
+    """Return whether every cube can be reached from the first, (S,)."""
     reached = np.zeros(touching.shape[:2], dtype=np.bool_)
     reached[:, 0] = True
     for _ in range(1, touching.shape[1]):
@@ -112,7 +97,7 @@ def _reaches_all(touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _walkable(touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Whether a path along touching cubes visits each of them once, (S,)."""
+    """Return whether a path along touching cubes visits each of them once, (S,)."""
     count, size = touching.shape[:2]
     bits = 1 << np.arange(size)
     neighbours = touching @ bits  # (S, n) sets of cubes as bits of an integer
@@ -125,7 +110,7 @@ def _walkable(touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
     for _ in range(1, size):
         ahead = neighbours[shape, here] & ~been
         row, there = np.nonzero(ahead[:, None] & bits)
-        # Walks that came to the same cube through the same cubes go on alike: keep one.
+        # Walks that came to the same cube through the same cubes continue alike: keep one.
         walk = ((shape[row] * size + there) << size) | been[row] | bits[there]
         shape_here, been = np.divmod(np.unique(walk), 1 << size)
         shape, here = np.divmod(shape_here, size)

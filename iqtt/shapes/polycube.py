@@ -1,13 +1,13 @@
 """Polycubes on the integer grid: the rotations of the cube, canonical form, chirality, size.
 
-A shape is an array of cubes, (n, 3) integers: cube ``c`` fills ``[c, c + 1]`` along each axis. The
+A shape is an array of cubes, (n, 3) integers: cube c fills [c, c + 1] along each axis. The
 functions here take many shapes of one number of cubes at once, (S, n, 3), and count in integers,
-so their answers are exact and the same on every machine.
+so their results are exact and the same on every machine.
 
 Shepard & Metzler, "Mental rotation of three-dimensional objects", Science 171 (1971), drew their
 objects as chains of such cubes and paired each with a rotated or a mirrored copy of itself. Two
-shapes are the same here when one of the 24 rotations and a translation take one to the other;
-they are of the same class when a mirror is allowed as well.
+shapes are the same here if one of the 24 rotations and a translation take one to the other; they
+are of the same class if a mirror is allowed as well.
 """
 
 import itertools
@@ -27,7 +27,10 @@ _NO_CUBE = 0xFFFF  # above every packed cube, so it also fills the end of an id
 
 
 def _signed_permutations(determinant: int) -> NDArray[np.int8]:
-    """The 24 matrices with one +-1 in each row and column and this determinant, identity first."""
+    """Return the 24 matrices of this determinant with one +-1 in each row and column.
+
+    The identity comes first.
+    """
     matrices = [
         np.array(signs)[:, None] * np.eye(3, dtype=int)[list(axes)]
         for axes in itertools.permutations(range(3))
@@ -40,15 +43,15 @@ def _signed_permutations(determinant: int) -> NDArray[np.int8]:
 
 
 ROTATIONS = _signed_permutations(1)
-"""The 24 rotations of the cube, (24, 3, 3) int8, identity first: ``rotated = cubes @ R.T``."""
+"""The 24 rotations of the cube, (24, 3, 3) int8, identity first: `rotated = cubes @ R.T`."""
 
 _REFLECTIONS = _signed_permutations(-1)
 
 
 def mirror(cubes: Cubes) -> Cubes:
-    """The mirror image of each shape, (..., n, 3), reflected along x within its own bounding box.
+    """Return the mirror image of each shape, (..., n, 3), reflected along x within its own box.
 
-    Twice gives the same array back. The row order of the cubes is kept.
+    Mirroring twice gives the same array back. The row order of the cubes is kept.
     """
     x = cubes[..., 0]
     low, high = x.min(axis=-1, keepdims=True), x.max(axis=-1, keepdims=True)
@@ -58,35 +61,39 @@ def mirror(cubes: Cubes) -> Cubes:
 
 
 def canonical(cubes: Cubes) -> NDArray[np.int8]:
-    """One form for all translated, rotated and re-ordered copies of each shape.
+    """Return one form for all translated, rotated and re-ordered copies of each shape.
 
     Of the orientations whose box is longest along x and shortest along z, it is the one whose
-    sorted list of cubes comes first. Mirror images of chiral shapes keep apart.
+    sorted list of cubes comes first. The mirror images of a chiral shape have different forms.
 
-    :param cubes: (S, n, 3); the cubes of a shape differ from each other.
-    :return: (S, n, 3) int8, cubes sorted, smallest coordinate 0 along each axis.
-    :raises ValueError: the array is not (S, n, 3) signed integers, has more than ``MAX_CUBES``
-        cubes, or a shape spans more than ``MAX_CUBES`` along an axis (it is then not connected).
+    Args:
+        cubes: (S, n, 3); the cubes of a shape differ from each other.
+
+    Returns (S, n, 3) int8, cubes sorted, smallest coordinate 0 along each axis.
+
+    Raises ValueError where the array is not (S, n, 3) signed integers, has more than MAX_CUBES
+    cubes, or a shape spans more than MAX_CUBES along an axis (it is then not connected).
     """
     return _unpacked(_least_keys(cubes, ROTATIONS))
 
 
 def canonical_class(cubes: Cubes) -> NDArray[np.int8]:
-    """One form for all copies of each shape, mirrored ones too; as `canonical` otherwise."""
+    """Return one form for all copies of each shape, mirrored ones too; as `canonical` otherwise."""
     group = np.concatenate([ROTATIONS, _REFLECTIONS])
     return _unpacked(_least_keys(cubes, group))
 
 
 def set_ids(cubes: Cubes) -> NDArray[np.void]:
-    """An id of each set of cubes that no other set has, whatever its place and row order.
+    """Return an id of each set of cubes, the same whatever its place and row order.
 
     The id is the sorted cubes themselves (no hash, so no collisions), two bytes a cube, high byte
-    first, filled up to ``MAX_CUBES``; so ids of shapes of unlike sizes may be mixed, sorted and
-    compared. Take it of canonical forms: ``set_ids(canonical(cubes))`` names the shapes and
-    ``set_ids(canonical_class(cubes))`` the classes.
+    first, filled up to MAX_CUBES; so ids of shapes with different numbers of cubes can be mixed,
+    sorted and compared. Use canonical forms: `set_ids(canonical(cubes))` names the shapes and
+    `set_ids(canonical_class(cubes))` the classes.
 
-    :return: (S,) void of 32 bytes; ``ids.view(np.uint8).reshape(-1, 32)`` shows the bytes.
-    :raises ValueError: as `canonical`.
+    Returns (S,) void of 32 bytes; `ids.view(np.uint8).reshape(-1, 32)` shows the bytes.
+
+    Raises ValueError as `canonical`.
     """
     low, extent = _boxed(cubes)
     keys = _oriented_keys(low, extent, ROTATIONS[0])
@@ -96,19 +103,18 @@ def set_ids(cubes: Cubes) -> NDArray[np.void]:
 
 
 def is_chiral(cubes: Cubes) -> NDArray[np.bool_]:
-    """Whether no rotation takes the shape's mirror image back to it, (S,) bool.
+    """Return whether no rotation takes a shape's mirror image back to it, (S,) bool.
 
-    :raises ValueError: as `canonical`.
+    Raises ValueError as `canonical`.
     """
     own, mirrored = _least_keys(cubes, ROTATIONS), _least_keys(cubes, _REFLECTIONS)
     return np.asarray((own != mirrored).any(axis=1))
 
 
 def symmetries(cubes: Cubes) -> NDArray[np.bool_]:
-    """Which of `ROTATIONS` take each shape, as it stands, to a translation of itself.
+    """Return which of `ROTATIONS` take each shape to a translation of itself, (S, 24) bool.
 
-    :return: (S, 24) bool; its sum along the last axis is the number of rotational symmetries.
-    :raises ValueError: as `canonical`.
+    Raises ValueError as `canonical`.
     """
     low, extent = _boxed(cubes)
     keys = [_oriented_keys(low, extent, rotation) for rotation in ROTATIONS]
@@ -116,18 +122,18 @@ def symmetries(cubes: Cubes) -> NDArray[np.bool_]:
 
 
 def box_centre(cubes: Cubes) -> NDArray[np.float64]:
-    """Centre of each shape's bounding box, (S, 3) float64, in cube edges."""
+    """Return the centre of each shape's bounding box, (S, 3) float64, in cube edges."""
     wide = cubes.astype(np.int64)
     return np.asarray((wide.min(axis=1) + wide.max(axis=1) + 1) / 2)
 
 
 def bounding_radius(cubes: Cubes) -> NDArray[np.float64]:
-    """Distance from `box_centre` to the farthest corner of any cube, (S,) float64, in cube edges.
+    """Return the distance from `box_centre` to the farthest corner, (S,) float64, in cube edges.
 
-    A shape turned any way about its box centre stays within a sphere of this radius, so one camera
-    distance set by a limit on it frames every shape of a split whole. Not the centroid: its sphere
-    is the larger one for four chains in five, so cubes would be drawn smaller; and the square of
-    this radius is a quarter of an integer, so comparing it with a limit never hangs on rounding.
+    A shape that turns about its box centre stays within a sphere of this radius, so a limit on it
+    sets the one camera distance that frames every shape of a split. The centroid would be a worse
+    centre: its sphere is larger for four chains in five, so cubes would be drawn smaller. And the
+    square of this radius is a quarter of an integer, so rounding never decides a comparison.
     """
     wide = cubes.astype(np.int64)
     low, high = wide.min(axis=1, keepdims=True), wide.max(axis=1, keepdims=True)
@@ -136,7 +142,7 @@ def bounding_radius(cubes: Cubes) -> NDArray[np.float64]:
 
 
 def _boxed(cubes: Cubes) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
-    """Each shape moved to the origin, (3, S, n), and its largest coordinates, (3, S)."""
+    """Return each shape moved to the origin, (3, S, n), and its largest coordinates, (3, S)."""
     if cubes.ndim != 3 or cubes.shape[2] != 3 or not np.issubdtype(cubes.dtype, np.signedinteger):
         found = f"{cubes.dtype} {cubes.shape}"
         raise ValueError(f"cubes must be signed integers of shape (S, n, 3), not {found}")
@@ -155,7 +161,7 @@ def _boxed(cubes: Cubes) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
 def _oriented_keys(
     low: NDArray[np.uint16], extent: NDArray[np.uint16], matrix: NDArray[np.int8]
 ) -> NDArray[np.uint16]:
-    """The cubes after a signed permutation, each packed into twelve bits, sorted: (S, n)."""
+    """Return the cubes after a signed permutation, each packed into 12 bits, sorted: (S, n)."""
     keys = np.zeros(low.shape[1:], dtype=np.uint16)
     for row in matrix:
         axis = int(np.flatnonzero(row)[0])
@@ -166,7 +172,7 @@ def _oriented_keys(
 
 
 def _least_keys(cubes: Cubes, matrices: NDArray[np.int8]) -> NDArray[np.uint16]:
-    """The first of the key lists of each shape under these matrices, (S, n)."""
+    """Return the first of the key lists of each shape under these matrices, (S, n)."""
     low, extent = _boxed(cubes)
     best = np.full(low.shape[1:], _NO_CUBE, dtype=np.uint16)
     for start in range(0, len(best), _CHUNK):
@@ -181,9 +187,9 @@ def _lower_to_least(
     extent: NDArray[np.uint16],
     matrices: NDArray[np.int8],
 ) -> None:
-    """Replace rows of ``best`` by smaller key lists found under the matrices, in place."""
+    """Replace rows of `best` in place by smaller key lists found under the matrices."""
     for matrix in matrices:
-        # Only orientations with a descending box compete: a sixth of the sorting for most shapes.
+        # Only orientations with a descending box compete: for most shapes a sixth of the sorting.
         x, y, z = extent[np.abs(matrix).argmax(axis=1)]
         rows = np.flatnonzero((x >= y) & (y >= z))
         keys = _oriented_keys(low[:, rows], extent[:, rows], matrix)
@@ -194,5 +200,5 @@ def _lower_to_least(
 
 
 def _unpacked(keys: NDArray[np.uint16]) -> NDArray[np.int8]:
-    """The cubes of packed keys, (S, n) to (S, n, 3)."""
+    """Return the cubes of packed keys, (S, n) to (S, n, 3)."""
     return np.stack([keys >> 8, (keys >> 4) & 15, keys & 15], axis=2).astype(np.int8)

@@ -96,18 +96,3 @@ def released(tmp_path: Path) -> Callable[..., Path]:
         return tmp_path / name
 
     return write
-
-
-@pytest.fixture(scope="session")
-def check_line() -> Callable[..., str]:
-    """Check that an error is one line that names the file first and has all words; return it."""
-
-    def check(error: pytest.ExceptionInfo[Exception], path: Path, *words: str) -> str:
-        line = str(error.value)
-        assert line.startswith(f"{path}: "), line
-        assert "\n" not in line
-        assert len(line) < 400
-        assert [word for word in words if word not in line] == [], line
-        return line
-
-    return check

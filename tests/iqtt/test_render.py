@@ -9,14 +9,15 @@ import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from iqtt import render as module
-from iqtt.questions import settle as settle_module
-from iqtt.questions.sampling import Pools, make_pools
-from iqtt.questions.settle import Tally
+from iqtt.questions import views
+from iqtt.questions.distractors import Pools, make_pools
+from iqtt.questions.packing import pack_questions
 from iqtt.questions.specs import SplitSpec
-from iqtt.questions.views import pack_questions
+from iqtt.questions.views import Tally
 from iqtt.render import Rendered, groups, render_question, render_questions
 from iqtt.shapes.polycube import box_centre
 from scenegen.camera import pixel_directions
+from scenegen.common.errors import PlacementError
 from scenegen.rendering.ground_truth import decode_image, encode_image
 from scenegen.rendering.renderer import launch_fields
 from scenegen.rendering.shading import shade
@@ -139,13 +140,13 @@ def test_a_question_alone_is_bit_for_bit_what_its_file_has(split, group):
 
 
 @pytest.mark.parametrize(
-    ("batch", "first", "settled"), [(1, 16, 512), (3, 7, 1), (64, 1, 1), (2, 1, 5), (4, 2, 4)]
+    ("batch", "first", "sampled"), [(1, 16, 512), (3, 7, 1), (64, 1, 1), (2, 1, 5), (4, 2, 4)]
 )
-def test_neither_batch_nor_how_many_are_settled_changes_a_bit(batch, first, settled, monkeypatch):
+def test_neither_batch_nor_how_many_are_sampled_changes_a_bit(batch, first, sampled, monkeypatch):
     tally, expected = Tally(), Tally()
     table = [bits(one) for one in rendered(SPEC, "train", "unlabeled", tally=expected)]
-    monkeypatch.setattr(module, "FIRST_SETTLED", first)
-    monkeypatch.setattr(module, "SETTLED", settled)
+    monkeypatch.setattr(module, "FIRST_SAMPLED", first)
+    monkeypatch.setattr(module, "SAMPLED", sampled)
     again = rendered(SPEC, "train", "unlabeled", batch=batch, tally=tally)
     assert [bits(one) for one in again] == table
     assert tally == expected
@@ -155,7 +156,7 @@ def test_neither_batch_nor_how_many_are_settled_changes_a_bit(batch, first, sett
 def test_a_cube_hidden_in_the_full_image_after_all_has_its_question_made_anew(monkeypatch):
     """Where the small image is hardly asked, that is often; then too each depends on itself."""
     spec = replace(SPEC, min_cube_pixels=4)
-    monkeypatch.setattr(settle_module, "MARGIN", 0.01)
+    monkeypatch.setattr(views, "MARGIN", 0.01)
     table = rendered(spec, "train", "unlabeled", batch=3)
     attempts = [one.question.attempt for one in table]
     assert {0, 1} <= set(attempts)
@@ -164,20 +165,19 @@ def test_a_cube_hidden_in_the_full_image_after_all_has_its_question_made_anew(mo
         assert (one.visible_pixels[:, :used] >= 4).all()
         assert not one.visible_pixels[:, used:].any()
         assert bits(render_question(spec, pools_of(spec), "train", one.question.index)) == bits(one)
-    monkeypatch.setattr(settle_module, "QUESTION_ATTEMPTS", 1)
-    with pytest.raises(
-        settle_module.PlacementError, match="no view of 1 choices of shapes shows 4"
-    ):
+    monkeypatch.setattr(views, "QUESTION_ATTEMPTS", 1)
+    with pytest.raises(PlacementError):
         rendered(spec, "train", "unlabeled")
 
 
 def test_a_request_that_cannot_be_met_ends_after_a_few_questions(monkeypatch):
     for name, value in {"MARGIN": 1000, "QUESTION_ATTEMPTS": 1, "VIEWS": 2}.items():
-        monkeypatch.setattr(settle_module, name, value)
+        monkeypatch.setattr(views, name, value)
     tally = Tally()
-    with pytest.raises(settle_module.PlacementError, match="train question 0"):
+    with pytest.raises(PlacementError) as error:
         rendered(replace(SPEC, train=600, labeled=0), "train", "unlabeled", tally=tally)
-    assert tally == Tally(2 * module.FIRST_SETTLED, 2 * module.FIRST_SETTLED)
+    assert error.value.where == "train question 0"
+    assert tally == Tally(2 * module.FIRST_SAMPLED, 2 * module.FIRST_SAMPLED)
 
 
 def test_every_cube_shows_in_every_image():
@@ -226,6 +226,6 @@ def test_questions_that_a_split_does_not_have():
             render_question(SPEC, pools_of(SPEC), split, index)
         count = getattr(SPEC, split)
         assert str(error.value) == f"{split} has {count} questions, none with index {index}"
-    empty = replace(SPEC, train=0, labeled=0, val=0, test=0)
+    empty = replace(SPEC, train=0, labeled=0, test=0)
     assert rendered(empty, "train", "labeled") == rendered(empty, "test") == []
     assert groups(replace(SPEC, labeled=12), "train") == {"labeled": (0, 12), "unlabeled": (12, 0)}

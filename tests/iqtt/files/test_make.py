@@ -1,24 +1,23 @@
-"""The files of a split: the released layout, our own group, and nothing that tells test answers."""
+"""Splits as wholes: the same request, the same bytes; odd requests; runs that end early."""
 
-import hashlib
 import os
 import re
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 
-from iqtt.files.layout import CONVENTIONS
+from iqtt.files import make as module
 from iqtt.files.make import FILES, make_split
-from iqtt.questions.sampling import Pools, make_pools
-from iqtt.questions.settle import Tally
 from iqtt.questions.specs import SplitSpec
-from iqtt.render import Rendered, render_question
-from iqtt.shapes.congruence import are_congruent
+from iqtt.shapes.splits import TooFewShapesError
+from scenegen.common.errors import PlacementError, SpecError
+from scenegen.rendering.backend import versions
 
 SECRET = 8_123_456_789_012_345
 SPEC = SplitSpec(
@@ -26,28 +25,21 @@ SPEC = SplitSpec(
     min_cube_pixels=1, lights=(1, 2),
 )  # fmt: skip
 COMMAND = f"iqtt make-split --seed {SECRET}"
-TRUTH = {
-    "cube_count", "cubes", "shape_id", "class_id", "world_from_shape", "light_count",
-    "light_position", "light_color", "distractor_kind", "angle_degrees", "visible_pixels",
-}  # fmt: skip
 AGAIN = """
 import sys
 from iqtt.questions.specs import SplitSpec
 from iqtt.files.make import make_split
 make_split(sys.argv[1], SplitSpec.from_json(sys.argv[2]), batch=3, command=sys.argv[3])
 """
-
-
-@pytest.fixture(scope="module")
-def pools() -> Pools:
-    return make_pools(SPEC)
+TINY = SplitSpec(
+    seed=1, train=3, labeled=2, val=2, test=2, cubes=(6, 6), height=16, width=16, min_cube_pixels=0
+)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("made") / "split"
     tally = make_split(folder, SPEC, command=COMMAND)
-    assert isinstance(tally, Tally)
     assert tally.proposed - tally.refused >= 4 * 16
     return folder
 
@@ -56,126 +48,17 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def everything(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:
-    found = {"/": file["/"]}
-    file.visititems(found.__setitem__)
-    return found
-
-
-def test_the_layout_is_the_released_one(folder):
-    assert sorted(contents(folder)) == sorted(FILES)
-    expected = {
-        "iqtt-train.h5": {
-            "labeled/questions": (3, 4, 24, 32, 3),
-            "labeled/answers": (3,),
-            "unlabeled/questions": (4, 4, 24, 32, 3),
-        },
-        "iqtt-val.h5": {"questions": (4, 4, 24, 32, 3), "answers": (4,)},
-        "iqtt-test.h5": {"questions": (5, 4, 24, 32, 3)},
-        "iqtt-test-answers.h5": {"answers": (5,)},
-    }
-    for name, shapes in expected.items():
-        with h5py.File(folder / name) as file:
-            datasets = {k: v for k, v in everything(file).items() if isinstance(v, h5py.Dataset)}
-            public = {k: v.shape for k, v in datasets.items() if not k.startswith("truth/")}
-            assert public == shapes
-            assert {datasets[k].dtype for k in public} == {np.dtype("uint8")}
-            for group in {"iqtt-train.h5": ("labeled", "unlabeled")}.get(name, ("",)):
-                rows = next(iter(v[0] for k, v in shapes.items() if k.startswith(group)))
-                known = {k for k in datasets if k.startswith(f"truth/{group}")}
-                if name == "iqtt-test.h5":
-                    assert not known
-                    continue
-                prefix = f"truth/{group}/" if group else "truth/"
-                assert known == {prefix + one for one in TRUTH}
-                assert {len(datasets[k]) for k in known} == {rows}
-
-
-def test_files_hold_the_questions_that_are_made_one_by_one(folder, pools):
-    with (
-        h5py.File(folder / "iqtt-train.h5") as train,
-        h5py.File(folder / "iqtt-val.h5") as val,
-        h5py.File(folder / "iqtt-test.h5") as test,
-        h5py.File(folder / "iqtt-test-answers.h5") as told,
-    ):
-        tables = [
-            (
-                "train",
-                0,
-                train["labeled/questions"],
-                train["truth/labeled"],
-                train["labeled/answers"],
-            ),
-            ("train", 3, train["unlabeled/questions"], train["truth/unlabeled"], None),
-            ("val", 0, val["questions"], val["truth"], val["answers"]),
-            ("test", 0, test["questions"], told["truth"], told["answers"]),
-        ]
-        for split, first, questions, truth, answers in tables:
-            for row in range(len(questions)):
-                one: Rendered = render_question(SPEC, pools, split, first + row)
-                assert questions[row].tobytes() == one.images.tobytes()
-                shapes, count = one.question.shapes.cubes, one.question.shapes.cubes.shape[1]
-                stored = {name: truth[name][row] for name in TRUTH}
-                assert stored["cube_count"] == count
-                assert np.array_equal(stored["cubes"][:, :count], shapes)
-                assert (stored["cubes"][:, count:] == -128).all()
-                assert np.array_equal(stored["distractor_kind"], one.question.shapes.kinds)
-                assert np.array_equal(stored["visible_pixels"], one.visible_pixels)
-                for name in ("world_from_shape", "light_count", "light_position", "light_color"):
-                    assert np.array_equal(stored[name], getattr(one.question, name)), name
-                assert stored["angle_degrees"] == one.question.angle_degrees
-                for i, j in ((i, j) for i in range(4) for j in range(i)):
-                    same = are_congruent(shapes[i], shapes[j])
-                    mirrored = are_congruent(shapes[i], -shapes[j])
-                    assert (stored["shape_id"][i] == stored["shape_id"][j]).all() == same
-                    assert (stored["class_id"][i] == stored["class_id"][j]).all() == (
-                        same or mirrored
-                    )
-                answer = int(np.flatnonzero(truth["distractor_kind"][row] == -1)[0])
-                assert answer == one.question.shapes.answer
-                if answers is not None:
-                    assert answers[row] == answer
-            if answers is not None:
-                assert sorted(answers[:].tolist()) == sorted(i % 3 for i in range(len(answers)))
-
-
-def test_every_number_says_what_it_is(folder):
-    for name in FILES:
-        with h5py.File(folder / name) as file:
-            for path, item in everything(file).items():
-                if isinstance(item, h5py.Dataset):
-                    assert item.attrs["meaning"], path
-                    assert path.endswith("answers") or item.attrs["unit"], path
-            for path in ("truth", "truth/labeled", "truth/unlabeled"):
-                if "questions" not in file.get(path, {}) and "cubes" in file.get(path, {}):
-                    attributes = file[path].attrs
-                    np.testing.assert_array_equal(
-                        attributes["world_from_camera"], SPEC.camera.world_from_camera
-                    )
-                    assert attributes["fov_y_degrees"] == SPEC.camera.fov_y_degrees
-                    for one in ("ambient", "reflectance", "background"):
-                        assert tuple(attributes[one]) == getattr(SPEC, one)
-                    assert attributes["attenuation"].tolist() == [0, 1]
-            root = file.attrs
-            assert root["format"] == "pix2shape-bench/iqtt"
-            assert root["conventions"] == CONVENTIONS
-            assert root["split"] == name.split("-")[1].removesuffix(".h5")
-            spec = SplitSpec.from_json(root["spec"])
-            assert spec == (SPEC if "answers" in name else SPEC.public())
-            if "questions" in file:
-                assert file["questions"].attrs["scale"] == 1 / 255
-
-
 def test_nothing_handed_out_tells_the_test_answers(folder):
     """No seed, no command, no truth; and no bytes that follow from the answers but a hash of much
     more than them.
     """
     with h5py.File(folder / "iqtt-test.h5") as file:
-        assert set(everything(file)) == {"/", "questions"}
+        assert list(file) == ["questions"]
         assert set(file.attrs) == {
             "format", "format_version", "writer", "variant", "spec", "conventions", "split",
-            "fingerprint",
+            "fingerprint", *versions(),
         }  # fmt: skip
+        assert {name: file.attrs[name] for name in versions()} == versions()
         assert set(file["questions"].attrs) == {"unit", "shape", "frame", "meaning", "scale"}
         assert re.fullmatch("[0-9a-f]{64}", file.attrs["fingerprint"])
     with h5py.File(folder / "iqtt-test-answers.h5") as file:
@@ -195,55 +78,217 @@ def test_the_same_request_gives_the_same_bytes(folder, tmp_path):
     assert os.listdir(tmp_path) == ["again"]
 
 
-def test_another_seed_changes_every_file(folder, tmp_path):
-    make_split(tmp_path / "other", replace(SPEC, seed=SECRET + 1), command=COMMAND)
-    old, new = contents(folder), contents(tmp_path / "other")
-    assert all(old[name] != new[name] for name in FILES)
-    for name in FILES[:3]:
-        with h5py.File(folder / name) as a, h5py.File(tmp_path / "other" / name) as b:
-            assert a.attrs["spec"] == b.attrs["spec"]
-            for path in ("questions", "labeled/questions", "unlabeled/questions"):
-                if path in a:
-                    assert (a[path][:] != b[path][:]).any(axis=(1, 2, 3, 4)).all()
-
-
 def test_a_table_does_not_depend_on_the_size_of_the_others(folder, tmp_path):
-    """Fingerprints, which hold the whole request, apart."""
-    changed = replace(SPEC, val=1, test=0, labeled=3, train=3)
-    make_split(tmp_path / "changed", changed)
+    """Fingerprints, which hold all settings, apart."""
+    make_split(tmp_path / "changed", replace(SPEC, val=1, test=0, labeled=3, train=3))
     with (
         h5py.File(folder / "iqtt-train.h5") as a,
         h5py.File(tmp_path / "changed" / "iqtt-train.h5") as b,
     ):
-        for path, item in everything(a).items():
-            if isinstance(item, h5py.Dataset) and "unlabeled" not in path:
-                assert item[:].tobytes() == b[path][:].tobytes()
+        for name in ("questions", "answers"):
+            assert a["labeled"][name][:].tobytes() == b["labeled"][name][:].tobytes()
+        for name, values in a["truth/labeled"].items():
+            assert values[:].tobytes() == b["truth/labeled"][name][:].tobytes()
         assert b["unlabeled/questions"].shape == (0, 4, 24, 32, 3)
         assert a.attrs["fingerprint_labeled"] != b.attrs["fingerprint_labeled"]
 
 
-def test_fingerprints_are_of_the_public_request_and_of_all_that_tables_say(folder):
-    """So they tell tables apart, join a test set to its answers, and tell no seed."""
-    found = []
-    for name in FILES:
-        split = name.split("-")[1].removesuffix(".h5")
-        with h5py.File(folder / name) as file:
-            for group in ("labeled", "unlabeled") if split == "train" else ("",):
-                told = file.attrs[f"fingerprint_{group}" if group else "fingerprint"]
-                if f"truth/{group}" not in file:
-                    assert told == found_in_answers(folder)
-                    continue
-                truth = {k: v[:] for k, v in file[f"truth/{group}"].items()}
-                digest = hashlib.sha256(f"{SPEC.public().to_json()} {split} {group}".encode())
-                for row, kinds in enumerate(truth["distractor_kind"]):
-                    for one in ("cubes", "world_from_shape", "light_position", "light_color"):
-                        digest.update(truth[one][row].tobytes())
-                    digest.update(bytes([kinds.tolist().index(-1)]))
-                assert told == digest.hexdigest()
-                found.append(told)
-    assert len(set(found)) == 4
+def listing(folder: Path) -> dict[str, bytes | None]:
+    """All there is in a folder, hidden names too."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None
+        for path in folder.rglob("*")
+    }
 
 
-def found_in_answers(folder: Path) -> str:
-    with h5py.File(folder / "iqtt-test-answers.h5") as file:
-        return file.attrs["fingerprint"]
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made") / "split"
+    make_split(folder, TINY)
+    return folder
+
+
+@pytest.fixture
+def old(made: Path, tmp_path: Path) -> Path:
+    """The folder of an older split."""
+    folder = tmp_path / "old"
+    folder.mkdir()
+    for name, raw in listing(made).items():
+        (folder / name).write_bytes(raw)
+    return folder
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"cubes": (16, 16), "shapes": "tree", "train": 1, "labeled": 0},
+        {"cubes": (12, 12), "distractors": "mirror", "test": 0},
+        {"height": 24, "width": 40, "min_angle_degrees": 90},
+        {"height": 40, "width": 24, "lights": (1, 4)},
+        {"max_radius": 10},
+        {"cubes": (5, 6), "max_radius": 2.2, "distractors": "other"},
+        {"cubes": (5, 5), "distractors": "other"},
+        {"seed": 2**63 - 1, "background": (0, 0, 0)},
+        {"labeled": 3, "val": 6},
+        {"labeled": 0},
+        {"train": 0, "labeled": 0, "val": 0, "test": 5},
+    ],
+)
+def test_odd_requests_are_answered_in_full(changed, tmp_path):
+    spec = replace(TINY, **changed)
+    done = []
+    make_split(tmp_path / "split", spec, batch=1, progress=done.append)
+    assert sum(done) == spec.train + spec.val + spec.test
+    sizes = {
+        "iqtt-train.h5": {"labeled/": spec.labeled, "unlabeled/": spec.train - spec.labeled},
+        "iqtt-val.h5": {"": spec.val},
+        "iqtt-test.h5": {"": spec.test},
+    }
+    for name, groups in sizes.items():
+        with h5py.File(tmp_path / "split" / name) as file:
+            for group, count in groups.items():
+                images = file[group + "questions"]
+                assert images.shape == (count, 4, spec.height, spec.width, 3)
+                raw = {image.tobytes() for image in images[:].reshape(-1, *images.shape[2:])}
+                assert len(raw) == 4 * count, "all images differ"
+                if f"{group}answers" in file:
+                    counts = np.bincount(file[f"{group}answers"][:], minlength=3)
+                    assert np.ptp(counts) <= 1
+
+
+@pytest.mark.parametrize("compression", ["none", "lzf", "gzip"])
+@pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
+def test_plain_h5py_reads_every_type_and_compression(compression, dtype, made, tmp_path):
+    spec = replace(TINY, image_dtype=dtype, with_depth=True)
+    make_split(tmp_path / "split", spec, compression=compression)
+    for name, path in (("iqtt-train.h5", "unlabeled/questions"), ("iqtt-val.h5", "questions")):
+        with h5py.File(made / name) as plain, h5py.File(tmp_path / "split" / name) as file:
+            images = file[path]
+            assert images.dtype == dtype
+            assert images.compression == (None if compression == "none" else compression)
+            assert images.attrs["scale"] == (1 / 255 if dtype == "uint8" else 1)
+            radiance = images[:] * images.attrs["scale"]
+            assert radiance.min() >= 0
+            assert radiance.max() == 1
+            assert abs(radiance - plain[path][:] / 255).max() < 0.6 / 255
+            truth = file["truth" if name == "iqtt-val.h5" else "truth/unlabeled"]
+            assert truth["depth"].attrs["unit"] == "cube edge"
+            surface = np.isfinite(truth["depth"][:])
+            assert (radiance[~surface] == 1).all()
+            middle = spec.camera_distance
+            assert (abs(truth["depth"][:][surface] - middle) < spec.max_radius).all()
+    with h5py.File(tmp_path / "split" / "iqtt-test.h5") as file:
+        assert list(file) == ["questions"]
+    with h5py.File(tmp_path / "split" / "iqtt-test-answers.h5") as file:
+        assert file["truth/depth"].shape == (2, 4, 16, 16)
+
+
+def test_an_older_split_is_replaced_only_on_request(old, tmp_path):
+    before = listing(tmp_path)
+    with pytest.raises(FileExistsError):
+        make_split(old, replace(TINY, seed=2))
+    assert listing(tmp_path) == before
+    (old / "iqtt-val.h5").unlink()
+    beside = set()
+    look = lambda _: beside.update(os.listdir(tmp_path))  # noqa: E731
+    make_split(old, replace(TINY, seed=2), overwrite=True, progress=look)
+    assert beside == {"old"}, "made inside, as another disk may be mounted there"
+    after = listing(tmp_path)
+    assert set(after) == set(before)
+    assert all(after[f"old/{name}"] != before[f"old/{name}"] for name in FILES)
+
+
+def test_a_linked_or_empty_folder_is_filled_where_it_is(old, tmp_path, monkeypatch):
+    (tmp_path / "link").symlink_to(old)
+    make_split(tmp_path / "link", replace(TINY, seed=2), overwrite=True)
+    assert (tmp_path / "link").is_symlink()
+    assert sorted(os.listdir(old)) == sorted(FILES)
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "empty")
+    make_split(".", replace(TINY, seed=2), overwrite=True)
+    assert listing(Path()) == listing(old)
+
+
+@pytest.mark.parametrize(
+    "stranger", ["notes.txt", "iqtt-test-predictions.h5", ".hidden", "iqtt-train.h5/"]
+)
+def test_a_folder_with_other_things_is_never_replaced(stranger, old, tmp_path):
+    if stranger.endswith("/"):
+        (old / stranger).unlink()
+        (old / stranger).mkdir()
+    else:
+        (old / stranger).write_text("mine")
+    before = listing(tmp_path)
+    with pytest.raises(FileExistsError) as error:
+        make_split(old, TINY, overwrite=True)
+    assert stranger.rstrip("/") in str(error.value.strerror)
+    assert error.value.filename == str(old)
+    assert listing(tmp_path) == before
+
+
+def test_places_that_cannot_be_a_folder_are_refused_before_anything_is_made(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "make_pools", None)
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
+    before = listing(tmp_path)
+    for overwrite in (False, True):
+        for name, kind in (
+            ("file", NotADirectoryError),
+            ("file/split", NotADirectoryError),
+            ("missing/split", FileNotFoundError),
+            ("nowhere", FileNotFoundError),
+        ):
+            with pytest.raises(kind):
+                make_split(tmp_path / name, TINY, overwrite=overwrite)
+    (tmp_path / "locked").mkdir()
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    for path in ("locked", "locked/split"):
+        with pytest.raises(PermissionError) as error:
+            make_split(tmp_path / path, TINY, overwrite=True)
+        assert error.value.filename == str(tmp_path / "locked")
+    del before["file"]
+    assert set(listing(tmp_path)) == {*before, "file", "locked"}
+
+
+class StopError(Exception):
+    """What the test's progress bar raises."""
+
+
+@pytest.mark.parametrize("kind", [StopError, KeyboardInterrupt])
+@pytest.mark.parametrize("after", [1, 7])
+def test_an_interrupted_run_leaves_all_as_it_was(kind, after, old, tmp_path):
+    done = []
+
+    def progress(count: int) -> None:
+        done.append(count)
+        if sum(done) >= after:
+            raise kind
+
+    before = listing(tmp_path)
+    for folder in (tmp_path / "new", old):
+        done.clear()
+        with pytest.raises(kind):
+            make_split(folder, replace(TINY, seed=2), batch=1, progress=progress, overwrite=True)
+        assert listing(tmp_path) == before
+
+
+def test_errors_on_the_way_leave_all_as_it_was(old, tmp_path, monkeypatch):
+    before, new = listing(tmp_path), tmp_path / "new"
+    with pytest.raises(SpecError):
+        make_split(new, TINY, compression="zip")
+    with pytest.raises(TooFewShapesError):
+        make_split(new, replace(TINY, cubes=(3, 3)))
+    monkeypatch.setattr("iqtt.questions.views.QUESTION_ATTEMPTS", 1)
+    monkeypatch.setattr("iqtt.questions.views.VIEWS", 1)
+    with pytest.raises(PlacementError):
+        make_split(old, replace(TINY, height=64, width=64, min_cube_pixels=15), overwrite=True)
+    monkeypatch.undo()
+    monkeypatch.setattr(os, "statvfs", lambda path: SimpleNamespace(f_bavail=0, f_frsize=1))
+    with pytest.raises(OSError, match="No space left on device") as error:
+        make_split(new, TINY)
+    assert error.value.filename == str(new / "iqtt-train.h5")
+    monkeypatch.undo()
+    with pytest.raises(FileExistsError):  # somebody else makes the folder meanwhile
+        make_split(new, TINY, progress=lambda count: new.mkdir(exist_ok=True))
+    new.rmdir()
+    assert listing(tmp_path) == before

@@ -1,4 +1,4 @@
-"""Tests of rotations, canonical form, chirality and symmetries."""
+"""Rotations, canonical form, chirality, symmetries, ids and sizes of shapes; what is refused."""
 
 import itertools
 
@@ -7,11 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from polycubes import some_shapes
 
+from iqtt.shapes.chains_and_trees import Kind
 from iqtt.shapes.polycube import (
     MAX_CUBES,
     ROTATIONS,
     bounding_radius,
+    box_centre,
     canonical,
     canonical_class,
     is_chiral,
@@ -19,7 +22,6 @@ from iqtt.shapes.polycube import (
     set_ids,
     symmetries,
 )
-from iqtt.shapes.sampling import Kind, random_shapes
 
 Shapes = NDArray[np.int8]
 
@@ -47,7 +49,7 @@ def shapes(draw: st.DrawFn) -> Shapes:
     """One random shape of 1 to 16 cubes, (1, n, 3)."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     kind: Kind = draw(st.sampled_from(("chain", "tree")))
-    return random_shapes(rng, 1, draw(st.integers(1, MAX_CUBES)), kind)
+    return some_shapes(rng, 1, draw(st.integers(1, MAX_CUBES)), kind)
 
 
 @st.composite
@@ -123,46 +125,31 @@ def test_the_canonical_form_is_a_turned_copy(shape: Shapes) -> None:
 
 
 def test_many_shapes_at_once_give_what_each_gives_alone() -> None:
-    many = random_shapes(np.random.default_rng(0), 20_000, 6)  # more than one chunk
+    many = some_shapes(np.random.default_rng(0), 20_000, 6)  # more than one chunk
     together = canonical(many)
     for row in (0, 8191, 8192, 19_999):
         assert (together[row] == canonical(many[row : row + 1])[0]).all()
 
 
 @pytest.mark.parametrize(
-    ("cubes", "chiral"),
+    ("cubes", "count", "chiral"),
     [
-        ([[0, 0, 0]], False),
-        (ROD, False),
-        (CORNER, False),
-        (TRIPOD, False),
-        (BLOCK, False),
-        (TWIST, True),
-        (BENT_ARM, True),
+        ([[0, 0, 0]], 24, False),
+        (BLOCK, 24, False),
+        (ROD, 8, False),
+        (SQUARE, 8, False),
+        (TRIPOD, 3, False),
+        (CORNER, 2, False),
+        (TWIST, 2, True),
+        (BENT_ARM, 1, True),
     ],
 )
-def test_chirality_of_known_shapes(cubes: list[list[int]], chiral: bool) -> None:
+def test_symmetries_and_chirality_of_known_shapes(
+    cubes: list[list[int]], count: int, chiral: bool
+) -> None:
     shape = one(cubes)
-    assert is_chiral(shape) == [chiral]
-    assert is_chiral(mirror(shape)) == [chiral]
+    assert is_chiral(shape) == is_chiral(mirror(shape)) == [chiral]
     assert (set_ids(canonical(shape)) != set_ids(canonical(mirror(shape)))) == [chiral]
-
-
-@pytest.mark.parametrize(
-    ("cubes", "count"),
-    [
-        ([[0, 0, 0]], 24),
-        (BLOCK, 24),
-        (ROD, 8),
-        (SQUARE, 8),
-        (TRIPOD, 3),
-        (CORNER, 2),
-        (TWIST, 2),
-        (BENT_ARM, 1),
-    ],
-)
-def test_symmetries_of_known_shapes(cubes: list[list[int]], count: int) -> None:
-    shape = one(cubes)
     mask = symmetries(shape)
     assert mask.shape == (1, 24)
     assert mask.sum() == count
@@ -171,3 +158,69 @@ def test_symmetries_of_known_shapes(cubes: list[list[int]], count: int) -> None:
         turned = shape[0] @ rotation.T
         turned = turned - turned.min(axis=0) + shape[0].min(axis=0)
         assert ({tuple(cube) for cube in turned.tolist()} == own) == keeps
+
+
+def test_ids_are_the_sorted_cubes_themselves() -> None:
+    shape = np.array([[[4, 9, 7], [3, 8, 5]]])
+    (bytes_,) = set_ids(shape).view(np.uint8).reshape(-1, 32)
+    assert bytes_.tolist() == [0x00, 0x00, 0x01, 0x12] + [0xFF] * 28
+
+
+def test_ids_tell_sets_apart_but_not_places_and_orders() -> None:
+    chain = some_shapes(np.random.default_rng(0), 3000, 5)
+    ids = set_ids(chain)
+    sets = [frozenset(map(tuple, (c - c.min(axis=0)).tolist())) for c in chain]
+    assert len(set(ids.tolist())) == len(set(sets))
+    assert (set_ids(chain[:, ::-1] + np.int8(3)) == ids).all()
+    sizes = [set_ids(chain[:1, :n]) for n in range(1, 6)]
+    assert len(np.unique(np.concatenate(sizes))) == 5, "ids of other numbers of cubes differ"
+
+
+def test_radius_of_known_shapes() -> None:
+    assert bounding_radius(np.array([[[7, 7, 7]]])) == pytest.approx(np.sqrt(3) / 2)
+    assert bounding_radius(np.array([ROD])) == pytest.approx(np.sqrt(1.5**2 + 0.5))
+    assert box_centre(np.array([ROD])).tolist() == [[1.5, 0.5, 0.5]]
+
+
+@pytest.mark.parametrize("cubes", [1, 2, 5, 16])
+def test_the_radius_reaches_the_farthest_corner(cubes: int) -> None:
+    unit = np.array(list(itertools.product((0, 1), repeat=3)))
+    for shape in some_shapes(np.random.default_rng(cubes), 50, cubes):
+        corners = (shape[:, None] + unit).reshape(-1, 3)
+        centre = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        assert box_centre(shape[None])[0] == pytest.approx(centre)
+        farthest = np.linalg.norm(corners - centre, axis=1).max()
+        assert bounding_radius(shape[None])[0] == pytest.approx(farthest)
+
+
+def test_no_shapes_are_no_trouble() -> None:
+    nothing = np.zeros((0, 4, 3), dtype=np.int8)
+    assert canonical(nothing).shape == canonical_class(nothing).shape == (0, 4, 3)
+    assert set_ids(nothing).shape == is_chiral(nothing).shape == (0,)
+    assert symmetries(nothing).shape == (0, 24)
+    assert bounding_radius(nothing).shape == (0,)
+
+
+@pytest.mark.parametrize(
+    ("cubes", "message"),
+    [
+        (np.zeros((2, 3), np.int8), r"shape \(S, n, 3\)"),
+        (np.zeros((2, 3, 4), np.int8), r"shape \(S, n, 3\)"),
+        (np.zeros((2, 3, 3)), "signed integers"),
+        (np.zeros((2, 3, 3), np.uint8), "signed integers"),
+        (np.zeros((2, 0, 3), np.int8), "1 to 16 cubes, not 0"),
+        (np.zeros((2, 17, 3), np.int8), "1 to 16 cubes, not 17"),
+        (np.array([[[0, 0, 0]] * 2, [[0, 0, 0], [0, 16, 0]]]), "shape 1 spans more than 16"),
+        (np.array([[[-(2**63), 0, 0], [2**63 - 1, 0, 0]]]), "shape 0 spans more than 16"),
+    ],
+)
+def test_what_cannot_be_shapes_is_refused(cubes: NDArray[np.int64], message: str) -> None:
+    for function in (canonical, canonical_class, set_ids, is_chiral, symmetries):
+        with pytest.raises(ValueError, match=message):
+            function(cubes)
+
+
+def test_the_longest_shape_is_accepted() -> None:
+    rod = np.zeros((1, MAX_CUBES, 3), dtype=np.int8)
+    rod[0, :, 2] = np.arange(MAX_CUBES)
+    assert canonical(rod)[0, :, 0].tolist() == list(range(MAX_CUBES))

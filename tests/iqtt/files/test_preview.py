@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from iqtt.files.preview import BACKGROUND, RIGHT, question_sheet, save_sheet
 from iqtt.files.reader import QuestionRecord, open_questions
-from iqtt.files.show import BACKGROUND, RIGHT, question_sheet, save_sheet
 from scenegen.common.errors import SpecError
 from scenegen.rooms.preview import srgb_bytes
 
@@ -159,20 +159,14 @@ def test_narrow_images_leave_room_for_the_labels():
     assert (np.diff([x for _, x in places]) > 128).all()
 
 
-@pytest.mark.parametrize("value", [0, 255])
-def test_tiles_stand_out_from_the_sheet(value):
-    """Plain white and plain black images have an outline in another grey."""
-    plain = QuestionRecord(0, np.full((4, 128, 128, 3), value, np.uint8), None, None)
-    sheet = np.asarray(question_sheet([plain], False)).astype(int)
-    row = sheet[80, 14:18, 0]
-    assert row.tolist() == [BACKGROUND[0], row[1], value, value]
-    assert abs(row[1] - BACKGROUND[0]) > 40
-
-
-def test_values_that_are_no_numbers_are_shown_black():
-    images = np.full((4, 16, 16, 3), np.nan, np.float32)
-    sheet = question_sheet([QuestionRecord(0, images, None, None)], False)
-    assert sheet.getpixel((20, 20)) == (0, 0, 0)
+def test_plain_tiles_have_an_outline_and_no_number_is_black():
+    for value in (0, 255, np.nan):
+        images = np.full((4, 128, 128, 3), value, np.float32 if value != value else np.uint8)
+        sheet = np.asarray(question_sheet([QuestionRecord(0, images, None, None)], False))
+        row = sheet[80, 14:18, 0].astype(int).tolist()
+        assert row[0] == BACKGROUND[0]
+        assert row[2:] == [255 if value == 255 else 0] * 2
+        assert abs(row[1] - BACKGROUND[0]) > 40
 
 
 def test_many_questions_stand_in_two_columns(tmp_path):
@@ -184,5 +178,5 @@ def test_many_questions_stand_in_two_columns(tmp_path):
         sheet = np.asarray(b)
     places = [find(sheet, shown(record, 4)[0]) for record in many]
     assert places == sorted(places), "in reading order"
-    with pytest.raises(SpecError, match="picture's name"):
+    with pytest.raises(SpecError):
         save_sheet(few, False, tmp_path / "few.h5")

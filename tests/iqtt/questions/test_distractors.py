@@ -1,4 +1,4 @@
-"""Shapes, answers, rotations and lights of questions: right, fair, and each on its own."""
+"""The shapes of questions: right, fair, each on its own, and of no other split."""
 
 import math
 from collections import Counter
@@ -9,17 +9,18 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from iqtt.questions import sampling as questions
-from iqtt.questions.sampling import (
-    KIND_NAMES,
+from iqtt.audit.congruence import congruent_rows
+from iqtt.questions import distractors as module
+from iqtt.questions.distractors import (
     Drawn,
     Pools,
+    answer_positions,
     arrange,
     draw_shapes,
     make_pools,
+    question_key,
 )
-from iqtt.questions.specs import SPLITS, SplitSpec
-from iqtt.shapes.congruence import congruent_rows
+from iqtt.questions.specs import DISTRACTOR_KINDS, SPLITS, SplitSpec
 from iqtt.shapes.near import is_chain, is_connected
 from iqtt.shapes.polycube import (
     bounding_radius,
@@ -29,7 +30,8 @@ from iqtt.shapes.polycube import (
     set_ids,
     symmetries,
 )
-from scenegen.common.errors import PlacementError
+from iqtt.shapes.splits import TooFewShapesError, assign_classes
+from scenegen.common.errors import PlacementError, SpecError
 
 SPEC = SplitSpec(seed=11, cubes=(6, 8), max_radius=2.7)
 CASES = [
@@ -100,7 +102,7 @@ def test_no_class_is_met_in_two_splits(cubes):
         met.append(set())
         for shapes, _ in by_size(draw(spec, 60, split)):
             flat = shapes.reshape(-1, *shapes.shape[2:])
-            owners = pools_of(spec).catalogues[shapes.shape[2]].owner(flat)
+            owners = pools_of(spec).classes[shapes.shape[2]].owner(canonical_class(flat))
             assert (owners == index).all()
             met[-1] |= {bytes(i) for i in set_ids(canonical_class(flat))}
         assert len(met[-1]) > 20
@@ -177,14 +179,14 @@ def check_that_answers_alone_tell_nothing(kind: str, cubes: int, count: int) -> 
             assert abs(score.mean() - 1 / 3) < 4 * error, f"{clue}: {score.mean():.3f}"
 
 
-@pytest.mark.parametrize("kind", KIND_NAMES)
+@pytest.mark.parametrize("kind", DISTRACTOR_KINDS)
 def test_answers_alone_tell_nothing(kind):
     check_that_answers_alone_tell_nothing(kind, 7, 3000)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("cubes", [6, 9, 12])
-@pytest.mark.parametrize("kind", KIND_NAMES)
+@pytest.mark.parametrize("kind", DISTRACTOR_KINDS)
 def test_many_answers_alone_tell_nothing(kind, cubes):
     check_that_answers_alone_tell_nothing(kind, cubes, 10_000)
 
@@ -206,15 +208,75 @@ def test_arranging_puts_the_right_answer_at_its_place():
 
 
 def test_a_reference_without_distractors_is_searched_for_so_often_only(monkeypatch):
-    spec = replace(SPEC, cubes=(7, 7), distractors="near")
-    pools = Pools(pools_of(SPEC).catalogues, {"near": (7,)})
-    monkeypatch.setattr(questions, "SHAPE_ATTEMPTS", 3)
-    monkeypatch.setitem(
-        questions._MAKERS, "near", lambda spec, pool, split, rngs: [None] * len(rngs)
-    )
-    with pytest.raises(PlacementError) as error:
-        draw_shapes(spec, pools, "test", [(4, 0), (9, 2)])
-    assert str(error.value) == (
-        "test question 4: none of 3 chain shapes of 7 cubes has 'near' distractors that no other"
-        " split may use; take more --cubes, or another kind of --distractors"
-    )
+    one_each = {4: assign_classes(RNG(0), 4, [1, 1, 1])}  # so no near shape is of the same split
+    monkeypatch.setattr(module, "SHAPE_ATTEMPTS", 3)
+    for kind in ("near", "mirror"):
+        with pytest.raises(PlacementError) as error:
+            draw_shapes(SPEC, Pools(one_each, {kind: (4,)}), "test", [(4, 0), (9, 2)])
+        assert error.value.where == "test question 4"
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 200, 1001])
+def test_answer_positions_are_balanced_exactly(count):
+    for split in SPLITS:
+        places = answer_positions(SPEC, split, 7, count)
+        assert (places.dtype, places.shape) == (np.uint8, (count,))
+        assert sorted(places.tolist()) == sorted(i % 3 for i in range(count))
+        others = replace(SPEC, train=7, labeled=3, val=8, test=9, cubes=(9, 9))
+        assert (answer_positions(others, split, 7, count) == places).all()
+
+
+def test_answer_positions_follow_no_pattern():
+    rows = np.array([answer_positions(replace(SPEC, seed=s), "val", 0, 6) for s in range(600)])
+    for column in rows.T:
+        assert stats.chisquare(np.bincount(column, minlength=3)).pvalue > 1e-4
+    assert len({row.tobytes() for row in rows}) > 85, "of 90 orders"
+    tables = [(split, first) for split in SPLITS for first in (0, 30)]
+    orders = {answer_positions(SPEC, split, first, 30).tobytes() for split, first in tables}
+    assert len(orders) == 6
+    keys = {question_key(split, index) for split in SPLITS for index in (0, 1, 10**8)}
+    assert len(keys) == 9
+
+
+@pytest.mark.parametrize(
+    ("settings", "kind"),
+    [
+        ({"cubes": (3, 3)}, "other"),
+        ({"cubes": (4, 4)}, "other"),
+        ({"cubes": (4, 4), "shapes": "tree", "distractors": "near"}, "near"),
+        ({"cubes": (5, 5)}, "near"),
+        ({"cubes": (5, 5), "distractors": "mirror"}, "mirror"),
+        ({"cubes": (8, 8), "max_radius": 1.5, "min_cube_pixels": 1}, "other"),
+    ],
+)
+def test_too_few_shapes_are_told_before_anything_is_rendered(settings, kind, monkeypatch):
+    monkeypatch.setattr("scenegen.rendering.renderer.launch_fields", None)
+    spec = SplitSpec(**settings)
+    low, high = spec.cubes
+    with pytest.raises(TooFewShapesError) as error:
+        make_pools(spec)
+    assert error.value.where == "cubes"
+    assert f"{low}-{high}" in error.value.found
+    assert repr(kind) in error.value.expected
+
+
+def test_a_request_that_does_not_tell_its_seed_is_refused():
+    with pytest.raises(SpecError) as error:
+        make_pools(SPEC.public())
+    assert error.value.where == "seed"
+
+
+def test_sizes_that_do_not_allow_a_kind_are_left_out_of_it_alone():
+    sizes = make_pools(replace(SPEC, seed=0, cubes=(3, 7))).sizes
+    assert sizes == {"other": (5, 6, 7), "near": (6, 7), "mirror": (6, 7)}
+    alone = replace(SPEC, cubes=(5, 5), distractors="other")
+    assert len(draw_shapes(alone, make_pools(alone), "train", [(0, 0), (1, 0)])) == 2
+
+
+def test_where_few_shapes_of_many_cubes_are_found_those_are_shared_out(monkeypatch):
+    monkeypatch.setattr(module, "DRAWN_CLASSES", 4000)
+    spec = replace(SPEC, cubes=(12, 12), max_radius=2.5)
+    pools = make_pools(spec)
+    assert [len(split) for split in pools.classes[12].splits] == [40] * 3
+    for shapes, _ in draw_shapes(spec, pools, "val", [(i, 0) for i in range(6)]):
+        assert (bounding_radius(shapes) <= 2.5).all()

@@ -1,4 +1,4 @@
-"""Numbers that say something of an image: size, place, light, outline; none knows its shape."""
+"""Numbers that describe images (size, place, light, outline) and shapes; probes look at these."""
 
 import itertools
 import math
@@ -9,30 +9,32 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from iqtt.files.layout import NO_CUBE
 from scenegen.rendering.ground_truth import decode_image
 
 Array = NDArray[Any]
 THUMBNAIL = 16  # pixels a side
-LEVELS = 4  # of each channel, in a colour histogram
-SAME = 1 / 512  # how far a channel of floating-point images may be off the background's
+LEVELS = 4  # levels of each channel in a colour histogram
+SAME = 1 / 512  # how far a channel of a floating-point image may differ from the background's
+SHAPE_STATISTICS = ("contacts of cubes", "spread of cubes", "shape met elsewhere")
 
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """What was measured of the images of Q questions: the reference, then three answers.
+    """Statistics of the images of Q questions: the reference, then three answers.
 
     Attributes:
-        area: of the silhouette, as a share of the image, (Q, 4).
+        area: area of the silhouette, as a share of the image, (Q, 4).
         extent: diagonal of the silhouette's bounding box, pixels, (Q, 4).
-        offset: from the image's middle to that box's, pixels, (Q, 4).
+        offset: distance from the middle of the image to the middle of that box, pixels, (Q, 4).
         image_brightness: mean of all pixels and channels, (Q, 4).
-        brightness: the same of the silhouette's pixels, (Q, 4).
-        mean_color: of the silhouette's pixels, (Q, 4, 3).
-        contrast: standard deviation of these pixels' grey, (Q, 4).
-        colors: share of the silhouette's pixels in each box of colours, (Q, 4, LEVELS**3).
-        moments: what `_moments` says of the silhouette, (Q, 4, 4).
-        thumbnails: grey, (Q, 4, THUMBNAIL**2) float32.
-        pixel_distance: root mean square between the images of a question, (Q, 4, 4).
+        brightness: mean of the silhouette's pixels and channels, (Q, 4).
+        mean_color: mean of the silhouette's pixels, (Q, 4, 3).
+        contrast: standard deviation of the grey of the silhouette's pixels, (Q, 4).
+        colors: colour histogram of the silhouette's pixels, shares, (Q, 4, LEVELS**3).
+        moments: lengths from the silhouette's second and third moments, (Q, 4, 4).
+        thumbnails: small grey images, (Q, 4, THUMBNAIL**2) float32.
+        pixel_distance: root mean square differences of a question's images, (Q, 4, 4).
     """
 
     area: Array
@@ -52,17 +54,17 @@ class Statistics:
 
     @classmethod
     def join(cls, parts: Sequence[Self]) -> Self:
-        """Put the questions of one or more together."""
+        """Join the statistics of one or more groups of questions."""
         names = [field.name for field in fields(cls)]
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
     def take(self, rows: Array) -> Self:
-        """Return some questions' alone; rows as numbers, or (Q,) bool."""
+        """Return the statistics of some questions; rows as numbers, or (Q,) bool."""
         return type(self)(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 
 def silhouettes(images: Array, background: Array) -> NDArray[np.bool_]:
-    """Return which pixels are not the background, (Q, 4, H, W).
+    """Return which pixels differ from the background, (Q, 4, H, W).
 
     Args:
         images: (Q, 4, H, W, 3), as stored.
@@ -80,7 +82,7 @@ def measure(images: Array, shown: NDArray[np.bool_]) -> Statistics:
 
     Args:
         images: (Q, 4, H, W, 3), as stored; values that are not finite count as 0.
-        shown: their silhouettes, (Q, 4, H, W).
+        shown: silhouettes, (Q, 4, H, W).
     """
     questions, height, width = len(images), *images.shape[2:4]
     radiance = decode_image(images)
@@ -118,7 +120,7 @@ def measure(images: Array, shown: NDArray[np.bool_]) -> Statistics:
 
 
 def _averages(side: int) -> Array:
-    """Return weights that shrink `side` pixels to THUMBNAIL averages, (THUMBNAIL, side) float32."""
+    """Return weights that average `side` pixels to THUMBNAIL ones, (THUMBNAIL, side) float32."""
     edges = np.linspace(0, side, THUMBNAIL + 1)
     pixel = np.arange(side)
     covered = np.minimum(edges[1:, None], pixel + 1) - np.maximum(edges[:-1, None], pixel)
@@ -126,7 +128,7 @@ def _averages(side: int) -> Array:
 
 
 def _boxes(mask: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return the diagonal of each silhouette's box, and how far its middle is off the image's."""
+    """Return the diagonal of each silhouette's box, and its middle's distance from the image's."""
     spans, offsets = [], []
     for axis in (1, 2):
         line = np.asarray(mask.any(axis=3 - axis))
@@ -139,7 +141,7 @@ def _boxes(mask: NDArray[np.bool_]) -> tuple[Array, Array]:
 
 
 def _color_shares(radiance: Array, mask: NDArray[np.bool_]) -> Array:
-    """Return the share of each silhouette's pixels in each box of colours, (N, LEVELS**3)."""
+    """Return the colour histogram of each silhouette's pixels, shares, (N, LEVELS**3)."""
     level = np.minimum((radiance[mask] * LEVELS).astype(np.int64), LEVELS - 1)
     boxes = LEVELS**3
     code = level @ np.array([LEVELS**2, LEVELS, 1]) + boxes * np.nonzero(mask)[0]
@@ -148,11 +150,11 @@ def _color_shares(radiance: Array, mask: NDArray[np.bool_]) -> Array:
 
 
 def _moments(mask: NDArray[np.bool_]) -> Array:
-    """Return four lengths, as shares of the image's shorter side, that turning an image keeps.
+    """Return four lengths of each silhouette that turning and mirroring it keep, (N, 4).
 
-    They are the silhouette's spreads (standard deviations) along its two axes and, of its third
-    moments, the third and fourth of Hu's invariants ("Visual pattern recognition by moment
-    invariants", 1962), not normalised for size, sixth roots; mirroring keeps them too. (N, 4).
+    They are shares of the image's shorter side: the standard deviations along the silhouette's two
+    principal axes, and the sixth roots of the third and fourth of Hu's invariants ("Visual pattern
+    recognition by moment invariants", 1962), which are not normalised for size.
     """
     height, width = mask.shape[1:]
     short = min(height, width)
@@ -172,3 +174,38 @@ def _moments(mask: NDArray[np.bool_]) -> Array:
     fourth = (xxx + yyx) ** 2 + (yxx + yyy) ** 2
     spreads = np.sqrt(np.maximum([middle + half, middle - half], 0))
     return np.stack([*spreads, *np.power([third, fourth], 1 / 6)], axis=1)
+
+
+def shape_statistics(
+    cubes: Sequence[Array], class_names: Sequence[Array], whole: Sequence[Array]
+) -> list[Array]:
+    """Return for each table the SHAPE_STATISTICS of its answers, (Q, 3, 3); NaN unless whole.
+
+    They are the number of pairs of cubes that share a face; the cubes' mean squared distance from
+    their middle; and how many answers of other questions, in all tables, show the shape or its
+    mirror image. The references of other questions are not counted: a right answer comes with one,
+    so they would tell which answers of other questions are right.
+
+    Args:
+        cubes: for each table its cubes, (Q, 4, most, 3), as stored.
+        class_names, whole: for each table, as in `shape_proofs.Shapes`.
+    """
+    everything = np.concatenate([names[:, 1:].reshape(-1) for names in class_names])
+    names, times = np.unique(everything, return_counts=True)
+    results = []
+    for stored, own, good in zip(cubes, class_names, whole, strict=True):
+        answers = stored[:, 1:]
+        used = (answers != NO_CUBE).all(axis=3)
+        contacts, spread = np.zeros((2, *used.shape[:2]))
+        # One cube of each shape at a time, so that memory stays small.
+        for i in range(used.shape[2]):
+            apart = np.abs(answers - answers[:, :, i : i + 1].astype(np.int16))
+            both = used & used[:, :, i : i + 1]
+            contacts += np.count_nonzero(both & (apart.sum(axis=3) == 1), axis=2) / 2
+            spread += ((apart**2).sum(axis=3) * both).sum(axis=2)
+        spread /= 2 * np.maximum(used.sum(axis=2), 1) ** 2
+        here = (own[:, 1:, None] == own[:, None, 1:]).sum(axis=2)
+        elsewhere = times[np.searchsorted(names, own[:, 1:])] - here
+        numbers = np.stack([contacts, spread, elsewhere], axis=2)
+        results.append(np.where(good[:, None, None], numbers, np.nan))
+    return results

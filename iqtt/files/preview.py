@@ -1,4 +1,4 @@
-"""Sheets of questions, as a person would be asked them."""
+"""Pictures of questions: a sheet with the reference and the three answers of each."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,14 +14,14 @@ from scenegen.rooms.preview import BACKGROUND, FAINT, INK, save_picture, srgb_by
 Array = NDArray[Any]
 LABELS = ("", "A", "B", "C")
 SMALLEST_TILE, LARGEST_TILE = 128, 256  # other images are scaled by a whole factor
-FRAME = 4  # around the right answer
-GAP = 10  # between answers
-WIDE_GAP = 34  # between reference and answers; the divider stands in its middle
-MARGIN = 16  # around a question
+FRAME = 4  # pixels around the right answer
+GAP = 10  # pixels between answers
+WIDE_GAP = 34  # pixels between reference and answers, with a line in the middle
+MARGIN = 16  # pixels around a question
 LABEL_HEIGHT = 22
 RIGHT = (0, 128, 94)  # Okabe and Ito's green, darker
 LINE = (190, 190, 190)
-MANY = 4  # more questions than so many stand in two columns
+MANY = 4  # more questions than this stand in two columns
 
 
 def question_sheet(records: Sequence[QuestionRecord], show_answers: bool) -> Image.Image:
@@ -29,7 +29,7 @@ def question_sheet(records: Sequence[QuestionRecord], show_answers: bool) -> Ima
 
     Args:
         records: one or more questions with images of one size.
-        show_answers: frame the right answer, and say how each was made, where that is known.
+        show_answers: whether to frame the right answer, and to name the kind of the wrong ones.
     """
     pictures = [[_tile(image) for image in np.nan_to_num(record.radiance)] for record in records]
     width, height = _slot(pictures[0][0])
@@ -47,7 +47,7 @@ def question_sheet(records: Sequence[QuestionRecord], show_answers: bool) -> Ima
 
 
 def save_sheet(records: Sequence[QuestionRecord], show_answers: bool, path: str | Path) -> None:
-    """Write a sheet; the ending of `path` names the format. Raises as `save_picture`."""
+    """Write a sheet; the suffix of `path` names the format. Raises as `save_picture`."""
     save_picture(question_sheet(records, show_answers), path)
 
 
@@ -84,14 +84,14 @@ def _draw_question(
 
 
 def _right_answer(record: QuestionRecord) -> int | None:
-    """Return which answer is right, by the answers or else by the truth."""
+    """Return which answer is right, from the answers or else from the truth; None if unknown."""
     if record.answer is None and record.truth is not None and None in record.truth.distractor_kind:
         return record.truth.distractor_kind.index(None)
     return record.answer
 
 
 def _note(record: QuestionRecord, k: int, right: bool) -> str:
-    """Say of answer k whether it is right, and how it was made."""
+    """Return the text below answer k: whether it is right, or its kind."""
     if right:
         return "   right" + (f", turned {record.truth.angle_degrees:.0f}°" if record.truth else "")
     kind = record.truth.distractor_kind[k] if record.truth else None
@@ -99,7 +99,7 @@ def _note(record: QuestionRecord, k: int, right: bool) -> str:
 
 
 def _slot(tile: Image.Image) -> tuple[int, int]:
-    """Return width and height of a tile's place, wide enough for the text below it."""
+    """Return width and height of the place of a tile, wide enough for the text below it."""
     return max(tile.width, SMALLEST_TILE), tile.height
 
 

@@ -5,15 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from polycubes import some_shapes
 
-from iqtt.audit.image_statistics import THUMBNAIL, Statistics, measure, silhouettes
 from iqtt.audit.shape_proofs import compare_shapes
-from iqtt.audit.shape_statistics import answer_statistics
+from iqtt.audit.statistics import THUMBNAIL, Statistics, measure, shape_statistics, silhouettes
 from iqtt.audit.view_proofs import angles
 from iqtt.files.layout import NO_CUBE
-from iqtt.questions.draws import draw_rotations, rotation_angle_degrees
+from iqtt.questions.views import draw_rotations, rotation_angle_degrees
 from iqtt.shapes.polycube import ROTATIONS, mirror, symmetries
-from iqtt.shapes.sampling import random_shapes
 
 WHITE = np.array([255, 255, 255], np.uint8)
 
@@ -116,7 +115,12 @@ def test_numbers_of_shapes() -> None:
         [ell, twist, ell, rod],
     ]
     tables = [table(np.array(questions[:2])), table(np.array(questions[2:]))]
-    first, second = answer_statistics(tables, compare_shapes(tables))
+    found = compare_shapes(tables)
+    first, second = shape_statistics(
+        [one.truth["cubes"] for one in tables],
+        [one.class_name for one in found],
+        [one.whole for one in found],
+    )
     assert first[0].tolist() == [[3, 1.25, 2], [4, 0.5, 0], [3, 0.875, 1]]
     # A mirror image is the same class; those of the question itself do not count.
     assert first[1, :, 2].tolist() == [1, 1, 2]
@@ -126,7 +130,7 @@ def test_numbers_of_shapes() -> None:
 def test_angles_are_those_of_the_generator() -> None:
     rng = np.random.default_rng(3)
     rod = np.array([[[x, 0, 0] for x in range(5)]], np.int8)
-    shapes = np.concatenate([random_shapes(rng, 40, 5), rod.repeat(5, axis=0)])
+    shapes = np.concatenate([some_shapes(rng, 40, 5), rod.repeat(5, axis=0)])
     others = np.roll(shapes, 5, axis=0)[:, None].repeat(2, axis=1)
     views = draw_rotations(rng, (len(shapes), 4))
     # The right answer's cubes are stored in another orientation than the reference's.

@@ -1,0 +1,102 @@
+"""Write the tables of question files: images, answers, and what is known of the questions."""
+
+import hashlib
+from collections.abc import Sequence
+from typing import Any
+
+import h5py
+import numpy as np
+
+from iqtt.files.layout import ID_BYTES, NO_CUBE, question_columns, truth_attributes, truth_columns
+from iqtt.questions.specs import SplitSpec
+from iqtt.render import Rendered
+from iqtt.shapes.polycube import canonical, canonical_class, set_ids
+from scenegen.common.row_file import Table
+
+FINGERPRINTED = ("cubes", "world_from_shape", "light_position", "light_color")
+
+
+class QuestionsWriter:
+    """Writes the questions of one table in order; `close` completes the table.
+
+    Images go to one file and everything else to another, so that a test file can be handed out; for
+    training and validation both are the same file.
+    """
+
+    def __init__(
+        self,
+        images_file: h5py.File,
+        truth_file: h5py.File,
+        spec: SplitSpec,
+        split: str,
+        part: str,
+        count: int,
+        compression: str,
+    ) -> None:
+        """Create the datasets of a table with `count` questions.
+
+        Args:
+            part: "labeled" or "unlabeled" of a training file, else "".
+        """
+        self._spec, self._part = spec, part
+        self._files = (images_file, truth_file)
+        truth = truth_file.require_group(f"truth/{part}")
+        truth.attrs.update(truth_attributes(spec))
+        images = images_file.require_group(part or "/")
+        self._images = Table(images, question_columns(spec), count, compression)
+        self._truth = Table(truth, truth_columns(spec), count, compression)
+        self._answers = np.zeros(count, np.uint8)
+        self._digest = hashlib.sha256(f"{spec.public().to_json()} {split} {part}".encode())
+
+    def append(self, questions: Sequence[Rendered]) -> int:
+        """Write the next questions; return their number."""
+        for one, row in zip(questions, _truth_rows(self._spec, questions), strict=True):
+            answer = one.question.shapes.answer
+            self._answers[self._images.rows] = answer
+            for name in FINGERPRINTED:
+                self._digest.update(np.ascontiguousarray(row[name]).tobytes())
+            self._digest.update(bytes([answer]))
+            self._images.append({"questions": one.images})
+            self._truth.append(row)
+        return len(questions)
+
+    def close(self) -> None:
+        """Write the answers, except those of unlabelled questions, and the fingerprint."""
+        images_file, truth_file = self._files
+        if self._part != "unlabeled":
+            group = truth_file.require_group(self._part or "/")
+            dataset = group.create_dataset("answers", data=self._answers)
+            dataset.attrs["meaning"] = "which of images 1 to 3 shows the reference's shape, from 0"
+        for file in (images_file, truth_file):
+            file.attrs[f"fingerprint_{self._part}".rstrip("_")] = self._digest.hexdigest()
+
+
+def _truth_rows(spec: SplitSpec, rendered: Sequence[Rendered]) -> list[dict[str, Any]]:
+    """Return the values of `truth_columns` for each question."""
+    most = spec.cubes[1]
+    cubes = np.full((len(rendered), 4, most, 3), NO_CUBE, np.int8)
+    shape_ids, class_ids = np.zeros((2, len(rendered), 4, ID_BYTES), np.uint8)
+    counts = np.array([one.question.shapes.cubes.shape[1] for one in rendered])
+    for count in np.unique(counts).tolist():
+        rows = np.flatnonzero(counts == count)
+        cubes[rows, :, :count] = [rendered[i].question.shapes.cubes for i in rows.tolist()]
+        flat = cubes[rows, :, :count].reshape(-1, count, 3)
+        for ids, form in ((shape_ids, canonical), (class_ids, canonical_class)):
+            ids[rows] = set_ids(form(flat)).view(np.uint8).reshape(-1, 4, ID_BYTES)
+    return [
+        {
+            "cube_count": counts[i],
+            "cubes": cubes[i],
+            "shape_id": shape_ids[i],
+            "class_id": class_ids[i],
+            "world_from_shape": one.question.world_from_shape,
+            "light_count": one.question.light_count,
+            "light_position": one.question.light_position,
+            "light_color": one.question.light_color,
+            "distractor_kind": one.question.shapes.kinds,
+            "angle_degrees": one.question.angle_degrees,
+            "visible_pixels": one.visible_pixels,
+            "depth": one.depth,
+        }
+        for i, one in enumerate(rendered)
+    ]

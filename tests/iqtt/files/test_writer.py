@@ -1,0 +1,146 @@
+"""The files of a split: the released layout and our group, told in full and truly."""
+
+import hashlib
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from polycubes import are_congruent
+
+from iqtt.files.layout import CONVENTIONS
+from iqtt.files.make import FILES, make_split
+from iqtt.questions.distractors import make_pools
+from iqtt.questions.specs import SplitSpec
+from iqtt.render import Rendered, render_question
+
+SPEC = SplitSpec(
+    seed=3, train=7, labeled=3, val=4, test=5, cubes=(6, 7), height=24, width=32,
+    min_cube_pixels=1, lights=(1, 2),
+)  # fmt: skip
+TABLES = [  # split, part, first question; the test split's truth lies in a file of its own
+    ("train", "labeled", 0), ("train", "unlabeled", 3), ("val", "", 0), ("test", "", 0),
+]  # fmt: skip
+TRUTH = {
+    "cube_count", "cubes", "shape_id", "class_id", "world_from_shape", "light_count",
+    "light_position", "light_color", "distractor_kind", "angle_degrees", "visible_pixels",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made") / "split"
+    make_split(folder, SPEC)
+    return folder
+
+
+def everything(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:
+    found = {"/": file["/"]}
+    file.visititems(found.__setitem__)
+    return found
+
+
+def test_the_layout_is_the_released_one(folder):
+    assert sorted(path.name for path in folder.iterdir()) == sorted(FILES)
+    expected = {
+        "iqtt-train.h5": {
+            "labeled/questions": (3, 4, 24, 32, 3),
+            "labeled/answers": (3,),
+            "unlabeled/questions": (4, 4, 24, 32, 3),
+        },
+        "iqtt-val.h5": {"questions": (4, 4, 24, 32, 3), "answers": (4,)},
+        "iqtt-test.h5": {"questions": (5, 4, 24, 32, 3)},
+        "iqtt-test-answers.h5": {"answers": (5,)},
+    }
+    for name, shapes in expected.items():
+        with h5py.File(folder / name) as file:
+            datasets = {k: v for k, v in everything(file).items() if isinstance(v, h5py.Dataset)}
+            public = {k: v.shape for k, v in datasets.items() if not k.startswith("truth/")}
+            assert public == shapes
+            assert {datasets[k].dtype for k in public} == {np.dtype("uint8")}
+            for group in {"iqtt-train.h5": ("labeled", "unlabeled")}.get(name, ("",)):
+                rows = next(iter(v[0] for k, v in shapes.items() if k.startswith(group)))
+                known = {k for k in datasets if k.startswith(f"truth/{group}")}
+                if name == "iqtt-test.h5":
+                    assert not known
+                    continue
+                prefix = f"truth/{group}/" if group else "truth/"
+                assert known == {prefix + one for one in TRUTH}
+                assert {len(datasets[k]) for k in known} == {rows}
+
+
+@pytest.mark.parametrize(("split", "part", "first"), TABLES)
+def test_tables_hold_the_questions_that_are_made_one_by_one(folder, split, part, first):
+    pools, group = make_pools(SPEC), part or "/"
+    beside = folder / f"iqtt-{split}{'-answers' if split == 'test' else ''}.h5"
+    with h5py.File(folder / f"iqtt-{split}.h5") as file, h5py.File(beside) as known:
+        questions, truth = file[group]["questions"], known[f"truth/{part}"]
+        answers = None if part == "unlabeled" else known[group]["answers"]
+        for row in range(len(questions)):
+            one: Rendered = render_question(SPEC, pools, split, first + row)
+            assert questions[row].tobytes() == one.images.tobytes()
+            shapes, count = one.question.shapes.cubes, one.question.shapes.cubes.shape[1]
+            stored = {name: truth[name][row] for name in TRUTH}
+            assert stored["cube_count"] == count
+            assert np.array_equal(stored["cubes"][:, :count], shapes)
+            assert (stored["cubes"][:, count:] == -128).all()
+            assert np.array_equal(stored["distractor_kind"], one.question.shapes.kinds)
+            assert np.array_equal(stored["visible_pixels"], one.visible_pixels)
+            for name in ("world_from_shape", "light_count", "light_position", "light_color"):
+                assert np.array_equal(stored[name], getattr(one.question, name)), name
+            assert stored["angle_degrees"] == one.question.angle_degrees
+            for i, j in ((i, j) for i in range(4) for j in range(i)):
+                same = are_congruent(shapes[i], shapes[j])
+                alike = same or are_congruent(shapes[i], -shapes[j])
+                assert (stored["shape_id"][i] == stored["shape_id"][j]).all() == same
+                assert (stored["class_id"][i] == stored["class_id"][j]).all() == alike
+            answer = stored["distractor_kind"].tolist().index(-1)
+            assert answer == one.question.shapes.answer
+            assert answers is None or answers[row] == answer
+        if answers is not None:
+            assert sorted(answers[:].tolist()) == sorted(i % 3 for i in range(len(answers)))
+
+
+def test_every_number_says_what_it_is(folder):
+    for name in FILES:
+        with h5py.File(folder / name) as file:
+            for path, item in everything(file).items():
+                if isinstance(item, h5py.Dataset):
+                    assert item.attrs["meaning"], path
+                    assert path.endswith("answers") or item.attrs["unit"], path
+            for path in ("truth", "truth/labeled", "truth/unlabeled"):
+                if "questions" not in file.get(path, {}) and "cubes" in file.get(path, {}):
+                    attributes = file[path].attrs
+                    np.testing.assert_array_equal(
+                        attributes["world_from_camera"], SPEC.camera.world_from_camera
+                    )
+                    assert attributes["fov_y_degrees"] == SPEC.camera.fov_y_degrees
+                    for one in ("ambient", "reflectance", "background"):
+                        assert tuple(attributes[one]) == getattr(SPEC, one)
+                    assert attributes["attenuation"].tolist() == [0, 1]
+            root = file.attrs
+            assert root["format"] == "pix2shape-bench/iqtt"
+            assert root["conventions"] == CONVENTIONS
+            assert root["split"] == name.split("-")[1].removesuffix(".h5")
+            spec = SplitSpec.from_json(root["spec"])
+            assert spec == (SPEC if "answers" in name else SPEC.public())
+            if "questions" in file:
+                assert file["questions"].attrs["scale"] == 1 / 255
+
+
+def test_fingerprints_are_of_the_public_settings_and_of_all_that_tables_tell(folder):
+    """So they tell tables apart, join a test set to its answers, and tell no seed."""
+    found = set()
+    for split, part, _ in TABLES:
+        beside = folder / f"iqtt-{split}{'-answers' if split == 'test' else ''}.h5"
+        with h5py.File(folder / f"iqtt-{split}.h5") as file, h5py.File(beside) as known:
+            truth = known[f"truth/{part}"]
+            digest = hashlib.sha256(f"{SPEC.public().to_json()} {split} {part}".encode())
+            for row, kinds in enumerate(truth["distractor_kind"]):
+                for name in ("cubes", "world_from_shape", "light_position", "light_color"):
+                    digest.update(truth[name][row].tobytes())
+                digest.update(bytes([kinds.tolist().index(-1)]))
+            name = f"fingerprint_{part}" if part else "fingerprint"
+            assert file.attrs[name] == known.attrs[name] == digest.hexdigest()
+            found.add(digest.hexdigest())
+    assert len(found) == 4
