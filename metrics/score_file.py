@@ -26,8 +26,11 @@ from metrics.scoring.records import (
     ScoreFile,
     Submission,
 )
+from metrics.scoring.schema import parse_scores
 from metrics.submissions.problems import JsonError
+from metrics.submissions.strict_json import parse_json, read_bytes
 from scenegen.common.new_file import written_beside
+from scenegen.common.text_table import by_number
 
 MOST_BYTES = 256 * 2**20
 MOST_KEYS = 10_000  # of one object
@@ -53,8 +56,6 @@ def read_scores(path: str | Path) -> ScoreFile:
         OSError: it cannot be read.
         JsonError: it is no score file, or a broken one.
     """
-    from metrics.submissions.strict_json import read_bytes
-
     path = Path(path)
     with _naming(path):
         return replace(_parsed(read_bytes(path, MOST_BYTES)), path=path)
@@ -83,9 +84,6 @@ def _naming(path: str | Path) -> Iterator[None]:
 
 
 def _parsed(data: bytes) -> ScoreFile:
-    from metrics.scoring.schema import parse_scores
-    from metrics.submissions.strict_json import parse_json
-
     return parse_scores(parse_json(data, MOST_KEYS))
 
 
@@ -123,13 +121,7 @@ def _metrics(found: Mapping[str, Score]) -> dict[str, Any]:
 
 
 def _groups(groups: Groups) -> dict[str, Any]:
-    """Return groups in the order of the numbers that their keys begin with, then by key."""
-
-    def place(key: str) -> tuple[float, str]:
-        first = key.partition("-")[0]
-        return (float(first) if first.isdecimal() else math.inf, key)
-
-    return {key: _metrics(groups[key]) for key in sorted(groups, key=place)}
+    return {key: _metrics(groups[key]) for key in by_number(groups)}
 
 
 def _column(values: Any) -> list[Any]:

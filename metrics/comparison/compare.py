@@ -22,7 +22,7 @@ from metrics.comparison.statistics import (
     smallest_detectable_difference,
     smallest_significant_fraction,
 )
-from metrics.measures.statistics import RESAMPLES, cluster_bootstrap, cluster_means
+from metrics.measures.statistics import RESAMPLES, bootstrap_interval, cluster_means
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import ScoreFile
 from scenegen.common.text_table import distinct, plain
@@ -134,20 +134,20 @@ def compare(
 
     def difference(name: str, i: int) -> Difference:
         a, b = (column(files[k], name, orders[k]) for k in (i, 0))
-        estimate = cluster_bootstrap(a - b, clusters, seed, resamples, CONFIDENCE)
         apart = cluster_means(a - b, clusters)
+        ends = bootstrap_interval(apart[:, None], seed, resamples, CONFIDENCE)
+        low, high = (None if math.isnan(end) else float(end) for (end,) in ends)
         better = apart if metric(name).higher_is_better else -apart
         exact = files[0].task == "iqtt" and files[i].runs == files[0].runs == 1
         p_value = mcnemar_exact(a == 1.0, b == 1.0) if exact else sign_flip_test(apart, seed)
-        single = math.isnan(estimate.low)
         return Difference(
             metric=name,
             method=labels[i],
             value=float(cluster_means(a, clusters).mean()),
             reference_value=float(cluster_means(b, clusters).mean()),
-            difference=estimate.value,
-            low=None if single else estimate.low,
-            high=None if single else estimate.high,
+            difference=float(apart.mean()),
+            low=low,
+            high=high,
             test=MCNEMAR if exact else SIGN_FLIP,
             p_value=p_value,
             p_holm=p_value,

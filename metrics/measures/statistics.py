@@ -1,7 +1,6 @@
 """Confidence intervals: Wilson's for fractions, the bootstrap over scenes for all other scores."""
 
 import math
-from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
@@ -14,16 +13,6 @@ Array = NDArray[np.float64]
 RESAMPLES = 2000
 # How many draws are held at a time. This bounds the memory for any number of scenes.
 DRAWS_HELD = 1 << 16
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A mean over `n` scenes or questions with the ends of its interval, NaN where it has none."""
-
-    value: float
-    low: float
-    high: float
-    n: int
 
 
 def wilson_interval(successes: int, n: int, confidence: float = 0.95) -> tuple[float, float]:
@@ -71,25 +60,6 @@ def cluster_means(values: ArrayLike, clusters: ArrayLike) -> Array:
     return sums / counts
 
 
-def cluster_bootstrap(
-    values: ArrayLike,
-    clusters: ArrayLike,
-    seed: int,
-    resamples: int = RESAMPLES,
-    confidence: float = 0.95,
-) -> Estimate:
-    """Return the mean over clusters of their means, with the interval of `bootstrap_interval`.
-
-    Values and cluster labels are (N,). Whole clusters are resampled, because the errors of the
-    views of one scene are correlated (Davison and Hinkley 1997, section 3.8); resampling single
-    views would give intervals that are too short.
-    """
-    means = cluster_means(values, clusters)
-    require(means.ndim == 1, "values", f"shape {np.shape(values)}", "one score, (N,)")
-    low, high = bootstrap_interval(means[:, None], seed, resamples, confidence)
-    return Estimate(float(means.mean()), float(low[0]), float(high[0]), len(means))
-
-
 def bootstrap_interval(
     means: Array, seed: int, resamples: int = RESAMPLES, confidence: float = 0.95
 ) -> tuple[Array, Array]:
@@ -99,6 +69,10 @@ def bootstrap_interval(
     1987; Efron and Tibshirani 1993, equations 14.9 to 14.15. Columns share their resamples, and a
     column's interval does not depend on the others. The same seed gives the same interval. Both
     ends are NaN for a single cluster, which tells nothing about the spread.
+
+    Whole clusters are resampled, because the errors of the views of one scene are correlated
+    (Davison and Hinkley 1997, section 3.8); resampling views would give intervals that are too
+    short.
 
     The method was chosen by simulation with 200 clusters. Its coverage is 93 to 95% on skewed
     scores, like that of plain percentiles, and nearer to 95% where most clusters score 0. It falls

@@ -3,7 +3,7 @@
 `evaluate.score` is the entry: it opens the submissions and calls `rooms` or `questions`, which
 share `runs`. `image_scores` computes all scores of one image. `records` are the scores as data,
 `metric_names` is the table of all scores with units and definitions, and `schema` checks a score
-file that is read (with pydantic, imported only then).
+file that is read.
 
 Imports `metrics.measures`, `metrics.submissions`, and the readers of rooms and questions; never a
 renderer.

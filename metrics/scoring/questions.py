@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures.answers import ABSTAINED, iqtt_accuracy
-from metrics.measures.statistics import bootstrap_interval
+from metrics.measures.answers import ABSTAINED
+from metrics.measures.statistics import bootstrap_interval, wilson_interval
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import Groups, Score, ScoreFile
 from metrics.scoring.runs import (
@@ -85,12 +85,16 @@ def score_questions(
 
 
 def _accuracy(right: Array, settings: Settings) -> Score:
-    """Return the accuracy of R runs on Q questions, from (R, Q) bool."""
+    """Return the accuracy of R runs on Q questions, from (R, Q) bool.
+
+    Source: Pix2Shape, section "3D-IQTT" and Table 3: the percentage of questions answered
+    correctly, here as a fraction. Intervals take questions as independent.
+    """
     runs, questions = right.shape
     unit = metric("iqtt_accuracy").unit
     if runs == 1:
-        found = iqtt_accuracy(np.where(right[0], 0, ABSTAINED), np.zeros(questions, np.int64))
-        return Score(found.value, found.low, found.high, unit, questions)
+        count = int(np.count_nonzero(right))
+        return Score(count / questions, *wilson_interval(count, questions), unit, questions, None)
     means = right.mean(axis=0)[:, None]
     low, high = bootstrap_interval(means, settings.seed, settings.resamples, CONFIDENCE)
     std = float(right.mean(axis=1).std(ddof=1))

@@ -1,18 +1,35 @@
-"""The scores of one method on one test set, as records; `metrics.score_file` reads and writes."""
+"""The scores of one method on one test set, as records; `metrics.score_file` reads and writes.
+
+`schema` reads them with pydantic, by the types and limits that are stated here; nothing is checked
+where a record is made in memory.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from numpy.typing import NDArray
+from pydantic import ConfigDict, FailFast, Field, SkipValidation
+
+from metrics.measures.depth import Alignment
+from metrics.submissions.strict_json import LARGEST_WHOLE
 
 FORMAT_NAME = "pix2shape-bench/scores"
 FORMAT_VERSION = "1.0"
 LONGEST_NAME = 200  # characters of method, run and fingerprint
 LONGEST_TEXT = 10_000
 Task = Literal["rooms", "iqtt"]
-Groups = Mapping[str, Mapping[str, "Score"]]
+Key = TypeVar("Key")
+Value = TypeVar("Value")
+Name = Annotated[str, Field(max_length=LONGEST_NAME)]
+Text = Annotated[str, Field(max_length=LONGEST_TEXT)]
+Whole = Annotated[int, Field(strict=True, ge=0, le=LARGEST_WHOLE)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+NotNegative = Annotated[Number, Field(ge=0.0)]
+# The first error is all that is told: no need to collect the others.
+TupleOf = Annotated[tuple[Value, ...], FailFast()]
+ByKey = Annotated[Mapping[Key, Value], FailFast()]
 # Columns of `ScoreFile.items` that identify each entry; no two entries share the first one.
 ID_COLUMNS = {"rooms": ("row", "scene_index", "view_index"), "iqtt": ("question",)}
 OPTIONAL_COLUMNS = {"rooms": ("view_angle_degrees",), "iqtt": ()}
@@ -22,6 +39,10 @@ GROUPINGS = {
 }
 
 
+# Unknown keys are refused; the columns of items are arrays, which pydantic does not look into.
+_CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+
+
 @dataclass(frozen=True)
 class Score:
     """A score with its interval.
@@ -29,26 +50,27 @@ class Score:
     Attributes:
         value: mean over views within a scene, then over scenes; or over questions.
         low, high: ends of the interval at `Meta.confidence`; None where there is none.
-        unit: of all of them.
         n: scenes, or questions, that it rests on.
         std: standard deviation over training runs (n - 1 in the denominator); None for one run.
     """
 
-    value: float
-    low: float | None
-    high: float | None
-    unit: str
-    n: int
-    std: float | None = None
+    __pydantic_config__ = _CONFIG
+    value: NotNegative
+    low: Number | None
+    high: Number | None
+    unit: Text
+    n: Annotated[int, Field(strict=True, ge=1)]
+    std: NotNegative | None
 
 
 @dataclass(frozen=True)
 class Submission:
     """A file that was scored: one training run."""
 
-    path: str
-    sha256: str
-    run: str = ""
+    __pydantic_config__ = _CONFIG
+    path: Text
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    run: Name
 
 
 @dataclass(frozen=True)
@@ -63,24 +85,33 @@ class Meta:
         writer: the program and its release.
         versions: releases of the libraries that computed the scores, by package.
         seed, resamples: of the bootstrap; 0 resamples where intervals come by formula.
-        confidence: of all intervals, between 0 and 1.
+        confidence: of all intervals.
         counts: such as the number of rows, scenes, runs.
         warnings: for a person, such as why the scores are not comparable.
         chamfer_floor: Chamfer distance between two samples of the true surface at this
-            resolution, scene units; None where it was not measured.
+            resolution, scene units; None where it was not measured, and for questions.
     """
 
-    truth_fingerprint: str
-    truth_path: str
-    submissions: tuple[Submission, ...]
-    writer: str
-    versions: Mapping[str, str]
-    seed: int
-    resamples: int
-    confidence: float
-    counts: Mapping[str, int]
-    warnings: tuple[str, ...] = ()
-    chamfer_floor: float | None = None
+    __pydantic_config__ = _CONFIG
+    truth_fingerprint: Annotated[Name, Field(pattern=r"\S")]
+    truth_path: Text
+    submissions: Annotated[TupleOf[Submission], Field(min_length=1)]
+    writer: Text
+    versions: ByKey[str, Text]
+    seed: Annotated[int, Field(strict=True, ge=-LARGEST_WHOLE, le=LARGEST_WHOLE)]
+    resamples: Whole
+    confidence: Annotated[Number, Field(gt=0.0, lt=1.0)]
+    counts: ByKey[str, Whole]
+    warnings: TupleOf[Text]
+    chamfer_floor: NotNegative | None = None
+
+
+Scores = ByKey[str, Score]
+Groups = ByKey[str, Scores]
+Degrees = Annotated[str, Field(pattern="^[0-9]{1,3}$")]
+DegreeRange = Annotated[str, Field(pattern="^[0-9]{1,3}-[0-9]{1,3}$")]
+KindOfAnswers = Annotated[str, Field(pattern=r"^[^\s].{0,59}$")]
+Position = Annotated[str, Field(pattern="^[0-2]$")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +119,6 @@ class ScoreFile:
     """All scores of one method on one test set.
 
     Attributes:
-        task: "rooms" or "iqtt".
         method: its name; any text.
         comparable: whether all of the test set was scored, and nothing penalised.
         alignment: what the method says it cannot know; "none" for questions.
@@ -104,17 +134,18 @@ class ScoreFile:
         path: where it was read from; no part of the content.
     """
 
+    __pydantic_config__ = _CONFIG
     task: Task
-    method: str
-    comparable: bool
-    alignment: str
-    metrics: Mapping[str, Score]
-    items: Mapping[str, NDArray[Any]]
+    method: Name
+    comparable: Annotated[bool, Field(strict=True)]
+    alignment: Alignment
+    metrics: Annotated[Scores, Field(min_length=1)]
+    items: Mapping[str, Annotated[NDArray[Any], SkipValidation]]
     meta: Meta
-    by_view_angle: Groups = field(default_factory=dict)
-    by_distractor: Groups = field(default_factory=dict)
-    by_rotation_angle: Groups = field(default_factory=dict)
-    by_position: Groups = field(default_factory=dict)
+    by_view_angle: ByKey[Degrees, Scores] = field(default_factory=dict)
+    by_distractor: ByKey[KindOfAnswers, Scores] = field(default_factory=dict)
+    by_rotation_angle: ByKey[DegreeRange, Scores] = field(default_factory=dict)
+    by_position: ByKey[Position, Scores] = field(default_factory=dict)
     path: Path | None = None
 
     @property

@@ -1,179 +1,64 @@
-"""The content of a score file: the type and limits of every key, and that the numbers agree.
+"""The content of a score file, held against `records`, and whether its numbers agree.
 
 This module imports pydantic: import it only where a score file is really read or written.
 """
 
 import sys
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeVar
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, FailFast, Field
+from pydantic import Field
 
 from metrics.scoring.metric_names import Metric, UnknownMetricError, metric
-from metrics.scoring.records import (
-    GROUPINGS,
-    ID_COLUMNS,
-    LONGEST_NAME,
-    LONGEST_TEXT,
-    OPTIONAL_COLUMNS,
-    Meta,
-    Score,
-    ScoreFile,
-    Submission,
-    Task,
-)
-from metrics.submissions.strict_json import LARGEST_WHOLE, Record, refusal, shown, validated
+from metrics.scoring.records import GROUPINGS, ID_COLUMNS, OPTIONAL_COLUMNS, Score, ScoreFile, Task
+from metrics.submissions.strict_json import LARGEST_WHOLE, refusal, shown, validated
 
 AGREEMENT = 1e-9  # of a score with the mean of its column, relative
-Value = TypeVar("Value")
-Name = Annotated[str, Field(max_length=LONGEST_NAME)]
-Text = Annotated[str, Field(max_length=LONGEST_TEXT)]
-Whole = Annotated[int, Field(ge=0, le=LARGEST_WHOLE)]
-NotNegative = Annotated[float, Field(ge=0.0)]
-# The first error is all that is told: no need to collect the others.
-ListOf = Annotated[list[Value], FailFast()]
-ByName = Annotated[dict[str, Value], FailFast()]
 
 
-class ScoreRecord(Record):
-    """A score, as in `records.Score`."""
-
-    value: NotNegative
-    low: float | None
-    high: float | None
-    unit: Text
-    n: Annotated[int, Field(ge=1)]
-    std: NotNegative | None
-
-
-class SubmissionRecord(Record):
-    """A file that was scored."""
-
-    path: Text
-    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-    run: Name
-
-
-class MetaRecord(Record):
-    """Where the scores come from."""
-
-    truth_fingerprint: Annotated[Name, Field(pattern=r"\S")]
-    truth_path: Text
-    submissions: Annotated[ListOf[SubmissionRecord], Field(min_length=1)]
-    writer: Text
-    versions: ByName[Text]
-    seed: Annotated[int, Field(ge=-LARGEST_WHOLE, le=LARGEST_WHOLE)]
-    resamples: Whole
-    confidence: Annotated[float, Field(gt=0.0, lt=1.0)]
-    counts: ByName[Whole]
-    warnings: ListOf[Text]
-
-
-class RoomsMetaRecord(MetaRecord):
-    """Where the scores of rooms come from."""
-
-    chamfer_floor: NotNegative | None = None
-
-
-Scores = ByName[ScoreRecord]
-
-
-GroupName = TypeVar("GroupName")
-ScoresBy = Annotated[dict[GroupName, Scores], FailFast()]
-Degrees = Annotated[str, Field(pattern="^[0-9]{1,3}$")]
-DegreeRange = Annotated[str, Field(pattern="^[0-9]{1,3}-[0-9]{1,3}$")]
-KindOfAnswers = Annotated[str, Field(pattern=r"^[^\s].{0,59}$")]
-Position = Annotated[str, Field(pattern="^[0-2]$")]
-
-
-class Head(BaseModel):
+@dataclass(frozen=True)
+class Head:
     """The keys that say how to read the others."""
 
-    model_config = ConfigDict(strict=True)
     format: Literal["pix2shape-bench/scores"]
     format_version: Annotated[str, Field(pattern=r"^1\.[0-9]{1,4}$")]
     task: Task
 
 
-class FileRecord(Record, Head):
-    """A score file of either task; `items` are checked by `_column`."""
-
-    method: Name
-    comparable: bool
-    metrics: Annotated[Scores, Field(min_length=1)]
-    items: dict[str, Any]
-    meta: MetaRecord
-
-
-class RoomsRecord(FileRecord):
-    """A score file of rooms."""
-
-    alignment: Literal["none", "median_scale", "scale", "scale_shift"]
-    meta: RoomsMetaRecord
-    by_view_angle: ScoresBy[Degrees] = Field(default_factory=dict)
-
-
-class QuestionsRecord(FileRecord):
-    """A score file of questions."""
-
-    alignment: Literal["none"]
-    by_distractor: ScoresBy[KindOfAnswers] = Field(default_factory=dict)
-    by_rotation_angle: ScoresBy[DegreeRange] = Field(default_factory=dict)
-    by_position: ScoresBy[Position] = Field(default_factory=dict)
-
-
-RECORDS: dict[str, type[RoomsRecord] | type[QuestionsRecord]] = {
-    "rooms": RoomsRecord,
-    "iqtt": QuestionsRecord,
-}
-
-
 def parse_scores(content: Any) -> ScoreFile:
     """Check the parsed JSON of a score file. Raises JsonError at the first thing that is wrong."""
     task = validated(Head, content).task
-    found = validated(RECORDS[task], content)
-    runs = len(found.meta.submissions)
-    digests = [submission.sha256 for submission in found.meta.submissions]
-    if len(set(digests)) < runs:
+    body = {key: value for key, value in content.items() if key not in ("format", "format_version")}
+    foreign = {"path"}.union(*GROUPINGS.values()).difference(GROUPINGS[task])
+    for name in foreign.intersection(body):
+        raise refusal(name, "this key", "no key of this name")
+    found = validated(ScoreFile, body)
+    if task == "iqtt":
+        if found.alignment != "none":
+            raise refusal("alignment", repr(found.alignment), "'none'")
+        if "chamfer_floor" in body["meta"]:
+            raise refusal("meta.chamfer_floor", "this key", "no key of this name")
+    if len({submission.sha256 for submission in found.meta.submissions}) < found.runs:
         raise refusal("meta.submissions", "the same sha256 twice", "each submission once")
-    items = _items(found.items, task, runs)
-    most = len(items[ID_COLUMNS[task][0]])
-
-    def scores(place: str, stored: Mapping[str, ScoreRecord]) -> dict[str, Score]:
-        for name, one in stored.items():
-            _check_score(f"{place}.{name}", name, one, task, runs, most)
-        return {name: Score(**dict(one)) for name, one in stored.items()}
-
-    meta = dict(found.meta) | {
-        "submissions": tuple(Submission(**dict(one)) for one in found.meta.submissions),
-        "warnings": tuple(found.meta.warnings),
-    }
-    groups: dict[str, Any] = {
-        name: {key: scores(f"{name}.{key}", some) for key, some in getattr(found, name).items()}
-        for name in GROUPINGS[task]
-    }
-    parsed = ScoreFile(
-        task,
-        found.method,
-        found.comparable,
-        found.alignment,
-        scores("metrics", found.metrics),
-        items,
-        Meta(**meta),
-        **groups,
-    )
-    for name, stored in parsed.metrics.items():
-        _check_agreement(parsed, name, stored.value)
-    return parsed
+    found = replace(found, items=_items(found.items, task, found.runs))
+    groups = {"metrics": found.metrics}
+    for grouping in GROUPINGS[task]:
+        for key, scores in getattr(found, grouping).items():
+            groups[f"{grouping}.{key}"] = scores
+    for place, scores in groups.items():
+        for name, score in scores.items():
+            _check_score(f"{place}.{name}", name, score, found)
+    for name, score in found.metrics.items():
+        _check_agreement(found, name, score.value)
+    return found
 
 
-def _check_score(
-    place: str, name: str, score: ScoreRecord, task: str, runs: int, most: int
-) -> None:
+def _check_score(place: str, name: str, score: Score, file: ScoreFile) -> None:
     """Raise JsonError unless a score suits its name, its interval, and the number of items."""
-    known = _metric(place, name, task)
+    known, most = _metric(place, name, file.task), len(file.ids)
     if score.unit != known.unit:
         raise refusal(f"{place}.unit", repr(score.unit), repr(known.unit))
     if score.value > known.largest:
@@ -185,7 +70,7 @@ def _check_score(
     if score.low is not None and score.high is not None and score.low > score.high:
         found = f"low {score.low!r} and high {score.high!r}"
         raise refusal(place, found, "low to be at most high")
-    if score.std is not None and runs == 1:
+    if score.std is not None and file.runs == 1:
         raise refusal(f"{place}.std", shown(score.std), "null, as there is one run")
 
 

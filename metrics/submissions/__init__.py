@@ -7,5 +7,5 @@ are the conditions on values that readers and writers share, and `problems` is h
 what is wrong. Hints on known mistakes are in `hints`. Start reading with `layout`.
 
 Imports `metrics.measures`, the readers of rooms and questions, and `scenegen.common`; never a
-renderer. pydantic is imported by `strict_json` and `answers_json` alone, when a JSON file is read.
+renderer. `strict_json` and `answers_json` import pydantic: import them only where JSON is read.
 """

@@ -4,16 +4,17 @@ This module imports pydantic: import it only where a JSON file is really read.
 """
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ConfigDict
 
 from metrics.submissions.layout import ATTRIBUTES, MOST_ROWS, text_fault
 from metrics.submissions.problems import JsonError, Problem, first_ids
 from metrics.submissions.rules import Ids, answer_problems, id_problems
 from metrics.submissions.strict_json import (
-    Record,
     parse_json,
     read_bytes,
     refusal,
@@ -25,9 +26,11 @@ MOST_BYTES = 32 * 2**20
 _EXPECTED = "0, 1, 2 or -1 for each question"
 
 
-class NamedAnswers(Record):
+@dataclass(frozen=True)
+class NamedAnswers:
     """Answers with what the submission says of itself; the list or object is checked later."""
 
+    __pydantic_config__ = ConfigDict(extra="forbid")
     answers: Any
     method: str
     run: str = ""

@@ -8,12 +8,13 @@ import hashlib
 import os
 from functools import cached_property
 from pathlib import Path
-from typing import Self
+from typing import Self, cast
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.measures.depth import Alignment
 from metrics.submissions.inspection import Inspection, inspect
 from metrics.submissions.problems import Problem, first_error
 from metrics.submissions.rules import Ids, as_doubles
@@ -88,7 +89,7 @@ class RoomPredictions(Predictions):
         """Take over an open file whose ids and depth are usable."""
         assert found.ids is not None, "only usable files are opened"
         super().__init__(path, found.texts, found.ids, file)
-        self.alignment = found.texts.get("alignment", "none")
+        self.alignment = cast(Alignment, found.texts.get("alignment", "none"))
         self._datasets = found.found
         self.height, self.width = (int(s) for s in self._datasets["depth"].shape[1:3])
 

@@ -3,36 +3,32 @@
 This module imports pydantic: import it only where a JSON file is really read.
 """
 
+import functools
 import json
 import re
 import stat
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from metrics.submissions.problems import JsonError
 
 LARGEST_WHOLE = 2**53  # beyond it, JSON readers that know only doubles change whole numbers
-_FOUND = {"missing": "no such key", "extra_forbidden": "this key"}
+_FOUND = {"missing": "no such key", "unexpected_keyword_argument": "this key"}
 _EXPECTED = {
     "missing": "it to be there",
-    "extra_forbidden": "no key of this name",
-    "model_type": "an object",
+    "unexpected_keyword_argument": "no key of this name",
+    "dataclass_type": "an object",
     "dict_type": "an object",
-    "list_type": "a list",
+    "tuple_type": "a list",
 }  # for the others pydantic's own words will do
 
 
-class Record(BaseModel):
-    """A JSON object with these keys and no others, each value of exactly the declared type."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-Kind = TypeVar("Kind", bound=BaseModel)
+Kind = TypeVar("Kind")
+_adapter: Callable[[Any], TypeAdapter[Any]] = functools.cache(TypeAdapter)
 
 
 def read_bytes(path: Path, most: int) -> bytes:
@@ -85,22 +81,20 @@ def parse_json(data: bytes, most_keys: int) -> Any:
 
 
 def validated(kind: type[Kind], content: Any) -> Kind:
-    """Return parsed JSON as a record. Raises JsonError with the first thing that is wrong."""
+    """Return parsed JSON as a dataclass. Raises JsonError with the first thing that is wrong."""
     try:
-        return kind.model_validate(content)
+        record: Kind = _adapter(kind).validate_python(content)
+        return record
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]
-    way = [part for part in first["loc"] if part != "[key]"]  # which says that the key is wrong
+    # The part "[key]" only says that the key itself is wrong.
+    way = (part for part in first["loc"] if part != "[key]")
+    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part:.60}" for part in way)
     found = _FOUND.get(first["type"]) or shown(first["input"])
     expected = _EXPECTED.get(first["type"]) or first["msg"].removeprefix("Input should be ")
+    expected = expected.replace("Tuple", "List")
     expected = re.sub(r"^(\w+) should", lambda kind: f"a {kind[1].lower()} to", expected)
-    raise refusal(place_of(way), found, expected)
-
-
-def place_of(way: Iterable[str | int]) -> str:
-    """Return keys and indices as one place, such as `meta.submissions[0].path`."""
-    parts = (f"[{part}]" if isinstance(part, int) else f".{part:.60}" for part in way)
-    return "".join(parts).removeprefix(".")
+    raise refusal(place.removeprefix("."), found, expected)
 
 
 def refusal(place: str, found: str, expected: str) -> JsonError:

@@ -116,7 +116,9 @@ def test_numbers_that_are_not_finite_become_null(tmp_path):
 def test_numpy_numbers_are_taken(tmp_path):
     scores = made_scores.simple_rooms()
     old = scores.metrics["chamfer"]
-    odd = Score(np.float64(old.value), np.float32(0.0), np.float64(1.0), old.unit, np.int64(2))
+    odd = Score(
+        np.float64(old.value), np.float32(0.0), np.float64(1.0), old.unit, np.int64(2), None
+    )
     counts = {"images": np.int64(4)}
     numpy_scores = replace(
         scores,
@@ -126,7 +128,7 @@ def test_numpy_numbers_are_taken(tmp_path):
     )
     write_scores(numpy_scores, tmp_path / "s.json")
     found = read_scores(tmp_path / "s.json")
-    assert found.metrics["chamfer"] == Score(old.value, 0.0, 1.0, old.unit, 2)
+    assert found.metrics["chamfer"] == Score(old.value, 0.0, 1.0, old.unit, 2, None)
     assert found.meta.counts == {"images": 4}
 
 
@@ -136,7 +138,9 @@ def test_what_the_reader_would_refuse_is_not_written(tmp_path):
     path.write_text("before")
     wrong = {
         "a metric": replace(scores, metrics={"cd": scores.metrics["chamfer"]}),
-        "a value": replace(scores, metrics={"chamfer": Score(9.0, None, None, "scene unit", 2)}),
+        "a value": replace(
+            scores, metrics={"chamfer": Score(9.0, None, None, "scene unit", 2, None)}
+        ),
         "a name": replace(scores, method="\ud800"),
         "a task": replace(scores, task="room"),
         "no items": replace(scores, items={}),

@@ -60,7 +60,7 @@ def iqtt_scores(method, right, runs=1, questions=None, **other):
     values = np.asarray(right, np.float64)
     ids = np.arange(len(values)) if questions is None else np.asarray(questions)
     comparable = other.pop("comparable", True)
-    group = {"mirror": {"iqtt_accuracy": Score(CHANCE, None, None, "fraction", len(values))}}
+    group = {"mirror": {"iqtt_accuracy": Score(CHANCE, None, None, "fraction", len(values), None)}}
     return ScoreFile(
         task="iqtt",
         method=method,
@@ -83,7 +83,7 @@ def simple_rooms(method="mine", **other):
         "f_score_0.05": [0.5, 0.25, 1.0, 0.0],
     }
     angles = {
-        str(angle): {"chamfer": Score(0.1, None, None, metric("chamfer").unit, 2)}
+        str(angle): {"chamfer": Score(0.1, None, None, metric("chamfer").unit, 2, None)}
         for angle in (0, 35, 5)
     }
     return rooms_scores(method, columns, [0, 0, 1, 1], by_view_angle=angles, **other)

@@ -116,7 +116,8 @@ def test_labels_tell_runs_and_claims():
 
 def angles(shift):
     return {
-        str(a): {"chamfer": Score(a / 100 + shift, None, None, "scene unit", 2)} for a in (5, 35, 0)
+        str(a): {"chamfer": Score(a / 100 + shift, None, None, "scene unit", 2, None)}
+        for a in (5, 35, 0)
     }
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from metrics.measures.answers import answers_from_scores, iqtt_accuracy
+from metrics.measures.answers import answers_from_scores
 from metrics.measures.chamfer_hausdorff import NearestDistances, f_score, nearest_distances
 from metrics.measures.checks import (
     LARGEST_MAGNITUDE,
@@ -21,7 +21,7 @@ from metrics.measures.image_search import nearest_distances_on_image
 from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_depth
 from metrics.measures.statistics import (
     bootstrap_interval,
-    cluster_bootstrap,
+    cluster_means,
     normal_quantile,
     wilson_interval,
 )
@@ -38,8 +38,6 @@ def on_image(predicted, true, fov=20.0, mask=None):
 WRONG_KINDS = [["a"], [1j], [True], [[1], [1, 2]], [None], b"12", {}]
 WRONG_CLOUDS = [np.zeros(3), np.zeros((2, 2)), np.zeros((2, 3, 1)), 1.0, [["a"] * 3], None]
 WRONG_SCORES = [[[1.0, 2.0]], [1.0, 2.0, 3.0], np.zeros((2, 3, 1)), [["a", "b", "c"]]]
-WRONG_ANSWERS = [[0.0, 1.0], [True, False], ["0", "1"], [[0], [1]], [3, 0], [-2, 0], [None, 0]]
-WRONG_ANSWERS += [np.array([2**64 - 1, 0], dtype=np.uint64), [0]]
 WRONG_MASKS = [np.ones((4, 5)), np.ones(5, dtype=bool), np.ones((4, 5), dtype=np.uint8)]
 CASES = [
     *((MeasureError, "it", as_float64, bad, "it") for bad in WRONG_KINDS),
@@ -74,13 +72,10 @@ CASES = [
     (MeasureError, "depth", normals_from_depth, np.ones(4), 20.0),
     *((MeasureError, "scores", answers_from_scores, bad) for bad in WRONG_SCORES),
     (EmptyError, "scores", answers_from_scores, CLOUD[:0]),
-    *((MeasureError, "answers", iqtt_accuracy, bad, [0, 1]) for bad in WRONG_ANSWERS),
-    (MeasureError, "true answers", iqtt_accuracy, [0, 1], [0, -1]),
-    (EmptyError, "answers", iqtt_accuracy, [], []),
-    (EmptyError, "values", cluster_bootstrap, [], [], 0),
-    (MeasureError, "cluster labels", cluster_bootstrap, [1.0, 2.0], [0], 0),
-    (MeasureError, "values", cluster_bootstrap, [[1.0], [2.0]], [0, 1], 0),
-    (MeasureError, "resamples", cluster_bootstrap, [1.0, 2.0], [0, 1], 0, 99),
+    (EmptyError, "values", cluster_means, [], []),
+    (MeasureError, "cluster labels", cluster_means, [1.0, 2.0], [0]),
+    (MeasureError, "cluster means", bootstrap_interval, [1.0, 2.0], 0),
+    (MeasureError, "resamples", bootstrap_interval, [[1.0], [2.0]], 0, 99),
     (MeasureError, "cluster means", bootstrap_interval, np.zeros((0, 2)), 0),
     (EmptyError, "trials", wilson_interval, 0, 0),
     (MeasureError, "successes", wilson_interval, 3, 2),
@@ -106,7 +101,7 @@ PLACES = [
     ("prediction", (2, 3), lambda bad: nearest_distances(bad, CLOUD)),
     ("truth", (2, 3), lambda bad: nearest_distances(CLOUD, bad)),
     ("scores", (2, 3), answers_from_scores),
-    ("values", (3,), lambda bad: cluster_bootstrap(bad, [0, 1, 2], 0)),
+    ("values", (3,), lambda bad: cluster_means(bad, [0, 1, 2])),
     ("cluster means", (3, 1), lambda bad: bootstrap_interval(bad, 0)),
     ("it", (2, 3, 3), lambda bad: require_finite(bad, "it")),
 ]

@@ -12,9 +12,7 @@ from scipy.stats import binomtest, bootstrap
 
 from metrics.measures import statistics
 from metrics.measures.statistics import (
-    Estimate,
     bootstrap_interval,
-    cluster_bootstrap,
     cluster_means,
     wilson_interval,
 )
@@ -37,8 +35,8 @@ def bootstrap_coverage(name, scenes, trials, resamples, seed):
         views = np.repeat(np.arange(scenes), rng.integers(1, 5, scenes))
         # Views differ within a scene and agree with it on average.
         values = draw(rng, scenes)[views] * rng.uniform(0.5, 1.5, len(views))
-        found = cluster_bootstrap(values, views, trial, resamples)
-        hits += found.low <= mean <= found.high
+        low, high = bootstrap_interval(cluster_means(values, views)[:, None], trial, resamples)
+        hits += low[0] <= mean <= high[0]
     return hits / trials
 
 
@@ -76,17 +74,8 @@ def test_bca_agrees_with_scipy():
 def test_means_of_scenes_then_of_all():
     values, scenes = [1.0, 3.0, 10.0, 20.0, 30.0], ["b", "b", "a", "a", "a"]
     assert cluster_means(values, scenes).tolist() == [20.0, 2.0]
-    assert cluster_bootstrap(values, scenes, seed=0).value == 11.0
     two = cluster_means(np.stack([values, np.ones(5)], axis=1), scenes)
     assert two.tolist() == [[20.0, 1.0], [2.0, 1.0]]
-
-
-def test_views_of_one_scene_count_as_one():
-    values = np.random.default_rng(0).random(50)
-    once = cluster_bootstrap(values, np.arange(50), seed=4)
-    repeated = cluster_bootstrap(np.repeat(values, 7), np.repeat(np.arange(50), 7), seed=4)
-    assert repeated.n == once.n == 50
-    assert (repeated.low, repeated.high) == pytest.approx((once.low, once.high), rel=1e-12)
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(-5.0, 5.0), st.sampled_from([0.01, 3.0, 1e30]))
@@ -114,13 +103,12 @@ def test_the_size_of_the_pieces_does_not_matter(monkeypatch):
 
 
 def test_few_scenes_and_constant_scores():
-    one = cluster_bootstrap([2.0, 4.0], [7, 7], seed=0)
-    assert (one.value, one.n) == (3.0, 1)
-    assert np.isnan([one.low, one.high]).all()
+    assert np.isnan(bootstrap_interval(cluster_means([[2.0], [4.0]], [7, 7]), seed=0)).all()
     for value in (0.1, 0.7, 0.0, 1e90):
-        constant = cluster_bootstrap([value] * 30, np.arange(30), seed=0)
-        assert constant.low == constant.value == constant.high == pytest.approx(value)
-    assert cluster_bootstrap([0.0, 1.0], [0, 1], seed=0) == Estimate(0.5, 0.0, 1.0, 2)
+        constant = np.full((30, 1), value)
+        low, high = bootstrap_interval(constant, seed=0)
+        assert low == high == constant.mean() == pytest.approx(value)
+    assert bootstrap_interval([[0.0], [1.0]], seed=0) == ([0.0], [1.0])
 
 
 SCRIPT = """

@@ -176,7 +176,7 @@ for path in {[str(rooms), str(answers)]!r}:
     find_truth(open_predictions(path))
     assert validate(path) == []
 import metrics.score_file
-heavy = "mitsuba drjit torch scipy pykdtree trimesh click PIL tqdm pydantic".split()
+heavy = "mitsuba drjit torch scipy pykdtree trimesh click PIL tqdm jinja2".split()
 print(*[name for name in heavy if name in sys.modules])
 """
     done = subprocess.run(
