@@ -14,28 +14,8 @@ import h5py
 import numpy as np
 
 from metrics.measures.answers import answers_from_scores
-from metrics.submissions.layout import (
-    ATTRIBUTES,
-    DATA_FORMATS,
-    FORMAT_NAME,
-    FORMAT_VERSION,
-    ID_NAMES,
-    MOST_ROWS,
-    Attribute,
-    Dataset,
-    datasets,
-    text_fault,
-)
+from metrics.submissions import layout, rules
 from metrics.submissions.problems import Problem
-from metrics.submissions.rules import (
-    Array,
-    Ids,
-    agreement_problems,
-    answer_problems,
-    as_doubles,
-    id_problems,
-    score_problems,
-)
 from scenegen.common.errors import FileFormatError
 from scenegen.common.row_file import reading
 from scenegen.description.specs import MAX_PIXELS
@@ -61,9 +41,9 @@ class Inspection:
 
     texts: dict[str, str] = field(default_factory=dict)
     task: str | None = None
-    ids: Ids | None = None
+    ids: rules.Ids | None = None
     found: dict[str, h5py.Dataset] = field(default_factory=dict)
-    answers: Ids | None = None
+    answers: rules.Ids | None = None
     problems: list[Problem] = field(default_factory=list)
 
 
@@ -75,15 +55,15 @@ def inspect(file: h5py.File) -> Inspection:
     if result.task is None:
         return result
     count = None
-    for dataset in datasets(result.task):
+    for dataset in layout.datasets(result.task):
         item, problems = open_dataset(file, dataset, count)
         result.problems += problems
         if item is not None:
             result.found[dataset.name] = item
-            count = int(item.shape[0]) if dataset.name in ID_NAMES.values() else count
+            count = int(item.shape[0]) if dataset.name in layout.ID_NAMES.values() else count
     if result.task == "iqtt":
         _require_answers(file, result)
-    _take_ids(result, ID_NAMES[result.task])
+    _take_ids(result, layout.ID_NAMES[result.task])
     if result.task == "iqtt" and result.ids is not None:
         _take_answers(result, result.ids)
     return result
@@ -98,14 +78,14 @@ def read_texts(file: h5py.File) -> tuple[dict[str, str], list[Problem]]:
     if wrong is not None:
         return {}, [wrong]
     texts, problems = {}, []
-    for attribute in ATTRIBUTES:
+    for attribute in layout.ATTRIBUTES:
         found = _checked(file, attribute)
         if isinstance(found, Problem):
             problems.append(found)
         elif found is not None:
             texts[attribute.name] = found
     task = texts.get("task")
-    theirs = {a.name for a in ATTRIBUTES if task is None or task in a.tasks}
+    theirs = {a.name for a in layout.ATTRIBUTES if task is None or task in a.tasks}
     problems = [problem for problem in problems if problem.dataset in theirs]
     if task == "rooms" and texts.get("truth_fingerprint") == "":
         expected = "the attribute 'fingerprint' of the rooms file"
@@ -115,29 +95,30 @@ def read_texts(file: h5py.File) -> tuple[dict[str, str], list[Problem]]:
 
 def _format_problem(file: h5py.File) -> Problem | None:
     head = {}
-    for attribute in ATTRIBUTES[:2]:
+    for attribute in layout.ATTRIBUTES[:2]:
         text = _read(file, attribute.name)
         if isinstance(text, Problem):
             return text
         head[attribute.name] = text
     name, version = head["format"], head["format_version"]
     if name is None:
-        return Problem("format", "present", repr(FORMAT_NAME), "no such root attribute")
-    if name != FORMAT_NAME:
-        what = f", a file of {DATA_FORMATS[name]}, not a submission" if name in DATA_FORMATS else ""
-        return Problem("format", "value", repr(FORMAT_NAME), f"{name!r:.60}{what}")
-    major = FORMAT_VERSION.split(".", maxsplit=1)[0]
+        return Problem("format", "present", repr(layout.FORMAT_NAME), "no such root attribute")
+    if name != layout.FORMAT_NAME:
+        kind = layout.DATA_FORMATS.get(name)
+        what = f", a file of {kind}, not a submission" if kind else ""
+        return Problem("format", "value", repr(layout.FORMAT_NAME), f"{name!r:.60}{what}")
+    major = layout.FORMAT_VERSION.split(".", maxsplit=1)[0]
     if version is None or version.split(".", maxsplit=1)[0] != major:
         found = "no such root attribute" if version is None else f"version {version!r:.20}"
         return Problem("format_version", "value", f"{major}.x", found)
     return None
 
 
-def _checked(file: h5py.File, attribute: Attribute) -> str | Problem | None:
+def _checked(file: h5py.File, attribute: layout.Attribute) -> str | Problem | None:
     """Return a root attribute; None where there is none and none is needed."""
     text = _read(file, attribute.name)
     if isinstance(text, str):
-        fault = text_fault(attribute, text)
+        fault = layout.text_fault(attribute, text)
         return text if fault is None else Problem(attribute.name, "value", fault[1], fault[0])
     if text is None and attribute.required:
         return Problem(attribute.name, "present", attribute.meaning, "no such root attribute")
@@ -166,7 +147,7 @@ def _unreadable(name: str, expected: str, error: FileFormatError) -> Problem:
 
 
 def open_dataset(
-    file: h5py.File, dataset: Dataset, count: int | None
+    file: h5py.File, dataset: layout.Dataset, count: int | None
 ) -> tuple[h5py.Dataset | None, list[Problem]]:
     """Open a dataset that should have `count` rows, or any number if that is None.
 
@@ -191,7 +172,7 @@ def names(file: h5py.File) -> str:
     return ", ".join(first[:8] + ["..."] * (len(first) > 8)) or "none at all"
 
 
-def _missing(file: h5py.File, dataset: Dataset) -> Problem:
+def _missing(file: h5py.File, dataset: layout.Dataset) -> Problem:
     expected = f"{dataset.shown_shape} {dataset.kind}"
     found = f"no such dataset; found {names(file)}"
     return Problem(dataset.name, "present", expected, found)
@@ -204,7 +185,7 @@ def _link_problems(link: Any, name: str) -> list[Problem]:
     return [Problem(name, "link", "a dataset in the submission itself", f"a link{where}")]
 
 
-def _problems(item: Any, dataset: Dataset, count: int | None) -> list[Problem]:
+def _problems(item: Any, dataset: layout.Dataset, count: int | None) -> list[Problem]:
     """Return what is wrong with type, shape and storage."""
     name = dataset.name
     if not isinstance(item, h5py.Dataset):
@@ -217,15 +198,15 @@ def _problems(item: Any, dataset: Dataset, count: int | None) -> list[Problem]:
         problems.append(Problem(name, "shape", dataset.shown_shape, f"shape {item.shape}"))
     elif count is not None and shape[0] != count:
         problems.append(Problem(name, "count", f"{count}, one for each id", f"{shape[0]} rows"))
-    elif shape[0] > MOST_ROWS:
-        problems.append(Problem(name, "count", f"at most {MOST_ROWS:,}", f"{shape[0]} rows"))
+    elif shape[0] > layout.MOST_ROWS:
+        problems.append(Problem(name, "count", f"at most {layout.MOST_ROWS:,}", f"{shape[0]} rows"))
     elif math.prod(shape[1:3]) > MAX_PIXELS:
         found = f"images of {shape[1]}x{shape[2]}"
         problems.append(Problem(name, "shape", f"at most {MAX_PIXELS:,} pixels", found))
     return problems or _storage_problems(item, name)
 
 
-def _fits(shape: tuple[int, ...], dataset: Dataset) -> bool:
+def _fits(shape: tuple[int, ...], dataset: layout.Dataset) -> bool:
     """Return whether a shape has the right axes; only the first one may be empty."""
     sizes = shape[1:]
     if not shape or len(sizes) != len(dataset.shape) or 0 in sizes:
@@ -290,16 +271,16 @@ def _take_ids(result: Inspection, name: str) -> None:
         result.problems.append(Problem(name, "range", "rows of the truth", found))
         return
     ids = values.astype(np.int64)
-    result.problems += id_problems(ids, name)
+    result.problems += rules.id_problems(ids, name)
     result.ids = ids if len(ids) else None
 
 
-def _take_answers(result: Inspection, ids: Ids) -> None:
+def _take_answers(result: Inspection, ids: rules.Ids) -> None:
     """Read the answers, and those that follow from scores, which must agree."""
     before = len(result.problems)
     answers = _taken(result, "answer", "numbers", lambda item: item[()])
     if answers is not None:
-        result.problems += answer_problems(answers, ids)
+        result.problems += rules.answer_problems(answers, ids)
         answers = answers.astype(np.int64)
     from_scores = None
     if len(result.problems) == before:
@@ -307,17 +288,17 @@ def _take_answers(result: Inspection, ids: Ids) -> None:
     if len(result.problems) > before:
         return
     if answers is not None and from_scores is not None:
-        result.problems += agreement_problems(answers, from_scores, ids)
+        result.problems += rules.agreement_problems(answers, from_scores, ids)
     result.answers = from_scores if answers is None else answers
 
 
-def _answers(result: Inspection, scores: h5py.Dataset, ids: Ids) -> Ids:
+def _answers(result: Inspection, scores: h5py.Dataset, ids: rules.Ids) -> rules.Ids:
     """Return the answers (M,) of scores (M, 3), up to the first score that is not finite."""
     answers = np.empty(len(ids), np.int64)
     for start in range(0, len(ids), BLOCK_ROWS):
         rows = slice(start, start + BLOCK_ROWS)
-        block = as_doubles(scores[rows])
-        problems = score_problems(block, ids[rows])
+        block = rules.as_doubles(scores[rows])
+        problems = rules.score_problems(block, ids[rows])
         result.problems += problems
         if problems:
             break
@@ -326,8 +307,8 @@ def _answers(result: Inspection, scores: h5py.Dataset, ids: Ids) -> Ids:
 
 
 def _taken(
-    result: Inspection, name: str, expected: str, read: Callable[[h5py.Dataset], Array]
-) -> Array | None:
+    result: Inspection, name: str, expected: str, read: Callable[[h5py.Dataset], rules.Array]
+) -> rules.Array | None:
     """Return what `read` makes of a dataset; None where there is none, or it is damaged."""
     try:
         with reading(name):

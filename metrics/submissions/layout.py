@@ -124,8 +124,10 @@ def attributes(task: str) -> tuple[Attribute, ...]:
     return tuple(attribute for attribute in ATTRIBUTES if task in attribute.tasks)
 
 
-def text_fault(attribute: Attribute, text: str) -> tuple[str, str] | None:
-    """Return what was found and what was expected where a text does not suit an attribute."""
+def text_fault(attribute: Attribute, text: Any) -> tuple[str, str] | None:
+    """Return what was found and what was expected where a value does not suit an attribute."""
+    if not isinstance(text, str):
+        return f"{text!r:.40}", "a text"
     if attribute.choices and text not in attribute.choices:
         return f"{text!r:.60}", " or ".join(map(repr, attribute.choices))
     if not text.strip() and not attribute.may_be_empty:

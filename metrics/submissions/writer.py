@@ -16,27 +16,8 @@ from numpy.typing import ArrayLike
 
 from metrics.measures.answers import ABSTAINED, CANDIDATES, answers_from_scores
 from metrics.measures.depth import Alignment
-from metrics.submissions.layout import (
-    ATTRIBUTES,
-    FORMAT_NAME,
-    FORMAT_VERSION,
-    ID_NAMES,
-    attributes,
-    datasets,
-    text_fault,
-)
+from metrics.submissions import layout, rules
 from metrics.submissions.problems import PredictionError, first_error, first_ids
-from metrics.submissions.rules import (
-    EXPECTED,
-    FOUND,
-    Array,
-    agreement_problems,
-    answer_problems,
-    depth_faults,
-    faces_away,
-    normal_faults,
-    score_problems,
-)
 from scenegen.common.row_file import Table, new_file, writer_name
 from scenegen.rooms.reader import RoomsFile
 
@@ -82,7 +63,6 @@ class RoomPredictionWriter:
         self._overwrite, self._allow_partial = overwrite, allow_partial
         self._context: AbstractContextManager[None] | None = None
         self._table: Table | None = None
-        self._written = 0
 
     def __enter__(self) -> Self:
         self._context = self._opened()
@@ -111,13 +91,13 @@ class RoomPredictionWriter:
         where = f"{self._path}: row {row}"
         mask = np.isfinite(self._truth.read("depth", row))
         values = {"depth": _checked_floats(depth, mask.shape, f"{where}: depth")}
-        _refuse(depth_faults(values["depth"], mask), f"{where}: depth")
-        if self._texts["alignment"] != "scale_shift" and faces_away(values["depth"], mask):
+        _refuse(rules.depth_faults(values["depth"], mask), f"{where}: depth")
+        if self._texts["alignment"] != "scale_shift" and rules.faces_away(values["depth"], mask):
             expected = "planar depth, which is positive in front of the camera"
             raise PredictionError(f"{where}: depth", "most of it at or below 0", expected)
         if normal is not None:
             values["normal"] = _checked_floats(normal, (*mask.shape, 3), f"{where}: normal")
-            _refuse(normal_faults(values["normal"], mask), f"{where}: normal")
+            _refuse(rules.normal_faults(values["normal"], mask), f"{where}: normal")
         if self._table is None:
             self._table = self._new_table(values)
         with_normal = "normal" in self._columns
@@ -125,9 +105,8 @@ class RoomPredictionWriter:
             found, expected = ("none", "one") if with_normal else ("one", "none")
             raise PredictionError(f"{where}: normal", found, f"{expected}, as in the first row")
         self._table.append(values)
-        self._order[self._written] = row
+        self._rows.append(row)
         self._given[row] = True
-        self._written += 1
 
     @contextmanager
     def _opened(self) -> Iterator[None]:
@@ -135,15 +114,15 @@ class RoomPredictionWriter:
             RoomsFile(self._truth_path) as self._truth,
             new_file(self._path, self._overwrite) as self._file,
         ):
-            count = len(self._truth)
-            self._given, self._order = np.zeros(count, np.bool_), np.zeros(count, np.int64)
-            self._written, self._table = 0, None
+            self._given = np.zeros(len(self._truth), np.bool_)
+            self._rows: list[int] = []
+            self._table = None
             yield
             self._finish(self._file)
 
-    def _new_table(self, values: Mapping[str, Array]) -> Table:
+    def _new_table(self, values: Mapping[str, rules.Array]) -> Table:
         height, width = values["depth"].shape
-        columns = [d.column(height, width) for d in datasets("rooms") if d.name in values]
+        columns = [d.column(height, width) for d in layout.datasets("rooms") if d.name in values]
         self._columns = [column.name for column in columns]
         return Table(self._file, columns, len(self._given))
 
@@ -159,18 +138,18 @@ class RoomPredictionWriter:
 
     def _finish(self, file: h5py.File) -> None:
         missing = np.flatnonzero(~self._given)
-        if self._written == 0 or (len(missing) and not self._allow_partial):
+        if not self._rows or (len(missing) and not self._allow_partial):
             shown = ", ".join(map(str, first_ids(missing)))
             raise PredictionError(
                 f"{self._path}: row",
                 f"{len(missing)} of {len(self._given)} missing, such as {shown}",
-                "every one" if self._written else "at least one",
+                "every one" if self._rows else "at least one",
                 "nothing was written",
             )
         for name in self._columns if len(missing) else ():
-            file[name].resize(self._written, axis=0)
+            file[name].resize(len(self._rows), axis=0)
         file.attrs.update({**self._texts, "truth_fingerprint": self._truth.fingerprint})
-        _write_columns(file, "rooms", {ID_NAMES["rooms"]: self._order[: self._written]})
+        _write_columns(file, "rooms", {layout.ID_NAMES["rooms"]: np.array(self._rows)})
 
 
 def write_answers(
@@ -208,32 +187,32 @@ def write_answers(
     values = _checked_answers(answer, scores, count, f"{path}")
     with new_file(path, overwrite) as file:
         file.attrs.update({**texts, "truth_fingerprint": fingerprint})
-        _write_columns(file, "iqtt", {ID_NAMES["iqtt"]: np.arange(count), **values})
+        _write_columns(file, "iqtt", {layout.ID_NAMES["iqtt"]: np.arange(count), **values})
 
 
 def _checked_answers(
     answer: ArrayLike | None, scores: ArrayLike | None, count: int, where: str
-) -> dict[str, Array]:
+) -> dict[str, rules.Array]:
     """Return the datasets to write. Raises PredictionError."""
     ids = np.arange(count)
-    values: dict[str, Array] = {}
+    values: dict[str, rules.Array] = {}
     problems = []
     if scores is not None:
         shape = (count, CANDIDATES)
         values["scores"] = _checked_floats(scores, shape, f"{where}: scores", np.float64)
-        problems += score_problems(values["scores"], ids)
+        problems += rules.score_problems(values["scores"], ids)
     if answer is not None:
         found = values["answer"] = np.asarray(answer)
         if found.shape != (count,) or found.dtype.kind not in "iu":
             expected = f"integers of shape ({count},), {ABSTAINED} to {CANDIDATES - 1}"
             what = f"{found.dtype} of shape {found.shape}"
             raise PredictionError(f"{where}: answer", what, expected)
-        problems += answer_problems(found, ids)
+        problems += rules.answer_problems(found, ids)
     if not values:
         raise PredictionError(where, "neither answer nor scores", "either")
     if len(values) == 2 and not problems:
         from_scores = answers_from_scores(values["scores"])
-        problems = agreement_problems(values["answer"].astype(np.int64), from_scores, ids)
+        problems = rules.agreement_problems(values["answer"].astype(np.int64), from_scores, ids)
     if problems:
         raise first_error(PredictionError, where, problems)
     return values
@@ -260,23 +239,20 @@ def _check_elsewhere(path: str | Path, truth: str | Path) -> None:
 
 def _checked_texts(task: str, given: Mapping[str, str]) -> dict[str, str]:
     """Return the root attributes, except for the fingerprint. Raises PredictionError."""
-    for attribute in attributes(task):
+    for attribute in layout.attributes(task):
         if attribute.name not in given:
             continue
-        text = given[attribute.name]
-        fault = (
-            text_fault(attribute, text) if isinstance(text, str) else (f"{text!r:.40}", "a text")
-        )
+        fault = layout.text_fault(attribute, given[attribute.name])
         if fault is not None:
             raise PredictionError(attribute.name, *fault)
-    ours = {"format": FORMAT_NAME, "format_version": FORMAT_VERSION, "task": task}
+    ours = {"format": layout.FORMAT_NAME, "format_version": layout.FORMAT_VERSION, "task": task}
     texts = {**ours, "writer": writer_name(), **given}
-    return {a.name: texts[a.name] for a in ATTRIBUTES if a.name in texts}
+    return {a.name: texts[a.name] for a in layout.ATTRIBUTES if a.name in texts}
 
 
 def _checked_floats(
     values: ArrayLike, shape: tuple[int, ...], where: str, dtype: type[Any] = np.float32
-) -> Array:
+) -> rules.Array:
     """Return the array as it is stored. Raises PredictionError for another shape, or no floats."""
     try:
         array = np.asarray(values)
@@ -291,16 +267,16 @@ def _checked_floats(
         return array.astype(dtype)
 
 
-def _refuse(faults: Mapping[str, Array], where: str) -> None:
+def _refuse(faults: Mapping[str, rules.Array], where: str) -> None:
     for rule, at in faults.items():
         first = tuple(int(i) for i in np.argwhere(at)[0])
-        found = f"{FOUND[rule]} at {np.count_nonzero(at)} pixels, the first at {first}"
-        raise PredictionError(where, found, EXPECTED[rule])
+        found = f"{rules.FOUND[rule]} at {np.count_nonzero(at)} pixels, the first at {first}"
+        raise PredictionError(where, found, rules.EXPECTED[rule])
 
 
-def _write_columns(file: h5py.File, task: str, values: Mapping[str, Array]) -> None:
+def _write_columns(file: h5py.File, task: str, values: Mapping[str, rules.Array]) -> None:
     """Write datasets that are small enough to be kept in memory."""
-    for dataset in datasets(task):
+    for dataset in layout.datasets(task):
         if dataset.name in values:
             data = values[dataset.name].astype(dataset.dtype)
             stored = file.create_dataset(
