@@ -109,26 +109,21 @@ def test_the_smallest_significant_fraction_is_the_first_that_is():
 
 NAN = np.nan
 NONE = np.zeros(0, dtype=bool)
+WRONG_DIFFERENCES = ((EmptyError, []), (NonFiniteError, [1.0, NAN]), (MeasureError, [[1.0, 2.0]]))
 
 
 @pytest.mark.parametrize(
     ("kind", "where", "test", "arguments"),
     [
-        *((EmptyError, "differences", test, [[], 0]) for test in (sign_flip_test, detectable)),
         *(
-            (NonFiniteError, "differences", t, [[1.0, NAN], 0])
-            for t in (sign_flip_test, detectable)
-        ),
-        *(
-            (MeasureError, "differences", t, [[[1.0, 2.0]], 0])
-            for t in (sign_flip_test, detectable)
+            (kind, "differences", test, [values, 0])
+            for test in (sign_flip_test, detectable)
+            for kind, values in WRONG_DIFFERENCES
         ),
         (MeasureError, "differences", detectable, [[1.0], 0]),
         (MeasureError, "power", smallest_detectable_difference, [[1.0, 2.0], 0.05, 1.0]),
-        *(
-            (MeasureError, "answers", mcnemar_exact, [bad, [True, False]])
-            for bad in ([0, 1], [True])
-        ),
+        (MeasureError, "answers", mcnemar_exact, [[0, 1], [True, False]]),
+        (MeasureError, "answers", mcnemar_exact, [[True], [True, False]]),
         (EmptyError, "answers", mcnemar_exact, [NONE, NONE]),
         *((MeasureError, "p-values", holm, [bad]) for bad in ([1.1], [-0.1], [NAN], [[0.5]])),
         (EmptyError, "questions", smallest_significant_fraction, [0]),

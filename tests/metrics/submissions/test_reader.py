@@ -9,7 +9,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from h5_edits import attribute, damaged_chunk, put
+from h5_edits import attribute, damaged_chunk, gone, put
+from refusals import refused
 from submissions import as_json, edited, good_answers, good_rooms
 
 from metrics.submissions.inspection import inspect
@@ -24,6 +25,7 @@ from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
 ROOT = Path(__file__).parents[3]
+HEAD = {"format": "pix2shape-bench/predictions", "format_version": "1.0", "method": "mine"}
 
 
 @pytest.fixture
@@ -33,14 +35,9 @@ def by_hand(truths, tmp_path):
     def write(**datasets):
         path = tmp_path / "hand.h5"
         with RoomsFile(truths.rooms) as rooms, h5py.File(path, "w") as file:
-            file.attrs["format"] = "pix2shape-bench/predictions"
-            file.attrs["format_version"] = "1.0"
-            file.attrs["task"] = "rooms"
-            file.attrs["method"] = "mine"
-            file.attrs["truth_fingerprint"] = rooms.fingerprint
+            file.attrs.update(HEAD, task="rooms", truth_fingerprint=rooms.fingerprint)
             depth = rooms.read("depth", slice(None))
-            made = {"row": np.arange(8), "depth": depth, **datasets}
-            for name, values in made.items():
+            for name, values in {"row": np.arange(8), "depth": depth, **datasets}.items():
                 file[name] = values
         return path
 
@@ -50,9 +47,8 @@ def by_hand(truths, tmp_path):
 def test_the_least_that_is_needed(by_hand, truths):
     with open_predictions(by_hand()) as found, RoomsFile(truths.rooms) as rooms:
         assert isinstance(found, RoomPredictions)
-        assert (found.task, found.method, found.run, found.notes) == ("rooms", "mine", "", "")
-        assert found.alignment == "none"
-        assert found.truth_path == ""
+        assert (found.task, found.method, found.alignment) == ("rooms", "mine", "none")
+        assert found.run == found.notes == found.truth_path == ""
         assert found.truth_fingerprint == rooms.fingerprint
         assert found.rows.dtype == np.int64
         assert found.rows.tolist() == list(range(8))
@@ -62,19 +58,21 @@ def test_the_least_that_is_needed(by_hand, truths):
         depth = found.depth(3)
         assert (depth.dtype, depth.shape) == (np.float64, (32, 32))
         assert np.array_equal(depth, rooms.read("depth", 3))
-        with pytest.raises(FileFormatError) as caught:
+        with refused(FileFormatError, "hand.h5: normal"):
             found.normal(0)
-        assert caught.value.where.endswith("hand.h5: normal")
         assert match_problems(found, truths.rooms, rooms.fingerprint, len(rooms)) == []
         assert size_problems(found, rooms) == []
 
 
 @pytest.mark.parametrize("dtype", ["f2", "f4", "f8", ">f4", ">f8"])
-def test_any_floats(by_hand, dtype):
-    values = np.linspace(1, 2, 8 * 32 * 32).reshape(8, 32, 32).astype(dtype)
-    with open_predictions(by_hand(depth=values)) as found:
-        assert found.depth(5).dtype == np.float64
-        assert np.array_equal(found.depth(5), values[5].astype("f8"))
+def test_any_floats_and_normals_of_any_length(by_hand, dtype):
+    depth = np.linspace(1, 2, 8 * 32 * 32).reshape(8, 32, 32).astype(dtype)
+    normal = np.full((8, 32, 32, 3), 7.0, dtype)
+    with open_predictions(by_hand(depth=depth, normal=normal)) as found:
+        assert found.has_normals
+        for read, values in ((found.depth(5), depth[5]), (found.normal(2), normal[2])):
+            assert read.dtype == np.float64
+            assert np.array_equal(read, values.astype("f8"))
 
 
 @pytest.mark.parametrize("dtype", ["u1", "i2", ">i4", "u8"])
@@ -84,13 +82,6 @@ def test_any_integers_in_any_order(by_hand, dtype):
     with open_predictions(by_hand(row=rows.astype(dtype), depth=depth)) as found:
         assert found.rows.tolist() == rows.tolist()
         assert [found.depth(i)[0, 0] for i in range(8)] == rows.tolist()
-
-
-def test_normals_of_any_length(by_hand):
-    normal = np.full((8, 32, 32, 3), 7.0)
-    with open_predictions(by_hand(normal=normal)) as found:
-        assert found.has_normals
-        assert np.array_equal(found.normal(2), normal[2])
 
 
 def test_texts_of_any_kind(by_hand):
@@ -115,13 +106,6 @@ def test_opening_reads_no_pixels(truths, tmp_path):
         assert caught.value.where.startswith(f"{path}: depth, row 3")
 
 
-def test_values_that_are_not_finite_are_handed_out(truths, tmp_path):
-    """Whether they are penalised or refused is for scoring to say."""
-    path = edited(put("depth", (1, 2, 3), np.nan))(tmp_path, truths.rooms)
-    with open_predictions(path) as found:
-        assert np.isnan(found.depth(1)[2, 3])
-
-
 def test_chunks_of_many_rows_are_unpacked_once(by_hand):
     """h5py's own choice of chunks spans rows; row by row each would be unpacked many times."""
     path = by_hand()
@@ -133,12 +117,6 @@ def test_chunks_of_many_rows_are_unpacked_once(by_hand):
         stored = inspect(file).found["depth"]
         assert stored.id.get_access_plist().get_chunk_cache()[1] == 8 * 800 * 600 * 4
         assert np.array_equal(stored[7], values[7])
-
-
-def test_sha256_is_that_of_the_file(by_hand):
-    path = by_hand()
-    with open_predictions(path) as found:
-        assert found.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def test_a_refused_file_is_closed(truths, tmp_path):
@@ -155,13 +133,9 @@ def test_a_refused_file_is_closed(truths, tmp_path):
 
 
 def test_the_first_of_many_problems_is_told(truths, tmp_path):
-    path = edited(lambda file: [file.attrs.pop("method"), file.pop("depth")])(
-        tmp_path, truths.rooms
-    )
-    with pytest.raises(FileFormatError) as caught:
+    path = edited(gone("method", "depth"))(tmp_path, truths.rooms)
+    with refused(FileFormatError, f"{path}: method", hint="and 1 more problem"):
         open_predictions(path)
-    assert caught.value.where == f"{path}: method"
-    assert caught.value.hint == "and 1 more problem"
 
 
 def test_reading_loads_little(truths, tmp_path):
@@ -188,8 +162,9 @@ print(*[name for name in heavy if name in sys.modules])
 # ---- answers ----
 
 
-def test_answers_and_scores(truths, tmp_path):
-    with open_predictions(good_answers(tmp_path, truths.iqtt)) as found:
+def test_answers_and_scores_whatever_the_name(truths, tmp_path):
+    path = good_answers(tmp_path, truths.iqtt).rename(tmp_path / "answers.json")
+    with open_predictions(path) as found:
         assert isinstance(found, QuestionPredictions)
         assert found.task == "iqtt"
         assert found.rows.tolist() == list(range(6))
@@ -227,20 +202,15 @@ def test_scores_are_read_in_blocks(count, tmp_path):
     scores = rng.random((count, 3))
     path = tmp_path / "many.h5"
     with h5py.File(path, "w") as file:
-        file.attrs.update(
-            format="pix2shape-bench/predictions", format_version="1.0", task="iqtt",
-            method="m", truth_fingerprint="",
-        )  # fmt: skip
+        file.attrs.update(HEAD, task="iqtt", truth_fingerprint="")
         file["question"], file["scores"] = np.arange(count), scores
     with open_predictions(path) as found:
         assert np.array_equal(found.answers, scores.argmax(axis=1))
         assert found.truth_fingerprint is None
     with h5py.File(path, "r+") as file:
         file["scores"][count - 1, 1] = np.nan
-    with pytest.raises(FileFormatError) as caught:
+    with refused(FileFormatError, f"{path}: scores", found=f"(ids {count - 1})"):
         open_predictions(path)
-    assert caught.value.where == f"{path}: scores"
-    assert caught.value.found.endswith(f"(ids {count - 1})")
 
 
 @pytest.mark.parametrize(
@@ -273,12 +243,6 @@ def test_json_under_any_name(tmp_path, name, start):
         assert found.answers.tolist() == [0, 1]
 
 
-def test_hdf5_under_the_name_of_json(truths, tmp_path):
-    path = good_answers(tmp_path, truths.iqtt).rename(tmp_path / "answers.json")
-    with open_predictions(path) as found:
-        assert found.method == "guess"
-
-
 # ---- where the truth lies ----
 
 
@@ -308,10 +272,8 @@ def test_truth_as_given(truths, tmp_path):
         assert find_truth(found) == truths.rooms
         assert find_truth(found, truths.iqtt) == truths.iqtt
         for nothing in (tmp_path / "none.h5", tmp_path):
-            with pytest.raises(FileFormatError) as caught:
+            with refused(FileFormatError, ": truth", found=str(nothing)):
                 find_truth(found, nothing)
-            assert caught.value.where.endswith(": truth")
-            assert str(nothing) in caught.value.found
 
 
 def test_answers_beside_the_test_file_are_the_truth(truths, tmp_path):
@@ -326,8 +288,6 @@ def test_answers_beside_the_test_file_are_the_truth(truths, tmp_path):
 
 @pytest.mark.parametrize("path", ["x" * 5000, "~/rooms.h5", ".", "/"])
 def test_a_strange_path_is_not_found(truths, tmp_path, path):
-    edit = edited(attribute("truth_path", path))
-    with open_predictions(edit(tmp_path, truths.rooms)) as found:
-        with pytest.raises(FileFormatError) as caught:
-            find_truth(found)
-        assert caught.value.where.endswith(": truth")
+    path = edited(attribute("truth_path", path))(tmp_path, truths.rooms)
+    with open_predictions(path) as found, refused(FileFormatError, ": truth"):
+        find_truth(found)
