@@ -62,16 +62,12 @@ class PaperTable:
 
 
 _SHAPES, _SHAPENET, _MULTIPLE = "Shape scenes", "ShapeNet scenes", "Multiple-shape scenes"
+_OTHERS = ("CNN", "Siamese CNN", "Human Evaluation", "Persp. Transf. Nets", "Rezende et al.")
 _ANGLES = (5, 35, 55, 80)
 
 
 def _table_1() -> Iterator[Figure]:
-    columns = (
-        ("Pix2Shape", _SHAPES),
-        ("Pix2Shape", _SHAPENET),
-        ("PTN", _SHAPES),
-        ("PTN", _SHAPENET),
-    )
+    columns = [(method, data) for method in ("Pix2Shape", "PTN") for data in (_SHAPES, _SHAPENET)]
     rows = {
         "chamfer": "0.103 0.133 0.145 0.181",
         "hausdorff": "0.191 0.215 0.229 0.254",
@@ -97,21 +93,13 @@ def _table_2() -> Iterator[Figure]:
 
 
 def _table_3() -> Iterator[Figure]:
-    methods = (
-        "CNN",
-        "Siamese CNN",
-        "Human Evaluation",
-        "Persp. Transf. Nets",
-        "Rezende et al.",
-        "Pix2Shape",
-    )
     rows = {
         0: "0.3385 0.3698 0.7329±0.148 0.5344 0.5202 0.5519±0.013",
         200: "0.3350 0.3610 - 0.6011 0.6155 0.6312±0.031",
         1000: "0.3392 0.3701 - 0.6645 0.7001 0.7012±0.021",
     }
     for labels, texts in rows.items():
-        for method, printed in zip(methods, texts.split(), strict=True):
+        for method, printed in zip((*_OTHERS, "Pix2Shape"), texts.split(), strict=True):
             text, _, spread = printed.partition("±")
             if text != "-":
                 yield Figure(3, method, "3D-IQTT", "iqtt_accuracy", text, spread, labels=labels)

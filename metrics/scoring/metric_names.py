@@ -13,20 +13,16 @@ from scenegen.common.errors import SceneGenError
 HEADLINE = {"rooms": ("chamfer", "hausdorff", "mse_depth"), "iqtt": ("iqtt_accuracy",)}
 F_SCORE = "f_score_<threshold>"
 DERIVED = "derived_"
+_NEAREST = "the predicted depth of an image nearest to the true depth in least squares."
 _ALIGNED = {
     "_after_median_scale": (
         "scaled to the truth's median",
         "the same after the predicted depth was scaled to the true median depth of its image.",
     ),
-    "_after_scale": (
-        "scaled",
-        "the same after the scale, at least 0, that brings the predicted depth of an image nearest"
-        " to the true depth in least squares.",
-    ),
+    "_after_scale": ("scaled", f"the same after the scale, at least 0, that brings {_NEAREST}"),
     "_after_scale_shift": (
         "scaled and shifted",
-        "the same after the scale, at least 0, and the shift that bring the predicted depth of an"
-        " image nearest to the true depth in least squares.",
+        f"the same after the scale, at least 0, and the shift that bring {_NEAREST}",
     ),
 }
 
@@ -119,11 +115,12 @@ _NORMALS = (
              f"fraction of these angles below {limit} degrees.")
       for limit in ("11.25", "22.5", "30")),
 )  # fmt: skip
-_ANSWERS = (
-    _share("iqtt_accuracy", "IQTT accuracy",
-           "1 where the right answer is given, else 0, abstentions included; chance is 1/3.",
-           "iqtt"),
-)  # fmt: skip
+_ACCURACY = _share(
+    "iqtt_accuracy",
+    "IQTT accuracy",
+    "1 where the right answer is given, else 0, abstentions included; chance is 1/3.",
+    "iqtt",
+)
 
 
 def _aligned(metric: Metric, ending: str) -> Metric:
@@ -154,7 +151,7 @@ ALL: dict[str, Metric] = {
         *(_aligned(metric, ending) for ending in _ALIGNED for metric in _DEPTH),
         *_NORMALS,
         *(_derived(metric) for metric in _NORMALS),
-        *_ANSWERS,
+        _ACCURACY,
     )
 }
 _PLACES = {name: place for place, name in enumerate(ALL)}
@@ -208,7 +205,7 @@ def markdown_table() -> str:
         *forms,
         *map(_cells, _NORMALS),
         (f"{DERIVED}<normal score>", "the same", "the same", derived),
-        *map(_cells, _ANSWERS),
+        _cells(_ACCURACY),
     ]
     lines = [f"| `{name}` | {' | '.join(cells)} |" for name, *cells in rows]
     return "\n".join(["| name | unit | better | definition |", "| --- | --- | --- | --- |", *lines])

@@ -7,7 +7,6 @@ import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
@@ -17,12 +16,7 @@ from numpy.typing import NDArray
 from metrics.measures.checks import NoDirectionError, NonFiniteError
 from metrics.measures.depth import Alignment
 from metrics.measures.statistics import bootstrap_interval, cluster_means
-from metrics.scoring.image_scores import (
-    ALIGNMENTS,
-    TrueView,
-    chamfer_floor,
-    score_view,
-)
+from metrics.scoring.image_scores import ALIGNMENTS, TrueView, chamfer_floor, score_view
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import Score, ScoreFile
 from metrics.scoring.runs import (
@@ -41,6 +35,9 @@ from metrics.submissions.reader import RoomPredictions, open_predictions
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
+# What a process must know to score rows, small, as it is sent along with each chunk: the paths of
+# the submissions, that of the truth, and the alignments after which depth is scored.
+Job = tuple[tuple[Path, ...], Path, tuple[Alignment, ...]]
 CHUNK = 8  # rows scored between two reports of progress
 FEW = 32  # rows that are not worth starting processes for
 FLOOR_ROWS = 16  # rows on which the noise floor is measured
@@ -124,7 +121,7 @@ def score_rows(
     of length 0, what is wrong; such values have the worst score.
     """
     alignments = tuple(a for a in get_args(Alignment) if a in (*ALIGNMENTS, alignment))
-    job = _Job(tuple(map(str, paths)), str(truth_path), alignments)
+    job = tuple(paths), truth_path, alignments
     chunks = [rows[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
     table: list[list[dict[str, float]]] = []
     bad: dict[int, ScoringError] = {}
@@ -150,23 +147,16 @@ def view_angles(scene_index: Array, view_index: Array, world_from_camera: Array)
     return np.where(np.isfinite(turned), np.rint(turned), -1).astype(np.int64)
 
 
-@dataclass(frozen=True)
-class _Job:
-    """What a process must know to score rows; small, as it is sent along with each chunk."""
-
-    paths: tuple[str, ...]
-    truth_path: str
-    alignments: tuple[Alignment, ...]
-
-
 class _RowScorer:
     """The files of a job, open in one process, and where each row lies in each submission."""
 
-    def __init__(self, job: _Job) -> None:
-        self._alignments = job.alignments
+    def __init__(
+        self, paths: tuple[Path, ...], truth_path: Path, alignments: tuple[Alignment, ...]
+    ) -> None:
+        self._alignments = alignments
         with ExitStack() as opening:  # closes what is open already where a later file is refused
-            self._truth = opening.enter_context(RoomsFile(job.truth_path))
-            self._files = [opening.enter_context(open_predictions(path)) for path in job.paths]
+            self._truth = opening.enter_context(RoomsFile(truth_path))
+            self._files = [opening.enter_context(open_predictions(path)) for path in paths]
             self._stack = opening.pop_all()
         self._entries = [{row: i for i, row in enumerate(f.rows.tolist())} for f in self._files]
 
@@ -200,11 +190,11 @@ class _RowScorer:
         return table, bad
 
 
-def _in_processes(job: _Job, chunks: Sequence[Array], processes: int | None) -> Iterator[Any]:
+def _in_processes(job: Job, chunks: Sequence[Array], processes: int | None) -> Iterator[Any]:
     """Yield what `_RowScorer.score` gives for the chunks, in their order."""
     count = min(processes or os.cpu_count() or 1, len(chunks))
     if count == 1 or (processes is None and len(chunks) * CHUNK <= FEW):
-        with closing(_RowScorer(job)) as scorer:
+        with closing(_RowScorer(*job)) as scorer:
             yield from map(scorer.score, chunks)
         return
     # Spawned, as forked processes would share open files and threads' locks.
@@ -212,14 +202,14 @@ def _in_processes(job: _Job, chunks: Sequence[Array], processes: int | None) -> 
         yield from pool.map(functools.partial(_score_in_worker, job), chunks)
 
 
-def _score_in_worker(job: _Job, rows: Array) -> Any:
+def _score_in_worker(job: Job, rows: Array) -> Any:
     return _scorer_of_this_process(job).score(rows)
 
 
 @functools.cache
-def _scorer_of_this_process(job: _Job) -> _RowScorer:
+def _scorer_of_this_process(job: Job) -> _RowScorer:
     """Open the files of a job when its first chunk comes; a worker process has only one job."""
-    scorer = _RowScorer(job)
+    scorer = _RowScorer(*job)
     atexit.register(scorer.close)
     return scorer
 

@@ -4,7 +4,7 @@ import importlib.metadata
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,12 @@ from metrics.scoring.image_scores import NonFinite
 from metrics.scoring.records import Meta, Submission
 from metrics.submissions.missing_rows import match_problems
 from metrics.submissions.problems import Problem, first_error
-from metrics.submissions.reader import QuestionPredictions, RoomPredictions
+from metrics.submissions.reader import Predictions
 from scenegen.common.errors import SceneGenError
 from scenegen.common.row_file import writer_name
 
 Array = NDArray[Any]
 Progress = Callable[[int], Any]
-Kind = TypeVar("Kind", RoomPredictions, QuestionPredictions)
 CONFIDENCE = 0.95
 LIBRARIES = ("numpy", "pykdtree", "scipy")  # whose releases scores may depend on
 
@@ -49,7 +48,11 @@ class Settings:
 
 
 def matched_rows(
-    files: Sequence[Kind], truth_path: Path, fingerprint: str | None, count: int, partial: bool
+    files: Sequence[Predictions],
+    truth_path: Path,
+    fingerprint: str | None,
+    count: int,
+    partial: bool,
 ) -> tuple[Array, bool]:
     """Return the rows of the truth that all files answer, and whether those are all rows.
 
@@ -91,7 +94,7 @@ def warnings_of(whole: bool, scored: int, count: int, penalised: Sequence[int]) 
 
 
 def meta_of(
-    files: Sequence[RoomPredictions | QuestionPredictions],
+    files: Sequence[Predictions],
     truth_path: Path,
     fingerprint: str,
     settings: Settings,

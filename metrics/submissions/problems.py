@@ -3,11 +3,10 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import Self, TypeVar
+from typing import Self
 
 from scenegen.common.errors import SceneGenError
 
-Error = TypeVar("Error", bound=SceneGenError)
 MOST_IDS = 5
 HINT = "hint"
 
@@ -60,12 +59,12 @@ class Problem:
 
 
 def first_error(
-    kind: type[Error], place: object, problems: Sequence[Problem], advice: str = ""
-) -> Error:
+    kind: type[SceneGenError], place: object, problems: Sequence[Problem], advice: str = ""
+) -> SceneGenError:
     """Return the first problem as an error of this kind; its hint says how many more there are."""
     first, more = problems[0], len(problems) - 1
-    hints = [f"and {more} more problem{'s' * (more > 1)}"] if more else []
-    hint = "; ".join([*hints, *([advice] if advice else [])])
+    others = f"and {more} more problem{'s' * (more > 1)}" if more else ""
+    hint = "; ".join(filter(None, (others, advice)))
     return kind(f"{place}: {first.dataset}", first.found_in_rows, first.expected, hint)
 
 

@@ -212,15 +212,13 @@ def find_truth(predictions: Predictions, given: str | Path | None = None) -> Pat
     places = [predictions.path.parent / recorded, recorded] if given is None else [Path(given)]
     for place in places:
         if os.path.isfile(place):
-            return _with_answers(place) if predictions.task == "iqtt" else place
+            if predictions.task == "rooms":
+                return place
+            from iqtt.files.reader import answers_beside
+
+            return answers_beside(place) or place
     looked = " and ".join(dict.fromkeys(str(place) for place in places))
     raise FileFormatError(f"{predictions.path}: truth", f"nothing at {looked}", "a file", advice)
-
-
-def _with_answers(path: Path) -> Path:
-    from iqtt.files.reader import answers_beside
-
-    return answers_beside(path) or path
 
 
 def _looks_like_json(path: Path) -> bool:
