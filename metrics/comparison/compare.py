@@ -37,8 +37,6 @@ class Difference:
     """One score of a method against that of the reference.
 
     Attributes:
-        metric: name of the score.
-        method: its name in `Comparison.methods`.
         value, reference_value: means over the rows that are compared, in the score's unit.
         difference: value - reference_value.
         low, high: its 95% interval, not corrected for the number of comparisons; None for a single
@@ -80,15 +78,12 @@ class Comparison:
     """Methods against the first of them.
 
     Attributes:
-        task: "rooms" or "iqtt".
-        truth_fingerprint: fingerprint of their test set.
         reference: name of the first file's method.
         methods: names of the others; equal names are made distinct.
         items, clusters: how many images and scenes were compared; for questions both are their
             number.
         differences: one for each score and method, ordered by score, then by method.
         comparable: False where a file says that it is not, and was compared all the same.
-        notes: what a reader has to know, in sentences.
         seed, resamples: of the bootstrap; the seed is that of random sign flips, too.
     """
 
@@ -119,8 +114,7 @@ def compare(
         files: two or more, of one test set.
         metrics: the scores to compare; None means `metric_names.HEADLINE` of the task. Holm's
             correction is for the number of these scores times that of the later files.
-        seed: seed of the bootstrap and of random sign flips.
-        resamples: how many resamples the bootstrap draws.
+        seed, resamples: of the bootstrap; the seed is that of random sign flips, too.
         allow_incomparable: compare files that say that they are not comparable, over the rows that
             all of them hold.
 

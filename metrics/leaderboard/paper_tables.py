@@ -47,7 +47,6 @@ class PaperTable:
     """A table of the paper.
 
     Attributes:
-        number: as the paper counts.
         caption: its title and first sentence.
         unit: of its figures, as the paper states it.
         remark: what a reader has to know.

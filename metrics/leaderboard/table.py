@@ -35,13 +35,12 @@ class Cell:
 
 @dataclass(frozen=True)
 class Row:
-    """A method.
+    """A method and its cells, one for each column.
 
     Attributes:
         rank: its place by the first column, such as "1"; empty where it has none.
         label: the method's name and what has to be known about it, in one line, not escaped.
         kind: only "ranked" rows have ranks and best cells.
-        cells: one for each column.
     """
 
     rank: str
@@ -76,7 +75,6 @@ def build_table(
     """Return a table of the scored methods, then of the paper's figures.
 
     Args:
-        title: of the table.
         columns: by key, the name of the score in each column and the column's head.
         entries: for each method, best first: its label, whether it is comparable, and its scores
             by the columns' keys.

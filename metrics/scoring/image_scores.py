@@ -95,21 +95,18 @@ def chamfer_floor(truth: TrueView) -> float:
     1 / depth is linear across the image. NaN where no corner counts.
     """
     ids, mask = truth.object_id, truth.mask
-    quads = [(slice(i, ids.shape[0] - 1 + i), slice(j, ids.shape[1] - 1 + j)) for i, j in _QUAD]
+    height, width = ids.shape
+    quads = [(slice(i, height - 1 + i), slice(j, width - 1 + j)) for i, j in np.ndindex(2, 2)]
     whole = np.logical_and.reduce([mask[q] & (ids[q] == ids[quads[0]]) for q in quads])
     if not whole.any():
         return float("nan")
     depth = np.where(mask, truth.depth, 1.0).astype(np.float64)
     corner_depth = 4.0 / np.sum([1.0 / depth[q] for q in quads], axis=0)
-    height, width = ids.shape
     rays = pixel_directions(height, width, truth.fov_y_degrees)
     between = np.sum([rays[q] for q in quads], axis=0) / 4.0
     corners = (corner_depth[..., None] * between)[whole]
     centres = back_project(truth.depth, truth.fov_y_degrees)[mask]
     return chamfer(nearest_distances(corners, centres))
-
-
-_QUAD = ((0, 0), (0, 1), (1, 0), (1, 1))
 
 
 def _finite(values: Array) -> Array:

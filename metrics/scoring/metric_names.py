@@ -38,9 +38,7 @@ class Metric:
     Attributes:
         name: its key in score files.
         title: for the head of a table.
-        task: "rooms" or "iqtt".
-        unit: of its values; "fraction" runs from 0 to 1.
-        higher_is_better: whether larger values are better.
+        unit: "fraction" runs from 0 to 1.
         definition: one sentence that defines the score of one image or question.
         largest: the upper limit of its values; the lower one is 0.
     """

@@ -32,11 +32,10 @@ class Inspection:
 
     Attributes:
         texts: its root attributes.
-        task: "rooms" or "iqtt"; None where it is neither.
+        task: None where it is neither of the two.
         ids: (M,) int64, rows of the truth or indices of questions; None where they are unusable.
         found: the datasets that can be used, by name.
         answers: (M,) int64, of an iqtt submission; None where they are unusable.
-        problems: all that is wrong.
     """
 
     texts: dict[str, str] = field(default_factory=dict)
@@ -62,7 +61,10 @@ def inspect(file: h5py.File) -> Inspection:
             result.found[dataset.name] = item
             count = int(item.shape[0]) if dataset.name in layout.ID_NAMES.values() else count
     if result.task == "iqtt":
-        _require_answers(file, result)
+        known = {problem.dataset for problem in result.problems} | set(result.found)
+        if not {"answer", "scores"} & known:
+            found = f"neither; found {names(file)}"
+            result.problems.append(Problem("answer", "present", "answer, or scores", found))
     _take_ids(result, layout.ID_NAMES[result.task])
     if result.task == "iqtt" and result.ids is not None:
         _take_answers(result, result.ids)
@@ -77,20 +79,16 @@ def read_texts(file: h5py.File) -> tuple[dict[str, str], list[Problem]]:
     wrong = _format_problem(file)
     if wrong is not None:
         return {}, [wrong]
-    texts, problems = {}, []
-    for attribute in layout.ATTRIBUTES:
-        found = _checked(file, attribute)
-        if isinstance(found, Problem):
-            problems.append(found)
-        elif found is not None:
-            texts[attribute.name] = found
-    task = texts.get("task")
-    theirs = {a.name for a in layout.ATTRIBUTES if task is None or task in a.tasks}
-    problems = [problem for problem in problems if problem.dataset in theirs]
+    read = {attribute.name: _checked(file, attribute) for attribute in layout.ATTRIBUTES}
+    task = read["task"] if isinstance(read["task"], str) else None
+    theirs = layout.ATTRIBUTES if task is None else layout.attributes(task)
+    found = {attribute.name: read[attribute.name] for attribute in theirs}
+    texts = {name: text for name, text in found.items() if isinstance(text, str)}
+    problems = [problem for problem in found.values() if isinstance(problem, Problem)]
     if task == "rooms" and texts.get("truth_fingerprint") == "":
         expected = "the attribute 'fingerprint' of the rooms file"
         problems.append(Problem("truth_fingerprint", "value", expected, "an empty text"))
-    return {name: text for name, text in texts.items() if name in theirs}, problems
+    return texts, problems
 
 
 def _format_problem(file: h5py.File) -> Problem | None:
@@ -159,7 +157,10 @@ def open_dataset(
         with reading(name):
             link = file.get(name, getlink=True)
             if link is None:
-                return None, [_missing(file, dataset)] if dataset.required else []
+                expected = f"{dataset.shown_shape} {dataset.kind}"
+                found = f"no such dataset; found {names(file)}"
+                missing = Problem(name, "present", expected, found)
+                return None, [missing] if dataset.required else []
             problems = _link_problems(link, name) or _problems(file[name], dataset, count)
             return None if problems else _open_with_cache(file, name), problems
     except FileFormatError as error:
@@ -170,12 +171,6 @@ def names(file: h5py.File) -> str:
     """Return the names of the first few objects in a file, for a message."""
     first = [f"{name!r:.40}" for name in itertools.islice(file, 9)]
     return ", ".join(first[:8] + ["..."] * (len(first) > 8)) or "none at all"
-
-
-def _missing(file: h5py.File, dataset: layout.Dataset) -> Problem:
-    expected = f"{dataset.shown_shape} {dataset.kind}"
-    found = f"no such dataset; found {names(file)}"
-    return Problem(dataset.name, "present", expected, found)
 
 
 def _link_problems(link: Any, name: str) -> list[Problem]:
@@ -253,13 +248,6 @@ def _type_name(dtype: np.dtype[Any]) -> str:
     if h5py.check_ref_dtype(dtype) is not None:
         return "reference"
     return "compound" if dtype.names else str(dtype)
-
-
-def _require_answers(file: h5py.File, result: Inspection) -> None:
-    known = {problem.dataset for problem in result.problems} | set(result.found)
-    if not {"answer", "scores"} & known:
-        found = f"neither; found {names(file)}"
-        result.problems.append(Problem("answer", "present", "answer, or scores", found))
 
 
 def _take_ids(result: Inspection, name: str) -> None:

@@ -29,8 +29,6 @@ class Predictions:
     """An open submission. Use it as a context manager, or close it.
 
     Attributes:
-        path: where it lies.
-        task: "rooms" or "iqtt".
         method, run, notes: what it says of itself; run and notes may be empty.
         truth_fingerprint: of the truth that it answers; None where it names none.
         truth_path: where the truth lay when the submission was written; empty where not recorded.

@@ -44,17 +44,13 @@ class RoomPredictionWriter:
         """Check the texts; the files are opened when the block begins.
 
         Args:
-            path: where to write.
             truth: the rooms file that is predicted, recorded as given.
             method, run: who predicts; runs of one method are averaged.
             alignment: what the method cannot know, as in `metrics.measures.depth.align`.
-            notes: any text.
-            overwrite: whether an existing file may be replaced.
             allow_partial: whether rows may be missing; scores of such a file are not comparable.
 
-        Raises:
-            PredictionError: a text does not suit.
-        When the block begins also OSError for either path, FileFormatError for the truth.
+        Raises PredictionError where a text does not suit; when the block begins also OSError for
+        either path, and FileFormatError for the truth.
         """
         given = {"method": method, "run": run, "alignment": alignment, "notes": notes}
         self._texts = _checked_texts("rooms", {**given, "truth_path": str(truth)})
@@ -166,9 +162,8 @@ def write_answers(
     """Write answers to all questions of a file, in its order.
 
     Args:
-        path: where to write.
         questions_file: such as iqtt-test.h5, recorded as given.
-        method, run, notes, overwrite: as for `RoomPredictionWriter`.
+        method, run: as for `RoomPredictionWriter`.
         answer: (Q,) integers: 0, 1 or 2, or -1 to abstain, which counts as wrong.
         scores: (Q, 3) floats: the highest wins, a tie for it abstains. Either or both; both must
             say the same.
