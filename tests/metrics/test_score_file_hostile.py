@@ -135,29 +135,28 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("place", "value", "where", "found", "expected"), WRONG)
-def test_each_fault_is_told_by_its_place(place, value, where, found, expected, tmp_path):
-    error = told(tmp_path / "s.json", json.dumps(changed(ROOMS, place, value)))
-    assert error[:2] == (where or place.replace("/", "."), found)
-    assert expected in error[2]
-
-
 SAME = ROOMS["meta"]["submissions"][:1]
+WRONG += [
+    ("meta/submissions", SAME, "metrics.chamfer.std", "0.002", "one run"),
+    ("meta/submissions", SAME * 2, "", "the same sha256 twice", "each submission once"),
+    ("path", "s.json", "", "this key", "no key of this name"),
+]
+WRONG_QUESTIONS = [
+    ("items/iqtt_accuracy", [1, 0, 1, 0.5], "", "0.5", "0 or 1"),
+    ("alignment", "scale", "", "'scale'", "'none'"),
+    ("by_view_angle", {}, "", "this key", "no key of this name"),
+    ("meta/chamfer_floor", None, "", "this key", "no key of this name"),
+]
 
 
 @pytest.mark.parametrize(
-    ("document", "place", "value", "where", "found"),
-    [
-        (ROOMS, "meta/submissions", SAME, "metrics.chamfer.std", "0.002"),
-        (ROOMS, "meta/submissions", SAME * 2, "meta.submissions", "the same sha256 twice"),
-        (IQTT, "items/iqtt_accuracy", [1, 0, 1, 0.5], "items.iqtt_accuracy", "0.5"),
-        (IQTT, "alignment", "scale", "alignment", "'scale'"),
-        (IQTT, "meta/chamfer_floor", 0.1, "meta.chamfer_floor", "this key"),
-    ],
+    ("document", "place", "value", "where", "found", "expected"),
+    [*((ROOMS, *wrong) for wrong in WRONG), *((IQTT, *wrong) for wrong in WRONG_QUESTIONS)],
 )
-def test_runs_and_questions_agree(document, place, value, where, found, tmp_path):
+def test_each_fault_is_told_by_its_place(document, place, value, where, found, expected, tmp_path):
     error = told(tmp_path / "s.json", json.dumps(changed(document, place, value)))
-    assert error[:2] == (where, found)
+    assert error[:2] == (where or place.replace("/", "."), found)
+    assert expected in error[2]
 
 
 def meta_with(seed):

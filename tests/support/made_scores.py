@@ -17,16 +17,9 @@ def make_meta(method, runs=1, truth=TRUTH, **other):
         Submission(f"{method}-{i}.h5", f"{digest}{i:x}".rjust(64, "0"), f"seed {i}")
         for i in range(runs)
     )
-    told = {
-        "truth_path": "rooms.h5",
-        "writer": "bench 0.1.0",
-        "versions": {"numpy": "2.4.6", "h5py": "3.12"},
-        "seed": 0,
-        "resamples": 2000,
-        "confidence": 0.95,
-        "counts": {"images": 4},
-        "warnings": (),
-    }
+    told = {"truth_path": "rooms.h5", "writer": "bench 0.1.0", "counts": {"images": 4}}
+    told |= {"versions": {"numpy": "2.4.6", "h5py": "3.12"}, "warnings": ()}
+    told |= {"seed": 0, "resamples": 2000, "confidence": 0.95}
     return Meta(truth_fingerprint=truth, submissions=submissions, **{**told, **other})
 
 
@@ -70,7 +63,6 @@ def iqtt_scores(method, right, runs=1, questions=None, **other):
         items={"question": ids, "iqtt_accuracy": values},
         meta=make_meta(method, runs, **other),
         by_distractor=group,
-        path=None,
     )
 
 

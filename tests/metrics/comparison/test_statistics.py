@@ -38,12 +38,9 @@ def test_sign_flips_by_hand():
 def test_sign_flips_agree_with_scipy():
     for count in (9, 30):
         differences = np.random.default_rng(count).standard_normal(count) + 0.5
+        pair, settings = (differences, np.zeros(count)), {"n_resamples": 9999, "rng": 1}
         expected = permutation_test(
-            (differences, np.zeros(count)),
-            lambda x, y: np.mean(x - y),
-            permutation_type="samples",
-            n_resamples=9999,
-            rng=1,
+            pair, lambda x, y: np.mean(x - y), permutation_type="samples", **settings
         ).pvalue
         found = sign_flip_test(differences, seed=0)
         assert found == pytest.approx(expected, abs=1e-12 if count == 9 else 0.006)
