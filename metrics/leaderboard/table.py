@@ -111,16 +111,11 @@ def reported_rows(
     figures: Mapping[str, Mapping[str, Figure]], keys: Sequence[str]
 ) -> tuple[Row, ...]:
     """Return a row of the paper's figures, as printed, for each label."""
-
-    def cell(figure: Figure | None) -> Cell:
-        if figure is None:
-            return Cell()
-        return Cell(figure.text, f" ± {figure.spread}" if figure.spread else "")
-
-    return tuple(
-        Row("", label, "reported", tuple(cell(found.get(key)) for key in keys))
-        for label, found in figures.items()
-    )
+    rows = []
+    for label, found in figures.items():
+        cells = {k: Cell(f.text, f" ± {f.spread}" if f.spread else "") for k, f in found.items()}
+        rows.append(Row("", label, "reported", tuple(cells.get(key, Cell()) for key in keys)))
+    return tuple(rows)
 
 
 def column_head(name: str) -> str:

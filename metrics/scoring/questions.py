@@ -49,18 +49,19 @@ def score_questions(
     progress(len(rows))
 
     def grouped(labels: Array) -> Groups:
-        found = {}
-        for label in np.unique(labels).tolist():
-            found[str(label)] = {"iqtt_accuracy": _accuracy(right[:, labels == label], settings)}
-        return found
+        return {
+            str(label): {"iqtt_accuracy": _accuracy(right[:, labels == label], settings)}
+            for label in np.unique(labels).tolist()
+        }
 
-    by_distractor: Groups = {}
-    by_angle: Groups = {}
+    groups: dict[str, Any] = {"by_position": grouped(true[rows])}
     if kinds is not None and angles is not None:
-        by_distractor = grouped(np.array([_kinds(row, names) for row in kinds[rows]]))
+        by_kind = np.array([_kinds(row, names) for row in kinds[rows]])
         bins = np.clip(np.digitize(angles[rows], ANGLE_BINS) - 1, 0, len(ANGLE_BINS) - 2)
         spans = np.array([f"{a}-{b}" for a, b in itertools.pairwise(ANGLE_BINS)])
-        by_angle = grouped(spans[bins])
+        groups |= {"by_distractor": grouped(by_kind), "by_rotation_angle": grouped(spans[bins])}
+    if not fingerprint:  # that of a truth that has none is SHA-256 of its answers
+        fingerprint = hashlib.sha256(true.astype(np.uint8).tobytes()).hexdigest()
     warnings = warnings_of(whole, len(rows), len(true), ())
     counts = {
         "questions": len(rows),
@@ -74,13 +75,9 @@ def score_questions(
         comparable=not warnings,
         alignment="none",
         metrics={"iqtt_accuracy": _accuracy(right, settings)},
-        by_distractor=by_distractor,
-        by_rotation_angle=by_angle,
-        by_position=grouped(true[rows]),
+        **groups,
         items={"question": rows, "iqtt_accuracy": right.mean(axis=0)},
-        meta=meta_of(
-            files, truth_path, fingerprint or _digest(true), settings, counts, warnings, None
-        ),
+        meta=meta_of(files, truth_path, fingerprint, settings, counts, warnings, None),
     )
 
 
@@ -105,8 +102,3 @@ def _kinds(row: Array, names: Sequence[str]) -> str:
     """Return the kind of a question: "mirror" where a wrong answer is a mirror image, else both."""
     found = {names[kind] for kind in row.tolist() if kind >= 0}
     return "mirror" if "mirror" in found else "+".join(sorted(found))
-
-
-def _digest(answers: Array) -> str:
-    """Return SHA-256 of the answers, the fingerprint of a truth that has none."""
-    return hashlib.sha256(answers.astype(np.uint8).tobytes()).hexdigest()

@@ -107,11 +107,9 @@ def _simple_errors(images: Sequence[_Image]) -> Array:
     line = slope * centred + true.mean()
     ends = np.cumsum([len(image.true) for image in images])[:-1]
     parts = [np.split(values, ends) for values in (predicted, scaled, line)]
+    rows = zip(images, *parts, strict=True)
     return np.array(
-        [
-            np.nanmin([_error(values[k], image.true) for values in parts])
-            for k, image in enumerate(images)
-        ]
+        [np.nanmin([_error(one, image.true) for one in found]) for image, *found in rows]
     )
 
 
