@@ -58,11 +58,8 @@ UNUSABLE = "2 of 6 rows without a usable number: 1, 3"
     ],
 )
 def test_files_that_do_not_belong_together(files, where, found, expected, allowed):
-    with pytest.raises(ComparisonError) as caught:
+    with refused(ComparisonError, where, found, expected):
         compare(files, ["chamfer"], allow_incomparable=allowed)
-    error = caught.value
-    assert (error.where, error.found, error.expected) == (where, found, expected)
-    assert "\n" not in str(error)
 
 
 def test_files_that_are_not_comparable_need_leave():

@@ -269,9 +269,8 @@ def test_answers(truths, tmp_path, name):
     path = tmp_path / "answers.h5"
     write_answers(path, file, method="m", run="1", notes="n", answer=answer, scores=scores)
     assert validate(path) == []
-    with open_predictions(path) as found, AnswersFile(truths.iqtt.with_name(
-        "iqtt-val.h5" if "val" in name else "iqtt-test-answers.h5"
-    )) as truth:  # fmt: skip
+    truth_name = "iqtt-val.h5" if "val" in name else "iqtt-test-answers.h5"
+    with open_predictions(path) as found, AnswersFile(file.with_name(truth_name)) as truth:
         assert found.rows.tolist() == list(range(6))
         assert found.answers.tolist() == answer
         assert np.array_equal(found.scores, scores)
