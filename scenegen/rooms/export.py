@@ -59,19 +59,11 @@ def write_exr(room: Room, path: str | Path) -> None:
     import OpenEXR
 
     depth = np.where(np.isfinite(room.depth), room.depth, np.inf)
-    planes = {
-        "R": room.radiance[..., 0],
-        "G": room.radiance[..., 1],
-        "B": room.radiance[..., 2],
-        "Z": depth,
-        "N.X": room.normal[..., 0],
-        "N.Y": room.normal[..., 1],
-        "N.Z": room.normal[..., 2],
-        "id": room.object_id,
-    }
+    planes = (*np.moveaxis(room.radiance, -1, 0), depth, *np.moveaxis(room.normal, -1, 0))
+    names = ("R", "G", "B", "Z", "N.X", "N.Y", "N.Z", "id")
     channels = {
         name: OpenEXR.Channel(name, np.ascontiguousarray(plane, np.float32))
-        for name, plane in planes.items()
+        for name, plane in zip(names, (*planes, room.object_id), strict=True)
     }
     header = {
         "compression": OpenEXR.ZIP_COMPRESSION,
@@ -90,10 +82,8 @@ def write_surfels_ply(room: Room, path: str | Path) -> None:
         + [(name, "u1") for name in ("red", "green", "blue")]
         + [("object_id", "i1")],
     )
-    points, normals = (
-        room.points_world[hit],
-        transform_vectors(room.world_from_camera, room.normal[hit]),
-    )
+    points = room.points_world[hit]
+    normals = transform_vectors(room.world_from_camera, room.normal[hit])
     colors = srgb_bytes(room.radiance)[hit]
     for i in range(3):
         vertices["xyz"[i]], vertices["n" + "xyz"[i]] = points[:, i], normals[:, i]

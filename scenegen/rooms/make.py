@@ -70,12 +70,7 @@ def make_dataset(
     attributes = {"creation_command": command, "variant": variant, **versions()}
     with (
         create_rooms(
-            path,
-            spec,
-            count,
-            compression=compression,
-            overwrite=overwrite,
-            attributes=attributes,
+            path, spec, count, compression=compression, overwrite=overwrite, attributes=attributes
         ) as writer,
         ThreadPoolExecutor(1) as pool,
     ):

@@ -1,9 +1,8 @@
 """Read a file of rooms: typed records by index, and a map-style dataset for training loops."""
 
-import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import back_project, transform_points
-from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.errors import FileFormatError
+from scenegen.common.records import check
 from scenegen.common.row_file import (
+    RowDataset,
     and_more,
-    check_version,
     checking,
     column_problems,
+    describing,
     open_file,
+    read_spec,
     reading,
 )
 from scenegen.description.scenes import SceneSpec
@@ -117,7 +119,7 @@ class RoomsFile:
 
     def scene(self, index: int) -> SceneSpec:
         """Return the description of the scene that row `index` shows."""
-        with _inside(f"{self.path}: scene, row {index}"):
+        with describing(f"{self.path}: scene, row {index}"):
             return SceneSpec.from_json(self.read("scene", index))
 
     def read(self, name: str, rows: int | slice) -> Any:
@@ -164,21 +166,10 @@ class RoomsFile:
                 "no format attribute" if found is None else f"format {found!r:.60}",
                 f"{FORMAT_NAME!r}, as scenegen render writes it",
             )
-        check_version(self.path, self.attributes, FORMAT_VERSION)
-        for name in ("spec", "fingerprint", "writer"):
-            if name not in self.attributes:
-                raise FileFormatError(self.path, f"no root attribute {name!r}")
-        with _inside(f"{self.path}: attribute 'spec'"):
-            return DatasetSpec.from_json(str(self.attributes["spec"]))
-
-
-@contextmanager
-def _inside(place: str) -> Iterator[None]:
-    """Turn the error of a description into one of the file that holds it."""
-    try:
-        yield
-    except SpecError as error:
-        raise FileFormatError(f"{place}: {error.where}", error.found, error.expected) from error
+        spec = read_spec(self.path, self.attributes, FORMAT_VERSION, DatasetSpec.from_json)
+        if "fingerprint" not in self.attributes:
+            raise FileFormatError(f"{self.path}: attribute 'fingerprint'", "none", "a text")
+        return spec
 
 
 def _layout_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
@@ -205,38 +196,17 @@ def _attribute_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
     return problems
 
 
-class RoomsDataset:
-    """A map-style dataset (`__len__`, `__getitem__` -> dict of arrays) for any training loop.
-
-    `torch.utils.data.DataLoader` takes it as it is, with any number of workers: pickled, it is no
-    more than its path, and every process opens the file for itself when it first reads.
-    """
+class RoomsDataset(RowDataset):
+    """The rows of a rooms file as dicts of arrays, for any training loop; see `RowDataset`."""
 
     def __init__(
-        self,
-        path: str | Path,
-        fields: Sequence[str] = ("image", "depth", "normal", "object_id"),
+        self, path: str | Path, fields: Sequence[str] = ("image", "depth", "normal", "object_id")
     ) -> None:
         """Check the file once. Raises as `RoomsFile`, and SpecError for an unknown field."""
         known = [field.name for field in FIELDS if field.dtype != "text"]
         for name in fields:
-            if name not in known:
-                raise SpecError("field", repr(name), f"some of {', '.join(known)}")
-        self.path, self.fields = Path(path), tuple(fields)
+            check(name in known, "field", repr(name), f"some of {', '.join(known)}")
+        self.path = Path(path)
         with RoomsFile(path) as rooms:
-            self._length, self.spec, self.fingerprint = len(rooms), rooms.spec, rooms.fingerprint
-        self._open: tuple[int, RoomsFile] | None = None
-
-    def __len__(self) -> int:
-        return self._length
-
-    def __getitem__(self, index: int) -> dict[str, Any]:
-        """Return the fields of one row, by name; image values are as stored."""
-        row = range(self._length)[index]
-        if self._open is None or self._open[0] != os.getpid():
-            self._open = (os.getpid(), RoomsFile(self.path))
-        rooms = self._open[1]
-        return {name: rooms.read(name, row) for name in self.fields}
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_open": None}
+            super().__init__(partial(RoomsFile, self.path), len(rooms), fields)
+            self.spec, self.fingerprint = rooms.spec, rooms.fingerprint

@@ -116,16 +116,14 @@ def create_rooms(
     check(1 <= count <= most, "n", count, f"from 1 to {most:,} scenes")
     with new_file(path, overwrite) as file:
         file.attrs.update(
-            {
-                "format": FORMAT_NAME,
-                "format_version": FORMAT_VERSION,
-                "writer": writer_name(),
-                "spec": spec.to_json(),
-                "count": rows,
-                "compression": compression,
-                "conventions": CONVENTIONS,
-                **(attributes or {}),
-            }
+            format=FORMAT_NAME,
+            format_version=FORMAT_VERSION,
+            writer=writer_name(),
+            spec=spec.to_json(),
+            count=rows,
+            compression=compression,
+            conventions=CONVENTIONS,
+            **(attributes or {}),
         )
         writer = RoomsWriter(file, spec, count, compression)
         yield writer

@@ -5,8 +5,6 @@ import hashlib
 import importlib.metadata
 import json
 import pickle
-import subprocess
-import sys
 import zlib
 
 import h5py
@@ -200,33 +198,6 @@ def test_a_room_is_complete_and_shades_to_its_image(float_path):
         np.testing.assert_allclose(room.image, image, atol=2e-6)
 
 
-# Reads a file in other processes, after it was read here; prints the sum each of them found.
-PROCESSES = """
-import multiprocessing, sys, warnings
-from scenegen import RoomsDataset
-warnings.simplefilter("ignore", DeprecationWarning)  # 3.12 on: forking a process with threads
-
-def total(i):
-    return float(data[i]["depth"].sum()) if "data" in globals() else None
-
-def from_pickle(pair):
-    rooms, i = pair
-    return float(rooms[i]["depth"].sum())
-
-if __name__ == "__main__":
-    data = RoomsDataset(sys.argv[1])
-    here = [total(i) for i in range(len(data))]
-    with multiprocessing.get_context("fork").Pool(3) as pool:
-        for _ in range(5):
-            assert pool.map(total, range(len(data)), chunksize=1) == here, "fork"
-    pairs = [(data, i) for i in range(len(data))]
-    with multiprocessing.get_context("spawn").Pool(2) as pool:
-        assert pool.map(from_pickle, pairs, chunksize=1) == here, "spawn"
-    assert [total(i) for i in range(len(data))] == here, "here again"
-    print("equal")
-"""
-
-
 def test_indices(rooms_path):
     with open_rooms(rooms_path) as rooms:
         assert len(rooms) == 8
@@ -278,22 +249,3 @@ def test_pickling_after_reading(rooms_path):
     for name, values in again[0].items():
         np.testing.assert_array_equal(values, first[name])
     assert again.fingerprint == data.fingerprint
-
-
-def test_reading_in_several_processes(rooms_path, tmp_path):
-    script = tmp_path / "read.py"
-    script.write_text(PROCESSES)
-    command = [sys.executable, str(script), str(rooms_path)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-    assert done.stdout == "equal\n", done.stderr
-
-
-@pytest.mark.slow
-def test_torch_loader_with_workers(rooms_path):
-    torch = pytest.importorskip("torch")
-    data = RoomsDataset(rooms_path)
-    data[0]  # open here, before the workers are forked
-    loader = torch.utils.data.DataLoader(data, batch_size=3, num_workers=2)
-    depth = torch.cat([batch["depth"] for batch in loader])
-    with open_rooms(rooms_path) as rooms:
-        np.testing.assert_array_equal(depth.numpy(), np.stack([room.depth for room in rooms]))
