@@ -78,15 +78,10 @@ def _table(folder: "ModelFolder", records: Sequence["ModelCheck"]) -> Iterator[s
 
 
 def _json(folder: "ModelFolder", records: Sequence["ModelCheck"]) -> str:
+    names = ("name", "ok", "reason", "faces")
     models = [
-        {
-            "name": record.name,
-            "ok": record.ok,
-            "reason": record.reason,
-            "faces": record.faces,
-            "mended": dict(record.mended),
-            "seconds": round(record.seconds, 4),
-        }
+        {name: getattr(record, name) for name in names}
+        | {"mended": dict(record.mended), "seconds": round(record.seconds, 4)}
         for record in records
     ]
     about = {"kind": folder.kind, "up": folder.up, "digest": folder.digest(), "models": models}

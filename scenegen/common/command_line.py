@@ -39,13 +39,13 @@ class PackageCommands(click.Group):
             return super().invoke(ctx)
         except OSError as error:
             where = f"{error.filename}: " if error.filename else ""
-            raise _failure(f"{where}{error.strerror or error}") from error
+            raise UserError(f"{where}{error.strerror or error}") from error
         except ValueError as error:
             from scenegen.common.errors import SceneGenError
 
             if not isinstance(error, SceneGenError):
                 raise
-            raise _failure(str(error)) from error
+            raise UserError(str(error)) from error
 
     def _loaded(self) -> list[Any]:
         modules = [importlib.import_module(name) for name in self.modules]
@@ -53,13 +53,12 @@ class PackageCommands(click.Group):
 
 
 class UserError(click.ClickException):
-    """A mistake that the user can mend."""
+    """A mistake that the user can mend; its text is shown as one line."""
 
     exit_code = 2
 
-
-def _failure(text: str) -> click.ClickException:
-    return UserError(" ".join(text.split()))
+    def __init__(self, text: str) -> None:
+        super().__init__(" ".join(text.split()))
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

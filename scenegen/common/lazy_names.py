@@ -6,11 +6,7 @@ from typing import Any
 
 
 def lazy_names(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return the `__getattr__` of a package.
-
-    Args:
-        homes: for each module, relative to the package, the names it has, between blanks.
-    """
+    """Return a package's `__getattr__`; `homes` are names, between blanks, by the module's path."""
     modules = {name: module for module, names in homes.items() for name in names.split()}
 
     def load(name: str) -> Any:

@@ -139,9 +139,7 @@ def new_file(path: str | Path, overwrite: bool = False) -> Iterator[h5py.File]:
 def open_file(path: str | Path, kind: str) -> h5py.File:
     """Open an HDF5 file to read; `kind` is what it should be, such as "rooms file".
 
-    Raises:
-        OSError: no such file, a folder, or no regular file.
-        FileFormatError: not HDF5, or cut off.
+    Raises OSError for what is no regular file, FileFormatError for one that is not HDF5 or cut off.
     """
     problems = (
         (not os.path.exists(path), errno.ENOENT, "no such file"),
@@ -206,11 +204,8 @@ def read_spec(
 ) -> Spec:
     """Return the request that a file answers, from the root attributes that all our files have.
 
-    Args:
-        version: the format version that this release writes.
-        from_json: reads the request.
-
-    Raises FileFormatError for another major version, a missing attribute and a broken request.
+    Raises FileFormatError for a major version other than `version`'s, a missing attribute and a
+    request that `from_json` refuses.
     """
     found, major = str(attributes.get("format_version")), version.split(".", maxsplit=1)[0]
     if found.split(".", maxsplit=1)[0] != major:

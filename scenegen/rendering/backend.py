@@ -39,10 +39,8 @@ def select_variant(device: str) -> str:
     """Return the Mitsuba variant for a device and make its LLVM known to Dr.Jit.
 
     "auto": llvm_ad_rgb, else scalar_rgb with a warning. "cpu": llvm_ad_rgb. "cuda": cuda_ad_rgb.
-    "auto" never picks the GPU: its bits differ from the CPU's.
-
-    Raises:
-        BackendError: the device is unknown, or cannot be used here.
+    "auto" never picks the GPU: its bits differ from the CPU's. Raises BackendError for a device
+    that is unknown or cannot be used here.
     """
     if device not in DEVICES:
         raise BackendError("device", repr(device), f"one of {', '.join(DEVICES)}")

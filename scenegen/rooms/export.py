@@ -1,6 +1,7 @@
 """Write one row of a file of rooms in the formats of other tools: EXR, PNG, PLY, OBJ."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,12 +40,11 @@ def export_room(
 ) -> None:
     """Write one room to its `export_paths`. Raises OSError as `new_file.written_beside`.
 
-    Args:
-        objects: what the scene is made of, for "obj"; None where its objects are built in.
+    "obj" needs the `objects` of the scene, unless they are built in.
     """
     shape_of = objects.shape if objects else built_in_shape
-    obj: Writer = lambda room, path: write_mesh_obj(room, path, shape_of)  # noqa: E731
-    one = {"exr": write_exr, "ply": write_surfels_ply, "obj": obj}
+    obj = partial(write_mesh_obj, shape_of=shape_of)
+    one: dict[str, Writer] = {"exr": write_exr, "ply": write_surfels_ply, "obj": obj}
     writers = list(_PNG.values()) if form == "png" else [one[form]]
     for path, write in zip(paths, writers, strict=True):
         with written_beside(path, overwrite) as temporary:

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 
@@ -67,6 +67,14 @@ def forgetful(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     yield
     backend.point_to_llvm.cache_clear()
     backend.warn_of_slow_rendering.cache_clear()
+
+
+def no_package(name: str) -> NoReturn:
+    raise importlib.metadata.PackageNotFoundError(name)
+
+
+def no_library(name: str) -> NoReturn:
+    raise OSError(name)
 
 
 class FakeLibrary:
@@ -128,10 +136,7 @@ def test_the_order_is_own_choice_then_wheel_then_system(monkeypatch: pytest.Monk
 
 
 def test_without_the_wheel_and_without_llvm(monkeypatch: pytest.MonkeyPatch) -> None:
-    def missing(name: str) -> None:
-        raise importlib.metadata.PackageNotFoundError(name)
-
-    monkeypatch.setattr(importlib.metadata, "files", missing)
+    monkeypatch.setattr(importlib.metadata, "files", no_package)
     monkeypatch.setattr(ctypes.util, "find_library", lambda name: None)
     with pytest.warns(SlowFallbackWarning, match=f"scalar_rgb.*pip install {LLVM_WHEEL}"):
         assert select_variant("auto") == "scalar_rgb"
@@ -145,10 +150,7 @@ def test_without_the_wheel_and_without_llvm(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_cuda_needs_a_driver(monkeypatch: pytest.MonkeyPatch) -> None:
-    def missing(name: str) -> None:
-        raise OSError(name)
-
-    monkeypatch.setattr(ctypes, "CDLL", missing)
+    monkeypatch.setattr(ctypes, "CDLL", no_library)
     with pytest.raises(BackendError) as caught:
         select_variant("cuda")
     assert (caught.value.where, caught.value.hint) == ("device cuda", "use --device cpu")
@@ -216,9 +218,6 @@ print(before["llvm_version"])
 
 
 def test_a_version_that_nothing_tells_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
-    def missing(package: str) -> str:
-        raise importlib.metadata.PackageNotFoundError(package)
-
-    monkeypatch.setattr(importlib.metadata, "version", missing)
+    monkeypatch.setattr(importlib.metadata, "version", no_package)
     monkeypatch.setenv(LLVM_VARIABLE, "/nowhere/libLLVM.so")
     assert set(backend.versions().values()) == {"unknown"}
