@@ -76,28 +76,20 @@ def write_exr(room: Room, path: str | Path) -> None:
 def write_surfels_ply(room: Room, path: str | Path) -> None:
     """Write the surfels in the world frame: position, normal, colour (sRGB), object id."""
     hit = room.object_id >= 0
-    vertices = np.empty(
-        int(hit.sum()),
-        [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")]
-        + [(name, "u1") for name in ("red", "green", "blue")]
-        + [("object_id", "i1")],
-    )
+    names = ("x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "object_id")
+    kinds = 6 * ["float"] + 3 * ["uchar"] + ["char"]
+    types = {"float": "<f4", "uchar": "u1", "char": "i1"}
     points = room.points_world[hit]
     normals = transform_vectors(room.world_from_camera, room.normal[hit])
-    colors = srgb_bytes(room.radiance)[hit]
-    for i in range(3):
-        vertices["xyz"[i]], vertices["n" + "xyz"[i]] = points[:, i], normals[:, i]
-        vertices[("red", "green", "blue")[i]] = colors[:, i]
-    vertices["object_id"] = room.object_id[hit]
-    kinds = {"<f4": "float", "|u1": "uchar", "|i1": "char"}
-    fields = (vertices.dtype.fields or {}).items()
-    properties = [f"property {kinds[kind.str]} {name}" for name, (kind, *_) in fields]
+    columns = (*points.T, *normals.T, *srgb_bytes(room.radiance)[hit].T, room.object_id[hit])
+    named = list(zip(names, kinds, strict=True))
+    vertices = np.rec.fromarrays(columns, [(name, types[kind]) for name, kind in named])
     header = [
         "ply",
         "format binary_little_endian 1.0",
         f"comment surfels of room {room.index}: world frame, y up, scene units",
         f"element vertex {len(vertices)}",
-        *properties,
+        *(f"property {kind} {name}" for name, kind in named),
         "end_header",
     ]
     Path(path).write_bytes("\n".join([*header, ""]).encode() + vertices.tobytes())

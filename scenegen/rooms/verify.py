@@ -7,6 +7,7 @@ still gives the description, and the description the pixels.
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -242,10 +243,8 @@ def _sampled_again(rooms: RoomsFile, rows: Array, objects: Objects) -> Check:
     for i in rows.tolist():
         try:
             stored = rooms.scene(i)
-            tries = (
-                sample_scene(rooms.spec, stored.index, k, objects) for k in range(MAX_ATTEMPTS)
-            )
-            same = any(scene == stored for scene in tries)
+            draw = partial(sample_scene, rooms.spec, stored.index, objects=objects)
+            same = any(draw(k) == stored for k in range(MAX_ATTEMPTS))
         except (FileFormatError, SpecError):
             same = False
         if not same:
