@@ -2,8 +2,8 @@
 
 import click
 
-from baselines.pix2shape.commands import EXAMPLE, predict_to
-from scenegen.common.command_line import OVERWRITE, progress_bar
+from baselines.pix2shape.commands import predict_to
+from scenegen.common.command_line import EXAMPLE, OVERWRITE, progress_bar
 
 BASELINES = """\b
 Baselines:

@@ -9,41 +9,22 @@ images) and `files`; `audit` checks files. Each may import those before it, and 
 names are loaded when they are first used, so that importing the package is fast.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from scenegen.common.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from iqtt.files.make import make_split
-    from iqtt.files.reader import (
-        QuestionRecord,
-        QuestionsDataset,
-        QuestionsFile,
-        open_questions,
-    )
-    from iqtt.questions.specs import SplitSpec, preset_spec
+    from iqtt.files.make import make_split as make_split
+    from iqtt.files.reader import QuestionRecord as QuestionRecord
+    from iqtt.files.reader import QuestionsDataset as QuestionsDataset
+    from iqtt.files.reader import QuestionsFile as QuestionsFile
+    from iqtt.files.reader import open_questions as open_questions
+    from iqtt.questions.specs import SplitSpec as SplitSpec
+    from iqtt.questions.specs import preset_spec as preset_spec
 
-_HOME = {
-    "QuestionRecord": "files.reader",
-    "QuestionsDataset": "files.reader",
-    "QuestionsFile": "files.reader",
-    "SplitSpec": "questions.specs",
-    "make_split": "files.make",
-    "open_questions": "files.reader",
-    "preset_spec": "questions.specs",
+HOMES = {
+    "files.make": "make_split",
+    "files.reader": "QuestionRecord QuestionsDataset QuestionsFile open_questions",
+    "questions.specs": "SplitSpec preset_spec",
 }
-
-__all__ = [
-    "QuestionRecord",
-    "QuestionsDataset",
-    "QuestionsFile",
-    "SplitSpec",
-    "make_split",
-    "open_questions",
-    "preset_spec",
-]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'iqtt' has no attribute {name!r}")
-    return getattr(import_module(f"iqtt.{_HOME[name]}"), name)
+__getattr__ = lazy_names(__name__, HOMES)

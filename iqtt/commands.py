@@ -13,6 +13,7 @@ import click
 from scenegen.common.command_line import (
     COMPRESSION,
     DEVICE,
+    EXAMPLE,
     IMAGE_DTYPE,
     OVERWRITE,
     SEED,
@@ -26,7 +27,9 @@ from scenegen.common.command_line import (
 SHOWN = 8  # questions that `show` draws by default
 
 
-@click.command("make-split")
+@click.command(
+    "make-split", epilog=f"{EXAMPLE}iqtt make-split --out iqtt-split --preset small --seed 1"
+)
 @click.option("--out", default="iqtt-split", show_default=True, help="Folder for the four files.")
 @click.option(
     "--preset",
@@ -116,10 +119,6 @@ def make_split(
 
     A question has four images: a reference, and three answers of which one shows the same shape.
     No shape, nor its mirror image, is in two of training, validation and test.
-
-    \b
-    Example:
-        iqtt make-split --out iqtt-split --preset small --seed 1
     """
     from iqtt.files import make
     from iqtt.questions.specs import preset_spec
@@ -151,7 +150,9 @@ def make_split(
     )
 
 
-@click.command()
+@click.command(
+    epilog=f"{EXAMPLE}iqtt show iqtt-split/iqtt-val.h5 --items 0-3 --answers --out questions.png"
+)
 @click.argument("file")
 @click.option(
     "--out",
@@ -167,12 +168,7 @@ def make_split(
     "--answers", is_flag=True, help="Mark the right answers, and name the kinds of the wrong ones."
 )
 def show(file: str, out: str, items: list[int] | None, part: str | None, answers: bool) -> None:
-    """Draw questions of FILE: the reference on the left, its three answers beside it.
-
-    \b
-    Example:
-        iqtt show iqtt-split/iqtt-val.h5 --items 0-3 --answers --out questions.png
-    """
+    """Draw questions of FILE: the reference on the left, its three answers beside it."""
     from iqtt.files.preview import save_sheet
     from iqtt.files.reader import answers_beside, open_questions, parts
     from scenegen.common.errors import SpecError
@@ -188,21 +184,16 @@ def show(file: str, out: str, items: list[int] | None, part: str | None, answers
     click.echo(f"{out}: {len(rows)} of {file}'s {len(questions)} questions")
 
 
-@click.command()
+@click.command(epilog=f"{EXAMPLE}iqtt info iqtt-split/iqtt-val.h5")
 @click.argument("file")
 def info(file: str) -> None:
-    """Describe FILE: its questions, settings, versions, fingerprints and sizes.
-
-    \b
-    Example:
-        iqtt info iqtt-split/iqtt-val.h5
-    """
+    """Describe FILE: its questions, settings, versions, fingerprints and sizes."""
     from iqtt.files.info import describe
 
     click.echo(describe(file))
 
 
-@click.command()
+@click.command(epilog=f"{EXAMPLE}iqtt audit iqtt-split --json audit.json")
 @click.argument("splits", nargs=-1, required=True, metavar="SPLIT...")
 @click.option("--json", "json_path", help="Write all numbers to this JSON file.")
 @click.option("--markdown", is_flag=True, help="Print the tables as Markdown.")
@@ -227,10 +218,6 @@ def audit(
 
     Proofs recompute what must hold, with code that is independent of the generator. Probes try to
     find the right answers without comparing shapes. The exit code is 1 if a proof fails.
-
-    \b
-    Example:
-        iqtt audit iqtt-split --json audit.json
     """
     from iqtt.audit import report
     from iqtt.audit.audit import audit as audit_files

@@ -8,9 +8,8 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import OVERWRITE, progress_bar
+from scenegen.common.command_line import EXAMPLE, OVERWRITE, progress_bar
 
-EXAMPLE = "\b\nExample:\n  "  # click keeps the line breaks of a paragraph that begins with \b
 TRUTH = click.option(
     "--truth",
     help="The rooms file or the file of answers to score against [default: the file that the"

@@ -7,48 +7,30 @@ Make one:       `scenegen.make_dataset("rooms.h5", scenegen.DatasetSpec(seed=1),
 Names are loaded when first used, so that importing the package costs nothing.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from scenegen.common.lazy_names import lazy_names
 
 if TYPE_CHECKING:
-    from scenegen.camera import Camera, back_project
-    from scenegen.common.errors import SceneGenError
-    from scenegen.description.scenes import SceneSpec
-    from scenegen.description.specs import DatasetSpec
-    from scenegen.rendering.shading import shade
-    from scenegen.rooms.make import make_dataset
-    from scenegen.rooms.reader import Room, RoomsDataset, RoomsFile, open_rooms
+    from scenegen.camera import Camera as Camera
+    from scenegen.camera import back_project as back_project
+    from scenegen.common.errors import SceneGenError as SceneGenError
+    from scenegen.description.scenes import SceneSpec as SceneSpec
+    from scenegen.description.specs import DatasetSpec as DatasetSpec
+    from scenegen.rendering.shading import shade as shade
+    from scenegen.rooms.make import make_dataset as make_dataset
+    from scenegen.rooms.reader import Room as Room
+    from scenegen.rooms.reader import RoomsDataset as RoomsDataset
+    from scenegen.rooms.reader import RoomsFile as RoomsFile
+    from scenegen.rooms.reader import open_rooms as open_rooms
 
-_HOME = {
-    "Camera": "camera",
-    "DatasetSpec": "description.specs",
-    "Room": "rooms.reader",
-    "RoomsDataset": "rooms.reader",
-    "RoomsFile": "rooms.reader",
-    "SceneGenError": "common.errors",
-    "SceneSpec": "description.scenes",
-    "back_project": "camera",
-    "make_dataset": "rooms.make",
-    "open_rooms": "rooms.reader",
-    "shade": "rendering.shading",
+HOMES = {
+    "camera": "Camera back_project",
+    "common.errors": "SceneGenError",
+    "description.scenes": "SceneSpec",
+    "description.specs": "DatasetSpec",
+    "rendering.shading": "shade",
+    "rooms.make": "make_dataset",
+    "rooms.reader": "Room RoomsDataset RoomsFile open_rooms",
 }
-
-__all__ = [
-    "Camera",
-    "DatasetSpec",
-    "Room",
-    "RoomsDataset",
-    "RoomsFile",
-    "SceneGenError",
-    "SceneSpec",
-    "back_project",
-    "make_dataset",
-    "open_rooms",
-    "shade",
-]
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'scenegen' has no attribute {name!r}")
-    return getattr(import_module(f"scenegen.{_HOME[name]}"), name)
+__getattr__ = lazy_names(__name__, HOMES)

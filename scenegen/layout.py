@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from scenegen.common.row_file import Column
+from scenegen.common.text_table import piped
 from scenegen.description.specs import DatasetSpec
 
 FORMAT_NAME = "pix2shape-bench/rooms"
@@ -83,13 +84,8 @@ FIELDS = (
 
 def columns(spec: DatasetSpec) -> list[Column]:
     """Return the datasets of a file that answers that spec, with their attributes."""
-    sizes = {
-        "H": spec.height,
-        "W": spec.width,
-        "K": spec.object_slots,
-        "K+1": spec.object_slots + 1,
-        "L": spec.light_slots,
-    }
+    slots = spec.object_slots
+    sizes = {"H": spec.height, "W": spec.width, "K": slots, "K+1": slots + 1, "L": spec.light_slots}
     found = []
     for field in FIELDS:
         attributes: dict[str, Any] = {
@@ -110,15 +106,12 @@ def columns(spec: DatasetSpec) -> list[Column]:
 
 def markdown_table() -> str:
     """Return the layout as a Markdown table."""
-    lines = [
-        "| dataset | row | type | unit | frame | meaning |",
-        "| --- | --- | --- | --- | --- | --- |",
-    ]
+    rows = [("dataset", "row", "type", "unit", "frame", "meaning")]
     for f in FIELDS:
         row = "(" + ", ".join(map(str, f.shape)) + ")"
         dtype = {"image": "`--image-dtype`", "text": "UTF-8 string"}.get(f.dtype, f.dtype)
-        lines.append(f"| `{f.name}` | {row} | {dtype} | {f.unit} | {f.frame} | {f.meaning} |")
-    return "\n".join(lines)
+        rows.append((f"`{f.name}`", row, dtype, f.unit, f.frame, f.meaning))
+    return "\n".join(piped(rows))
 
 
 if __name__ == "__main__":

@@ -8,10 +8,9 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import OVERWRITE, Items, UserError, progress_bar
+from scenegen.common.command_line import EXAMPLE, OVERWRITE, Items, UserError, progress_bar
 
 PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
-EXAMPLE = "\b\nExample:\n  "  # click keeps the line breaks of a paragraph that begins with \b
 A_MODEL = "A .safetensors file with its .json beside it, or the name of bundled weights"
 
 WEIGHTS = click.option("--weights", help=f"{A_MODEL}  [those that suit the data].")

@@ -16,7 +16,7 @@ def machine() -> dict[str, Any]:
     names = ("mitsuba", "drjit", "numpy", "h5py", "isal")
     versions = {name: importlib.metadata.version(name) for name in names}
     library = find_llvm()
-    llvm = str(llvm_version(library)) if library else "none that works"
+    llvm = str(llvm_version(library)[0]) if library else "none that works"
     return {"versions": {**versions, "LLVM": llvm}, "variant": select_variant("auto")}
 
 

@@ -1,8 +1,8 @@
 """Read question files, ours and the released 3D-IQTT v2: records by row, map-style dataset."""
 
-import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from iqtt.files.layout import question_columns
 from iqtt.files.tables import QuestionTruth, TableFile, read_root, table_parts
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.row_file import checking, open_file
+from scenegen.common.row_file import RowDataset, checking, open_file
 from scenegen.description.specs import IMAGE_DTYPES
 from scenegen.rendering.ground_truth import decode_image
 
@@ -180,12 +180,8 @@ class QuestionsFile(TableFile):
         self.kind_names = beside.kind_names
 
 
-class QuestionsDataset:
-    """A map-style dataset (`__len__`, `__getitem__` -> dict of arrays) for any training loop.
-
-    `torch.utils.data.DataLoader` takes it as it is, with any number of workers: it pickles as its
-    path, and every process opens the file for itself when it first reads.
-    """
+class QuestionsDataset(RowDataset):
+    """The questions of a table as dicts of arrays, for any training loop; see `RowDataset`."""
 
     def __init__(
         self,
@@ -203,28 +199,13 @@ class QuestionsDataset:
 
         Raises as `QuestionsFile`, and SpecError for an unknown field.
         """
-        self._where = (Path(path), part, answers)
-        with QuestionsFile(*self._where) as file:
+        opener = partial(QuestionsFile, Path(path), part, answers)
+        with opener() as file:
             default = ("questions", "answers") if file.has_answers else ("questions",)
-            self.fields = default if fields is None else tuple(fields)
+            super().__init__(opener, len(file), default if fields is None else fields)
             for name in self.fields:
                 file.check_field(name)
-            self._length, self.spec, self.fingerprint = len(file), file.spec, file.fingerprint
-        self._open: tuple[int, QuestionsFile] | None = None
-
-    def __len__(self) -> int:
-        return self._length
-
-    def __getitem__(self, index: int) -> dict[str, Any]:
-        """Return the fields of one row, by name; image values are as stored."""
-        row = range(self._length)[index]
-        if self._open is None or self._open[0] != os.getpid():
-            self._open = (os.getpid(), QuestionsFile(*self._where))
-        file = self._open[1]
-        return {name: file.read(name, row) for name in self.fields}
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_open": None}
+            self.spec, self.fingerprint = file.spec, file.fingerprint
 
 
 def _identity(file: TableFile) -> str:

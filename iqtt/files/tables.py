@@ -19,10 +19,10 @@ from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.records import check
 from scenegen.common.row_file import (
     and_more,
-    check_version,
     checking,
     column_problems,
     open_file,
+    read_spec,
     reading,
 )
 
@@ -268,19 +268,12 @@ def read_root(path: Path, attributes: dict[str, Any]) -> tuple[SplitSpec | None,
     if not isinstance(found, str) or found != FORMAT_NAME:
         expected = f"{FORMAT_NAME!r}, or none, as in the released 3D-IQTT"
         raise FileFormatError(f"{path}: attribute 'format'", f"{found!r:.60}", expected)
-    check_version(path, attributes, FORMAT_VERSION)
-    for name in ("spec", "writer"):
-        if name not in attributes:
-            raise FileFormatError(f"{path}: attribute {name!r}", "none", "a text")
+    spec = read_spec(path, attributes, FORMAT_VERSION, SplitSpec.from_json)
     split = attributes.get("split")
     if not isinstance(split, str) or split not in SPLITS:
         expected = f"one of {', '.join(SPLITS)}"
         raise FileFormatError(f"{path}: attribute 'split'", f"{split!r:.40}", expected)
-    try:
-        return SplitSpec.from_json(str(attributes["spec"])), split
-    except SpecError as error:
-        where = f"{path}: attribute 'spec': {error.where}"
-        raise FileFormatError(where, error.found, error.expected, error.hint) from error
+    return spec, split
 
 
 def _question_truth(values: Mapping[str, Any], kind_names: Sequence[str]) -> QuestionTruth:

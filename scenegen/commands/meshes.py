@@ -7,14 +7,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenegen.common.command_line import CACHE_DIR, OVERWRITE, UP, Names, progress_bar
+from scenegen.common.command_line import CACHE_DIR, EXAMPLE, OVERWRITE, UP, Names, progress_bar
 
 if TYPE_CHECKING:
     from scenegen.objects.meshes.check import ModelCheck
     from scenegen.objects.meshes.listing import ModelFolder
 
 
-@click.command("check-objects")
+@click.command(
+    "check-objects",
+    epilog=f"{EXAMPLE}scenegen check-objects ShapeNetCore.v2 --classes mug,bowl --jobs 4",
+)
 @click.argument("folder")
 @UP
 @click.option("--classes", type=Names(), help="Classes to check, such as bowl,mug [default: all].")
@@ -39,10 +42,6 @@ def check_objects(
 
     The folder is ShapeNetCore's or has a sub-folder for each class. Prints counts for each class
     and why each model is refused. Exits with 1 if no model is usable.
-
-    \b
-    Example:
-        scenegen check-objects ShapeNetCore.v2 --classes mug,bowl --jobs 4
     """
     from scenegen.common.new_file import check_writable, write_text
     from scenegen.objects.meshes.cache import default_cache_dir
@@ -79,15 +78,10 @@ def _table(folder: "ModelFolder", records: Sequence["ModelCheck"]) -> Iterator[s
 
 
 def _json(folder: "ModelFolder", records: Sequence["ModelCheck"]) -> str:
+    names = ("name", "ok", "reason", "faces")
     models = [
-        {
-            "name": record.name,
-            "ok": record.ok,
-            "reason": record.reason,
-            "faces": record.faces,
-            "mended": dict(record.mended),
-            "seconds": round(record.seconds, 4),
-        }
+        {name: getattr(record, name) for name in names}
+        | {"mended": dict(record.mended), "seconds": round(record.seconds, 4)}
         for record in records
     ]
     about = {"kind": folder.kind, "up": folder.up, "digest": folder.digest(), "models": models}

@@ -13,6 +13,7 @@ import click
 from scenegen.common.command_line import (
     COMPRESSION,
     DEVICE,
+    EXAMPLE,
     IMAGE_DTYPE,
     MESHES,
     OVERWRITE,
@@ -26,19 +27,11 @@ from scenegen.common.command_line import (
     progress_bar,
 )
 
-OBJECT_OPTIONS = (
-    "shapes",
-    "classes",
-    "object_split",
-    "shapenet_root",
-    "objects_root",
-    "up",
-    "cache_dir",
-)
-
 
 # fmt: off
-@click.command()
+@click.command(
+    epilog=f"{EXAMPLE}scenegen render --n 1000 --preset shapenet --seed 1 --out rooms.h5"
+)
 @click.option("--n", "count", type=int, required=True, help="Number of scenes.")
 @click.option("--out", default="rooms.h5", show_default=True, help="File to write.")
 @click.option("--preset", default="shapes", show_default=True,
@@ -111,22 +104,18 @@ def render(
 
     Every image comes with its depth, normals, object ids, camera, lights and scene description.
     Square brackets hold the defaults, which presets may change.
-
-    \b
-    Example:
-        scenegen render --n 1000 --preset shapenet --seed 1 --out rooms.h5
     """
     from scenegen.description.presets import preset_spec
     from scenegen.objects.sources import object_source
     from scenegen.rooms.make import make_dataset
 
-    objects = {name: settings.pop(name) for name in OBJECT_OPTIONS}
+    names = ("shapes", "classes", "object_split", "shapenet_root", "objects_root", "up")
+    objects = {name: settings.pop(name) for name in (*names, "cache_dir")}
     chosen = {name: value for name, value in settings.items() if value is not None}
     if size is not None:
         chosen["height"], chosen["width"] = size
     source = object_source(preset, **objects)
     spec = preset_spec(preset, **chosen, **source.settings)
-    command = " ".join(["scenegen", *sys.argv[1:]])
     images = count * len(spec.views)
     started = time.perf_counter()
     with progress_bar(images, "image") as bar:
@@ -138,7 +127,7 @@ def render(
             device=device,
             compression=compression,
             overwrite=overwrite,
-            command=command,
+            command=" ".join(["scenegen", *sys.argv[1:]]),
             objects=source.objects,
             progress=bar.update,
         )
@@ -150,28 +139,22 @@ def render(
 
 
 # fmt: on
-@click.command()
+@click.command(epilog=f"{EXAMPLE}scenegen presets")
 def presets() -> None:
-    """List the presets of `render` with their settings: the paper's data sets.
-
-    \b
-    Example:
-        scenegen presets
-    """
+    """List the presets of `render` with their settings: the paper's data sets."""
     from scenegen.description.presets import PRESETS
+
+    def shown(value: Any) -> str:
+        return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
     width = max(map(len, PRESETS))
     for name, preset in PRESETS.items():
         click.echo(f"{name:{width}}  {preset.meaning}")
-        options = (f"{key} {_shown(value)}" for key, value in preset.settings.items())
+        options = (f"{key} {shown(value)}" for key, value in preset.settings.items())
         click.echo(f"{'':{width}}  {', '.join(options) or 'the defaults'}")
 
 
-def _shown(value: Any) -> str:
-    return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
-
-
-@click.command()
+@click.command(epilog=f"{EXAMPLE}scenegen preview rooms.h5 --random 12 --out sheet.png")
 @click.argument("file")
 @click.option("--out", default="sheet.png", show_default=True, help="Picture to write.")
 @click.option("--items", type=Items(), help="Rows to show [default: the first 12].")
@@ -180,12 +163,7 @@ def _shown(value: Any) -> str:
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of --random.")
 def preview(file: str, out: str, items: list[int] | None, number: int | None, seed: int) -> None:
-    """Show some rooms of a file in one picture: image, depth, normals and object ids.
-
-    \b
-    Example:
-        scenegen preview rooms.h5 --random 12 --out sheet.png
-    """
+    """Show some rooms of a file in one picture: image, depth, normals and object ids."""
     from scenegen.rooms.preview import contact_sheet, pick_rows, save_picture
     from scenegen.rooms.reader import RoomsFile
 
@@ -195,21 +173,16 @@ def preview(file: str, out: str, items: list[int] | None, number: int | None, se
     click.echo(f"{out}: {len(rows)} of {file}'s rooms")
 
 
-@click.command()
+@click.command(epilog=f"{EXAMPLE}scenegen info rooms.h5")
 @click.argument("file")
 def info(file: str) -> None:
-    """Print what a file holds: settings, ranges of values, units, sizes, versions, fingerprint.
-
-    \b
-    Example:
-        scenegen info rooms.h5
-    """
+    """Print what a file holds: settings, ranges of values, units, sizes, versions, fingerprint."""
     from scenegen.rooms.info import describe
 
     click.echo(describe(file))
 
 
-@click.command()
+@click.command(epilog=f"{EXAMPLE}scenegen verify rooms.h5 --items 20")
 @click.argument("file")
 @click.option(
     "--items",
@@ -226,10 +199,6 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
 
     Rows rendered again must agree bit for bit, or within a stated tolerance where the file was
     rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.
-
-    \b
-    Example:
-        scenegen verify rooms.h5 --items 20
     """
     from scenegen.objects.sources import file_objects
     from scenegen.rooms.reader import RoomsFile
@@ -243,13 +212,14 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     for check in checks:
         click.echo(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:26} {check.detail}")
     failed = sum(not check.ok for check in checks)
-    click.echo(
-        f"{file}: {failed} of {len(checks)} checks failed" if failed else f"{file}: verified"
-    )
+    outcome = f"{failed} of {len(checks)} checks failed" if failed else "verified"
+    click.echo(f"{file}: {outcome}")
     ctx.exit(1 if failed else 0)
 
 
-@click.command()
+@click.command(
+    epilog=f"{EXAMPLE}scenegen export rooms.h5 --items 0,5-7 --format exr --out exported"
+)
 @click.argument("file")
 @click.option("--items", type=Items(), required=True, help="Rows to export.")
 @click.option(
@@ -265,12 +235,7 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
 def export(
     file: str, items: list[int], form: str, out: str, overwrite: bool, **meshes: Any
 ) -> None:
-    """Write rows of a file in the formats of other tools.
-
-    \b
-    Example:
-        scenegen export rooms.h5 --items 0,5-7 --format exr --out exported
-    """
+    """Write rows of a file in the formats of other tools."""
     from scenegen.common.errors import SpecError
     from scenegen.common.new_file import check_writable
     from scenegen.objects.catalogue import changed_meshes

@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+# An `epilog` is this and a command line. A paragraph that begins with \b keeps its line breaks.
+EXAMPLE = "\b\nExample:\n  "
 NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
 MOST_ITEMS = 1_000_000  # numbers of a range; keeps 0-99999999999 from filling the memory
 
@@ -37,13 +39,13 @@ class PackageCommands(click.Group):
             return super().invoke(ctx)
         except OSError as error:
             where = f"{error.filename}: " if error.filename else ""
-            raise _failure(f"{where}{error.strerror or error}") from error
+            raise UserError(f"{where}{error.strerror or error}") from error
         except ValueError as error:
             from scenegen.common.errors import SceneGenError
 
             if not isinstance(error, SceneGenError):
                 raise
-            raise _failure(str(error)) from error
+            raise UserError(str(error)) from error
 
     def _loaded(self) -> list[Any]:
         modules = [importlib.import_module(name) for name in self.modules]
@@ -51,13 +53,12 @@ class PackageCommands(click.Group):
 
 
 class UserError(click.ClickException):
-    """A mistake that the user can mend."""
+    """A mistake that the user can mend; its text is shown as one line."""
 
     exit_code = 2
 
-
-def _failure(text: str) -> click.ClickException:
-    return UserError(" ".join(text.split()))
+    def __init__(self, text: str) -> None:
+        super().__init__(" ".join(text.split()))
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
@@ -67,14 +68,13 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 class _Parsed(click.ParamType):  # type: ignore[type-arg]
     """The value of an option that is not one of click's types.
 
-    `parse` raises ValueError where the text is not what `expected` says. A value that is no text,
+    `_parse` raises ValueError where the text is not what `expected` says. A value that is no text,
     such as a default, passes as it is.
     """
 
     expected: str
 
-    def parse(self, text: str) -> Any:
-        """Return the value that a text stands for."""
+    def _parse(self, text: str) -> Any:
         raise NotImplementedError
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -82,7 +82,7 @@ class _Parsed(click.ParamType):  # type: ignore[type-arg]
         if not isinstance(value, str):
             return value
         try:
-            return self.parse(value)
+            return self._parse(value)
         except ValueError:
             self.fail(f"found {value!r:.60}, expected {self.expected}", param, ctx)
 
@@ -102,8 +102,7 @@ class Range(_Parsed):
     def __init__(self, number: Callable[[str], Any]) -> None:
         self.number = number
 
-    def parse(self, text: str) -> tuple[Any, Any]:
-        """Return both ends, which may be equal."""
+    def _parse(self, text: str) -> tuple[Any, Any]:
         first, last = _matched(rf"({NUMBER})(?:-({NUMBER}))?", text).groups()
         return self.number(first), self.number(last or first)
 
@@ -113,8 +112,7 @@ class Size(_Parsed):
 
     name, expected = "N or HxW", "a number such as 128 or HxW such as 96x128"
 
-    def parse(self, text: str) -> tuple[int, int]:
-        """Return height and width."""
+    def _parse(self, text: str) -> tuple[int, int]:
         height, width = _matched("([0-9]+)(?:x([0-9]+))?", text.lower()).groups()
         return int(height), int(width or height)
 
@@ -124,8 +122,7 @@ class Items(_Parsed):
 
     name, expected = "0,5,7 or 0-7", "numbers such as 0,5,7 or rising ranges such as 0-7"
 
-    def parse(self, text: str) -> list[int]:
-        """Return the numbers in the order told, of one range `MOST_ITEMS` and one at most."""
+    def _parse(self, text: str) -> list[int]:
         chosen: list[int] = []
         for part in text.split(","):
             match = _matched("([0-9]+)(?:-([0-9]+))?", part)
@@ -141,8 +138,7 @@ class Names(_Parsed):
 
     name, expected = "NAME,NAME", "names such as mug,bowl"
 
-    def parse(self, text: str) -> tuple[str, ...]:
-        """Return the names, without the blanks around them."""
+    def _parse(self, text: str) -> tuple[str, ...]:
         return tuple(part.strip() for part in text.split(","))
 
 
@@ -151,8 +147,7 @@ class Numbers(_Parsed):
 
     name, expected = "N,N", "numbers such as 0,5,35"
 
-    def parse(self, text: str) -> tuple[float, ...]:
-        """Return the numbers."""
+    def _parse(self, text: str) -> tuple[float, ...]:
         return tuple(float(_matched(NUMBER, part)[0]) for part in text.split(","))
 
 
@@ -162,8 +157,7 @@ class Color(_Parsed):
     name = "white, black, GREY or R,G,B"
     expected = "white, black, a grey from 0 to 1, or R,G,B"
 
-    def parse(self, text: str) -> tuple[float, ...]:
-        """Return red, green and blue."""
+    def _parse(self, text: str) -> tuple[float, ...]:
         told = {"white": "1", "black": "0"}.get(text.lower(), text)
         channels = tuple(float(_matched(NUMBER, part)[0]) for part in told.split(","))
         if len(channels) not in (1, 3):
@@ -204,12 +198,8 @@ CACHE_DIR = click.option("--cache-dir", help="Folder for cleaned meshes [the use
 
 def MESHES(command: Any) -> Any:  # noqa: N802
     """Add the options that name the folder of meshes that objects are taken from."""
-    options = (
-        click.option("--shapenet-root", help="Folder of ShapeNetCore 1 or 2 with the objects."),
-        click.option("--objects-root", help="Folder with the objects, a sub-folder per class."),
-        UP,
-        CACHE_DIR,
+    command = UP(CACHE_DIR(command))  # the last option comes first
+    own = click.option("--objects-root", help="Folder with the objects, a sub-folder per class.")
+    return click.option("--shapenet-root", help="Folder of ShapeNetCore 1 or 2 with the objects.")(
+        own(command)
     )
-    for option in reversed(options):
-        command = option(command)
-    return command

@@ -15,11 +15,8 @@ _NUMBERS = itertools.count()
 def written_beside(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
     """Give a hidden path in the same folder to write to; it is renamed when the block ends well.
 
-    Whatever goes wrong, nothing is left under either name that was not there before.
-
-    Raises:
-        OSError: as `check_writable`, or what the disk raises, with `path` instead of the hidden
-            path as file name.
+    Whatever goes wrong, nothing is left under either name that was not there before. Raises OSError
+    as `check_writable` or as the disk does, with `path` in place of the hidden path.
     """
     path = Path(path)
     check_writable(path, overwrite)

@@ -42,10 +42,7 @@ def from_json(cls: type[T], text: str | bytes, what: str) -> T:
     """Build a dataclass, nested ones and tuples included, from what `to_json` wrote.
 
     Types must be exact, but a whole number may stand for a float. Floats are finite and of at
-    most `LARGEST`.
-
-    Args:
-        what: name of the record, for errors that belong to none of its fields.
+    most `LARGEST`. Errors that belong to none of the fields name the record `what`.
 
     Raises SpecError, naming the field, where the text is no JSON, where a field is missing,
     unknown or of another type, and where the dataclass itself refuses the values.

@@ -1,4 +1,4 @@
-"""Rotation matrices from quaternions."""
+"""Rotation matrices from quaternions, and cross products."""
 
 from typing import Any
 
@@ -19,3 +19,8 @@ def rotation_matrix(quaternion: Any) -> NDArray[np.float64]:
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
     return np.moveaxis(np.array(rows, dtype=float), (0, 1), (-2, -1))
+
+
+def cross(a: NDArray[Any], b: NDArray[Any]) -> tuple[Any, Any, Any]:
+    """Return the cross product of (3, ...) arrays by components, much faster than NumPy's."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

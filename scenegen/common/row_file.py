@@ -7,11 +7,11 @@ own filter and any HDF5 library reads it. A file gets its name when it is comple
 import errno
 import importlib.metadata
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import h5py
 import numpy as np
@@ -22,6 +22,7 @@ from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.common.new_file import written_beside
 
 Array = NDArray[Any]
+Spec = TypeVar("Spec")
 COMPRESSIONS = ("gzip", "lzf", "none")
 DEFLATE_LEVEL = 1
 CLOSING_SLACK = 8192  # bytes that HDF5 may need to close a file beyond what it says it needs
@@ -138,9 +139,7 @@ def new_file(path: str | Path, overwrite: bool = False) -> Iterator[h5py.File]:
 def open_file(path: str | Path, kind: str) -> h5py.File:
     """Open an HDF5 file to read; `kind` is what it should be, such as "rooms file".
 
-    Raises:
-        OSError: no such file, a folder, or no regular file.
-        FileFormatError: not HDF5, or cut off.
+    Raises OSError for what is no regular file, FileFormatError for one that is not HDF5 or cut off.
     """
     problems = (
         (not os.path.exists(path), errno.ENOENT, "no such file"),
@@ -182,17 +181,6 @@ def checking(file: h5py.File) -> Iterator[None]:
         raise
 
 
-def check_version(path: str | Path, attributes: Mapping[str, Any], version: str) -> None:
-    """Raise FileFormatError where a file's major format version is not that of `version`."""
-    found, major = str(attributes.get("format_version")), version.split(".", maxsplit=1)[0]
-    if found.split(".", maxsplit=1)[0] != major:
-        raise FileFormatError(
-            f"{path}: format version {found}",
-            expected=f"{major}.x",
-            hint=f"read it with the release that wrote it ({attributes.get('writer')})",
-        )
-
-
 def column_problems(group: h5py.Group, columns: Sequence[Column], count: int) -> list[str]:
     """Return a sentence for each column that is missing or has the wrong shape or type."""
     problems = []
@@ -209,6 +197,38 @@ def column_problems(group: h5py.Group, columns: Sequence[Column], count: int) ->
         if column.dtype == "text" and h5py.check_string_dtype(dataset.dtype) is None:
             problems.append(f"{column.name}: type {dataset.dtype}, expected strings")
     return problems
+
+
+def read_spec(
+    path: Path, attributes: Mapping[str, Any], version: str, from_json: Callable[[str], Spec]
+) -> Spec:
+    """Return the request that a file answers, from the root attributes that all our files have.
+
+    Raises FileFormatError for a major version other than `version`'s, a missing attribute and a
+    request that `from_json` refuses.
+    """
+    found, major = str(attributes.get("format_version")), version.split(".", maxsplit=1)[0]
+    if found.split(".", maxsplit=1)[0] != major:
+        raise FileFormatError(
+            f"{path}: format version {found}",
+            expected=f"{major}.x",
+            hint=f"read it with the release that wrote it ({attributes.get('writer')})",
+        )
+    for name in ("spec", "writer"):
+        if name not in attributes:
+            raise FileFormatError(f"{path}: attribute {name!r}", "none", "a text")
+    with describing(f"{path}: attribute 'spec'"):
+        return from_json(str(attributes["spec"]))
+
+
+@contextmanager
+def describing(place: str) -> Iterator[None]:
+    """Turn the SpecError of a stored description into a FileFormatError of its place."""
+    try:
+        yield
+    except SpecError as error:
+        where = f"{place}: {error.where}"
+        raise FileFormatError(where, error.found, error.expected, error.hint) from error
 
 
 def reason(error: BaseException) -> str:
@@ -243,3 +263,30 @@ def shuffle_bytes(values: Array) -> Array:
     size = values.dtype.itemsize
     flat = values.reshape(-1).view(np.uint8)
     return flat if size == 1 else np.ascontiguousarray(flat.reshape(-1, size).T)
+
+
+class RowDataset:
+    """A map-style dataset (`__len__`, `__getitem__` -> dict of arrays) for any training loop.
+
+    `torch.utils.data.DataLoader` takes it as it is, with any number of workers: it is pickled
+    without the open file, and every process opens the file for itself when it first reads.
+    """
+
+    def __init__(self, opener: Callable[[], Any], length: int, fields: Sequence[str]) -> None:
+        """Keep how to open the file; `opener` can be pickled, and gives a reader with `read`."""
+        self.fields, self._opener, self._length = tuple(fields), opener, length
+        self._open: tuple[int, Any] | None = None
+
+    def __len__(self) -> int:
+        return self._length
+
+    def __getitem__(self, index: int) -> dict[str, Any]:
+        """Return the fields of one row, by name; image values are as stored."""
+        row = range(self._length)[index]
+        if self._open is None or self._open[0] != os.getpid():
+            self._open = (os.getpid(), self._opener())
+        file = self._open[1]
+        return {name: file.read(name, row) for name in self.fields}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_open": None}

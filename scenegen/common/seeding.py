@@ -33,13 +33,9 @@ class Purpose(IntEnum):
 
 
 def item_rng(seed: int, index: int, purpose: Purpose, attempt: int = 0) -> np.random.Generator:
-    """Return the generator of one item, purpose and attempt.
+    """Return the generator of one item, purpose and attempt; no number may be negative.
 
-    Args:
-        seed: dataset seed, >= 0.
-        index: item index, >= 0.
-        purpose: what the numbers are for.
-        attempt: number of the retry, >= 0; a retry never continues the stream of the one before.
+    A retry (`attempt`) never continues the stream of the one before.
     """
     key = np.random.SeedSequence(seed, spawn_key=(index, int(purpose), attempt))
     return np.random.Generator(np.random.PCG64(key))

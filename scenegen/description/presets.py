@@ -7,6 +7,7 @@ from scenegen.common.records import check
 from scenegen.description.specs import DatasetSpec
 
 VESSELS = ("bag", "bottle", "bowl", "can", "cap", "lamp", "mug")
+HOUSEHOLD = {"source": "families", "shapes": VESSELS}
 PAPER_VIEWS = (0.0, 5.0, 35.0, 55.0, 80.0)  # degrees, as in the paper's table of unseen views
 VISIBLE_SHARE = 0.003  # least share of the image's pixels that show an object, by default
 VIEWS_SHRINK = 0.75  # factor on object radii where several views must show objects whole
@@ -24,13 +25,10 @@ class Preset:
 PRESETS = {
     "shapes": Preset("one to three basic shapes in a room", {}),
     "shapes-single": Preset("one basic shape", {"objects": (1, 1)}),
-    "shapenet": Preset(
-        "two to four household objects",
-        {"source": "families", "shapes": VESSELS, "objects": (2, 4)},
-    ),
+    "shapenet": Preset("two to four household objects", {**HOUSEHOLD, "objects": (2, 4)}),
     "shapenet-single": Preset(
         "one household object, of a known class",
-        {"source": "families", "shapes": VESSELS, "objects": (1, 1), "object_radius": (0.16, 0.26)},
+        {**HOUSEHOLD, "objects": (1, 1), "object_radius": (0.16, 0.26)},
     ),
     "furniture-256": Preset(
         "two or three thin-edged chairs and tables, 256x256",

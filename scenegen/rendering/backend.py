@@ -26,8 +26,6 @@ HOW_TO_GET_LLVM = (
     f"install LLVM {OLDEST_LLVM} or newer (on Linux x86-64: pip install {LLVM_WHEEL}) and, where it"
     f" is not found by itself, set {LLVM_VARIABLE} to its libLLVM before drjit is imported"
 )
-
-
 # Root attributes of files that name the releases which rendered them; see `versions`.
 VERSION_ATTRIBUTES = ("mitsuba_version", "drjit_version", "llvm_version")
 UNKNOWN = "unknown"
@@ -41,36 +39,28 @@ def select_variant(device: str) -> str:
     """Return the Mitsuba variant for a device and make its LLVM known to Dr.Jit.
 
     "auto": llvm_ad_rgb, else scalar_rgb with a warning. "cpu": llvm_ad_rgb. "cuda": cuda_ad_rgb.
-    "auto" never picks the GPU: its bits differ from the CPU's.
-
-    Raises:
-        BackendError: the device is unknown, or cannot be used here.
+    "auto" never picks the GPU: its bits differ from the CPU's. Raises BackendError for a device
+    that is unknown or cannot be used here.
     """
     if device not in DEVICES:
-        raise BackendError(f"device: found {device!r}, expected one of {', '.join(DEVICES)}")
+        raise BackendError("device", repr(device), f"one of {', '.join(DEVICES)}")
     if device == "cuda":
-        if not _cuda_driver():
-            raise BackendError("device cuda: no NVIDIA driver found here; use --device cpu")
+        if not _has_cuda_driver():
+            raise BackendError("device cuda", "no NVIDIA driver", hint="use --device cpu")
         return "cuda_ad_rgb"
-    library = _point_to_llvm()
-    if library:
+    if point_to_llvm():
         return "llvm_ad_rgb"
     if device == "cpu":
-        raise BackendError(f"device cpu: no usable LLVM found; {HOW_TO_GET_LLVM}")
-    _warn_once()
+        raise BackendError("device cpu", "no usable LLVM", hint=HOW_TO_GET_LLVM)
+    warn_of_slow_rendering()
     return "scalar_rgb"
 
 
-def llvm_version(library: str) -> int:
-    """Return an LLVM library's major version; 0 where it does not load or does not tell.
+def llvm_version(library: str) -> tuple[int, ...]:
+    """Return an LLVM library's version, three numbers: zeros where it does not load or tell.
 
     LLVMGetVersion came with LLVM 16, so whatever lacks it is too old.
     """
-    return _llvm_numbers(library)[0]
-
-
-def _llvm_numbers(library: str) -> tuple[int, ...]:
-    """Return the major, minor and patch number of an LLVM library, zeros as `llvm_version`."""
     numbers = [ctypes.c_uint() for _ in range(3)]
     try:
         ctypes.CDLL(library).LLVMGetVersion(*map(ctypes.byref, numbers))
@@ -82,11 +72,8 @@ def _llvm_numbers(library: str) -> tuple[int, ...]:
 def find_llvm() -> str | None:
     """Return the first LLVM that works: the user's own choice, the wheel's, the system's."""
     chosen = os.environ.get(LLVM_VARIABLE)
-    candidates = [chosen] if chosen else [*_wheel_libraries(), *_system_libraries()]
-    for library in candidates:
-        if library and llvm_version(library) >= OLDEST_LLVM:
-            return library
-    return None
+    candidates = [chosen] if chosen else [*wheel_libraries(), *system_libraries()]
+    return next((some for some in candidates if llvm_version(some)[0] >= OLDEST_LLVM), None)
 
 
 def versions() -> dict[str, str]:
@@ -96,9 +83,12 @@ def versions() -> dict[str, str]:
     tells it. Nothing is imported for this. For the LLVM that Dr.Jit uses, call it after
     `select_variant`.
     """
-    return dict(
-        zip(VERSION_ATTRIBUTES, (_release("mitsuba"), _release("drjit"), _llvm()), strict=True)
-    )
+    drjit = sys.modules.get("drjit")
+    library = None if drjit else find_llvm()
+    numbers = drjit.detail.llvm_version() if drjit else llvm_version(library) if library else (0,)
+    llvm = ".".join(map(str, numbers)) if numbers[0] > 0 else UNKNOWN
+    found = (_release("mitsuba"), _release("drjit"), llvm)
+    return dict(zip(VERSION_ATTRIBUTES, found, strict=True))
 
 
 def _release(package: str) -> str:
@@ -108,31 +98,20 @@ def _release(package: str) -> str:
         return UNKNOWN
 
 
-def _llvm() -> str:
-    """Return the version of the LLVM that an imported Dr.Jit uses, or else would find."""
-    drjit = sys.modules.get("drjit")
-    library = None if drjit else find_llvm()
-    numbers = drjit.detail.llvm_version() if drjit else _llvm_numbers(library) if library else (0,)
-    return ".".join(map(str, numbers)) if numbers[0] > 0 else UNKNOWN
-
-
 @lru_cache(maxsize=1)
-def _point_to_llvm() -> str | None:
+def point_to_llvm() -> str | None:
+    """Tell Dr.Jit which LLVM to use, and return it; None where none is usable."""
     if "drjit" in sys.modules:  # it looked for its LLVM when it was imported, and keeps to that
-        return _llvm_of_drjit()
+        version = sys.modules["drjit"].detail.llvm_version()
+        return f"LLVM {version[0]}" if version[0] >= OLDEST_LLVM else None
     library = find_llvm()
     if library:
         os.environ[LLVM_VARIABLE] = library
     return library
 
 
-def _llvm_of_drjit() -> str | None:
-    """Return which LLVM an imported Dr.Jit uses, unless that is too old."""
-    version = sys.modules["drjit"].detail.llvm_version()
-    return f"LLVM {version[0]}" if version[0] >= OLDEST_LLVM else None
-
-
-def _wheel_libraries() -> list[str]:
+def wheel_libraries() -> list[str]:
+    """Return the LLVM that the wheel brings, if it is installed."""
     try:
         files = importlib.metadata.files(LLVM_WHEEL) or []
     except importlib.metadata.PackageNotFoundError:
@@ -141,8 +120,8 @@ def _wheel_libraries() -> list[str]:
     return sorted(str(path) for path in found if path.exists())
 
 
-def _system_libraries() -> list[str]:
-    """Where package managers put LLVM (Debian, Fedora, Homebrew), the newest first."""
+def system_libraries() -> list[str]:
+    """Return what package managers installed (Debian, Fedora, Homebrew), the newest first."""
     named = ctypes.util.find_library("LLVM")
     patterns = (
         "/usr/lib/*/libLLVM*.so*",
@@ -155,7 +134,7 @@ def _system_libraries() -> list[str]:
     return ([named] if named else []) + newest[::-1]
 
 
-def _cuda_driver() -> bool:
+def _has_cuda_driver() -> bool:
     try:
         ctypes.CDLL("nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1")
     except OSError:
@@ -164,7 +143,8 @@ def _cuda_driver() -> bool:
 
 
 @lru_cache(maxsize=1)
-def _warn_once() -> None:
+def warn_of_slow_rendering() -> None:
+    """Warn, once a process, that rendering goes on without the fast path."""
     warnings.warn(
         f"no usable LLVM found: rendering with scalar_rgb, many times slower; {HOW_TO_GET_LLVM}",
         SlowFallbackWarning,

@@ -57,7 +57,8 @@ def closest_cube(cubes: Cubes, item: Any, o: Any, d: Any) -> Any:
 
     As in `rays`, directions have -z = 1 in the camera frame, so t is planar depth.
     """
-    rows = [mi.Vector3f(*row) for row in _rows(gather_row(cubes.frame, item, 9))]
+    frame = gather_row(cubes.frame, item, 9)
+    rows = [mi.Vector3f(*frame[i : i + 3]) for i in (0, 3, 6)]
     start: Any = mi.Vector3f(*(dr.dot(row, o) for row in rows))
     along: Any = mi.Vector3f(*(dr.dot(row, d) for row in rows))
     inverse = 1 / dr.select(dr.abs(along) < SMALLEST, SMALLEST, along)
@@ -82,7 +83,3 @@ def closest_cube(cubes: Cubes, item: Any, o: Any, d: Any) -> Any:
     n = dr.normalize(face)
     n = dr.select(dr.dot(n, d) > 0, -n, n)
     return t, object_id, dr.select(object_id >= 0, n, mi.Vector3f(0))
-
-
-def _rows(values: list[Any]) -> list[list[Any]]:
-    return [values[i : i + 3] for i in range(0, len(values), 3)]

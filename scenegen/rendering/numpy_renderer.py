@@ -79,9 +79,8 @@ def _closest(
     object_id = np.where(inside, 0, -1)
     for k in range(int(batch.object_count[b])):
         name = batch.names[batch.shape[b, k]]
-        start, along, meets = _to_object_frame(
-            batch, b, k, np.broadcast_to(origin, rays.shape), rays
-        )
+        origins = np.broadcast_to(origin, rays.shape)
+        start, along, meets = _to_object_frame(batch, b, k, origins, rays)
         distance, local_normal = cast(name, start[meets], along[meets])
         nearer = np.zeros(len(rays), bool)
         nearer[meets] = np.isfinite(distance) & (distance <= t[meets])
@@ -100,20 +99,12 @@ def _shade(
     positions, colors = batch.light_position[b, :light_count], batch.light_color[b, :light_count]
     material = np.maximum(object_id, 0)
     specular, shininess = batch.gloss[b, material].T
+    viewpoint = batch.world_from_camera[b, :3, 3] if batch.spec.specular[1] > 0 else None
+    looks = (batch.attenuation[b], specular, shininess, viewpoint)
 
     def lit(positions: Array, colors: Array, ambient: Array) -> Array:
-        return shade(
-            points,
-            normal,
-            batch.reflectance[b, material],
-            positions,
-            colors,
-            ambient,
-            batch.attenuation[b],
-            specular,
-            shininess,
-            batch.world_from_camera[b, :3, 3] if batch.spec.specular[1] > 0 else None,
-        )
+        rho = batch.reflectance[b, material]
+        return shade(points, normal, rho, positions, colors, ambient, *looks)
 
     ambient = batch.ambient[b]
     if not batch.spec.shadows:

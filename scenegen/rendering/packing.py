@@ -95,12 +95,8 @@ def pack(
 ) -> SceneBatch:
     """Pack these views of each scene into arrays, scene after scene.
 
-    Args:
-        objects: the catalogue of models; None for `objects_of(spec)`.
-
-    Raises:
-        SpecError: a scene has more objects or lights, or other shapes, than `spec` allows, or lacks
-            one of the views.
+    Raises SpecError where a scene has more objects or lights, or other shapes, than `spec` allows,
+    or lacks one of the views.
     """
     batch, slots, light_slots = len(scenes), spec.object_slots, spec.light_slots
     items = [item for scene in scenes for item in scene.objects]

@@ -29,8 +29,7 @@ def launch_pixels(
 ) -> Callable[[], dict[str, Array]]:
     """Start the kernel; the returned function waits for it and returns the pixels by field.
 
-    Args:
-        fields: names of fields of `GroundTruth`. Only what they need is computed.
+    Only what is needed for these fields of `GroundTruth` is computed.
     """
     scenes, cameras = upload_scenes(batch, variant)
     cubes = upload_cubes(batch) if batch.cubes_only else None

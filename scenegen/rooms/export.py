@@ -1,6 +1,7 @@
 """Write one row of a file of rooms in the formats of other tools: EXR, PNG, PLY, OBJ."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,12 +40,11 @@ def export_room(
 ) -> None:
     """Write one room to its `export_paths`. Raises OSError as `new_file.written_beside`.
 
-    Args:
-        objects: what the scene is made of, for "obj"; None where its objects are built in.
+    "obj" needs the `objects` of the scene, unless they are built in.
     """
     shape_of = objects.shape if objects else built_in_shape
-    obj: Writer = lambda room, path: write_mesh_obj(room, path, shape_of)  # noqa: E731
-    one = {"exr": write_exr, "ply": write_surfels_ply, "obj": obj}
+    obj = partial(write_mesh_obj, shape_of=shape_of)
+    one: dict[str, Writer] = {"exr": write_exr, "ply": write_surfels_ply, "obj": obj}
     writers = list(_PNG.values()) if form == "png" else [one[form]]
     for path, write in zip(paths, writers, strict=True):
         with written_beside(path, overwrite) as temporary:
@@ -59,19 +59,11 @@ def write_exr(room: Room, path: str | Path) -> None:
     import OpenEXR
 
     depth = np.where(np.isfinite(room.depth), room.depth, np.inf)
-    planes = {
-        "R": room.radiance[..., 0],
-        "G": room.radiance[..., 1],
-        "B": room.radiance[..., 2],
-        "Z": depth,
-        "N.X": room.normal[..., 0],
-        "N.Y": room.normal[..., 1],
-        "N.Z": room.normal[..., 2],
-        "id": room.object_id,
-    }
+    planes = (*np.moveaxis(room.radiance, -1, 0), depth, *np.moveaxis(room.normal, -1, 0))
+    names = ("R", "G", "B", "Z", "N.X", "N.Y", "N.Z", "id")
     channels = {
         name: OpenEXR.Channel(name, np.ascontiguousarray(plane, np.float32))
-        for name, plane in planes.items()
+        for name, plane in zip(names, (*planes, room.object_id), strict=True)
     }
     header = {
         "compression": OpenEXR.ZIP_COMPRESSION,
@@ -84,30 +76,20 @@ def write_exr(room: Room, path: str | Path) -> None:
 def write_surfels_ply(room: Room, path: str | Path) -> None:
     """Write the surfels in the world frame: position, normal, colour (sRGB), object id."""
     hit = room.object_id >= 0
-    vertices = np.empty(
-        int(hit.sum()),
-        [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")]
-        + [(name, "u1") for name in ("red", "green", "blue")]
-        + [("object_id", "i1")],
-    )
-    points, normals = (
-        room.points_world[hit],
-        transform_vectors(room.world_from_camera, room.normal[hit]),
-    )
-    colors = srgb_bytes(room.radiance)[hit]
-    for i in range(3):
-        vertices["xyz"[i]], vertices["n" + "xyz"[i]] = points[:, i], normals[:, i]
-        vertices[("red", "green", "blue")[i]] = colors[:, i]
-    vertices["object_id"] = room.object_id[hit]
-    kinds = {"<f4": "float", "|u1": "uchar", "|i1": "char"}
-    fields = (vertices.dtype.fields or {}).items()
-    properties = [f"property {kinds[kind.str]} {name}" for name, (kind, *_) in fields]
+    names = ("x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "object_id")
+    kinds = 6 * ["float"] + 3 * ["uchar"] + ["char"]
+    types = {"float": "<f4", "uchar": "u1", "char": "i1"}
+    points = room.points_world[hit]
+    normals = transform_vectors(room.world_from_camera, room.normal[hit])
+    columns = (*points.T, *normals.T, *srgb_bytes(room.radiance)[hit].T, room.object_id[hit])
+    named = list(zip(names, kinds, strict=True))
+    vertices = np.rec.fromarrays(columns, [(name, types[kind]) for name, kind in named])
     header = [
         "ply",
         "format binary_little_endian 1.0",
         f"comment surfels of room {room.index}: world frame, y up, scene units",
         f"element vertex {len(vertices)}",
-        *properties,
+        *(f"property {kind} {name}" for name, kind in named),
         "end_header",
     ]
     Path(path).write_bytes("\n".join([*header, ""]).encode() + vertices.tobytes())

@@ -1,5 +1,6 @@
 """Describe a file of rooms as text: what it was asked for, what it holds, how it is stored."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -61,13 +62,11 @@ def setting_lines(spec: Any) -> list[str]:
 
 
 def _ranges(rooms: RoomsFile, rows: NDArray[np.int_]) -> tuple[dict[str, tuple[float, float]], str]:
-    low: dict[str, float] = {}
-    high: dict[str, float] = {}
-    counts: dict[str, int] = {}
+    ends: dict[str, list[float]] = {}
+    counts: Counter[str] = Counter()
     for i in rows.tolist():
         room = rooms[i]
-        for item in room.scene.objects:
-            counts[item.name] = counts.get(item.name, 0) + 1
+        counts.update(item.name for item in room.scene.objects)
         values = {
             "radiance": room.radiance,
             "depth": room.depth[np.isfinite(room.depth)],
@@ -76,10 +75,9 @@ def _ranges(rooms: RoomsFile, rows: NDArray[np.int_]) -> tuple[dict[str, tuple[f
         }
         for name, array in values.items():
             if array.size:
-                low[name] = min(low.get(name, np.inf), float(array.min()))
-                high[name] = max(high.get(name, -np.inf), float(array.max()))
+                ends.setdefault(name, []).extend((float(array.min()), float(array.max())))
     shapes = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
-    return {name: (low[name], high[name]) for name in low}, shapes or "none"
+    return {name: (min(some), max(some)) for name, some in ends.items()}, shapes or "none"
 
 
 def size_text(count: int) -> str:

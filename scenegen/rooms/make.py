@@ -5,7 +5,7 @@ is rendered, the next is proposed and the one before is written. Memory does not
 number of scenes.
 """
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -53,11 +53,8 @@ def make_dataset(
         objects: what the scenes are made of; None for `objects_of(spec)`.
         progress: called now and then with the number of rows written since the last call.
 
-    Raises:
-        SpecError: a setting is out of range.
-        BackendError: the device cannot render here.
-        PlacementError: no scene meets the request.
-        OSError: the file cannot be written.
+    Raises SpecError for a setting out of range, BackendError where the device cannot render here,
+    PlacementError where no scene meets the request, and OSError where the disk refuses.
     """
     check(1 <= batch <= MAX_BATCH, "batch", batch, f"from 1 to {MAX_BATCH}")
     most = MAX_RAYS // (spec.height * spec.width)
@@ -70,12 +67,7 @@ def make_dataset(
     attributes = {"creation_command": command, "variant": variant, **versions()}
     with (
         create_rooms(
-            path,
-            spec,
-            count,
-            compression=compression,
-            overwrite=overwrite,
-            attributes=attributes,
+            path, spec, count, compression=compression, overwrite=overwrite, attributes=attributes
         ) as writer,
         ThreadPoolExecutor(1) as pool,
     ):
@@ -111,10 +103,18 @@ def render_items(
     batch = max(1, batch // len(views))  # scenes
     next_in = 0
     retries: deque[int] = deque()
-    attempts: dict[int, int] = {}
-    rendered: dict[int, int] = {}
+    attempts, rendered = Counter[int](), Counter[int]()  # of items that are not finished
     finished: dict[int, RenderedScene] = {}
     next_out = 0
+
+    def proposal(index: int) -> SceneSpec:
+        """Return the item's next proposal that places all its objects."""
+        while attempts[index] < MAX_ATTEMPTS:
+            attempts[index] += 1
+            scene = sample_scene(spec, index, attempts[index] - 1, objects)
+            if scene is not None:
+                return scene
+        raise refusal(spec, index, rendered[index], objects)
 
     def propose() -> list[SceneSpec]:
         nonlocal next_in
@@ -127,7 +127,7 @@ def render_items(
                 next_in += 1
             else:
                 break
-            scenes.append(_next_proposal(spec, index, attempts, rendered, objects))
+            scenes.append(proposal(index))
         return scenes
 
     def begin(scenes: list[SceneSpec]) -> _Begun | None:
@@ -148,8 +148,7 @@ def render_items(
                 rendered[scene.index] += 1
             else:
                 finished[scene.index] = shown
-                attempts.pop(scene.index)
-                rendered.pop(scene.index)
+                del attempts[scene.index], rendered[scene.index]
         ready = []
         while next_out < len(indices) and indices[next_out] in finished:
             ready.append(finished.pop(indices[next_out]))
@@ -170,20 +169,3 @@ def _shown(
         pixels = {name: values[images] for name, values in vars(truth).items()}
         shown = RenderedScene(scene, batch, first, pixels, visible[images])
         yield shown if enough.all() else None
-
-
-def _next_proposal(
-    spec: DatasetSpec,
-    index: int,
-    attempts: dict[int, int],
-    rendered: dict[int, int],
-    objects: Objects,
-) -> SceneSpec:
-    """Return the item's next proposal that places all its objects."""
-    rendered.setdefault(index, 0)
-    for attempt in range(attempts.get(index, 0), MAX_ATTEMPTS):
-        scene = sample_scene(spec, index, attempt, objects)
-        if scene is not None:
-            attempts[index] = attempt + 1
-            return scene
-    raise refusal(spec, index, rendered[index], objects)

@@ -1,9 +1,8 @@
 """Read a file of rooms: typed records by index, and a map-style dataset for training loops."""
 
-import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import back_project, transform_points
-from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.row_file import (
-    and_more,
-    check_version,
-    checking,
-    column_problems,
-    open_file,
-    reading,
-)
+from scenegen.common import row_file
+from scenegen.common.errors import FileFormatError
+from scenegen.common.records import check
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.layout import FIELDS, FORMAT_NAME, FORMAT_VERSION, columns
@@ -69,27 +62,25 @@ class RoomsFile:
     """An open rooms file: a sequence of `Room`s. Use it as a context manager, or close it.
 
     Attributes:
-        path: of the file.
         spec: the request that it answers.
         fingerprint: SHA-256 of request and scenes (`specs.Fingerprint`).
         attributes: all root attributes.
     """
 
     def __init__(self, path: str | Path) -> None:
-        """Open and check the layout.
+        """Open and check the layout. Raises OSError where there is no such file.
 
-        Raises:
-            FileNotFoundError: no such file.
-            FileFormatError: not HDF5, not a file of rooms, of another major version, or damaged.
+        Raises FileFormatError where it is not HDF5, not a file of rooms, of another major version,
+        or damaged.
         """
         self.path = Path(path)
-        self._file = open_file(path, "rooms file")
-        with checking(self._file):
+        self._file = row_file.open_file(path, "rooms file")
+        with row_file.checking(self._file):
             self.attributes: dict[str, Any] = dict(self._file.attrs)
             self.spec = self._check_root()
             problems = _layout_problems(self._file, self.spec)
             if problems:
-                raise FileFormatError(f"{path}: {and_more(problems)}")
+                raise FileFormatError(f"{path}: {row_file.and_more(problems)}")
         self.fingerprint = str(self.attributes["fingerprint"])
         self._count = int(self._file["image"].shape[0])
 
@@ -117,17 +108,17 @@ class RoomsFile:
 
     def scene(self, index: int) -> SceneSpec:
         """Return the description of the scene that row `index` shows."""
-        with _inside(f"{self.path}: scene, row {index}"):
+        with row_file.describing(f"{self.path}: scene, row {index}"):
             return SceneSpec.from_json(self.read("scene", index))
 
     def read(self, name: str, rows: int | slice) -> Any:
         """Read rows of one dataset. Raises FileFormatError where they are damaged."""
-        with reading(f"{self.path}: {name}, row {rows}"):
+        with row_file.reading(f"{self.path}: {name}, row {rows}"):
             return self._file[name][rows]
 
     def problems(self) -> list[str]:
         """Return what is wrong with the layout, the datasets' own descriptions included."""
-        with reading(self.path):
+        with row_file.reading(self.path):
             return _layout_problems(self._file, self.spec) + _attribute_problems(
                 self._file, self.spec
             )
@@ -138,7 +129,7 @@ class RoomsFile:
         HDF5 does not tell the size of the heaps that hold texts. The dataset "scene" is said to
         take what all others leave of the file.
         """
-        with reading(self.path):
+        with row_file.reading(self.path):
             sizes = {f.name: self._file[f.name].id.get_storage_size() for f in FIELDS}
             memory = {f.name: self._file[f.name].nbytes for f in FIELDS}
         texts = self.path.stat().st_size - sum(sizes.values()) + sizes["scene"]
@@ -164,28 +155,17 @@ class RoomsFile:
                 "no format attribute" if found is None else f"format {found!r:.60}",
                 f"{FORMAT_NAME!r}, as scenegen render writes it",
             )
-        check_version(self.path, self.attributes, FORMAT_VERSION)
-        for name in ("spec", "fingerprint", "writer"):
-            if name not in self.attributes:
-                raise FileFormatError(self.path, f"no root attribute {name!r}")
-        with _inside(f"{self.path}: attribute 'spec'"):
-            return DatasetSpec.from_json(str(self.attributes["spec"]))
-
-
-@contextmanager
-def _inside(place: str) -> Iterator[None]:
-    """Turn the error of a description into one of the file that holds it."""
-    try:
-        yield
-    except SpecError as error:
-        raise FileFormatError(f"{place}: {error.where}", error.found, error.expected) from error
+        spec = row_file.read_spec(self.path, self.attributes, FORMAT_VERSION, DatasetSpec.from_json)
+        if "fingerprint" not in self.attributes:
+            raise FileFormatError(f"{self.path}: attribute 'fingerprint'", "none", "a text")
+        return spec
 
 
 def _layout_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
     """Return a sentence for each dataset that is missing or has the wrong shape or type."""
     image = file.get("image")
     count = image.shape[0] if isinstance(image, h5py.Dataset) and image.shape else 0
-    problems = column_problems(file, columns(spec), count)
+    problems = row_file.column_problems(file, columns(spec), count)
     told = file.attrs.get("count")
     if not problems and (count == 0 or not np.array_equal(count, told)):
         problems.append(
@@ -205,38 +185,17 @@ def _attribute_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
     return problems
 
 
-class RoomsDataset:
-    """A map-style dataset (`__len__`, `__getitem__` -> dict of arrays) for any training loop.
-
-    `torch.utils.data.DataLoader` takes it as it is, with any number of workers: pickled, it is no
-    more than its path, and every process opens the file for itself when it first reads.
-    """
+class RoomsDataset(row_file.RowDataset):
+    """The rows of a rooms file as dicts of arrays, for any training loop; see `RowDataset`."""
 
     def __init__(
-        self,
-        path: str | Path,
-        fields: Sequence[str] = ("image", "depth", "normal", "object_id"),
+        self, path: str | Path, fields: Sequence[str] = ("image", "depth", "normal", "object_id")
     ) -> None:
         """Check the file once. Raises as `RoomsFile`, and SpecError for an unknown field."""
         known = [field.name for field in FIELDS if field.dtype != "text"]
         for name in fields:
-            if name not in known:
-                raise SpecError("field", repr(name), f"some of {', '.join(known)}")
-        self.path, self.fields = Path(path), tuple(fields)
+            check(name in known, "field", repr(name), f"some of {', '.join(known)}")
+        self.path = Path(path)
         with RoomsFile(path) as rooms:
-            self._length, self.spec, self.fingerprint = len(rooms), rooms.spec, rooms.fingerprint
-        self._open: tuple[int, RoomsFile] | None = None
-
-    def __len__(self) -> int:
-        return self._length
-
-    def __getitem__(self, index: int) -> dict[str, Any]:
-        """Return the fields of one row, by name; image values are as stored."""
-        row = range(self._length)[index]
-        if self._open is None or self._open[0] != os.getpid():
-            self._open = (os.getpid(), RoomsFile(self.path))
-        rooms = self._open[1]
-        return {name: rooms.read(name, row) for name in self.fields}
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_open": None}
+            super().__init__(partial(RoomsFile, self.path), len(rooms), fields)
+            self.spec, self.fingerprint = rooms.spec, rooms.fingerprint

@@ -7,6 +7,7 @@ still gives the description, and the description the pixels.
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -65,10 +66,8 @@ def verify_file(
         objects: what its scenes are made of; None where its objects are built in.
         progress: called with the number of rows read since the last call.
 
-    Raises:
-        FileNotFoundError, FileFormatError: the file cannot be opened as a file of rooms.
-        SpecError: it shows meshes, and `objects` are not given.
-        BackendError: the device cannot render here.
+    Raises as `RoomsFile`; SpecError where the file shows meshes and `objects` are not given; and
+    BackendError where the device cannot render here.
     """
     with RoomsFile(path) as rooms:
         objects = objects or objects_of(rooms.spec)
@@ -120,9 +119,14 @@ def _row_problems(rooms: RoomsFile, i: int, objects: Objects) -> Iterable[tuple[
         room = rooms[i]
         batch = pack(rooms.spec, [room.scene], (room.view_index,), objects)
     except (SceneGenError, IndexError) as error:
-        unreadable = [name for name in _PIXELS if not _can_read(rooms, name, i)]
-        yield from ((name, f"{name} cannot be read") for name in unreadable)
-        if not unreadable:
+        readable = True
+        for name in _PIXELS:
+            try:
+                rooms.read(name, i)
+            except FileFormatError:
+                readable = False
+                yield name, f"{name} cannot be read"
+        if readable:
             yield "description", str(error)
         return
     found = {
@@ -134,14 +138,6 @@ def _row_problems(rooms: RoomsFile, i: int, objects: Objects) -> Iterable[tuple[
     }
     with np.errstate(all="ignore"):  # a damaged number may overflow, and is found all the same
         yield from ((name, problem) for name, some in found.items() for problem in some)
-
-
-def _can_read(rooms: RoomsFile, name: str, row: int) -> bool:
-    try:
-        rooms.read(name, row)
-    except FileFormatError:
-        return False
-    return True
 
 
 def _description_problems(
@@ -247,10 +243,8 @@ def _sampled_again(rooms: RoomsFile, rows: Array, objects: Objects) -> Check:
     for i in rows.tolist():
         try:
             stored = rooms.scene(i)
-            tries = (
-                sample_scene(rooms.spec, stored.index, k, objects) for k in range(MAX_ATTEMPTS)
-            )
-            same = any(scene == stored for scene in tries)
+            draw = partial(sample_scene, rooms.spec, stored.index, objects=objects)
+            same = any(draw(k) == stored for k in range(MAX_ATTEMPTS))
         except (FileFormatError, SpecError):
             same = False
         if not same:
@@ -263,8 +257,7 @@ def _rendered_again(rooms: RoomsFile, rows: Array, device: str, objects: Objects
     """Check that the stored descriptions still give the stored pixels."""
     here = {"variant": select_variant(device), **versions()}
     stored = {name: rooms.attributes.get(name, "not stored") for name in here}
-    others = [f"{name} {stored[name]}, here {here[name]}" for name in here
-              if stored[name] != here[name]]  # fmt: skip
+    others = [f"{x} {stored[x]}, here {here[x]}" for x in here if stored[x] != here[x]]
     wrong = []
     for i in rows.tolist():
         try:

@@ -46,7 +46,6 @@ class RoomsWriter:
     """Writes the rows of a new file of rooms; `create_rooms` makes one."""
 
     def __init__(self, file: h5py.File, spec: DatasetSpec, count: int, compression: str) -> None:
-        """Create the datasets of `count` scenes."""
         self.views = range(len(spec.views))
         self.table = Table(file, columns(spec), count * len(spec.views), compression)
         self.fingerprint = Fingerprint(spec)
@@ -66,8 +65,7 @@ class RoomsWriter:
 def described(batch: SceneBatch, i: int, scene: SceneSpec) -> dict[str, Any]:
     """Return what a row holds that follows from a scene's description, by name of the dataset.
 
-    Args:
-        i: the image of `batch` that shows a view of `scene`.
+    Image `i` of `batch` shows a view of `scene`.
     """
     spec, view = batch.spec, int(batch.view[i])
     unused = spec.object_slots - len(scene.objects)
@@ -105,27 +103,22 @@ def create_rooms(
 ) -> Iterator[RoomsWriter]:
     """Open a new file of rooms for `count` scenes; it gets its name when the block ends well.
 
-    Its bytes depend on the rows alone, not on how many were appended at a time.
-
-    Raises:
-        SpecError: unknown compression, or a count below 1.
-        OSError: the file cannot be written.
+    Its bytes depend on the rows alone, not on how many were appended at a time. Raises SpecError
+    for an unknown compression or a count below 1, OSError where the file cannot be written.
     """
     rows = count * len(spec.views)
     most = MAX_COUNT // len(spec.views)
     check(1 <= count <= most, "n", count, f"from 1 to {most:,} scenes")
     with new_file(path, overwrite) as file:
         file.attrs.update(
-            {
-                "format": FORMAT_NAME,
-                "format_version": FORMAT_VERSION,
-                "writer": writer_name(),
-                "spec": spec.to_json(),
-                "count": rows,
-                "compression": compression,
-                "conventions": CONVENTIONS,
-                **(attributes or {}),
-            }
+            format=FORMAT_NAME,
+            format_version=FORMAT_VERSION,
+            writer=writer_name(),
+            spec=spec.to_json(),
+            count=rows,
+            compression=compression,
+            conventions=CONVENTIONS,
+            **(attributes or {}),
         )
         writer = RoomsWriter(file, spec, count, compression)
         yield writer

@@ -24,8 +24,5 @@ def octant_point(height: float, azimuth: float) -> Vector3:
 
 def around(center: Vector3, radius: float, direction: Vector3) -> Vector3:
     """Return the point at distance `radius` from `center` in a unit direction."""
-    return (
-        center[0] + radius * direction[0],
-        center[1] + radius * direction[1],
-        center[2] + radius * direction[2],
-    )
+    x, y, z = (c + radius * d for c, d in zip(center, direction, strict=True))
+    return (x, y, z)

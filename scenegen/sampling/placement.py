@@ -56,9 +56,7 @@ def are_apart(places: Array, support: Array, other: Body) -> Array:
     """Return at which places, (C, 3), a plane keeps a body more than GAP away from another.
 
     True is a proof. False means that the bodies touch, or nearly: every plane tried cuts one.
-
-    Args:
-        support: of the first body, as in `Body`.
+    `support` is the first body's, as in `Body`.
     """
     distance = (places - other.position) @ SEPARATORS.T
     return np.asarray((distance > support[1] + other.support[0] + GAP).any(axis=1))
@@ -85,10 +83,8 @@ def find_place(
     """Try `CANDIDATES` places on the floor, uniform over it; return the first that is free.
 
     Free is: inside the walls, inside every camera's image (only the centre if `cropped`), and a
-    plane away from each body in `placed`.
-
-    Args:
-        frustums: (camera position (3,), outward border normals (4, 3)) of each camera.
+    plane away from each body in `placed`. `frustums` are each camera's position, (3,), and its
+    outward border normals, (4, 3).
     """
     borders = [normals for _, normals in frustums]
     directions = np.concatenate([_WALLS, *borders, SEPARATORS, -SEPARATORS])

@@ -32,10 +32,8 @@ def sample_scene(
     """Propose the scene of item `index`; None where this attempt could not place its objects.
 
     Pure: the same arguments give the same scene, on any machine, in any order. The caller renders
-    a proposal, and asks for the next attempt if some object is not visible enough.
-
-    Args:
-        objects: None for `objects_of(spec)`.
+    a proposal, and asks for the next attempt if some object is not visible enough. `objects` are
+    those of the spec by default.
 
     Raises SpecError where no model of a class can be used.
     """
@@ -58,11 +56,7 @@ def sample_scene(
 def refusal(
     spec: DatasetSpec, index: int, placed_but_hidden: int, objects: Objects | None = None
 ) -> PlacementError:
-    """Return the error that says why item `index` got no scene.
-
-    Args:
-        placed_but_hidden: how many of its proposals were rendered, in vain.
-    """
+    """Return why item `index` got no scene, `placed_but_hidden` of its proposals being rendered."""
     unplaced = sample_objects(spec, index, objects or objects_of(spec))
     wanted = len(unplaced)
     if placed_but_hidden:

@@ -46,29 +46,10 @@ def test_world_from_camera_is_rigid_and_looks_at_its_target(
     assert rotation[1, 1] > 0.0, "y axis is up"
 
 
-def test_a_camera_on_the_z_axis_is_the_world_moved() -> None:
-    matrix = Camera((0.3, 0.3, 2.0), (0.3, 0.3, 0.3), 30.0).world_from_camera
-    expected = np.eye(4)
-    expected[:3, 3] = 0.3, 0.3, 2.0
-    np.testing.assert_allclose(matrix, expected, atol=1e-15)
-
-
-def test_a_camera_on_the_x_axis_has_minus_z_on_its_right() -> None:
-    matrix = Camera((2.0, 0.3, 0.3), (0.3, 0.3, 0.3), 30.0).world_from_camera
-    np.testing.assert_allclose(matrix[:3, 0], [0, 0, -1], atol=1e-15)
-    np.testing.assert_allclose(matrix[:3, 1], [0, 1, 0], atol=1e-15)
-    np.testing.assert_allclose(matrix[:3, 2], [1, 0, 0], atol=1e-15)
-
-
 @pytest.mark.parametrize("height", [2.0, -2.0])
 def test_looking_straight_up_or_down_is_refused(height: float) -> None:
     with pytest.raises(SpecError, match="along y"):
         _ = Camera((0.3, height, 0.3), (0.3, 0.3, 0.3), 30.0).world_from_camera
-
-
-def test_whole_numbers_are_numbers() -> None:
-    whole, real = Camera((2, 1, 2), (0, 0, 1), 30), Camera((2.0, 1.0, 2.0), (0.0, 0.0, 1.0), 30.0)
-    np.testing.assert_array_equal(whole.world_from_camera, real.world_from_camera)
 
 
 def test_a_camera_looks_elsewhere_and_not_all_around() -> None:
@@ -118,12 +99,6 @@ def test_projection_takes_back_projected_points_to_their_pixels(
     np.testing.assert_allclose(columns, np.tile(np.arange(width) + 0.5, (height, 1)), atol=1e-9)
     expected_rows = np.tile(np.arange(height)[:, None] + 0.5, (1, width))
     np.testing.assert_allclose(rows, expected_rows, atol=1e-9)
-
-
-def test_intrinsics_by_hand() -> None:
-    np.testing.assert_allclose(
-        intrinsics(100, 200, 90.0), [[50, 0, 100], [0, 50, 50], [0, 0, 1]], rtol=1e-12
-    )
 
 
 def test_back_projection_keeps_misses_as_nan() -> None:

@@ -20,6 +20,7 @@ from iqtt.files.reader import (
 )
 from iqtt.shapes.polycube import canonical, set_ids
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.row_file import open_file
 
 TABLES = [  # of the tiny split: file, part, answers told, truth told
     ("iqtt-train.h5", "labeled", True, True),
@@ -284,9 +285,9 @@ def test_each_process_opens_the_file_once(split_folder, monkeypatch):
 
     def counting(*arguments):
         opened.append(os.getpid())
-        return QuestionsFile(*arguments)
+        return open_file(*arguments)
 
-    monkeypatch.setattr("iqtt.files.reader.QuestionsFile", counting)
+    monkeypatch.setattr("iqtt.files.tables.open_file", counting)
     for process in (1, 1, 2, 2):
         monkeypatch.setattr("os.getpid", lambda process=process: process)
         data[0], data[1]

@@ -23,30 +23,6 @@ def test_a_broken_model_is_passed_over_and_told_of(run: Run, meshes: Path) -> No
     assert used == {"mug/tall", "mug/round", "bowl/ball", "bowl/cone"}
 
 
-def test_rows_name_class_and_model_and_the_file_behind(run: Run, meshes: Path) -> None:
-    render(run, "--objects-root", meshes)
-    with h5py.File("rooms.h5") as file:
-        names = list(file["object/shape"].attrs["names"])
-        spec = json.loads(file.attrs["spec"])
-        shape, model, count = (file[f"object/{n}"][:] for n in ("shape", "model", "count"))
-        scenes = [json.loads(text) for text in file["scene"][:]]
-    assert names == spec["shapes"] == ["bowl", "mug"]
-    assert spec["source"] == "folder"
-    assert spec["listing"]
-    digests: dict[str, set[str]] = {}
-    for row, scene in enumerate(scenes):
-        items = scene["objects"]
-        assert [item["shape"].encode() for item in items] == model[row, : count[row]].tolist()
-        assert [names[i] for i in shape[row, : count[row]]] == [
-            item["shape"].split("/")[0] for item in items
-        ]
-        assert (shape[row, count[row] :] == -1).all()
-        for item in items:
-            digests.setdefault(item["shape"], set()).add(item["mesh"])
-    assert all(len(some) == 1 for some in digests.values())
-    assert len(set.union(*digests.values())) == len(digests) == 4
-
-
 def test_the_same_bytes_with_and_without_the_cache_and_in_any_batch(run: Run, meshes: Path) -> None:
     for name, options in (
         ("a", ()),
@@ -76,15 +52,6 @@ def test_a_folder_with_nothing_usable_is_refused_in_one_line(run: Run, tmp_path:
     assert not (tmp_path / "rooms.h5").exists()
 
 
-def test_a_class_of_one_broken_model_is_refused_likewise(run: Run, meshes: Path) -> None:
-    for name in ("tall.obj", "round.stl"):
-        (meshes / "mug" / name).unlink()
-    result = run("render", "--n", 2, *SMALL, "--objects-root", meshes, "--classes", "mug")
-    assert result.exit_code == 2
-    assert "models drawn from 'mug' cannot be used" in result.stderr
-    assert len(result.stderr.splitlines()) == 1
-
-
 def test_many_broken_models_are_told_of_in_a_few_lines(run: Run, meshes: Path) -> None:
     for i in range(30):
         (meshes / "mug" / f"bad{i}.obj").write_text("")
@@ -104,9 +71,7 @@ def test_splits_of_a_folder_are_disjoint(run: Run, tmp_path: Path) -> None:
         render(run, "--objects-root", "many", "--object-split", split, "--out", split, count=25)
         used[split] = set(models_of(split))
         assert used[split]
-    assert not used["train"] & used["val"]
-    assert not used["train"] & used["test"]
-    assert not used["val"] & used["test"]
+    assert sum(map(len, used.values())) == len(set.union(*used.values()))
     result = run("verify", "val", "--objects-root", "many", "--cache-dir", "cache")
     assert result.exit_code == 0, result.output
 
@@ -138,7 +103,6 @@ def test_classes_that_a_folder_lacks_are_refused(
     refuses(*render_one, "--objects-root", meshes, "--classes", "mug,plane", words=("plane",))
     refuses(*render_one, "--shapenet-root", shapenet, "--classes", "sofa", words=("sofa",))
     refuses(*render_one, "--objects-root", meshes, "--classes", "", words=("class",))
-    refuses(*render_one, "--shapenet-root", meshes, words=("found no ShapeNet", "--objects-root"))
 
 
 @pytest.mark.parametrize("least", [0, 1])
@@ -155,6 +119,7 @@ def test_built_in_families_need_no_folder(run: Run, verdict: Any, options: str) 
     assert verdict("rooms.h5")[0] == 0
     assert run("info", "rooms.h5").exit_code == 0
     assert run("preview", "rooms.h5").exit_code == 0
+    assert run("export", "rooms.h5", "--items", 0, "--format", "obj").exit_code == 0
 
 
 @pytest.mark.parametrize("views", ["0", "0,40"])
@@ -226,13 +191,6 @@ def test_meshes_are_exported_from_their_folder(run: Run, meshes: Path) -> None:
     for place, scale in zip(places, scales, strict=True):
         distance = np.linalg.norm(scene.vertices - place[:3, 3], axis=1)
         assert np.isclose(distance, scale, rtol=1e-5).any(), "a corner on the bounding sphere"
-
-
-def test_built_in_objects_are_exported(run: Run) -> None:
-    render(run, "--classes", "mug,chair", count=1)
-    result = run("export", "rooms.h5", "--items", 0, "--format", "obj")
-    assert result.exit_code == 0, result.output
-    assert len(trimesh.load_mesh("rooms-000000.obj").faces) > 6
 
 
 def test_a_folder_whose_files_have_changed_is_noticed(run: Run, meshes: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from model_rooms import FAMILIES, folder_objects, folder_spec, some_scenes
 from numpy.typing import NDArray
-from other_engines import bits, cast_whole_scene, render_elsewhere
+from other_engines import bits, cast_whole_scene
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from scenegen.common.errors import BackendError
@@ -131,19 +131,6 @@ def test_models_of_a_folder_agree_with_another_engine(model_folder: Path) -> Non
     check_against_whole_scenes(spec, some_scenes(spec, objects, 6), objects)
 
 
-def test_the_scalar_fallback_draws_models_with_gloss_alike() -> None:
-    spec = replace(FAMILIES, height=24, width=24, specular=(0.2, 0.5), shininess=(3.0, 9.0))
-    scenes = some_scenes(spec, objects_of(spec), 3)
-    slow = render_elsewhere(spec, scenes, scalar=True)
-    fast = render(pack(spec, scenes))
-    same = fast.object_id == slow.object_id
-    assert same.mean() > 0.997
-    assert (fast.object_id > 0).mean() > 0.03
-    assert (abs(fast.depth - slow.depth)[same] < 1e-5).mean() > 0.995
-    assert (abs(fast.normal - slow.normal).max(axis=-1) < 1e-3)[same].mean() > 0.99
-    assert (abs(fast.image - slow.image).max(axis=-1) < 1e-3).mean() > 0.985
-
-
 def test_path_tracing_is_refused_where_only_the_slow_path_is(
     scenes_of: Scenes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -153,19 +140,6 @@ def test_path_tracing_is_refused_where_only_the_slow_path_is(
     with pytest.raises(BackendError) as refused:
         renderer.launch(batch)
     assert refused.value.where == "shading path"
-
-
-def test_rows_of_a_batch_are_the_batch_of_those_scenes(scenes_of: Scenes) -> None:
-    scenes = scenes_of(FAMILIES, 6)
-    batch = pack(FAMILIES, scenes)
-    for start, end in ((0, 6), (2, 5), (5, 6)):
-        some, expected = batch.rows(start, end), pack(FAMILIES, scenes[start:end])
-        assert some.names == expected.names
-        for name, value in vars(expected).items():
-            if isinstance(value, np.ndarray):
-                found = getattr(some, name)
-                np.testing.assert_array_equal(found, value, err_msg=name)
-                assert found.dtype == value.dtype
 
 
 def test_rows_with_every_slot_used_and_with_none() -> None:

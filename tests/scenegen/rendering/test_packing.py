@@ -107,12 +107,6 @@ def test_views_that_a_scene_lacks_are_refused(views: tuple[int, ...]) -> None:
     assert error.expected == "views from 0 to 1"
 
 
-def test_each_scene_needs_the_views() -> None:
-    with pytest.raises(SpecError) as refused:
-        pack(SPEC, [FULL, replace(LAST, cameras=VIEWS[:1])], (1,))
-    assert (refused.value.where, refused.value.found) == ("scene 6", "1")
-
-
 def test_models_are_known_by_class_and_number() -> None:
     spec = replace(SPEC, source="families", shapes=("mug", "can"))
     mug, can = replace(CONE, shape="mug/0007"), replace(BOX, shape="can/0001")

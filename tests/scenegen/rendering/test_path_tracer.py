@@ -224,13 +224,3 @@ def test_samples_in_several_goes_make_the_same_picture(
     )
     assert error_parts < 1.2 * error_two * (2 / spp) ** 0.5, "no noise is drawn twice"
     assert error_parts < 1.8 * error_once, "but 16 at once are spread more evenly"
-
-
-def test_more_samples_are_less_noise() -> None:
-    scene = replace(OPEN, room_reflectance=(0.5,) * 3, ambient=(0.2,) * 3)
-    best = render(pack(replace(PATH, spp=1024), [scene])).image
-    error = [
-        float(np.sqrt(np.mean((render(pack(replace(PATH, spp=n), [scene])).image - best) ** 2)))
-        for n in (4, 16, 64)
-    ]
-    assert error[0] > 1.4 * error[1] > 1.4**2 * error[2]

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from other_engines import near_silhouettes
 from scipy.spatial.transform import Rotation
 
-from scenegen.camera import Camera, back_project, transform_points
+from scenegen.camera import Camera
 from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
-from scenegen.rendering.ground_truth import GroundTruth
 from scenegen.rendering.numpy_renderer import Cast, render_in_numpy
-from scenegen.rendering.packing import SceneBatch, pack
+from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import render
 from scenegen.rendering.shading import shade
 
@@ -128,37 +127,6 @@ def test_a_missed_pixel_is_shaded_without_a_warning() -> None:
         ORIGIN, ORIGIN, WHITE, UP * 2, np.ones((1, 3)), np.full(3, 0.1), K, 1.0, 5.0, DARK
     )
     np.testing.assert_allclose(found, 0.1)
-
-
-def shaded_again(batch: SceneBatch, truth: GroundTruth, b: int) -> Array:
-    """In the camera frame, from the pixels' own depth and normals."""
-    camera_from_world = np.linalg.inv(batch.world_from_camera[b])
-    ids = np.maximum(truth.object_id[b], 0)
-    lights = slice(0, batch.light_count[b])
-    specular, shininess = batch.gloss[b, ids].T.swapaxes(1, 2)
-    return shade(
-        np.nan_to_num(back_project(truth.depth[b], float(batch.fov_y_degrees[b]))),
-        truth.normal[b],
-        batch.reflectance[b, ids],
-        transform_points(camera_from_world, batch.light_position[b, lights]),
-        batch.light_color[b, lights],
-        batch.ambient[b],
-        batch.attenuation[b],
-        specular,
-        shininess,
-        np.zeros(3),
-    )
-
-
-def test_shading_the_pixels_own_truth_gives_their_image(scenes_of: Scenes) -> None:
-    batch = pack(GLOSSY, scenes_of(GLOSSY, 12))
-    assert {0, 4} <= set(batch.light_count.tolist())
-    truth = render(batch)
-    matte = render(replace(batch, spec=replace(GLOSSY, specular=(0.0, 0.0))))
-    assert (truth.image - matte.image).max() > 0.1
-    assert ((truth.image > matte.image).any(-1) <= (truth.object_id > 0)).all(), "the room is matte"
-    for b in range(len(batch)):
-        assert abs(truth.image[b] - shaded_again(batch, truth, b)).max() < 1e-5
 
 
 @pytest.mark.parametrize("change", [{}, {"shadows": True}, {"spp": 3, "shadows": True}], ids=str)

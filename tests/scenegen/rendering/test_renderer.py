@@ -1,9 +1,11 @@
 """The choice of backend, and that the scalar fallback gives the same images."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from model_rooms import FAMILIES
 from other_engines import render_elsewhere
 
 from scenegen.description.scenes import SceneSpec
@@ -18,26 +20,32 @@ TINY = DatasetSpec(
     min_visible_pixels=0, shapes=("sphere", "cone", "teapot", "prism"),
 )  # fmt: skip
 
+GLOSSY_MODELS = replace(FAMILIES, height=24, width=24, specular=(0.2, 0.5), shininess=(3.0, 9.0))
+
 
 @pytest.fixture(scope="module")
 def scenes(scenes_of: Callable[..., list[SceneSpec]]) -> list[SceneSpec]:
     return scenes_of(TINY, 4)
 
 
-def test_the_scalar_fallback_agrees_with_the_wavefront(scenes: list[SceneSpec]) -> None:
+@pytest.mark.parametrize("spec", [TINY, GLOSSY_MODELS], ids=["shapes", "glossy models"])
+def test_the_scalar_fallback_agrees_with_the_wavefront(
+    spec: DatasetSpec, scenes_of: Callable[..., list[SceneSpec]]
+) -> None:
     """In a process of its own, where no vectorised variant is ever loaded."""
-    slow = render_elsewhere(TINY, scenes, scalar=True)
-    fast = render(pack(TINY, scenes))
+    scenes = scenes_of(spec, 4)
+    slow, fast = render_elsewhere(spec, scenes, scalar=True), render(pack(spec, scenes))
     for name in vars(fast):
         ours, theirs = getattr(fast, name), getattr(slow, name)
         assert (ours.shape, ours.dtype) == (theirs.shape, theirs.dtype)
     same = fast.object_id == slow.object_id
     assert same.mean() > 0.997
     assert (fast.object_id > 0).mean() > 0.03
-    assert (abs(fast.depth - slow.depth)[same] < 1e-5).mean() > 0.999
+    fine = spec is TINY  # models have smaller triangles
+    assert (abs(fast.depth - slow.depth)[same] < 1e-5).mean() > (0.999 if fine else 0.995)
     aligned = abs(fast.normal - slow.normal).max(axis=-1) < 1e-3
-    assert aligned[same].mean() > 0.999
-    assert (abs(fast.image - slow.image).max(axis=-1) < 1e-3).mean() > 0.99
+    assert aligned[same].mean() > (0.999 if fine else 0.99)
+    assert (abs(fast.image - slow.image).max(axis=-1) < 1e-3).mean() > (0.99 if fine else 0.985)
 
 
 def test_without_llvm_the_work_is_done_when_fetched(

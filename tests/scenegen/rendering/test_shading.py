@@ -1,8 +1,10 @@
 """The shading equation against numbers worked out by hand, and its symmetries."""
 
+from typing import Any
+
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from numpy.typing import NDArray
 
 from scenegen.rendering.shading import shade
 
@@ -12,12 +14,6 @@ WHITE = np.ones(3)
 DARK = np.zeros(3)
 NO_LIGHT = np.zeros((0, 3))
 K = np.array([0.5, 0.25])
-
-
-def test_ambient_alone() -> None:
-    ambient = np.array([0.1, 0.2, 0.3])
-    result = shade(ORIGIN, UP, np.array([0.5, 1.0, 0.0]), NO_LIGHT, NO_LIGHT, ambient, K)
-    np.testing.assert_allclose(result, [[0.05, 0.2, 0.0]])
 
 
 def test_light_overhead() -> None:
@@ -34,23 +30,10 @@ def test_cosine_and_distance_of_a_slanted_light() -> None:
     np.testing.assert_allclose(result, [[0.8, 0.0, 0.0]])
 
 
-def test_linear_and_quadratic_terms_are_not_swapped() -> None:
-    light, color = np.array([[0.0, 2.0, 0.0]]), np.ones((1, 3))
-    linear = shade(ORIGIN, UP, WHITE, light, color, DARK, np.array([1.0, 0.0]))
-    quadratic = shade(ORIGIN, UP, WHITE, light, color, DARK, np.array([0.0, 1.0]))
-    np.testing.assert_allclose(linear, 0.5)
-    np.testing.assert_allclose(quadratic, 0.25)
-
-
 @pytest.mark.parametrize("light", [[0.0, -1.0, 0.0], [1.0, -1e-3, 0.0], [1.0, 0.0, 0.0]])
-def test_light_from_behind_takes_nothing_away(light: list[float]) -> None:
-    result = shade(ORIGIN, UP, WHITE, np.array([light]), np.ones((1, 3)), np.full(3, 0.1), K)
-    np.testing.assert_allclose(result, 0.1)
-
-
-def test_zero_normal_receives_ambient_only() -> None:
-    light, color = np.array([[0.0, 1.0, 0.0]]), np.ones((1, 3))
-    result = shade(ORIGIN, np.zeros((1, 3)), WHITE, light, color, np.full(3, 0.1), K)
+@pytest.mark.parametrize("normal", [UP, 0 * UP], ids=["up", "zero"])
+def test_light_from_behind_takes_nothing_away(normal: NDArray[Any], light: list[float]) -> None:
+    result = shade(ORIGIN, normal, WHITE, np.array([light]), np.ones((1, 3)), np.full(3, 0.1), K)
     np.testing.assert_allclose(result, 0.1)
 
 
@@ -66,19 +49,6 @@ def test_lights_add_up() -> None:
     assert together.shape == (4, 5, 3)
     assert together.max() > 0
     np.testing.assert_allclose(together, one_by_one, atol=1e-14)
-
-
-def test_any_rigid_frame_gives_the_same_radiance() -> None:
-    """Points, normals and lights may be in camera or world coordinates."""
-    rng = np.random.default_rng(2)
-    points, normals = rng.standard_normal((2, 50, 3))
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    lights, colors = rng.standard_normal((3, 3)) * 4, rng.random((3, 3))
-    turn = Rotation.random(rng=3).as_matrix()
-    moved = [x @ turn.T + [1.0, -2.0, 3.0] for x in (points, lights)]
-    here = shade(points, normals, WHITE, lights, colors, WHITE, K)
-    there = shade(moved[0], normals @ turn.T, WHITE, moved[1], colors, WHITE, K)
-    np.testing.assert_allclose(there, here, rtol=1e-12)
 
 
 def test_float32_input_is_shaded_in_double_precision() -> None:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from scenegen import open_rooms
-from scenegen.common.errors import PlacementError, SpecError
 from scenegen.description.specs import DatasetSpec
 from scenegen.rooms.make import make_dataset, render_items
 
@@ -20,7 +19,8 @@ PEAK = """
 import resource, sys
 from scenegen.rooms.make import make_dataset
 from scenegen.description.specs import DatasetSpec
-make_dataset("x.h5", DatasetSpec(height=64, width=64, min_visible_pixels=3), int(sys.argv[1]))
+spec = DatasetSpec(height=64, width=64, min_visible_pixels=3)
+make_dataset(f"{sys.argv[1]}.h5", spec, int(sys.argv[1]))
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
@@ -138,26 +138,6 @@ def test_an_error_of_the_caller_ends_the_run(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("settings", "option"),
-    [({"objects": (30, 30)}, "--objects"), ({"min_visible_pixels": 1000}, "--min-visible-pixels")],
-)
-def test_what_cannot_be_placed_leaves_nothing_behind(tmp_path, settings, option):
-    spec = DatasetSpec(**{**vars(SPEC), **settings})
-    with pytest.raises(PlacementError) as caught:
-        make_dataset(tmp_path / "x.h5", spec, 3)
-    assert caught.value.where.startswith("item ")
-    assert option in caught.value.hint
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("how", [{"batch": 0}, {"batch": 10**9}, {"compression": "zip"}])
-def test_bad_arguments(tmp_path, how):
-    with pytest.raises(SpecError):
-        make_dataset(tmp_path / "x.h5", SPEC, 3, **how)
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="asks Linux how much memory is used")
 def test_waiting_items_take_no_memory():
     """What is asked for, but not begun, must not exist: N may be a hundred million."""
@@ -176,17 +156,9 @@ def test_waiting_items_take_no_memory():
 
 @pytest.mark.slow
 def test_memory_is_flat(tmp_path):
-    few, many = (
-        int(
-            subprocess.run(
-                [sys.executable, "-c", PEAK, str(count)],
-                cwd=tmp_path / name,
-                check=True,
-                capture_output=True,
-                text=True,
-            ).stdout
-        )
-        for name, count in (("a", 400), ("b", 4000))
-        if not (tmp_path / name).mkdir()
-    )
-    assert many < 1.15 * few
+    peaks = []
+    for count in (400, 4000):
+        command = [sys.executable, "-c", PEAK, str(count)]
+        done = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True)
+        peaks.append(int(done.stdout))
+    assert peaks[1] < 1.15 * peaks[0]

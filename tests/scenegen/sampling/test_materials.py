@@ -9,7 +9,6 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from click.testing import Result
 from numpy.typing import NDArray
 from scipy.stats import kstest
 
@@ -117,26 +116,3 @@ def test_saturation_moves_no_light_and_keeps_the_level(saturation: float) -> Non
     for scene in scenes(spec, 20):
         level = sum(max(x.color) for x in scene.lights) / (0.2 * 3 + 0.9 * 3**2)
         assert level == pytest.approx(0.6)
-
-
-@pytest.mark.parametrize(
-    ("options", "objects", "room"),
-    [
-        ("", 0.8, 0.8),
-        ("--reflectance 0.5", 0.5, 0.5),
-        ("--room-reflectance 0.3", 0.8, 0.3),
-        ("--reflectance 0.5 --room-reflectance 0.3", 0.5, 0.3),
-        ("--preset two-tone --reflectance white", 1.0, (0.4, 0.6, 0.85)),
-        ("--reflectance 0.1,0.2,0.3", (0.1, 0.2, 0.3), (0.1, 0.2, 0.3)),
-        ("--reflectance black --room-reflectance white", 0.0, 1.0),
-    ],
-)
-def test_the_room_has_the_reflectance_told_for_objects_unless_told_its_own(
-    options: str, objects: Any, room: Any, run: Callable[..., Result]
-) -> None:
-    result = run("render", "--n", 1, "--size", 16, "--objects", 1, *options.split())
-    assert result.exit_code == 0, result.output
-    with h5py.File("rooms.h5") as file:
-        stored = file["material/reflectance"][0]
-    assert stored[0].tolist() == [*np.broadcast_to(room, 3)]
-    assert stored[1].tolist() == [*np.broadcast_to(objects, 3)]

@@ -90,33 +90,6 @@ def test_frustum_normals_hold_exactly_what_the_image_shows() -> None:
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", SHAPE_NAMES)
-def test_places_are_in_the_room_on_the_floor_and_in_the_image(
-    name: str, unit_corners: Callable[[str], Array]
-) -> None:
-    rng = np.random.default_rng(2)
-    frustum = (np.array(CAMERA.position), frustum_normals(CAMERA, 40, 30))
-    camera_from_world = np.linalg.inv(CAMERA.world_from_camera)
-    half_y = math.tan(math.radians(CAMERA.fov_y_degrees) / 2)
-    found = 0
-    for cropped in (False, True) * 6:
-        rotation = rotation_matrix(random_rotation(unit_shape(name), "any", rng))
-        place = find_place(unit_shape(name), rotation, 0.13, [frustum], cropped, [], rng)
-        if place is None:
-            continue
-        corners = 0.13 * unit_corners(name) @ rotation.T + place.position
-        assert corners.min() >= -1e-12
-        assert corners.max() <= 1 + 1e-12
-        assert corners[:, 1].min() < 0.13 * (3e-3 if name == "teapot" else 5e-5)
-        shown = place.position[None] if cropped else corners
-        seen = shown @ camera_from_world[:3, :3].T + camera_from_world[:3, 3]
-        assert (seen[:, 2] < 0).all()
-        assert (abs(seen[:, 0]) <= -seen[:, 2] * half_y * 0.75 + 1e-9).all()
-        assert (abs(seen[:, 1]) <= -seen[:, 2] * half_y + 1e-9).all()
-        found += 1
-    assert found > 6
-
-
 def test_no_place_where_there_is_none() -> None:
     rng, upright = np.random.default_rng(0), np.eye(3)
     behind = (
