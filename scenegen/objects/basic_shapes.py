@@ -8,15 +8,14 @@ mesh is for export only.
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from scenegen.common.errors import SpecError
 from scenegen.objects import teapot
 from scenegen.objects.solids import (
+    Array,
     UnitShape,
     arc,
     face_outwards,
@@ -25,8 +24,6 @@ from scenegen.objects.solids import (
     resting_directions,
     revolution,
 )
-
-Array = NDArray[Any]
 
 
 @cache

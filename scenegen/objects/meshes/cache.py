@@ -15,17 +15,15 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.meshes.clean import clean_mesh
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.hull import hull_points
 from scenegen.objects.meshes.read import parse_mesh, read_bytes
+from scenegen.objects.solids import Array
 
-Array = NDArray[Any]
 CLEANING_VERSION = 1  # raise it when a file would give other triangles or hull points than before
 
 

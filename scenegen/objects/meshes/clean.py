@@ -9,12 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.meshes import limits
 from scenegen.objects.meshes.errors import BadMeshError
+from scenegen.objects.solids import Array
 
-Array = NDArray[Any]
 MOST_COORDINATE = 1e30  # faces with a larger coordinate, or one that is not finite, are dropped
 NARROWEST = 1e-6  # least height of a triangle over its longest edge, in bounding radii
 LOWEST = 1e-4  # least height of a model, in bounding radii

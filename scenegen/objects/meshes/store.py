@@ -3,17 +3,14 @@
 import threading
 from collections import OrderedDict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.meshes.cache import CachedModel, MeshCache
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFolder
 from scenegen.objects.solids import UnitShape
 
-Array = NDArray[Any]
 MOST_FACES_KEPT = 3_000_000  # of all shapes in memory; a face takes about 100 bytes
 
 

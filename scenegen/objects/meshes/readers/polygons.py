@@ -1,16 +1,14 @@
 """Triangulation of polygons with any number of corners, convex or not."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import mapbox_earcut
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.meshes import limits
 from scenegen.objects.meshes.errors import BadMeshError
+from scenegen.objects.solids import Array
 
-Array = NDArray[Any]
 NOWHERE = -1  # stands for a vertex index that could not be read
 _SMALL_AREA = 1e-9  # of a polygon whose squared distances from the middle add up to 1
 

@@ -16,7 +16,6 @@ from scenegen.objects.families.parts.profiles import (
     hull_rows,
     inset,
     line,
-    polyline,
     tightest,
     wave,
 )
@@ -26,7 +25,7 @@ from scenegen.objects.families.parts.walls import hollow, ring, shell
 
 Array = NDArray[np.float64]
 CURVES = {
-    "line": line((1.0, 0.0), (0.5, 2.0), 5),
+    "line": line((1.0, 0.0), (0.5, 2.0), strips=5),
     "arc": arc((1.0, 2.0), 0.5, -90, 60, 9),
     "ellipse": arc((0.0, 0.0), (2.0, 1.0), 170, 20, 12),
     "bezier": bezier((0.0, 0.0), (1.0, 0.0), (1.5, 1.0), (0.5, 2.0), 12),
@@ -75,7 +74,7 @@ def test_a_fillet_keeps_its_ends_and_its_radius() -> None:
 def test_insets_lie_on_the_left_and_meet_at_creases() -> None:
     points, _ = inset(arc((0.0, 0.0), 1.0, 0, 90, 8), 0.25)
     np.testing.assert_allclose(np.hypot(*points.T), 0.75, atol=1e-12)
-    points, _ = inset(polyline((1.0, 0.0), (1.0, 2.0), (0.0, 2.0)), 0.25)
+    points, _ = inset(line((1.0, 0.0), (1.0, 2.0), (0.0, 2.0)), 0.25)
     np.testing.assert_allclose(points, [(0.75, 0), (0.75, 1.75), (0.75, 1.75), (0, 1.75)])
 
 
@@ -97,15 +96,15 @@ def test_an_upright_line_keeps_its_ends_although_rounding_bends_it() -> None:
 def test_lofts_have_the_volume_of_their_formula() -> None:
     n = 40
     polygon = n / 2 * math.sin(2 * math.pi / n)  # the area of the disc's polygon
-    assert volume(loft(polyline((0.5, 0.0), (0.5, 2.0)))) == pytest.approx(0.5 * polygon)
-    cone = loft(polyline((1.0, 0.0), (0.0, 3.0)))
+    assert volume(loft(line((0.5, 0.0), (0.5, 2.0)))) == pytest.approx(0.5 * polygon)
+    cone = loft(line((1.0, 0.0), (0.0, 3.0)))
     assert volume(cone) == pytest.approx(polygon)
-    leaning = loft(polyline((1.0, 0.0), (0.0, 3.0)), lean=(0.5, -0.2))
+    leaning = loft(line((1.0, 0.0), (0.0, 3.0)), lean=(0.5, -0.2))
     assert volume(leaning) == pytest.approx(polygon)
-    block = loft(polyline((1.0, 0.0), (1.0, 2.0)), size=(1.0, 0.5), corner=0.0)
+    block = loft(line((1.0, 0.0), (1.0, 2.0)), size=(1.0, 0.5), corner=0.0)
     assert volume(block) == pytest.approx(2 * 1 * 2)
     assert len(block.triangles) == 4 * 2 + 2 * 4
-    rounded = loft(polyline((1.0, 0.0), (1.0, 2.0)), size=(1.0, 0.5), corner=0.2)
+    rounded = loft(line((1.0, 0.0), (1.0, 2.0)), size=(1.0, 0.5), corner=0.2)
     assert volume(rounded) == pytest.approx(2 * (2.0 - (4 - polygon) * 0.04))
     four = loft(line((0.1, 0.0), (0.1, 1.0)), at=[(1, 1), (1, -1), (-1, 1), (-1, -1)])
     assert volume(four) == pytest.approx(4 * 0.01 * polygon)
