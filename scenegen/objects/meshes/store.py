@@ -35,8 +35,7 @@ class MeshStore:
     def shape(self, name: str) -> UnitShape:
         """Return the model named "class/id" as a unit shape with flat faces, resting on its base.
 
-        Raises:
-            BadMeshError: there is no such model, or it cannot be used.
+        Raises BadMeshError where there is no such model or it cannot be used.
         """
         with self._lock:
             shape = self._shapes.get(name)
@@ -57,8 +56,7 @@ class MeshStore:
     def digest(self, name: str) -> str:
         """Return the first 16 hex digits of the content hash of a model's file.
 
-        Raises:
-            BadMeshError: as `shape`.
+        Raises BadMeshError as `shape` does.
         """
         if name not in self._digests:
             self._load(name)
