@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -196,14 +197,9 @@ def test_refusals(shapenet: Callable[..., Path], make: Make) -> None:
     flat, textual = make("a.obj", "b.ply", root="flat"), make("mug/readme.txt", root="textual")
     other = next(s for s in ("train", "val", "test") if s != object_split("a"))
     cases: list[tuple[Callable[..., ModelFolder], tuple[Any, ...], str, str]] = [
-        (opened, (path, None), f"{path.name}: {problem}", "")
-        for opened in (open_shapenet, open_objects, open_models)
-        for path, problem in (
-            (net / "none", "no such folder"),
-            (empty / "x.txt", "is not a folder"),
-        )
-    ]
-    cases += [
+        (open_models, (net / "none",), "none: no such folder", ""),
+        (open_objects, (empty / "x.txt",), "x.txt: is not a folder", ""),
+        (open_shapenet, (net / "none",), "none: no such folder", ""),
         (open_shapenet, (plain,), "plain", "no ShapeNet"),
         (open_shapenet, (gutted,), "gutted", "no ShapeNet"),
         (open_shapenet, (net, ["cup"]), "root", "no class cup"),
@@ -237,10 +233,7 @@ def test_files_and_folders_that_cannot_be_read(
         open_shapenet(root)
     assert refused.value.where.endswith("all.csv")
 
-    def locked(path: Path) -> None:
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr("os.scandir", locked)
+    monkeypatch.setattr("os.scandir", Mock(side_effect=PermissionError(13, "Permission denied")))
     with pytest.raises(MeshFolderError) as refused:
         open_objects(root)
     assert "Permission denied" in refused.value.found

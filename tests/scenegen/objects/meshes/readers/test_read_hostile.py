@@ -89,15 +89,14 @@ def test_files_that_are_no_files(
     assert (refused.value.where, refused.value.found) == ("file", found)
 
 
+BOX = trimesh.creation.box()
 SEEDS = [
     (OBJ["textured"].encode(), ".obj"),
     (SPHERE.export(file_type="ply")[:4000], ".ply"),
-    (trimesh.creation.box().export(file_type="ply", encoding="ascii"), ".ply"),
-    (trimesh.creation.box().export(file_type="ply"), ".ply"),
-    (trimesh.creation.box().export(file_type="off").encode(), ".off"),
-    (trimesh.creation.box().export(file_type="stl"), ".stl"),
-    (trimesh.creation.box().export(file_type="stl_ascii").encode(), ".stl"),
-    (trimesh.creation.box().export(file_type="glb"), ".glb"),
+    (BOX.export(file_type="ply", encoding="ascii"), ".ply"),
+    (BOX.export(file_type="stl_ascii").encode(), ".stl"),
+    (BOX.export(file_type="off").encode(), ".off"),
+    *((BOX.export(file_type=kind), f".{kind}") for kind in ("ply", "stl", "glb")),
 ]
 
 
