@@ -25,9 +25,11 @@ def check_centred(corners: Array, tolerance: float) -> None:
     np.testing.assert_allclose(corners.min(axis=0) + corners.max(axis=0), 0.0, atol=tolerance)
 
 
-def check_body(shape: UnitShape, most: float, directions: Array, slack: float = 1e-12) -> None:
-    """Check that the convex body contains the mesh and reaches at most `most` beyond it."""
-    corners = shape.triangles.reshape(-1, 3)
+def check_body(
+    shape: UnitShape, corners: Array, most: float, directions: Array, slack: float = 1e-12
+) -> None:
+    """Check that the convex body contains the corners and reaches at most `most` beyond them."""
+    corners = corners.reshape(-1, 3)
     excess = shape.support(directions) - [(corners @ one).max() for one in directions]
     assert excess.min() > -slack, f"{shape.name}: the body must contain the mesh"
     assert excess.max() < most, shape.name

@@ -114,7 +114,7 @@ def test_members_are_centred_of_radius_one_and_stand(family: str) -> None:
 def test_support_bounds_members_closely(family: str) -> None:
     directions = np.concatenate([unit_vectors(300), np.eye(3), -np.eye(3)])
     for shape in spread(family):
-        check_body(shape, 0.02, directions)
+        check_body(shape, shape.triangles, 0.02, directions)
 
 
 @FAMILIES

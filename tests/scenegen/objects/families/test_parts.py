@@ -139,7 +139,8 @@ def test_bodies_hold_their_parts_closely() -> None:
     }
     for name, part in parts.items():
         fields = part.triangles, part.normals, part.hull_points, part.hull_discs
-        check_body(UnitShape(name, *fields, 0.0, DOWN), 0.02, unit_vectors(200))
+        shape = UnitShape(name, *fields, 0.0, DOWN)
+        check_body(shape, part.triangles, 0.02, unit_vectors(200))
 
 
 def test_boxes_are_flat_and_moves_are_rigid() -> None:

@@ -69,7 +69,7 @@ def check_shape(shape: UnitShape) -> None:
 
 
 def check_hull(shape: UnitShape) -> None:
-    check_body(shape, 0.03, unit_vectors(500), slack=1e-9)
+    check_body(shape, shape.triangles, 0.03, unit_vectors(500), slack=1e-9)
     assert shape.support(DOWN)[0] == -shape.triangles[..., 1].min(), "it stands exactly"
 
 
