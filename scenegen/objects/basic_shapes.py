@@ -8,15 +8,14 @@ mesh is for export only.
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from scenegen.common.errors import SpecError
 from scenegen.objects import teapot
 from scenegen.objects.solids import (
+    Array,
     UnitShape,
     arc,
     face_outwards,
@@ -25,8 +24,6 @@ from scenegen.objects.solids import (
     resting_directions,
     revolution,
 )
-
-Array = NDArray[Any]
 
 
 @cache
@@ -38,16 +35,13 @@ def unit_shape(name: str) -> UnitShape:
 
 
 def _box() -> UnitShape:
-    return polyhedron(
-        "box", np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), float).reshape(3, -1).T
-    )
+    corners = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), float).reshape(3, -1).T
+    return polyhedron("box", corners)
 
 
 def _sphere() -> UnitShape:
-    anywhere = np.empty((0, 3))
-    return revolution(
-        "sphere", [arc((0, 0), 1, -90, 90, 256)], [(0, 0)], 1.0, anywhere, is_sphere=True
-    )
+    half, anywhere = [arc((0, 0), 1, -90, 90, 256)], np.empty((0, 3))
+    return revolution("sphere", half, [(0, 0)], 1.0, anywhere, is_sphere=True)
 
 
 def _cone() -> UnitShape:
@@ -67,11 +61,8 @@ def _torus() -> UnitShape:
 def _capsule() -> UnitShape:
     angle = np.linspace(0, 2 * np.pi, 256, endpoint=False)
     lying = np.stack([np.cos(angle), np.zeros(256), np.sin(angle)], axis=1)
-    pieces = [
-        arc((0, -0.5), 0.5, -90, 0, 96),
-        line((0.5, -0.5), (0.5, 0.5)),
-        arc((0, 0.5), 0.5, 0, 90, 96),
-    ]
+    ends = arc((0, -0.5), 0.5, -90, 0, 96), arc((0, 0.5), 0.5, 0, 90, 96)
+    pieces = [ends[0], line((0.5, -0.5), (0.5, 0.5)), ends[1]]
     return revolution("capsule", pieces, [(0, -0.5), (0, 0.5)], 0.5, lying)
 
 
@@ -87,9 +78,8 @@ def _prism() -> UnitShape:
 
 
 def _tetrahedron() -> UnitShape:
-    return polyhedron(
-        "tetrahedron", np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], float)
-    )
+    corners = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], float)
+    return polyhedron("tetrahedron", corners)
 
 
 def _octahedron() -> UnitShape:
@@ -132,8 +122,8 @@ def _teapot() -> UnitShape:
     corners = (corners - center) * scale
     triangles = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
     corner_normals = np.concatenate([normals[:, [0, 1, 2]], normals[:, [0, 2, 3]]])
-    triangles, corner_normals = face_outwards(triangles, corner_normals)
-    return UnitShape("teapot", triangles, corner_normals, hull, discs, 0.0, resting)
+    surface = face_outwards(triangles, corner_normals)
+    return UnitShape("teapot", *surface, hull, discs, 0.0, resting)
 
 
 _BUILDERS: dict[str, Callable[[], UnitShape]] = {

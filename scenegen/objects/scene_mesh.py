@@ -14,10 +14,8 @@ from scenegen.objects.solids import UnitShape
 
 def welded(shape: UnitShape) -> trimesh.Trimesh:
     """Return a unit shape as a mesh whose triangles share vertices."""
-    triangles = shape.triangles
-    mesh = trimesh.Trimesh(
-        triangles.reshape(-1, 3), np.arange(triangles.size // 3).reshape(-1, 3), process=False
-    )
+    corners = shape.triangles.reshape(-1, 3)
+    mesh = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
     mesh.merge_vertices()
     return mesh
 
@@ -38,11 +36,8 @@ def room_mesh() -> trimesh.Trimesh:
     """Return the floor y = 0 and the walls x = 0 and z = 0 of the unit box, facing inwards."""
     faces = np.array([[0, 1, 2], [0, 2, 3]])
     floor = np.array([[0, 0, 0], [0, 0, 1], [1, 0, 1], [1, 0, 0]], float)
-    planes = [
-        floor,
-        floor[:, [1, 2, 0]],
-        floor[:, [2, 0, 1]],
-    ]  # cyclic permutations keep the winding
+    # Cyclic permutations of the axes keep the winding.
+    planes = [np.roll(floor, shift, axis=1) for shift in (0, 2, 1)]
     return trimesh.util.concatenate([trimesh.Trimesh(p, faces, process=False) for p in planes])
 
 

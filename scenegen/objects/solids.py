@@ -51,10 +51,9 @@ def polyhedron(name: str, points: Array) -> UnitShape:
     points = points / np.linalg.norm(points, axis=1).max()
     hull = ConvexHull(points)
     triangles = points[hull.simplices]
-    normals = np.repeat(hull.equations[:, None, :3], 3, axis=1)
-    triangles, normals = face_outwards(triangles, normals)
+    surface = face_outwards(triangles, np.repeat(hull.equations[:, None, :3], 3, axis=1))
     resting = resting_directions(points)
-    return UnitShape(name, triangles, normals, points, np.zeros(len(points)), 0.0, resting)
+    return UnitShape(name, *surface, points, np.zeros(len(points)), 0.0, resting)
 
 
 def revolution(
@@ -76,11 +75,8 @@ def revolution(
     angle = np.linspace(0, 2 * np.pi, SEGMENTS + 1)
 
     def turn(values: Array, at: Array) -> Array:
-        radius, height = (
-            values[:, None, 0],
-            np.broadcast_to(values[:, None, 1], (len(values), at.size)),
-        )
-        return np.stack([radius * np.cos(at), height, radius * np.sin(at)], axis=-1)
+        height = np.broadcast_to(values[:, 1:], (len(values), at.size))
+        return np.stack([values[:, :1] * np.cos(at), height, values[:, :1] * np.sin(at)], axis=-1)
 
     corners, normals = [], []
     for profile, profile_normals in pieces:
@@ -92,16 +88,12 @@ def revolution(
             normals.append(np.stack([n[t] for t in take], axis=2).reshape(-1, 3, 3))
     rings = np.array(hull_rings)
     scale = 1 / (np.linalg.norm(rings, axis=1).max() + rounding)
-    triangles, corner_normals = face_outwards(
-        np.concatenate(corners) * scale, np.concatenate(normals)
-    )
+    surface = face_outwards(np.concatenate(corners) * scale, np.concatenate(normals))
     if resting is None:
         resting = resting_directions(np.unique(turn(rings, angle[:-1]).reshape(-1, 3), axis=0))
     discs, heights = (rings * scale).T
     hull = np.stack([0 * heights, heights, 0 * heights], axis=1)
-    return UnitShape(
-        name, triangles, corner_normals, hull, discs, rounding * scale, resting, is_sphere
-    )
+    return UnitShape(name, *surface, hull, discs, rounding * scale, resting, is_sphere)
 
 
 def face_outwards(triangles: Array, normals: Array) -> tuple[Array, Array]:

@@ -1,7 +1,6 @@
 """Turn the command line's options on objects into `DatasetSpec` settings and a catalogue."""
 
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from scenegen.common.errors import SpecError
@@ -63,17 +62,20 @@ def object_source(
     """
     root = mesh_folder(shapenet_root, objects_root, up)
     if shapes is not None and (classes is not None or root):
-        raise SpecError(
-            "objects: found --shapes beside --classes or a folder of meshes, expected one of them"
-        )
+        found = "--shapes beside --classes or a folder of meshes"
+        raise SpecError("objects", found, "one of them")
     split = {} if object_split is None else {"object_split": object_split}
     if shapes is not None:
         return ObjectSource({"source": "shapes", "shapes": shapes, **split})
     if root is None:
         families = {} if classes is None else {"source": "families", "shapes": classes}
         return ObjectSource({**families, **split})
-    wanted = PRESETS[preset].settings.get("shapes", ()) if preset in PRESETS else ()
-    folder = _open(root, shapenet_root is not None, classes, wanted, up, object_split or "all")
+    shapenet, part = shapenet_root is not None, object_split or "all"
+    folder = _open(root, shapenet, classes, up, part)
+    if classes is None and preset in PRESETS:
+        wanted = PRESETS[preset].settings.get("shapes", ())
+        present = tuple(name for name in wanted if name in folder.classes)
+        folder = _open(root, shapenet, present, up, part) if present else folder
     store = MeshStore(folder, cache_dir or default_cache_dir())
     settings = {"source": folder.kind, "shapes": folder.classes, "listing": folder.digest()}
     return ObjectSource({**settings, **split}, mesh_objects(store), store)
@@ -113,31 +115,17 @@ def file_objects(
     root = objects_root if spec.source == "folder" else shapenet_root
     if root is None:
         return objects_of(spec)
-    folder = _open(root, spec.source != "folder", spec.shapes, (), up, spec.object_split)
+    folder = _open(root, spec.source != "folder", spec.shapes, up, spec.object_split)
     if (folder.kind, folder.digest()) != (spec.source, spec.listing):
-        raise SpecError(
-            f"{root}: holds other models than the file was made from ({folder.kind}, listing"
-            f" {folder.digest()[:12]}; the file's are {spec.source}, {spec.listing[:12]})"
-        )
+        found = f"other models than the file's: {folder.kind}, listing {folder.digest()[:12]}"
+        raise SpecError(root, found, f"{spec.source}, listing {spec.listing[:12]}")
     return mesh_objects(MeshStore(folder, cache_dir or default_cache_dir()))
 
 
 def _open(
-    root: str | Path,
-    shapenet: bool,
-    classes: tuple[str, ...] | None,
-    wanted: tuple[str, ...],
-    up: str,
-    split: str,
+    root: str, shapenet: bool, classes: tuple[str, ...] | None, up: str, split: str
 ) -> ModelFolder:
-    def listed(some: tuple[str, ...] | None) -> ModelFolder:
-        if shapenet:
-            return open_shapenet(root, some, split)
-        return open_objects(root, some, up, split)
-
-    if classes is not None:
-        check(len(set(classes)) == len(classes), "classes", classes, "each name once")
-        return listed(classes)
-    everything = listed(None)
-    some = tuple(name for name in wanted if name in everything.classes)
-    return listed(some) if some else everything
+    check(len(set(classes or ())) == len(classes or ()), "classes", classes, "each name once")
+    if shapenet:
+        return open_shapenet(root, classes, split)
+    return open_objects(root, classes, up, split)

@@ -1,11 +1,10 @@
 """Newell's teapot (the "Utah teapot") as bicubic Bezier patches.
 
-The control points are from M. Newell, "The Utilization of Procedure Models in Digital Image
-Synthesis", PhD thesis,
-University of Utah, 1975, with the bottom F. Crow published in "The Origins of the Teapot", IEEE
-CG&A 7(1), 1987, with z up. Surfaces of revolution are stored as profiles: rows (r, t, z), for which
-a quarter turn has the control points (r, 0), (r, -t), (t, -r), (0, -r) at the height z. Handle and
-spout are stored as halves (y <= 0) and mirrored.
+The control points, with z up, are from M. Newell, "The Utilization of Procedure Models in Digital
+Image Synthesis", PhD thesis, University of Utah, 1975, and those of the bottom from F. Crow, "The
+Origins of the Teapot", IEEE CG&A 7(1), 1987. Surfaces of revolution are stored as profiles: rows
+(r, t, z), for which a quarter turn has the control points (r, 0), (r, -t), (t, -r), (0, -r) at the
+height z. Handle and spout are stored as halves (y <= 0) and mirrored.
 """
 
 from typing import Any

@@ -5,15 +5,7 @@ from numpy.random import Generator
 from scenegen.objects.families.parts.boxes import box, boxes
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.moves import moved
-from scenegen.objects.families.parts.profiles import (
-    Curve,
-    arc,
-    bezier,
-    fillet,
-    join,
-    line,
-    tightest,
-)
+from scenegen.objects.families.parts.profiles import Curve, arc, bezier, fillet, join, limited, line
 from scenegen.objects.families.parts.surfaces import Part, loft
 from scenegen.objects.families.parts.sweeps import tube
 from scenegen.objects.families.parts.walls import hollow
@@ -37,13 +29,8 @@ def _hand_bag(rng: Generator) -> list[Part]:
     slope = max(0.35, min(slope, 1.2))
     base = depth - slope
     bulge = span(rng, 0.0, 0.18)
-    side = bezier(
-        (1.0 - edge, 0.0),
-        (1.0 + bulge, 0.0),
-        (0.5 + 0.5 * narrow + bulge, 0.6 * height),
-        (narrow, height),
-        12,
-    )
+    low, high = (1.0 + bulge, 0.0), (0.5 + 0.5 * narrow + bulge, 0.6 * height)
+    side = bezier((1.0 - edge, 0.0), low, high, (narrow, height), 12)
     least = min(narrow, 1.0 - edge)
     corner = span(rng, 0.3, 0.95) * (base + slope * least)
     body = loft(side, size=(1.0, slope), base=(0.0, base, corner), corner=0.0, segments=32)
@@ -69,9 +56,8 @@ def _paper_bag(rng: Generator) -> list[Part]:
     narrow = span(rng, 0.85, 1.2)
     wall = line((1.0, 0.0), (narrow, height))
     thick = 0.05
-    body = loft(
-        hollow(wall, thick), size=(1.0, depth), corner=pick(rng, (0.0, 0.0, 0.12)), segments=24
-    )
+    corner = pick(rng, (0.0, 0.0, 0.12))
+    body = loft(hollow(wall, thick), size=(1.0, depth), corner=corner, segments=24)
     rise, half = span(rng, 0.3, 1.0), narrow * span(rng, 0.25, 0.6)
     path = _arch(rng, half, height - 0.25, rise + 0.25)
     wide = pick(rng, (0.03, span(rng, 0.06, 0.14)))
@@ -83,7 +69,7 @@ def _paper_bag(rng: Generator) -> list[Part]:
 
 def _band(path: Curve, z: float, wide: float) -> Part:
     """Build a handle whose band lies flat in the plane of x and y at this z."""
-    wide = min(wide, 0.7 * tightest(path))
+    wide = limited(path, wide)
     return tube(path, 0.025, wide, origin=(0.0, 0.0, z), corner=0.02, segments=16, thin=True)
 
 
@@ -93,24 +79,12 @@ def _sack(rng: Generator) -> list[Part]:
     depth = span(rng, 0.6, 1.0)
     if chance(rng, 0.5):
         neck, frill = span(rng, 0.2, 0.4), span(rng, 0.3, 0.6)
-        side = join(
-            bezier((foot, 0.0), (1.35, 0.05), (1.2, 0.9 * height), (neck, height), 14),
-            bezier(
-                (neck, height),
-                (0.7 * neck, height + 0.1),
-                (frill, height + 0.3),
-                (frill, height + 0.45),
-                7,
-            ),
-        )
-        cord = tube(
-            arc((0.0, 0.0), 0.98 * neck, 0, 350, 24),
-            0.06,
-            origin=(0.0, height, 0.0),
-            up=(0.0, 0.0, 1.0),
-            segments=16,
-        )
-        return [loft(side), cord]
+        side = bezier((foot, 0.0), (1.35, 0.05), (1.2, 0.9 * height), (neck, height), 14)
+        low, high = (0.7 * neck, height + 0.1), (frill, height + 0.3)
+        edge = bezier((neck, height), low, high, (frill, height + 0.45), 7)
+        around = arc((0.0, 0.0), 0.98 * neck, 0, 350, 24)
+        cord = tube(around, 0.06, origin=(0.0, height, 0.0), up=(0.0, 0.0, 1.0))
+        return [loft(join(side, edge)), cord]
     top = span(rng, 0.8, 1.15)
     wall = bezier((foot, 0.0), (1.1 * foot, 0.3 * height), (top, 0.6 * height), (top, height), 8)
     rise = span(rng, 0.6, 1.5)
@@ -125,16 +99,11 @@ def _rucksack(rng: Generator) -> list[Part]:
     foot = span(rng, 0.75, 1.0)
     dome = height * span(rng, 0.15, 0.45)
     top = span(rng, 0.3, 0.6)
+    bend, end = (0.95, height - 0.4 * dome), (0.45 * top + 0.55 * 0.97, height)
     side = join(
         bezier((foot - 0.1, 0.0), (foot + 0.05, 0.0), (1.0, 0.1), (1.0, 0.3 * height), 7),
         line((1.0, 0.3 * height), (0.97, height - dome)),
-        bezier(
-            (0.97, height - dome),
-            (0.95, height - 0.4 * dome),
-            (0.45 * top + 0.55 * 0.97, height),
-            (top, height),
-            10,
-        ),
+        bezier((0.97, height - dome), bend, end, (top, height), 10),
     )
     corner = depth * span(rng, 0.5, 0.95)
     parts = [loft(side, size=(1.0, depth), corner=corner, segments=32)]
@@ -146,27 +115,12 @@ def _rucksack(rng: Generator) -> list[Part]:
             line((w, 0.18), (w, h - 0.15)),
             arc((w - 0.15, h - 0.15), 0.15, 0, 90, 5),
         )
-        parts.append(
-            loft(
-                pocket,
-                size=(1.0, 0.3),
-                base=(0.0, out - 0.3 * w, 0.6 * out),
-                corner=0.0,
-                at=(0.0, depth - 0.02),
-                segments=24,
-            )
-        )
+        base, at = (0.0, out - 0.3 * w, 0.6 * out), (0.0, depth - 0.02)
+        parts.append(loft(pocket, size=(1.0, 0.3), base=base, corner=0.0, at=at, segments=24))
     if chance(rng, 0.3):  # a lid over the top
-        lid = join(
-            line((1.03, height - dome - 0.1), (1.03, height - 0.6 * dome)),
-            bezier(
-                (1.03, height - 0.6 * dome),
-                (1.03, height),
-                (0.9, height + 0.05),
-                (0.6, height + 0.05),
-                6,
-            ),
-        )
+        edge, high = height - 0.6 * dome, height + 0.05
+        curve = bezier((1.03, edge), (1.03, height), (0.9, high), (0.6, high), 6)
+        lid = join(line((1.03, height - dome - 0.1), (1.03, edge)), curve)
         parts.append(loft(lid, size=(1.0, depth), corner=corner, segments=32))
     parts.append(_strap(_arch(rng, 0.18, height - 0.1, 0.3), -0.4 * depth * top, 0.05, 0.03))
     far = span(rng, 0.25, 0.6)
@@ -183,9 +137,8 @@ def _travel_bag(rng: Generator) -> list[Part]:
     tall = radius * span(rng, 0.75, 1.15)
     side = arc((0.0, 0.0), (radius, tall), -62, 70, 14)
     swell = span(rng, 0.0, 0.25)
-    body = loft(
-        side, size=(swell, 1.0), base=(half, 0.0, 0.0), corner=span(rng, 0.3, 0.8), segments=32
-    )
+    corner = span(rng, 0.3, 0.8)
+    body = loft(side, size=(swell, 1.0), base=(half, 0.0, 0.0), corner=corner, segments=32)
     low, spread = 0.7 * tall, half * span(rng, 0.2, 0.4)
     path = _arch(rng, spread, low, span(rng, 0.5, 0.9) + 0.3 * tall)
     z = radius * 0.45
@@ -210,12 +163,8 @@ def _case(rng: Generator) -> list[Part]:
     body = loft(side, size=(1.0, 1.0), base=(0.0, inner, corner), corner=0.0, segments=24)
     half = span(rng, 0.2, 0.35) if not rolling else span(rng, 0.3, 0.6)
     rise = span(rng, 0.2, 0.35) if not rolling else span(rng, 0.5, 1.4)
-    corners = [
-        (half, height - 0.06),
-        (half, height + rise),
-        (-half, height + rise),
-        (-half, height - 0.06),
-    ]
+    low, high = height - 0.06, height + rise
+    corners = [(half, low), (half, high), (-half, high), (-half, low)]
     z = 0.0 if not rolling else -0.6 * (depth - edge)
     parts = [body, _strap(fillet(corners, 0.12, 5), z, 0.06, 0.04)]
     if rolling:
@@ -226,11 +175,10 @@ def _case(rng: Generator) -> list[Part]:
         ]
         parts.append(boxes(wheels))
         ribs = int(4 * rng.random())
-        bars = []
-        for i in range(ribs):
-            x = 1.4 * (i + 0.5) / ribs - 0.7
-            bars.append(box((x - 0.06, foot + 0.2, 0.0), (x + 0.06, height - 0.2, depth + 0.04)))
-        if bars:
+        places = [1.4 * (i + 0.5) / ribs - 0.7 for i in range(ribs)]
+        low, high = foot + 0.2, height - 0.2
+        if ribs:
+            bars = [box((x - 0.06, low, 0.0), (x + 0.06, high, depth + 0.04)) for x in places]
             parts.append(boxes(bars))
     elif chance(rng, 0.6):
         flap = box((-0.9, span(rng, 0.3, 0.6) * height, 0.0), (0.9, height - 0.1, depth + 0.05))

@@ -5,16 +5,7 @@ import math
 from numpy.random import Generator
 
 from scenegen.objects.families.parts.draws import chance, pick, span
-from scenegen.objects.families.parts.profiles import (
-    Curve,
-    arc,
-    bezier,
-    fillet,
-    join,
-    line,
-    polyline,
-    wave,
-)
+from scenegen.objects.families.parts.profiles import Curve, arc, bezier, fillet, join, line, wave
 from scenegen.objects.families.parts.surfaces import Part, loft
 from scenegen.objects.families.parts.sweeps import tube
 
@@ -79,9 +70,8 @@ def _body(rng: Generator, radius: float, least: float, high: float) -> tuple[Cur
     else:
         bulge = span(rng, 0.55, 0.8) if style == "waisted" else span(rng, 1.15, 1.45)
         middle = max(radius * bulge, least)
-        side = bezier(
-            (foot, edge), (middle, edge + third), (middle, high - third), (upper, high), 9
-        )
+        low, end = (middle, edge + third), (middle, high - third)
+        side = bezier((foot, edge), low, end, (upper, high), 9)
     return join(base, side), upper
 
 
@@ -100,12 +90,12 @@ def _neck(rng: Generator, radius: float, low: float) -> tuple[Curve, tuple[float
         outer = narrow + lip
         depth = (HEIGHT - low) * span(rng, 0.15, 0.4)
         corners = [(narrow, HEIGHT - depth), (outer, HEIGHT - depth), (outer, HEIGHT)]
-        side = polyline((radius, low), *corners)
+        side = line((radius, low), *corners)
     else:
         outer = narrow
         side = line((radius, low), (narrow, HEIGHT))
     depth = low + 0.3 * (HEIGHT - low)
-    inside = polyline((outer, HEIGHT), (hole, HEIGHT), (hole, depth), (0.0, depth))
+    inside = line((outer, HEIGHT), (hole, HEIGHT), (hole, depth), (0.0, depth))
     return join(side, inside), (outer, HEIGHT)
 
 
@@ -117,11 +107,11 @@ def _closure(rng: Generator, mouth: tuple[float, float]) -> list[Part]:
         return []
     if style == "cork":
         cork, rise = radius * 0.78, radius * span(rng, 0.4, 1.2)
-        return [loft(polyline((cork, high - 0.05), (1.05 * cork, high + rise)))]
+        return [loft(line((cork, high - 0.05), (1.05 * cork, high + rise)))]
     wide, rise = radius * span(rng, 1.12, 1.5), radius * span(rng, 0.5, 1.6)
     skirt = high - min(0.12, 0.5 * rise)
     if style == "cap":
-        return [loft(polyline((wide, skirt), (wide * span(rng, 0.85, 1.0), high + rise)))]
+        return [loft(line((wide, skirt), (wide * span(rng, 0.85, 1.0), high + rise)))]
     if style == "stopper":
         ball = radius * span(rng, 0.8, 1.5)
         return [loft(arc((0.0, high + 0.8 * ball), (ball, ball), -80, 90, 10))]
@@ -129,8 +119,8 @@ def _closure(rng: Generator, mouth: tuple[float, float]) -> list[Part]:
     arm, bar = wide * span(rng, 1.2, 2.2), 0.3 * wide
     path = fillet([(0.0, head + bar), (arm, head + bar), (arm + 0.1, head - 0.6 * bar)], bar, 4)
     return [
-        loft(polyline((wide, skirt), (wide, high + 0.4 * rise)), segments=24),
-        loft(polyline((bar, high), (bar, head + 0.5 * bar)), segments=16),
-        loft(polyline((1.5 * bar, head), (1.5 * bar, head + 2 * bar)), segments=24),
+        loft(line((wide, skirt), (wide, high + 0.4 * rise)), segments=24),
+        loft(line((bar, high), (bar, head + 0.5 * bar)), segments=16),
+        loft(line((1.5 * bar, head), (1.5 * bar, head + 2 * bar)), segments=24),
         tube(path, 0.8 * bar, across=(0.0, 0.0, 1.0), segments=12),
     ]

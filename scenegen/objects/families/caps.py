@@ -1,27 +1,15 @@
 """Caps and hats: hollow crowns with peaks or brims. The peak points to +z."""
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from scenegen.objects.families.parts.draws import chance, pick, span
-from scenegen.objects.families.parts.profiles import (
-    Curve,
-    arc,
-    bezier,
-    join,
-    line,
-    polyline,
-    reverse,
-)
+from scenegen.objects.families.parts.profiles import Curve, arc, bezier, join, line, reverse
 from scenegen.objects.families.parts.surfaces import Part, loft
 from scenegen.objects.families.parts.walls import shell
-
-Array = NDArray[Any]
-
+from scenegen.objects.solids import Array
 
 THICK = 0.04  # thickness of the cloth; a crown is about 2 long
 
@@ -37,12 +25,9 @@ def _dome(rng: Generator, height: float) -> Curve:
     steep, flat = span(rng, 0.35, 0.75), span(rng, 0.4, 0.95)
     band = span(rng, 0.02, 0.25) * height
     lean = span(rng, 0.97, 1.06)
-    return join(
-        line((1.0, 0.0), (lean, band)),
-        bezier(
-            (lean, band), (lean, band + steep * (height - band)), (flat, height), (0.0, height), 11
-        ),
-    )
+    bend = (lean, band + steep * (height - band))
+    dome = bezier((lean, band), bend, (flat, height), (0.0, height), 11)
+    return join(line((1.0, 0.0), (lean, band)), dome)
 
 
 def _oval(rng: Generator) -> tuple[float, float]:
@@ -96,9 +81,7 @@ def _woolly(rng: Generator) -> list[Part]:
             arc((1.06 + out - edge, edge), edge, -90, 0, 4),
             line((1.06 + out, edge), (1.06 + out, cuff - edge)),
             arc((1.06 + out - edge, cuff - edge), edge, 0, 90, 4),
-            line((1.06 + out - edge, cuff), (0.97, cuff)),
-            line((0.97, cuff), (0.97, 0.0)),
-            line((0.97, 0.0), (1.06 + out - edge, 0.0)),
+            line((1.06 + out - edge, cuff), (0.97, cuff), (0.97, 0.0), (1.06 + out - edge, 0.0)),
         )
         parts.append(loft(fold, size=size, closed=True))
     if chance(rng, 0.55):
@@ -113,23 +96,16 @@ def _bowler(rng: Generator) -> list[Part]:
     size = _oval(rng)
     brim, rise = span(rng, 0.25, 0.8), span(rng, 0.0, 0.22)
     top, edge = span(rng, 0.75, 1.12), span(rng, 0.05, 0.45) * min(1.0, height)
+    begin, end = (top, height - 0.45 * edge), (top - 0.5 * edge, height)
     wall = join(
         bezier((1.0, 0.02), (1.0, 0.4 * height), (top, 0.5 * height), (top, height - edge), 8),
-        bezier(
-            (top, height - edge),
-            (top, height - 0.45 * edge),
-            (top - 0.5 * edge, height),
-            (top - edge, height),
-            6,
-        ),
+        bezier((top, height - edge), begin, end, (top - edge, height), 6),
         line((top - edge, height), (0.0, height - span(rng, 0.0, 0.08))),
     )
-    outer = 1.0 + brim
-    under = bezier(
-        (0.9, 0.0), (1.0 + 0.4 * brim, 0.0), (1.0 + 0.8 * brim, 0.3 * rise), (outer, rise), 7
-    )
+    outer, end = 1.0 + brim, (1.0 + 0.8 * brim, 0.3 * rise)
+    under = bezier((0.9, 0.0), (1.0 + 0.4 * brim, 0.0), end, (outer, rise), 7)
     over = reverse((under[0] + (0.0, THICK), under[1]))
-    edge_of = polyline((outer, rise), (outer, rise + THICK))
+    edge_of = line((outer, rise), (outer, rise + THICK))
     flat = join(under, edge_of, over, line((0.9, THICK), (0.9, 0.0)))
     return [loft(shell(wall, THICK), size=size, closed=True), loft(flat, size=size, closed=True)]
 
@@ -139,17 +115,9 @@ def _sun_hat(rng: Generator) -> list[Part]:
     height, brim, drop = span(rng, 0.7, 1.1), span(rng, 0.25, 0.65), span(rng, 0.1, 0.5)
     size = _oval(rng)
     top = span(rng, 0.72, 0.98)
-    wall = join(
-        line((1.0 + brim, 0.0), (1.0, drop)),
-        line((1.0, drop), (top, drop + 0.85 * height)),
-        bezier(
-            (top, drop + 0.85 * height),
-            (top, drop + height),
-            (0.6 * top, drop + height),
-            (0.0, drop + height + 0.02),
-            6,
-        ),
-    )
+    low, high = drop + 0.85 * height, drop + height
+    crown = bezier((top, low), (top, high), (0.6 * top, high), (0.0, high + 0.02), 6)
+    wall = join(line((1.0 + brim, 0.0), (1.0, drop), (top, low)), crown)
     return [loft(shell(wall, THICK), size=size, closed=True)]
 
 

@@ -5,10 +5,10 @@ import math
 import numpy as np
 from numpy.random import Generator
 
-from scenegen.objects.families.parts.boxes import box, boxes
+from scenegen.objects.families.parts.boxes import box, boxes, spoke
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.moves import buried
-from scenegen.objects.families.parts.profiles import arc, bezier, fillet, join, line, polyline
+from scenegen.objects.families.parts.profiles import arc, bezier, fillet, join, line
 from scenegen.objects.families.parts.surfaces import Part, loft
 from scenegen.objects.families.parts.sweeps import tube
 
@@ -41,7 +41,7 @@ def _seat(style: str, depth: float, high: float, thick: float) -> Part:
     if style == "square":
         return boxes([box((-HALF, low, -depth), (HALF, high, depth))])
     if style == "round":
-        side = polyline((HALF - 0.05, low), (HALF, high))
+        side = line((HALF - 0.05, low), (HALF, high))
         return loft(side, base=(0.0, depth - HALF, 0.6 * min(depth, HALF) - HALF))
     edge = 0.49 * thick
     side = join(
@@ -58,33 +58,23 @@ def _tub(rng: Generator) -> list[Part]:
     radius, thick = span(rng, 0.9, 1.15), span(rng, 0.12, 0.25)
     foot = span(rng, 0.15, 0.45)
     deep = span(rng, 0.3, 0.9)
-    bend = arc((0.0, 0.0), radius, 0, -180, 20)
     path = join(
         (np.array([[radius, deep]]), np.array([[0.0, -1.0]])),
-        bend,
+        arc((0.0, 0.0), radius, 0, -180, 20),
         (np.array([[-radius, deep]]), np.array([[0.0, 1.0]])),
     )
-    middle = (high + rise + foot) / 2
-    wall = tube(
-        path,
-        (high + rise - foot) / 2,
-        thick,
-        origin=(0.0, middle, 0.0),
-        up=(0.0, 0.0, 1.0),
-        corner=0.8 * thick,
-    )
+    tall, middle = (high + rise - foot) / 2, (0.0, (high + rise + foot) / 2, 0.0)
+    wall = tube(path, tall, thick, origin=middle, up=(0.0, 0.0, 1.0), corner=0.8 * thick)
     edge = 0.12
-    cushion = join(
-        line((1.0, foot + 0.05), (1.0, high - edge)), arc((1.0 - edge, high - edge), edge, 0, 90, 4)
-    )
+    rim = arc((1.0 - edge, high - edge), edge, 0, 90, 4)
+    cushion = join(line((1.0, foot + 0.05), (1.0, high - edge)), rim)
     size = radius - 0.02
     half = (radius + deep) / 2
-    seat = loft(
-        cushion, base=(size - 1.0, half - 1.0, 0.3 - 1.0), at=(0.0, deep - half + 0.05), segments=32
-    )
+    base = (size - 1.0, half - 1.0, 0.3 - 1.0)
+    seat = loft(cushion, base=base, at=(0.0, deep - half + 0.05), segments=32)
     x, z = 0.7 * radius, 0.55 * radius
     if chance(rng, 0.3):
-        plate = polyline((0.7, 0.0), (0.7, 0.06), (0.12, 0.08), (0.12, foot + 0.1))
+        plate = line((0.7, 0.0), (0.7, 0.06), (0.12, 0.08), (0.12, foot + 0.1))
         return [wall, seat, loft(plate, segments=32)]
     spots = [(x, 0.7 * deep), (-x, 0.7 * deep), (x, -z), (-x, -z)]
     feet = loft(line((0.06, 0.0), (0.1, foot + 0.15)), at=spots, segments=16)
@@ -94,28 +84,21 @@ def _tub(rng: Generator) -> list[Part]:
 def _legs(rng: Generator, width: float, depth: float, under: float) -> list[Part]:
     """Build legs that reach up to the seat's underside and a little into it."""
     top = under + 0.03
-    style = pick(
-        rng, ("straight", "straight", "splayed", "turned", "star", "sled", "frame", "panel")
-    )
+    styles = ("straight", "straight", "splayed", "turned", "star", "sled", "frame", "panel")
+    style = pick(rng, styles)
     if style == "star":
         return _star(rng, top)
     thin = span(rng, 0.06, 0.14)
     x, z = width - thin - 0.02, depth - thin - 0.02
-    if style == "sled":
+    if style in ("sled", "frame"):
         bar = 0.7 * thin
-        corners = [(z, top), (z, bar), (-z, bar), (-z, top)]
-        path = fillet(corners, 0.25, 5)
-        return [
-            tube(path, bar, origin=(side * x, 0.0, 0.0), across=(0.0, 0.0, 1.0)) for side in (1, -1)
-        ]
-    if style == "frame":  # a cantilever chair has no legs at the back
-        bar = 0.7 * thin
-        corners = [(-0.6 * z, top - bar), (z, top - bar), (z, bar), (-z, bar)]
-        path = fillet(corners, 0.3, 5)
-        pair = [
-            tube(path, bar, origin=(side * x, 0.0, 0.0), across=(0.0, 0.0, 1.0)) for side in (1, -1)
-        ]
-        return [*pair, boxes([box((-x, 0.0, -z), (x, 2 * bar, -z + 2 * bar))])]
+        path = fillet([(z, top), (z, bar), (-z, bar), (-z, top)], 0.25, 5)
+        if style == "frame":  # a cantilever chair has no legs at the back
+            path = fillet([(-0.6 * z, top - bar), (z, top - bar), (z, bar), (-z, bar)], 0.3, 5)
+        sides = ((x, 0.0, 0.0), (-x, 0.0, 0.0))
+        parts = [tube(path, bar, origin=side, across=(0.0, 0.0, 1.0)) for side in sides]
+        cross = boxes([box((-x, 0.0, -z), (x, 2 * bar, -z + 2 * bar))])
+        return [*parts, cross] if style == "frame" else parts
     if style == "panel":
         wall = 0.7 * thin
         panels = [box((s * x - wall, 0.0, -z), (s * x + wall, top, z)) for s in (1, -1)]
@@ -125,9 +108,7 @@ def _legs(rng: Generator, width: float, depth: float, under: float) -> list[Part
     corners = [(sx * x, sz * z) for sx in (1.0, -1.0) for sz in (1.0, -1.0)]
     out = span(rng, 0.05, 0.3) if style == "splayed" else 0.0
     feet = [(cx * (1 + out), cz * (1 + 0.7 * out)) for cx, cz in corners]
-    lean = [
-        ((cx - fx) / top, (cz - fz) / top) for (cx, cz), (fx, fz) in zip(corners, feet, strict=True)
-    ]
+    lean = np.subtract(corners, feet) / top
     if style == "turned":
         at = span(rng, 0.35, 0.75) * top
         bulge = 1.7 * thin
@@ -150,9 +131,8 @@ def _legs(rng: Generator, width: float, depth: float, under: float) -> list[Part
         if chance(rng, 0.5):
             rails.append(box((-a, y - half, -half), (a, y + half, half)))
         else:
-            rails += [
-                box((-a, y - half, s * b - half), (a, y + half, s * b + half)) for s in (1, -1)
-            ]
+            low, high = y - half, y + half
+            rails += [box((-a, low, s * b - half), (a, high, s * b + half)) for s in (1, -1)]
         parts.append(buried(boxes(rails)))
     return parts
 
@@ -163,24 +143,19 @@ def _star(rng: Generator, top: float) -> list[Part]:
     if chance(rng, 0.35):
         plate = span(rng, 0.6, 0.9)
         side = join(
-            polyline((plate, 0.0), (plate, 0.06)),
+            line((plate, 0.0), (plate, 0.06)),
             bezier((plate, 0.06), (0.3, 0.1), (thin, 0.15), (thin, 0.4), 6),
         )
         return [loft(join(side, line((thin, 0.4), (thin, top))), segments=32)]
     reach, arms = span(rng, 0.75, 1.0), pick(rng, (4, 5, 5))
     ball = 0.11
-    parts = [loft(polyline((thin, ball), (thin, top)), segments=20)]
+    parts = [loft(line((thin, ball), (thin, top)), segments=20)]
     bars, wheels = [], []
     for i in range(arms):
         angle = 2 * math.pi * (i + 0.25) / arms
         c, s = math.cos(angle), math.sin(angle)
         wheels.append((reach * c, reach * s))
-        bar: Corners = []
-        for near, far in ((ball, ball), (2.2 * ball, 1.6 * ball)):
-            for along, across in ((0.0, -0.07), (0.0, 0.07), (reach, 0.07), (reach, -0.07)):
-                y = near if along == 0.0 else far
-                bar.append((along * c - across * s, y, along * s + across * c))
-        bars.append(bar)
+        bars.append(spoke(0.0, angle, reach, 0.07, ((ball, ball), (2.2 * ball, 1.6 * ball))))
     castor = arc((0.0, ball), ball, -90, 90, 6)
     return [*parts, boxes(bars), loft(castor, at=wheels, segments=16)]
 
@@ -207,7 +182,7 @@ def _back(
     if style == "solid":
         return [boxes([slab(-wide, wide, low, top, half)])], lean
     if style == "hoop":
-        return _hoop(rng, (low, top), z, lean, wide), lean
+        return _hoop(rng, low, top, z, lean, wide), lean
     post = span(rng, 0.06, 0.12)
     frame = [  # its convex hull contains the thinner boards between
         slab(s * wide - post * (1 + s), s * wide + post * (1 - s), low, top, 1.1 * half)
@@ -239,29 +214,23 @@ def _back(
         for s in (1.0, -1.0):
             bar = slab(-0.08, 0.08, y, top - rail + 0.02, 0.5 * half)
             move = s * (inner - 0.08)
-            within.append(
-                [(px + (-move if i < 4 else move), py, pz) for i, (px, py, pz) in enumerate(bar)]
-            )
+            within.append([(x - move, y, z) for x, y, z in bar[:4]])
+            within[-1] += [(x + move, y, z) for x, y, z in bar[4:]]
     else:
         y = high + span(rng, 0.3, 0.5) * rise
         within.append(slab(-inner, inner, y - 0.08, y + 0.08, 0.8 * half))
     return [boxes(frame), buried(boxes(within))], lean
 
 
-def _hoop(
-    rng: Generator, span_y: tuple[float, float], z: float, lean: float, wide: float
-) -> list[Part]:
+def _hoop(rng: Generator, low: float, top: float, z: float, lean: float, wide: float) -> list[Part]:
     """Build a back of a bent bow with spindles or a board inside."""
-    low, top = span_y
     up = np.array([0.0, 1.0, -lean]) / math.hypot(1.0, lean)
-    frame = ((1.0, 0.0, 0.0), (0.0, float(up[1]), float(up[2])))
     length = (top - low) * math.hypot(1.0, lean)
     flare = wide * span(rng, 0.85, 1.15)
     bar = span(rng, 0.05, 0.09)
-    bow = bezier(
-        (wide * 0.8, 0.0), (flare, length * 4 / 3), (-flare, length * 4 / 3), (-wide * 0.8, 0.0), 16
-    )
-    parts = [tube(bow, bar, origin=(0.0, low, z), across=frame[0], up=frame[1])]
+    peak, foot = length * 4 / 3, wide * 0.8
+    bow = bezier((foot, 0.0), (flare, peak), (-flare, peak), (-foot, 0.0), 16)
+    parts = [tube(bow, bar, origin=(0.0, low, z), up=(0.0, float(up[1]), float(up[2])))]
     count = pick(rng, (1, 3, 4, 5, 6, 7))
     bars = []
     for i in range(count):
@@ -271,11 +240,8 @@ def _hoop(
         ends = [-abs(x) - thin, abs(x) + thin]  # the bow must cover the board's whole top
         reach = float(np.interp(ends, -points[:, 0], points[:, 1]).min())
         height = reach * float(up[1])
-        bars.append(
-            box(
-                (x - thin, low, z - 0.03), (x + thin, low + height, z + 0.03), (0.0, -lean * height)
-            )
-        )
+        start, end = (x - thin, low, z - 0.03), (x + thin, low + height, z + 0.03)
+        bars.append(box(start, end, (0.0, -lean * height)))
     return [*parts, buried(boxes(bars))]
 
 
@@ -296,10 +262,6 @@ def _arms(rng: Generator, depth: float, high: float, lean: float, rise: float) -
     for s in (1, -1):
         shapes.append(box((s * x - wide, y - 0.08, back), (s * x + wide, y, front)))
         start = back if solid else front - 2.2 * wide
-        shapes.append(
-            box(
-                (s * x - 0.6 * wide, high - 0.04, start + 0.02),
-                (s * x + 0.6 * wide, y - 0.04, front - 0.03),
-            )
-        )
+        low, top = (s * x - 0.6 * wide, high - 0.04), (s * x + 0.6 * wide, y - 0.04)
+        shapes.append(box((*low, start + 0.02), (*top, front - 0.03)))
     return [boxes(shapes)]

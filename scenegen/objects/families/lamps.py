@@ -9,15 +9,7 @@ from numpy.random import Generator
 from scenegen.objects.families.parts.boxes import box, boxes
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.moves import buried, moved, turn_about_x
-from scenegen.objects.families.parts.profiles import (
-    Curve,
-    arc,
-    bezier,
-    join,
-    line,
-    polyline,
-    tightest,
-)
+from scenegen.objects.families.parts.profiles import Curve, arc, bezier, join, limited, line
 from scenegen.objects.families.parts.surfaces import Part, loft
 from scenegen.objects.families.parts.sweeps import tube
 from scenegen.objects.families.parts.walls import ring
@@ -25,9 +17,8 @@ from scenegen.objects.families.parts.walls import ring
 
 def lamp(rng: Generator) -> list[Part]:
     """Build a table, floor, desk, arc or globe lamp, or an uplight."""
-    kind = pick(
-        rng, ("table", "table", "table", "floor", "desk", "desk", "bent", "globe", "uplight")
-    )
+    kinds = ("table", "table", "table", "floor", "desk", "desk", "bent", "globe", "uplight")
+    kind = pick(rng, kinds)
     if kind == "desk":
         return _desk(rng)
     if kind == "bent":
@@ -54,13 +45,13 @@ def _pole(rng: Generator, height: float) -> list[Part]:
         leg = line((1.2 * thin, 0.0), (thin, hub))
         return [
             loft(leg, at=feet, lean=lean, segments=16),
-            loft(polyline((thin, hub - 0.15), (thin, height)), segments=16),
-            loft(polyline((2.2 * thin, hub - 0.1), (2.2 * thin, hub + 0.05)), segments=16),
+            loft(line((thin, hub - 0.15), (thin, height)), segments=16),
+            loft(line((2.2 * thin, hub - 0.1), (2.2 * thin, hub + 0.05)), segments=16),
         ]
     plate, thick = span(rng, 0.35, 0.6), span(rng, 0.04, 0.15)
     corner = pick(rng, (1.0, 1.0, 0.1))
-    foot = loft(polyline((plate, 0.0), (0.96 * plate, thick)), corner=corner)
-    return [foot, loft(polyline((thin, 0.5 * thick), (thin, height)), segments=16)]
+    foot = loft(line((plate, 0.0), (0.96 * plate, thick)), corner=corner)
+    return [foot, loft(line((thin, 0.5 * thick), (thin, height)), segments=16)]
 
 
 def _stand(rng: Generator, height: float, shade: float) -> list[Part]:
@@ -68,22 +59,18 @@ def _stand(rng: Generator, height: float, shade: float) -> list[Part]:
     style = pick(rng, ("vase", "vase", "gourd", "column", "block", "balls", "tripod"))
     top = 0.9 * height
     wide = shade * span(rng, 0.4, 0.8)
-    rod = loft(polyline((0.05, 0.5 * top), (0.05, height)), segments=16)
+    rod = loft(line((0.05, 0.5 * top), (0.05, height)), segments=16)
     if style == "tripod":
         return [*_tripod(rng, top, wide), rod]
     if style == "column":
         thin, thick = span(rng, 0.05, 0.16), span(rng, 0.05, 0.16)
-        profile = polyline((wide, 0.0), (wide * 0.95, thick), (thin, thick), (thin, top))
+        profile = line((wide, 0.0), (wide * 0.95, thick), (thin, thick), (thin, top))
         return [loft(profile), rod]
     if style == "block":
         depth = span(rng, 0.6, 1.0)
-        block = loft(
-            polyline((wide, 0.0), (wide * span(rng, 0.5, 1.1), top)),
-            size=(1.0, depth),
-            corner=pick(rng, (0.0, 0.2)),
-            segments=24,
-        )
-        return [block, rod]
+        side = line((wide, 0.0), (wide * span(rng, 0.5, 1.1), top))
+        corner = pick(rng, (0.0, 0.2))
+        return [loft(side, size=(1.0, depth), corner=corner, segments=24), rod]
     if style == "balls":
         return [*_balls(rng, top, wide), rod]
     neck, foot = wide * span(rng, 0.15, 0.45), wide * span(rng, 0.4, 0.9)
@@ -106,7 +93,7 @@ def _tripod(rng: Generator, top: float, wide: float) -> list[Part]:
     angle = np.radians([90, 210, 330])
     feet = [(spread * math.cos(a), spread * math.sin(a)) for a in angle]
     lean = [(-x * 0.9 / top, -z * 0.9 / top) for x, z in feet]
-    hub = loft(polyline((2.6 * thin, top - 0.12), (2.6 * thin, top + 0.02)), segments=20)
+    hub = loft(line((2.6 * thin, top - 0.12), (2.6 * thin, top + 0.02)), segments=20)
     return [loft(line((thin, 0.0), (thin, top)), at=feet, lean=lean, segments=16), hub]
 
 
@@ -116,11 +103,10 @@ def _balls(rng: Generator, top: float, wide: float) -> list[Part]:
     half = (top - 0.1) / count / 2
     radius = min(wide, half * span(rng, 1.0, 1.6))
     shrink = span(rng, 0.75, 1.0)
-    pieces = [polyline((wide, 0.0), (0.95 * wide, 0.1), (0.3 * radius, 0.1))]
+    pieces = [line((wide, 0.0), (0.95 * wide, 0.1), (0.3 * radius, 0.1))]
     for i in range(count):
         bulge, middle = radius * shrink**i, 0.1 + half * (2 * i + 1)
-        piece = arc((0.0, middle), (bulge, half), -72, 72, 7)
-        pieces.append(piece)
+        pieces.append(arc((0.0, middle), (bulge, half), -72, 72, 7))
     return [loft(_bridged(pieces), segments=28)]
 
 
@@ -147,21 +133,11 @@ def _shade(rng: Generator, height: float, radius: float) -> list[Part]:
         wall = line((radius, low), (narrow, high))
     elif style == "bell":
         waist = narrow + 0.1 * (radius - narrow)
-        wall = bezier(
-            (radius, low),
-            (0.4 * radius + 0.6 * waist, low + 0.3 * rise),
-            (narrow, low + 0.5 * rise),
-            (narrow, high),
-            8,
-        )
+        begin, end = (0.4 * radius + 0.6 * waist, low + 0.3 * rise), (narrow, low + 0.5 * rise)
+        wall = bezier((radius, low), begin, end, (narrow, high), 8)
     else:
-        wall = bezier(
-            (radius, low),
-            (radius, low + 0.6 * rise),
-            ((radius + narrow) / 2, high),
-            (narrow, high),
-            8,
-        )
+        begin, end = (radius, low + 0.6 * rise), ((radius + narrow) / 2, high)
+        wall = bezier((radius, low), begin, end, (narrow, high), 8)
     outline = pick(rng, ("round", "round", "round", "square", "oval"))
     size, corner = (1.0, 1.0), 1.0
     if outline == "square":
@@ -177,7 +153,7 @@ def _shade(rng: Generator, height: float, radius: float) -> list[Part]:
         box((-level_radius, level, -bar), (level_radius, level + 2 * bar, bar)),
         box((-bar, level, -depth), (bar, level + 2 * bar, depth)),
     ]
-    stem = polyline((0.05, height - 0.05), (0.05, max(level + 2 * bar, height)))
+    stem = line((0.05, height - 0.05), (0.05, max(level + 2 * bar, height)))
     bulb = arc((0.0, level - 0.2 * rise), 0.16 * radius + 0.03, -80, 90, 8)
     parts = [
         loft(ring(wall, thick), size=size, corner=corner, closed=True),
@@ -188,7 +164,7 @@ def _shade(rng: Generator, height: float, radius: float) -> list[Part]:
     if chance(rng, 0.3):  # a finial
         ball = span(rng, 0.05, 0.1)
         parts += [
-            loft(polyline((0.03, level), (0.03, high + ball)), segments=16),
+            loft(line((0.03, level), (0.03, high + ball)), segments=16),
             loft(arc((0.0, high + 1.5 * ball), ball, -80, 90, 8), segments=16),
         ]
     return parts
@@ -199,24 +175,17 @@ def _globe(rng: Generator, height: float, radius: float) -> list[Part]:
     tall = radius * span(rng, 0.8, 1.4)
     collar = 0.4 * radius
     ball = arc((0.0, height + 0.9 * tall), (radius, tall), -75, 90, 16)
-    return [loft(polyline((collar, height - 0.08), (collar, height + 0.08 * tall))), loft(ball)]
+    return [loft(line((collar, height - 0.08), (collar, height + 0.08 * tall))), loft(ball)]
 
 
 def _bowl(rng: Generator, height: float, radius: float) -> list[Part]:
     """Build an uplight's bowl, which is open upwards."""
     rise = radius * span(rng, 0.35, 0.9)
-    start, bend = (0.06, height - 0.03), span(rng, 0.3, 1.0)
-    wall = bezier(
-        start,
-        (radius * bend, height - 0.03),
-        (radius, height + 0.4 * rise),
-        (radius, height + rise),
-        10,
-    )
-    return [
-        loft(ring(wall, 0.03), closed=True),
-        loft(arc((0.0, height), 0.12, -80, 90, 6), segments=16),
-    ]
+    low, bend = height - 0.03, (radius, height + 0.4 * rise)
+    begin = (radius * span(rng, 0.3, 1.0), low)
+    wall = bezier((0.06, low), begin, bend, (radius, height + rise), 10)
+    bulb = loft(arc((0.0, height), 0.12, -80, 90, 6), segments=16)
+    return [loft(ring(wall, 0.03), closed=True), bulb]
 
 
 def _head(rng: Generator, room: float) -> tuple[Curve, float]:
@@ -242,9 +211,9 @@ def _hang(rng: Generator, at: tuple[float, float], tilt: float) -> list[Part]:
     turn = turn_about_x(-tilt)
     # This moves the top of the head, (0, rise, 0), to the end of the arm.
     offset = (0.0, at[1] - rise * math.cos(tilt), at[0] + rise * math.sin(tilt))
-    lid = loft(polyline((crown + 0.01, rise - 0.05), (0.8 * crown, rise + 0.08)), segments=24)
+    lid = loft(line((crown + 0.01, rise - 0.05), (0.8 * crown, rise + 0.08)), segments=24)
     bulb = loft(arc((0.0, 0.45 * rise), 0.6 * crown, -80, 80, 8), segments=16)
-    stem = loft(polyline((0.3 * crown, 0.5 * rise), (0.3 * crown, rise)), segments=16)
+    stem = loft(line((0.3 * crown, 0.5 * rise), (0.3 * crown, rise)), segments=16)
     parts = [loft(ring(wall, 0.025), closed=True, segments=32), lid, buried(bulb), buried(stem)]
     return [moved(part, offset, turn) for part in parts]
 
@@ -259,7 +228,7 @@ def _desk(rng: Generator) -> list[Part]:
     elbow = (foot[0] - lower * math.sin(back), foot[1] + lower * math.cos(back))
     wrist = (elbow[0] + upper * math.sin(ahead), elbow[1] + upper * math.cos(ahead))
     corner = pick(rng, (1.0, 1.0, 0.15))
-    parts = [loft(polyline((plate, 0.0), (0.94 * plate, thick)), corner=corner)]
+    parts = [loft(line((plate, 0.0), (0.94 * plate, thick)), corner=corner)]
     arms = [(foot[0], 0.7 * thick), elbow, wrist]
     double = chance(rng, 0.4)
     for start, end in itertools.pairwise(arms):
@@ -278,19 +247,14 @@ def _bent(rng: Generator) -> list[Part]:
     plate, thick = span(rng, 0.4, 0.7), span(rng, 0.06, 0.2)
     height, reach = span(rng, 1.4, 3.8), span(rng, 0.7, 1.8)
     thin = span(rng, 0.035, 0.06)
-    start = (0.0, 0.7 * thick)
     end = (reach, height * span(rng, 0.62, 0.92))
-    path = bezier(
-        start,
-        (span(rng, -0.5, 0.1), height * 1.15),
-        (reach * span(rng, 0.6, 1.0), height * 1.2),
-        end,
-        16,
-    )
-    thin = min(thin, 0.7 * tightest(path))
+    rise = (span(rng, -0.5, 0.1), height * 1.15)
+    fall = (reach * span(rng, 0.6, 1.0), height * 1.2)
+    path = bezier((0.0, 0.7 * thick), rise, fall, end, 16)
+    thin = limited(path, thin)
     along = path[1][-1] / math.hypot(*path[1][-1])
     tilt = math.atan2(float(along[0]), -float(along[1])) * span(rng, 0.0, 1.0)
-    foot = loft(polyline((plate, 0.0), (0.94 * plate, thick)))
+    foot = loft(line((plate, 0.0), (0.94 * plate, thick)))
     arm = tube(path, thin, across=(0.0, 0.0, 1.0))
     joint = loft(arc((0.0, end[1]), 1.8 * thin, -90, 90, 8), at=(0.0, end[0]), segments=16)
     return [foot, arm, joint, *_hang(rng, end, tilt)]

@@ -25,7 +25,6 @@ _BUILDERS: dict[str, Callable[[np.random.Generator], list[Part]]] = {
     "chair": chairs.chair,
     "table": tables.table,
 }
-_PLACE = {name: place for place, name in enumerate(_BUILDERS)}
 _ENTROPY = 0x5E1F_0B7E  # part of every member's seed, so it must never change
 
 
@@ -43,6 +42,7 @@ def member_shape(family: str, member: int) -> UnitShape:
         raise SpecError("family", repr(family), f"one of {', '.join(FAMILY_NAMES)}")
     if not 0 <= member < MEMBERS:
         raise SpecError(family, f"member {member}", f"0 to {MEMBERS - 1}")
-    key = np.random.SeedSequence(_ENTROPY, spawn_key=(_PLACE[family], member))
+    place = list(_BUILDERS).index(family)
+    key = np.random.SeedSequence(_ENTROPY, spawn_key=(place, member))
     rng = np.random.Generator(np.random.PCG64(key))
     return assemble(f"{family}/{member:04d}", _BUILDERS[family](rng))

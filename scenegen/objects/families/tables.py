@@ -1,14 +1,14 @@
 """Tables: a top on legs, columns, panels or a frame. The long side is along x."""
 
 import math
-from collections.abc import Callable
 
+import numpy as np
 from numpy.random import Generator
 
-from scenegen.objects.families.parts.boxes import box, boxes
+from scenegen.objects.families.parts.boxes import box, boxes, spoke
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.moves import buried
-from scenegen.objects.families.parts.profiles import bezier, fillet, join, line, polyline
+from scenegen.objects.families.parts.profiles import bezier, fillet, join, line
 from scenegen.objects.families.parts.surfaces import Part, loft
 from scenegen.objects.families.parts.sweeps import tube
 
@@ -23,28 +23,19 @@ def table(rng: Generator) -> list[Part]:
         depth = 1.0
     top = _top(rng, outline, depth, height, thick)
     under = height - thick + 0.02
-    round_top = outline in ("round", "oval")
-    kinds: tuple[Callable[[Generator, float, float, float], list[Part]], ...] = (
-        _four,
-        _four,
-        _four,
-        _column,
-        _panels,
-        _trestle,
-        _hairpins,
-    )
-    if round_top:
-        kinds = (_four, _four, _column, _column, _drum, _crossed)
-    x, z = (0.68, 0.68 * depth) if round_top else (0.93, depth - 0.07)
-    return [top, *pick(rng, kinds)(rng, x, z, under)]
+    if outline in ("round", "oval"):
+        kind = pick(rng, (_four, _four, _column, _column, _drum, _crossed))
+        return [top, *kind(rng, 0.68, 0.68 * depth, under)]
+    kind = pick(rng, (_four, _four, _four, _column, _panels, _trestle, _hairpins))
+    return [top, *kind(rng, 0.93, depth - 0.07, under)]
 
 
 def _top(rng: Generator, outline: str, depth: float, height: float, thick: float) -> Part:
     edge = pick(rng, (0.0, span(rng, 0.2, 1.0) * thick))
     low = height - thick
-    side = polyline((1.0 - edge, low), (1.0, low + 0.5 * edge), (1.0, height))
+    side = line((1.0 - edge, low), (1.0, low + 0.5 * edge), (1.0, height))
     if not edge:
-        side = polyline((1.0, low), (1.0, height))
+        side = line((1.0, low), (1.0, height))
     corner = {"square": 0.0, "rounded": span(rng, 0.15, 0.6) * depth}.get(outline, depth)
     if corner == 0.0:
         return loft(side, size=(1.0, depth), corner=0.0, segments=4)
@@ -57,18 +48,16 @@ def _column(rng: Generator, x: float, z: float, top: float) -> list[Part]:
     at = [(0.0, 0.0)] if x < 1.7 * z else [(0.55 * x, 0.0), (-0.55 * x, 0.0)]
     style = pick(rng, ("plate", "bell", "feet", "urn"))
     if style == "feet":
-        feet = []
         turn = pick(rng, (0.0, math.pi / 4))
-        arms = pick(rng, (3, 4)) if len(at) == 1 else 2
-        for cx, _ in at:
-            for i in range(arms):
-                angle = (
-                    turn + 2 * math.pi * i / arms + math.pi / 2 if arms > 2 else math.pi * (i + 0.5)
-                )
-                feet.append(_foot(cx, angle, reach, 0.7 * thin, min(0.35, 0.4 * top)))
-        return [loft(polyline((thin, 0.04), (thin, top)), at=at, segments=24), boxes(feet)]
+        angles = [math.pi * 0.5, math.pi * 1.5]
+        if len(at) == 1:
+            arms = pick(rng, (3, 4))
+            angles = [turn + 2 * math.pi * i / arms + math.pi / 2 for i in range(arms)]
+        levels = ((0.04, 0.0), (min(0.35, 0.4 * top), 0.07))
+        feet = [spoke(cx, angle, reach, 0.7 * thin, levels) for cx, _ in at for angle in angles]
+        return [loft(line((thin, 0.04), (thin, top)), at=at, segments=24), boxes(feet)]
     if style == "plate":
-        side = polyline((reach, 0.0), (reach, 0.06), (thin, 0.09), (thin, top))
+        side = line((reach, 0.0), (reach, 0.06), (thin, 0.09), (thin, top))
     elif style == "bell":
         high = span(rng, 0.3, 0.8) * top
         side = join(
@@ -78,33 +67,13 @@ def _column(rng: Generator, x: float, z: float, top: float) -> list[Part]:
         )
     else:
         belly = min(thin * span(rng, 1.5, 2.6), 0.8 * reach)
+        waist = (0.7 * thin, 0.6 * top)
         side = join(
-            polyline((reach, 0.0), (reach, 0.07), (thin, 0.12)),
-            bezier(
-                (thin, 0.12), (belly, 0.2 * top), (belly, 0.55 * top), (0.7 * thin, 0.6 * top), 9
-            ),
-            bezier(
-                (0.7 * thin, 0.6 * top),
-                (0.7 * thin, 0.8 * top),
-                (thin, 0.9 * top),
-                (1.6 * thin, top),
-                6,
-            ),
+            line((reach, 0.0), (reach, 0.07), (thin, 0.12)),
+            bezier((thin, 0.12), (belly, 0.2 * top), (belly, 0.55 * top), waist, 9),
+            bezier(waist, (0.7 * thin, 0.8 * top), (thin, 0.9 * top), (1.6 * thin, top), 6),
         )
     return [loft(side, at=at, segments=40 if len(at) == 1 else 28)]
-
-
-def _foot(
-    x: float, angle: float, reach: float, half: float, rise: float
-) -> list[tuple[float, float, float]]:
-    """Return the corners of a bar from the column down to the floor."""
-    c, s = math.cos(angle), math.sin(angle)
-    corners = []
-    for inner, outer in ((0.04, 0.0), (rise, 0.07)):
-        for along, across in ((0.0, -half), (0.0, half), (reach, half), (reach, -half)):
-            y = inner if along == 0.0 else outer
-            corners.append((x + along * c - across * s, y, along * s + across * c))
-    return corners
 
 
 def _drum(rng: Generator, x: float, z: float, top: float) -> list[Part]:
@@ -123,9 +92,7 @@ def _crossed(rng: Generator, x: float, z: float, top: float) -> list[Part]:
     angles = [2 * math.pi * i / count + 0.4 for i in range(count)]
     feet = [(r * math.cos(a), r * math.sin(a)) for a in angles]
     heads = [(0.9 * r * math.cos(a + twist), 0.9 * r * math.sin(a + twist)) for a in angles]
-    lean = [
-        ((hx - fx) / top, (hz - fz) / top) for (fx, fz), (hx, hz) in zip(feet, heads, strict=True)
-    ]
+    lean = np.subtract(heads, feet) / top
     return [loft(line((thin, 0.0), (thin, top)), at=feet, lean=lean, segments=16)]
 
 
@@ -137,9 +104,7 @@ def _four(rng: Generator, x: float, z: float, top: float) -> list[Part]:
     style = pick(rng, ("straight", "straight", "tapered", "splayed", "turned", "bent"))
     out = span(rng, 0.06, 0.25) if style == "splayed" else 0.0
     feet = [(cx * (1.0 + out), cz + math.copysign(out * x, cz)) for cx, cz in corners]
-    lean = [
-        ((cx - fx) / top, (cz - fz) / top) for (cx, cz), (fx, fz) in zip(corners, feet, strict=True)
-    ]
+    lean = np.subtract(corners, feet) / top
     corner = pick(rng, (0.0, 0.0, 1.0))
     if style == "turned":
         at, bulge = span(rng, 0.3, 0.8) * top, 1.8 * thin
@@ -150,13 +115,8 @@ def _four(rng: Generator, x: float, z: float, top: float) -> list[Part]:
         )
         legs = loft(side, at=feet, segments=16)
     elif style == "bent":  # a cabriole leg: thin at the foot, thick at the knee
-        side = bezier(
-            (0.7 * thin, 0.0),
-            (0.3 * thin, 0.4 * top),
-            (1.7 * thin, 0.6 * top),
-            (1.6 * thin, top),
-            9,
-        )
+        ankle, knee = (0.3 * thin, 0.4 * top), (1.7 * thin, 0.6 * top)
+        side = bezier((0.7 * thin, 0.0), ankle, knee, (1.6 * thin, top), 9)
         legs = loft(side, at=feet, segments=16)
     else:
         foot = thin if style == "straight" else span(rng, 0.35, 0.8) * thin
@@ -168,9 +128,8 @@ def _four(rng: Generator, x: float, z: float, top: float) -> list[Part]:
         boards += [box((s * x - half, top - drop, -z), (s * x + half, top, z)) for s in (1, -1)]
         if chance(rng, 0.4):  # the front of a drawer
             wide = span(rng, 0.2, 0.6) * x
-            boards.append(
-                box((-wide, top - 0.85 * drop, z - thin), (wide, top - 0.1 * drop, z + 0.9 * thin))
-            )
+            low, high = top - 0.85 * drop, top - 0.1 * drop
+            boards.append(box((-wide, low, z - thin), (wide, high, z + 0.9 * thin)))
     low = span(rng, 0.12, 0.5) * top
     share = 1.0 - low / top
     a, b = x + out * x * share, z + out * x * share
@@ -178,16 +137,13 @@ def _four(rng: Generator, x: float, z: float, top: float) -> list[Part]:
     if kind == "shelf":
         boards.append(box((-a, low - 0.03, -b), (a, low + 0.03, b)))
     half = 0.35 * thin  # so thin that the hull of legs and top contains it
+    low, high = low - half, low + half
     if kind in ("rails", "h"):
-        boards += [
-            box((s * a - half, low - half, -b), (s * a + half, low + half, b)) for s in (1, -1)
-        ]
+        boards += [box((s * a - half, low, -b), (s * a + half, high, b)) for s in (1, -1)]
     if kind == "rails":
-        boards += [
-            box((-a, low - half, s * b - half), (a, low + half, s * b + half)) for s in (1, -1)
-        ]
+        boards += [box((-a, low, s * b - half), (a, high, s * b + half)) for s in (1, -1)]
     if kind == "h":
-        boards.append(box((-a, low - half, -half), (a, low + half, half)))
+        boards.append(box((-a, low, -half), (a, high, half)))
     return [legs, buried(boxes(boards))] if boards else [legs]
 
 
@@ -198,9 +154,8 @@ def _panels(rng: Generator, x: float, z: float, top: float) -> list[Part]:
     boards = [box((s * a - half, 0.0, -b), (s * a + half, top, b)) for s in (1, -1)]
     kind = pick(rng, ("back", "shelf", "drawers", "drawers"))
     if kind == "back":
-        boards.append(
-            box((-a, span(rng, 0.1, 0.6) * top, -0.6 * b - 0.03), (a, top, -0.6 * b + 0.03))
-        )
+        low, z = span(rng, 0.1, 0.6) * top, -0.6 * b
+        boards.append(box((-a, low, z - 0.03), (a, top, z + 0.03)))
     elif kind == "shelf":
         y = span(rng, 0.15, 0.6) * top
         boards.append(box((-a, y - 0.03, -b + 0.01), (a, y + 0.03, b - 0.01)))
@@ -212,9 +167,9 @@ def _panels(rng: Generator, x: float, z: float, top: float) -> list[Part]:
         count = 1 + int(3 * rng.random())
         gap = (top - low) / count
         for i in range(count):
-            y = low + i * gap
+            y, ahead = low + i * gap, b + 0.01
             boards.append(
-                box((left + 0.03, y + 0.1 * gap, 0.0), (right - 0.03, y + 0.9 * gap, b + 0.01))
+                box((left + 0.03, y + 0.1 * gap, 0.0), (right - 0.03, y + 0.9 * gap, ahead))
             )
     return [boxes(boards)]
 
@@ -227,20 +182,15 @@ def _trestle(rng: Generator, x: float, z: float, top: float) -> list[Part]:
     for sx in (1, -1):
         for sz in (1, -1):
             foot, head = sz * (z - half), sz * (-(z - half) if crossed else 0.15 * z)
-            bar = box(
-                (sx * a - half, 0.0, foot - half),
-                (sx * a + half, top, foot + half),
-                (0.0, head - foot),
-            )
-            boards.append(bar)
+            left, right = sx * a - half, sx * a + half
+            shift = (0.0, head - foot)
+            boards.append(box((left, 0.0, foot - half), (right, top, foot + half), shift))
     y = 0.5 * top if crossed else span(rng, 0.2, 0.6) * top
     boards.append(box((-a, y - half, -half), (a, y + half, half)))
     if not crossed:
         reach = z - half - (0.85 * z - half) * y / top
-        boards += [
-            box((s * a - 0.8 * half, y - half, -reach), (s * a + 0.8 * half, y + half, reach))
-            for s in (1, -1)
-        ]
+        thin, low, high = 0.8 * half, y - half, y + half
+        boards += [box((s * a - thin, low, -reach), (s * a + thin, high, reach)) for s in (1, -1)]
     return [boxes(boards)]
 
 
@@ -249,9 +199,8 @@ def _hairpins(rng: Generator, x: float, z: float, top: float) -> list[Part]:
     bar, a = span(rng, 0.025, 0.05), x * span(rng, 0.8, 0.97)
     b, foot = 0.95 * z, span(rng, 0.4, 1.0) * z
     path = fillet([(b, top), (foot, bar), (-foot, bar), (-b, top)], 0.3 * foot, 6)
+    wide = (bar, 2.5 * bar)
     return [
-        tube(
-            path, pick(rng, (bar, 2.5 * bar)), bar, origin=(s * a, 0.0, 0.0), across=(0.0, 0.0, 1.0)
-        )
+        tube(path, pick(rng, wide), bar, origin=(s * a, 0.0, 0.0), across=(0.0, 0.0, 1.0))
         for s in (1, -1)
     ]

@@ -6,15 +6,7 @@ import numpy as np
 from numpy.random import Generator
 
 from scenegen.objects.families.parts.draws import chance, pick, span
-from scenegen.objects.families.parts.profiles import (
-    Curve,
-    arc,
-    bezier,
-    fillet,
-    join,
-    line,
-    tightest,
-)
+from scenegen.objects.families.parts.profiles import Curve, arc, bezier, fillet, join, limited, line
 from scenegen.objects.families.parts.surfaces import Part, loft
 from scenegen.objects.families.parts.sweeps import tube
 from scenegen.objects.families.parts.walls import hollow
@@ -29,14 +21,9 @@ def bowl(rng: Generator) -> list[Part]:
     foot = pick(rng, (0.0, span(rng, 0.04, 0.16), span(rng, 0.04, 0.16), span(rng, 0.2, 0.55)))
     belly = bottom + (1.0 - bottom) * span(rng, 0.35, 1.15)
     flare = span(rng, 0.75, 1.15)
-    low, high = span(rng, 0.0, 0.25), span(rng, 0.35, 0.85)
-    wall = bezier(
-        (bottom, foot),
-        (belly, foot + low * height),
-        (flare, foot + high * height),
-        (1.0, foot + height),
-        segments=10,
-    )
+    low = (belly, foot + span(rng, 0.0, 0.25) * height)
+    high = (flare, foot + span(rng, 0.35, 0.85) * height)
+    wall = bezier((bottom, foot), low, high, (1.0, foot + height), 10)
     profile = hollow(wall, thickness)
     if foot:
         stem = bottom * (span(rng, 0.35, 0.6) if foot > 0.17 else span(rng, 0.75, 0.95))
@@ -55,25 +42,13 @@ def bowl(rng: Generator) -> list[Part]:
         at = int(len(wall[0]) * span(rng, 0.72, 0.9))
         radius, level = (float(v) for v in wall[0][at])
         inner = size[0] * (radius - 0.6 * thickness) - 0.07 * half
-        hoop = bezier(
-            (inner, half),
-            (inner + 1.33 * (reach + 0.1), half * 1.1),
-            (inner + 1.33 * (reach + 0.1), -half * 1.1),
-            (inner, -half),
-            11,
-        )
+        outer = inner + 1.33 * (reach + 0.1)
+        hoop = bezier((inner, half), (outer, half * 1.1), (outer, -half * 1.1), (inner, -half), 11)
         bar = min(span(rng, 0.035, 0.06), 0.4 * (height - level + foot) + 0.03)
-        parts += [
-            tube(
-                hoop,
-                bar,
-                origin=(0.0, level, 0.0),
-                across=(way, 0.0, 0.0),
-                up=(0.0, 0.0, way),
-                segments=12,
-            )
-            for way in (1.0, -1.0)
-        ]
+        origin = (0.0, level, 0.0)
+        for way in (1.0, -1.0):
+            across, up = (way, 0.0, 0.0), (0.0, 0.0, way)
+            parts.append(tube(hoop, bar, origin=origin, across=across, up=up, segments=12))
     return parts
 
 
@@ -85,23 +60,15 @@ def mug(rng: Generator) -> list[Part]:
     style = pick(rng, ("straight", "curved", "curved", "round"))
     if style == "straight":
         edge = span(rng, 0.04, 0.2)
-        wall = join(arc((foot - edge, edge), edge, -90, 0, 5), line((foot, edge), (1.0, height), 2))
+        wall = join(
+            arc((foot - edge, edge), edge, -90, 0, 5), line((foot, edge), (1.0, height), strips=2)
+        )
     elif style == "curved":
-        wall = bezier(
-            (foot, 0.0),
-            (belly, 0.3 * height),
-            (span(rng, 0.8, 1.15), 0.7 * height),
-            (1.0, height),
-            10,
-        )
+        upper = (span(rng, 0.8, 1.15), 0.7 * height)
+        wall = bezier((foot, 0.0), (belly, 0.3 * height), upper, (1.0, height), 10)
     else:
-        wall = bezier(
-            (0.6 * foot, 0.0),
-            (span(rng, 0.9, 1.25), 0.0),
-            (belly, span(rng, 0.4, 0.6) * height),
-            (1.0, height),
-            10,
-        )
+        lower, upper = (span(rng, 0.9, 1.25), 0.0), (belly, span(rng, 0.4, 0.6) * height)
+        wall = bezier((0.6 * foot, 0.0), lower, upper, (1.0, height), 10)
     return [loft(hollow(wall, thickness)), _handle(rng, wall, thickness, height)]
 
 
@@ -124,9 +91,8 @@ def _handle(rng: Generator, wall: Curve, thickness: float, height: float) -> Par
         turn = (reach, top - span(rng, 0.25, 0.5) * (top - low))
         shoulder = (at_top + 0.6 * (reach - at_top), top + 0.04 * height)
         path = bezier((at_top, top), shoulder, (reach, top), turn, 7)
-        tail = bezier(
-            turn, (reach, 0.4 * turn[1] + 0.6 * low), (at_low + 0.3, low), (at_low, low), 7
-        )
+        bend = (reach, 0.4 * turn[1] + 0.6 * low)
+        tail = bezier(turn, bend, (at_low + 0.3, low), (at_low, low), 7)
         path = join(path, (tail[0][1:], tail[1][1:]))
-    bar = min(bar, 0.7 * tightest(path))
+    bar = limited(path, bar)
     return tube(path, half_width, bar, corner=span(rng, 0.6, 1.0) * min(bar, half_width))

@@ -15,17 +15,16 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.meshes.clean import clean_mesh
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.hull import hull_points
 from scenegen.objects.meshes.read import parse_mesh, read_bytes
+from scenegen.objects.solids import Array
 
-Array = NDArray[Any]
+_ARRAYS = {"vertices": np.float32, "faces": np.int32, "hull_points": np.float64}
 CLEANING_VERSION = 1  # raise it when a file would give other triangles or hull points than before
 
 
@@ -103,13 +102,9 @@ class MeshCache:
         try:
             entry.parent.mkdir(parents=True, exist_ok=True)
             with temporary.open("xb") as file:
-                np.savez(
-                    file,
-                    vertices=model.vertices,
-                    faces=model.faces,
-                    hull_points=model.hull_points,
-                    about=np.frombuffer(json.dumps(about).encode(), np.uint8),
-                )
+                arrays = {name: getattr(model, name) for name in _ARRAYS}
+                text = np.frombuffer(json.dumps(about).encode(), np.uint8)
+                np.savez(file, **arrays, about=text)
             os.replace(temporary, entry)
         except OSError as error:
             self._give_up(error)
@@ -153,23 +148,17 @@ def _read_entry(entry: Path) -> CachedModel | None:
     try:
         with entry.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             about = json.loads(arrays["about"].tobytes())
-            model = CachedModel(
-                arrays["vertices"],
-                arrays["faces"],
-                arrays["hull_points"],
-                about["mended"],
-                about["refusal"],
-            )
+            model = CachedModel(**{name: arrays[name] for name in _ARRAYS}, **about)
     except Exception:  # whatever the damage is, the entry is made again
         return None
     return model if _is_whole(model) else None
 
 
 def _is_whole(model: CachedModel) -> bool:
-    kinds = ((model.vertices, np.float32), (model.faces, np.int32), (model.hull_points, np.float64))
-    if any(a.ndim != 2 or a.shape[1] != 3 or a.dtype != kind for a, kind in kinds):
+    arrays = {name: getattr(model, name) for name in _ARRAYS}
+    if any(a.shape[1:] != (3,) or a.dtype != _ARRAYS[name] for name, a in arrays.items()):
         return False
     if model.refusal is not None:
         return isinstance(model.refusal, str)
-    some = all(len(a) for a, _ in kinds)
+    some = all(len(a) for a in arrays.values())
     return bool(some and model.faces.min() >= 0 and model.faces.max() < len(model.vertices))

@@ -25,7 +25,6 @@ class ModelCheck:
 
     Attributes:
         name: "class/id".
-        ok: whether it can be used.
         reason: why it cannot be used; empty if it can.
         faces: number of triangles after cleaning.
         mended: counts as in `CleanMesh.mended`.

@@ -9,12 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.meshes import limits
-from scenegen.objects.meshes.errors import BadMeshError
+from scenegen.objects.meshes.errors import BadMeshError, check_most
+from scenegen.objects.solids import Array
 
-Array = NDArray[Any]
 MOST_COORDINATE = 1e30  # faces with a larger coordinate, or one that is not finite, are dropped
 NARROWEST = 1e-6  # least height of a triangle over its longest edge, in bounding radii
 LOWEST = 1e-4  # least height of a model, in bounding radii
@@ -52,9 +51,7 @@ def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
     """
     vertices = np.asarray(vertices, np.float64).reshape(-1, 3)
     faces = np.asarray(faces, np.int64).reshape(-1, 3)
-    if len(faces) > limits.MOST_FACES:
-        expected = f"at most {limits.MOST_FACES}"
-        raise BadMeshError("faces", len(faces), expected, "simplify the model")
+    check_most("faces", len(faces), limits.MOST_FACES)
     if not len(faces):
         raise BadMeshError("faces", f"none, but {len(vertices)} vertices")
     found: dict[str, int] = {}

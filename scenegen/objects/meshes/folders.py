@@ -23,8 +23,7 @@ def open_models(
 ) -> ModelFolder:
     """List a folder that is either ShapeNet or a plain one; with up="z" it is always plain.
 
-    Raises:
-        MeshFolderError: as `open_shapenet` and `open_objects`.
+    Raises MeshFolderError as `open_shapenet` and `open_objects` do.
     """
     path = existing(root)
     if up == "y" and shapenet_version(path):
@@ -53,8 +52,8 @@ def open_objects(
         raise MeshFolderError("up", repr(up), "y or z")
     names = sorted(subfolders(root))
     if not names:
-        here = sum(1 for _ in mesh_files(root, 0))
-        found = f"no sub-folders{f' but {here} meshes' if here else ''}"
+        here = len(list(mesh_files(root, 0)))
+        found = f"no sub-folders and {here} meshes"
         hint = "put the meshes into sub-folders named after their classes"
         raise MeshFolderError(root, found, "one sub-folder per class", hint)
 

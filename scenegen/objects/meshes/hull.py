@@ -1,12 +1,10 @@
 """A convex body of few points around a mesh. Placement tests these bodies for overlap."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-Array = NDArray[Any]
+from scenegen.objects.solids import Array
+
 MOST_POINTS = 400  # of the body, as placement loops over all of them many times
 _DIRECTIONS = 300
 _MOST_GROWTH = 1.03

@@ -128,8 +128,7 @@ def existing(root: str | Path) -> Path:
 def subfolders(path: Path) -> Iterator[str]:
     """Yield the names of sub-folders, and of links to folders, except hidden ones.
 
-    Raises:
-        MeshFolderError: where the folder cannot be listed.
+    Raises MeshFolderError where the folder cannot be listed.
     """
     return (entry.name for entry in _entries(path) if _is_folder(entry, follow=True))
 
@@ -137,8 +136,7 @@ def subfolders(path: Path) -> Iterator[str]:
 def mesh_files(path: Path, depth: int) -> Iterator[Path]:
     """Yield the files with a mesh suffix, down to `depth` levels below, following no links.
 
-    Raises:
-        MeshFolderError: where a folder cannot be listed.
+    Raises MeshFolderError where a folder cannot be listed.
     """
     for entry in _entries(path):
         if _is_folder(entry, follow=False):
@@ -153,10 +151,11 @@ def _entries(path: Path) -> list[os.DirEntry[str]]:
         with os.scandir(path) as entries:
             return [entry for entry in entries if not entry.name.startswith(".")]
     except OSError as error:
-        hint = "give read permission, or move the folder away"
-        raise MeshFolderError(
-            path, f"an error ({error.strerror})", "a readable folder", hint
-        ) from error
+        found, hint = (
+            f"an error ({error.strerror})",
+            "give read permission, or move the folder away",
+        )
+        raise MeshFolderError(path, found, "a readable folder", hint) from error
 
 
 def _is_folder(entry: os.DirEntry[str], follow: bool) -> bool:

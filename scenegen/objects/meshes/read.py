@@ -7,10 +7,8 @@ broken lines, and triangulate polygons that are not convex correctly.
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.meshes import limits
 from scenegen.objects.meshes.errors import BadMeshError
@@ -19,8 +17,8 @@ from scenegen.objects.meshes.readers.obj import read_obj
 from scenegen.objects.meshes.readers.off import read_off
 from scenegen.objects.meshes.readers.ply import read_ply
 from scenegen.objects.meshes.readers.stl import read_stl
+from scenegen.objects.solids import Array
 
-Array = NDArray[Any]
 _READERS: dict[str, Callable[[bytes], tuple[Array, Array]]] = {
     ".glb": read_glb,
     ".obj": read_obj,

@@ -105,10 +105,7 @@ def synset_names(root: Path) -> dict[str, tuple[str, ...]]:
     """Return each synset's names, the one to be shown first.
 
     They come from `CLASS_NAMES` and then from `taxonomy.json`, a flat list or a tree, if there is
-    one.
-
-    Raises:
-        MeshFolderError: where the file exists but is not JSON.
+    one. Raises MeshFolderError where that file is not JSON.
     """
     names: dict[str, tuple[str, ...]] = {synset: (name,) for synset, name in CLASS_NAMES.items()}
     path = root / "taxonomy.json"
@@ -146,8 +143,7 @@ def _taxonomy_entries(tree: Any) -> Iterator[tuple[str, str]]:
 def official_splits(root: Path) -> dict[tuple[str, str], str] | None:
     """Return "train", "val" or "test" by (synset, model id) from `all.csv`; None without one.
 
-    Raises:
-        MeshFolderError: where the file cannot be read or lacks a column.
+    Raises MeshFolderError where the file cannot be read or lacks a column.
     """
     path, hint = root / "all.csv", "mend it or delete it"
     try:

@@ -3,17 +3,14 @@
 import threading
 from collections import OrderedDict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.meshes.cache import CachedModel, MeshCache
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFolder
 from scenegen.objects.solids import UnitShape
 
-Array = NDArray[Any]
 MOST_FACES_KEPT = 3_000_000  # of all shapes in memory; a face takes about 100 bytes
 
 
@@ -38,8 +35,7 @@ class MeshStore:
     def shape(self, name: str) -> UnitShape:
         """Return the model named "class/id" as a unit shape with flat faces, resting on its base.
 
-        Raises:
-            BadMeshError: there is no such model, or it cannot be used.
+        Raises BadMeshError where there is no such model or it cannot be used.
         """
         with self._lock:
             shape = self._shapes.get(name)
@@ -60,8 +56,7 @@ class MeshStore:
     def digest(self, name: str) -> str:
         """Return the first 16 hex digits of the content hash of a model's file.
 
-        Raises:
-            BadMeshError: as `shape`.
+        Raises BadMeshError as `shape` does.
         """
         if name not in self._digests:
             self._load(name)

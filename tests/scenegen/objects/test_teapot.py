@@ -27,19 +27,15 @@ def borders() -> dict[tuple[float, ...], list[tuple[int, int]]]:
     return found
 
 
-def test_every_border_is_shared_or_known_to_be_open() -> None:
-    alone = {users[0] for users in borders().values() if len(users) == 1}
+def test_every_border_is_shared_by_two_or_known_to_be_open_or_a_pole() -> None:
+    by_border = borders()
+    alone = {users[0] for users in by_border.values() if len(users) == 1}
     open_rings = {(i, 0) for i in RIM} | {(i, 1) for i in LID}
     assert alone == open_rings | TUBE_ENDS
-
-
-def test_poles_are_points_and_every_other_shared_border_has_two_sides() -> None:
-    shared = {key: users for key, users in borders().items() if len(users) != 1}
-    poles = {key: users for key, users in shared.items() if len(users) > 2}
+    poles = {key: users for key, users in by_border.items() if len(users) > 2}
     assert sorted(poles.values()) == [[(i, 0) for i in KNOB], [(i, 1) for i in BOTTOM]]
     points = sorted(tuple(np.unique(np.reshape(key, (4, 3)), axis=0).ravel()) for key in poles)
     assert points == [(0.0, 0.0, 0.0), (0.0, 3.15, 0.0)]
-    assert all(len(users) == 2 for key, users in shared.items() if key not in poles)
 
 
 def test_the_surface_is_smooth_across_all_borders() -> None:
@@ -55,13 +51,6 @@ def test_the_surface_is_smooth_across_all_borders() -> None:
     del by_place[(-2.0, 0.9, 0.0)]
     worst = min((np.array(some) @ np.transpose(some)).min() for some in by_place.values())
     assert worst > 0.9999
-
-
-@pytest.mark.parametrize("net", range(24, 28))
-def test_tubes_are_halves_that_meet_on_the_mirror_plane(net: int) -> None:
-    half, other = patches()[[net, net + 4]]
-    np.testing.assert_array_equal(half[:, [0, 3], 2], 0.0)
-    assert (half[:, 1:3, 2] * other[:, 1:3, 2] < 0).all()
 
 
 def test_it_is_its_own_mirror_image() -> None:

@@ -1,15 +1,12 @@
 """Join parts into a unit shape: centred, of bounding radius 1, standing upright."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.families.parts.surfaces import Part
 from scenegen.objects.solids import UnitShape
 
-Array = NDArray[Any]
 UPRIGHT = np.array([[0.0, -1.0, 0.0]])
 
 

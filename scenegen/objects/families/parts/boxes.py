@@ -1,5 +1,6 @@
 """Boxes with flat sides, which may be tapered or lean."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -30,6 +31,24 @@ def box(
         for sx, sz in ((-1, -1), (-1, 1), (1, 1), (1, -1)):
             corners.append((x + move_x + sx * a, y, z + move_z + sz * b))
     return corners
+
+
+def spoke(
+    x: float, angle: float, reach: float, half_width: float, levels: Sequence[Point]
+) -> list[Corner]:
+    """Return the eight corners of a bar that starts at (x, z) = (x, 0).
+
+    Args:
+        angle: its direction, in radians from the x axis towards z.
+        levels: the heights at its start and at its end, of the lower side and of the upper side.
+    """
+    c, s = math.cos(angle), math.sin(angle)
+    ends = ((0.0, -half_width), (0.0, half_width), (reach, half_width), (reach, -half_width))
+    return [
+        (x + along * c - across * s, far if along else near, along * s + across * c)
+        for near, far in levels
+        for along, across in ends
+    ]
 
 
 _SIDES = np.array(

@@ -1,14 +1,11 @@
 """Turn parts, shift them, or leave them out of the convex body that placement uses."""
 
 import math
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.families.parts.surfaces import Part
-
-Array = NDArray[Any]
+from scenegen.objects.solids import Array
 
 
 def moved(part: Part, offset: tuple[float, float, float], turn: Array | None = None) -> Part:

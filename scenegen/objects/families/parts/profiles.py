@@ -7,29 +7,23 @@ are (radius, height), and its outside is on the right of its direction.
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from scenegen.objects.solids import Array
+
 Curve = tuple[Array, Array]
 Point = tuple[float, float]
 
 
-def line(start: Point, end: Point, strips: int = 1) -> Curve:
-    """Return a straight piece, cut into `strips` equal parts."""
-    along = np.array([[end[0] - start[0], end[1] - start[1]]])
-    points = np.array([start]) + np.linspace(0.0, 1.0, strips + 1)[:, None] * along
-    points[-1] = end
-    return points, np.repeat(along, strips + 1, axis=0)
-
-
-def polyline(*corners: Point) -> Curve:
-    """Return straight pieces from corner to corner, with a crease at each corner."""
-    points = np.array(corners, float)
-    along = np.diff(points, axis=0)
-    return (np.repeat(points, 2, axis=0)[1:-1], np.repeat(along, 2, axis=0))
+def line(*corners: Point, strips: int = 1) -> Curve:
+    """Return straight pieces from corner to corner, each cut into `strips` equal parts."""
+    ends = np.array(corners, float)
+    share = np.tile(np.linspace(0.0, 1.0, strips + 1), len(ends) - 1)[:, None]
+    along = np.repeat(np.diff(ends, axis=0), strips + 1, axis=0)
+    points = np.repeat(ends[:-1], strips + 1, axis=0) + share * along
+    points[strips :: strips + 1] = ends[1:]
+    return points, along
 
 
 def arc(center: Point, radius: float | Point, low: float, high: float, segments: int = 8) -> Curve:
@@ -82,7 +76,7 @@ def _cubic(corners: Array, t: Array) -> Curve:
 
 
 def fillet(corners: Sequence[Point], radius: float, segments: int = 6) -> Curve:
-    """Return a polyline whose inner corners are rounded by arcs of this radius, which must fit."""
+    """Return a line whose inner corners are rounded by arcs of this radius, which must fit."""
     points, tangents = [], []
     start = np.array(corners[0], float)
     for i in range(1, len(corners) - 1):
@@ -141,10 +135,15 @@ def tightest(curve: Curve) -> float:
     return float((step / np.maximum(turn, 1e-9))[step > 1e-9].min())
 
 
+def limited(curve: Curve, thickness: float) -> float:
+    """Return a thickness, reduced where the curve bends too tightly for it."""
+    return min(thickness, 0.7 * tightest(curve))
+
+
 def wave(low: Point, high: Point, depth: float, count: int) -> Curve:
     """Return a straight piece with `count` cosine grooves, beginning and ending on a ridge."""
     t = np.linspace(0.0, 1.0, 5 * count + 1)
-    points, tangents = line(low, high, 5 * count)
+    points, tangents = line(low, high, strips=5 * count)
     phase = 2 * np.pi * count * t
     side = np.array([[low[1] - high[1], high[0] - low[0]]]) / math.dist(low, high)
     points = points + (depth * 0.5 * (1.0 - np.cos(phase)))[:, None] * side

@@ -6,14 +6,12 @@ Every part comes with a convex body that contains it, as the hull of horizontal 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.families.parts.profiles import Curve, Point, hull_rows
+from scenegen.objects.solids import Array
 
-Array = NDArray[Any]
 SEGMENTS = 40  # around an axis; a multiple of 4
 
 
@@ -41,7 +39,7 @@ def loft(
     corner: float = 1.0,
     base: tuple[float, float, float] = (0.0, 0.0, 0.0),
     at: Point | Sequence[Point] = (0.0, 0.0),
-    lean: Point | Sequence[Point] = (0.0, 0.0),
+    lean: Point | Sequence[Point] | Array = (0.0, 0.0),
     segments: int = SEGMENTS,
     closed: bool = False,
 ) -> Part:

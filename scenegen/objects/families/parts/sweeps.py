@@ -1,14 +1,10 @@
 """Tubes of constant cross-section along plane curves: handles, straps, lamp arms."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.families.parts.profiles import Curve, hull_rows
 from scenegen.objects.families.parts.surfaces import Part, outline, section, strips
 
-Array = NDArray[Any]
 Vector = tuple[float, float, float]
 _HALF = np.tan(np.pi / 8)  # an octagon around a unit circle has the corner (1, _HALF)
 

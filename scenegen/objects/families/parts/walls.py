@@ -4,15 +4,7 @@ import math
 
 import numpy as np
 
-from scenegen.objects.families.parts.profiles import (
-    Curve,
-    arc,
-    inset,
-    join,
-    polyline,
-    reverse,
-    tightest,
-)
+from scenegen.objects.families.parts.profiles import Curve, arc, inset, join, limited, line, reverse
 
 
 def hollow(wall: Curve, thickness: float) -> Curve:
@@ -43,21 +35,21 @@ def hollow(wall: Curve, thickness: float) -> Curve:
         tangents[first] = before + share * (after - before)
     inside = reverse((inner[first:], tangents[first:]))
     end = (float(inside[0][-1, 0]), float(inside[0][-1, 1]))
-    return join(wall, rim, inside, polyline(end, (0.0, end[1])))
+    return join(wall, rim, inside, line(end, (0.0, end[1])))
 
 
 def ring(wall: Curve, thickness: float) -> Curve:
     """Return a closed profile, for `closed` lofts: the wall and its inside, with flat edges."""
-    inner = reverse(inset(wall, min(thickness, 0.7 * tightest(wall))))
+    inner = reverse(inset(wall, limited(wall, thickness)))
     ends = [_corner(wall, -1), _corner(inner, 0), _corner(inner, -1), _corner(wall, 0)]
-    return join(wall, polyline(*ends[:2]), inner, polyline(*ends[2:]))
+    return join(wall, line(*ends[:2]), inner, line(*ends[2:]))
 
 
 def shell(wall: Curve, thickness: float) -> Curve:
     """Return a closed profile as `ring` does, for a dome whose wall ends on the axis."""
-    inner = reverse(inset(wall, min(thickness, 0.7 * tightest(wall))))
+    inner = reverse(inset(wall, limited(wall, thickness)))
     inner[0][0, 0] = 0.0
-    return join(wall, inner, polyline(_corner(inner, -1), _corner(wall, 0)))
+    return join(wall, inner, line(_corner(inner, -1), _corner(wall, 0)))
 
 
 def _corner(curve: Curve, row: int) -> tuple[float, float]:

@@ -11,13 +11,12 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.common.rotations import rotation_matrix
 from scenegen.objects.meshes import limits
-from scenegen.objects.meshes.errors import BadMeshError
+from scenegen.objects.meshes.errors import BadMeshError, check_most
+from scenegen.objects.solids import Array
 
-Array = NDArray[Any]
 _TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
@@ -44,9 +43,7 @@ def read_glb(data: bytes) -> tuple[Array, Array]:
                 known[mesh, i] = _primitive(document, buffers, one)
             points, triangles = known[mesh, i]
             count += max(1, len(triangles), len(points) // 3)  # even an empty one costs time
-            if count > limits.MOST_FACES:
-                expected = f"at most {limits.MOST_FACES}"
-                raise BadMeshError("faces", "more", expected, "simplify the model")
+            check_most("faces", count, limits.MOST_FACES)
             if not len(points):
                 continue
             vertices.append(points @ matrix[:3, :3].T + matrix[:3, 3])

@@ -5,14 +5,10 @@ cleaning drops and counts: one bad line does not lose a model.
 """
 
 from itertools import chain
-from typing import Any
-
-from numpy.typing import NDArray
 
 from scenegen.objects.meshes.readers.polygons import NOWHERE, Polygons
 from scenegen.objects.meshes.readers.text import FAR, PolygonList, lines
-
-Array = NDArray[Any]
+from scenegen.objects.solids import Array
 
 
 def read_obj(data: bytes) -> tuple[Array, Array]:

@@ -2,15 +2,11 @@
 
 import re
 from itertools import islice
-from typing import Any
-
-from numpy.typing import NDArray
 
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.readers.polygons import NOWHERE
 from scenegen.objects.meshes.readers.text import FAR, PolygonList, lines
-
-Array = NDArray[Any]
+from scenegen.objects.solids import Array
 
 
 def read_off(data: bytes) -> tuple[Array, Array]:

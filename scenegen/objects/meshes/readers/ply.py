@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.meshes import limits
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.readers.polygons import Polygons
+from scenegen.objects.solids import Array
 
-Array = NDArray[Any]
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
     "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",

@@ -1,16 +1,14 @@
 """Triangulation of polygons with any number of corners, convex or not."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import mapbox_earcut
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.meshes import limits
-from scenegen.objects.meshes.errors import BadMeshError
+from scenegen.objects.meshes.errors import BadMeshError, check_most
+from scenegen.objects.solids import Array
 
-Array = NDArray[Any]
 NOWHERE = -1  # stands for a vertex index that could not be read
 _SMALL_AREA = 1e-9  # of a polygon whose squared distances from the middle add up to 1
 
@@ -39,10 +37,7 @@ class Polygons:
             BadMeshError: there are more than MOST_FACES triangles, or polygons that would take too
                 long to cut.
         """
-        count = int(np.maximum(self.sizes - 2, 1).sum())
-        if count > limits.MOST_FACES:
-            expected = f"at most {limits.MOST_FACES}"
-            raise BadMeshError("faces", count, expected, "simplify the model")
+        check_most("faces", int(np.maximum(self.sizes - 2, 1).sum()), limits.MOST_FACES)
         start = np.cumsum(self.sizes) - self.sizes
         known = (self.corners >= 0) & (self.corners < len(self.vertices))
         corners = np.where(known, self.corners, NOWHERE)

@@ -1,15 +1,13 @@
 """STL files, binary and text. A file that starts with "solid" may be either."""
 
 from array import array
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.readers.text import lines, point
+from scenegen.objects.solids import Array
 
-Array = NDArray[Any]
 _HEADER_BYTES = 84
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from scenegen.objects.meshes import limits
-from scenegen.objects.meshes.errors import BadMeshError
+from scenegen.objects.meshes.errors import check_most
 from scenegen.objects.meshes.readers.polygons import Polygons
 
 FAR = 1 << 40  # larger than any vertex number; keeps huge numbers within 64 bits
@@ -54,17 +54,13 @@ class PolygonList:
     def add_vertex(self, words: list[bytes]) -> None:
         """Add a vertex from three words."""
         self._coordinates.extend(point(words))
-        if self.vertex_count > limits.MOST_CORNERS:
-            expected = f"at most {limits.MOST_CORNERS}"
-            raise BadMeshError("vertices", "more", expected, "simplify the model")
+        check_most("vertices", self.vertex_count, limits.MOST_CORNERS)
 
     def add_face(self, corners: list[int]) -> None:
         """Add a polygon from the indices of its vertices."""
         self._sizes.append(len(corners))
         self._corners.extend(corners)
-        if len(self._corners) > limits.MOST_CORNERS:
-            expected = f"at most {limits.MOST_CORNERS}"
-            raise BadMeshError("corners of faces", "more", expected, "simplify the model")
+        check_most("corners of faces", len(self._corners), limits.MOST_CORNERS)
 
     def polygons(self) -> Polygons:
         """Return all that was added."""

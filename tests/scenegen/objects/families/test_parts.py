@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from shape_checks import DOWN, check_body, unit_vectors
 
 from scenegen.objects.families.parts.assembly import assemble
 from scenegen.objects.families.parts.boxes import box, boxes
@@ -16,17 +16,16 @@ from scenegen.objects.families.parts.profiles import (
     hull_rows,
     inset,
     line,
-    polyline,
     tightest,
     wave,
 )
 from scenegen.objects.families.parts.surfaces import Part, loft
 from scenegen.objects.families.parts.sweeps import tube
 from scenegen.objects.families.parts.walls import hollow, ring, shell
+from scenegen.objects.solids import UnitShape
 
-Array = NDArray[np.float64]
 CURVES = {
-    "line": line((1.0, 0.0), (0.5, 2.0), 5),
+    "line": line((1.0, 0.0), (0.5, 2.0), strips=5),
     "arc": arc((1.0, 2.0), 0.5, -90, 60, 9),
     "ellipse": arc((0.0, 0.0), (2.0, 1.0), 170, 20, 12),
     "bezier": bezier((0.0, 0.0), (1.0, 0.0), (1.5, 1.0), (0.5, 2.0), 12),
@@ -38,17 +37,6 @@ CURVES = {
 def volume(part: Part) -> float:
     a, b, c = (part.triangles[:, i] for i in range(3))
     return float(np.einsum("fi,fi->", a, np.cross(b, c)) / 6)
-
-
-def reach(part: Part, directions: Array) -> Array:
-    """Return how far the part's convex body reaches along directions."""
-    disc = part.hull_discs[:, None] * np.hypot(directions[:, 0], directions[:, 2])
-    return np.asarray((part.hull_points @ directions.T + disc).max(axis=0))
-
-
-def spread(count: int = 200) -> Array:
-    d = np.random.default_rng(0).standard_normal((count, 3))
-    return np.asarray(d / np.linalg.norm(d, axis=1, keepdims=True))
 
 
 @pytest.mark.parametrize("name", CURVES)
@@ -75,7 +63,7 @@ def test_a_fillet_keeps_its_ends_and_its_radius() -> None:
 def test_insets_lie_on_the_left_and_meet_at_creases() -> None:
     points, _ = inset(arc((0.0, 0.0), 1.0, 0, 90, 8), 0.25)
     np.testing.assert_allclose(np.hypot(*points.T), 0.75, atol=1e-12)
-    points, _ = inset(polyline((1.0, 0.0), (1.0, 2.0), (0.0, 2.0)), 0.25)
+    points, _ = inset(line((1.0, 0.0), (1.0, 2.0), (0.0, 2.0)), 0.25)
     np.testing.assert_allclose(points, [(0.75, 0), (0.75, 1.75), (0.75, 1.75), (0, 1.75)])
 
 
@@ -97,15 +85,15 @@ def test_an_upright_line_keeps_its_ends_although_rounding_bends_it() -> None:
 def test_lofts_have_the_volume_of_their_formula() -> None:
     n = 40
     polygon = n / 2 * math.sin(2 * math.pi / n)  # the area of the disc's polygon
-    assert volume(loft(polyline((0.5, 0.0), (0.5, 2.0)))) == pytest.approx(0.5 * polygon)
-    cone = loft(polyline((1.0, 0.0), (0.0, 3.0)))
+    assert volume(loft(line((0.5, 0.0), (0.5, 2.0)))) == pytest.approx(0.5 * polygon)
+    cone = loft(line((1.0, 0.0), (0.0, 3.0)))
     assert volume(cone) == pytest.approx(polygon)
-    leaning = loft(polyline((1.0, 0.0), (0.0, 3.0)), lean=(0.5, -0.2))
+    leaning = loft(line((1.0, 0.0), (0.0, 3.0)), lean=(0.5, -0.2))
     assert volume(leaning) == pytest.approx(polygon)
-    block = loft(polyline((1.0, 0.0), (1.0, 2.0)), size=(1.0, 0.5), corner=0.0)
+    block = loft(line((1.0, 0.0), (1.0, 2.0)), size=(1.0, 0.5), corner=0.0)
     assert volume(block) == pytest.approx(2 * 1 * 2)
     assert len(block.triangles) == 4 * 2 + 2 * 4
-    rounded = loft(polyline((1.0, 0.0), (1.0, 2.0)), size=(1.0, 0.5), corner=0.2)
+    rounded = loft(line((1.0, 0.0), (1.0, 2.0)), size=(1.0, 0.5), corner=0.2)
     assert volume(rounded) == pytest.approx(2 * (2.0 - (4 - polygon) * 0.04))
     four = loft(line((0.1, 0.0), (0.1, 1.0)), at=[(1, 1), (1, -1), (-1, 1), (-1, -1)])
     assert volume(four) == pytest.approx(4 * 0.01 * polygon)
@@ -149,13 +137,10 @@ def test_bodies_hold_their_parts_closely() -> None:
         "turned": moved(loft(line((0.4, 0.0), (0.2, 1.0))), (1.0, 2.0, 3.0), turn_about_x(0.7)),
         "box": boxes([box((0, 0, 0), (1, 2, 3), (0.5, 0.0), (0.5, 1.0))]),
     }
-    directions = spread()
     for name, part in parts.items():
-        excess = reach(part, directions) - (part.triangles.reshape(-1, 3) @ directions.T).max(
-            axis=0
-        )
-        assert excess.min() > -1e-12, name
-        assert excess.max() < 0.02, name
+        fields = part.triangles, part.normals, part.hull_points, part.hull_discs
+        shape = UnitShape(name, *fields, 0.0, DOWN)
+        check_body(shape, part.triangles, 0.02, unit_vectors(200))
 
 
 def test_boxes_are_flat_and_moves_are_rigid() -> None:
@@ -181,9 +166,8 @@ def test_walls_are_as_thick_as_asked() -> None:
 
 
 def test_assembled_parts_are_centred_and_scaled() -> None:
-    shape = assemble(
-        "pair", [boxes([box((0, 0, 0), (6, 2, 3))]), boxes([box((0, 1, 0), (1, 4, 1))])]
-    )
+    pair = [boxes([box((0, 0, 0), (6, 2, 3))]), boxes([box((0, 1, 0), (1, 4, 1))])]
+    shape = assemble("pair", pair)
     low, high = shape.triangles.min(axis=(0, 1)), shape.triangles.max(axis=(0, 1))
     np.testing.assert_allclose(low + high, 0.0, atol=1e-12)
     np.testing.assert_allclose((high - low) / (high - low)[0], [1.0, 4 / 6, 0.5])

@@ -44,17 +44,15 @@ def test_glb_with_transforms_against_trimesh() -> None:
         matrix[:3, :3] *= rng.uniform(0.5, 2) * (-1) ** i
         matrix[:3, 3] = rng.uniform(-4, 4, 3)
         name = ("ball", "box")[i % 2]
-        scene.add_geometry(
-            parts[name], f"{name}{i}", f"{name}{i}", parent_node_name=parent, transform=matrix
-        )
-        parent = f"{name}{i}" if i % 2 else parent
+        node = f"{name}{i}"
+        scene.add_geometry(parts[name], node, node, parent_node_name=parent, transform=matrix)
+        parent = node if i % 2 else parent
     expected = scene.to_mesh()
     vertices, faces = parse_mesh(scene.export(file_type="glb"), ".glb")
     assert len(faces) == len(expected.faces)
-    order = [np.lexsort(t.mean(axis=1).round(3).T) for t in (vertices[faces], expected.triangles)]
-    np.testing.assert_allclose(
-        vertices[faces][order[0]].mean(axis=1), expected.triangles[order[1]].mean(axis=1), atol=1e-4
-    )
+    middles = [t.mean(axis=1) for t in (vertices[faces], expected.triangles)]
+    ours, theirs = (some[np.lexsort(some.round(3).T)] for some in middles)
+    np.testing.assert_allclose(ours, theirs, atol=1e-4)
 
 
 def test_glb_by_hand() -> None:

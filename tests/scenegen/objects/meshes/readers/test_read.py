@@ -1,18 +1,17 @@
 """The readers against trimesh's readers and against meshes written by hand."""
 
 import struct
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 import pytest
 from known_meshes import OBJ, PYRAMID, SPHERE
-from numpy.typing import NDArray
 
 from scenegen.objects.meshes.clean import clean_mesh
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.read import parse_mesh, read_bytes
-
-Array = NDArray[Any]
+from scenegen.objects.solids import Array
 
 
 def faces_of(vertices: Array, faces: Array) -> set[tuple[tuple[float, ...], ...]]:
@@ -24,12 +23,9 @@ def pyramid_of(vertices: Array, faces: Array) -> None:
     """Check that a mesh is the pyramid, its base cut along either diagonal."""
     points = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1)], float)
     found = faces_of(vertices, faces)
-    sides = [face for face in sorted(PYRAMID) if len(face) == 3]
-    assert faces_of(points, np.array(sides)) <= found
-    assert found - faces_of(points, np.array(sides)) in (
-        faces_of(points, np.array([(0, 1, 2), (0, 2, 3)])),
-        faces_of(points, np.array([(0, 1, 3), (1, 2, 3)])),
-    )
+    sides = faces_of(points, np.array([face for face in PYRAMID if len(face) == 3]))
+    bases = [[(0, 1, 2), (0, 2, 3)], [(0, 1, 3), (1, 2, 3)]]
+    assert found in [sides | faces_of(points, np.array(base)) for base in bases]
     assert len(faces) == 6
 
 
@@ -39,20 +35,12 @@ def area_of(vertices: Array, faces: Array) -> float:
 
 
 @pytest.mark.parametrize("text", OBJ.values(), ids=OBJ.keys())
-@pytest.mark.parametrize(
-    "encode",
-    [
-        lambda text: text.encode(),
-        lambda text: text.replace("\n", "\r\n").encode(),
-        lambda text: text.replace("\n", "\r").encode(),
-        lambda text: text.encode("utf-8-sig"),
-        lambda text: text.encode("utf-16"),
-        lambda text: b"o caf\xe9 \xff\xfe\n" + text.encode() + b"\ng \xf0\x9f\x8d\xb5\x00\n",
-    ],
-    ids=["unix", "windows", "old mac", "byte order mark", "utf-16", "latin-1"],
-)
-def test_obj_in_many_hands(text: str, encode: Any) -> None:
-    pyramid_of(*parse_mesh(encode(text), ".obj"))
+def test_obj_in_many_hands(text: str) -> None:
+    """Line ends of Unix, Windows and old Macs, byte order marks, UTF-16 and Latin-1."""
+    ends = [text.replace("\n", end).encode() for end in ("\n", "\r\n", "\r")]
+    latin = b"o caf\xe9 \xff\xfe\n" + text.encode() + b"\ng \xf0\x9f\x8d\xb5\x00\n"
+    for data in (*ends, text.encode("utf-8-sig"), text.encode("utf-16"), latin):
+        pyramid_of(*parse_mesh(data, ".obj"))
 
 
 def test_broken_lines_do_not_lose_a_model() -> None:
@@ -72,6 +60,12 @@ def test_broken_lines_do_not_lose_a_model() -> None:
     assert mesh.mended["faces_not_finite"] == 1
 
 
+def obj_of(points: Iterable[Iterable[float]], face: Iterable[object]) -> bytes:
+    """Return an OBJ file of one polygon."""
+    lines = ["v " + " ".join(map(repr, map(float, point))) for point in points]
+    return "\n".join([*lines, "f " + " ".join(map(str, face))]).encode()
+
+
 def star(corners: int, tilt: float = 0.0) -> Array:
     """A star with `corners` / 2 deep points, tilted about x."""
     angle = np.arange(corners) * 2 * np.pi / corners
@@ -87,13 +81,10 @@ def area_inside(polygon: Array) -> float:
 
 def covers_once(polygon: Array, vertices: Array, faces: Array) -> None:
     """Check that triangles tile a simple flat polygon: its area, in its plane, none twice."""
-    cross = np.cross(
-        vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]]
-    )
-    assert area_of(vertices, faces) == pytest.approx(area_inside(polygon), rel=1e-9)
-    assert float(np.linalg.norm(cross.sum(axis=0)) / 2) == pytest.approx(
-        area_inside(polygon), rel=1e-9
-    )
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    turned = np.linalg.norm(np.cross(b - a, c - a).sum(axis=0)) / 2
+    for area in (area_of(vertices, faces), turned):
+        assert area == pytest.approx(area_inside(polygon), rel=1e-9)
 
 
 @pytest.mark.parametrize("corners", [16, 272, 2000])
@@ -102,9 +93,8 @@ def covers_once(polygon: Array, vertices: Array, faces: Array) -> None:
 def test_huge_faces_that_are_not_convex(corners: int, tilt: float, turn: int) -> None:
     """The face is one line of thousands of characters; a fan would cover more than the polygon."""
     polygon = star(corners, tilt)[::turn]
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in polygon.tolist()]
-    lines.append("f " + " ".join(f"{i + 1}/{i + 1}/{i + 1}" for i in range(corners)))
-    vertices, faces = parse_mesh("\n".join(lines).encode(), ".obj")
+    face = [f"{i + 1}/{i + 1}/{i + 1}" for i in range(corners)]
+    vertices, faces = parse_mesh(obj_of(polygon.tolist(), face), ".obj")
     assert len(faces) == corners - 2
     covers_once(polygon, vertices, faces)
     fan = np.stack([0 * faces[:, 0], np.arange(1, corners - 1), np.arange(2, corners)], axis=1)
@@ -115,16 +105,14 @@ def test_huge_faces_that_are_not_convex(corners: int, tilt: float, turn: int) ->
 @pytest.mark.parametrize("turn", [1, -1])
 def test_a_dart_is_cut_at_its_notch(first: int, turn: int) -> None:
     dart = np.roll([(0, 0, 0), (2, 1, 0), (0, 2, 0), (0.5, 1, 0)], first, axis=0)[::turn]
-    text = "".join(f"v {x} {y} {z}\n" for x, y, z in dart) + "f 1 2 3 4\n"
-    covers_once(dart, *parse_mesh(text.encode(), ".obj"))
+    covers_once(dart, *parse_mesh(obj_of(dart, range(1, 5)), ".obj"))
 
 
 def test_a_hole_joined_to_the_rim_by_a_slit_stays_open() -> None:
     rim = [(0, 0, 0), (4, 0, 0), (4, 4, 0), (0, 4, 0)]
     hole = [(1, 1, 0), (1, 3, 0), (3, 3, 0), (3, 1, 0)]
-    text = "".join(f"v {x} {y} {z}\n" for x, y, z in rim + hole) + "f 1 2 3 4 1 5 6 7 8 5\n"
-    vertices, faces = parse_mesh(text.encode(), ".obj")
-    assert area_of(vertices, faces) == pytest.approx(12.0)
+    read = parse_mesh(obj_of(rim + hole, (1, 2, 3, 4, 1, 5, 6, 7, 8, 5)), ".obj")
+    assert area_of(*read) == pytest.approx(12.0)
 
 
 def test_sides_that_cross_and_sides_on_a_line() -> None:
@@ -133,9 +121,7 @@ def test_sides_that_cross_and_sides_on_a_line() -> None:
     bow = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0), (1, 1, 0), (2, 1, 0)]
     line = [(0, 0, 0), (3, 3, 3), (1, 1, 1), (2, 2, 2), (2.5, 2.5, 2.5)]
     for points, area in ((eight, 1.0), (bow, 0.1), (line, 0.0)):
-        text = "".join(f"v {x} {y} {z}\n" for x, y, z in points)
-        text += "f " + " ".join(str(i + 1) for i in range(len(points)))
-        vertices, faces = parse_mesh(text.encode(), ".obj")
+        vertices, faces = parse_mesh(obj_of(points, range(1, len(points) + 1)), ".obj")
         assert len(faces)
         assert area_of(vertices, faces) >= area
         a, b, c = vertices[faces].transpose(1, 0, 2)
@@ -171,10 +157,8 @@ def test_binary_ply_with_all_sorts_of_columns(order: str, name: str, columns: st
     long = {"<": "binary_little_endian", ">": "binary_big_endian"}[order]
     head = PLY_HEAD.format(long) + f"property {kind} x\nproperty uchar red\nproperty {kind} y\n"
     head += f"property {kind} z\nelement other 2\nproperty list uchar short what\n"
-    head += (
-        f"element face 5\nproperty list uint8 int32 {name}\nproperty list uchar float texcoord\n"
-    )
-    head += "property uchar flags\nend_header\n"
+    head += f"element face 5\nproperty list uint8 int32 {name}\n"
+    head += "property list uchar float texcoord\nproperty uchar flags\nend_header\n"
     body = b"".join(struct.pack(f"{order}{columns}B2{columns}", x, 7, y, z) for x, y, z in POINTS)
     body += struct.pack(f"{order}BhBhh", 1, 5, 2, 6, 7)
     for face in sorted(PYRAMID):

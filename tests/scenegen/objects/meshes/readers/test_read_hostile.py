@@ -64,18 +64,13 @@ def test_small_files_that_claim_to_be_large_or_are_something_else(
     assert found in refusal(data, suffix).found
 
 
-@pytest.mark.parametrize(
-    ("name", "found"),
-    [
-        ("empty.obj", "nothing in it"), ("blank.obj", "nothing in it"),
-        ("folder.obj", "something else"), ("pipe.obj", "something else"),
-        ("none.obj", "nothing"), ("loop.obj", "nothing"), ("gone.obj", "nothing"),
-        ("big.obj", "more bytes"),
-    ],
-)  # fmt: skip
-def test_files_that_are_no_files(
-    tmp_path: Path, name: str, found: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_files_that_are_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = {
+        "nothing in it": "empty blank",
+        "something else": "folder pipe",
+        "nothing": "none loop gone",
+        "more bytes": "big",
+    }
     (tmp_path / "empty.obj").touch()
     (tmp_path / "blank.obj").write_bytes(b" \r\n\0\0\n" * 8)
     (tmp_path / "folder.obj").mkdir()
@@ -84,20 +79,20 @@ def test_files_that_are_no_files(
     os.mkfifo(tmp_path / "pipe.obj")  # reading it would never end
     (tmp_path / "big.obj").write_text(OBJ["plain"])
     monkeypatch.setattr(limits, "MOST_BYTES", 50)
-    with pytest.raises(BadMeshError) as refused:
-        read_bytes(tmp_path / name)
-    assert (refused.value.where, refused.value.found) == ("file", found)
+    for found, name in ((found, name) for found, some in names.items() for name in some.split()):
+        with pytest.raises(BadMeshError) as refused:
+            read_bytes(tmp_path / f"{name}.obj")
+        assert (refused.value.where, refused.value.found) == ("file", found), name
 
 
+BOX = trimesh.creation.box()
 SEEDS = [
     (OBJ["textured"].encode(), ".obj"),
     (SPHERE.export(file_type="ply")[:4000], ".ply"),
-    (trimesh.creation.box().export(file_type="ply", encoding="ascii"), ".ply"),
-    (trimesh.creation.box().export(file_type="ply"), ".ply"),
-    (trimesh.creation.box().export(file_type="off").encode(), ".off"),
-    (trimesh.creation.box().export(file_type="stl"), ".stl"),
-    (trimesh.creation.box().export(file_type="stl_ascii").encode(), ".stl"),
-    (trimesh.creation.box().export(file_type="glb"), ".glb"),
+    (BOX.export(file_type="ply", encoding="ascii"), ".ply"),
+    (BOX.export(file_type="stl_ascii").encode(), ".stl"),
+    (BOX.export(file_type="off").encode(), ".off"),
+    *((BOX.export(file_type=kind), f".{kind}") for kind in ("ply", "stl", "glb")),
 ]
 
 
