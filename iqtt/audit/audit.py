@@ -36,7 +36,6 @@ class AuditedTable:
     """A table of questions that was audited; split and fingerprint are None for a released file.
 
     Attributes:
-        questions: number of questions.
         answers: where the right answers come from: "stored", "from the cubes", or "unknown".
         probed: number of questions that probes looked at.
     """
@@ -130,11 +129,7 @@ def audit(
 
 
 def _spread(counts: Sequence[int], most: int) -> list[Array]:
-    """Choose rows of each table, evenly: `most` rows in all, or all there are.
-
-    Args:
-        counts: number of rows of each table.
-    """
+    """Choose rows of tables with `counts` rows, evenly: `most` rows in all, or all there are."""
     total = sum(counts)
     rows = np.unique(np.linspace(0, max(total - 1, 0), min(most, total)).astype(np.int64))
     starts = np.cumsum([0, *counts])

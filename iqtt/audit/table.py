@@ -18,13 +18,8 @@ from scenegen.common.records import check
 Array = NDArray[Any]
 CHUNK_PIXELS = 2**20  # pixels of questions in memory at once
 TRUTH = (
-    "cubes",
-    "shape_id",
-    "class_id",
-    "world_from_shape",
-    "distractor_kind",
-    "angle_degrees",
-    "visible_pixels",
+    *("cubes", "shape_id", "class_id", "world_from_shape"),
+    *("distractor_kind", "angle_degrees", "visible_pixels"),
 )
 
 
@@ -37,7 +32,6 @@ class Source:
         part: "labeled" or "unlabeled" of a training file, else "".
         answers: the file with the answers, if it is another one.
         answered: whether the right answers are known, from answers or from shapes.
-        count: number of questions.
     """
 
     name: str

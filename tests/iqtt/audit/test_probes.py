@@ -66,10 +66,6 @@ def test_numbers_are_those_of_the_binomial_test() -> None:
     assert (found.low, found.high) == pytest.approx((middle - half, middle + half))
 
 
-def test_the_same_questions_give_the_same_numbers() -> None:
-    assert run_probes(fair(3, 60)) == run_probes(fair(3, 60))
-
-
 @pytest.mark.usefixtures("quick")
 def test_fair_questions_are_seldom_accused() -> None:
     accused = [bool(shortcuts(fair(seed, 150))) for seed in range(60)]
