@@ -5,106 +5,75 @@ Heavy modules are imported inside the commands, so that `--help` is fast.
 
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
-from scenegen.common.command_line import (
-    COMPRESSION,
-    DEVICE,
-    EXAMPLE,
-    IMAGE_DTYPE,
-    OVERWRITE,
-    SEED,
-    SIZE,
-    Color,
-    Items,
-    Range,
-    progress_bar,
-)
+from scenegen.common import command_line
+from scenegen.common.command_line import EXAMPLE, Color, Items, Range, progress_bar
 
 SHOWN = 8  # questions that `show` draws by default
+option = partial(click.option, show_default=True)
 
 
 @click.command(
     "make-split", epilog=f"{EXAMPLE}iqtt make-split --out iqtt-split --preset small --seed 1"
 )
-@click.option("--out", default="iqtt-split", show_default=True, help="Folder for the four files.")
-@click.option(
+@option("--out", default="iqtt-split", help="Folder for the four files.")
+@option(
     "--preset",
     type=click.Choice(["small", "v2", "paper"]),
     default="small",
-    show_default=True,
     help="Numbers of questions. small: 1,000 for training (100 with answers), 200 for validation,"
     " 200 for testing; v2: as in the released data; paper: as in the paper.",
 )
-@click.option("--train", type=int, help="Number of training questions, with and without answers.")
-@click.option(
+@option("--train", type=int, help="Number of training questions, with and without answers.")
+@option(
     "--labeled",
     type=int,
     help="How many training questions have answers [default: the preset's share].",
 )
-@click.option("--val", type=int, help="Number of validation questions.")
-@click.option(
-    "--test", type=int, help="Number of test questions; their answers are in a separate file."
-)
-@SEED
-@click.option(
-    "--cubes",
-    type=Range(int),
-    default="5-11",
-    show_default=True,
-    help="Number of cubes of a shape.",
-)
-@click.option(
+@option("--val", type=int, help="Number of validation questions.")
+@option("--test", type=int, help="Number of test questions; their answers are in a separate file.")
+@command_line.SEED
+@option("--cubes", type=Range(int), default="5-11", help="Number of cubes of a shape.")
+@option(
     "--shapes",
     type=click.Choice(["chain", "tree"]),
     default="chain",
-    show_default=True,
     help="chain: self-avoiding chains of cubes; tree: shapes that may branch.",
 )
-@click.option(
+@option(
     "--distractors",
     type=click.Choice(["other", "near", "mirror", "mixed"]),
     default="mixed",
-    show_default=True,
     help="Wrong answers. other: different shapes; near: one cube moved; mirror: a mirror image and"
     " a near shape; mixed: each question one of the three.",
 )
-@click.option(
+@option(
     "--min-angle",
     "min_angle_degrees",
     type=float,
     default=30,
-    show_default=True,
     help="Smallest rotation between the reference's view and an answer's, in degrees.",
 )
-@click.option(
+@option(
     "--min-cube-pixels",
     type=int,
     help="Smallest number of pixels that show a cube [default: 12 at 128x128 and radius 3.5].",
 )
-@click.option(
-    "--max-radius", type=float, help="Largest radius of a shape, in cube edges [default: 3.5]."
-)
-@SIZE
-@click.option(
-    "--background", type=Color(), default="white", show_default=True, help="Background colour."
-)
-@click.option("--lights", type=Range(int), default="2", show_default=True, help="Number of lights.")
-@IMAGE_DTYPE
-@click.option("--with-depth", is_flag=True, help="Store planar depth as well.")
-@COMPRESSION
-@click.option(
-    "--batch",
-    type=click.IntRange(1),
-    default=64,
-    show_default=True,
-    help="Questions rendered at once.",
-)
-@DEVICE
-@OVERWRITE
+@option("--max-radius", type=float, help="Largest radius of a shape, in cube edges [default: 3.5].")
+@command_line.SIZE
+@option("--background", type=Color(), default="white", help="Background colour.")
+@option("--lights", type=Range(int), default="2", help="Number of lights.")
+@command_line.IMAGE_DTYPE
+@option("--with-depth", is_flag=True, help="Store planar depth as well.")
+@command_line.COMPRESSION
+@option("--batch", type=click.IntRange(1), default=64, help="Questions rendered at once.")
+@command_line.DEVICE
+@command_line.OVERWRITE
 def make_split(
     out: str,
     preset: str,
@@ -154,17 +123,10 @@ def make_split(
     epilog=f"{EXAMPLE}iqtt show iqtt-split/iqtt-val.h5 --items 0-3 --answers --out questions.png"
 )
 @click.argument("file")
-@click.option(
-    "--out",
-    default="questions.png",
-    show_default=True,
-    help="Picture to write; its suffix names the format.",
-)
-@click.option("--items", type=Items(), help="Questions to show [default: the first 8].")
-@click.option(
-    "--part", type=click.Choice(["labeled", "unlabeled"]), help="Part of a training file."
-)
-@click.option(
+@option("--out", default="questions.png", help="Picture to write; its suffix names the format.")
+@option("--items", type=Items(), help="Questions to show [default: the first 8].")
+@option("--part", type=click.Choice(["labeled", "unlabeled"]), help="Part of a training file.")
+@option(
     "--answers", is_flag=True, help="Mark the right answers, and name the kinds of the wrong ones."
 )
 def show(file: str, out: str, items: list[int] | None, part: str | None, answers: bool) -> None:
@@ -195,16 +157,15 @@ def info(file: str) -> None:
 
 @click.command(epilog=f"{EXAMPLE}iqtt audit iqtt-split --json audit.json")
 @click.argument("splits", nargs=-1, required=True, metavar="SPLIT...")
-@click.option("--json", "json_path", help="Write all numbers to this JSON file.")
-@click.option("--markdown", is_flag=True, help="Print the tables as Markdown.")
-@click.option(
+@option("--json", "json_path", help="Write all numbers to this JSON file.")
+@option("--markdown", is_flag=True, help="Print the tables as Markdown.")
+@option(
     "--probed",
     type=click.IntRange(0),
     default=20_000,
-    show_default=True,
     help="Largest number of questions that probes try to guess.",
 )
-@OVERWRITE
+@command_line.OVERWRITE
 @click.pass_context
 def audit(
     ctx: click.Context,

@@ -5,7 +5,7 @@ of it.
 """
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from iqtt.audit import proofs, shape_proofs, view_proofs
 from iqtt.audit.probes import Evidence, Probe, run_probes
 from iqtt.audit.proofs import Proof
 from iqtt.audit.shape_proofs import Shapes
-from iqtt.audit.statistics import SHAPE_STATISTICS, Statistics, shape_statistics
+from iqtt.audit.statistics import SHAPE_STATISTICS, shape_statistics
 from iqtt.audit.table import AuditTable, find_tables, read_table
 from scenegen.common.row_file import writer_name
 
@@ -36,7 +36,6 @@ class AuditedTable:
     """A table of questions that was audited; split and fingerprint are None for a released file.
 
     Attributes:
-        questions: number of questions.
         answers: where the right answers come from: "stored", "from the cubes", or "unknown".
         probed: number of questions that probes looked at.
     """
@@ -119,20 +118,18 @@ def audit(
     tables = [
         read_table(source, rows, progress) for source, rows in zip(sources, measured, strict=True)
     ]
-    told = [table for table in tables if table.truth]
-    shapes = dict(zip((t.name for t in told), shape_proofs.compare_shapes(told), strict=True))
-    right = [_right(table, shapes.get(table.name)) for table in tables]
-    found = _prove(tables, told, list(shapes.values()), right)
+    shapes = shape_proofs.compare_shapes(tables)
+    right = [
+        one.place if table.answers is None else table.answers.astype(np.int64)
+        for table, one in zip(tables, shapes, strict=True)
+    ]
+    found = _prove(tables, shapes, right)
     probes = run_probes(_evidence(tables, shapes, right))
     return Audit(tuple(map(_audited, tables, right)), tuple(found), probes)
 
 
 def _spread(counts: Sequence[int], most: int) -> list[Array]:
-    """Choose rows of each table, evenly: `most` rows in all, or all there are.
-
-    Args:
-        counts: number of rows of each table.
-    """
+    """Choose rows of tables with `counts` rows, evenly: `most` rows in all, or all there are."""
     total = sum(counts)
     rows = np.unique(np.linspace(0, max(total - 1, 0), min(most, total)).astype(np.int64))
     starts = np.cumsum([0, *counts])
@@ -142,19 +139,10 @@ def _spread(counts: Sequence[int], most: int) -> list[Array]:
     ]
 
 
-def _right(table: AuditTable, shapes: Shapes | None) -> Array:
-    """Return the positions of the right answers, as stored or as found, (Q,); -1 if unknown."""
-    if table.answers is not None:
-        return table.answers.astype(np.int64)
-    return np.full(len(table), -1) if shapes is None else shapes.place
-
-
 def _prove(
-    tables: Sequence[AuditTable],
-    told: Sequence[AuditTable],
-    shapes: Sequence[Shapes],
-    right: Sequence[Array],
+    tables: Sequence[AuditTable], shapes: Sequence[Shapes], right: Sequence[Array]
 ) -> list[Proof]:
+    """Run all proofs; right: positions of the right answers, (Q,) each, -1 where unknown."""
     found = [
         proofs.balance(tables, right),
         proofs.values(tables),
@@ -162,6 +150,8 @@ def _prove(
         proofs.distinct_images(tables),
         proofs.distinct_questions(tables),
     ]
+    told = [table for table in tables if table.truth]
+    shapes = [one for table, one in zip(tables, shapes, strict=True) if table.truth]
     if not told:
         return [Proof(name, "skipped", "no shape descriptions") for name in _BY_CUBES] + found
     sample = _spread([len(table) for table in told], CAST)
@@ -182,53 +172,44 @@ def _prove(
 
 
 def _evidence(
-    tables: Sequence[AuditTable], shapes: Mapping[str, Shapes], right: Sequence[Array]
+    tables: Sequence[AuditTable], shapes: Sequence[Shapes], right: Sequence[Array]
 ) -> Evidence:
     """Gather the questions that were measured and whose right answer is known."""
-    told = [table.truth["cubes"] for table in tables if table.name in shapes]
-    classes = [one.class_name for one in shapes.values()]
-    whole = [one.whole for one in shapes.values()]
-    numbers = shape_statistics(told, classes, whole) if told else []
-    described = dict(zip(shapes, numbers, strict=True))
-    cubes, mirrored, places, kept = [], [], [], []
-    for table, place in zip(tables, right, strict=True):
-        rows = table.measured[place[table.measured] >= 0]
-        kept.append(np.isin(table.measured, rows))
-        places.append(place[rows])
-        unknown = np.full((len(table), 3, len(SHAPE_STATISTICS)), np.nan)
-        cubes.append(described.get(table.name, unknown)[rows])
-        mirrored.append(_mirror_images(shapes.get(table.name), place, rows))
-    joined = np.concatenate(cubes)
+    numbers = shape_statistics(
+        [table.cubes for table in tables],
+        [one.class_name for one in shapes],
+        [one.whole for one in shapes],
+    )
+    parts = []
+    for table, one, place, described in zip(tables, shapes, right, numbers, strict=True):
+        known = place[table.measured] >= 0
+        rows = table.measured[known]
+        mirrored = _mirror_images(one, place, rows)
+        parts.append((table.statistics[known], place[rows], mirrored, described[rows]))
+    statistics, places, mirrored, cubes = map(np.concatenate, zip(*parts, strict=True))
     return Evidence(
-        statistics=Statistics.join([t.statistics for t in tables]).take(np.concatenate(kept)),
-        right=np.concatenate(places),
-        mirrored=np.concatenate(mirrored),
-        cubes={name: joined[:, :, i] for i, name in enumerate(SHAPE_STATISTICS)},
+        statistics=statistics,
+        right=places,
+        mirrored=mirrored,
+        cubes={name: cubes[:, :, i] for i, name in enumerate(SHAPE_STATISTICS)},
         places=[place[place >= 0] for place in right],
     )
 
 
-def _mirror_images(shapes: Shapes | None, place: Array, rows: Array) -> Array:
+def _mirror_images(shapes: Shapes, place: Array, rows: Array) -> Array:
     """Return for some rows which answer is the right one's mirror image; -1 for none."""
-    if shapes is None:
-        return np.full(len(rows), -1)
+    classes, names = shapes.class_name[rows], shapes.shape_name[rows]
     right = 1 + place[rows, None]
-    same_class = shapes.class_name[rows] == np.take_along_axis(
-        shapes.class_name[rows], right, axis=1
-    )
-    mirror = same_class & (
-        shapes.shape_name[rows] != np.take_along_axis(shapes.shape_name[rows], right, 1)
-    )
+    mirror = classes == np.take_along_axis(classes, right, axis=1)
+    mirror &= names != np.take_along_axis(names, right, axis=1)
     mirror &= shapes.whole[rows, None]
     return np.where(mirror[:, 1:].any(axis=1), mirror[:, 1:].argmax(axis=1), -1)
 
 
 def _audited(table: AuditTable, right: Array) -> AuditedTable:
-    answers = (
-        "stored" if table.answers is not None else "from the cubes" if table.truth else "unknown"
-    )
+    answers = "from the cubes" if table.truth else "unknown"
+    if table.answers is not None:
+        answers = "stored"
     known = int(np.count_nonzero(right[table.measured] >= 0))
-    source = table.source
-    return AuditedTable(
-        table.name, str(source.path), table.split, table.fingerprint, len(table), answers, known
-    )
+    path, split, mark = str(table.source.path), table.split, table.fingerprint
+    return AuditedTable(table.name, path, split, mark, len(table), answers, known)

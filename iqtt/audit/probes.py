@@ -30,8 +30,6 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit.statistics import Statistics
-
 Array = NDArray[Any]
 WITHOUT, LIGHT, MIRRORED, OUTLINE = "without the reference", "light", "mirrored", "outline"
 FAULTS = (WITHOUT, LIGHT, MIRRORED)
@@ -53,6 +51,7 @@ _OUTLINE = {
     "moments": "silhouette's moments",
     "image_brightness": "image's brightness",
 }
+_SIZE, _NEARNESS = ("largest", "smallest"), ("nearest", "farthest")
 _SUMMARY = ("mean_color", "contrast", *_OUTLINE)
 
 
@@ -98,7 +97,7 @@ class Evidence:
     """What probes may look at, of N questions.
 
     Attributes:
-        statistics: statistics of the images.
+        statistics: `statistics.STATISTICS` of the images, (N,).
         right: which answer is right, (N,).
         mirrored: which answer is the right one's mirror image, (N,); -1 for none.
         cubes: numbers that describe the answers' shapes, (N, 3) each, by name; NaN where the file
@@ -106,7 +105,7 @@ class Evidence:
         places: positions of the right answers of whole tables, in their order, (Q,) each.
     """
 
-    statistics: Statistics
+    statistics: Array
     right: Array
     mirrored: Array
     cubes: dict[str, Array]
@@ -153,54 +152,53 @@ def _judged(probes: Sequence[Probe]) -> list[Probe]:
 def _by_rule(evidence: Evidence) -> Iterator[_Guess]:
     statistics, right = evidence.statistics, evidence.right
     for name, title in {**_LIGHT, **_OUTLINE}.items():
-        values, sees = getattr(statistics, name), LIGHT if name in _LIGHT else OUTLINE
+        values, sees = statistics[name], LIGHT if name in _LIGHT else OUTLINE
         if values.ndim == 2:
-            yield from _by_size(title, values[:, 1:], right)
+            yield from _by_cost(title, WITHOUT, _SIZE, -values[:, 1:], right)
         yield from _by_distance(title, sees, _distances(values), right)
-    yield from _by_distance("pixel distance", OUTLINE, statistics.pixel_distance, right)
+    yield from _by_distance("pixel distance", OUTLINE, statistics["pixel_distance"], right)
     for title, values in evidence.cubes.items():
         told = np.isfinite(values).all(axis=1)
-        yield from _by_size(title, values[told], right[told])
-        apart = _distances(values[told])
-        yield from _by_company(title, apart, right[told])
+        yield from _by_cost(title, WITHOUT, _SIZE, -values[told], right[told])
+        yield from _by_company(title, _distances(values[told]), right[told])
 
 
-def _by_size(title: str, values: Array, right: Array) -> Iterator[_Guess]:
-    yield (title, "largest", WITHOUT, _least(-values) == right)
-    yield (title, "smallest", WITHOUT, _least(values) == right)
+def _by_cost(
+    statistic: str, sees: str, rules: tuple[str, str], costs: Array, right: Array
+) -> Iterator[_Guess]:
+    """Guess, by two rules, the answer of least and that of most cost; costs: (N, K)."""
+    for rule, signed in zip(rules, (costs, -costs), strict=True):
+        yield (statistic, rule, sees, _least(signed) == right)
 
 
 def _by_company(title: str, apart: Array, right: Array) -> Iterator[_Guess]:
     """Guess by how far each answer is from the other two; apart: distances, (N, 3, 3)."""
-    far = apart.sum(axis=2)
-    yield (title, "most typical", WITHOUT, _least(far) == right)
-    yield (title, "odd one out", WITHOUT, _least(-far) == right)
+    rules = ("most typical", "odd one out")
+    yield from _by_cost(title, WITHOUT, rules, apart.sum(axis=2), right)
 
 
 def _by_distance(title: str, sees: str, apart: Array, right: Array) -> Iterator[_Guess]:
     """Guess by the distances between the four images; apart: (N, 4, 4)."""
     yield from _by_company(title, apart[:, 1:, 1:], right)
-    yield (title, "nearest", sees, _least(apart[:, 0, 1:]) == right)
-    yield (title, "farthest", sees, _least(-apart[:, 0, 1:]) == right)
+    yield from _by_cost(title, sees, _NEARNESS, apart[:, 0, 1:], right)
 
 
 def _by_mirror(evidence: Evidence) -> Iterator[_Guess]:
     rows = np.flatnonzero(evidence.mirrored >= 0)
     both = 1 + np.stack([evidence.right[rows], evidence.mirrored[rows]], axis=1)
     for name, title in {**_LIGHT, **_OUTLINE}.items():
-        apart = _distances(getattr(evidence.statistics, name)[rows])[:, 0]
+        apart = _distances(evidence.statistics[name][rows])[:, 0]
         pair = np.take_along_axis(apart, both, axis=1)
-        yield (title, "nearest", MIRRORED, _least(pair) == 0)
-        yield (title, "farthest", MIRRORED, _least(-pair) == 0)
+        yield from _by_cost(title, MIRRORED, _NEARNESS, pair, np.zeros(len(rows)))
 
 
 def _learned(evidence: Evidence) -> Iterator[_Guess]:
     right = evidence.right
     if len(right) < LEAST_QUESTIONS:
         return
-    summary = [getattr(evidence.statistics, name)[:, 1:] for name in _SUMMARY]
+    summary = [evidence.statistics[name][:, 1:] for name in _SUMMARY]
     wide = np.concatenate([v.reshape(len(right), 3, -1) for v in summary], axis=2)
-    pixels = components(evidence.statistics.thumbnails[:, 1:])
+    pixels = components(evidence.statistics["thumbnails"][:, 1:])
     features = {"low-resolution pixels": pixels, "all statistics": wide}
     for title, values in features.items():
         hits = choose(values, right) == right

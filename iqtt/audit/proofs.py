@@ -106,25 +106,22 @@ def framing(tables: Sequence[AuditTable]) -> Proof:
 
 def visibility(tables: Sequence[AuditTable]) -> Proof:
     """Prove, by the stored counts, that every cube shows and no silhouette is larger than them."""
-    told = [table for table in tables if table.truth]
-    if not told:
-        return Proof("visibility", "skipped", "no shape descriptions")
-    shown = [table.truth["visible_pixels"].astype(np.int64) for table in told]
-    used = [(table.truth["cubes"] != NO_CUBE).any(axis=3) for table in told]
+    shown = [table.truth["visible_pixels"].astype(np.int64) for table in tables]
+    used = [(table.cubes != NO_CUBE).any(axis=3) for table in tables]
     least = [np.where(u, s, 2**31).min(axis=2) for u, s in zip(used, shown, strict=True)]
     # A surface may have the colour of the background, which makes a silhouette smaller only.
     total = [np.where(u, s, 0).sum(axis=2) for u, s in zip(used, shown, strict=True)]
-    needed = [table.spec.min_cube_pixels if table.spec else 0 for table in told]
+    needed = [table.spec.min_cube_pixels if table.spec else 0 for table in tables]
     return judge(
         "visibility",
         f"every cube shows {max(needed)} pixels or more; no silhouette exceeds its cubes'",
-        told,
+        tables,
         [
-            ((least[t] < needed[t]) | (told[t].silhouette > total[t])).any(axis=1)
-            for t in range(len(told))
+            ((few < enough) | (table.silhouette > most)).any(axis=1)
+            for table, few, enough, most in zip(tables, least, needed, total, strict=True)
         ],
         lambda t, row: (
-            f"a cube shows {least[t][row].min()} pixels, silhouettes {told[t].silhouette[row]}"
+            f"a cube shows {least[t][row].min()} pixels, silhouettes {tables[t].silhouette[row]}"
             f" of cubes {total[t][row]}"
         ),
     )

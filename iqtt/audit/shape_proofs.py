@@ -45,10 +45,10 @@ class Shapes:
 
 
 def compare_shapes(tables: Sequence[AuditTable]) -> list[Shapes]:
-    """Find out which of the tables' shapes are the same; every table must have its truth."""
+    """Find out which of the tables' shapes are the same; of a table without truth none is whole."""
     results = []
     for table in tables:
-        cubes = table.truth["cubes"]
+        cubes = table.cubes
         whole, count = _whole(cubes)
         right = np.zeros((len(table), 3), np.bool_)
         for n in np.unique(count[whole]).tolist():
@@ -60,8 +60,8 @@ def compare_shapes(tables: Sequence[AuditTable]) -> list[Shapes]:
     sizes = {n for s in results for n in np.unique(s.count[s.whole]).tolist()}
     for n in sorted(sizes):
         chosen = [np.flatnonzero(s.whole & (s.count == n)) for s in results]
-        alike = [t.truth["cubes"][r, :, :n] for t, r in zip(tables, chosen, strict=True)]
-        names = name_shapes(np.concatenate(alike).reshape(-1, n, 3))
+        alike = [t.cubes[r, :, :n].reshape(-1, n, 3) for t, r in zip(tables, chosen, strict=True)]
+        names = name_shapes(np.concatenate(alike))
         ends = np.cumsum([len(rows) for rows in chosen])[:-1]
         shape, mirrored = (np.split(v.reshape(-1, 4) * MOST_CUBES + n, ends) for v in names)
         for i, one in enumerate(results):
@@ -172,25 +172,15 @@ def _not_one_to_one(a: Array, b: Array) -> Array:
 def splits_share_nothing(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     """Prove that no shape, nor its mirror image, is in two splits."""
     names = [table.split or "" for table in tables]
-    splits = sorted(set(names))
-    if len(splits) < 2:
-        return Proof("splits apart", "skipped", f"one split alone: {', '.join(splits)}")
-    owned = {
-        split: np.unique(
-            np.concatenate(
-                [
-                    s.class_name[s.whole].reshape(-1)
-                    for s, n in zip(shapes, names, strict=True)
-                    if n == split
-                ]
-            )
-        )
-        for split in splits
-    }
+    owned: dict[str, Array] = dict.fromkeys(sorted(set(names)), np.zeros(0, np.int64))
+    if len(owned) < 2:
+        return Proof("splits apart", "skipped", f"one split alone: {', '.join(owned)}")
+    for split, one in zip(names, shapes, strict=True):
+        owned[split] = np.union1d(owned[split], one.class_name[one.whole])
     every, times = np.unique(np.concatenate(list(owned.values())), return_counts=True)
     shared = every[times > 1]
     rule = "no shape, nor its mirror image, in two splits"
-    number = ", ".join(f"{split} {len(owned[split]):,}" for split in splits)
+    number = ", ".join(f"{split} {len(own):,}" for split, own in owned.items())
     return judge(
         "splits apart",
         f"{rule} (classes: {number})",

@@ -3,8 +3,7 @@
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,48 +18,22 @@ SAME = 1 / 512  # how far a channel of a floating-point image may differ from th
 SHAPE_STATISTICS = ("contacts of cubes", "spread of cubes", "shape met elsewhere")
 
 
-@dataclass(frozen=True, eq=False)
-class Statistics:
-    """Statistics of the images of Q questions: the reference, then three answers.
-
-    Attributes:
-        area: area of the silhouette, as a share of the image, (Q, 4).
-        extent: diagonal of the silhouette's bounding box, pixels, (Q, 4).
-        offset: distance from the middle of the image to the middle of that box, pixels, (Q, 4).
-        image_brightness: mean of all pixels and channels, (Q, 4).
-        brightness: mean of the silhouette's pixels and channels, (Q, 4).
-        mean_color: mean of the silhouette's pixels, (Q, 4, 3).
-        contrast: standard deviation of the grey of the silhouette's pixels, (Q, 4).
-        colors: colour histogram of the silhouette's pixels, shares, (Q, 4, LEVELS**3).
-        moments: lengths from the silhouette's second and third moments, (Q, 4, 4).
-        thumbnails: small grey images, (Q, 4, THUMBNAIL**2) float32.
-        pixel_distance: root mean square differences of a question's images, (Q, 4, 4).
-    """
-
-    area: Array
-    extent: Array
-    offset: Array
-    image_brightness: Array
-    brightness: Array
-    mean_color: Array
-    contrast: Array
-    colors: Array
-    moments: Array
-    thumbnails: Array
-    pixel_distance: Array
-
-    def __len__(self) -> int:
-        return len(self.area)
-
-    @classmethod
-    def join(cls, parts: Sequence[Self]) -> Self:
-        """Join the statistics of one or more groups of questions."""
-        names = [field.name for field in fields(cls)]
-        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
-
-    def take(self, rows: Array) -> Self:
-        """Return the statistics of some questions; rows as numbers, or (Q,) bool."""
-        return type(self)(*(getattr(self, field.name)[rows] for field in fields(self)))
+STATISTICS = np.dtype(
+    [
+        ("area", "f8", 4),  # of the silhouette, as a share of the image
+        ("extent", "f8", 4),  # diagonal of the silhouette's bounding box, pixels
+        ("offset", "f8", 4),  # from the middle of the image to the middle of that box, pixels
+        ("image_brightness", "f4", 4),  # mean of all pixels and channels
+        ("brightness", "f8", 4),  # mean of the silhouette's pixels and channels
+        ("mean_color", "f8", (4, 3)),  # mean of the silhouette's pixels
+        ("contrast", "f8", 4),  # standard deviation of the grey of the silhouette's pixels
+        ("colors", "f8", (4, LEVELS**3)),  # colour histogram of the silhouette's pixels, shares
+        ("moments", "f8", (4, 4)),  # lengths from the silhouette's second and third moments
+        ("thumbnails", "f4", (4, THUMBNAIL**2)),  # small grey images
+        ("pixel_distance", "f8", (4, 4)),  # root mean square differences of the four images
+    ]
+)
+"""Statistics of a question's images: the reference, then three answers."""
 
 
 def silhouettes(images: Array, background: Array) -> NDArray[np.bool_]:
@@ -77,8 +50,8 @@ def silhouettes(images: Array, background: Array) -> NDArray[np.bool_]:
     return np.asarray(differs[..., 0] | differs[..., 1] | differs[..., 2])
 
 
-def measure(images: Array, shown: NDArray[np.bool_]) -> Statistics:
-    """Measure the images of Q questions.
+def measure(images: Array, shown: NDArray[np.bool_]) -> Array:
+    """Return the STATISTICS of the images of Q questions, (Q,).
 
     Args:
         images: (Q, 4, H, W, 3), as stored; values that are not finite count as 0.
@@ -89,10 +62,10 @@ def measure(images: Array, shown: NDArray[np.bool_]) -> Statistics:
     if images.dtype != np.uint8:
         radiance = np.nan_to_num(radiance, nan=0.0, posinf=0.0, neginf=0.0).clip(0, 1)
     flat = radiance.reshape(questions, 4, height * width * 3)
-    pixel_distance = np.zeros((questions, 4, 4))
+    result = np.zeros(questions, STATISTICS)
     for a, b in itertools.combinations(range(4), 2):
         apart = np.linalg.norm(flat[:, a] - flat[:, b], axis=1) / math.sqrt(flat.shape[2])
-        pixel_distance[:, a, b] = pixel_distance[:, b, a] = apart
+        result["pixel_distance"][:, a, b] = result["pixel_distance"][:, b, a] = apart
     radiance = radiance.reshape(-1, height, width, 3)
     mask = shown.reshape(-1, height, width)
     grey = radiance @ np.full(3, 1 / 3, np.float32)
@@ -113,10 +86,11 @@ def measure(images: Array, shown: NDArray[np.bool_]) -> Statistics:
         "contrast": np.sqrt((deviation**2).sum(axis=(1, 2)) / pixels),
         "colors": _color_shares(radiance, mask),
         "moments": _moments(mask),
-        "thumbnails": thumbnails.reshape(-1, THUMBNAIL**2).astype(np.float32),
+        "thumbnails": thumbnails,
     }
-    grouped = {name: v.reshape(questions, 4, *v.shape[1:]) for name, v in found.items()}
-    return Statistics(pixel_distance=pixel_distance, **grouped)
+    for name, values in found.items():
+        result[name] = values.reshape(result[name].shape)
+    return result
 
 
 def _averages(side: int) -> Array:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit.statistics import Statistics, measure, silhouettes
+from iqtt.audit.statistics import measure, silhouettes
+from iqtt.files.layout import NO_CUBE
 from iqtt.files.reader import QuestionsFile, answers_beside, parts
 from iqtt.questions.specs import SplitSpec
 from scenegen.common.records import check
@@ -17,13 +18,8 @@ from scenegen.common.records import check
 Array = NDArray[Any]
 CHUNK_PIXELS = 2**20  # pixels of questions in memory at once
 TRUTH = (
-    "cubes",
-    "shape_id",
-    "class_id",
-    "world_from_shape",
-    "distractor_kind",
-    "angle_degrees",
-    "visible_pixels",
+    *("cubes", "shape_id", "class_id", "world_from_shape"),
+    *("distractor_kind", "angle_degrees", "visible_pixels"),
 )
 
 
@@ -36,7 +32,6 @@ class Source:
         part: "labeled" or "unlabeled" of a training file, else "".
         answers: the file with the answers, if it is another one.
         answered: whether the right answers are known, from answers or from shapes.
-        count: number of questions.
     """
 
     name: str
@@ -65,6 +60,7 @@ class AuditTable:
         on_border: number of those pixels on the image's border, (Q, 4).
         unfit: number of values of each image that are not finite, or outside 0..1, (Q, 4).
         measured: rows that `statistics` describe.
+        statistics: `STATISTICS` of those rows.
     """
 
     source: Source
@@ -75,17 +71,22 @@ class AuditTable:
     answers: Array | None
     truth: dict[str, Array]
     background: Array
+    measured: Array
     digests: Array
     silhouette: Array
     on_border: Array
     unfit: Array
-    measured: Array
-    statistics: Statistics
+    statistics: Array
 
     @property
     def name(self) -> str:
         """Name of the source."""
         return self.source.name
+
+    @property
+    def cubes(self) -> Array:
+        """Cubes of the four shapes as stored, (Q, 4, most, 3); NO_CUBE if the file has none."""
+        return self.truth["cubes"] if self.truth else np.full((len(self), 4, 1, 3), NO_CUBE)
 
     def __len__(self) -> int:
         return self.source.count
@@ -149,7 +150,6 @@ def read_table(
             scans.append(_scan(images, background, wanted))
             progress(len(images))
         scans = scans or [_scan(first, background, measured)]
-        digests, silhouette, on_border, unfit, statistics = zip(*scans, strict=True)
         return AuditTable(
             source,
             questions.spec,
@@ -159,12 +159,8 @@ def read_table(
             questions.read("answers", everything) if questions.has_answers else None,
             {name: questions.read(name, everything) for name in names},
             background,
-            np.concatenate(digests),
-            np.concatenate(silhouette),
-            np.concatenate(on_border),
-            np.concatenate(unfit),
             measured,
-            Statistics.join(statistics),
+            *map(np.concatenate, zip(*scans, strict=True)),
         )
 
 
@@ -183,9 +179,12 @@ def _border_color(images: Array) -> Array:
     return np.asarray(distinct[counts.argmax()])
 
 
-def _scan(
-    images: Array, background: Array, wanted: Array
-) -> tuple[Array, Array, Array, Array, Statistics]:
+def _scan(images: Array, background: Array, wanted: Array) -> tuple[Array, ...]:
+    """Return the arrays of `AuditTable`, from `digests` on, of some questions.
+
+    Args:
+        wanted: which of the questions to take statistics of, as numbers.
+    """
     shown = silhouettes(images, background)
     digests = [
         hashlib.blake2b(image.tobytes(), digest_size=16).digest()

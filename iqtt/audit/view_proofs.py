@@ -70,7 +70,7 @@ def _angles(table: AuditTable, shapes: Shapes) -> Array:
     for n in np.unique(shapes.count[shapes.place >= 0]).tolist():
         rows = np.flatnonzero((shapes.place >= 0) & (shapes.count == n))
         place = 1 + shapes.place[rows]
-        cubes = table.truth["cubes"][..., :n, :].astype(np.int64)
+        cubes = table.cubes[..., :n, :].astype(np.int64)
         views = table.truth["world_from_shape"]
         reference, target = cubes[rows, 0], cube_codes(cubes[rows, place])
         for turn in cube_rotations():
@@ -116,11 +116,10 @@ def _difference(questions: QuestionsFile, row: int, count: int) -> str:
     spec = questions.spec
     if spec is None:
         return ""
-    names = ("questions", "cubes", "world_from_shape", "visible_pixels", "light_count")
-    images, cubes, views, visible, lights = (questions.read(name, row) for name in names)
-    light_position, light_color = (
-        questions.read(name, row) for name in ("light_position", "light_color")
-    )
+    names = ("questions", "cubes", "world_from_shape", "visible_pixels")
+    images, cubes, views, visible = (questions.read(name, row) for name in names)
+    lamps = ("light_count", "light_position", "light_color")
+    lights, light_position, light_color = (questions.read(name, row) for name in lamps)
     for k in range(4):
         used = slice(0, int(lights[k]))
         hit, radiance, sure = _cast(

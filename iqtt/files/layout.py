@@ -48,42 +48,21 @@ def truth_columns(spec: SplitSpec) -> list[Column]:
         own_chunk = name == "depth"
         return Column(name, shape, dtype, own_chunk, {"unit": unit, "meaning": meaning, **more})
 
+    coordinates = f"integer coordinates of the cubes of each shape; {NO_CUBE} in unused rows"
+    shape_id = "canonical shape under the 24 rotations: its sorted cubes, two bytes each"
+    kind = "of each answer: -1 the right one, else an index into `names`"
+    angle = "difficulty: smallest rotation from the reference's view to the right answer's"
     columns = [
         column("cube_count", (), "int32", "1", "cubes of each of the four shapes"),
-        column(
-            "cubes",
-            (4, most, 3),
-            "int8",
-            "cube edge",
-            f"integer coordinates of the cubes of each shape; {NO_CUBE} in unused rows",
-        ),
-        column(
-            "shape_id",
-            (4, ID_BYTES),
-            "uint8",
-            "1",
-            "canonical shape under the 24 rotations: its sorted cubes, two bytes each",
-        ),
+        column("cubes", (4, most, 3), "int8", "cube edge", coordinates),
+        column("shape_id", (4, ID_BYTES), "uint8", "1", shape_id),
         column("class_id", (4, ID_BYTES), "uint8", "1", "the same, mirror images as one"),
         column("world_from_shape", (4, 3, 3), "float64", "1", "rotation of each image's shape"),
         column("light_count", (4,), "int32", "1", "point lights of each image"),
         column("light_position", (4, lights, 3), "float64", "cube edge", "world; unused: zero"),
         column("light_color", (4, lights, 3), "float64", "radiance", "L_j; unused: zero"),
-        column(
-            "distractor_kind",
-            (3,),
-            "int8",
-            "1",
-            "of each answer: -1 the right one, else an index into `names`",
-            names=list(DISTRACTOR_KINDS),
-        ),
-        column(
-            "angle_degrees",
-            (),
-            "float64",
-            "degree",
-            "difficulty: smallest rotation from the reference's view to the right answer's",
-        ),
+        column("distractor_kind", (3,), "int8", "1", kind, names=list(DISTRACTOR_KINDS)),
+        column("angle_degrees", (), "float64", "degree", angle),
         column("visible_pixels", (4, most), "int32", "pixel", "pixels that show each cube"),
     ]
     if spec.with_depth:

@@ -33,10 +33,7 @@ def question_sheet(records: Sequence[QuestionRecord], show_answers: bool) -> Ima
     """
     pictures = [[_tile(image) for image in np.nan_to_num(record.radiance)] for record in records]
     width, height = _slot(pictures[0][0])
-    cell = (
-        4 * width + WIDE_GAP + 2 * GAP + 2 * MARGIN,
-        height + LABEL_HEIGHT + MARGIN + 2 * FRAME,
-    )
+    cell = (4 * width + WIDE_GAP + 2 * GAP + 2 * MARGIN, height + LABEL_HEIGHT + MARGIN + 2 * FRAME)
     columns = 2 if len(records) > MANY else 1
     lines = -(-len(records) // columns)
     sheet = Image.new("RGB", (columns * cell[0], lines * cell[1] + MARGIN), BACKGROUND)

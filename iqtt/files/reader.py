@@ -49,11 +49,6 @@ def open_questions(
     return QuestionsFile(path, part, answers)
 
 
-def open_answers(path: str | Path, part: str | None = None) -> "AnswersFile":
-    """Open a file for its answers, whether it holds images or not; raises as `AnswersFile` does."""
-    return AnswersFile(path, part)
-
-
 def parts(path: str | Path) -> tuple[str, ...]:
     """Return the tables of a file: "labeled" and "unlabeled", or "" for one at the root.
 

@@ -65,7 +65,6 @@ class TableFile:
     """An open file and one of its tables. Use it as a context manager, or close it.
 
     Attributes:
-        path: path of the file.
         part: which of its tables: "labeled" or "unlabeled", or "" for the only one.
         attributes: all root attributes.
         spec: the settings it was made with, without the seed unless it is a file of answers; None

@@ -102,13 +102,13 @@ def make_pools(spec: SplitSpec) -> Pools:
 def _split_classes(spec: SplitSpec, cubes: int) -> SplitClasses:
     """Give each split as many classes as there are, or as are found where not all are listed."""
     size = DRAWN_CLASSES
-    if cubes <= LISTED_CUBES[spec.kind]:
-        size = len(known_classes(cubes, spec.kind, spec.max_radius)) // len(SPLITS)
+    if cubes <= LISTED_CUBES[spec.shapes]:
+        size = len(known_classes(cubes, spec.shapes, spec.max_radius)) // len(SPLITS)
     while True:
         rng = item_rng(spec.seed or 0, cubes, Purpose.CATALOGUE)
         try:
             sizes = [size] * len(SPLITS)
-            return assign_classes(rng, cubes, sizes, spec.kind, spec.max_radius)
+            return assign_classes(rng, cubes, sizes, spec.shapes, spec.max_radius)
         except TooFewShapesError:  # the loop ends: 0 classes are always found
             size //= 10
 
@@ -122,7 +122,7 @@ def _allows(spec: SplitSpec, classes: SplitClasses, kind: str, cubes: int) -> bo
             item_rng(spec.seed or 0, cubes, Purpose.CATALOGUE, 1 + split * TRIALS + trial)
             for trial in range(TRIALS)
         ]
-        made = _MAKERS[kind](spec, classes, split, rngs)
+        made = _draw(spec, kind, classes, split, rngs)
         if sum(drawn is not None for drawn in made) < TRIALS / 20:
             return False
     return True
@@ -162,9 +162,8 @@ def draw_shapes(
     for (kind, cubes), waiting in groups.items():
         rows = waiting
         for _ in range(SHAPE_ATTEMPTS):
-            made = _MAKERS[kind](
-                spec, pools.classes[cubes], SPLITS.index(split), [rngs[i] for i in rows]
-            )
+            some = [rngs[i] for i in rows]
+            made = _draw(spec, kind, pools.classes[cubes], SPLITS.index(split), some)
             for i, one in zip(rows, made, strict=True):
                 drawn[i] = one
             rows = [i for i in rows if drawn[i] is None]
@@ -184,42 +183,32 @@ def _either_hand(cubes: Array, rng: np.random.Generator) -> Array:
     return mirror(cubes) if rng.random() < 0.5 else cubes
 
 
-def _other(
-    _spec: SplitSpec, split_classes: SplitClasses, split: int, rngs: Sequence[np.random.Generator]
+def _draw(
+    spec: SplitSpec,
+    kind: str,
+    split_classes: SplitClasses,
+    split: int,
+    rngs: Sequence[np.random.Generator],
 ) -> list[Drawn | None]:
-    pool = split_classes.splits[split]
-    made: list[Drawn | None] = []
-    for rng in rngs:
-        chosen = rng.choice(len(pool), 3, replace=False)
-        cubes = np.stack([_either_hand(pool[i], rng) for i in chosen])
-        made.append((cubes, np.array([-1, 0, 0], np.int8)))
-    return made
-
-
-def _near(
-    spec: SplitSpec, split_classes: SplitClasses, split: int, rngs: Sequence[np.random.Generator]
-) -> list[Drawn | None]:
-    kinds = np.array([-1, 1, 1], np.int8)
-    made: list[Drawn | None] = []
-    for rng, (shape, moved) in zip(rngs, _moved(spec, split_classes, split, rngs), strict=True):
-        order = rng.permutation(3)
-        made.append((np.stack([shape, *moved])[order], kinds) if len(moved) == 2 else None)
-    return made
-
-
-def _mirror(
-    spec: SplitSpec, split_classes: SplitClasses, split: int, rngs: Sequence[np.random.Generator]
-) -> list[Drawn | None]:
+    """Draw the shapes of a question with each generator; None where they are not all found."""
+    if kind == "other":
+        pool, kinds = split_classes.splits[split], np.array([-1, 0, 0], np.int8)
+        chosen = [rng.choice(len(pool), 3, replace=False) for rng in rngs]
+        return [
+            (np.stack([_either_hand(pool[i], rng) for i in three]), kinds)
+            for three, rng in zip(chosen, rngs, strict=True)
+        ]
     found = _moved(spec, split_classes, split, rngs)
-    chiral = is_chiral(np.stack([shape for shape, _ in found]))
+    chiral = is_chiral(np.stack([shape for shape, _ in found])) if kind == "mirror" else None
     made: list[Drawn | None] = []
-    for rng, (shape, moved), differs in zip(rngs, found, chiral, strict=True):
-        order, kinds = _MIRROR_ROLES[rng.integers(3)]
-        if moved and differs:
-            three = np.stack([shape, mirror(shape), moved[0]])[list(order)]
-            made.append((three, np.array(kinds, np.int8)))
+    for i, (rng, (shape, moved)) in enumerate(zip(rngs, found, strict=True)):
+        if chiral is None:
+            shapes, order, kinds = [shape, *moved], rng.permutation(3), np.array([-1, 1, 1])
         else:
-            made.append(None)
+            shapes = [shape, mirror(shape), *moved[:1]] if chiral[i] else []
+            order, kinds = _MIRROR_ROLES[rng.integers(3)]
+        complete = len(shapes) == 3
+        made.append((np.stack(shapes)[order], kinds.astype(np.int8)) if complete else None)
     return made
 
 
@@ -239,7 +228,7 @@ def _moved(
         [rng.integers(count) * per_cube + rng.permutation(per_cube)[:MOVES] for rng in rngs]
     )
     repeated = np.repeat(references, moves.shape[1], axis=0)
-    moved, valid = move_cubes(repeated, moves.ravel(), spec.kind, spec.max_radius)
+    moved, valid = move_cubes(repeated, moves.ravel(), spec.shapes, spec.max_radius)
     question = np.repeat(np.arange(len(rngs)), moves.shape[1])[valid]
     moved = moved[valid]
     classes = canonical_class(np.concatenate([references, moved]))
@@ -265,9 +254,6 @@ def arrange(drawn: Drawn, answer: int, rng: np.random.Generator) -> Shapes:
 # Which of (shape, its mirror image, near shape) are the right answer and the two distractors, and
 # of what kinds these are. Where the near shape is right, the shape is near to it, and the mirror
 # image counts as `mirror` because it mirrors a shape that is near.
-_MIRROR_ROLES = (
-    ((0, 1, 2), (-1, 2, 1)),
-    ((1, 0, 2), (-1, 2, 1)),
-    ((2, 0, 1), (-1, 1, 2)),
+_MIRROR_ROLES = np.array(
+    [[[0, 1, 2], [-1, 2, 1]], [[1, 0, 2], [-1, 2, 1]], [[2, 0, 1], [-1, 1, 2]]]
 )
-_MAKERS = {"other": _other, "near": _near, "mirror": _mirror}

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any, get_args
 
 from iqtt.shapes.chains_and_trees import Kind
 from iqtt.shapes.polycube import MAX_CUBES
@@ -13,7 +13,6 @@ from scenegen.description.specs import IMAGE_DTYPES, MAX_LIGHTS, DatasetSpec
 SPLITS = ("train", "val", "test")
 DISTRACTOR_KINDS = ("other", "near", "mirror")
 DISTRACTORS = (*DISTRACTOR_KINDS, "mixed")
-KINDS = ("chain", "tree")
 MAX_QUESTIONS = 10**8  # of each of train, val and test
 PRESETS: dict[str, dict[str, int]] = {
     # training questions in all, labelled ones among them, validation, test
@@ -55,7 +54,7 @@ class SplitSpec:
     val: int = 200
     test: int = 200
     cubes: tuple[int, int] = (5, 11)
-    shapes: str = "chain"
+    shapes: Kind = "chain"
     distractors: str = "mixed"
     height: int = 128
     width: int = 128
@@ -84,7 +83,7 @@ class SplitSpec:
         check_range("cubes", self.cubes, 3, MAX_CUBES)
         check_range("lights", self.lights, 1, MAX_LIGHTS)
         for name, value, known in (
-            ("shapes", self.shapes, KINDS),
+            ("shapes", self.shapes, get_args(Kind)),
             ("distractors", self.distractors, DISTRACTORS),
             ("image dtype", self.image_dtype, IMAGE_DTYPES),
         ):
@@ -132,11 +131,6 @@ class SplitSpec:
             half = math.tan(math.radians(self.fov_degrees) / 2) * self.height / self.width
             fov_y = math.degrees(2 * math.atan(half))
         return Camera((0.0, 0.0, self.camera_distance), (0.0, 0.0, 0.0), fov_y)
-
-    @property
-    def kind(self) -> Kind:
-        """The setting `shapes`, with the type that `iqtt.shapes` expects."""
-        return cast(Kind, self.shapes)
 
     def render_spec(self, shrink: int = 1) -> DatasetSpec:
         """Return the renderer's settings for images that are `shrink` times smaller."""

@@ -75,7 +75,10 @@ def sample_questions(
         again = []
         for i, (index, place, attempt) in enumerate(waiting):
             if np.isfinite(turns[i]).all():
-                done[index] = _lit(spec, split, index, attempt, shapes[i], turns[i], symmetric[i])
+                angle = rotation_angle_degrees(turns[i, 0], turns[i, 1 + place], symmetric[i, 0])
+                rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.LIGHTS, attempt)
+                lights = draw_lights(spec, rng, 4)
+                done[index] = Question(index, attempt, shapes[i], turns[i], *lights, angle)
             else:
                 again.append((index, place, attempt + 1))
         waiting = again
@@ -205,21 +208,6 @@ def _first_good(
     tally.refused += int(refused.sum())
     tally.proposed += int(refused.sum() + took.sum())
     return chosen
-
-
-def _lit(
-    spec: SplitSpec,
-    split: str,
-    index: int,
-    attempt: int,
-    shapes: Shapes,
-    turns: Array,
-    symmetric: Array,
-) -> Question:
-    """Return the question with its lights, which have a random generator of their own."""
-    rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.LIGHTS, attempt)
-    angle = rotation_angle_degrees(turns[0], turns[1 + shapes.answer], symmetric[0])
-    return Question(index, attempt, shapes, turns, *draw_lights(spec, rng, 4), angle)
 
 
 def rotation_angle_degrees(a: Array, b: Array, symmetric: Array) -> float:

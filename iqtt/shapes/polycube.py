@@ -176,27 +176,16 @@ def _least_keys(cubes: Cubes, matrices: NDArray[np.int8]) -> NDArray[np.uint16]:
     low, extent = _boxed(cubes)
     best = np.full(low.shape[1:], _NO_CUBE, dtype=np.uint16)
     for start in range(0, len(best), _CHUNK):
-        part = slice(start, start + _CHUNK)
-        _lower_to_least(best[part], low[:, part], extent[:, part], matrices)
+        for matrix in matrices:
+            # Only orientations with a descending box compete: for most a sixth of the sorting.
+            x, y, z = extent[np.abs(matrix).argmax(axis=1), start : start + _CHUNK]
+            rows = start + np.flatnonzero((x >= y) & (y >= z))
+            keys = _oriented_keys(low[:, rows], extent[:, rows], matrix)
+            rival = best[rows]
+            first = (keys != rival).argmax(axis=1)[:, None]
+            smaller = np.take_along_axis(keys, first, 1) < np.take_along_axis(rival, first, 1)
+            best[rows] = np.where(smaller, keys, rival)
     return best
-
-
-def _lower_to_least(
-    best: NDArray[np.uint16],
-    low: NDArray[np.uint16],
-    extent: NDArray[np.uint16],
-    matrices: NDArray[np.int8],
-) -> None:
-    """Replace rows of `best` in place by smaller key lists found under the matrices."""
-    for matrix in matrices:
-        # Only orientations with a descending box compete: for most shapes a sixth of the sorting.
-        x, y, z = extent[np.abs(matrix).argmax(axis=1)]
-        rows = np.flatnonzero((x >= y) & (y >= z))
-        keys = _oriented_keys(low[:, rows], extent[:, rows], matrix)
-        rival = best[rows]
-        first = (keys != rival).argmax(axis=1)[:, None]
-        smaller = np.take_along_axis(keys, first, 1) < np.take_along_axis(rival, first, 1)
-        best[rows] = np.where(smaller, keys, rival)
 
 
 def _unpacked(keys: NDArray[np.uint16]) -> NDArray[np.int8]:

@@ -32,9 +32,9 @@ def score_questions(
     files: Sequence[QuestionPredictions], truth_path: Path, settings: Settings, progress: Progress
 ) -> ScoreFile:
     """Score runs of one method on a file of answers; raises as `evaluate.score`."""
-    from iqtt.files.reader import open_answers
+    from iqtt.files.reader import AnswersFile
 
-    with open_answers(truth_path) as truth:
+    with AnswersFile(truth_path) as truth:
         true = np.asarray(truth.read("answers", slice(None))).astype(np.int64)
         fingerprint = truth.fingerprint
         kinds, names, angles = None, truth.kind_names, None

@@ -9,30 +9,9 @@ from hypothesis import strategies as st
 from polycubes import are_congruent, some_shapes
 
 from iqtt.audit import congruence
-from iqtt.audit.congruence import congruent_rows, cube_codes, cube_rotations, name_shapes
+from iqtt.audit.congruence import congruent_rows, cube_codes, name_shapes
 from iqtt.shapes.chains_and_trees import Kind, all_classes
-from iqtt.shapes.polycube import (
-    ROTATIONS,
-    canonical,
-    canonical_class,
-    is_chiral,
-    mirror,
-    set_ids,
-)
-
-TWIST = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 1]])
-OTHER_TWIST = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, -1]])
-ELL = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0]])
-
-
-def test_known_pairs() -> None:
-    assert are_congruent(TWIST, TWIST)
-    assert are_congruent(
-        ELL, ELL[::-1] * np.array([1, -1, 1]) + np.array([3, -20, 5])
-    )  # flat: a mirror is a turn
-    assert not are_congruent(TWIST, OTHER_TWIST)
-    assert not are_congruent(TWIST, ELL)
-    assert not are_congruent(TWIST, TWIST[:3])
+from iqtt.shapes.polycube import ROTATIONS, canonical, canonical_class, is_chiral, mirror, set_ids
 
 
 def test_each_turn_is_needed() -> None:
@@ -42,13 +21,6 @@ def test_each_turn_is_needed() -> None:
             moved = arm[:, axes] * np.array(signs)
             even = list(axes) in ([0, 1, 2], [1, 2, 0], [2, 0, 1])
             assert are_congruent(arm, moved) == (even == (np.prod(signs) == 1))
-
-
-def test_shapes_with_the_same_distances_are_told_apart() -> None:
-    # The quick filter cannot tell mirror images, so all the work is left to the rotations.
-    chiral = all_classes(6)
-    chiral = chiral[is_chiral(chiral)]
-    assert not congruent_rows(chiral, mirror(chiral)).any()
 
 
 @given(st.integers(0, 2**32), st.integers(1, 12), st.sampled_from(["chain", "tree"]))
@@ -111,7 +83,7 @@ def test_what_cannot_be_shapes_is_refused_and_its_row_named(
 
 def test_unlike_arrays_cannot_be_paired() -> None:
     with pytest.raises(ValueError, match="cannot pair"):
-        congruent_rows(np.tile(ELL, (2, 1, 1)), np.tile(ELL, (3, 1, 1)))
+        congruent_rows(np.zeros((2, 4, 3), np.int8), np.zeros((3, 4, 3), np.int8))
 
 
 def same_partition(a: np.ndarray, b: np.ndarray) -> bool:
@@ -124,17 +96,9 @@ def numbered(ids: np.ndarray) -> np.ndarray:
     return np.unique(ids, return_inverse=True)[1].reshape(-1)
 
 
-def test_the_turns_are_the_rotations_of_the_cube() -> None:
-    assert {t.tobytes() for t in cube_rotations()} == {
-        r.tobytes() for r in ROTATIONS.astype(np.int32)
-    }
-
-
-@pytest.mark.parametrize("collide", [False, True])
-def test_names_are_those_of_canonical_forms(collide: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    if collide:  # then comparing alone decides
-        monkeypatch.setattr(congruence, "shape_invariants", lambda cubes: np.zeros(len(cubes)))
-    classes = all_classes(5 if collide else 7)
+def test_comparing_decides_where_invariants_collide(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(congruence, "shape_invariants", lambda cubes: np.zeros(len(cubes)))
+    classes = all_classes(5)
     rng = np.random.default_rng(0)
     shapes = np.concatenate([classes, mirror(classes), classes])
     turns = ROTATIONS[rng.integers(24, size=len(shapes))]

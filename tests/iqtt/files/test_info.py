@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from iqtt.files.info import describe
-from scenegen.common.errors import FileFormatError
 from scenegen.rendering.backend import versions
 
 
@@ -136,9 +135,3 @@ def test_strange_values_are_told_not_raised(damaged):
     assert "77: 3" in value(text, "distractors")
     assert value(text, "cubes a shape").startswith("-3: 1, ")
     assert value(header, "rendered by") == "Mitsuba unknown, Dr.Jit unknown, LLVM unknown"
-
-
-def test_files_of_other_kinds(tmp_path):
-    (tmp_path / "x.h5").write_text("hello")
-    with pytest.raises(FileFormatError):
-        describe(tmp_path / "x.h5")

@@ -90,8 +90,8 @@ def test_labels_tell_index_letters_kinds_and_angle(records):
         places = [find(sheet, tile) for tile in shown(record, 4)]
         return [sheet[y:][BELOW, x : x + 128] for y, x in places]
 
-    def differing(record, other, **options):
-        pairs = zip(labels(record, **options), labels(other, **options), strict=True)
+    def differing(record, other):
+        pairs = zip(labels(record), labels(other), strict=True)
         return [k for k, (a, b) in enumerate(pairs) if not np.array_equal(a, b)]
 
     base = dataclasses.replace(records[0], answer=0)
@@ -103,11 +103,6 @@ def test_labels_tell_index_letters_kinds_and_angle(records):
     assert differing(told, dataclasses.replace(told, truth=other)) == [3]
     assert differing(told, dataclasses.replace(told, truth=angle)) == [1]
     assert differing(told, dataclasses.replace(told, truth=None)) == [1, 2, 3]
-    silent = [other, angle, None]
-    for truth in silent:
-        assert differing(told, dataclasses.replace(told, truth=truth), show_answers=False) == []
-    secret = dataclasses.replace(told, answer=2)
-    assert differing(told, secret, show_answers=False) == []
     a, b, c = (one[:, 40:88] for one in labels(base, show_answers=False)[1:])
     assert not np.array_equal(a, b)
     assert not np.array_equal(b, c)

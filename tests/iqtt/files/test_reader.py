@@ -11,10 +11,10 @@ import pytest
 
 from iqtt.files.layout import NO_CUBE
 from iqtt.files.reader import (
+    AnswersFile,
     QuestionsDataset,
     QuestionsFile,
     answers_beside,
-    open_answers,
     open_questions,
     parts,
 )
@@ -123,14 +123,14 @@ def test_answers_of_another_file(split_folder, damaged, released):
         kinds = [record.truth.distractor_kind.index(None) for record in questions]
         assert kinds == file["answers"][:].tolist()
         assert questions.read("cubes", 2).shape == (4, 7, 3)
-    with open_answers(answers) as known:
+    with AnswersFile(answers) as known:
         assert len(known) == 6
         assert known.fingerprint == questions.fingerprint
         assert known.truth(-1).distractor_kind == known.truth(5).distractor_kind
         assert known.read("answers", slice(1, 4)).tolist() == [
             known.read("answers", i) for i in (1, 2, 3)
         ]
-    with open_answers(split_folder / "iqtt-train.h5") as known:
+    with AnswersFile(split_folder / "iqtt-train.h5") as known:
         assert (known.part, len(known)) == ("labeled", 6)
     plain = released("iqtt-test.h5", {"": (4, None)})
     with h5py.File(plain.with_name("iqtt-test-answers.h5"), "w") as file:

@@ -42,31 +42,27 @@ def everything(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:
 
 def test_the_layout_is_the_released_one(folder):
     assert sorted(path.name for path in folder.iterdir()) == sorted(FILES)
-    expected = {
-        "iqtt-train.h5": {
-            "labeled/questions": (3, 4, 24, 32, 3),
-            "labeled/answers": (3,),
-            "unlabeled/questions": (4, 4, 24, 32, 3),
-        },
-        "iqtt-val.h5": {"questions": (4, 4, 24, 32, 3), "answers": (4,)},
-        "iqtt-test.h5": {"questions": (5, 4, 24, 32, 3)},
-        "iqtt-test-answers.h5": {"answers": (5,)},
-    }
-    for name, shapes in expected.items():
-        with h5py.File(folder / name) as file:
-            datasets = {k: v for k, v in everything(file).items() if isinstance(v, h5py.Dataset)}
-            public = {k: v.shape for k, v in datasets.items() if not k.startswith("truth/")}
-            assert public == shapes
-            assert {datasets[k].dtype for k in public} == {np.dtype("uint8")}
-            for group in {"iqtt-train.h5": ("labeled", "unlabeled")}.get(name, ("",)):
-                rows = next(iter(v[0] for k, v in shapes.items() if k.startswith(group)))
-                known = {k for k in datasets if k.startswith(f"truth/{group}")}
-                if name == "iqtt-test.h5":
-                    assert not known
-                    continue
-                prefix = f"truth/{group}/" if group else "truth/"
-                assert known == {prefix + one for one in TRUTH}
-                assert {len(datasets[k]) for k in known} == {rows}
+    images = (4, 24, 32, 3)
+    for name, public, parts in (
+        (
+            "train",
+            {
+                "labeled/questions": (3, *images),
+                "labeled/answers": (3,),
+                "unlabeled/questions": (4, *images),
+            },
+            {"labeled/": 3, "unlabeled/": 4},
+        ),
+        ("val", {"questions": (4, *images), "answers": (4,)}, {"": 4}),
+        ("test", {"questions": (5, *images)}, {}),
+        ("test-answers", {"answers": (5,)}, {"": 5}),
+    ):
+        with h5py.File(folder / f"iqtt-{name}.h5") as file:
+            found = {k: v for k, v in everything(file).items() if isinstance(v, h5py.Dataset)}
+            truth = {k: len(found.pop(k)) for k in list(found) if k.startswith("truth/")}
+            assert {k: v.shape for k, v in found.items()} == public
+            assert {v.dtype for v in found.values()} == {np.dtype("uint8")}
+            assert truth == {f"truth/{p}{one}": rows for p, rows in parts.items() for one in TRUTH}
 
 
 @pytest.mark.parametrize(("split", "part", "first"), TABLES)

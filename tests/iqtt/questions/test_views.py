@@ -9,14 +9,8 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from iqtt.questions import views as module
-from iqtt.questions.distractors import (
-    Pools,
-    Shapes,
-    draw_shapes,
-    make_pools,
-    question_key,
-)
-from iqtt.questions.packing import Question, pack_questions
+from iqtt.questions.distractors import Pools, Shapes, draw_shapes, make_pools, question_key
+from iqtt.questions.packing import Question
 from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import (
     Tally,
@@ -31,7 +25,6 @@ from iqtt.questions.views import (
 from iqtt.shapes.polycube import symmetries
 from scenegen.common.errors import PlacementError
 from scenegen.common.seeding import Purpose, item_rng
-from scenegen.rendering.renderer import render
 
 SPEC = SplitSpec(seed=4, cubes=(5, 8), height=64, width=64, min_cube_pixels=3, lights=(1, 3))
 REQUESTS = [(i, i % 3, 0) for i in (0, 1, 2, 3, 40, 41, 42, 10**6)]
@@ -56,17 +49,12 @@ def bits(question: Question) -> tuple:
     )
 
 
-def test_every_cube_shows_in_the_full_image(sampled):
-    questions, _ = sampled
-    ids = render(pack_questions(SPEC, questions)).object_id.reshape(len(questions), 4, 64, 64)
-    enough = 0
-    for question, images in zip(questions, ids, strict=True):
-        count = question.shapes.cubes.shape[1]
-        for image in images:
-            shown = np.bincount(image[image > 0], minlength=count + 1)[1:]
-            assert len(shown) == count
-            enough += int((shown >= SPEC.min_cube_pixels).all())
-    assert enough >= 4 * len(questions) - 2, "now and then the small image promised too much"
+def symmetry_group(cubes: np.ndarray) -> list[Rotation]:
+    """Return SciPy's rotations of the cube that leave a shape as it is."""
+    centred = 2 * cubes.astype(int) - cubes.min(axis=0) - cubes.max(axis=0)
+    own = sorted(centred.tolist())
+    group = Rotation.create_group("O")
+    return [turn for turn in group if sorted(np.rint(turn.apply(centred)).tolist()) == own]
 
 
 @pytest.mark.parametrize("least", [0, 30, 90])
@@ -78,14 +66,8 @@ def test_answers_are_turned_far_enough_by_any_way_of_looking(pools, least):
     for question in questions:
         reference, *others = map(Rotation.from_matrix, question.world_from_shape)
         for k, (cubes, turn) in enumerate(zip(question.shapes.cubes[1:], others, strict=True)):
-            centred = 2 * cubes.astype(int) - cubes.min(axis=0) - cubes.max(axis=0)
-            angle = math.degrees(
-                min(
-                    (turn * g * reference.inv()).magnitude()
-                    for g in Rotation.create_group("O")
-                    if sorted(np.rint(g.apply(centred)).tolist()) == sorted(centred.tolist())
-                )
-            )
+            same = [turn * symmetry * reference.inv() for symmetry in symmetry_group(cubes)]
+            angle = math.degrees(min(one.magnitude() for one in same))
             assert angle >= least - 1e-9
             angles.append(angle)
             if k == question.shapes.answer:
@@ -115,9 +97,6 @@ def test_questions_are_what_was_asked_for(sampled):
         assert question.shapes.kinds[place] == -1
         assert question.attempt >= attempt
         assert (question.shapes.cubes[0] == question.shapes.cubes[1 + place]).all()
-        turned = question.world_from_shape
-        assert abs(turned @ turned.swapaxes(1, 2) - np.eye(3)).max() < 1e-12
-        assert question.light_position.shape == question.light_color.shape == (4, 3, 3)
         assert ((question.light_count >= 1) & (question.light_count <= 3)).all()
     assert len({bits(q) for q in questions}) == len(questions)
 
@@ -141,16 +120,6 @@ def test_neither_company_nor_order_nor_chunks_change_a_question(
         sample_questions(SPEC, pools, "val", [request], total)
     assert total == sampled[1], "proposals are counted one by one, however many are judged at once"
     assert sample_questions(SPEC, pools, "val", [], tally) == []
-
-
-def test_requests_that_say_so_begin_with_later_attempts(pools, sampled):
-    [first] = sample_questions(SPEC, pools, "val", [(40, 1, 0)], Tally())
-    [later] = sample_questions(SPEC, pools, "val", [(40, 1, 3)], Tally())
-    assert (first.attempt, later.attempt) == (0, 3)
-    assert first.shapes.answer == later.shapes.answer == 1
-    assert bits(first) != bits(later)
-    assert not np.isclose(first.world_from_shape, later.world_from_shape).all(axis=(1, 2)).any()
-    assert (first.light_position != later.light_position).any()
 
 
 def proposed(question):
@@ -300,12 +269,7 @@ SYMMETRIC = {
 def test_the_angle_between_views_is_the_least_that_symmetry_leaves(name):
     """Against SciPy's rotations of the cube, tried on the shape one by one."""
     cubes = np.array(SYMMETRIC[name])
-    centred = 2 * cubes - cubes.min(axis=0) - cubes.max(axis=0)
-    group = [
-        turn
-        for turn in Rotation.create_group("O")
-        if sorted(np.rint(turn.apply(centred)).tolist()) == sorted(centred.tolist())
-    ]
+    group = symmetry_group(cubes)
     symmetric = symmetries(cubes[None])[0]
     order = {"straight": 8, "square": 8, "cube": 24, "corner": 2, "screw": 2, "none": 1}[name]
     assert len(group) == symmetric.sum() == order

@@ -5,7 +5,7 @@ import pytest
 from polycubes import some_shapes
 
 from iqtt.shapes import chains_and_trees
-from iqtt.shapes.chains_and_trees import Kind, all_classes, all_walks, distinct, random_shapes
+from iqtt.shapes.chains_and_trees import Kind, all_classes, all_walks, random_shapes
 from iqtt.shapes.polycube import canonical_class, is_chiral, set_ids, symmetries
 
 # Self-avoiding walks of 1, 2, ... steps on the cubic lattice, OEIS A001412.
@@ -87,11 +87,6 @@ def test_a_request_that_no_shape_meets_is_refused() -> None:
     with pytest.raises(ValueError, match="ring"):
         random_shapes(rng, 1, 5, "ring")  # type: ignore[arg-type]
     assert random_shapes(rng, 0, 4).shape == (0, 4, 3)
-
-
-def test_distinct_drops_repeats_only() -> None:
-    classes = all_classes(5)
-    assert (distinct(np.concatenate([classes[::-1], classes[3:7]])) == classes).all()
 
 
 def test_growing_by_parts_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

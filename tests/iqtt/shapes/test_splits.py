@@ -50,14 +50,6 @@ def test_the_seed_decides(cubes: int) -> None:
         assert (a != c).any()
 
 
-def test_classes_come_in_random_order() -> None:
-    (part,) = assign_classes(np.random.default_rng(0), 9, (1000,)).splits
-    place = np.searchsorted(set_ids(known_classes(9)), set_ids(part))
-    assert abs(np.corrcoef(place, np.arange(1000))[0, 1]) < 0.15
-    assert place.min() < 300
-    assert place.max() > len(known_classes(9)) - 300
-
-
 def test_all_classes_there_are_can_be_shared_out() -> None:
     assigned = assign_classes(np.random.default_rng(0), 5, (7, 4, 3))
     assert ids_of(np.concatenate(assigned.splits)) == ids_of(all_classes(5))
