@@ -27,4 +27,5 @@ HOMES = {
     "files.reader": "QuestionRecord QuestionsDataset QuestionsFile open_questions",
     "questions.specs": "SplitSpec preset_spec",
 }
+__all__ = [name for names in HOMES.values() for name in names.split()]
 __getattr__ = lazy_names(__name__, HOMES)

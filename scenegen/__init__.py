@@ -33,4 +33,5 @@ HOMES = {
     "rooms.make": "make_dataset",
     "rooms.reader": "Room RoomsDataset RoomsFile open_rooms",
 }
+__all__ = [name for names in HOMES.values() for name in names.split()]
 __getattr__ = lazy_names(__name__, HOMES)
