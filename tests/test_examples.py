@@ -43,7 +43,7 @@ def test_an_example_writes_what_can_be_scored(name, truths, tmp_path):
         ("submit_iqtt", "no such file", "no such file"),
         ("submit_iqtt", "a file that exists", "exists"),
         ("submit_iqtt", "not HDF5", "not a readable HDF5 file"),
-        ("submit_iqtt", "rooms", "not a question file"),
+        ("submit_iqtt", "rooms", "'pix2shape-bench/rooms'"),
     ],
 )
 def test_a_mistake_ends_in_one_line_and_exit_code_2(name, mistake, words, truths, tmp_path):
