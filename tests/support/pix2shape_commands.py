@@ -43,9 +43,6 @@ def prepare(folder: Path, rooms: Path, questions: Path, make_rooms: Callable[...
     written(folder / "rooms.safetensors", tiny(), **known)
     written(folder / "questions.safetensors", of_questions(folder / "iqtt-train.h5"))
     written(folder / "classes.safetensors", tiny(classes=2), classes=("mug", "bowl"), **known)
-    shutil.copy(folder / "rooms.safetensors", folder / "alone.safetensors")
-    shutil.copy(folder / "rooms.safetensors", folder / "garbage.safetensors")
-    (folder / "garbage.json").write_text('{"config": ')
     (folder / "text.safetensors").write_text("no weights")
     shutil.copy(folder / "rooms.json", folder / "text.json")
     return folder
