@@ -32,13 +32,6 @@ PLAIN = replace(TINY, adversarial=0.0, code_reconstruction=0.0)
 Losses = list[dict[str, float]]
 
 
-@pytest.fixture(scope="session")
-def fabric() -> Fabric:
-    fabric = Fabric(accelerator="cpu", devices=1)
-    fabric.launch()
-    return fabric
-
-
 def bits(state: State) -> dict[str, Any]:
     """Return all that training changes, by name."""
     found = {f"model.{name}": value.clone() for name, value in state.model.state_dict().items()}

@@ -21,8 +21,7 @@ def test_penalty_of_a_linear_critic_is_that_of_its_slope() -> None:
     def critic(image: torch.Tensor, code: torch.Tensor) -> torch.Tensor:
         return 0.5 * image.sum(dim=(1, 2, 3)) + 2 * code.sum(dim=1)
 
-    real = torch.rand(5, 3, 2, 2), torch.rand(5, 2)
-    made = torch.rand(5, 3, 2, 2), torch.rand(5, 2)
+    real, made = ((torch.rand(5, 3, 2, 2), torch.rand(5, 2)) for _ in range(2))
     found = losses.gradient_penalty(critic, real, made, torch.rand(5))
     assert float(found) == pytest.approx(10 * (math.sqrt(11) - 1) ** 2, rel=1e-6)
 
@@ -53,12 +52,8 @@ def test_reconstruction_is_the_norm_of_all_numbers_and_the_mean_of_images() -> N
 
 
 def test_mutual_information_of_a_known_statistic() -> None:
-    first, second = torch.tensor([[1.0], [2.0]]), torch.tensor([[3.0], [5.0]])
-
-    def product(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
-        return (a * b).flatten()
-
-    found = losses.mutual_information(product, first, second, torch.tensor([1, 0]))
+    first, second, order = torch.tensor([1.0, 2.0]), torch.tensor([3.0, 5.0]), torch.tensor([1, 0])
+    found = losses.mutual_information(torch.mul, first, second, order)
     assert float(found) == pytest.approx((3 + 10) / 2 - math.log((math.exp(5) + math.exp(6)) / 2))
 
 
@@ -94,14 +89,12 @@ def test_question_loss_and_answers_by_hand() -> None:
 
 
 def test_absolute_differences_are_as_large_as_the_norm_where_all_are_equal() -> None:
-    values = torch.zeros(2, 3, 4, 4)
-    again = torch.full((2, 3, 4, 4), -0.5)
-    assert float(losses.absolute_loss(values, again)) == pytest.approx(0.5 * math.sqrt(48))
-    assert float(losses.reconstruction_loss(values, again)) == pytest.approx(0.5 * math.sqrt(48))
+    values, again = torch.zeros(2, 3, 4, 4), torch.full((2, 3, 4, 4), -0.5)
+    for loss in (losses.absolute_loss, losses.reconstruction_loss):
+        assert float(loss(values, again)) == pytest.approx(0.5 * math.sqrt(48))
     again[:, 0] = 1.0
-    assert float(losses.absolute_loss(values, again)) == pytest.approx(
-        (2 * 0.5 + 1) / 3 * math.sqrt(48)
-    )
+    found = float(losses.absolute_loss(values, again))
+    assert found == pytest.approx((2 * 0.5 + 1) / 3 * math.sqrt(48))
 
 
 FOV = 60.0

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pix2shape_models import tiny
@@ -13,8 +14,6 @@ from pix2shape_models import tiny
 from scenegen.common.errors import FileFormatError
 
 torch = pytest.importorskip("torch")
-from lightning_fabric import Fabric  # noqa: E402
-
 from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
 from baselines.pix2shape.training import loop as training  # noqa: E402
 from baselines.pix2shape.training.loop import train  # noqa: E402
@@ -47,11 +46,9 @@ save_state(folder, state, Card(config, state.iteration))
 
 
 @pytest.fixture(scope="session")
-def trained(rooms_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def trained(rooms_path: Path, fabric: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with the checkpoint of a tiny model, trained for three iterations."""
     folder = tmp_path_factory.mktemp("trained")
-    fabric = Fabric(accelerator="cpu", devices=1)
-    fabric.launch()
     state = new_state(TINY)
     for _ in train(state, RoomImages(rooms_path, TINY), fabric):
         pass
@@ -105,9 +102,9 @@ def test_damaged_checkpoints_are_refused(trained, tmp_path, edit, words):
     assert "\n" not in str(error.value)
 
 
-def test_every_step_has_noise_of_its_own(rooms_path, monkeypatch):
+def test_every_step_has_noise_of_its_own(rooms_path, fabric, monkeypatch):
     """Of each critic's batch, too; but the same wherever training began."""
-    fabric, seeds = Fabric(accelerator="cpu", devices=1), []
+    seeds: list[int] = []
     draw = training.draw
     monkeypatch.setattr(training, "draw", lambda *a: (seeds.append(a[2]), draw(*a))[1])
     config = replace(TINY, critic_steps=2, iterations=2)

@@ -11,7 +11,7 @@ from baselines.pix2shape.data.rooms import Batch  # noqa: E402
 from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.config import LOSSES, ModelConfig  # noqa: E402
 from baselines.pix2shape.network.model import Pix2Shape, Views  # noqa: E402
-from baselines.pix2shape.network.surfels import Scene, pixel_rays  # noqa: E402
+from baselines.pix2shape.network.surfels import Scene, back_project  # noqa: E402
 from baselines.pix2shape.training import losses as functions  # noqa: E402
 from baselines.pix2shape.training.steps import critic_step, draw, generator_step  # noqa: E402
 
@@ -20,9 +20,8 @@ NEEDED = {"adversarial": {"critic"}, "mutual_information": {"statistics"}}
 
 
 def only(**weights: float) -> ModelConfig:
-    return ModelConfig(
-        networks=NETWORKS, question_batch=8, **{**dict.fromkeys(LOSSES, 0.0), **weights}
-    )
+    weights = {**dict.fromkeys(LOSSES, 0.0), **weights}
+    return ModelConfig(networks=NETWORKS, question_batch=8, **weights)
 
 
 def model_of(config: ModelConfig) -> Pix2Shape:
@@ -101,9 +100,8 @@ def test_the_critics_total_is_penalty_less_distance_less_information():
     model = model_of(only(adversarial=1.0, mutual_information=0.1))
     total, numbers = critic_step(model, batch, noise)
     code = model.encode(batch.image, batch.views)
-    information = functions.mutual_information(
-        model.statistics, code[:, :6], code[:, 6:], noise.order
-    )
+    halves = code[:, :6], code[:, 6:]
+    information = functions.mutual_information(model.statistics, *halves, noise.order)
     expected = numbers["penalty"] - numbers["distance"] - information
     assert total.item() == pytest.approx(expected.item(), rel=1e-5)
     losses = generator_step(model, batch, noise)[1]
@@ -141,9 +139,8 @@ def test_questions_teach_the_scenes_part_of_the_code():
     assert (weight[:6] > 1e-4).all()
     assert not weight[6:].any()
     codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
-    assert losses["questions"].item() == pytest.approx(
-        functions.question_loss(codes, answers).item()
-    )
+    expected = functions.question_loss(codes, answers).item()
+    assert losses["questions"].item() == pytest.approx(expected)
 
 
 def test_questions_of_unknown_answers_are_contrasted_alone():
@@ -153,9 +150,8 @@ def test_questions_of_unknown_answers_are_contrasted_alone():
     for answers in ([-1, -1], [-1, 1], [2, 0]):
         told = torch.tensor(answers)
         losses = generator_step(model, some_batch(), draw(8, 8, 3), (images, told))[1]
-        assert losses["contrast"].item() == pytest.approx(
-            functions.contrast_loss(codes, told).item()
-        )
+        expected = functions.contrast_loss(codes, told).item()
+        assert losses["contrast"].item() == pytest.approx(expected)
         known = told >= 0
         assert ("questions" in losses) == bool(known.any())
         if known.any():
@@ -171,8 +167,7 @@ class Sphere(Pix2Shape):
     def surfels(self, code: Any, condition: Any) -> Any:
         self.seen = [*getattr(self, "seen", []), condition]
         turn = facing_the_origin(condition)[:, :3, :3]
-        x, y = pixel_rays(32, 32, 28.0, condition)
-        rays = torch.stack([x + 0 * y, y + 0 * x, -1 + 0 * x * y])
+        rays = back_project(torch.ones(1, 32, 32), 28.0)[0]
         along = torch.einsum("bij,jhw->bihw", turn, rays)
         b = torch.einsum("bihw,bi->bhw", along, condition)
         a, c = (along**2).sum(dim=1), (condition**2).sum(dim=1)[:, None, None] - self.radius**2

@@ -35,11 +35,6 @@ CLASSES = ("bag", "bowl", "mug")
 
 
 @pytest.fixture(scope="session")
-def model() -> Any:
-    return made(tiny())
-
-
-@pytest.fixture(scope="session")
 def conditional() -> Any:
     return made(tiny(classes=3))
 
