@@ -50,25 +50,21 @@ def baseline(
         raise click.UsageError(f"--weights: {name} has none; they are pix2shape's")
     if train is not None and name == "pix2shape":
         raise click.UsageError("--train: pix2shape is trained already; see pix2shape train")
+    method = name
     if name == "pix2shape":
-        weights = predict_to(out, weights, data, overwrite=overwrite)
-        click.echo(
-            f"{out}: {name}, weights {weights}, on {data}; score it with `bench score {out}`"
-        )
-        return
-    from baselines.trivial import write_chance, write_room_baseline
-    from scenegen.rooms.reader import RoomsFile
+        method += f", weights {predict_to(out, weights, data, overwrite=overwrite)},"
+    elif name == "chance":
+        from baselines.trivial import write_chance
 
-    if name == "chance":
         write_chance(data, out, seed, overwrite)
     else:
-        with RoomsFile(data) as rooms:
-            count = len(rooms)
-        with progress_bar(count, "image") as bar:
-            write_room_baseline(
-                name, data, out, train=train, overwrite=overwrite, progress=bar.update
-            )
-    click.echo(f"{out}: {name} on {data}; score it with `bench score {out}`")
+        from baselines.trivial import write_room_baseline
+        from scenegen.rooms.reader import RoomsFile
+
+        with RoomsFile(data) as rooms, progress_bar(len(rooms), "image") as bar:
+            how = {"overwrite": overwrite, "progress": bar.update}
+            write_room_baseline(name, data, out, train=train, **how)
+    click.echo(f"{out}: {method} on {data}; score it with `bench score {out}`")
 
 
 COMMANDS = (baseline,)

@@ -97,12 +97,9 @@ def _mean_depth(rooms: RoomsFile, train: str | Path) -> Array:
     with RoomsFile(train) as training:
         same_rooms = training.fingerprint == rooms.fingerprint
         if same_rooms or training.spec.seed == rooms.spec.seed:
-            raise SpecError(
-                "train",
-                f"the test file's seed, {rooms.spec.seed}, and so its cameras and places",
-                "another seed",
-                "render training rooms with another --seed",
-            )
+            found = f"the test file's seed, {rooms.spec.seed}, and so its cameras and places"
+            hint = "render training rooms with another --seed"
+            raise SpecError("train", found, "another seed", hint)
         sizes = [f"images of {one.spec.height}x{one.spec.width}" for one in (training, rooms)]
         if sizes[0] != sizes[1]:
             raise SpecError("train", sizes[0], f"{sizes[1]}, as in the test file")

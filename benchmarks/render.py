@@ -34,8 +34,8 @@ def jobs(folder: str, quick: bool) -> Iterator[Job]:
     yield "b", what, "rooms:end_to_end", whole
     shared = {"rooms": rooms, "count": scenes, "repeats": repeats}
     yield "stage", "(b) scenegen, rendering stage alone", "rooms:stage", shared
-    yield "c1", "(c) bare cast, unit scene", "bare_cast:unit_scene", shared
-    yield "c2", "(c) bare cast, lattice of instances", "bare_cast:lattice", shared
+    yield "c, unit scene", "(c) bare cast, unit scene", "bare_cast:unit_scene", shared
+    yield "c, lattice", "(c) bare cast, lattice of instances", "bare_cast:lattice", shared
     plain = {"rooms": rooms, "count": per_scene, "repeats": min(repeats, 3), "folder": folder}
     for coarse, meshes in ((False, "the same"), (True, "coarse")):
         for variant in ("llvm_ad_rgb", "scalar_rgb"):
@@ -53,7 +53,6 @@ def print_ratios(rows: dict[str, Row]) -> None:
     for meshes in ("same", "coarse"):
         rates = [rate for key, rate in best.items() if key.startswith("a ") and meshes in key]
         best[f"a, {meshes} meshes"] = max(rates)
-    best["c, unit scene"], best["c, lattice"] = best["c1"], best["c2"]
     for what, over, under, goal in GOALS:
         for key in [key for key in best if key.startswith(f"{under}, ")]:
             if best[over] and best[key]:

@@ -8,6 +8,7 @@ import argparse
 import json
 import os
 import platform
+import re
 import site
 import statistics
 import subprocess
@@ -31,34 +32,19 @@ class Row:
     result: dict[str, Any]
 
     @property
-    def rate(self) -> float:
-        """Images a second, median of the repeats; 0 where the job failed."""
-        return self._rate(statistics.median)
-
-    @property
     def best(self) -> float:
         """Images a second, fastest repeat; 0 where the job failed."""
-        return self._rate(min)
-
-    def _rate(self, choose: Any) -> float:
-        if "error" in self.result:
-            return 0.0
-        return float(self.result["images"] / choose(self.result["seconds"]))
+        return self.result["images"] / min(self.result["seconds"]) if "note" in self.result else 0.0
 
     def cells(self) -> list[str]:
         """Return the row's cells."""
         if "error" in self.result:
-            return [self.what, "-", "-", "-", "-", "-", self.result["error"].replace("|", "/")]
-        repeats = len(self.result["seconds"])
-        return [
-            self.what,
-            f"{self.rate:,.0f}",
-            f"{self.best:,.0f}",
-            f"{1e3 / self.rate:.2f}",
-            f"{self.result['images']:,} x {repeats}",
-            f"{self.result['peak_mib']:,.0f}",
-            self.result["note"],
-        ]
+            return [self.what, *5 * "-", self.result["error"].replace("|", "/")]
+        images, seconds = self.result["images"], self.result["seconds"]
+        rate = images / statistics.median(seconds)
+        numbers = [f"{rate:,.0f}", f"{self.best:,.0f}", f"{1e3 / rate:.2f}"]
+        numbers += [f"{images:,} x {len(seconds)}", f"{self.result['peak_mib']:,.0f}"]
+        return [self.what, *numbers, self.result["note"]]
 
 
 class Session:
@@ -67,11 +53,8 @@ class Session:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         # Dr.Jit keeps compiled kernels in the home folder: start from none, and leave none behind.
-        self._environment = {
-            **os.environ,
-            "HOME": str(folder),
-            "PYTHONUSERBASE": site.getuserbase(),
-        }
+        own = {"HOME": str(folder), "PYTHONUSERBASE": site.getuserbase()}
+        self._environment = {**os.environ, **own}
 
     def run(self, job: str, **arguments: Any) -> dict[str, Any]:
         """Return what a job of `benchmarks.jobs` returns; {"error": text} where it fails."""
@@ -107,12 +90,9 @@ def print_report(
     """Read the command line, run the jobs, and print machine, table and ratios.
 
     Args:
-        description: first line of `--help`.
         jobs: (folder, quick) -> the jobs in order; those with an empty key make no row.
-        head: of the table's first column.
-        notes: below the table.
+        head: head of the table's first column.
         print_ratios: prints what the rows, by key, say about each other.
-        last: prints something more.
     """
     parser = argparse.ArgumentParser(description=description.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="measure fewer images")
@@ -122,14 +102,12 @@ def print_report(
         _print_machine(session.run("rooms:machine"))
         rows = {}
         for key, what, job, arguments in jobs(folder, quick):
-            result = session.run(job, **arguments)
-            if key:
-                rows[key] = Row(what, result)
-        cells = [head, "images/s, median", "best", "ms/image", "images", "MiB", "remarks"]
-        print("| " + " | ".join(cells) + " |")
-        print("| --- |" + " ---: |" * (len(cells) - 2) + " --- |")
-        for row in rows.values():
-            print("| " + " | ".join(row.cells()) + " |")
+            rows[key] = Row(what, session.run(job, **arguments))
+        rows.pop("", None)
+        heads = [head, "images/s, median", "best", "ms/image", "images", "MiB", "remarks"]
+        ruler = ["---", *["---:"] * 5, "---"]
+        for cells in (heads, ruler, *(row.cells() for row in rows.values())):
+            print("| " + " | ".join(cells) + " |")
         print(f"\n{notes}\n\nRatios of the best repeats:\n")  # noise only ever adds time
         print_ratios(rows)
         last(session)
@@ -138,13 +116,9 @@ def print_report(
 def _print_machine(machine: dict[str, Any]) -> None:
     versions = ", ".join(f"{name} {text}" for name, text in machine.get("versions", {}).items())
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    load = os.getloadavg()[0]
-    print(f"{_processor()}, {cores} cores (load before: {load:.1f}), {platform.system()}")
-    print(f"Python {platform.python_version()}, {versions}; variant {machine.get('variant')}\n")
-
-
-def _processor() -> str:
     info = Path("/proc/cpuinfo")
-    lines = info.read_text().splitlines() if info.exists() else []
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or platform.machine()
+    named = re.search(r"model name\s*: (.*)", info.read_text()) if info.exists() else None
+    processor = named[1] if named else platform.processor() or platform.machine()
+    load = os.getloadavg()[0]
+    print(f"{processor}, {cores} cores (load before: {load:.1f}), {platform.system()}")
+    print(f"Python {platform.python_version()}, {versions}; variant {machine.get('variant')}\n")

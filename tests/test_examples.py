@@ -15,6 +15,14 @@ ROOT = Path(__file__).parents[1]
 EXAMPLES, SAMPLE = ROOT / "examples", ROOT / "examples" / "sample"
 
 
+MISTAKES = (
+    ("no arguments", "arguments are required"),
+    ("no such file", "no such file"),
+    ("a file that exists", "exists"),
+    ("not HDF5", "not a readable HDF5 file"),
+)
+
+
 def run(name, *arguments, folder):
     command = [sys.executable, EXAMPLES / f"{name}.py", *arguments]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -34,16 +42,9 @@ def test_an_example_writes_what_can_be_scored(name, truths, tmp_path):
 @pytest.mark.parametrize(
     ("name", "mistake", "words"),
     [
-        ("submit", "no arguments", "arguments are required"),
-        ("submit", "no such file", "no such file"),
-        ("submit", "a file that exists", "exists"),
-        ("submit", "not HDF5", "not a readable HDF5 file"),
+        *((name, *mistake) for name in ("submit", "submit_iqtt") for mistake in MISTAKES),
         ("submit", "questions", "not a rooms file"),
-        ("submit_iqtt", "no arguments", "arguments are required"),
-        ("submit_iqtt", "no such file", "no such file"),
-        ("submit_iqtt", "a file that exists", "exists"),
-        ("submit_iqtt", "not HDF5", "not a readable HDF5 file"),
-        ("submit_iqtt", "rooms", "not a question file"),
+        ("submit_iqtt", "rooms", "'pix2shape-bench/rooms'"),
     ],
 )
 def test_a_mistake_ends_in_one_line_and_exit_code_2(name, mistake, words, truths, tmp_path):

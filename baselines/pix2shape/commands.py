@@ -65,12 +65,7 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
     " weights.json of a run lists all settings.",
 )
 @click.option("--seed", type=click.IntRange(0), help="Seed of every random choice  [0].")
-@_number(
-    "--labels",
-    least=0,
-    default=0,
-    text="Number of labelled questions whose answers may be learned from.",
-)
+@_number("--labels", least=0, default=0, text="Labelled questions whose answers may be used.")
 @click.option(
     "--conditional",
     is_flag=True,
@@ -169,12 +164,7 @@ def predict(
 
 
 def predict_to(out: str, weights: str | None, data: str, **how: Any) -> str:
-    """Write a submission, with a progress bar; return the weights that were used.
-
-    Args:
-        weights: None for the bundled ones that suit the data.
-        how: settings of `predict_file`.
-    """
+    """Write a submission with `predict_file`, and a progress bar; return the weights used."""
     needs_torch()
     from baselines.pix2shape.use.predict import predict_file
     from baselines.pix2shape.weights.bundled import suited
@@ -237,13 +227,7 @@ def interpolate(weights: str | None, data: str, items: list[int], steps: int, ou
 @click.option(
     "--items", type=Items(), default="0-5", show_default=True, help="Rows of the rooms to turn."
 )
-@_number(
-    "--degrees",
-    least=0,
-    most=90,
-    default=80,
-    text="How far the camera turns about the vertical axis.",
-)
+@_number("--degrees", least=0, most=90, default=80, text="Camera's turn about the vertical axis.")
 @_number("--frames", least=2, most=200, default=33, text="Number of pictures on the way there.")
 @click.option("--out", default="rotation.gif", show_default=True, help="GIF or WebP to write.")
 def rotate(
@@ -277,11 +261,9 @@ def _model_and_rooms(
 
 def needs_torch() -> None:
     """Raise UserError where an optional package is missing."""
-    missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
+    missing = ", ".join(name for name in PACKAGES if importlib.util.find_spec(name) is None)
     if missing:
-        raise UserError(
-            f"pix2shape needs {', '.join(missing)}: pip install 'pix2shape-bench[model]'"
-        )
+        raise UserError(f"pix2shape needs {missing}: pip install 'pix2shape-bench[model]'")
 
 
 COMMANDS = (train, predict, sample, interpolate, rotate)

@@ -15,19 +15,12 @@ from baselines.pix2shape.network.model import Pix2Shape, Views, shaded
 from baselines.pix2shape.network.surfels import normals_from_depth
 from scenegen.common.errors import SpecError
 from scenegen.common.new_file import check_writable, written_beside
-from scenegen.rooms.preview import (
-    BACKGROUND,
-    GAP,
-    SMALLEST_TILE,
-    check_picture_name,
-    depth_bytes,
-    save_picture,
-    srgb_bytes,
-)
+from scenegen.rooms import preview
+from scenegen.rooms.preview import BACKGROUND, GAP, SMALLEST_TILE
 
 Array = NDArray[Any]
 Tiles = list[NDArray[np.uint8]]  # (H, W, 3) each
-FRAME_SECONDS = 0.08
+FRAME_MILLISECONDS = 80
 
 
 @torch.no_grad()
@@ -39,17 +32,15 @@ def drawn(model: Pix2Shape, code: Tensor, views: Views) -> tuple[Tiles, Tiles, T
     if opacity is not None:
         depth = torch.where(opacity > 0.5, depth, torch.nan)
         normals = normals * (opacity > 0.5)[:, None]
-    return image_tiles(image), [depth_bytes(z.cpu().numpy()) for z in depth], _normal_tiles(normals)
+    depths = [preview.depth_bytes(z.cpu().numpy()) for z in depth]
+    xyz = np.moveaxis(normals.cpu().numpy(), 1, -1)
+    colors = np.rint(np.clip(xyz * 0.5 + 0.5, 0, 1) * 255).astype(np.uint8)
+    return image_tiles(image), depths, list(colors)
 
 
 def image_tiles(radiance: Tensor) -> Tiles:
     """Return tiles of images of linear radiance, (B, 3, H, W), encoded as sRGB."""
-    return [srgb_bytes(np.moveaxis(image.cpu().numpy(), 0, -1)) for image in radiance]
-
-
-def _normal_tiles(normals: Tensor) -> Tiles:
-    values = np.moveaxis(normals.cpu().numpy(), 1, -1)
-    return list(np.rint(np.clip(values * 0.5 + 0.5, 0, 1) * 255).astype(np.uint8))
+    return [preview.srgb_bytes(np.moveaxis(image.cpu().numpy(), 0, -1)) for image in radiance]
 
 
 def sheet(rows: Sequence[Tiles]) -> Image.Image:
@@ -87,7 +78,7 @@ def check_picture(path: str | Path, animated: bool = False) -> None:
     """Raise now what `save_pictures` would raise once all is drawn."""
     path = Path(path)
     if not animated:
-        check_picture_name(path)
+        preview.check_picture_name(path)
     elif path.suffix.lower() not in (".gif", ".webp"):
         raise SpecError("out", repr(path.name), "an animation's name such as turn.gif")
     check_writable(path, overwrite=True)
@@ -100,14 +91,8 @@ def save_pictures(frames: Sequence[Image.Image], path: str | Path) -> None:
     """
     check_picture(path, len(frames) > 1)
     if len(frames) == 1:
-        save_picture(frames[0], path)
+        preview.save_picture(frames[0], path)
         return
-    turn = [*frames, *frames[-2:0:-1]]
+    rest, pause = [*frames[1:], *frames[-2:0:-1]], FRAME_MILLISECONDS
     with written_beside(path, overwrite=True) as temporary:
-        turn[0].save(
-            temporary,
-            save_all=True,
-            append_images=turn[1:],
-            duration=round(FRAME_SECONDS * 1000),
-            loop=0,
-        )
+        frames[0].save(temporary, save_all=True, append_images=rest, duration=pause, loop=0)

@@ -7,7 +7,7 @@ Only the ray parameter and an id are evaluated.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -28,6 +28,7 @@ from scenegen.rendering.rays import Scenes, closest_hit
 from scenegen.rendering.unit_scene import mitsuba_shape
 
 Array = NDArray[Any]
+Casts = Sequence[Callable[[], tuple[Any, Any]]]
 BATCHES = (64, 256)
 SPACING = 2.0  # lattice: the camera is 1.5 from a point inside the unit room, so its rays stay near
 CHECKED = 16  # images whose depths are compared with the stored ones
@@ -38,54 +39,58 @@ def unit_scene(rooms: str, count: int, repeats: int) -> dict[str, Any]:
     variant = select_variant("cpu")
     mi.set_variant(variant)
     spec, scenes = read_scenes(rooms, count)
-    seconds = {}
-    for size in BATCHES:
-        batches = [pack(spec, scenes[i : i + size]) for i in range(0, count, size)]
-        casts = [
-            partial(
-                cast_at_unit_scene,
-                upload_scenes(batch, variant)[0],
-                camera_table(batch),
-                len(batch),
-                spec,
-            )
-            for batch in batches
-        ]
-        seconds[size] = repeat(partial(evaluate, casts), repeats)
-    wrong = share_of_wrong_depths(casts[0]()[0], rooms, spec)
-    size = min(seconds, key=lambda key: min(seconds[key]))
-    note = f"no build; batches of {size}; depths off by > 1e-4: {wrong:.4%}"
-    return {"seconds": seconds[size], "images": count, "note": note}
+
+    def ways() -> Iterator[tuple[str, Casts]]:
+        for size in BATCHES:
+            batches = [pack(spec, scenes[i : i + size]) for i in range(0, count, size)]
+            known = [(one, upload_scenes(one, variant)[0], camera_table(one)) for one in batches]
+            yield f"batches of {size}", [partial(cast_at_unit_scene, *one) for one in known]
+
+    seconds, note = fastest(ways(), repeats, rooms, spec)
+    return {"seconds": seconds, "images": count, "note": f"no build; {note}"}
 
 
 def lattice(rooms: str, count: int, repeats: int) -> dict[str, Any]:
     """Time the cast at the lattice for the better batch size and kind of traversal."""
     mi.set_variant(select_variant("cpu"))
     spec, scenes = read_scenes(rooms, count)
-    groups = shape_groups(spec)
-    seconds, build = {}, {}
-    for size in BATCHES:
-        batches = [pack(spec, scenes[i : i + size]) for i in range(0, count, size)]
-        start = time.perf_counter()
-        built = [build_lattice(batch, groups) for batch in batches]
-        build[size] = time.perf_counter() - start
-        for coherent in (False, True):
-            casts = [
-                partial(cast_at_lattice, scene, table, len(batch), spec, coherent)
-                for batch, (scene, table) in zip(batches, built, strict=True)
-            ]
-            seconds[size, coherent] = repeat(partial(evaluate, casts), repeats)
-    wrong = share_of_wrong_depths(casts[0]()[0], rooms, spec)
-    size, coherent = min(seconds, key=lambda key: min(seconds[key]))
-    apart = ", ".join(f"{build[size] / count * 1e3:.2f} in batches of {size}" for size in BATCHES)
-    note = (
-        f"batches of {size}, coherent={coherent}; build apart, ms/image: {apart};"
-        f" depths off by > 1e-4: {wrong:.4%}"
-    )
-    return {"seconds": seconds[size, coherent], "images": count, "note": note}
+    groups, build = shape_groups(spec), []
+
+    def ways() -> Iterator[tuple[str, Casts]]:
+        for size in BATCHES:
+            batches = [pack(spec, scenes[i : i + size]) for i in range(0, count, size)]
+            start = time.perf_counter()
+            built = [build_lattice(batch, groups) for batch in batches]
+            spent = (time.perf_counter() - start) / count
+            build.append(f"{1e3 * spent:.2f} in batches of {size}")
+            for coherent in (False, True):
+                pairs = zip(batches, built, strict=True)
+                casts = [partial(cast_at_lattice, one, *known, coherent) for one, known in pairs]
+                yield f"batches of {size}, coherent={coherent}", casts
+
+    seconds, note = fastest(ways(), repeats, rooms, spec)
+    note = f"{note}; build apart, ms/image: {', '.join(build)}"
+    return {"seconds": seconds, "images": count, "note": note}
 
 
-def evaluate(casts: Sequence[Callable[[], tuple[Any, Any]]]) -> None:
+def fastest(
+    ways: Iterator[tuple[str, Casts]], repeats: int, rooms: str, spec: DatasetSpec
+) -> tuple[list[float], str]:
+    """Return the seconds of the way with the fastest repeat, and a note that names it.
+
+    The ways are made one after another, as Mitsuba slows down with the shapes that are alive.
+    """
+    seconds = {}
+    for name, casts in ways:
+        seconds[name] = repeat(partial(evaluate, casts), repeats)
+    stored = read_depth(rooms, CHECKED)
+    found = casts[0]()[0].numpy().reshape(-1, spec.height, spec.width)[:CHECKED]
+    wrong = float((np.abs(found - stored) > 1e-4).mean())
+    best = min(seconds, key=lambda name: min(seconds[name]))
+    return seconds[best], f"{best}; depths off by > 1e-4: {wrong:.4%}"
+
+
+def evaluate(casts: Casts) -> None:
     """Run casts one behind the other and wait for the last."""
     for cast in casts:
         dr.eval(*cast())
@@ -102,10 +107,10 @@ def camera_table(batch: SceneBatch, offset: Array | float = 0.0) -> Any:
     return mi.Float(table.astype(np.float32).ravel())
 
 
-def rays(table: Any, images: int, spec: DatasetSpec) -> tuple[Any, Any, Any, Any]:
+def rays(batch: SceneBatch, table: Any) -> tuple[Any, Any, Any, Any]:
     """Return image number, origin and direction of each primary ray, and the scene's offset."""
-    pixels = spec.height * spec.width
-    index = dr.arange(mi.UInt32, images * pixels)
+    spec, pixels = batch.spec, batch.spec.height * batch.spec.width
+    index = dr.arange(mi.UInt32, len(batch) * pixels)
     item = index // pixels
     pixel = index - item * pixels
     row = pixel // spec.width
@@ -117,11 +122,9 @@ def rays(table: Any, images: int, spec: DatasetSpec) -> tuple[Any, Any, Any, Any
     return item, origin, right * x + up * y - back, mi.Vector3f(*camera[13:])
 
 
-def cast_at_unit_scene(
-    scenes: Scenes, table: Any, images: int, spec: DatasetSpec
-) -> tuple[Any, Any]:
+def cast_at_unit_scene(batch: SceneBatch, scenes: Scenes, table: Any) -> tuple[Any, Any]:
     """Return ray parameter and object id of the nearest hits."""
-    item, origin, direction, _ = rays(table, images, spec)
+    item, origin, direction, _ = rays(batch, table)
     t, object_id, _, _ = closest_hit(scenes, item, origin, direction)
     return t, object_id
 
@@ -147,28 +150,17 @@ def build_lattice(batch: SceneBatch, groups: dict[str, Any]) -> tuple[Any, Any]:
     contents: dict[str, Any] = {"type": "scene", **groups}
     for b, k in np.argwhere(batch.shape >= 0):
         group = groups.get(batch.spec.shapes[batch.shape[b, k]])
-        matrix = mi.ScalarTransform4f(matrices[b, k])
-        if group is None:
-            contents[f"object_{b}_{k}"] = {"type": "sphere", "to_world": matrix}
-        else:
-            contents[f"object_{b}_{k}"] = {"type": "instance", "group": group, "to_world": matrix}
+        kind = {"type": "sphere"} if group is None else {"type": "instance", "group": group}
+        kind["to_world"] = mi.ScalarTransform4f(matrices[b, k])
+        contents[f"object_{b}_{k}"] = kind
     return mi.load_dict(contents), camera_table(batch, offset)
 
 
-def cast_at_lattice(
-    scene: Any, table: Any, images: int, spec: DatasetSpec, coherent: bool
-) -> tuple[Any, Any]:
+def cast_at_lattice(batch: SceneBatch, scene: Any, table: Any, coherent: bool) -> tuple[Any, Any]:
     """Return ray parameter and instance of the nearest hits; the room is three planes."""
-    _, origin, direction, offset = rays(table, images, spec)
+    _, origin, direction, offset = rays(batch, table)
     planes = [dr.select(direction[i] < 0, -origin[i] / direction[i], dr.inf) for i in range(3)]
     room = dr.minimum(planes[0], dr.minimum(planes[1], planes[2]))
     ray = mi.Ray3f(mi.Ray3f(mi.Point3f(origin + offset), direction), room)
     hit = scene.ray_intersect_preliminary(ray, coherent=coherent)
     return dr.minimum(hit.t, room), dr.reinterpret_array(mi.UInt32, hit.instance)
-
-
-def share_of_wrong_depths(t: Any, rooms: str, spec: DatasetSpec) -> float:
-    """Return the share of the first images' depths that differ from the stored ones."""
-    stored = read_depth(rooms, CHECKED)
-    cast = t.numpy().reshape(-1, spec.height, spec.width)[:CHECKED]
-    return float((np.abs(cast - stored) > 1e-4).mean())

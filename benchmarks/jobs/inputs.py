@@ -10,9 +10,7 @@ from trimesh.grouping import unique_rows
 
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
-from scenegen.objects.catalogue import Objects
 from scenegen.objects.solids import UnitShape
-from scenegen.objects.sources import file_objects
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
@@ -24,11 +22,6 @@ def read_scenes(rooms: str, count: int) -> tuple[DatasetSpec, list[SceneSpec]]:
     """Return a file's spec and its first `count` scenes."""
     with RoomsFile(rooms) as file:
         return file.spec, [file.scene(row) for row in range(count)]
-
-
-def read_objects(spec: DatasetSpec, root: str) -> Objects:
-    """Return the objects of the scenes: built in, or the meshes of a folder."""
-    return file_objects(spec, objects_root=root or None)
 
 
 def read_depth(rooms: str, count: int) -> Array:
@@ -67,20 +60,17 @@ def moved(mesh: Mesh, world_from_object: Array) -> Mesh:
 def join(meshes: list[Mesh]) -> Mesh:
     """Put meshes into one."""
     starts = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
-    return Mesh(
-        np.concatenate([mesh.points for mesh in meshes]),
-        np.concatenate([mesh.normals for mesh in meshes]),
-        np.concatenate([mesh.faces + s for mesh, s in zip(meshes, starts[:-1], strict=True)]),
-    )
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)]
+    parts = ([mesh.points for mesh in meshes], [mesh.normals for mesh in meshes], faces)
+    return Mesh(*map(np.concatenate, parts))
 
 
 def _weld(shape: UnitShape, coarse: bool) -> Mesh:
     points, normals = shape.triangles.reshape(-1, 3), shape.normals.reshape(-1, 3)
-    corners = np.concatenate([points, normals], axis=1)
     drawn = coarse and len(shape.triangles) >= COARSE_FROM
     if drawn:
         points = np.round(points * COARSE_GRID) / COARSE_GRID
-        corners = points
+    corners = points if drawn else np.concatenate([points, normals], axis=1)
     first, number = unique_rows(corners, digits=6)
     faces = number.reshape(-1, 3)
     if drawn:

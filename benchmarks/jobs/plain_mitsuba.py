@@ -21,26 +21,21 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.jobs.inputs import (
-    Mesh,
-    join,
-    moved,
-    read_depth,
-    read_objects,
-    read_scenes,
-    unit_meshes,
-)
+from benchmarks.jobs.inputs import Mesh, join, moved, read_depth, read_scenes, unit_meshes
 from benchmarks.jobs.timing import repeat
+from iqtt.questions.specs import SplitSpec
 from scenegen.camera import Camera, pixel_directions
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.scene_mesh import room_mesh, world_from_object
+from scenegen.objects.sources import file_objects
 from scenegen.rendering.backend import select_variant
 
 Array = NDArray[Any]
 WAYS = ("files", "merged", "instances")
 DEPTH = 3  # channel of the distance, behind the colour
-NEAR = 0.01  # Mitsuba counts distances from its near plane
+NEAR = 0.01  # Mitsuba counts distances from its near plane; this is its default
+DIRECT = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +64,10 @@ def per_scene(
 
     Instances come last: Mitsuba slows down with the number of shapes that are alive, used or not.
     """
-    if variant != "scalar_rgb":
-        select_variant("cpu")  # raises where there is no good LLVM
-    mi.set_variant(variant)
-    mi.set_log_level(mi.LogLevel.Error)
+    choose(variant)
     spec, scenes = read_scenes(rooms, count)
     names = {item.shape: None for scene in scenes for item in scene.objects}
-    meshes = unit_meshes(names, coarse, read_objects(spec, root).shape)
+    meshes = unit_meshes(names, coarse, file_objects(spec, objects_root=root or None).shape)
     seconds = {}
     for way in ways:
         kit = prepare(spec, way, meshes, f"{folder}/{variant}-{coarse}")
@@ -84,6 +76,14 @@ def per_scene(
     fastest = min(ways, key=lambda way: min(seconds[way]))
     rates = ", ".join(f"{way} {count / min(seconds[way]):.0f}" for way in ways)
     return {"seconds": seconds[fastest], "images": count, "note": f"of {rates}"}
+
+
+def choose(variant: str) -> None:
+    """Set Mitsuba's variant. Raises where it needs LLVM and there is no good one."""
+    if variant != "scalar_rgb":
+        select_variant("cpu")
+    mi.set_variant(variant)
+    mi.set_log_level(mi.LogLevel.Error)
 
 
 def render_all(kit: Kit, scenes: list[SceneSpec]) -> None:
@@ -100,9 +100,7 @@ def render_scene(kit: Kit, scene: SceneSpec, number: int) -> Array:
 
 def prepare(spec: DatasetSpec, way: str, meshes: dict[str, Mesh], stem: str) -> Kit:
     """Make what all scenes share."""
-    material = mi.load_dict(
-        {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(spec.reflectance)}}
-    )
+    material = diffuse(spec.reflectance)
     objects: dict[str, Any] = {}
     for name, mesh in meshes.items():
         if way == "files":
@@ -115,25 +113,16 @@ def prepare(spec: DatasetSpec, way: str, meshes: dict[str, Mesh], stem: str) -> 
             objects[name] = mesh
     shell = room_mesh()
     room = Mesh(np.array(shell.vertices), np.array(shell.vertex_normals), np.array(shell.faces))
-    direct = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
-    aov = {"type": "aov", "aovs": "distance:depth,normal:sh_normal", "colour": direct}
+    aov = {"type": "aov", "aovs": "distance:depth,normal:sh_normal", "colour": DIRECT}
     return Kit(spec, way, objects, room, material, mi.load_dict(aov))
 
 
 def describe(kit: Kit, scene: SceneSpec) -> dict[str, Any]:
     """Return the scene as `mi.load_dict` wants it."""
-    contents = {
-        "type": "scene",
-        "integrator": kit.integrator,
-        "sensor": sensor(kit.spec, scene.cameras[0], NEAR),
-    }
+    contents = {"type": "scene", "integrator": kit.integrator}
+    contents["sensor"] = sensor(kit.spec, scene.cameras[0])
     for j, light in enumerate(scene.lights):
-        power = {"type": "rgb", "value": list(light.color)}
-        contents[f"light{j}"] = {
-            "type": "point",
-            "position": list(light.position),
-            "intensity": power,
-        }
+        contents[f"light{j}"] = point_light(light.position, light.color)
     merged = [kit.room]
     for k, item in enumerate(scene.objects):
         matrix = world_from_object(item.position, item.rotation, item.scale)
@@ -154,35 +143,34 @@ def describe(kit: Kit, scene: SceneSpec) -> dict[str, Any]:
         contents["meshes"] = mitsuba_mesh("meshes", join(merged), kit.material)
     else:
         for axis, to_world in enumerate(room_planes()):
-            contents[f"plane{axis}"] = {
-                "type": "rectangle",
-                "to_world": to_world,
-                "bsdf": kit.material,
-            }
+            plane = {"type": "rectangle", "to_world": to_world, "bsdf": kit.material}
+            contents[f"plane{axis}"] = plane
     return contents
 
 
-def sensor(spec: Any, camera: Camera, near: float = 0.01) -> dict[str, Any]:
-    """Return camera, film and sampler: one sample a pixel, box filter.
+def point_light(position: Sequence[float], color: Sequence[float]) -> dict[str, Any]:
+    """Return a point light of some radiant intensity."""
+    power = {"type": "rgb", "value": list(color)}
+    return {"type": "point", "position": list(position), "intensity": power}
 
-    Args:
-        spec: anything with the images' height and width.
-        near: distance of the near plane, Mitsuba's default if not given.
-    """
+
+def diffuse(reflectance: Sequence[float]) -> Any:
+    """Return a matte material."""
+    return mi.load_dict(
+        {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(reflectance)}}
+    )
+
+
+def sensor(spec: DatasetSpec | SplitSpec, camera: Camera) -> dict[str, Any]:
+    """Return camera, film and sampler: one sample a pixel, box filter."""
     view = mi.ScalarTransform4f().look_at(
         origin=list(camera.position), target=list(camera.target), up=[0, 1, 0]
     )
     film = {"type": "hdrfilm", "width": spec.width, "height": spec.height}
     film |= {"pixel_format": "rgb", "component_format": "float32", "rfilter": {"type": "box"}}
-    return {
-        "type": "perspective",
-        "fov": camera.fov_y_degrees,
-        "fov_axis": "y",
-        "near_clip": near,
-        "to_world": view,
-        "film": film,
-        "sampler": {"type": "independent", "sample_count": 1},
-    }
+    lens = {"fov": camera.fov_y_degrees, "fov_axis": "y", "near_clip": NEAR, "to_world": view}
+    sampler = {"type": "independent", "sample_count": 1}
+    return {"type": "perspective", **lens, "film": film, "sampler": sampler}
 
 
 def room_planes() -> list[Any]:

@@ -10,8 +10,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from benchmarks.jobs import plain_mitsuba as plain
 from benchmarks.jobs.inputs import Mesh
-from benchmarks.jobs.plain_mitsuba import mitsuba_mesh, sensor
 from benchmarks.jobs.timing import repeat, seconds_of
 from iqtt.files.make import make_split
 from iqtt.questions.distractors import make_pools
@@ -20,7 +20,6 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.render import render_questions
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.scene_mesh import welded
-from scenegen.rendering.backend import select_variant
 from scenegen.rendering.renderer import launch_fields
 
 
@@ -54,14 +53,11 @@ def per_image(questions: int, repeats: int, variant: str) -> dict[str, Any]:
 
     The cubes of a shape enter as one mesh, made outside the clock, in the camera's frame.
     """
-    if variant != "scalar_rgb":
-        select_variant("cpu")
     spec = SplitSpec()
     made = _questions(spec, questions)
-    mi.set_variant(variant)
-    mi.set_log_level(mi.LogLevel.Error)
+    plain.choose(variant)
     images = [_image(spec, question, i) for question in made for i in range(4)]
-    integrator = mi.load_dict({"type": "direct", "emitter_samples": 1, "bsdf_samples": 0})
+    integrator = mi.load_dict(plain.DIRECT)
     seconds = repeat(partial(_render_all, spec, images, integrator), repeats)
     return {"seconds": seconds, "images": len(images), "note": "one load_dict, one render each"}
 
@@ -81,25 +77,15 @@ def _image(spec: SplitSpec, question: Question, i: int) -> dict[str, Any]:
     points = (centres[:, None] + corners).reshape(-1, 3) @ question.world_from_shape[i].T
     faces = np.concatenate([np.asarray(box.faces) + k * len(corners) for k in range(len(cubes))])
     mesh = Mesh(points, np.zeros_like(points), faces)
-    grey = {"type": "rgb", "value": list(spec.reflectance)}
-    contents: dict[str, Any] = {
-        "mesh": mitsuba_mesh("cubes", mesh, mi.load_dict({"type": "diffuse", "reflectance": grey}))
-    }
+    contents = {"mesh": plain.mitsuba_mesh("cubes", mesh, plain.diffuse(spec.reflectance))}
     for j in range(int(question.light_count[i])):
-        power = {"type": "rgb", "value": question.light_color[i, j].tolist()}
-        position = question.light_position[i, j].tolist()
-        contents[f"light{j}"] = {"type": "point", "position": position, "intensity": power}
+        position, color = question.light_position[i, j], question.light_color[i, j]
+        contents[f"light{j}"] = plain.point_light(position.tolist(), color.tolist())
     return contents
 
 
 def _render_all(spec: SplitSpec, images: list[dict[str, Any]], integrator: Any) -> None:
     for number, contents in enumerate(images):
-        scene = mi.load_dict(
-            {
-                "type": "scene",
-                "integrator": integrator,
-                "sensor": sensor(spec, spec.camera),
-                **contents,
-            }
-        )
+        own = {"type": "scene", "integrator": integrator, **contents}
+        scene = mi.load_dict({**own, "sensor": plain.sensor(spec, spec.camera)})
         np.array(mi.render(scene, spp=1, seed=number))

@@ -3,6 +3,7 @@
 import importlib.metadata
 import statistics
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,11 @@ from benchmarks.jobs.timing import STARTED, repeat, seconds_of
 
 def machine() -> dict[str, Any]:
     """Return the versions and the variant, which only a process that renders can tell."""
-    from scenegen.rendering.backend import find_llvm, llvm_version, select_variant
+    from scenegen.rendering.backend import select_variant, versions
 
-    names = ("mitsuba", "drjit", "numpy", "h5py", "isal")
-    versions = {name: importlib.metadata.version(name) for name in names}
-    library = find_llvm()
-    llvm = str(llvm_version(library)[0]) if library else "none that works"
-    return {"versions": {**versions, "LLVM": llvm}, "variant": select_variant("auto")}
+    found = {name.removesuffix("_version"): text for name, text in versions().items()}
+    found |= {name: importlib.metadata.version(name) for name in ("numpy", "h5py", "isal")}
+    return {"versions": found, "variant": select_variant("auto")}
 
 
 def end_to_end(rooms: str, count: int, repeats: int) -> dict[str, Any]:
@@ -44,10 +43,8 @@ def end_to_end(rooms: str, count: int, repeats: int) -> dict[str, Any]:
         seconds.append(make(count))
         steady.append((count - quarter) / (seconds[-1] - short))
     size = Path(rooms).stat().st_size / count / 1024
-    note = (
-        f"steady {statistics.median(steady):.0f}; first {DEFAULT_BATCH} rows {first:.1f} s after"
-        f" the process began; {size:.0f} KiB a row"
-    )
+    note = f"steady {statistics.median(steady):.0f}; first {DEFAULT_BATCH} rows {first:.1f} s after"
+    note += f" the process began; {size:.0f} KiB a row"
     return {"seconds": seconds, "images": count, "note": note}
 
 
@@ -64,9 +61,8 @@ def from_nothing(
     spec = preset_spec(preset, **source.settings, **settings)
     warm = preset_spec(preset, seed=1, **settings)
     make_dataset(rooms, warm, DEFAULT_BATCH, overwrite=True)
-    seconds = seconds_of(
-        lambda: make_dataset(rooms, spec, count, objects=source.objects, overwrite=True)
-    )
+    make = partial(make_dataset, rooms, spec, count, objects=source.objects, overwrite=True)
+    seconds = seconds_of(make)
     _, scenes = read_scenes(rooms, count)
     models = len({item.shape for scene in scenes for item in scene.objects})
     return {"seconds": [seconds], "images": count, "note": f"{models:,} different models"}
@@ -92,13 +88,14 @@ def stage(rooms: str, count: int, repeats: int, root: str = "") -> dict[str, Any
 
     As in make_dataset, a batch is packed while the one before is cast.
     """
-    from benchmarks.jobs.inputs import read_objects, read_scenes
+    from benchmarks.jobs.inputs import read_scenes
+    from scenegen.objects.sources import file_objects
     from scenegen.rendering.packing import pack
     from scenegen.rendering.renderer import launch
     from scenegen.rooms.make import DEFAULT_BATCH
 
     spec, scenes = read_scenes(rooms, count)
-    objects = read_objects(spec, root)
+    objects = file_objects(spec, objects_root=root or None)
     parts = [scenes[i : i + DEFAULT_BATCH] for i in range(0, count, DEFAULT_BATCH)]
 
     def render_all() -> None:
@@ -109,6 +106,5 @@ def stage(rooms: str, count: int, repeats: int, root: str = "") -> dict[str, Any
                 batch = pack(spec, following, objects=objects)
             fetch()
 
-    seconds = repeat(render_all, repeats)
     note = f"batches of {DEFAULT_BATCH}; pack, launch, fetch"
-    return {"seconds": seconds, "images": count, "note": note}
+    return {"seconds": repeat(render_all, repeats), "images": count, "note": note}

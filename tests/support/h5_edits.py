@@ -10,10 +10,7 @@ def attribute(name, value):
 def gone(*names):
     def edit(file):
         for name in names:
-            if name in file:
-                del file[name]
-            else:
-                del file.attrs[name]
+            del (file if name in file else file.attrs)[name]
 
     return edit
 

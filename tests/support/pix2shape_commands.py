@@ -13,11 +13,8 @@ import cli
 
 
 def invoke(group: Any, *arguments: object) -> Any:
-    """Run a command; a traceback is a failure."""
-    result = CliRunner().invoke(group, [str(a) for a in arguments])
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise AssertionError(f"a traceback: {result.exception!r}") from result.exception
-    return result
+    """Run a command inside this process, which raises what the command raises."""
+    return CliRunner().invoke(group, [str(a) for a in arguments], catch_exceptions=False)
 
 
 def pix2shape(*arguments: object) -> Any:
@@ -43,9 +40,6 @@ def prepare(folder: Path, rooms: Path, questions: Path, make_rooms: Callable[...
     written(folder / "rooms.safetensors", tiny(), **known)
     written(folder / "questions.safetensors", of_questions(folder / "iqtt-train.h5"))
     written(folder / "classes.safetensors", tiny(classes=2), classes=("mug", "bowl"), **known)
-    shutil.copy(folder / "rooms.safetensors", folder / "alone.safetensors")
-    shutil.copy(folder / "rooms.safetensors", folder / "garbage.safetensors")
-    (folder / "garbage.json").write_text('{"config": ')
     (folder / "text.safetensors").write_text("no weights")
     shutil.copy(folder / "rooms.json", folder / "text.json")
     return folder

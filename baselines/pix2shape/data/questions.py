@@ -36,18 +36,16 @@ class QuestionImages(Dataset[dict[str, Any]]):
             check_reducible(path, questions.height, questions.width, self._size)
             if questions.spec is None or not questions.has_truth or not len(questions):
                 lights = "with" if questions.has_truth else "without"
-                raise SpecError(
-                    path,
+                expected = "some, with the group `truth` that tells the lights"
+                found, hint = (
                     f"{len(questions)} questions {lights} lights",
-                    "some, with the group `truth` that tells the lights",
                     "`iqtt make-split` writes it",
                 )
+                raise SpecError(path, found, expected, hint)
             self.spec = questions.spec
-            fields = ["questions", "light_position", "light_color"]
             self.has_answers = questions.has_answers
-        self._rows = QuestionsDataset(
-            path, part, [*fields, "answers"] if self.has_answers else fields
-        )
+        fields = ["questions", "light_position", "light_color", *["answers"] * self.has_answers]
+        self._rows = QuestionsDataset(path, part, fields)
         self.fingerprint = self._rows.fingerprint
         self.fov_y_degrees = self.spec.camera.fov_y_degrees
         self._camera = self.spec.camera.world_from_camera
@@ -65,11 +63,10 @@ class QuestionImages(Dataset[dict[str, Any]]):
             "condition": np.empty((4, 0)),
             "light_position": (stored["light_position"] - place) @ self._camera[:3, :3],
             "light_color": stored["light_color"],
-            "ambient": np.tile(self.spec.ambient, (4, 1)),
             "attenuation": np.tile((0.0, 1.0), (4, 1)),
-            "reflectance": np.tile(self.spec.reflectance, (4, 1)),
-            "background": np.tile(self.spec.background, (4, 1)),
         }
+        for name in ("ambient", "reflectance", "background"):
+            known[name] = np.tile(getattr(self.spec, name), (4, 1))
         item: dict[str, Any] = {name: np.float32(value) for name, value in known.items()}
         if self.has_answers:
             item["answer"] = int(stored["answers"])
@@ -100,11 +97,7 @@ def for_questions(config: ModelConfig, path: str | Path, part: str | None) -> Mo
         distance = float(np.linalg.norm(questions.spec.camera.world_from_camera[:3, 3]))
         radius = questions.spec.max_radius
     spec = replace(spec, camera=False, classes=0, standardised=True)
-    return replace(
-        config,
-        networks=replace(spec, z_scene=spec.z - Z_VIEW, z_view=Z_VIEW),
-        depth_middle=distance,
-        depth_reach=min(0.9, radius / distance),
-        opacity=True,
-        consistency=0.0,
-    )
+    spec = replace(spec, z_scene=spec.z - Z_VIEW, z_view=Z_VIEW)
+    reach = min(0.9, radius / distance)
+    config = replace(config, networks=spec, depth_middle=distance, depth_reach=reach)
+    return replace(config, opacity=True, consistency=0.0)

@@ -34,7 +34,6 @@ class Batch:
 
     Attributes:
         image: linear radiance, (B, 3, S, S).
-        views: cameras, classes and lights.
         depth: planar, scene units, (B, S, S), NaN where there is no surface; None unless depth
             supervision is on.
     """
@@ -81,11 +80,11 @@ class RoomImages(Dataset[dict[str, Any]]):
             check_reducible(path, rooms.spec.height, rooms.spec.width, spec.size)
             self.spec = rooms.spec
             self.world_from_camera = rooms.read("camera/world_from_camera", slice(None))
-            self.light_position = rooms.read("light/position", slice(None))
-            self.light_color = rooms.read("light/color", slice(None))
-            self.ambient = rooms.read("light/ambient", slice(None))
-            self.attenuation = rooms.read("light/attenuation", slice(None))
-            self.reflectance = self._uniform_reflectance(path, rooms)
+            self._told = {
+                name: rooms.read(f"light/{name.removeprefix('light_')}", slice(None))
+                for name in ("light_position", "light_color", "ambient", "attenuation")
+            }
+            self._told["reflectance"] = self._uniform_reflectance(path, rooms)
             self.classes: tuple[str, ...] = tuple(rooms.spec.shapes)
             self.label = rooms.read("object/shape", slice(None))[:, 0]
         if spec.classes and spec.classes != len(self.classes):
@@ -105,16 +104,13 @@ class RoomImages(Dataset[dict[str, Any]]):
         used = np.arange(every.shape[1]) <= rooms.read("object/count", slice(None))[:, None]
         shiny = rooms.read("material/specular", slice(None)).any()
         if shiny or ((every != every[:, :1]).any(axis=2) & used).any():
-            raise SpecError(
-                path,
-                "rooms of several materials",
-                "one matte reflectance in each image",
-                "the model is told the material, and several would tell it the shapes",
-            )
+            expected = "one matte reflectance in each image"
+            why = "the model is told the material, and several would tell it the shapes"
+            raise SpecError(path, "rooms of several materials", expected, why)
         return every[:, 0]
 
     def __len__(self) -> int:
-        return len(self.ambient)
+        return len(self.world_from_camera)
 
     def __getitem__(self, row: int) -> dict[str, Any]:
         """Return one image and what the model is told about it, as float32 arrays."""
@@ -135,15 +131,10 @@ class RoomImages(Dataset[dict[str, Any]]):
         condition = [pose[:3, 3]] if self._networks.camera else []
         if self._networks.classes:
             condition.append(np.eye(self._networks.classes)[self.label[row]])
-        known = {
-            "condition": np.concatenate([np.empty(0), *condition]),
-            "light_position": (self.light_position[row] - pose[:3, 3]) @ pose[:3, :3],
-            "light_color": self.light_color[row],
-            "ambient": self.ambient[row],
-            "attenuation": self.attenuation[row],
-            "reflectance": self.reflectance[row],
-            "world_from_camera": pose,
-        }
+        known = {name: values[row] for name, values in self._told.items()}
+        known["light_position"] = (known["light_position"] - pose[:3, 3]) @ pose[:3, :3]
+        known["condition"] = np.concatenate([np.empty(0), *condition])
+        known["world_from_camera"] = pose
         return {name: np.float32(value) for name, value in known.items()}
 
 
@@ -173,12 +164,7 @@ class Draws(Sampler[list[int]]):
     def __init__(
         self, rows: int, batch: int, seed: int, first: int = 0, share: slice = slice(None)
     ) -> None:
-        """Draw from `rows` rows.
-
-        Args:
-            first: number of the batch to begin with.
-            share: which rows of every batch this process takes, where several train together.
-        """
+        """Begin with batch `first`; this process takes a `share` of the rows of every batch."""
         self._rows, self._batch, self._seed = rows, batch, seed
         self._first, self._share = first, share
 

@@ -119,10 +119,8 @@ class Encoder(nn.Module):
     def __init__(self, spec: NetworkSpec) -> None:
         super().__init__()
         widths = spec.channels(ENCODER_CHANNELS)
-        before = [3 + spec.condition, *widths[:-1]]
-        self.layers = nn.ModuleList(
-            nn.Conv2d(a, b, 4, 2, 1) for a, b in zip(before, widths, strict=True)
-        )
+        pairs = itertools.pairwise([3 + spec.condition, *widths])
+        self.layers = nn.ModuleList(nn.Conv2d(a, b, 4, 2, 1) for a, b in pairs)
         self.norms = nn.ModuleList(ConditionalNorm(b, spec.condition) for b in widths[:-1])
         self.last = nn.Conv2d(widths[-1], spec.z, 4)
         self.standard = nn.BatchNorm1d(spec.z, affine=False) if spec.standardised else nn.Identity()
@@ -164,9 +162,7 @@ class Decoder(nn.Module):
         values = torch.cat([code, condition], dim=1)[..., None, None]
         for layer, norm in zip(self.layers, self.norms, strict=True):
             values = self.activation(norm(layer(values), condition))
-        with torch.autocast(
-            values.device.type, enabled=False
-        ):  # bfloat16 has too few bits for depth
+        with torch.autocast(values.device.type, enabled=False):  # bfloat16 is too coarse for depth
             return self.last(_full(values))
 
 
@@ -200,10 +196,8 @@ class Statistics(nn.Module):
     def __init__(self, spec: NetworkSpec) -> None:
         super().__init__()
         first, second = STATISTICS_CHANNELS
-        self.layers = nn.Sequential(
-            nn.Linear(spec.z, first), nn.ELU(), nn.Linear(first, second), nn.ELU(),
-            nn.Linear(second, 1),
-        )  # fmt: skip
+        hidden = nn.Linear(spec.z, first), nn.ELU(), nn.Linear(first, second), nn.ELU()
+        self.layers = nn.Sequential(*hidden, nn.Linear(second, 1))
 
     def forward(self, z_scene: Tensor, z_view: Tensor) -> Tensor:
         """(B, z_scene), (B, z_view) -> (B,)."""

@@ -28,18 +28,10 @@ CONFIGS: dict[str, dict[str, Any]] = {
         "question_batch": 32,
     },
 }
-
-
 LOSSES = (
-    "adversarial",
-    "reconstruction",
-    "code_reconstruction",
-    "consistency",
-    "mutual_information",
-    "questions",
-    "contrast",
-    "depth",
-)
+    "adversarial", "reconstruction", "code_reconstruction", "consistency", "mutual_information",
+    "questions", "contrast", "depth",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -84,10 +84,8 @@ def extrapolated(values: Tensor) -> Tensor:
     """Add a border of one pixel, each continuing the line through the two next to it."""
     first, last = 2 * values[:, :1] - values[:, 1:2], 2 * values[:, -1:] - values[:, -2:-1]
     values = torch.cat([first, values, last], dim=1)
-    first, last = (
-        2 * values[:, :, :1] - values[:, :, 1:2],
-        2 * values[:, :, -1:] - values[:, :, -2:-1],
-    )
+    first = 2 * values[:, :, :1] - values[:, :, 1:2]
+    last = 2 * values[:, :, -1:] - values[:, :, -2:-1]
     return torch.cat([first, values, last], dim=2)
 
 
@@ -113,10 +111,8 @@ def shade(positions: Tensor, normals: Tensor, scene: Scene) -> Tensor:
     if scene.specular is not None and scene.shininess is not None:
         mirrored = functional.normalize(p - 2 * (p * n).sum(dim=1, keepdim=True) * n, dim=1)
         toward = torch.bmm(light, mirrored) - (p * mirrored).sum(dim=1, keepdim=True)
-        specular, shininess = (
-            values.expand(batch, height, width).flatten(1)[:, None]
-            for values in (scene.specular, scene.shininess)
-        )
+        gloss = (scene.specular, scene.shininess)
+        specular, shininess = (v.expand(batch, height, width).flatten(1)[:, None] for v in gloss)
         lobe = specular * (toward / distance).clamp(min=1e-6) ** shininess / falloff
         image = image + torch.bmm(color, torch.where(cosine > 0, lobe, 0))
     return image.view(batch, 3, height, width)

@@ -59,13 +59,7 @@ def _collated(items: list[Any]) -> Any:
 
 
 def _loaded(
-    source: Source,
-    rows: int,
-    size: int,
-    first: int,
-    seed: int,
-    fabric: Fabric,
-    workers: int,
+    source: Source, rows: int, size: int, first: int, seed: int, fabric: Fabric, workers: int
 ) -> Iterator[dict[str, Tensor]]:
     """Yield this process's share of batch after batch without end, beginning with batch `first`."""
     share = slice(fabric.global_rank, None, fabric.world_size)

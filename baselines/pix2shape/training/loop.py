@@ -18,15 +18,10 @@ from torch.optim import Adam
 from baselines.pix2shape.data.questions import QuestionImages
 from baselines.pix2shape.data.rooms import Batch
 from baselines.pix2shape.network.config import ModelConfig
-from baselines.pix2shape.training.batches import (
-    Source,
-    batch_size,
-    image_batches,
-    question_batches,
-    question_sizes,
-)
+from baselines.pix2shape.training import batches
+from baselines.pix2shape.training.batches import Source
 from baselines.pix2shape.training.state import State
-from baselines.pix2shape.training.steps import Noise, critic_step, draw, generator_step
+from baselines.pix2shape.training.steps import critic_step, draw, generator_step
 from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.common.records import check
 from scenegen.common.seeding import Purpose, item_seed
@@ -50,7 +45,6 @@ def train(
     Yields the losses by name and the last batch, after each iteration.
 
     Args:
-        source: images to train on.
         fabric: launched; where several processes train, each takes its share of every batch.
         labelled: questions whose first `labels` answers may be used.
         workers: processes that read images; as many again read the questions that are compared.
@@ -66,16 +60,18 @@ def train(
     fabric.to_device(model)
     for optimiser in (state.generator, state.critic):  # moves their moments to the model's device
         optimiser.load_state_dict(optimiser.state_dict())
-    batches = image_batches(source, fabric, state, workers)
-    asked = question_batches(source, labelled, labels, fabric, state, workers)
+    images = batches.image_batches(source, fabric, state, workers)
+    asked = batches.question_batches(source, labelled, labels, fabric, state, workers)
     model.train()
     began = time.monotonic() - state.seconds
     while state.iteration < config.iterations:
         losses: dict[str, float] = {}
         _set_rate(state)
         for turn in range(config.batches_per_iteration):
-            batch = next(batches)
-            noise = _noise(state, batch, turn, fabric)
+            batch = next(images)
+            number = state.iteration * config.batches_per_iteration + turn
+            seed = item_seed(config.seed, number, Purpose.TRAINING, fabric.global_rank)
+            noise = draw(len(batch.image), config.networks.z, seed).to(fabric.device)
             if config.has_critic:
                 with fabric.autocast():
                     loss, numbers = critic_step(model, batch, noise)
@@ -99,8 +95,8 @@ def _check_request(
     if questions and config.consistency:
         expected = "0 for questions, whose cameras are not told"
         raise SpecError("consistency", config.consistency, expected)
-    sizes = question_sizes(config, source, labels)
-    for size in (batch_size(config, source), *(size for size in sizes if size)):
+    sizes = batches.question_sizes(config, source, labels)
+    for size in (batches.batch_size(config, source), *(size for size in sizes if size)):
         even = size % processes == 0 and size >= 2 * processes
         what = f"a number that shares {size} items, 2 or more each"
         check(processes == 1 or even, "devices", processes, what)
@@ -135,9 +131,8 @@ def _update(
     """Take one step, unless the loss or a gradient is not finite."""
     optimiser.zero_grad()
     fabric.backward(loss)
-    gradients = [
-        p.grad for group in optimiser.param_groups for p in group["params"] if p.grad is not None
-    ]
+    parameters = optimiser.param_groups[0]["params"]
+    gradients = [one.grad for one in parameters if one.grad is not None]
     if fabric.world_size > 1:  # DDP allows neither several backward passes nor second gradients
         for gradient in gradients:
             gradient.copy_(cast(Tensor, fabric.all_reduce(gradient, reduce_op="mean")))
@@ -159,10 +154,3 @@ def _set_rate(state: State) -> None:
     for optimiser in (state.generator, state.critic):
         for group in optimiser.param_groups:
             group["lr"] = config.learning_rate * (min(1.0, 2 * left) if config.decay else 1.0)
-
-
-def _noise(state: State, batch: Batch, turn: int, fabric: Fabric) -> Noise:
-    config = state.model.config
-    number = state.iteration * config.batches_per_iteration + turn
-    seed = item_seed(config.seed, number, Purpose.TRAINING, fabric.global_rank)
-    return draw(len(batch.image), config.networks.z, seed).to(fabric.device)

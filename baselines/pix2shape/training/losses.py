@@ -21,17 +21,12 @@ PENALTY = 10.0  # weight lambda of the gradient penalty
 
 
 def critic_loss(real: Tensor, made: Tensor) -> Tensor:
-    """Return the Wasserstein loss that the critic minimises.
+    """Return the Wasserstein loss that the critic minimises, and encoder and decoder maximise.
 
     Args:
         real, made: its scores of (x, G_z(x)) and of (G_x(z), z), (B,) each.
     """
     return made.mean() - real.mean()
-
-
-def generator_loss(real: Tensor, made: Tensor) -> Tensor:
-    """Return what encoder and decoder minimise: the critic's loss with the other sign."""
-    return real.mean() - made.mean()
 
 
 def gradient_penalty(

@@ -68,7 +68,6 @@ def train_run(
         config: None goes on from the checkpoint, with its labels and classes.
         labels: number of answers that training on questions may use.
         conditional: whether the networks are told the class of a room's only object.
-        progress: called with the state and the losses after every iteration.
 
     Raises SpecError where configuration and data do not fit; FileExistsError where a new run finds
     a checkpoint; TrainingError; FileFormatError, OSError.
@@ -78,11 +77,11 @@ def train_run(
         state, card = load_state(folder)
         labels = card.labels
         source, labelled = _sources(data, card.config, labels)
-        found = _fingerprint(source, labelled)
-        if found != card.fingerprint:
+        if (found := _fingerprint(source, labelled)) != card.fingerprint:
             expected = f"{card.fingerprint[:12]}, on which the run was trained"
-            hint = "resume with the same data"
-            raise SpecError(data, f"fingerprint {found[:12]}", expected, hint)
+            raise SpecError(
+                data, f"fingerprint {found[:12]}", expected, "resume with the same data"
+            )
     else:
         if (folder / CHECKPOINT).exists():
             what = "holds a checkpoint; say --resume, or name another folder"

@@ -10,19 +10,13 @@ from torch.optim import Adam
 
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
-from baselines.pix2shape.weights.storage import (
-    Card,
-    load_card,
-    load_into,
-    load_tensors,
-    save_card,
-    save_tensors,
-)
+from baselines.pix2shape.weights import storage
+from baselines.pix2shape.weights.storage import Card
 from scenegen.common.errors import FileFormatError
 from scenegen.common.seeding import Purpose, item_seed
 
 CHECKPOINT = "checkpoint.safetensors"
-KINDS = ("generator", "critic")  # the two optimisers
+KINDS = ("generator", "critic")  # the optimisers of a state
 MOMENTS = ("exp_avg", "exp_avg_sq", "step")  # Adam's
 
 
@@ -47,28 +41,24 @@ def new_state(config: ModelConfig) -> State:
 
 def _with_optimisers(model: Pix2Shape) -> State:
     config = model.config
-    groups = ((model.encoder, model.decoder), (model.critic, model.statistics))
-    first, second = (
-        Adam(_parameters(*group), lr=config.learning_rate, betas=config.betas) for group in groups
-    )
-    return State(model, first, second)
-
-
-def _parameters(*modules: nn.Module) -> list[nn.Parameter]:
-    return [parameter for module in modules for parameter in module.parameters()]
+    groups = (model.encoder, model.decoder), (model.critic, model.statistics)
+    trained = (nn.ModuleList(group).parameters() for group in groups)
+    rate, betas = config.learning_rate, config.betas
+    generator, critic = (Adam(weights, lr=rate, betas=betas) for weights in trained)
+    return State(model, generator, critic)
 
 
 def save_state(folder: Path, state: State, card: Card) -> None:
     """Write the folder's checkpoint; the old one stays until this one is complete."""
     tensors = {f"model.{name}": value for name, value in state.model.state_dict().items()}
     notes = {"iteration": str(state.iteration), "seconds": f"{state.seconds:.3f}"}
-    for kind, optimiser in (("generator", state.generator), ("critic", state.critic)):
-        moments = optimiser.state_dict()["state"]
+    for kind in KINDS:
+        moments = getattr(state, kind).state_dict()["state"]
         notes[kind] = str(len(moments))  # not every loss trains every parameter
         for index, values in moments.items():
             tensors |= {f"{kind}.{index}.{name}": value for name, value in values.items()}
-    save_card(folder / CHECKPOINT, card)
-    save_tensors(folder / CHECKPOINT, tensors, notes)
+    storage.save_card(folder / CHECKPOINT, card)
+    storage.save_tensors(folder / CHECKPOINT, tensors, notes)
 
 
 def load_state(folder: Path) -> tuple[State, Card]:
@@ -76,16 +66,16 @@ def load_state(folder: Path) -> tuple[State, Card]:
     path = folder / CHECKPOINT
     if not path.is_file():
         raise FileNotFoundError(errno.ENOENT, "holds no checkpoint to resume", str(folder))
-    card = load_card(path)
-    tensors, notes = load_tensors(path)
+    card = storage.load_card(path)
+    tensors, notes = storage.load_tensors(path)
     own = {k.removeprefix("model."): v for k, v in tensors.items() if k.startswith("model.")}
-    state = _with_optimisers(load_into(card, own, path))
+    state = _with_optimisers(storage.load_into(card, own, path))
     try:
         state.iteration, state.seconds = int(notes["iteration"]), float(notes["seconds"])
         _check(0 <= state.iteration <= card.config.iterations, f"iteration {state.iteration}")
-        for kind, optimiser in (("generator", state.generator), ("critic", state.critic)):
+        for kind in KINDS:
             own = {k.removeprefix(f"{kind}."): v for k, v in tensors.items() if k.startswith(kind)}
-            _load_moments(optimiser, own, int(notes[kind]))
+            _load_moments(getattr(state, kind), own, int(notes[kind]))
         strange = [name for name in tensors if name.split(".")[0] not in ("model", *KINDS)]
         _check(not strange, f"{', '.join(strange)} not expected")
     except (KeyError, ValueError) as error:

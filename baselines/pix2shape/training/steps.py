@@ -13,17 +13,7 @@ from torch import Tensor
 from baselines.pix2shape.data.rooms import Batch
 from baselines.pix2shape.network.architecture import CAMERA
 from baselines.pix2shape.network.model import Pix2Shape, mapped, shaded
-from baselines.pix2shape.training.losses import (
-    absolute_loss,
-    contrast_loss,
-    critic_loss,
-    disagreement,
-    generator_loss,
-    gradient_penalty,
-    mutual_information,
-    question_loss,
-    reconstruction_loss,
-)
+from baselines.pix2shape.training import losses
 
 Numbers = dict[str, Tensor]
 
@@ -71,12 +61,13 @@ def critic_step(model: Pix2Shape, batch: Batch, noise: Noise) -> tuple[Tensor, N
         def critic(image: Tensor, code: Tensor) -> Tensor:
             return model.critic(image, code, views.condition)
 
-        loss = critic_loss(critic(batch.image, code), critic(made, noise.code))
-        penalty = gradient_penalty(critic, (batch.image, code), (made, noise.code), noise.share)
+        loss = losses.critic_loss(critic(batch.image, code), critic(made, noise.code))
+        pairs = (batch.image, code), (made, noise.code)
+        penalty = losses.gradient_penalty(critic, *pairs, noise.share)
         numbers["distance"], numbers["penalty"] = -loss, penalty
         total = total + loss + penalty
     if config.disentangles:
-        total = total - mutual_information(model.statistics, *_halves(model, code), noise.order)
+        total = total - _information(model, code, noise)
     return total, numbers
 
 
@@ -91,54 +82,52 @@ def generator_step(
     """
     config, views = model.config, batch.views
     code = model.encode(batch.image, views)
-    losses: Numbers = {}
+    numbers: Numbers = {}
     if config.reconstruction or config.depth or config.consistency:
         depth, opacity = model.surfels(code, views.condition)
         if config.reconstruction:
             again = shaded(depth, opacity, views)
-            compared = absolute_loss if config.absolute_differences else reconstruction_loss
-            losses["reconstruction"] = compared(batch.image, again)
+            absolute = config.absolute_differences
+            compared = losses.absolute_loss if absolute else losses.reconstruction_loss
+            numbers["reconstruction"] = compared(batch.image, again)
         if config.depth and batch.depth is not None:
             known = torch.isfinite(batch.depth)
             wrong = torch.where(known, depth - torch.where(known, batch.depth, 0), 0)
-            losses["depth"] = (wrong**2).sum() / known.sum().clamp(min=1)
+            numbers["depth"] = (wrong**2).sum() / known.sum().clamp(min=1)
     if config.adversarial or config.code_reconstruction:
         made = model.image(noise.code, views)
         if config.adversarial:
             real = model.critic(batch.image, code, views.condition)
-            losses["adversarial"] = generator_loss(
-                real, model.critic(made, noise.code, views.condition)
-            )
+            fake = model.critic(made, noise.code, views.condition)
+            numbers["adversarial"] = -losses.critic_loss(real, fake)
         if config.code_reconstruction:
-            found = model.encode(made, views)
-            losses["code_reconstruction"] = reconstruction_loss(noise.code, found)
+            again = model.encode(made, views)
+            numbers["code_reconstruction"] = losses.reconstruction_loss(noise.code, again)
     if config.consistency:
         pose, fov = views.world_from_camera, views.scene.fov_y_degrees
         assert pose is not None, "for_questions switches consistency off"
         others = pose[noise.order]
         camera, classes = views.condition[noise.order, :CAMERA], views.condition[:, CAMERA:]
         elsewhere, _ = model.surfels(code, torch.cat([camera, classes], dim=1))
-        losses["consistency"] = (
-            disagreement(depth, elsewhere, torch.linalg.solve(others, pose), fov)
-            + disagreement(elsewhere, depth, torch.linalg.solve(pose, others), fov)
+        numbers["consistency"] = (
+            losses.disagreement(depth, elsewhere, torch.linalg.solve(others, pose), fov)
+            + losses.disagreement(elsewhere, depth, torch.linalg.solve(pose, others), fov)
         ) / 2
     if config.disentangles:
-        losses["mutual_information"] = mutual_information(
-            model.statistics, *_halves(model, code), noise.order
-        )
+        numbers["mutual_information"] = _information(model, code, noise)
     if asked is not None:
         images, answers = asked
-        scene = _halves(model, model.encode(images.image, images.views))[0]
+        scene = model.encode(images.image, images.views)[:, : config.networks.z_scene]
         codes, known = scene.view(-1, 4, scene.shape[1]), answers >= 0
         if config.questions and known.any():
-            losses["questions"] = question_loss(codes[known], answers[known])
+            numbers["questions"] = losses.question_loss(codes[known], answers[known])
         if config.contrast:
-            losses["contrast"] = contrast_loss(codes, answers)
-    total = sum((getattr(config, name) * loss for name, loss in losses.items()), code.new_zeros(()))
-    return total, losses
+            numbers["contrast"] = losses.contrast_loss(codes, answers)
+    weighted = (getattr(config, name) * loss for name, loss in numbers.items())
+    return sum(weighted, code.new_zeros(())), numbers
 
 
-def _halves(model: Pix2Shape, code: Tensor) -> tuple[Tensor, Tensor]:
-    """Return z_scene and z_view of codes."""
-    spec = model.config.networks
-    return code[:, : spec.z_scene], code[:, spec.z_scene :]
+def _information(model: Pix2Shape, code: Tensor, noise: Noise) -> Tensor:
+    """Return the mutual information of z_scene and z_view in codes."""
+    end = model.config.networks.z_scene
+    return losses.mutual_information(model.statistics, code[:, :end], code[:, end:], noise.order)

@@ -10,7 +10,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from PIL import Image
-from torch import Tensor
 from torch.utils.data import default_collate
 
 from baselines.pix2shape.data.rooms import RoomImages, as_views
@@ -101,11 +100,9 @@ def rotation_frames(
         code = model.encode(batch.image, batch.views)
     given, frames = image_tiles(batch.image), []
     for angle in degrees:
-        poses = [turned(rooms.world_from_camera[row], rooms.spec, angle) for row in rows]
-        known = [
-            rooms.view(row, camera.world_from_camera)
-            for row, camera in zip(rows, poses, strict=True)
-        ]
+        cameras = [turned(rooms.world_from_camera[row], rooms.spec, angle) for row in rows]
+        poses = [camera.world_from_camera for camera in cameras]
+        known = list(map(rooms.view, rows, poses))
         views = as_views(default_collate(known), rooms.spec.fov_y_degrees)
         frames.append(sheet([given, *drawn(model, code, views)]))
     return frames
@@ -114,45 +111,30 @@ def rotation_frames(
 def turned(world_from_camera: Array, spec: DatasetSpec, degrees: float) -> Camera:
     """Return a camera turned about the vertical axis through its target."""
     x, y, z = (float(v) for v in world_from_camera[:3, 3] - spec.camera_target)
-    azimuth = math.atan2(z, x)
-    sign = 1 if azimuth < math.pi / 4 else -1
-    azimuth += sign * math.radians(degrees)
-    radius = math.hypot(x, z)
+    azimuth, radius = math.atan2(z, x), math.hypot(x, z)
+    azimuth += math.radians(degrees if azimuth < math.pi / 4 else -degrees)
     offset = (radius * math.cos(azimuth), y, radius * math.sin(azimuth))
-    place = tuple(float(o + t) for o, t in zip(offset, spec.camera_target, strict=True))
+    place = (np.array(offset) + spec.camera_target).tolist()
     return Camera((place[0], place[1], place[2]), spec.camera_target, spec.fov_y_degrees)
 
 
 def known_views(
-    spec: DatasetSpec,
-    cameras: Sequence[Camera],
-    lights: Sequence[Sequence[Light]],
-    one_hot: Array,
+    spec: DatasetSpec, cameras: Sequence[Camera], lights: Sequence[Sequence[Light]], one_hot: Array
 ) -> Views:
     """Return the cameras, lights and reflectance of views that were never rendered."""
-    most = max(1, *map(len, lights))
-    position, color = np.zeros((len(cameras), most, 3)), np.zeros((len(cameras), most, 3))
+    position, color = np.zeros((2, len(cameras), max(1, *map(len, lights)), 3))
     for i, (camera, own) in enumerate(zip(cameras, lights, strict=True)):
         pose = camera.world_from_camera
         for j, light in enumerate(own):
             position[i, j] = (np.array(light.position) - pose[:3, 3]) @ pose[:3, :3]
             color[i, j] = light.color
     condition = np.concatenate([[c.position for c in cameras], one_hot], axis=1)
-    count = (len(cameras), 1)
-    known = (
-        position,
-        color,
-        np.tile(spec.ambient, count),
-        np.tile(spec.attenuation, count),
-        np.tile(spec.room_reflectance, count),
-    )
-    return Views(_tensor(condition), Scene(spec.fov_y_degrees, *map(_tensor, known)))
+    same = (spec.ambient, spec.attenuation, spec.room_reflectance)
+    known = (condition, position, color, *(np.tile(one, (len(cameras), 1)) for one in same))
+    told, *scene = (torch.from_numpy(np.float32(values)) for values in known)
+    return Views(told, Scene(spec.fov_y_degrees, *scene))
 
 
 def _check_camera(config: ModelConfig) -> None:
     if not config.networks.camera:
         raise SpecError("weights", "a model of questions", "one of rooms")
-
-
-def _tensor(values: Array) -> Tensor:
-    return torch.from_numpy(np.asarray(values, np.float32))

@@ -1,7 +1,7 @@
 """Submissions of a trained model. Of the truth only the cameras of rooms are read."""
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -44,30 +44,26 @@ def predict_file(
 
     Args:
         weights: a path, or the name of bundled weights.
-        data: rooms or questions.
-        out: submission to write.
         device: "auto", "cpu" or "cuda".
         run: name of this run among several of the method.
-        progress: called with the number of rows just done and of all rows.
 
     Raises as `open_weights`, `predict_rooms` and `answer_file`.
     """
     model, _ = open_weights(weights)
     model.to(chosen_device(device))
     check_writable(Path(out), overwrite)
-    if is_question_file(data):
-        answer_file(model, data, out, run=run, overwrite=overwrite, progress=progress)
-    else:
-        predict_rooms(model, data, out, run=run, overwrite=overwrite, progress=progress)
+    write = answer_file if is_question_file(data) else predict_rooms
+    write(model, data, out, run=run, overwrite=overwrite, progress=progress)
 
 
 def chosen_device(name: str, count: int = 1) -> torch.device:
     """Return a device by name; "auto" is a GPU if there is one. Raises SpecError."""
     if name == "cuda" and not torch.cuda.is_available():
         raise SpecError("device", "no GPU that this torch can use", hint="say --device cpu")
-    if name != "cpu" and torch.cuda.is_available():
-        check(count <= torch.cuda.device_count(), "devices", count, str(torch.cuda.device_count()))
-    return torch.device("cuda" if name != "cpu" and torch.cuda.is_available() else "cpu")
+    if name == "cpu" or not torch.cuda.is_available():
+        return torch.device("cpu")
+    check(count <= torch.cuda.device_count(), "devices", count, str(torch.cuda.device_count()))
+    return torch.device("cuda")
 
 
 @torch.inference_mode()
@@ -92,16 +88,20 @@ def predict_rooms(
     if not spec.camera or spec.classes:
         what = "is told classes, which are part of the truth" if spec.classes else "is not told it"
         raise SpecError("weights", f"a model that {what}", "one that is told the camera alone")
+    device = next(model.parameters()).device
     with RoomsFile(data) as rooms:
         size = rooms.spec.height
         check_reducible(data, size, rooms.spec.width, spec.size)
-        condition = torch.from_numpy(_camera_positions(rooms).astype(np.float32))
+        condition = torch.from_numpy(_camera_positions(rooms).astype(np.float32)).to(device)
         inputs, own = _input_views(rooms)
-        codes = torch.cat(list(_codes(model, rooms, inputs, condition)))
+        found = []
+        for chosen in _batches(len(inputs)):
+            images = [decode_image(rooms.read("image", int(row))) for row in inputs[chosen]]
+            found.append(model.encoder(_stacked(images, model), condition[inputs[chosen]]))
+        codes = torch.cat(found)
         with RoomPredictionWriter(out, data, method=METHOD, run=run, overwrite=overwrite) as file:
             for rows in _batches(len(rooms)):
-                device = next(model.parameters()).device
-                depth, _ = model.surfels(codes[own[rows]].to(device), condition[rows].to(device))
+                depth, _ = model.surfels(codes[own[rows]], condition[rows])
                 depth, normal = enlarged(depth, rooms.spec.fov_y_degrees, size)
                 for row, z, n in zip(rows, depth.cpu(), normal.cpu(), strict=True):
                     file.add(int(row), z.numpy(), np.moveaxis(n.numpy(), 0, -1))
@@ -129,24 +129,18 @@ def answer_file(
         raise SpecError("weights", "a model that is told the camera", "one for questions")
     if len(parts(data)) > 1:
         raise SpecError(data, "training questions", "questions to answer, such as iqtt-test.h5")
-    device = next(model.parameters()).device
     with open_questions(data) as questions:
         check_reducible(data, questions.height, questions.width, spec.size)
         scores = []
         for rows in _batches(len(questions), 4):
-            images = [
-                channels_first(image, spec.size)
-                for row in rows
-                for image in decode_image(questions.read("questions", int(row)))
-            ]
-            image = torch.from_numpy(np.stack(images)).to(device)
+            stored = [questions.read("questions", int(row)) for row in rows]
+            image = _stacked(np.concatenate([decode_image(four) for four in stored]), model)
             codes = model.encoder(image, image.new_empty(len(image), 0))[:, : spec.z_scene]
             distance = squared_distances(codes.view(len(rows), 4, -1)).sqrt()
             scores.append(-distance.cpu().double().numpy())
             progress(len(rows), len(questions))
-    write_answers(
-        out, data, method=METHOD, scores=np.concatenate(scores), run=run, overwrite=overwrite
-    )
+    found = np.concatenate(scores)
+    write_answers(out, data, method=METHOD, scores=found, run=run, overwrite=overwrite)
 
 
 def enlarged(depth: Tensor, fov_y_degrees: float, size: int) -> tuple[Tensor, Tensor]:
@@ -183,9 +177,7 @@ def _camera_positions(rooms: RoomsFile) -> Array:
 
 
 def _input_views(rooms: RoomsFile) -> tuple[Array, Array]:
-    """Return the rows that the scenes are predicted from, (S,), and for each row its scene's
-    place among them, (N,).
-    """
+    """Return each scene's input row, (S,), and for each row its scene's place in there, (N,)."""
     scene, view = (rooms.read(name, slice(None)) for name in ("scene_index", "view_index"))
     first: dict[int, int] = {}
     for row in np.argsort(view, kind="stable"):
@@ -200,18 +192,10 @@ def _input_views(rooms: RoomsFile) -> tuple[Array, Array]:
     return inputs, np.searchsorted(inputs, [first[int(number)] for number in scene])
 
 
-def _codes(
-    model: Pix2Shape, rooms: RoomsFile, inputs: Array, condition: Tensor
-) -> Iterator[Tensor]:
-    device = next(model.parameters()).device
-    for chosen in _batches(len(inputs)):
-        rows = inputs[chosen]
-        images = [
-            channels_first(decode_image(rooms.read("image", int(row))), model.config.networks.size)
-            for row in rows
-        ]
-        image = torch.from_numpy(np.stack(images)).to(device)
-        yield model.encoder(image, condition[rows].to(device)).cpu()
+def _stacked(images: Iterable[Array], model: Pix2Shape) -> Tensor:
+    """Return images of linear radiance, (H, W, 3), as the model takes them, (B, 3, S, S)."""
+    small = [channels_first(image, model.config.networks.size) for image in images]
+    return torch.from_numpy(np.stack(small)).to(next(model.parameters()).device)
 
 
 def _batches(count: int, items: int = 1) -> Iterator[Array]:

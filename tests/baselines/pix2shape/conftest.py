@@ -5,9 +5,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pix2shape_models import made, tiny
 
 torch = pytest.importorskip("torch")
 torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="session")
+def model() -> Any:
+    """Return a tiny model of rooms, which no test changes."""
+    return made(tiny())
 
 
 @pytest.fixture(scope="session")
@@ -29,3 +36,13 @@ def single_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPa
 def train_questions(truths: Any) -> Path:
     """Return a file of 3 labelled questions and 3 others."""
     return Path(truths.iqtt).with_name("iqtt-train.h5")
+
+
+@pytest.fixture(scope="session")
+def fabric() -> Any:
+    """Return the one process in which tests train."""
+    from lightning_fabric import Fabric
+
+    fabric = Fabric(accelerator="cpu", devices=1)
+    fabric.launch()
+    return fabric

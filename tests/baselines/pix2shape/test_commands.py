@@ -2,7 +2,6 @@
 
 import importlib.util
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -35,16 +34,14 @@ def test_train_predict_score(folder):
     made = train(*small, "--set=networks.size=32", "--set=networks.width=0.05", "--seed", 5)
     assert made.exit_code == 0, made.output
     card = json.loads((folder / "run" / "weights.json").read_text())
-    settings = {name: card["config"][name] for name in ("iterations", "batch", "seed", "decay")}
-    assert settings == {"iterations": 2, "batch": 2, "seed": 5, "decay": True}, "compact's others"
-    weights = "run/weights.safetensors"
-    done = pix2shape("predict", "--weights", weights, "--data", "large.h5", "--run", "one")
+    expected = {"iterations": 2, "batch": 2, "seed": 5, "decay": True}
+    assert expected.items() <= card["config"].items(), "the others are compact's"
+    on = ("--data", "large.h5", "--weights", "run/weights.safetensors")
+    done = pix2shape("predict", *on, "--run", "one")
     assert done.exit_code == 0, done.output
     assert bench("validate", "predictions.h5").stdout == "predictions.h5: valid\n"
     assert "chamfer" in bench("score", "predictions.h5").stdout
-    other = bench(
-        "baseline", "pix2shape", "--data", "large.h5", "--weights", weights, "--out", "b.h5"
-    )
+    other = bench("baseline", "pix2shape", *on, "--out", "b.h5")
     assert other.exit_code == 0, other.output
     with h5py.File("predictions.h5") as one, h5py.File("b.h5") as two:
         assert (one["depth"][()] == two["depth"][()]).all()
@@ -113,50 +110,33 @@ MISTAKES = [
     ("predict", ("--data",)),
     (f"predict {WITH} --data nothing.h5", ("nothing.h5",)),
     (f"predict {WITH} --data .", (".: is a folder",)),
-    (f"predict {WITH} --data rooms.json", ("rooms.json",)),
-    (f"predict {ROOMS} --weights nothing.safetensors", ("nothing.json",)),
-    (f"predict {ROOMS} --weights nothing", ("'nothing'", ".safetensors")),
     (f"predict {ROOMS} --weights rooms.json", ("'rooms.json'", ".safetensors")),
-    (f"predict {ROOMS} --weights .", ("'.'",)),
-    (f"predict {ROOMS} --weights alone.safetensors", ("alone.json",)),
-    (f"predict {ROOMS} --weights garbage.safetensors", ("garbage.json",)),
     (f"predict {ROOMS} --weights text.safetensors", ("text.safetensors",)),
     (f"predict {WITH} {ROOMS} --out rooms.h5", ("rooms.h5", "--overwrite")),
-    (f"predict {WITH} {ROOMS} --out none/p.h5", ("none", "does not exist")),
     (f"predict {WITH} --data damaged.h5", ("damaged.h5", "image, row 5")),
     (f"sample {WITH} --class mug", ("class", "'mug'")),
     ("sample --weights classes.safetensors --class sofa", ("'sofa'", "mug, bowl")),
     ("sample --weights questions.safetensors", ("weights",)),
     (f"sample {WITH} --seed 99999999999999999999", ("seed", "99999999999999999999")),
     (f"sample {WITH} --out x.gif", ("out", "'x.gif'")),
-    (f"sample {WITH} --out none/x.png", ("none", "does not exist")),
     (f"interpolate {WITH} {ROOMS} --items 0,8", ("items", "8")),
     (f"interpolate {WITH} {ROOMS} --items 0-2", ("--items", "3 rows")),
-    (f"interpolate {WITH} {ROOMS} --out x.h5", ("out", "'x.h5'")),
     (f"interpolate {WITH} --data iqtt-test.h5", ("iqtt-test.h5",)),
     (f"interpolate --weights questions.safetensors {ROOMS}", ("weights",)),
     (f"rotate {WITH} {ROOMS} --items 3-9", ("items", "8")),
     (f"rotate {WITH} {ROOMS} --frames 2 --out x.png", ("out", "'x.png'")),
-    (f"rotate --weights questions.safetensors {ROOMS}", ("weights",)),
     ("train --data rooms.h5 --out run", ("rooms.h5", "32x32", "64")),
-    (f"train {LARGE} --set batch", ("--set", "'batch'", "batch=8")),
-    (f"train {LARGE} --set batch=many", ("'batch=many'",)),
-    (f"train {LARGE} --set batch=1", ("batch", "1")),
+    (f"train {LARGE} --set batch=many", ("--set", "'batch=many'", "batch=8")),
     (f"train {LARGE} --set networks.sise=32", ("sise",)),
     (f"train {LARGE} --set networks.classes=3", ("classes", "--conditional")),
     (f"train {LARGE} --set networks.camera=false", ("camera",)),
     (f"train {LARGE} --resume", ("run: ", "checkpoint")),
-    (f"train {LARGE} --resume --config paper", ("--resume",)),
-    (f"train {LARGE} --resume --set batch=3", ("--resume",)),
     (f"train {LARGE} --resume --seed 3", ("--resume",)),
     (f"train {LARGE} --out rooms.json", ("rooms.json: File exists",)),
 ]
 BASELINE_MISTAKES = [
     (f"oracle {ROOMS} {WITH}", ("--weights", "oracle")),
     (f"pix2shape {ROOMS} {WITH} --train rooms.h5", ("--train",)),
-    (f"pix2shape {ROOMS} --weights nothing", ("'nothing'",)),
-    (f"pix2shape --data nothing.h5 {WITH}", ("nothing.h5",)),
-    (f"pix2shape {ROOMS} {WITH} --out rooms.h5", ("rooms.h5", "--overwrite")),
     ("pix2shape --data nothing.h5", ("nothing.h5",)),
 ]
 
@@ -181,16 +161,13 @@ def test_a_damaged_file_is_one_line_also_from_another_process(folder, check_refu
     check_refusal(result.exit_code, result.stdout, result.stderr, ("bad.h5", "image, row 1"))
 
 
-@pytest.mark.parametrize(
-    "line", [f"predict {WITH} {ROOMS} --device cuda", f"train {LARGE} --device cuda"]
-)
+@pytest.mark.parametrize("line", [f"predict {WITH} {ROOMS}", f"train {LARGE}"])
 def test_no_gpu_is_one_line(line, folder, check_refusal):
     if pytest.importorskip("torch").cuda.is_available():
         pytest.skip("there is one")
-    before = files_in(folder)
-    result = pix2shape(*line.split())
+    result = pix2shape(*line.split(), "--device", "cuda")
     check_refusal(result.exit_code, result.stdout, result.stderr, ("device", "--device cpu"))
-    assert files_in(folder) == before
+    assert not (folder / "run").exists()
 
 
 LINES = [
@@ -202,10 +179,8 @@ LINES += [("pix2shape", ["sample"]), ("bench", ["baseline", "pix2shape", "--data
 @pytest.mark.parametrize("gone", [PACKAGES, ("safetensors",)], ids=len)
 @pytest.mark.parametrize(("group", "line"), LINES, ids=str)
 def test_without_the_optional_packages(group, line, gone, tmp_path, monkeypatch, check_refusal):
-    find = importlib.util.find_spec
-    monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name: None if name in gone else find(name)
-    )
+    find, util = importlib.util.find_spec, importlib.util
+    monkeypatch.setattr(util, "find_spec", lambda name: None if name in gone else find(name))
     monkeypatch.chdir(tmp_path)
     result = invoke(getattr(cli, group), *line)
     words = (*gone, "pip install 'pix2shape-bench[model]'")
@@ -218,9 +193,7 @@ def test_without_torch_help_and_the_other_baselines_work(truths, tmp_path, check
 
     def run(group: str, *arguments: object) -> Any:
         command = [sys.executable, "-c", f"{code}{group}()", *map(str, arguments)]
-        return subprocess.run(
-            command, capture_output=True, text=True, check=False, cwd=tmp_path, env=os.environ
-        )
+        return subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
 
     assert all(name in run("pix2shape", "--help").stdout for name in COMMANDS)
     done = run("bench", "baseline", "empty-room", "--data", truths.rooms)

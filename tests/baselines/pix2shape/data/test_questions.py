@@ -9,7 +9,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from pix2shape_models import released
+from pix2shape_models import released, tiny
 
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
@@ -19,15 +19,13 @@ torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
 from baselines.pix2shape.data.questions import QuestionImages, for_questions  # noqa: E402
-from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
-from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
 from baselines.pix2shape.network.surfels import render  # noqa: E402
 
 SPEC = SplitSpec(
     seed=5, train=7, labeled=4, val=2, test=1, cubes=(5, 7), lights=(1, 3), height=64, width=64,
     min_cube_pixels=2, with_depth=True, image_dtype="float32", background=(0.9, 1.0, 0.8),
 )  # fmt: skip
-TINY = ModelConfig(networks=NetworkSpec(size=32, width=0.05, camera=False))
+TINY = tiny(camera=False)
 TRUTH = {
     "cube_count", "cubes", "shape_id", "class_id", "world_from_shape", "distractor_kind",
     "angle_degrees", "visible_pixels", "depth",
@@ -158,18 +156,17 @@ def test_no_questions_and_odd_sizes_are_refused(tmp_path):
 
 
 def test_the_configuration_for_questions(train_path):
-    plain = replace(TINY, networks=replace(TINY.networks, classes=7), batch=12, seed=9, depth=0.0)
+    plain = tiny(classes=7, camera=False, batch=12, seed=9)
     config = for_questions(plain, train_path, "unlabeled")
     spec = config.networks
     assert (spec.camera, spec.classes, spec.z_view, spec.z) == (False, 0, 10, plain.networks.z)
     assert (spec.size, spec.width, config.batch, config.seed) == (32, 0.05, 12, 9)
     assert config.opacity
-    assert config.depth_middle == pytest.approx(
-        1.02 * SPEC.max_radius / math.sin(math.radians(SPEC.fov_degrees) / 2)
-    )
+    distance = 1.02 * SPEC.max_radius / math.sin(math.radians(SPEC.fov_degrees) / 2)
+    assert config.depth_middle == pytest.approx(distance)
     assert config.depth_reach == pytest.approx(SPEC.max_radius / config.depth_middle)
     with h5py.File(train_path) as file:
         depth = file["truth/unlabeled/depth"][:] / config.depth_middle
     assert 1 - config.depth_reach < np.nanmin(depth) < np.nanmax(depth) < 1 + config.depth_reach
     with pytest.raises(SpecError, match="z scene"):
-        for_questions(replace(plain, networks=NetworkSpec(z_scene=10)), train_path, "labeled")
+        for_questions(tiny(z_scene=10), train_path, "labeled")

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pix2shape_models import edited, tiny
 
-from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.errors import SpecError
 from scenegen.description.presets import VESSELS
 from scenegen.rooms.reader import RoomsFile
 
@@ -133,46 +133,27 @@ def test_nothing_of_the_truth_is_read(views_path, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "settings",
+    ("classes", "rooms", "found"),
     [
-        {"random_reflectance": True},
-        {"room_reflectance": (0.4, 0.6, 0.85)},
-        {"specular": (0.3, 0.8), "shininess": (8.0, 64.0)},
+        (0, {"random_reflectance": True}, "rooms of several materials"),
+        (0, {"room_reflectance": (0.4, 0.6, 0.85)}, "rooms of several materials"),
+        (0, {"specular": (0.3, 0.8), "shininess": (8.0, 64.0)}, "rooms of several materials"),
+        (0, {"height": 96, "width": 128}, "images of 96x128"),
+        (0, {"height": 50, "width": 50}, "images of 50x50"),
+        (0, {"height": 16, "width": 16, "min_visible_pixels": 1}, "images of 16x16"),
+        (3, {"objects": (1, 1), "shapes": ("box", "sphere")}, "2 classes"),
+        (2, {"objects": (1, 2), "shapes": ("box", "sphere")}, "rooms of several objects"),
     ],
 )
-def test_several_materials_are_refused(make_rooms, tmp_path, settings):
-    path = make_rooms(tmp_path / "many.h5", 3, **settings)
+def test_rooms_that_do_not_suit_are_refused(make_rooms, tmp_path, classes, rooms, found):
+    path = make_rooms(tmp_path / "odd.h5", 3, **rooms)
     with pytest.raises(SpecError) as error:
-        RoomImages(path, tiny())
-    assert (error.value.where, error.value.found) == (str(path), "rooms of several materials")
-
-
-@pytest.mark.parametrize(("height", "width"), [(96, 128), (50, 50), (16, 16)])
-def test_sizes_that_cannot_be_reduced_are_refused(make_rooms, tmp_path, height, width):
-    path = make_rooms(tmp_path / "odd.h5", 1, height=height, width=width, min_visible_pixels=1)
-    with pytest.raises(SpecError) as error:
-        RoomImages(path, tiny())
-    assert (error.value.where, error.value.found) == (str(path), f"images of {height}x{width}")
-
-
-def test_other_classes_and_other_files_are_refused(vessels_path, tmp_path):
-    with pytest.raises(SpecError) as error:
-        RoomImages(vessels_path, tiny(classes=3))
-    assert (error.value.where, error.value.found) == (str(vessels_path), "7 classes")
-    with pytest.raises(FileNotFoundError, match=r"none\.h5"):
-        RoomImages(tmp_path / "none.h5", tiny())
-    (tmp_path / "text.h5").write_text("no rooms")
-    with pytest.raises(FileFormatError, match=r"text\.h5"):
-        RoomImages(tmp_path / "text.h5", tiny())
+        RoomImages(path, tiny(classes=classes))
+    assert (error.value.where, error.value.found) == (str(path), found)
 
 
 @settings(deadline=None, max_examples=40)
-@given(
-    rows=st.integers(1, 20),
-    batch=st.integers(1, 7),
-    seed=st.integers(0, 2**32),
-    first=st.integers(0, 30),
-)
+@given(st.integers(1, 20), st.integers(1, 7), st.integers(0, 2**32), st.integers(0, 30))
 def test_a_batch_depends_on_its_number_alone(rows, batch, seed, first):
     through = list(islice(Draws(rows, batch, seed), first + 3))
     assert list(islice(Draws(rows, batch, seed, first), 3)) == through[first:]

@@ -3,19 +3,11 @@
 import itertools
 
 import pytest
+from pix2shape_models import tiny
 
 torch = pytest.importorskip("torch")
-from baselines.pix2shape.network.architecture import (  # noqa: E402
-    DECODER_CHANNELS,
-    ENCODER_CHANNELS,
-    ConditionalNorm,
-    Critic,
-    Decoder,
-    Encoder,
-    NetworkSpec,
-    Statistics,
-)
-from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
+from baselines.pix2shape.network import architecture  # noqa: E402
+from baselines.pix2shape.network.architecture import Critic, Decoder, Encoder, NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.model import Pix2Shape, Views, shaded  # noqa: E402
 from baselines.pix2shape.network.surfels import Scene  # noqa: E402
 
@@ -38,17 +30,14 @@ def conditional(channels: list[int], inputs: int) -> int:
 def test_the_papers_networks_have_the_tables_sizes() -> None:
     spec = NetworkSpec()
     assert (spec.z, spec.condition) == (128, 3)
-    encoder = convolutions([6, *ENCODER_CHANNELS, 128])
+    encoder = convolutions([6, *architecture.ENCODER_CHANNELS, 128])
     assert count(Encoder(spec)) == encoder + conditional([85, 170, 340, 680], 3)
     plain = sum(2 * c for c in (627, 168))
-    decoder = sum(
-        16 * a * b + b
-        for a, b in zip([131, *DECODER_CHANNELS], [*DECODER_CHANNELS, 1], strict=True)
-    )
+    decoder = convolutions([131, *architecture.DECODER_CHANNELS, 1])
     assert count(Decoder(spec)) == decoder + conditional([1344, 336, 84], 3) + plain
     joined = convolutions([6, 85, 170, 340, 680]) + 16 * (680 + 128) * 1360 + 1360
     assert count(Critic(spec)) == joined + 16 * 1360 + 1
-    assert count(Statistics(spec)) == 128 * 256 + 256 + 256 * 512 + 512 + 512 + 1
+    assert count(architecture.Statistics(spec)) == 128 * 256 + 256 + 256 * 512 + 512 + 512 + 1
 
 
 def test_every_layer_has_the_output_size_of_its_table() -> None:
@@ -76,14 +65,19 @@ def test_all_sizes_and_conditions(size: int, camera: bool, classes: int) -> None
     assert code.shape == (2, 24)
     assert Decoder(spec)(code, condition).shape == (2, 1, size, size)
     assert Critic(spec)(image, code, condition).shape == (2,)
-    assert Statistics(spec)(code[:, :20], code[:, 20:]).shape == (2,)
+    assert architecture.Statistics(spec)(code[:, :20], code[:, 20:]).shape == (2,)
 
 
 def test_width_scales_channels() -> None:
-    assert NetworkSpec(width=0.5).channels(ENCODER_CHANNELS) == [42, 85, 170, 340, 680]
-    assert NetworkSpec().channels(DECODER_CHANNELS) == list(DECODER_CHANNELS)
-    assert NetworkSpec(size=256).channels(DECODER_CHANNELS) == [*DECODER_CHANNELS, 42]
-    assert NetworkSpec(size=64).channels(ENCODER_CHANNELS) == [170, 340, 680, 1360]
+    assert NetworkSpec(width=0.5).channels(architecture.ENCODER_CHANNELS) == [42, 85, 170, 340, 680]
+    assert NetworkSpec().channels(architecture.DECODER_CHANNELS) == list(
+        architecture.DECODER_CHANNELS
+    )
+    assert NetworkSpec(size=256).channels(architecture.DECODER_CHANNELS) == [
+        *architecture.DECODER_CHANNELS,
+        42,
+    ]
+    assert NetworkSpec(size=64).channels(architecture.ENCODER_CHANNELS) == [170, 340, 680, 1360]
 
 
 def test_the_camera_matters_to_every_network() -> None:
@@ -96,7 +90,7 @@ def test_the_camera_matters_to_every_network() -> None:
 
 def test_conditional_normalisation_normalises_and_then_follows_its_condition() -> None:
     torch.manual_seed(0)
-    norm, values = ConditionalNorm(5, 3), 3 + 2 * torch.randn(64, 5, 4, 4)
+    norm, values = architecture.ConditionalNorm(5, 3), 3 + 2 * torch.randn(64, 5, 4, 4)
     out = norm(values, torch.rand(64, 3))
     assert out.mean(dim=(0, 2, 3)).abs().max() < 1e-5, "scale 1 and shift 0 to begin with"
     assert (out.std(dim=(0, 2, 3)) - 1).abs().max() < 1e-2
@@ -117,19 +111,11 @@ def test_critic_scores_depend_on_their_own_item_only() -> None:
 
 def test_bfloat16_reaches_neither_renderer_nor_losses() -> None:
     """An image is the same under autocast, to the bit; codes and scores are full."""
-    config = ModelConfig(networks=NetworkSpec(size=32, width=0.05))
-    model = Pix2Shape(config).eval()
-    count = 3
-    scene = Scene(
-        28.0,
-        torch.rand(count, 2, 3) + torch.tensor([0.0, 0.0, 1.5]),
-        torch.rand(count, 2, 3),
-        torch.rand(count, 3),
-        torch.rand(count, 2) + 0.2,
-        torch.rand(count, 3),
-    )
-    views = Views(torch.rand(count, 3), scene)
-    depth = 1.5 + 0.1 * torch.rand(count, 32, 32)
+    model = Pix2Shape(tiny()).eval()
+    place, color = torch.rand(3, 2, 3) + torch.tensor([0.0, 0.0, 1.5]), torch.rand(3, 2, 3)
+    scene = Scene(28.0, place, color, torch.rand(3, 3), torch.rand(3, 2) + 0.2, torch.rand(3, 3))
+    views = Views(torch.rand(3, 3), scene)
+    depth = 1.5 + 0.1 * torch.rand(3, 32, 32)
     plain = shaded(depth, None, views)
     with torch.autocast("cpu", torch.bfloat16):
         assert torch.equal(shaded(depth, None, views), plain)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -15,15 +16,11 @@ from scenegen.rendering.shading import shade as shade_in_numpy
 from scenegen.sampling.scenes import sample_scene
 
 torch = pytest.importorskip("torch")
-from baselines.pix2shape.network.surfels import (  # noqa: E402
-    Scene,
-    back_project,
-    normals_from_depth,
-    render,
-    shade,
-)
+from baselines.pix2shape.network import surfels  # noqa: E402
+from baselines.pix2shape.network.surfels import Scene, normals_from_depth, render  # noqa: E402
 
 FOV = 30.0
+LIT = ("light_position", "light_color", "ambient", "attenuation", "reflectance")
 
 
 def plane_depth(normal: NDArray[np.float64], offset: float, height: int, width: int) -> object:
@@ -35,20 +32,11 @@ def plane_depth(normal: NDArray[np.float64], offset: float, height: int, width: 
 def some_scene(batch: int, height: int = 6, width: int = 5, gloss: bool = False) -> Scene:
     """Three lights behind the camera, float64."""
     rng = np.random.default_rng(0)
-
-    def tensor(values: NDArray[np.float64]) -> object:
-        return torch.tensor(values, dtype=torch.float64)
-
-    return Scene(
-        FOV,
-        tensor(rng.normal(size=(batch, 3, 3)) + np.array([0, 0, 1.5])),
-        tensor(rng.uniform(0.2, 1, (batch, 3, 3))),
-        tensor(rng.uniform(0, 0.3, (batch, 3))),
-        tensor(rng.uniform(0.2, 1, (batch, 2))),
-        tensor(rng.uniform(0.2, 1, (batch, 3))),
-        tensor(rng.uniform(0.2, 1, (batch, height, width))) if gloss else None,
-        tensor(rng.uniform(1, 20, (batch, height, width))) if gloss else None,
-    )
+    place = rng.normal(size=(batch, 3, 3)) + np.array([0, 0, 1.5])
+    ranges = [(0.2, 1, (3, 3)), (0, 0.3, (3,)), (0.2, 1, (2,)), (0.2, 1, (3,))]
+    ranges += [(0.2, 1, (height, width)), (1, 20, (height, width))] if gloss else []
+    others = (rng.uniform(low, high, (batch, *shape)) for low, high, shape in ranges)
+    return Scene(FOV, *map(torch.tensor, (place, *others)))
 
 
 @pytest.mark.parametrize("name", [n for n in PRESETS if n != "furniture-256"])
@@ -58,28 +46,15 @@ def test_ground_truth_gives_the_files_images_back(name: str) -> None:
     batch = pack(spec, scenes)
     truth = render_rooms(batch)
     camera = np.linalg.inv(batch.world_from_camera)
-    lights = np.stack(
-        [transform_points(c, p) for c, p in zip(camera, batch.light_position, strict=True)]
-    )
-    ids = np.maximum(truth.object_id, 0)
-    row = np.arange(len(ids))[:, None, None]
-
-    def tensor(values: NDArray[np.float64]) -> object:
-        return torch.tensor(values, dtype=torch.float32)
-
-    scene = Scene(
-        float(batch.fov_y_degrees[0]),
-        tensor(lights),
-        tensor(batch.light_color),
-        tensor(batch.ambient),
-        tensor(batch.attenuation),
-        tensor(np.moveaxis(batch.reflectance[row, ids], -1, 1)),
-        tensor(batch.gloss[row, ids, 0]),
-        tensor(batch.gloss[row, ids, 1]),
-    )
+    lights = np.stack(list(map(transform_points, camera, batch.light_position)))
+    assert (truth.object_id >= 0).all()
+    row, tensor = np.arange(len(scenes))[:, None, None], partial(torch.tensor, dtype=torch.float32)
+    reflectance = np.moveaxis(batch.reflectance[row, truth.object_id], -1, 1)
+    gloss = np.moveaxis(batch.gloss[row, truth.object_id], -1, 0)
+    told = (lights, batch.light_color, batch.ambient, batch.attenuation, reflectance, *gloss)
+    scene = Scene(float(batch.fov_y_degrees[0]), *map(tensor, told))
     normals = tensor(np.moveaxis(truth.normal, -1, 1))
     image = render(tensor(truth.depth), scene, normals).numpy()
-    assert (truth.object_id >= 0).all()
     np.testing.assert_allclose(np.moveaxis(image, 1, -1), truth.image, atol=4e-5, rtol=4e-5)
 
 
@@ -89,21 +64,12 @@ def test_shading_is_the_numpy_equation(gloss: bool) -> None:
     rng = np.random.default_rng(1)
     depth = torch.tensor(rng.uniform(1, 2, (2, 6, 5)))
     normals = torch.nn.functional.normalize(torch.tensor(rng.normal(size=(2, 3, 6, 5))), dim=1)
-    image = shade(back_project(depth, FOV), normals, scene).numpy()
+    image = surfels.shade(surfels.back_project(depth, FOV), normals, scene).numpy()
     for b in range(2):
         expected = shade_in_numpy(
             pixel_directions(6, 5, FOV) * depth[b, :, :, None].numpy(),
             np.moveaxis(normals[b].numpy(), 0, -1),
-            *(
-                values[b].numpy()
-                for values in (
-                    scene.reflectance,
-                    scene.light_position,
-                    scene.light_color,
-                    scene.ambient,
-                    scene.attenuation,
-                )
-            ),
+            *(getattr(scene, name)[b].numpy() for name in (LIT[-1], *LIT[:-1])),
             specular=scene.specular[b].numpy() if gloss else 0.0,
             shininess=scene.shininess[b].numpy() if gloss else 1.0,
             viewpoint=np.zeros(3) if gloss else None,
@@ -116,9 +82,7 @@ def test_normals_of_planes_are_exact(normal: tuple[float, float, float]) -> None
     """At the border, too."""
     unit = np.array(normal) / np.linalg.norm(normal)
     found = normals_from_depth(plane_depth(unit, 1.5, 12, 9), FOV)[0].numpy()
-    np.testing.assert_allclose(
-        np.moveaxis(found, 0, -1), np.broadcast_to(unit, (12, 9, 3)), atol=1e-12
-    )
+    np.testing.assert_allclose(np.moveaxis(found, 0, -1) - unit, 0, atol=1e-12)
 
 
 @pytest.mark.parametrize("size", [64, 256])
@@ -164,7 +128,5 @@ def test_items_do_not_mix() -> None:
     scene, depth = some_scene(3), 1 + torch.rand(3, 6, 5, dtype=torch.float64)
     together = render(depth, scene)
     for b in range(3):
-        one = Scene(FOV, *(getattr(scene, name)[b : b + 1] for name in (
-            "light_position", "light_color", "ambient", "attenuation", "reflectance",
-        )))  # fmt: skip
+        one = Scene(FOV, *(getattr(scene, name)[b : b + 1] for name in LIT))
         torch.testing.assert_close(render(depth[b : b + 1], one)[0], together[b])

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 import pytest
 from h5_edits import attribute
 from PIL import Image
@@ -28,10 +27,8 @@ from baselines.pix2shape.weights.storage import Card, load_card, load_model  # n
 
 HERE = Machine("cpu", workers=0, every=2)
 CONFIG = tiny(seed=3)
-FILES = {
-    "checkpoint.json", "checkpoint.safetensors", "logs", "pictures.png", "weights.json",
-    "weights.safetensors",
-}  # fmt: skip
+STORED = {f"{name}.{end}" for name in ("checkpoint", "weights") for end in ("json", "safetensors")}
+FILES = {"logs", "pictures.png", *STORED}
 
 
 @pytest.fixture
@@ -82,10 +79,8 @@ def test_what_a_run_leaves(rooms_path, unbroken):
     assert card.config == model.config == replace(CONFIG, **off)
     state, again = load_state(unbroken)
     assert again == card
-    for name, value in model.encoder.state_dict().items():
-        torch.testing.assert_close(
-            value, state.model.encoder.state_dict()[name], atol=1e-3, rtol=1e-3
-        )
+    found, expected = model.encoder.state_dict(), state.model.encoder.state_dict()
+    torch.testing.assert_close(dict(found), dict(expected), atol=1e-3, rtol=1e-3)
     with Image.open(unbroken / "pictures.png") as picture:
         assert picture.size == (4 * 134 + 6, 6 * 134 + 6)
 
@@ -139,14 +134,10 @@ def test_a_finished_run_is_neither_trained_on_nor_replaced(rooms_path, folder, u
 
 
 def test_classes_are_told(single_path, folder):
-    seen: list[dict[str, float]] = []
-    weights = train_run(
-        folder, single_path, CONFIG, HERE, conditional=True, progress=lambda _, n: seen.append(n)
-    )
+    weights = train_run(folder, single_path, CONFIG, HERE, conditional=True)
     model, card = load_model(weights)
     assert card.classes == ("box", "sphere")
     assert (model.config.networks.classes, model.config.networks.condition) == (2, 5)
-    assert all(np.isfinite(list(numbers.values())).all() for numbers in seen)
     again, how = folder.with_name("again"), {"conditional": True, "progress": killed_at(3)}
     with pytest.raises(Killed):
         train_run(again, single_path, CONFIG, HERE, **how)
@@ -157,9 +148,8 @@ def test_classes_are_told(single_path, folder):
 def test_questions_and_their_labels(train_questions, folder, labels):
     seen: list[dict[str, float]] = []
     config = replace(CONFIG, iterations=2)
-    weights = train_run(
-        folder, train_questions, config, HERE, labels=labels, progress=lambda _, n: seen.append(n)
-    )
+    how = {"labels": labels, "progress": lambda _, numbers: seen.append(numbers)}
+    weights = train_run(folder, train_questions, config, HERE, **how)
     assert all(("questions" in numbers) == bool(labels) for numbers in seen)
     assert all("mutual_information" in numbers for numbers in seen)
     model, card = load_model(weights)
@@ -177,14 +167,13 @@ def test_questions_and_their_labels(train_questions, folder, labels):
         ("questions", {"labels": 4}, "labels: found 4, expected 0 to 3"),
         ("questions", {"labels": -1}, "labels: found -1, expected 0 to 3"),
         ("test", {}, "iqtt-test"),
-        ("nothing", {}, "no such file"),
         ("large", {}, "images of 32x32"),
     ],
 )
 def test_what_does_not_go_together(data, how, words, truths, train_questions, folder):
-    paths = {"rooms": truths.rooms, "large": truths.rooms, "questions": train_questions}
-    path = {**paths, "test": truths.iqtt}.get(data, folder)
-    with pytest.raises((SceneGenError, OSError), match=words):
+    paths = {"rooms": truths.rooms, "large": truths.rooms, "test": truths.iqtt}
+    path = {**paths, "questions": train_questions}[data]
+    with pytest.raises(SceneGenError, match=words):
         train_run(folder, path, tiny(size=64) if data == "large" else CONFIG, HERE, **how)
     assert not folder.exists()
 

@@ -9,31 +9,19 @@ import pytest
 torch = pytest.importorskip("torch")
 from baselines.pix2shape.data.rooms import Batch  # noqa: E402
 from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
-from baselines.pix2shape.network.config import ModelConfig  # noqa: E402
+from baselines.pix2shape.network.config import LOSSES, ModelConfig  # noqa: E402
 from baselines.pix2shape.network.model import Pix2Shape, Views  # noqa: E402
-from baselines.pix2shape.network.surfels import Scene, pixel_rays  # noqa: E402
-from baselines.pix2shape.training.losses import (  # noqa: E402
-    absolute_loss,
-    contrast_loss,
-    disagreement,
-    mutual_information,
-    question_loss,
-    reconstruction_loss,
-)
+from baselines.pix2shape.network.surfels import Scene, back_project  # noqa: E402
+from baselines.pix2shape.training import losses as functions  # noqa: E402
 from baselines.pix2shape.training.steps import critic_step, draw, generator_step  # noqa: E402
 
 NETWORKS = NetworkSpec(size=32, width=0.05, z_scene=6, z_view=2)
-LOSSES = (
-    "adversarial", "reconstruction", "code_reconstruction", "consistency", "mutual_information",
-    "questions", "contrast", "depth",
-)  # fmt: skip
 NEEDED = {"adversarial": {"critic"}, "mutual_information": {"statistics"}}
 
 
 def only(**weights: float) -> ModelConfig:
-    return ModelConfig(
-        networks=NETWORKS, question_batch=8, **{**dict.fromkeys(LOSSES, 0.0), **weights}
-    )
+    weights = {**dict.fromkeys(LOSSES, 0.0), **weights}
+    return ModelConfig(networks=NETWORKS, question_batch=8, **weights)
 
 
 def model_of(config: ModelConfig) -> Pix2Shape:
@@ -112,7 +100,8 @@ def test_the_critics_total_is_penalty_less_distance_less_information():
     model = model_of(only(adversarial=1.0, mutual_information=0.1))
     total, numbers = critic_step(model, batch, noise)
     code = model.encode(batch.image, batch.views)
-    information = mutual_information(model.statistics, code[:, :6], code[:, 6:], noise.order)
+    halves = code[:, :6], code[:, 6:]
+    information = functions.mutual_information(model.statistics, *halves, noise.order)
     expected = numbers["penalty"] - numbers["distance"] - information
     assert total.item() == pytest.approx(expected.item(), rel=1e-5)
     losses = generator_step(model, batch, noise)[1]
@@ -150,7 +139,8 @@ def test_questions_teach_the_scenes_part_of_the_code():
     assert (weight[:6] > 1e-4).all()
     assert not weight[6:].any()
     codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
-    assert losses["questions"].item() == pytest.approx(question_loss(codes, answers).item())
+    expected = functions.question_loss(codes, answers).item()
+    assert losses["questions"].item() == pytest.approx(expected)
 
 
 def test_questions_of_unknown_answers_are_contrasted_alone():
@@ -160,11 +150,12 @@ def test_questions_of_unknown_answers_are_contrasted_alone():
     for answers in ([-1, -1], [-1, 1], [2, 0]):
         told = torch.tensor(answers)
         losses = generator_step(model, some_batch(), draw(8, 8, 3), (images, told))[1]
-        assert losses["contrast"].item() == pytest.approx(contrast_loss(codes, told).item())
+        expected = functions.contrast_loss(codes, told).item()
+        assert losses["contrast"].item() == pytest.approx(expected)
         known = told >= 0
         assert ("questions" in losses) == bool(known.any())
         if known.any():
-            expected = question_loss(codes[known], told[known]).item()
+            expected = functions.question_loss(codes[known], told[known]).item()
             assert losses["questions"].item() == pytest.approx(expected)
 
 
@@ -176,8 +167,7 @@ class Sphere(Pix2Shape):
     def surfels(self, code: Any, condition: Any) -> Any:
         self.seen = [*getattr(self, "seen", []), condition]
         turn = facing_the_origin(condition)[:, :3, :3]
-        x, y = pixel_rays(32, 32, 28.0, condition)
-        rays = torch.stack([x + 0 * y, y + 0 * x, -1 + 0 * x * y])
+        rays = back_project(torch.ones(1, 32, 32), 28.0)[0]
         along = torch.einsum("bij,jhw->bihw", turn, rays)
         b = torch.einsum("bihw,bi->bhw", along, condition)
         a, c = (along**2).sum(dim=1), (condition**2).sum(dim=1)[:, None, None] - self.radius**2
@@ -208,8 +198,8 @@ def test_consistency_loses_what_two_cameras_disagree_on():
     batch = replace(batch, views=replace(views, world_from_camera=wrong))
     own, other = sphere.surfels(None, place)[0], sphere.surfels(None, place[noise.order])[0]
     moved = torch.linalg.inv(wrong[noise.order]) @ wrong
-    there = disagreement(own, other, moved, 28.0)
-    back = disagreement(other, own, torch.linalg.inv(moved), 28.0)
+    there = functions.disagreement(own, other, moved, 28.0)
+    back = functions.disagreement(other, own, torch.linalg.inv(moved), 28.0)
     assert abs(there - back) > 1e-4, "or one of them would do"
     found = generator_step(sphere, batch, noise)[1]["consistency"]
     assert found.item() == pytest.approx((there + back).item() / 2, rel=1e-2)
@@ -240,7 +230,9 @@ def test_consistency_teaches_both_depths_with_the_codes_own_class():
     assert other.grad.any()
 
 
-@pytest.mark.parametrize(("absolute", "loss"), [(0, reconstruction_loss), (1, absolute_loss)])
+@pytest.mark.parametrize(
+    ("absolute", "loss"), [(0, functions.reconstruction_loss), (1, functions.absolute_loss)]
+)
 def test_images_are_compared_by_the_norm_or_by_absolute_differences(absolute, loss):
     batch = some_batch()
     model = model_of(replace(only(reconstruction=1.0), absolute_differences=bool(absolute)))

@@ -3,6 +3,7 @@
 import itertools
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,22 +27,11 @@ from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
 from baselines.pix2shape.network.surfels import render  # noqa: E402
 from baselines.pix2shape.pictures import drawn, image_tiles, sheet  # noqa: E402
 from baselines.pix2shape.use import explore  # noqa: E402
-from baselines.pix2shape.use.explore import (  # noqa: E402
-    interpolation_sheet,
-    known_views,
-    rotation_frames,
-    sample_sheet,
-    turned,
-)
+from baselines.pix2shape.use.explore import rotation_frames, sample_sheet, turned  # noqa: E402
 from baselines.pix2shape.weights.storage import Card  # noqa: E402
 
 SPEC = DatasetSpec(height=32, width=32)
 CLASSES = ("bag", "bowl", "mug")
-
-
-@pytest.fixture(scope="session")
-def model() -> Any:
-    return made(tiny())
 
 
 @pytest.fixture(scope="session")
@@ -59,6 +49,11 @@ def reconstructions(model: Any, source: RoomImages, rows: list[int], seen_as: li
     views = source.as_batch(default_collate([source[row] for row in seen_as])).views
     with torch.no_grad():
         return drawn(model, model.encode(batch.image, batch.views), views)
+
+
+def inputs(source: RoomImages, rows: list[int]) -> Any:
+    """Return the tiles of rows' own images."""
+    return image_tiles(torch.from_numpy(np.stack([source[row]["image"] for row in rows])))
 
 
 def pixels(picture: Any) -> np.ndarray:
@@ -102,20 +97,18 @@ def test_what_is_known_of_views_is_what_training_was_told(several_path):
     cameras = [camera for i in range(3) for camera in sample_cameras(spec, i)]
     lights = [sample_lights(spec, row // 3) for row in range(9)]
     assert len({len(own) for own in lights}) > 1
-    found = known_views(spec, cameras, lights, np.zeros((9, 0)))
+    found = explore.known_views(spec, cameras, lights, np.zeros((9, 0)))
     assert found.scene.fov_y_degrees == expected.scene.fov_y_degrees
     slots = found.scene.light_color.shape[1]
     there = (found.scene.light_color != 0).any(dim=2)
     assert there.sum(dim=1).tolist() == [len(own) for own in lights]
     assert not expected.scene.light_color[:, slots:].any()
-    pairs = [(found.condition, expected.condition)]
-    pairs.append((found.scene.light_color, expected.scene.light_color[:, :slots]))
-    place = expected.scene.light_position[:, :slots]
-    pairs.append((found.scene.light_position[there], place[there]))
-    names = ("ambient", "attenuation", "reflectance")
-    pairs += [(getattr(found.scene, name), getattr(expected.scene, name)) for name in names]
-    for one, other in pairs:
-        torch.testing.assert_close(one, other, rtol=1e-6, atol=1e-6)
+    close = partial(torch.testing.assert_close, rtol=1e-6, atol=1e-6)
+    close(found.condition, expected.condition)
+    close(found.scene.light_color, expected.scene.light_color[:, :slots])
+    close(found.scene.light_position[there], expected.scene.light_position[:, :slots][there])
+    for name in ("ambient", "attenuation", "reflectance"):
+        close(getattr(found.scene, name), getattr(expected.scene, name))
     image = render(depth, found.scene)
     torch.testing.assert_close(image, render(depth, expected.scene), rtol=1e-5, atol=1e-6)
 
@@ -156,9 +149,8 @@ def test_samples_are_seen_as_training_images_were(conditional, monkeypatch):
 
 def test_an_interpolation_ends_in_the_two_reconstructions(model, several_path):
     source = RoomImages(several_path, model.config)
-    found = pixels(interpolation_sheet(model, source, 3, 7, 5))
-    ends = reconstructions(model, source, [3, 7], [3, 3])
-    given = image_tiles(torch.from_numpy(np.stack([source[row]["image"] for row in (3, 7)])))
+    found = pixels(explore.interpolation_sheet(model, source, 3, 7, 5))
+    ends, given = reconstructions(model, source, [3, 7], [3, 3]), inputs(source, [3, 7])
     blank = np.full_like(given[0], 250)
     frames = [given, [blank, blank], [blank, blank]]
     first = pixels(sheet([[f[0], e[0]] for f, e in zip(frames, ends, strict=True)]))
@@ -173,7 +165,7 @@ def test_an_interpolation_ends_in_the_two_reconstructions(model, several_path):
 def test_a_rotation_turns_from_the_reconstructions_to_the_files_other_views(model, several_path):
     source, rows = RoomImages(several_path, model.config), [6, 0, 3]
     frames = [pixels(frame) for frame in rotation_frames(model, source, rows, [0.0, 35.0, 80.0])]
-    given = image_tiles(torch.from_numpy(np.stack([source[row]["image"] for row in rows])))
+    given = inputs(source, rows)
     for view, frame in enumerate(frames):
         expected = reconstructions(model, source, rows, [row + view for row in rows])
         assert np.abs(frame - pixels(sheet([given, *expected]))).max() <= 2
@@ -195,8 +187,7 @@ def test_a_rotation_of_other_rooms_is_shaded_with_their_own(model, several_path,
 
 def test_a_rotation_tells_the_class(single_path):
     model = made(tiny(classes=2))
-    source = RoomImages(single_path, model.config)
-    (frame,) = rotation_frames(model, source, [0, 1, 2, 3], [0.0])
-    given = image_tiles(torch.from_numpy(np.stack([source[row]["image"] for row in range(4)])))
-    expected = sheet([given, *reconstructions(model, source, [0, 1, 2, 3], [0, 1, 2, 3])])
+    source, rows = RoomImages(single_path, model.config), [0, 1, 2, 3]
+    (frame,) = rotation_frames(model, source, rows, [0.0])
+    expected = sheet([inputs(source, rows), *reconstructions(model, source, rows, rows)])
     assert np.abs(pixels(frame) - pixels(expected)).max() <= 2

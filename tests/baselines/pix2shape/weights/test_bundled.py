@@ -16,11 +16,9 @@ from scenegen.description.presets import preset_spec
 from scenegen.rooms.make import make_dataset
 from scenegen.rooms.reader import RoomsFile
 
-LARGEST = 25_000_000  # bytes in all
-
 
 def test_they_are_small_and_each_has_its_card() -> None:
-    assert sum(path.stat().st_size for path in FOLDER.iterdir()) <= LARGEST
+    assert sum(path.stat().st_size for path in FOLDER.iterdir()) <= 25_000_000
     for name in names():
         model, card = open_weights(name)
         assert card.config == model.config
