@@ -56,6 +56,7 @@ bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.questions
 	$(BIN)/python -m benchmarks.nearest
 	$(BIN)/python -m benchmarks.surfels
+	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.score_rows
 
 clean:
 	rm -rf $(VENV) demo build dist *.egg-info

@@ -7,7 +7,7 @@
 `write` runs the commands of one checkout from fresh files: rooms of every preset and of the options
 that change pixels, questions of every kind, trivial and learned submissions, scores, comparisons,
 leaderboards, exports. Each data set, attribute and file gets a digest of its own, so that `compare`
-names what differs. Command lines, clocks and releases are no content, and are left out.
+names what differs. Command lines and versions are not compared, as they differ between runs.
 """
 
 import hashlib
@@ -23,7 +23,10 @@ import click
 import h5py
 import numpy as np
 
-VOLATILE = ("creation_command", "writer", "versions", "submissions")
+VOLATILE = (
+    "creation_command", "writer", "versions", "submissions", "format_version",
+    "mitsuba_version", "drjit_version", "llvm_version",
+)  # fmt: skip
 PRESETS = (
     "shapes", "shapes-single", "shapenet", "shapenet-single", "furniture-256", "specular",
     "two-tone", "albedo", "random-lights", "views",
@@ -52,7 +55,7 @@ def run(tree: Path, folder: Path, command: str) -> bytes:
     done = subprocess.run(
         [sys.executable, "-c", call, *arguments], cwd=folder, capture_output=True, check=False
     )
-    if done.returncode not in (0, 1):
+    if done.returncode not in (0, 1) or b"Traceback" in done.stderr:
         raise click.ClickException(f"{command}: {done.stderr.decode()}")
     return done.stdout
 
@@ -134,7 +137,7 @@ def digest(data: bytes | str) -> str:
 
 
 def is_content(part: str) -> bool:
-    """Whether a part is neither a command line nor a clock, a release or a path."""
+    """Return whether a part is compared, because it is no command line and no version."""
     return not any(word in VOLATILE for word in part.replace("@", "/").lower().split("/"))
 
 

@@ -178,7 +178,8 @@ def audit(
     """Prove that the questions of files or folders are right, and try to guess their answers.
 
     Proofs recompute what must hold, with code that is independent of the generator. Probes try to
-    find the right answers without comparing shapes. The exit code is 1 if a proof fails.
+    find the right answers without comparing shapes. The exit code is 1 if a proof
+    fails, or if there are no questions.
     """
     from iqtt.audit import report
     from iqtt.audit.audit import audit as audit_files

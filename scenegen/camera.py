@@ -56,7 +56,11 @@ class Camera:
         right = np.array([back[2], 0.0, -back[0]])  # y axis x back
         length = math.hypot(back[2], back[0])
         if length < 1e-9:
-            raise SpecError("camera", f"a view straight along y from {self.position}", "a slope")
+            raise SpecError(
+                "camera",
+                f"a view straight along y from {self.position}",
+                "a direction of view that is not vertical",
+            )
         right /= length
         matrix = np.eye(4)
         matrix[:3, 0] = right

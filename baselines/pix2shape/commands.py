@@ -263,7 +263,7 @@ def needs_torch() -> None:
     """Raise UserError where an optional package is missing."""
     missing = ", ".join(name for name in PACKAGES if importlib.util.find_spec(name) is None)
     if missing:
-        raise UserError(f"pix2shape needs {missing}: pip install 'pix2shape-bench[model]'")
+        raise UserError(f"pix2shape needs {missing}: pip install '.[model]'")
 
 
 COMMANDS = (train, predict, sample, interpolate, rotate)

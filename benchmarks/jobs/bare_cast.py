@@ -22,8 +22,8 @@ from scenegen.camera import pixel_size
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.rendering.backend import select_variant
+from scenegen.rendering.drjit_renderer import upload_scenes
 from scenegen.rendering.packing import SceneBatch, pack
-from scenegen.rendering.pixels import upload_scenes
 from scenegen.rendering.rays import Scenes, closest_hit
 from scenegen.rendering.unit_scene import mitsuba_shape
 

@@ -1,6 +1,6 @@
 """A description of a question file, as text: counts, settings, shapes, sizes and versions."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from iqtt.files.layout import truth_columns
 from iqtt.files.reader import AnswersFile, QuestionsFile, answers_beside, parts
 from iqtt.files.tables import NoImagesError, TableFile
-from scenegen.rendering.backend import UNKNOWN, VERSION_ATTRIBUTES
 from scenegen.rendering.ground_truth import decode_image
-from scenegen.rooms.info import setting_lines, size_text
+from scenegen.rooms.info import renderer_text, setting_lines, size_text
 
 Array = NDArray[Any]
 SAMPLED = 64  # rows that are read for the range of the images
@@ -56,7 +55,7 @@ def _header(path: Path, tables: Sequence[TableFile]) -> list[str]:
         *lines,
         f"  format        {attributes['format']} {attributes['format_version']}",
         f"  written by    {attributes['writer']}, {attributes.get('variant')}",
-        f"  rendered by   {_renderer(attributes)}",
+        f"  rendered by   {renderer_text(attributes)}",
         f"  command       {attributes.get('creation_command') or '-'}",
         f"  split         {tables[0].split}",
         f"  conventions   {attributes.get('conventions')}",
@@ -64,12 +63,6 @@ def _header(path: Path, tables: Sequence[TableFile]) -> list[str]:
         "  spec (* differs from the default)",
         *setting_lines(spec),
     ]
-
-
-def _renderer(attributes: Mapping[str, Any]) -> str:
-    """Return the releases that rendered a file; older files do not tell them."""
-    named = zip(("Mitsuba", "Dr.Jit", "LLVM"), VERSION_ATTRIBUTES, strict=True)
-    return ", ".join(f"{name} {attributes.get(key, UNKNOWN)}" for name, key in named)
 
 
 def _answers_told(path: Path, tables: Sequence[TableFile], total: int) -> str:

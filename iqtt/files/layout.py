@@ -14,7 +14,7 @@ from scenegen.common.row_file import Column, writer_name
 
 Array = NDArray[Any]
 FORMAT_NAME = "pix2shape-bench/iqtt"
-FORMAT_VERSION = "1.0"
+FORMAT_VERSION = "1.1"
 NO_CUBE = -128
 ID_BYTES = 2 * MAX_CUBES
 CONVENTIONS = (

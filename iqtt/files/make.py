@@ -18,6 +18,7 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import DEFAULT_BATCH, Rendered, groups, render_questions
 from scenegen.common.new_file import check_writable
+from scenegen.common.records import check
 from scenegen.common.row_file import new_file
 from scenegen.rendering.backend import select_variant, versions
 
@@ -53,7 +54,8 @@ def make_split(
         PlacementError: the bounded search found no question that meets the spec.
         OSError: the folder, or the disk.
     """
-    folder = Path(folder)
+    folder, count = Path(folder), spec.train + spec.val + spec.test
+    check(count > 0, "train, val and test", count, "at least 1 question in all")
     _check_folder(folder, overwrite)
     renderer = {"variant": select_variant(device), **versions()}
     pools, tally = make_pools(spec), Tally()

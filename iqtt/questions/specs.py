@@ -77,8 +77,6 @@ class SplitSpec:
         check(self.seed is None or 0 <= self.seed < 2**63, "seed", self.seed, "0 to 2**63 - 1")
         for name in ("train", "val", "test"):
             _check_within(name, getattr(self, name), 0, MAX_QUESTIONS, " questions")
-        count = self.train + self.val + self.test
-        check(count > 0, "train, val and test", count, "at least 1 question in all")
         _check_within("labeled", self.labeled, 0, self.train, " training questions")
         check_range("cubes", self.cubes, 3, MAX_CUBES)
         check_range("lights", self.lights, 1, MAX_LIGHTS)

@@ -183,7 +183,8 @@ class _RowScorer:
                 try:
                     scores = score()
                 except (NonFiniteError, NoDirectionError) as error:
-                    bad[row] = ScoringError(f"{file.path}: row {row}", error)
+                    where = f"{file.path}: row {row}: {error.where}"
+                    bad[row] = ScoringError(where, error.found, error.expected, error.hint)
                     scores = score(non_finite="penalise")
                 line.append(scores)
             table.append(line)

@@ -1,6 +1,6 @@
 """The content of a score file, held against `records`, and whether its numbers agree.
 
-This module imports pydantic: import it only where a score file is really read or written.
+This module imports pydantic, so the commands import it only when they run.
 """
 
 import sys
@@ -34,13 +34,13 @@ def parse_scores(content: Any) -> ScoreFile:
     body = {key: value for key, value in content.items() if key not in ("format", "format_version")}
     foreign = {"path"}.union(*GROUPINGS.values()).difference(GROUPINGS[task])
     for name in foreign.intersection(body):
-        raise refusal(name, "this key", "no key of this name")
+        raise refusal(name, "an unknown key", "no key of this name")
     found = validated(ScoreFile, body)
     if task == "iqtt":
         if found.alignment != "none":
             raise refusal("alignment", repr(found.alignment), "'none'")
         if "chamfer_floor" in body["meta"]:
-            raise refusal("meta.chamfer_floor", "this key", "no key of this name")
+            raise refusal("meta.chamfer_floor", "an unknown key", "no key of this name")
     if len({submission.sha256 for submission in found.meta.submissions}) < found.runs:
         raise refusal("meta.submissions", "the same sha256 twice", "each submission once")
     found = replace(found, items=_items(found.items, task, found.runs))

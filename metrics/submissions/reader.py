@@ -216,7 +216,9 @@ def find_truth(predictions: Predictions, given: str | Path | None = None) -> Pat
 
             return answers_beside(place) or place
     looked = " and ".join(dict.fromkeys(str(place) for place in places))
-    raise FileFormatError(f"{predictions.path}: truth", f"nothing at {looked}", "a file", advice)
+    raise FileFormatError(
+        f"{predictions.path}: truth", f"no file at {looked}", "the file that is predicted", advice
+    )
 
 
 def _looks_like_json(path: Path) -> bool:

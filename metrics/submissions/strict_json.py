@@ -1,6 +1,6 @@
 """JSON files read strictly: bounded, each key once, no NaN, and every value of the declared type.
 
-This module imports pydantic: import it only where a JSON file is really read.
+This module imports pydantic, so the commands import it only when they run.
 """
 
 import functools
@@ -16,17 +16,25 @@ from pydantic import TypeAdapter, ValidationError
 
 from metrics.submissions.problems import JsonError
 
+LONGEST_SHOWN = 200  # characters of each part of an error: a file's keys and texts may be huge
 LARGEST_WHOLE = 2**53  # beyond it, JSON readers that know only doubles change whole numbers
-_FOUND = {"missing": "no such key", "unexpected_keyword_argument": "this key"}
+_FOUND = {"missing": "no such key", "unexpected_keyword_argument": "an unknown key"}
 _EXPECTED = {
     "missing": "it to be there",
     "unexpected_keyword_argument": "no key of this name",
     "dataclass_type": "an object",
     "dict_type": "an object",
     "tuple_type": "a list",
+    "string_type": "a text",
+    "too_short": "at least one entry",
 }  # for the others pydantic's own words will do
 
 
+_PATTERNS = {
+    r"^1\.[0-9]{1,4}$": "a version 1.x",
+    "^[0-9a-f]{64}$": "64 hexadecimal digits",
+    r"\S": "a text that is not blank",
+}
 Kind = TypeVar("Kind")
 _adapter: Callable[[Any], TypeAdapter[Any]] = functools.cache(TypeAdapter)
 
@@ -55,7 +63,7 @@ def parse_json(data: bytes, most_keys: int) -> Any:
     """
 
     def refuse(name: str) -> Any:
-        raise refusal("", name, "finite numbers, or null")
+        raise refusal("", name, "finite numbers")
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         if len(pairs) > most_keys:
@@ -92,14 +100,16 @@ def validated(kind: type[Kind], content: Any) -> Kind:
     place = "".join(f"[{part}]" if isinstance(part, int) else f".{part:.60}" for part in way)
     found = _FOUND.get(first["type"]) or shown(first["input"])
     expected = _EXPECTED.get(first["type"]) or first["msg"].removeprefix("Input should be ")
+    pattern = re.search(r"match pattern '(.*)'", expected)
+    expected = _PATTERNS.get(pattern[1], expected) if pattern else expected
     expected = expected.replace("Tuple", "List")
     expected = re.sub(r"^(\w+) should", lambda kind: f"a {kind[1].lower()} to", expected)
     raise refusal(place.removeprefix("."), found, expected)
 
 
 def refusal(place: str, found: str, expected: str) -> JsonError:
-    """Return the error about a place in a file; what a file says is made printable."""
-    lines = (" ".join(field.split()) for field in (place, found, expected))
+    """Return the error about a place in a file; what a file says is made short and printable."""
+    lines = (" ".join(field.split())[:LONGEST_SHOWN] for field in (place, found, expected))
     return JsonError(*("".join(c if c.isprintable() else "\ufffd" for c in s) for s in lines))
 
 

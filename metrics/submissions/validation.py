@@ -55,8 +55,10 @@ def validate(
                 return problems + _against_rooms(predictions, truth, progress)
             return problems + _against_questions(predictions, truth)
         except (SceneGenError, OSError) as error:
-            found = _short(error, path)
-            return [*problems, Problem("truth", "readable", "the file that is predicted", found)]
+            found, expected = _short(error, path), "the file that is predicted"
+            if isinstance(error, SceneGenError) and error.expected == expected:
+                found = error.found + (f" ({error.hint})" if error.hint else "")
+            return [*problems, Problem("truth", "readable", expected, found)]
 
 
 def _against_rooms(

@@ -180,7 +180,7 @@ def progress_bar(count: int | None, unit: str) -> Any:
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 DEVICE = click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
                       show_default=True,
-                      help="Where to render. auto is the CPU, with LLVM or else slowly.")
+                      help="Where to render; auto is the CPU, which is slow without LLVM.")
 IMAGE_DTYPE = click.option("--image-dtype", type=click.Choice(["uint8", "float16", "float32"]),
                            default="uint8", show_default=True, help="Type of stored radiance.")
 COMPRESSION = click.option("--compression", type=click.Choice(["gzip", "lzf", "none"]),

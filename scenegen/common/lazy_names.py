@@ -6,7 +6,7 @@ from typing import Any
 
 
 def lazy_names(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return a package's `__getattr__`; `homes` are names, between blanks, by the module's path."""
+    """Return a package's `__getattr__`; `homes` gives each module's names, separated by blanks."""
     modules = {name: module for module, names in homes.items() for name in names.split()}
 
     def load(name: str) -> Any:

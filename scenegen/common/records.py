@@ -14,6 +14,7 @@ from scenegen.common.errors import SpecError
 
 T = TypeVar("T")
 LARGEST = 1e9  # no length, colour or angle is larger; keeps later arithmetic from overflowing
+LONGEST_JSON = 4_000_000  # characters; a request with 4,000 class names or 64 views is far shorter
 # What holds for every part of a record, by the part's type in pydantic's core schema.
 _RULES: dict[str, dict[str, Any]] = {
     "dataclass": {"config": {"strict": True, "extra_fields_behavior": "forbid"}},
@@ -49,8 +50,11 @@ def from_json(cls: type[T], text: str | bytes, what: str) -> T:
     """
     from pydantic_core import ValidationError
 
+    # pydantic keeps an error for each unknown field, so the text is bounded, not only the fields.
+    check(len(text) <= LONGEST_JSON, what, f"{len(text):,} characters", f"at most {LONGEST_JSON:,}")
+    mark = "\ufeff" if isinstance(text, str) else b"\xef\xbb\xbf"
     try:
-        record: T = _validator(typing.cast(Any, cls)).validate_json(text)
+        record: T = _validator(typing.cast(Any, cls)).validate_json(text.removeprefix(mark))  # type: ignore[arg-type]
     except ValidationError as error:
         raise _spec_error(error.errors(include_url=False)[0], what) from error
     return record
@@ -122,8 +126,8 @@ def _spec_error(detail: Any, what: str) -> SpecError:
     places = [str(part).replace("_", " ") for part in detail["loc"]]
     found, expected = f"{detail['input']!r:.40}", _EXPECTED.get(kind, detail["msg"])
     if kind == "json_invalid":
-        found = context["error"]
-    elif kind == "unexpected_keyword_argument":
+        return SpecError(what, f"no JSON ({context['error']})", "JSON")
+    if kind == "unexpected_keyword_argument":
         found = f"an unknown field {detail['loc'][-1]!r:.40}"
         places.pop()
     elif kind == "missing" and isinstance(detail["input"], list):

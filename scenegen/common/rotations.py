@@ -18,7 +18,8 @@ def rotation_matrix(quaternion: Any) -> NDArray[np.float64]:
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
-    return np.moveaxis(np.array(rows, dtype=float), (0, 1), (-2, -1))
+    matrices = np.array(rows, dtype=float)
+    return matrices if matrices.ndim == 2 else np.moveaxis(matrices, (0, 1), (-2, -1))
 
 
 def cross(a: NDArray[Any], b: NDArray[Any]) -> tuple[Any, Any, Any]:

@@ -172,7 +172,7 @@ def reading(where: object) -> Iterator[None]:
 
 @contextmanager
 def checking(file: h5py.File) -> Iterator[None]:
-    """Close a file in which something is found wrong. Raises FileFormatError as `reading`."""
+    """Close the file if the block raises an error. Raises FileFormatError as `reading`."""
     try:
         with reading(file.filename):
             yield

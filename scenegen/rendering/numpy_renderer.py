@@ -1,8 +1,8 @@
 """A slow renderer in plain numpy that only needs a function that casts rays at unit shapes.
 
 It has two uses: the fallback without LLVM, where Mitsuba's scalar variant casts the rays, and an
-independent check of the fast path (`pixels`) with any other ray caster. It renders one image at a
-time in float64.
+independent check of the fast path (`drjit_renderer`) with any other ray caster. It renders one
+image at a time in float64.
 """
 
 from collections.abc import Callable

@@ -1,6 +1,6 @@
 """Path-traced images, for `--shading path`: shadows and indirect light, by Mitsuba.
 
-Only the colour is computed here; depth, normals and ids come from `pixels` as usual, bit for bit.
+Only the colour is computed here; depth, normals and ids are those of `drjit_renderer`, bit for bit.
 Scenes are traced one at a time, with samples at `pixel_samples.sample_positions`, and a pixel's
 samples are added in a fixed order, so that the same command gives the same bytes.
 
@@ -22,7 +22,7 @@ from scenegen.common.seeding import Purpose, item_seed
 from scenegen.objects.scene_mesh import room_mesh
 from scenegen.rendering.ground_truth import encode_image
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.phong import phong_bsdf
+from scenegen.rendering.phong_material import phong_bsdf
 from scenegen.rendering.pixel_samples import sample_positions
 from scenegen.rendering.unit_scene import triangle_mesh
 

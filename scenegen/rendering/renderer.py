@@ -53,7 +53,7 @@ def launch_fields(
             return {name: getattr(truth, name) for name in names}
 
         return fetch
-    from scenegen.rendering.pixels import launch_pixels  # imports drjit; not needed above
+    from scenegen.rendering.drjit_renderer import launch_pixels  # imports drjit; not needed above
 
     first, *others = parts(batch)
     fetch_first = launch_pixels(first, variant, names)

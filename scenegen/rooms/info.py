@@ -1,6 +1,7 @@
 """Describe a file of rooms as text: what it was asked for, what it holds, how it is stored."""
 
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from scenegen.common.records import changed_settings
 from scenegen.layout import FIELDS
-from scenegen.rendering.backend import VERSION_ATTRIBUTES
+from scenegen.rendering.backend import UNKNOWN, VERSION_ATTRIBUTES
 from scenegen.rooms.reader import RoomsFile
 
 SAMPLED = 64  # rows that are read to tell the ranges of values
@@ -24,14 +25,13 @@ def describe(path: str | Path) -> str:
         rows = np.unique(np.linspace(0, len(rooms) - 1, min(SAMPLED, len(rooms))).astype(int))
         ranges, shapes = _ranges(rooms, rows)
         attributes = rooms.attributes
-        released = [f"{name} {attributes.get(name, 'not stored')}" for name in VERSION_ATTRIBUTES]
         lines = [
             f"{path}: {len(rooms)} images of {rooms.spec.height}x{rooms.spec.width},"
             f" {Path(path).stat().st_size / 1e6:.1f} MB",
             "",
             f"  format        {attributes['format']} {attributes['format_version']}",
             f"  written by    {attributes['writer']}, {attributes.get('variant')}",
-            f"  rendered by   {', '.join(released)}",
+            f"  rendered by   {renderer_text(attributes)}",
             f"  command       {attributes.get('creation_command') or '-'}",
             f"  fingerprint   {rooms.fingerprint}",
             f"  conventions   {attributes.get('conventions')}",
@@ -48,6 +48,12 @@ def describe(path: str | Path) -> str:
             ratio = f"{raw / stored:.1f}" if stored else "-"
             lines.append(f"  {field.name:27} {row:14} {unit:24} {size_text(stored):>9} {ratio:>6}")
     return "\n".join(lines)
+
+
+def renderer_text(attributes: Mapping[str, Any]) -> str:
+    """Return the versions that rendered a file of rooms or questions; old files do not say."""
+    named = zip(("Mitsuba", "Dr.Jit", "LLVM"), VERSION_ATTRIBUTES, strict=True)
+    return ", ".join(f"{name} {attributes.get(key, UNKNOWN)}" for name, key in named)
 
 
 def setting_lines(spec: Any) -> list[str]:

@@ -169,7 +169,7 @@ def _layout_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
     told = file.attrs.get("count")
     if not problems and (count == 0 or not np.array_equal(count, told)):
         problems.append(
-            f"found {count} rows, but the attribute 'count' says {told}, expected over 0"
+            f"found {count} rows, but the attribute 'count' is {told}, expected the same above 0"
         )
     return problems
 

@@ -77,13 +77,13 @@ WRONG = [
     ("format_version", "2.0", "", "'2.0'", "1"),
     ("task", "room", "", "'room'", "'rooms' or 'iqtt'"),
     ("task", ["rooms"], "", "a list of 1", "'rooms' or 'iqtt'"),
-    ("method", 3, "", "3", "string"),
+    ("method", 3, "", "3", "text"),
     ("method", "m" * 201, "", f"{'m' * 201!r:.60}", "at most 200"),
     ("method", "\ud800", "", r"'\ud800'", "unicode"),
     ("comparable", 1, "", "1", "boolean"),
     ("comparable", GONE, "", "no such key", "to be there"),
     ("alignment", "affine", "", "'affine'", "'none', 'median_scale', 'scale' or 'scale_shift'"),
-    ("metrics", {}, "", "an object of 0", "at least 1"),
+    ("metrics", {}, "", "an object of 0", "at least one"),
     ("metrics/chamfer", [], "", "a list of 0", "an object"),
     ("metrics/cd", ROOMS["metrics"]["chamfer"], "", "no score of task 'rooms'", "docs/scores.md"),
     ("metrics/iqtt_accuracy", ROOMS["metrics"]["chamfer"], "", "no score of task 'rooms'", "docs"),
@@ -100,9 +100,9 @@ WRONG = [
     ("metrics/chamfer/n", 2.0, "", "2.0", "integer"),
     ("metrics/chamfer/std", -1, "", "-1", "equal to 0"),
     ("metrics/chamfer/std", True, "", "true", "number"),
-    ("metrics/chamfer/more", 1, "", "this key", "no key of this name"),
+    ("metrics/chamfer/more", 1, "", "an unknown key", "no key of this name"),
     ("by_view_angle/5.0", {}, "", "'5.0'", "[0-9]{1,3}"),
-    ("by_distractor", {}, "", "this key", "no key of this name"),
+    ("by_distractor", {}, "", "an unknown key", "no key of this name"),
     (ROW, GONE, "", "no such key", "to be there"),
     (ROW, [0, 1, 2], "items.scene_index", "4 entries", "3, as in row"),
     (ROW, [0, 1, 2, 2], "", "2 twice", "each once"),
@@ -121,17 +121,17 @@ WRONG = [
     ("items/f_score_0.05", [0.5, 0.25, 1, 1.5], "items.f_score_0.05[3]", "1.5", "from 0 to 1"),
     ("items/chamfer", 0.1, "", "0.1", "a list of numbers"),
     ("items/note", [0, 0, 0, 0], "", "no score of task 'rooms'", "docs/scores.md"),
-    ("meta/truth_fingerprint", " ", "", "' '", "string"),
+    ("meta/truth_fingerprint", " ", "", "' '", "not blank"),
     ("meta/seed", 1.5, "", "1.5", "integer"),
     ("meta/seed", True, "", "true", "integer"),
     ("meta/seed", 2**60, "", f"{2**60}", "9007199254740992"),
     ("meta/confidence", 1, "", "1", "less than 1"),
-    ("meta/submissions", [], "", "a list of 0", "at least 1"),
-    ("meta/submissions/0/sha256", "AB", "meta.submissions[0].sha256", "'AB'", "{64}"),
+    ("meta/submissions", [], "", "a list of 0", "at least one"),
+    ("meta/submissions/0/sha256", "AB", "meta.submissions[0].sha256", "'AB'", "64 hexadecimal"),
     ("meta/submissions/0", 1, "meta.submissions[0]", "1", "an object"),
     ("meta/counts/images", "4", "", "'4'", "integer"),
     ("meta/warnings", "none", "", "'none'", "a list"),
-    ("\x1b[31m\n", 1, "\ufffd[31m", "this key", "no key of this name"),
+    ("\x1b[31m\n", 1, "\ufffd[31m", "an unknown key", "no key of this name"),
 ]
 
 
@@ -139,13 +139,13 @@ SAME = ROOMS["meta"]["submissions"][:1]
 WRONG += [
     ("meta/submissions", SAME, "metrics.chamfer.std", "0.002", "one run"),
     ("meta/submissions", SAME * 2, "", "the same sha256 twice", "each submission once"),
-    ("path", "s.json", "", "this key", "no key of this name"),
+    ("path", "s.json", "", "an unknown key", "no key of this name"),
 ]
 WRONG_QUESTIONS = [
     ("items/iqtt_accuracy", [1, 0, 1, 0.5], "", "0.5", "0 or 1"),
     ("alignment", "scale", "", "'scale'", "'none'"),
-    ("by_view_angle", {}, "", "this key", "no key of this name"),
-    ("meta/chamfer_floor", None, "", "this key", "no key of this name"),
+    ("by_view_angle", {}, "", "an unknown key", "no key of this name"),
+    ("meta/chamfer_floor", None, "", "an unknown key", "no key of this name"),
 ]
 
 

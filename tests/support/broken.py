@@ -152,7 +152,7 @@ MATCH_FILES = [
 ]  # fmt: skip
 
 MATCH = [
-    ("truth not there", ["truth", "nothing at", "gone/rooms.h5", "--truth"],
+    ("truth not there", ["truth", "no file at", "gone/rooms.h5", "--truth"],
      attribute("truth_path", "gone/rooms.h5")),
     ("truth not named", ["no path of a truth", "--truth"], attribute("truth_path", "")),
     ("images too small", ["depth", "16x16", "expected 32x32"], made.smaller),
@@ -234,7 +234,7 @@ JSON_OPEN = [
     ("JSON: a key with zeros", ["the key '01'"], {"01": 1}),
     ("JSON: a negative key", ["the key '-1'"], {"-1": 1}),
     ("JSON: a key beyond all", ["the key '99999999999'"], {"99999999999": 1}),
-    ("JSON: an unknown key", ["model", "this key"], {"answers": [0] * 6, "model": "x"}),
+    ("JSON: an unknown key", ["model", "an unknown key"], {"answers": [0] * 6, "model": "x"}),
     ("JSON: answers are a text", ["'012012'", "a list or"], {"answers": "012012"}),
     ("JSON: method is a number", ["method", "7"], {"answers": [0] * 6, "method": 7}),
     ("JSON: method is null", ["method", "null"], {"answers": [0] * 6, "method": None}),

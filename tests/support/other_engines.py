@@ -66,7 +66,7 @@ truth = renderer.render(pack(spec, scenes))
 if scalar:
     import mitsuba
     assert mitsuba.variant() == "scalar_rgb"
-    assert "scenegen.rendering.pixels" not in sys.modules
+    assert "scenegen.rendering.drjit_renderer" not in sys.modules
 pickle.dump(truth, sys.stdout.buffer)
 """
 

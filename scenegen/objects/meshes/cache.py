@@ -137,7 +137,7 @@ def make_model(data: bytes, suffix: str, up: str) -> CachedModel:
         none = np.empty((0, 3), np.float32)
         return CachedModel(none, none.astype(np.int32), none.astype(np.float64), {}, str(error))
     except MemoryError as error:
-        raise BadMeshError("memory", "too little", hint="simplify the model") from error
+        raise BadMeshError("model", "more data than fits into memory", "", "simplify it") from error
     except Exception as error:  # one bad model must not stop a run of a million
         found = f"{type(error).__name__}: {error}"
         raise BadMeshError("cleaning", found, hint="please report the file") from error

@@ -121,7 +121,9 @@ def _until_one_dies(
             pool.submit(time.perf_counter).result()
         except BrokenProcessPool as error:  # before any model was read
             hint = 'call it inside `if __name__ == "__main__":`, or with jobs=1'
-            raise SceneGenError("check_models", "processes that end at once", hint=hint) from error
+            raise SceneGenError(
+                "check_models", "worker processes that ended as soon as they began", hint=hint
+            ) from error
         try:
             while waiting or running:
                 while waiting and len(running) < 2 * jobs:

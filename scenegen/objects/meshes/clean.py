@@ -41,7 +41,7 @@ def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
     """Mend a mesh and normalise it.
 
     Args:
-        vertices: (V, 3), of any scale and place; may be not finite.
+        vertices: (V, 3), of any scale and place; may hold NaN or infinity.
         faces: (F, 3) indices; may be out of range.
         up: the axis, "y" or "z", that points up in the file.
 

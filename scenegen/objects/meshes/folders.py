@@ -53,7 +53,7 @@ def open_objects(
     names = sorted(subfolders(root))
     if not names:
         here = len(list(mesh_files(root, 0)))
-        found = f"no sub-folders and {here} meshes"
+        found = f"no sub-folders, but {here} meshes" if here else "an empty folder"
         hint = "put the meshes into sub-folders named after their classes"
         raise MeshFolderError(root, found, "one sub-folder per class", hint)
 

@@ -81,7 +81,8 @@ def make_listing(
     asked = None if asked is None else [on_disk.get(name, name) for name in asked]
     unknown = [name for name in asked or () if name not in known]
     if unknown or (asked is not None and not asked):
-        found = f"no class {', '.join(unknown)}" if unknown else "no class named"
+        named = ", ".join(name for name in unknown if name)
+        found = f"no class {named}" if named else "no class named"
         raise MeshFolderError(root, found, f"some of {', '.join(on_disk)}")
     models, others = {}, 0
     for name in dict.fromkeys(known if asked is None else asked):

@@ -37,7 +37,7 @@ def read_bytes(path: str | Path) -> bytes:
     path = Path(path)
     try:
         if not path.is_file():
-            found = "something else" if path.exists() else "nothing"
+            found = "a folder or a device" if path.exists() else "no such file"
             raise BadMeshError("file", found, "a regular file")
         with path.open("rb") as file:
             data = file.read(limits.MOST_BYTES + 1)

@@ -183,7 +183,7 @@ def test_without_the_optional_packages(group, line, gone, tmp_path, monkeypatch,
     monkeypatch.setattr(util, "find_spec", lambda name: None if name in gone else find(name))
     monkeypatch.chdir(tmp_path)
     result = invoke(getattr(cli, group), *line)
-    words = (*gone, "pip install 'pix2shape-bench[model]'")
+    words = (*gone, "pip install '.[model]'")
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
 
 
@@ -199,4 +199,4 @@ def test_without_torch_help_and_the_other_baselines_work(truths, tmp_path, check
     done = run("bench", "baseline", "empty-room", "--data", truths.rooms)
     assert done.returncode == 0, done.stderr
     done = run("pix2shape", "sample")
-    check_refusal(done.returncode, done.stdout, done.stderr, ("pix2shape-bench[model]",))
+    check_refusal(done.returncode, done.stdout, done.stderr, (".[model]",))

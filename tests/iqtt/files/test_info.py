@@ -32,7 +32,7 @@ def test_header_and_settings(split_folder):
     releases = [root[f"{name}_version"] for name in ("mitsuba", "drjit", "llvm")]
     for name, expected in {
         "answers": "to 6 of them (50.0%)",
-        "format": "pix2shape-bench/iqtt 1.0",
+        "format": "pix2shape-bench/iqtt 1.1",
         "written by": f"{root['writer']}, {root['variant']}",
         "rendered by": "Mitsuba {}, Dr.Jit {}, LLVM {}".format(*releases),
         "split": "train",

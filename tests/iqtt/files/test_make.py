@@ -293,3 +293,11 @@ def test_errors_on_the_way_leave_all_as_it_was(old, tmp_path, monkeypatch):
         make_split(new, TINY, progress=lambda count: new.mkdir(exist_ok=True))
     new.rmdir()
     assert listing(tmp_path) == before
+
+
+def test_a_split_without_any_question_is_refused(tmp_path):
+    with pytest.raises(SpecError) as error:
+        make_split(tmp_path / "empty", SplitSpec(train=0, labeled=0, val=0, test=0))
+    assert error.value.where == "train, val and test"
+    assert error.value.expected == "at least 1 question in all"
+    assert list(tmp_path.iterdir()) == []

@@ -38,7 +38,7 @@ RENDER_MISTAKES = [
     ("--up z", "without a folder of meshes"),
     ("--objects-root nosuch", "nosuch: no such folder"),
     ("--shapenet-root .", "found no ShapeNet", "--objects-root"),
-    ("--objects-root empty", "no sub-folders"),
+    ("--objects-root empty", "an empty folder"),
     ("--out .", "is a folder"),
     ("--out ''", "is a folder"),
     ("--out none/x.h5", "none: ", "does not exist"),

@@ -120,8 +120,8 @@ def test_what_is_no_record_is_refused(text: str | bytes, expected: str) -> None:
     assert expected in caught.value.expected
 
 
-def test_a_million_wrong_items_are_refused_at_the_first() -> None:
-    text = json.dumps(RAW | {"leaves": ["a"] * 1_000_000})
+def test_many_wrong_items_are_refused_at_the_first() -> None:
+    text = json.dumps(RAW | {"leaves": ["a"] * 700_000})
     with pytest.raises(SpecError) as caught:
         from_json(Tree, text, "tree")
     assert caught.value.where == "leaves 0"

@@ -19,9 +19,9 @@ COUNT = 100_000
 
 
 @pytest.fixture(scope="module")
-def phong(variant: str) -> ModuleType:
+def phong_material(variant: str) -> ModuleType:
     """Return the module, whose import needs the variant to be chosen."""
-    return importlib.import_module("scenegen.rendering.phong")
+    return importlib.import_module("scenegen.rendering.phong_material")
 
 
 def toward(angle: float, azimuth: float = 0.7) -> Array:
@@ -70,11 +70,11 @@ def hemisphere(heights: int = 600, azimuths: int = 720) -> tuple[Array, float]:
 
 @pytest.mark.parametrize("material", MATERIALS, ids=str)
 def test_under_a_point_light_it_is_the_shading_equation(
-    material: tuple[float, float], phong: ModuleType
+    material: tuple[float, float], phong_material: ModuleType
 ) -> None:
     """f cos(theta) times pi; a light of colour 1 at distance 2, k_l d + k_q d^2 being 1 there."""
     specular, shininess = material
-    bsdf = phong.phong_bsdf(RHO, specular, shininess)
+    bsdf = phong_material.phong_bsdf(RHO, specular, shininess)
     rng = np.random.default_rng(5)
     wi, wo = rng.standard_normal((2, 200, 3))
     wi, wo = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in (wi, wo))
@@ -91,10 +91,10 @@ def test_under_a_point_light_it_is_the_shading_equation(
 @pytest.mark.parametrize("angle", INCIDENT)
 @pytest.mark.parametrize("material", MATERIALS, ids=str)
 def test_directions_come_as_often_as_their_density_says(
-    material: tuple[float, float], angle: float, phong: ModuleType
+    material: tuple[float, float], angle: float, phong_material: ModuleType
 ) -> None:
     """Chi-square over 24 x 16 cells above the surface, and one for those lost below it."""
-    bsdf = phong.phong_bsdf(RHO, *material)
+    bsdf = phong_material.phong_bsdf(RHO, *material)
     wi = toward(angle)
     wo, pdf, weight = drawn(bsdf, wi)
     np.testing.assert_allclose(np.linalg.norm(wo, axis=1), 1, atol=1e-5)
@@ -125,10 +125,10 @@ def test_directions_come_as_often_as_their_density_says(
 
 @pytest.mark.parametrize("material", MATERIALS, ids=str)
 def test_samples_weigh_what_the_surface_reflects_and_no_more_than_promised(
-    material: tuple[float, float], phong: ModuleType
+    material: tuple[float, float], phong_material: ModuleType
 ) -> None:
     specular, shininess = material
-    bsdf = phong.phong_bsdf(RHO, specular, shininess)
+    bsdf = phong_material.phong_bsdf(RHO, specular, shininess)
     above, solid = hemisphere()
     most = RHO + 2 * specular / (shininess + 1)
     for angle in INCIDENT:
@@ -142,9 +142,9 @@ def test_samples_weigh_what_the_surface_reflects_and_no_more_than_promised(
             np.testing.assert_allclose(albedo, most, rtol=2e-4)
 
 
-def test_both_sides_reflect_alike(phong: ModuleType) -> None:
+def test_both_sides_reflect_alike(phong_material: ModuleType) -> None:
     flip = np.array([1.0, 1.0, -1.0])
-    bsdf = phong.phong_bsdf(RHO, 0.6, 9.0)
+    bsdf = phong_material.phong_bsdf(RHO, 0.6, 9.0)
     for angle in INCIDENT:
         (wo, pdf, weight), (wo_below, *below) = (
             drawn(bsdf, toward(angle)), drawn(bsdf, toward(angle) * flip)
@@ -157,9 +157,9 @@ def test_both_sides_reflect_alike(phong: ModuleType) -> None:
 @pytest.mark.parametrize("material", [(0.01, 10_000.0), (10.0, 1.0), (10.0, 10_000.0)], ids=str)
 @pytest.mark.parametrize("rho", [0.0, 1.0])
 def test_the_extremes_of_what_may_be_asked_for_stay_finite(
-    material: tuple[float, float], rho: float, phong: ModuleType
+    material: tuple[float, float], rho: float, phong_material: ModuleType
 ) -> None:
-    bsdf = phong.phong_bsdf(np.full(3, rho), *material)
+    bsdf = phong_material.phong_bsdf(np.full(3, rho), *material)
     for angle in (*INCIDENT, 1.5707):
         wo, pdf, weight = drawn(bsdf, toward(angle))
         for values in (wo, pdf, weight, *call(bsdf, toward(angle), wo)):
@@ -167,10 +167,13 @@ def test_the_extremes_of_what_may_be_asked_for_stay_finite(
         assert weight.min() >= 0
 
 
-def test_materials_keep_to_themselves(phong: ModuleType) -> None:
+def test_materials_keep_to_themselves(phong_material: ModuleType) -> None:
     """Two materials of the same class exist at once."""
     wi, wo = toward(0.3), toward(0.4)[None]
-    first, second = phong.phong_bsdf(RHO, 0.5, 3.0), phong.phong_bsdf(0.1 * RHO, 0.1, 9.0)
+    first, second = (
+        phong_material.phong_bsdf(RHO, 0.5, 3.0),
+        phong_material.phong_bsdf(0.1 * RHO, 0.1, 9.0),
+    )
     before = call(first, wi, wo)[0]
     assert (call(second, wi, wo)[0] < before).all()
     np.testing.assert_array_equal(call(first, wi, wo)[0], before)

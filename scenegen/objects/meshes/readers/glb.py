@@ -54,7 +54,7 @@ def read_glb(data: bytes) -> tuple[Array, Array]:
 
 def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
     if data[:4] != b"glTF" or len(data) < 20:
-        raise BadMeshError("GLB file", "another start", "glTF")
+        raise BadMeshError("GLB file", "a file that does not begin with glTF", "a binary glTF file")
     _, version, length = struct.unpack_from("<4sII", data)
     if version != 2:
         raise BadMeshError("GLB file", f"version {version}", "version 2", "export it again")

@@ -23,7 +23,7 @@ def read_off(data: bytes) -> tuple[Array, Array]:
     first = next(rows, [b""])
     header = re.fullmatch(rb"(?:ST)?C?N?OFF(\d+)?", first[0])
     if not header or first[1:2] == [b"BINARY"]:
-        raise BadMeshError("OFF file", "another first line", "OFF in text form")
+        raise BadMeshError("OFF file", "a first line other than OFF", "an OFF file in text form")
     counts = ([header[1]] if header[1] else []) + first[1:] or next(rows, [])
     try:
         vertex_count, face_count = (int(word) for word in counts[:2])

@@ -18,7 +18,7 @@ class Polygons:
     """Faces as they are in a file.
 
     Attributes:
-        vertices: (V, 3); may be not finite.
+        vertices: (V, 3); may hold NaN or infinity.
         sizes: number of corners of each polygon, (P,).
         corners: indices into the vertices, polygon after polygon, (C,); may be out of range.
     """

@@ -125,7 +125,7 @@ def test_refusals_are_kept_with_their_reasons(tmp_path: Path, made: Mock) -> Non
 
 
 @pytest.mark.parametrize(
-    ("error", "where"), [(MemoryError(), "memory"), (np.linalg.LinAlgError("odd"), "cleaning")]
+    ("error", "where"), [(MemoryError(), "model"), (np.linalg.LinAlgError("odd"), "cleaning")]
 )
 def test_errors_that_are_not_the_file_s_are_not_cached(
     error: Exception, where: str, ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -201,7 +201,7 @@ def test_refusals(shapenet: Callable[..., Path], make: Make) -> None:
         (open_shapenet, (net, ["can"]), "root", "no class can"),
         (open_shapenet, (net, []), "root", "no class named"),
         (open_objects, (plain, [".", ".."]), "plain", "no class ., .."),
-        (open_objects, (empty,), "empty", "no sub-folders"),
+        (open_objects, (empty,), "empty", "an empty folder"),
         (open_objects, (flat,), "flat", "2 meshes"),
         (open_objects, (textual,), "textual", "no models"),
         (open_objects, (plain, ["bowl"]), "class bowl", "no models"),

@@ -52,8 +52,8 @@ def test_limits_hold(more: bytes, limit: str, where: str, monkeypatch: pytest.Mo
         (b"OFF\n900000000000 900000000000 0\n1 2 3\n", ".off", "1 vertices"),
         (bytes(80) + b"\xff\xff\xff\xff", ".stl", "0 triangles"),
         (b"short", ".stl", "5 bytes"),
-        (b"\x89PNG\r\n\x1a\n" + bytes(99), ".glb", "another start"),
-        (b"OBJ", ".off", "another first line"),
+        (b"\x89PNG\r\n\x1a\n" + bytes(99), ".glb", "does not begin with glTF"),
+        (b"OBJ", ".off", "a first line other"),
         (b"OFF\nx y\n", ".off", "no counts"),
         (b"x", ".fbx", "'.fbx'"),
     ],
@@ -67,8 +67,8 @@ def test_small_files_that_claim_to_be_large_or_are_something_else(
 def test_files_that_are_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     names = {
         "nothing in it": "empty blank",
-        "something else": "folder pipe",
-        "nothing": "none loop gone",
+        "a folder or a device": "folder pipe",
+        "no such file": "none loop gone",
         "more bytes": "big",
     }
     (tmp_path / "empty.obj").touch()
