@@ -187,7 +187,7 @@ def test_what_is_not_finite_is_refused_with_its_rows_or_penalised(folder, tmp_pa
         replaced("depth", np.float64)(file)
         file["depth"][5, 3, 7] = bad
         row = int(file["row"][5])
-    with refused(ScoringError, f"{path}: row {row}", hint="--non-finite penalise"):
+    with refused(ScoringError, f"{path}: row {row}: predicted depth", hint="--non-finite penalise"):
         score([path])
     found = score([path], settings=Settings(non_finite="penalise"))
     assert not found.comparable
