@@ -23,7 +23,7 @@ demo: $(VENV)/.runtime
 	$(BIN)/bench baseline empty-room --data demo/rooms.h5 --out demo/empty-room.h5 --overwrite
 	for name in constant mean-depth; do $(BIN)/bench score demo/$$name.h5 --json demo/$$name.json --overwrite > /dev/null || exit 1; done
 	$(BIN)/bench score demo/empty-room.h5 --json demo/empty-room.json --html demo/report.html --overwrite
-	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/empty-room.json
+	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/empty-room.json --no-paper
 	@echo
 	@echo "Look at $(CURDIR)/demo: rooms.png, objects.png, questions.png, report.html"
 

@@ -17,15 +17,20 @@ def predict(image):
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("rooms")
 parser.add_argument("predictions")
+parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
 arguments = parser.parse_args()
 truth, out = arguments.rooms, arguments.predictions
 try:
     with (
         scenegen.open_rooms(truth) as rooms,
-        RoomPredictionWriter(out, truth, method="constant", run="seed 0") as predictions,
+        RoomPredictionWriter(
+            out, truth, method="constant", run="seed 0", overwrite=arguments.overwrite
+        ) as predictions,
     ):
         for room in rooms:
             predictions.add(room.index, *predict(room.radiance))
-except (OSError, scenegen.SceneGenError) as error:
+except OSError as error:
+    parser.exit(2, f"Error: {error.filename}: {error.strerror}\n")
+except scenegen.SceneGenError as error:
     parser.exit(2, f"Error: {error}\n")
 print(f"now: bench score {out}")

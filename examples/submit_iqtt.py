@@ -17,12 +17,21 @@ def score(reference, candidates):
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("questions")
 parser.add_argument("answers")
+parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
 arguments = parser.parse_args()
 questions, out = arguments.questions, arguments.answers
 try:
     with iqtt.open_questions(questions) as file:
         scores = [score(question.radiance[0], question.radiance[1:]) for question in file]
-    write_answers(out, questions, method="mean brightness", scores=scores)
-except (OSError, SceneGenError) as error:
+    write_answers(
+        out,
+        questions,
+        method="mean brightness",  # it mostly measures the area that a shape covers
+        scores=scores,
+        overwrite=arguments.overwrite,
+    )
+except OSError as error:
+    parser.exit(2, f"Error: {error.filename}: {error.strerror}\n")
+except SceneGenError as error:
     parser.exit(2, f"Error: {error}\n")
 print(f"now: bench score {out}")
