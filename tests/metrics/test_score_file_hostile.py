@@ -7,6 +7,7 @@ import made_scores
 import pytest
 
 from metrics.score_file import JsonError, read_scores, to_json, write_scores
+from metrics.submissions.strict_json import LONGEST_SHOWN, refusal
 
 ROOMS = json.loads(to_json(made_scores.simple_rooms(runs=2, chamfer_floor=0.01)))
 IQTT = json.loads(to_json(made_scores.iqtt_scores("m", [1, 0, 1, 1])))
@@ -188,3 +189,8 @@ def test_text_that_is_no_score_file(text, where, found, tmp_path):
     error = told(tmp_path / "s.json", text)
     assert error[0] == where
     assert error[1].startswith(found)
+
+
+def test_what_a_file_says_is_cut_short_in_errors():
+    error = refusal("k" * 10**6, "f" * 10**4, "e" * 10**4)
+    assert max(map(len, (error.where, error.found, error.expected))) == LONGEST_SHOWN

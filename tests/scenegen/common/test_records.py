@@ -9,6 +9,7 @@ import pytest
 from scenegen.common.errors import SpecError
 from scenegen.common.records import (
     LARGEST,
+    LONGEST_JSON,
     changed_settings,
     check,
     check_range,
@@ -118,6 +119,16 @@ def test_what_is_no_record_is_refused(text: str | bytes, expected: str) -> None:
         from_json(Tree, text, "tree")
     assert caught.value.where == "tree"
     assert expected in caught.value.expected
+
+
+def test_a_byte_order_mark_is_ignored_and_the_length_is_bounded() -> None:
+    text = to_json(TREE)
+    assert from_json(Tree, "\ufeff" + text, "tree") == TREE
+    assert from_json(Tree, b"\xef\xbb\xbf" + text.encode(), "tree") == TREE
+    assert from_json(Tree, text.ljust(LONGEST_JSON), "tree") == TREE
+    with pytest.raises(SpecError) as caught:
+        from_json(Tree, text.ljust(LONGEST_JSON + 1), "tree")
+    assert caught.value.where == "tree"
 
 
 def test_many_wrong_items_are_refused_at_the_first() -> None:

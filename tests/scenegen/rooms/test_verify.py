@@ -51,6 +51,7 @@ OTHER_VERSION = {
     "another Mitsuba": ({"mitsuba_version": "3.8.1"}, "mitsuba_version 3.8.1"),
     "another LLVM": ({"llvm_version": "20.0.0"}, "llvm_version 20.0.0"),
     "another variant": ({"variant": "scalar_rgb"}, "variant scalar_rgb"),
+    "an array": ({"mitsuba_version": np.array([3, 8])}, "mitsuba_version [3 8]"),
     "none stored": (dict.fromkeys(VERSION_ATTRIBUTES), "mitsuba_version not stored"),
 }
 
