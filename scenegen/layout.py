@@ -11,7 +11,18 @@ from scenegen.common.text_table import piped
 from scenegen.description.specs import DatasetSpec
 
 FORMAT_NAME = "pix2shape-bench/rooms"
-FORMAT_VERSION = "2.1"
+FORMAT_VERSION = "2.2"
+TRUTH_DIGEST = "truth_digest"
+# The datasets that scores depend on: the root attribute TRUTH_DIGEST is their joint digest.
+SCORED = (
+    "depth",
+    "normal",
+    "object_id",
+    "scene_index",
+    "view_index",
+    "camera/world_from_camera",
+    "camera/fov_y_degrees",
+)
 
 
 @dataclass(frozen=True)

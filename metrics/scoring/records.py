@@ -16,7 +16,7 @@ from metrics.measures.depth import Alignment
 from metrics.submissions.strict_json import LARGEST_WHOLE
 
 FORMAT_NAME = "pix2shape-bench/scores"
-FORMAT_VERSION = "1.0"
+FORMAT_VERSION = "2.0"
 LONGEST_NAME = 200  # characters of method, run and fingerprint
 LONGEST_TEXT = 10_000
 Task = Literal["rooms", "iqtt"]
@@ -81,6 +81,10 @@ class Meta:
         truth_fingerprint: of the test set; never empty. Where the truth file has none (the released
             3D-IQTT), SHA-256 of its answers.
         truth_path: where the truth lay.
+        truth_digest: SHA-256 of the values of the truth that scores depend on, as they were read
+            when they were scored (`truth_digest` of rooms and question files).
+        truth_source: who chose the truth: "given" by the person who scored, "known" to the benchmark
+            by its digest (`known_tests`), or named by the "submission" alone, which is not comparable.
         submissions: one for each training run.
         writer: the program and its release.
         versions: releases of the libraries that computed the scores, by package.
@@ -95,6 +99,8 @@ class Meta:
     __pydantic_config__ = _CONFIG
     truth_fingerprint: Annotated[Name, Field(pattern=r"\S")]
     truth_path: Text
+    truth_digest: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    truth_source: Literal["given", "known", "submission"]
     submissions: Annotated[TupleOf[Submission], Field(min_length=1)]
     writer: Text
     versions: ByKey[str, Text]

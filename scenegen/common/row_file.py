@@ -5,6 +5,7 @@ own filter and any HDF5 library reads it. A file gets its name when it is comple
 """
 
 import errno
+import hashlib
 import importlib.metadata
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,6 +19,7 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
+from scenegen.common.content import SHA256, row_digest
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.common.new_file import written_beside
 
@@ -52,7 +54,8 @@ class Column:
 class Table:
     """Columns of equal length in one HDF5 group, filled row by row.
 
-    The bytes written depend on the rows alone, not on how many are appended at a time.
+    The bytes written depend on the rows alone, not on how many are appended at a time. When the
+    last row is written, each dataset gets its digest (`content.column_digest`) as an attribute.
     """
 
     def __init__(
@@ -68,6 +71,9 @@ class Table:
         self._columns, self._compression = columns, compression
         self._datasets = {column.name: self._create(group, column) for column in columns}
         self._block: dict[str, list[Any]] = {c.name: [] for c in columns if not c.own_chunk}
+        self._digests = {column.name: hashlib.sha256() for column in columns}
+        if not count:
+            self._write_digests()
 
     def append(self, row: Mapping[str, Any]) -> None:
         """Write the next row: one value for each column."""
@@ -79,6 +85,12 @@ class Table:
         self.rows += 1
         if self.rows % BLOCK_ROWS == 0 or self.rows == self.count:
             self._flush()
+        if self.rows == self.count:
+            self._write_digests()
+
+    def _write_digests(self) -> None:
+        for name, digest in self._digests.items():
+            self._datasets[name].attrs[SHA256] = digest.hexdigest()
 
     def _create(self, group: h5py.Group, column: Column) -> h5py.Dataset:
         text = column.dtype == "text"
@@ -98,10 +110,11 @@ class Table:
 
     def _write_chunk(self, name: str, values: Array) -> None:
         dataset = self._datasets[name]
-        if self._compression == "lzf":
-            dataset[self.rows] = values
-            return
         raw = np.ascontiguousarray(values, dataset.dtype)
+        self._digests[name].update(row_digest(raw))
+        if self._compression == "lzf":
+            dataset[self.rows] = raw
+            return
         if self._compression == "gzip":
             payload = isal_zlib.compress(shuffle_bytes(raw), DEFLATE_LEVEL)
         else:
@@ -113,8 +126,10 @@ class Table:
             if rows:
                 dataset = self._datasets[name]
                 text = h5py.check_string_dtype(dataset.dtype) is not None
-                values = np.array(rows, object) if text else np.stack(rows)
+                values = np.array(rows, object) if text else np.stack(rows).astype(dataset.dtype)
                 dataset[self.rows - len(rows) : self.rows] = values
+                for row in values:
+                    self._digests[name].update(row_digest(row))
                 rows.clear()
 
 

@@ -9,11 +9,12 @@ from typing import Any
 import h5py
 from numpy.typing import NDArray
 
+from scenegen.common.content import SHA256, joint_digest, seal
 from scenegen.common.records import check
 from scenegen.common.row_file import Table, new_file, writer_name
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec, Fingerprint
-from scenegen.layout import FORMAT_NAME, FORMAT_VERSION, columns
+from scenegen.layout import FORMAT_NAME, FORMAT_VERSION, SCORED, TRUTH_DIGEST, columns
 from scenegen.rendering.packing import SceneBatch
 
 Array = NDArray[Any]
@@ -125,3 +126,5 @@ def create_rooms(
         if writer.table.rows != rows:
             raise RuntimeError(f"{path}: got {writer.table.rows} of {rows} rows")
         file.attrs["fingerprint"] = writer.fingerprint.hex
+        file.attrs[TRUTH_DIGEST] = joint_digest({name: file[name].attrs[SHA256] for name in SCORED})
+        seal(file)

@@ -1,0 +1,97 @@
+"""Digests of what HDF5 files hold: of a row, a data set, some data sets, and a file with attributes.
+
+The digest of a data set is the SHA-256 of the SHA-256s of its rows, so that several processes can
+read rows in any order and still tell the digest of the whole. With plain h5py it is
+
+    hashlib.sha256(b"".join(hashlib.sha256(row.tobytes()).digest() for row in file["depth"]))
+
+It does not depend on how the values are stored (chunks, compression).
+"""
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+import h5py
+import numpy as np
+
+SHA256 = "sha256"  # attribute of each data set
+CONTENT_DIGEST = "content_digest"  # attribute of the root
+
+
+def row_digest(values: Any) -> bytes:
+    """Return the SHA-256 of one row: its bytes in C order, little-endian, or its texts.
+
+    Each text counts as its UTF-8 followed by a zero byte.
+    """
+    return hashlib.sha256(_bytes(values)).digest()
+
+
+def column_digest(rows: Iterable[bytes]) -> str:
+    """Return the digest of a data set, as hex, from the `row_digest` of each row in order."""
+    return hashlib.sha256(b"".join(rows)).hexdigest()
+
+
+def joint_digest(digests: Mapping[str, str]) -> str:
+    """Return the SHA-256, as hex, of a line `name digest` for each data set, sorted by name."""
+    lines = (f"{name} {digest}\n" for name, digest in sorted(digests.items()))
+    return hashlib.sha256("".join(lines).encode()).hexdigest()
+
+
+def seal(file: h5py.File) -> None:
+    """Write `content_digest` to a file in which each data set has its attribute `sha256`."""
+    file.attrs[CONTENT_DIGEST] = content_digest(file)
+
+
+def content_digest(file: h5py.File) -> str:
+    """Return the SHA-256, as hex, of every name, type, shape and attribute of a file but its own.
+
+    The values of the data sets count through their attribute `sha256`, which `digest_problems`
+    checks. Raises whatever HDF5 raises on a damaged file (`row_file.HDF5_ERRORS`).
+    """
+    lines = []
+    for name, item in (("/", file), *_objects(file)):
+        if isinstance(item, h5py.Dataset):
+            lines.append(f"{name} {item.dtype.str} {item.shape}".encode())
+        for key in sorted(item.attrs):
+            if (name, key) != ("/", CONTENT_DIGEST):
+                value = b"".join(_described(item.attrs[key], file))
+                lines.append(f"{name}@{key} ".encode() + hashlib.sha256(value).digest())
+    return column_digest(hashlib.sha256(line).digest() for line in lines)
+
+
+def _objects(file: h5py.File) -> list[tuple[str, Any]]:
+    found: list[tuple[str, Any]] = []
+    file.visititems(lambda name, item: found.append((name, item)))
+    return sorted(found, key=lambda pair: pair[0])
+
+
+def _bytes(values: Any) -> bytes:
+    if isinstance(values, str):
+        return values.encode() + b"\0"
+    if isinstance(values, bytes):  # as h5py reads texts
+        return values + b"\0"
+    array = np.asarray(values)
+    if array.dtype.kind in "OUS":
+        return b"".join(_bytes(text) for text in array.reshape(-1).tolist())
+    return np.ascontiguousarray(array, array.dtype.newbyteorder("<")).tobytes()
+
+
+def _described(value: Any, file: h5py.File) -> Iterator[bytes]:
+    """Yield an attribute's kind and value; references count as the names that they point to."""
+    if isinstance(value, h5py.Reference):
+        yield b"to " + str(file[value].name).encode() + b"\0"
+    elif isinstance(value, (str, bytes)):
+        yield b"text " + _bytes(value)
+    elif isinstance(value, h5py.Empty):
+        yield b"empty"
+    else:
+        array = np.asarray(value)
+        if array.dtype.kind in "OV":
+            yield f"{array.shape} ".encode()
+            for part in array.reshape(-1).tolist():
+                parts = part if isinstance(part, (tuple, np.ndarray)) else (part,)
+                for member in parts:
+                    yield from _described(member, file)
+        else:
+            yield f"{array.dtype.str} {array.shape} ".encode() + _bytes(array)
