@@ -33,7 +33,7 @@ def try_file(path: str | Path) -> None:
     limit = SECONDS + os.path.getsize(path) / BYTES_A_SECOND
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     # -P: a file h5py.py in the working directory must not be imported.
-    command = [sys.executable, "-P", "-m", __name__, os.path.abspath(path)]
+    command = [sys.executable, "-P", "-m", __name__, os.path.abspath(path), str(MEMORY)]
     try:
         done = subprocess.run(
             command,
@@ -80,19 +80,19 @@ def _read_structure(path: str) -> None:
             file.visititems(look)
 
 
-def _limit_memory() -> None:
+def _limit_memory(most: int) -> None:
     import resource
 
-    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, used + MEMORY))
+    most += int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
 
 
 if __name__ == "__main__":
     if os.path.exists("/proc/self/statm"):
-        _limit_memory()
+        _limit_memory(int(sys.argv[2]))
     try:
         _read_structure(sys.argv[1])
-    except MemoryError:
-        sys.exit(OUT_OF_MEMORY)
-    except HDF5_ERRORS:
-        pass  # the caller will meet the same error, and tell it
+    except HDF5_ERRORS as error:
+        if isinstance(error, MemoryError) or "alloc" in str(error):
+            sys.exit(OUT_OF_MEMORY)
+        # The caller will meet all other errors, and tell them.
