@@ -28,12 +28,13 @@ from metrics.scoring.records import (
 )
 from metrics.scoring.schema import parse_scores
 from metrics.submissions.problems import JsonError
-from metrics.submissions.strict_json import parse_json, read_bytes, require_size
+from metrics.submissions.strict_json import parse_json, read_bytes
 from scenegen.common.new_file import written_beside
 from scenegen.common.text_table import by_number
 
 MOST_BYTES = 256 * 2**20  # about 250,000 images
 MOST_KEYS = 10_000  # of one object
+WITHOUT_JSON = "about 250,000 images fit; --csv writes the scores of any number of them"
 
 __all__ = [
     "FORMAT_NAME",
@@ -70,7 +71,8 @@ def write_scores(scores: ScoreFile, path: str | Path, overwrite: bool = False) -
     """
     with written_beside(path, overwrite) as temporary, _naming(path):
         data = to_json(scores).encode("ascii")
-        require_size(len(data), MOST_BYTES)
+        if len(data) > MOST_BYTES:
+            raise JsonError("", f"{len(data)} bytes", f"at most {MOST_BYTES}", WITHOUT_JSON)
         _parsed(data)
         temporary.write_bytes(data)
 

@@ -53,14 +53,9 @@ def read_bytes(path: Path, most: int) -> bytes:
         raise IsADirectoryError(21, "is a folder; name a file in it", str(path))
     if not stat.S_ISREG(status.st_mode):
         raise refusal("", "something else", "a regular file")
-    require_size(status.st_size, most)
+    if status.st_size > most:
+        raise refusal("", f"{status.st_size} bytes", f"at most {most}")
     return path.read_bytes()
-
-
-def require_size(size: int, most: int) -> None:
-    """Raise JsonError for a file of too many bytes."""
-    if size > most:
-        raise refusal("", f"{size} bytes", f"at most {most}")
 
 
 def parse_json(data: bytes, most_keys: int, most_memory: int = MOST_MEMORY) -> Any:

@@ -153,7 +153,7 @@ def test_names_beyond_ascii_are_escaped(tmp_path):
 def test_what_is_too_large_to_read_is_not_written(tmp_path, monkeypatch):
     scores = made_scores.simple_rooms()
     monkeypatch.setattr("metrics.score_file.MOST_BYTES", len(to_json(scores)) - 1)
-    with refused(JsonError, "s.json", f"{len(to_json(scores))} bytes"):
+    with refused(JsonError, "s.json", f"{len(to_json(scores))} bytes", hint="--csv"):
         write_scores(scores, tmp_path / "s.json")
     assert os.listdir(tmp_path) == []
 

@@ -11,9 +11,11 @@ from made_scores import iqtt_scores, rooms_scores
 from refusals import refused
 
 import cli
+from baselines.trivial import write_chance, write_room_baseline
 from metrics.leaderboard.recheck import RecheckError, recheck, steps
 from metrics.measures.statistics import bootstrap_interval, cluster_means, wilson_interval
 from metrics.score_file import Score, read_scores, write_scores
+from metrics.scoring.evaluate import score
 from metrics.scoring.metric_names import metric
 
 SCENES = np.repeat(np.arange(9), 2)
@@ -82,6 +84,21 @@ def test_honest_files_pass_when_read_in_any_order(file, tmp_path):
     done = []
     recheck(read_scores(tmp_path / "s"), done.append)
     assert sum(done) == steps(file)
+
+
+def test_what_scoring_writes_passes(truths, tmp_path):
+    """The scores come from the program here, not from the formulas of this file."""
+    rooms, answers = tmp_path / "rooms.h5", [tmp_path / f"{i}.h5" for i in range(2)]
+    write_room_baseline("empty-room", truths.rooms, rooms)
+    for seed, path in enumerate(answers):
+        write_chance(truths.iqtt, path, seed)
+    for files, truth in (
+        ([rooms], truths.rooms),
+        (answers[:1], truths.iqtt),
+        (answers, truths.iqtt),
+    ):
+        write_scores(score(files, truth), tmp_path / "s.json", overwrite=True)
+        recheck(read_scores(tmp_path / "s.json"))
 
 
 NUMBERS = [
