@@ -17,7 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 from metrics.submissions.problems import JsonError
 
 LONGEST_SHOWN = 200  # characters of each part of an error: a file's keys and texts may be huge
-MOST_MEMORY = 5 * 2**28  # bytes that a parsed text may take; 160,000 scored images take half of it
+MOST_MEMORY = 5 * 2**28  # bytes that a parsed text may take; 160,000 scored images: 0.8 GB
 LARGEST_WHOLE = 2**53  # beyond it, JSON readers that know only doubles change whole numbers
 _FOUND = {"missing": "no such key", "unexpected_keyword_argument": "an unknown key"}
 _EXPECTED = {
@@ -97,8 +97,8 @@ def parse_json(data: bytes, most_keys: int, most_memory: int = MOST_MEMORY) -> A
 def memory_needed(data: bytes) -> int:
     """Return an upper bound, in bytes, of what parsing this JSON takes while it is parsed.
 
-    It is made of counts alone, so nothing of the text has been built yet. Each weight is what
-    CPython 3.11 takes for the smallest text of that kind; tests hold the bound against processes.
+    It is made of counts alone, so nothing of the text has been built yet. The weights are at least
+    what CPython 3.11 was seen to take for the worst text of each kind.
     """
     wide, escaped = not data.isascii(), b"\\" in data
     # Bytes, text, and strings; a text with one wide character is copied into 4 bytes a character.
