@@ -103,7 +103,7 @@ def memory_needed(data: bytes) -> int:
     wide, escaped = not data.isascii(), b"\\" in data
     # Bytes, text, and strings; a text with one wide character is copied into 4 bytes a character.
     held = 10_000 + len(data) * (7.5 if wide else 3.0)
-    weights = {b",": 50, b":": 200, b"{": 400, b"[": 130, b'"': 32}  # a string has two quotes
+    weights = {b",": 50, b":": 200, b"{": 130, b"[": 130, b'"': 32}  # a string has two quotes
     held += sum(weight * data.count(piece) for piece, weight in weights.items())
     if wide or escaped:
         held += 6.5 * sum(match.end() - match.start() for match in _STRING.finditer(data))

@@ -33,6 +33,7 @@ TEXTS = {
     "a long text": filled(b"a", b'"]', b'["'),
     "a long text, widened at its end": filled(b"a", '\U0001f600"]'.encode(), b'["'),
     "a long text, widened by an escape": filled(b"a", b'\\ud83d\\ude00"]', b'["'),
+    "spaces and a wide character": filled(b" ", WIDE),
     "escapes": filled(b"\\u0041", b'"]', b'["'),
     "small numbers": filled(b"0,"),
     "whole numbers": filled(b"999,"),
