@@ -104,9 +104,9 @@ class Meta:
     submissions: Annotated[TupleOf[Submission], Field(min_length=1)]
     writer: Text
     versions: ByKey[str, Text]
-    seed: Annotated[int, Field(strict=True, ge=-LARGEST_WHOLE, le=LARGEST_WHOLE)]
+    seed: Whole
     resamples: Whole
-    confidence: Annotated[Number, Field(gt=0.0, lt=1.0)]
+    confidence: Annotated[Number, Field(ge=0.5, le=0.999)]
     counts: ByKey[str, Whole]
     warnings: TupleOf[Text]
     chamfer_floor: NotNegative | None = None
