@@ -138,6 +138,8 @@ def test_damaged_layouts(damaged, name):
         ("light_count", -1, "0 to 2"),
         ("distractor_kind", 3, "-1 to 2"),
         ("distractor_kind", -2, "-1 to 2"),
+        ("angle_degrees", np.nan, "0 to 180"),
+        ("angle_degrees", 181, "0 to 180"),
     ],
 )
 def test_damaged_truth_of_one_row(damaged, name, value, expected):
@@ -146,7 +148,10 @@ def test_damaged_truth_of_one_row(damaged, name, value, expected):
         assert questions[3].truth is not None
         with pytest.raises(FileFormatError) as error:
             questions[4]
-    assert (error.value.where, error.value.expected) == (f"{path}: row 4: {name}", expected)
+    assert (error.value.where, error.value.expected) == (f"{path}: {name}, row 4", expected)
+    with open_questions(path) as questions, pytest.raises(FileFormatError) as error:
+        questions.read(name, slice(1, None))
+    assert (error.value.where, error.value.expected) == (f"{path}: {name}, row 4", expected)
 
 
 def test_a_damaged_chunk_spoils_its_row_only(damaged):
