@@ -144,6 +144,7 @@ def _prove(
 ) -> list[Proof]:
     """Run all proofs; right: positions of the right answers, (Q,) each, -1 where unknown."""
     found = [
+        proofs.content(tables),
         proofs.balance(tables, right),
         proofs.values(tables),
         proofs.framing(tables),
