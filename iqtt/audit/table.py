@@ -181,10 +181,9 @@ def _changed(questions: QuestionsFile, images: str) -> tuple[str, ...] | None:
     scored = joint_digest({name: found[name] for name in SCORED if name in found})
     if questions.has_answers and scored != questions.stored_truth_digest:
         changed.append("truth_digest")
-    for file in filter(None, (questions, questions.beside)):
-        if file.content_digest() != file.stored_content_digest:
-            changed.append(f"content_digest of {file.path.name}")
-    return tuple(changed)
+    files = filter(None, (questions, questions.beside))
+    altered = [f for f in files if f.content_digest() != f.stored_content_digest]
+    return (*changed, *(f"attributes of {file.path.name}" for file in altered))
 
 
 def _border(pixels: Array) -> Array:
