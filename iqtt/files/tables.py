@@ -18,14 +18,9 @@ from iqtt.files.attributes import has_digests, read_digest, read_names, read_roo
 from iqtt.files.layout import SCORED, named, truth_columns
 from scenegen.common import content
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.input_file import StoredArray, checking, open_file, reading
 from scenegen.common.records import check
-from scenegen.common.row_file import (
-    and_more,
-    checking,
-    column_problems,
-    open_file,
-    reading,
-)
+from scenegen.common.row_file import and_more, column_problems
 from scenegen.layout import TRUTH_DIGEST
 
 Array = NDArray[Any]
@@ -209,13 +204,13 @@ class TableFile:
         """Check and open questions and answers; return the number of questions."""
         raise NotImplementedError
 
-    def _dataset(self, name: str) -> h5py.Dataset:
+    def _dataset(self, name: str) -> StoredArray:
         """Return a dataset of this part, and note its size."""
         dataset = self._file[f"{self.part}/{name}"]
         if not isinstance(dataset, h5py.Dataset):
             raise FileFormatError(f"{self.path}: {name}", "a group", "a dataset")
         self._stored[name] = dataset
-        return dataset
+        return StoredArray(dataset)
 
     def _take_answers(self, count: int | None = None) -> int:
         """Read all answers; return their number, which must be `count` where that is given."""
@@ -249,7 +244,8 @@ class TableFile:
         if problems:
             raise FileFormatError(f"{self.path}: {name}: {and_more(problems)}")
         for column in columns:
-            self._datasets[column.name] = self._stored[column.name] = group[column.name]
+            dataset = self._stored[column.name] = group[column.name]
+            self._datasets[column.name] = StoredArray(dataset)
         place = f"{self.path}: {name}/distractor_kind"
         self.kind_names = read_names(group["distractor_kind"], "names", place)
         self._ranges = {
