@@ -89,6 +89,18 @@ def put(name, values):
     return edit
 
 
+NAMES = "truth/distractor_kind: attribute 'names'"
+
+
+def named(names):
+    return lambda file: file["truth/distractor_kind"].attrs.update(names=names)
+
+
+def padded_spec(file):
+    """HDF5 keeps attributes of 64 kB; where a text is longer, it lies elsewhere in the file."""
+    file.attrs["spec"] = file.attrs["spec"] + " " * 4_000_000
+
+
 OURS = {
     "other format": (attribute("format", "other"), "attribute 'format'"),
     "format is an array": (attribute("format", np.arange(3)), "attribute 'format'"),
@@ -119,7 +131,19 @@ OURS = {
     "cubes too few": (put("truth/cubes", np.zeros((6, 4, 3, 3), "i1")), "truth"),
     "cubes of floats": (put("truth/cubes", np.zeros((6, 4, 7, 3))), "truth"),
     "a dead link": (linked("answers", h5py.SoftLink("/nothing")), ""),
-    "no names": (lambda f: f["truth/distractor_kind"].attrs.pop("names"), ""),
+    "no names": (lambda f: f["truth/distractor_kind"].attrs.pop("names"), NAMES),
+    "names are numbers": (named([0, 1, 2]), NAMES),
+    "one name": (named("near"), NAMES),
+    "many names": (named(["near"] * 101), NAMES),
+    "names that cannot be printed": (named(["near", "\x1b[2J", "other"]), NAMES),
+    "a version without a minor one": (attribute("format_version", "1.x"), "attribute 'format_ver"),
+    "command is an array": (attribute("creation_command", np.arange(3)), "attribute 'creation_co"),
+    "variant of two lines": (attribute("variant", "a\nb"), "attribute 'variant'"),
+    "a long writer": (attribute("writer", "w" * 1001), "attribute 'writer'"),
+    "a long spec": (padded_spec, "attribute 'spec'"),
+    "no content digest": (gone("content_digest"), "attribute 'content_digest'"),
+    "no truth digest": (gone("truth_digest"), "attribute 'truth_digest'"),
+    "no hexadecimal digest": (attribute("truth_digest", "x" * 64), "attribute 'truth_digest'"),
 }
 
 
