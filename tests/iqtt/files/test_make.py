@@ -56,7 +56,7 @@ def test_nothing_handed_out_tells_the_test_answers(folder):
         assert list(file) == ["questions"]
         assert set(file.attrs) == {
             "format", "format_version", "writer", "variant", "spec", "conventions", "split",
-            "fingerprint", *versions(),
+            "fingerprint", "content_digest", *versions(),
         }  # fmt: skip
         assert {name: file.attrs[name] for name in versions()} == versions()
         assert set(file["questions"].attrs) == {
