@@ -8,6 +8,7 @@ from metrics.score_file import Meta, Score, ScoreFile, Submission
 from metrics.scoring.metric_names import metric
 
 TRUTH = "0123456789abcdef" * 4
+DIGEST = "fedcba9876543210" * 4
 HEADLINE = ("chamfer", "hausdorff", "mse_depth")
 
 
@@ -19,6 +20,7 @@ def make_meta(method, runs=1, truth=TRUTH, **other):
     )
     told = {"truth_path": "rooms.h5", "writer": "bench 0.1.0", "counts": {"images": 4}}
     told |= {"versions": {"numpy": "2.4.6", "h5py": "3.12"}, "warnings": ()}
+    told |= {"truth_digest": DIGEST, "truth_source": "given"}
     told |= {"seed": 0, "resamples": 2000, "confidence": 0.95}
     return Meta(truth_fingerprint=truth, submissions=submissions, **{**told, **other})
 
