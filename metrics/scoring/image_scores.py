@@ -94,4 +94,4 @@ def chamfer_floor(truth: TrueView) -> float:
 
 def _any(faults: Mapping[str, Array], mask: Array) -> Array:
     """Return at which pixels (H, W) any rule is broken."""
-    return np.logical_or.reduce([np.zeros_like(mask), *faults.values()])
+    return np.asarray(np.logical_or.reduce([np.zeros_like(mask), *faults.values()]))

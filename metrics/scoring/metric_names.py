@@ -98,7 +98,7 @@ _DEPTH = (
               "mean of absolute difference of depth divided by true depth.", "ratio"),
     _distance("silog", "SILog",
               "standard deviation of ln predicted - ln true depth, times 100; predicted depths up"
-              " to 0.001 count as 0.001 and are left out of the mean that is subtracted.", "100 ln"),
+              " to 0.001 count as 0.001 and are left out of the mean it subtracts.", "100 ln"),
     *(_share(f"delta_{power}", f"delta {power}",
              "fraction of pixels whose predicted and true depth differ by a factor below"
              f" {factor}.")

@@ -110,11 +110,13 @@ def _accuracy(right: Array, settings: Settings) -> Score:
 def _same(one: QuestionPredictions, other: QuestionPredictions) -> bool:
     """Return whether two submissions answer alike, and give no scores that differ."""
     a, b = (np.argsort(file.rows) for file in (one, other))
-    answers = np.array_equal(one.rows[a], other.rows[b]) and np.array_equal(
-        one.answers[a], other.answers[b]
-    )
-    scored = one.scores is not None and other.scores is not None
-    return answers and not (scored and not np.array_equal(one.scores[a], other.scores[b]))
+    pairs: list[tuple[Array, Array]] = [
+        (one.rows[a], other.rows[b]),
+        (one.answers[a], other.answers[b]),
+    ]
+    if one.scores is not None and other.scores is not None:
+        pairs.append((one.scores[a], other.scores[b]))
+    return all(np.array_equal(x, y) for x, y in pairs)
 
 
 def _check_labels(truth: "AnswersFile", columns: Mapping[str, Array]) -> None:
@@ -124,16 +126,11 @@ def _check_labels(truth: "AnswersFile", columns: Mapping[str, Array]) -> None:
     kinds, angles = (columns[name] for name in LABELS)
     right = np.arange(kinds.shape[1]) == columns["answers"][:, None]
     wrong = np.where(right, kinds != -1, (kinds < 0) | (kinds >= len(truth.kind_names)))
-    bad = {
-        "distractor_kind": wrong.any(axis=1),
-        "angle_degrees": ~((angles >= 0) & (angles <= 180)),
-    }
-    for name, expected in zip(
-        LABELS, ("-1 for the right answer, else a kind", "0 to 180"), strict=True
-    ):
-        for row in np.flatnonzero(bad[name])[:1].tolist():
-            where, found = truth.place(name, row), columns[name][row].tolist()
-            raise FileFormatError(where, found, expected)
+    bad = wrong.any(axis=1), ~((angles >= 0) & (angles <= 180))
+    expected = "-1 for the right answer, a kind for the others", "0 to 180"
+    for name, at, told in zip(LABELS, bad, expected, strict=True):
+        for row in np.flatnonzero(at)[:1].tolist():
+            raise FileFormatError(truth.place(name, row), columns[name][row].tolist(), told)
 
 
 def _kinds(row: Array, names: Sequence[str]) -> str:

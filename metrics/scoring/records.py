@@ -84,8 +84,8 @@ class Meta:
         truth_path: where the truth lay.
         truth_digest: SHA-256 of the values of the truth that scores depend on, as they were read
             when they were scored (`truth_digest` of rooms and question files).
-        truth_source: who chose the truth: "given" by the person who scored, "known" to the benchmark
-            by its digest (`known_tests`), or named by the "submission" alone, which is not comparable.
+        truth_source: who chose the truth: "given" by the person who scored, "known" to the
+            benchmark by its digest (`known_tests`), or the "submission" alone: not comparable.
         submissions: one for each training run.
         writer: the program and its release.
         versions: releases of the libraries that computed the scores, by package.
@@ -127,7 +127,8 @@ class ScoreFile:
 
     Attributes:
         method: its name; any text.
-        comparable: whether all of the test set was scored, and nothing penalised.
+        comparable: whether all of the test set was scored, nothing penalised, and the truth not
+            chosen by the submission.
         alignment: what the method says it cannot know; "none" for questions.
         metrics: by name, see `metric_names`.
         items: columns of equal length with an entry for each image or question: the integers of

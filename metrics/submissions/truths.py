@@ -1,4 +1,4 @@
-"""The truth of a submission: where it lies and who says so, and its views, checked as they are read.
+"""The truth of a submission: where it lies, who says so, and its views, checked when read.
 
 What is wrong with a truth is an error: left alone, it would change which pixels are scored.
 """
@@ -17,7 +17,7 @@ from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
-UNIT_TOLERANCE = 1e-3  # by which the length of a normal may differ from 1
+UNIT_TOLERANCE = 1e-3  # by which the squared length of a normal may differ from 1
 RIGID_TOLERANCE = 1e-6  # by which R^T R may differ from the identity, R being a camera's rotation
 
 
@@ -55,8 +55,8 @@ def find_truth(predictions: Predictions, given: str | Path | None = None) -> Fou
     """Return where the truth of a submission lies.
 
     That is `given`, or else the path recorded in the submission, taken from the submission's folder
-    and then from the working directory. Nothing but a regular file, or a link to one, is a truth. For
-    a test file without answers it is the file of answers beside it (iqtt-test-answers.h5). Where
+    and then from the working directory. Only a regular file, or a link to one, is a truth. For a
+    test file without answers it is the file of answers beside it (iqtt-test-answers.h5). Where
     `given` is there, nothing that the submission names is looked at.
 
     Raises FileFormatError where nothing lies there, with the places that were looked at.
@@ -94,8 +94,8 @@ def read_true_view(truth: RoomsFile, row: int) -> TrueView:
         float(truth.read("camera/fov_y_degrees", row)),
     )
     depth, surface = view.depth, view.object_id >= 0
-    length = np.linalg.norm(as_doubles(view.normal), axis=-1)
-    not_unit = ~(np.abs(length - 1.0) <= UNIT_TOLERANCE)
+    normal = as_doubles(view.normal)
+    not_unit = ~(np.abs(np.einsum("ijk,ijk->ij", normal, normal) - 1.0) <= UNIT_TOLERANCE)
     pixels = (
         ("depth", surface & ~((depth > 0) & np.isfinite(depth)), "above 0 where an object is seen"),
         ("depth", ~surface & ~np.isnan(depth), "NaN where no object is seen"),
