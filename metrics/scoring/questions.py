@@ -45,8 +45,9 @@ def score_questions(
         names = ("answers", *(LABELS if truth.has_truth else ()))
         columns = {name: np.asarray(truth.read(name, slice(None))) for name in names}
         fingerprint, kind_names = truth.fingerprint, truth.kind_names
-        _check_labels(truth, columns)
-        digest = answers_digest(truth.path, columns, truth.attributes, truth.part)
+        if truth.has_truth:
+            _check_kinds(truth, columns["distractor_kind"], columns["answers"])
+        digest = answers_digest(truth, columns)
     true = columns["answers"].astype(np.int64)
     rows, whole = matched_rows(files, found.path, fingerprint, len(true), settings.allow_partial)
     refuse_copies(files, lambda i, j: _same(files[i], files[j]))
@@ -119,18 +120,13 @@ def _same(one: QuestionPredictions, other: QuestionPredictions) -> bool:
     return all(np.array_equal(x, y) for x, y in pairs)
 
 
-def _check_labels(truth: "AnswersFile", columns: Mapping[str, Array]) -> None:
-    """Raise FileFormatError unless kinds and angles of the questions are what they can be."""
-    if len(columns) == 1:
-        return
-    kinds, angles = (columns[name] for name in LABELS)
-    right = np.arange(kinds.shape[1]) == columns["answers"][:, None]
-    wrong = np.where(right, kinds != -1, (kinds < 0) | (kinds >= len(truth.kind_names)))
-    bad = wrong.any(axis=1), ~((angles >= 0) & (angles <= 180))
-    expected = "-1 for the right answer, a kind for the others", "0 to 180"
-    for name, at, told in zip(LABELS, bad, expected, strict=True):
-        for row in np.flatnonzero(at)[:1].tolist():
-            raise FileFormatError(truth.place(name, row), columns[name][row].tolist(), told)
+def _check_kinds(truth: "AnswersFile", kinds: Array, answers: Array) -> None:
+    """Raise FileFormatError where a right answer has a kind of wrong ones, or a wrong one none."""
+    right = np.arange(kinds.shape[1]) == answers[:, None]
+    for row in np.flatnonzero(((kinds < 0) != right).any(axis=1))[:1].tolist():
+        where = truth.place("distractor_kind", row)
+        expected = f"-1 for the right answer, {answers[row]}, alone"
+        raise FileFormatError(where, kinds[row].tolist(), expected)
 
 
 def _kinds(row: Array, names: Sequence[str]) -> str:

@@ -5,7 +5,7 @@ docs/rooms-file.md and docs/iqtt.md say which data sets it covers.
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
@@ -14,6 +14,9 @@ from metrics.submissions.truths import TrueView
 from scenegen.common.content import column_digest, joint_digest, row_digest
 from scenegen.layout import SCORED, TRUTH_DIGEST
 from scenegen.rooms.reader import RoomsFile
+
+if TYPE_CHECKING:
+    from iqtt.files.reader import AnswersFile
 
 PER_PIXEL = ("depth", "normal", "object_id")
 RowDigests = tuple[bytes, ...]  # of PER_PIXEL
@@ -43,15 +46,15 @@ def rooms_digest(truth: RoomsFile, scored: Mapping[int, RowDigests]) -> str:
     return _checked(truth.path, columns, truth.attributes.get(TRUTH_DIGEST), truth.stored_digests())
 
 
-def answers_digest(
-    path: Path, columns: Mapping[str, NDArray[Any]], attributes: Mapping[str, Any], part: str
-) -> str:
+def answers_digest(truth: "AnswersFile", columns: Mapping[str, NDArray[Any]]) -> str:
     """Return the digest of the answers and what else their scores depend on, columns of Q rows.
 
     Raises ScoringError where it is not the one that was written with the file.
     """
     found = {name: column_digest(map(row_digest, rows)) for name, rows in columns.items()}
-    return _checked(path, found, attributes.get(f"{TRUTH_DIGEST}_{part}".rstrip("_")), {})
+    own = {name: truth.stored_digest(name) for name in columns}
+    told = {name: digest for name, digest in own.items() if digest is not None}
+    return _checked(truth.path, found, truth.stored_truth_digest, told)
 
 
 def _checked(path: Path, found: Mapping[str, str], stored: Any, own: Mapping[str, str]) -> str:
