@@ -137,7 +137,7 @@ def test_refused_at_write_time(writer, tmp_path, kind):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_refused_row_may_be_mended(writer, tmp_path):
+def test_a_refused_row_may_be_mended(writer, truths, tmp_path):
     with writer() as out:
         for row in range(8):
             with pytest.raises(PredictionError):
@@ -183,7 +183,7 @@ def test_missing_rows_are_an_error(writer, tmp_path, partial, rows, found):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_missing_rows_where_that_is_allowed(writer, tmp_path):
+def test_missing_rows_where_that_is_allowed(writer, truths, tmp_path):
     with writer(allow_partial=True) as out:
         for row in (6, 1):
             out.add(row, noise(row, *SIZE), GOOD_NORMAL)
