@@ -69,7 +69,7 @@ def test_a_mistake_ends_in_one_line_and_exit_code_2(name, mistake, words, truths
 
 
 def test_the_sample_has_its_documented_scores(tmp_path):
-    """Moved elsewhere, so that the truth is found beside the submission, and known by its digest."""
+    """Moved elsewhere; the truth is found beside the submission, and known by its digest."""
     for name in ("rooms.h5", "empty-room.h5"):
         shutil.copy(SAMPLE / name, tmp_path)
     found, told = score([tmp_path / "empty-room.h5"]), read_scores(SAMPLE / "empty-room.json")
