@@ -105,7 +105,7 @@ def read_true_view(truth: RoomsFile, row: int) -> TrueView:
         if wrong.any():
             first = tuple(np.argwhere(wrong)[0].tolist())
             value = np.asarray(getattr(view, name)[first]).tolist()
-            found = f"{value} at pixel {first}, and {np.count_nonzero(wrong) - 1} more like it"
+            found = f"{value} at pixel {first}, one of {np.count_nonzero(wrong)}"
             raise FileFormatError(_place(truth, name, row), found, expected)
     if not surface.any():
         raise FileFormatError(_place(truth, "object_id", row), "no surface", "a pixel to be scored")
