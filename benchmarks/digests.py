@@ -85,10 +85,11 @@ def commands(folder: Path) -> Iterator[str]:
     yield f"bench baseline pix2shape --data {answers}.h5 --out pix2shape-answers.h5"
     yield f"bench baseline chance --data {answers}.h5 --out chance.h5"
     for name in ("constant", "mean-depth", "empty-room", "oracle", "pix2shape"):
-        yield f"bench score {name}.h5 --json {name}.json --csv {name}.csv --markdown"
+        outputs = f"--json {name}.json --csv {name}.csv --markdown"
+        yield f"bench score {name}.h5 --truth truth.h5 {outputs}"
     yield "scenegen render --n 6 --seed 6 --out train-2.h5"
     yield "bench baseline constant --data truth.h5 --train train-2.h5 --out constant-2.h5"
-    yield "bench score constant.h5 constant-2.h5 --json runs.json"
+    yield "bench score constant.h5 constant-2.h5 --truth truth.h5 --json runs.json"
     for name in ("chance", "pix2shape-answers"):
         yield f"bench score {name}.h5 --truth {answers}-answers.h5 --json {name}.json"
     yield "bench compare constant.json mean-depth.json empty-room.json --json compare.json"

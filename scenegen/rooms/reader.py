@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from scenegen.camera import back_project, transform_points
 from scenegen.common import input_file, row_file
+from scenegen.common.content import SHA256
 from scenegen.common.errors import FileFormatError
 from scenegen.common.input_file import StoredArray
 from scenegen.common.records import check
@@ -124,6 +125,12 @@ class RoomsFile:
             return _layout_problems(self._file, self.spec) + _attribute_problems(
                 self._file, self.spec
             )
+
+    def stored_digests(self) -> dict[str, str]:
+        """Return the digest that each dataset got when it was written; none in older files."""
+        with input_file.reading(self.path):
+            found = {name: data.attrs.get(SHA256) for name, data in self._datasets.items()}
+        return {name: str(digest) for name, digest in found.items() if digest is not None}
 
     def stored_bytes(self) -> dict[str, tuple[int, int]]:
         """Return the bytes on disk and in memory of each dataset, by name.
