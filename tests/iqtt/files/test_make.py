@@ -195,7 +195,7 @@ def test_an_older_split_is_replaced_only_on_request(old, tmp_path):
     beside = set()
     look = lambda _: beside.update(os.listdir(tmp_path))  # noqa: E731
     make_split(old, replace(TINY, seed=2), overwrite=True, progress=look)
-    assert beside == {"old"}, "made inside, as another disk may be mounted there"
+    assert len(beside) == 2, "the new one is made beside the old one"
     after = listing(tmp_path)
     assert set(after) == set(before)
     assert all(after[f"old/{name}"] != before[f"old/{name}"] for name in FILES)
