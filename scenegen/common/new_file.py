@@ -66,14 +66,10 @@ def check_name(path: str | Path) -> None:
 
 
 def refuse_inputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path]) -> None:
-    """Raise an OSError for an output that is an input too, under any name, or lies in one.
-
-    Links and folders are looked through: what counts is what the disk says is one file.
-    """
+    """Raise an OSError for an output that is an input too, by that name or by a link to it."""
     known = [(os.stat(path), path) for path in inputs if os.path.exists(path)]
-    for output in (Path(path) for path in outputs if os.path.exists(path)):
-        for place in (output, *output.resolve().parents):
-            for status, path in known:
-                if os.path.samestat(place.stat(), status):
-                    text = f"is, or lies in, an input of this command ({path}); name another file"
-                    raise OSError(errno.EINVAL, text, str(output))
+    for output in filter(os.path.exists, outputs):
+        for status, path in known:
+            if os.path.samestat(os.stat(output), status):
+                text = f"is an input of this command too ({path}); name another file"
+                raise OSError(errno.EINVAL, text, str(output))
