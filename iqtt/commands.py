@@ -113,8 +113,6 @@ def make_split(
         settings["seed"] = specs.secret_seed(secret_seed)
     chosen = {name: value for name, value in settings.items() if value is not None}
     spec = specs.preset_spec(preset, height=size[0], width=size[1], **chosen)
-    if spec.test and secret_seed is None:
-        click.echo(KNOWN_SEED, err=True)
     count = spec.train + spec.val + spec.test
     started = time.perf_counter()
     with progress_bar(count, "question") as bar:
@@ -139,6 +137,8 @@ def make_split(
         f"{out}: {tally.refused / max(1, tally.proposed):.0%} of {tally.proposed} proposed views"
         f" hid a cube and were refused"
     )
+    if spec.test and secret_seed is None:
+        click.echo(KNOWN_SEED, err=True)
 
 
 @click.command(
