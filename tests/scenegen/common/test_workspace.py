@@ -219,7 +219,12 @@ def test_what_a_library_says_of_the_disk_is_an_error_of_the_disk(tmp_path, said,
 
 
 @pytest.mark.parametrize(
-    "raised", [RuntimeError("a bug"), FileNotFoundError(2, "none", "input.h5"), BrokenPipeError(32)]
+    "raised",
+    [
+        RuntimeError("a bug"),
+        FileNotFoundError(2, "none", "input.h5"),
+        BrokenPipeError(32, "Broken pipe"),
+    ],
 )
 def test_errors_that_are_not_the_output_s_pass_as_they_are(tmp_path, raised):
     with pytest.raises(type(raised)) as error, written_beside(tmp_path / "x.exr"):
