@@ -12,10 +12,9 @@ import sys, time
 from scenegen.common.worker_pool import worker_pool
 try:
     with worker_pool(2) as pool:
-        tasks = [pool.submit(time.sleep, float(sys.argv[1])) for _ in range(2)]
-        while not all(task.running() for task in tasks):
-            time.sleep(0.1)
-        time.sleep(2)  # until both began, not only the queue between the processes
+        tasks = [pool.submit(time.sleep, seconds) for seconds in (float(sys.argv[1]), 1)]
+        tasks[1].result()  # one process is busy now, and the other waits
+        time.sleep(1)
         print("busy", flush=True)
         [task.result() for task in tasks]
 except KeyboardInterrupt:
