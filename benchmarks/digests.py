@@ -23,6 +23,8 @@ import click
 import h5py
 import numpy as np
 
+from scenegen.common.new_file import write_text
+
 VOLATILE = (
     "creation_command", "writer", "versions", "submissions", "format_version",
     "mitsuba_version", "drjit_version", "llvm_version",
@@ -180,7 +182,7 @@ def write(out: str, tree: str, keep: str | None) -> None:
             inside = path.relative_to(folder)
             if path.is_file() and not inside.parts[0].startswith("models"):
                 found |= {f"{inside} {part}": value for part, value in digests(path)}
-    Path(out).write_text(json.dumps(found, indent=1) + "\n")
+    write_text(out, json.dumps(found, indent=1) + "\n", overwrite=True)
     print(f"{out}: {len(found):,} digests")
 
 

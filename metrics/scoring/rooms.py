@@ -2,10 +2,9 @@
 
 import atexit
 import functools
-import multiprocessing
 import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -36,6 +35,7 @@ from metrics.submissions.missing_rows import size_problems
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import RoomPredictions, open_predictions
 from metrics.submissions.truths import FoundTruth, read_true_view
+from scenegen.common.worker_pool import worker_pool
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
@@ -222,9 +222,12 @@ def _in_processes(job: Job, chunks: Sequence[Array], processes: int | None) -> I
         with closing(_RowScorer(*job)) as scorer:
             yield from map(scorer.score, chunks)
         return
-    # Spawned, as forked processes would share open files and threads' locks.
-    with ProcessPoolExecutor(count, multiprocessing.get_context("spawn")) as pool:
-        yield from pool.map(functools.partial(_score_in_worker, job), chunks)
+    try:
+        with worker_pool(count) as pool:
+            yield from pool.map(functools.partial(_score_in_worker, job), chunks)
+    except BrokenProcessPool as error:
+        hint = "memory may be short: take fewer --processes"
+        raise ScoringError(job[0][0], "a process that scores was killed", "", hint) from error
 
 
 def _score_in_worker(job: Job, rows: Array) -> Any:
