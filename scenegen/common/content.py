@@ -1,4 +1,4 @@
-"""Digests of what HDF5 files hold: of a row, a data set, some data sets, and a file with attributes.
+"""Digests of what HDF5 files hold: rows, data sets, some data sets, a file with attributes.
 
 The digest of a data set is the SHA-256 of the SHA-256s of its rows, so that several processes can
 read rows in any order and still tell the digest of the whole. With plain h5py it is
@@ -17,6 +17,7 @@ import numpy as np
 
 SHA256 = "sha256"  # attribute of each data set
 CONTENT_DIGEST = "content_digest"  # attribute of the root
+BLOCK_BYTES = 2**24  # of a data set that are in memory at once
 
 
 def row_digest(values: Any) -> bytes:
@@ -46,8 +47,9 @@ def seal(file: h5py.File) -> None:
 def content_digest(file: h5py.File) -> str:
     """Return the SHA-256, as hex, of every name, type, shape and attribute of a file but its own.
 
-    The values of the data sets count through their attribute `sha256`, which `digest_problems`
-    checks. Raises whatever HDF5 raises on a damaged file (`row_file.HDF5_ERRORS`).
+    The values of the data sets count through their attribute `sha256`, which
+    `row_file.digest_problems` checks. Raises whatever HDF5 raises on a damaged file
+    (`row_file.HDF5_ERRORS`).
     """
     lines = []
     for name, item in (("/", file), *_objects(file)):
@@ -58,6 +60,21 @@ def content_digest(file: h5py.File) -> str:
                 value = b"".join(_described(item.attrs[key], file))
                 lines.append(f"{name}@{key} ".encode() + hashlib.sha256(value).digest())
     return column_digest(hashlib.sha256(line).digest() for line in lines)
+
+
+def datasets(file: h5py.File) -> list[tuple[str, h5py.Dataset]]:
+    """Return the data sets of a file with their names, in the order of these."""
+    return [(name, item) for name, item in _objects(file) if isinstance(item, h5py.Dataset)]
+
+
+def dataset_digest(dataset: h5py.Dataset) -> str:
+    """Return the `column_digest` of a data set. Raises whatever HDF5 raises where it is damaged."""
+    if not dataset.shape:
+        return column_digest([row_digest(dataset[()])])
+    count = dataset.shape[0]
+    step = max(1, BLOCK_BYTES * count // max(1, dataset.nbytes))
+    blocks = (dataset[start : start + step] for start in range(0, count, step))
+    return column_digest(row_digest(row) for block in blocks for row in block)
 
 
 def _objects(file: h5py.File) -> list[tuple[str, Any]]:

@@ -43,7 +43,7 @@ def describe(path: str | Path) -> str:
         lines += [f"    {name:10} {low:.4g} to {high:.4g}" for name, (low, high) in ranges.items()]
         lines += ["", f"  {'dataset':27} {'row':14} {'unit':24} {'stored':>9} {'ratio':>6}"]
         for field, (stored, raw) in zip(FIELDS, rooms.stored_bytes().values(), strict=True):
-            row = "(" + ", ".join(map(str, field.shape)) + ")"
+            row = "(" + ", ".join(field.shape) + ")"
             unit = field.unit if len(field.unit) <= 24 else field.unit[:21] + "..."
             ratio = f"{raw / stored:.1f}" if stored else "-"
             lines.append(f"  {field.name:27} {row:14} {unit:24} {size_text(stored):>9} {ratio:>6}")
