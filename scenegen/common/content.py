@@ -97,7 +97,7 @@ def _bytes(values: Any) -> bytes:
 def _described(value: Any, file: h5py.File) -> Iterator[bytes]:
     """Yield an attribute's kind and value; references count as the names that they point to."""
     if isinstance(value, h5py.Reference):
-        yield b"to " + str(file[value].name).encode() + b"\0"
+        yield b"to " + (h5py.h5r.get_name(value, file.id) or b"nothing") + b"\0"
     elif isinstance(value, (str, bytes)):
         yield b"text " + _bytes(value)
     elif isinstance(value, h5py.Empty):
