@@ -157,15 +157,16 @@ def glossy(make_rooms, tmp_path_factory):
 def test_obj_has_names_materials_and_smooth_normals(tmp_path, glossy):
     """Read by trimesh, and by hand."""
     obj, mtl = export(glossy, tmp_path, "obj")
-    scene = trimesh.load(obj, split_object=True, group_material=False, process=False)
+    meshes = trimesh.load(obj, process=False).geometry  # by material
     names = [f"object_{k}_{item.shape}" for k, item in enumerate(glossy.scene.objects, start=1)]
-    assert list(scene.geometry) == ["floor", "wall_x", "wall_z", *names]
+    assert [name for [name] in words(obj, "o")] == ["floor", "wall_x", "wall_z", *names]
     materials = [words(mtl, "newmtl"), words(mtl, "Kd"), words(mtl, "Ks"), words(mtl, "Ns")]
     assert materials[0] == [["room"], ["object_1"], ["object_2"]]
+    assert set(meshes) == {"room", "object_1", "object_2"}
     assert words(obj, "usemtl") == [["room"]] * 3 + materials[0][1:]
     assert words(obj, "mtllib") == [[mtl.name]]
     for k, item in enumerate(glossy.scene.objects, start=1):
-        mesh = scene.geometry[names[k - 1]]
+        mesh = meshes[f"object_{k}"]
         assert [float(x) for x in materials[1][k]] == list(item.reflectance)
         assert [float(x) for x in materials[2][k]] == [item.specular] * 3
         assert [float(x) for x in materials[3][k]] == [item.shininess]
