@@ -53,8 +53,8 @@ def content_digest(file: h5py.File) -> str:
     """
     lines = []
     for name, item in (("/", file), *_objects(file)):
-        if isinstance(item, h5py.Dataset):
-            lines.append(f"{name} {item.dtype.str} {item.shape}".encode())
+        kind = f"{item.dtype.str} {item.shape}" if isinstance(item, h5py.Dataset) else "group"
+        lines.append(f"{name} {kind}".encode())
         for key in sorted(item.attrs):
             if (name, key) != ("/", CONTENT_DIGEST):
                 value = b"".join(_described(item.attrs[key], file))
