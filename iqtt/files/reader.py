@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from iqtt.files.layout import question_columns
 from iqtt.files.tables import QuestionTruth, TableFile, read_root, table_parts
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.row_file import RowDataset, checking, open_file
+from scenegen.common.input_file import checking, open_file
+from scenegen.common.row_file import RowDataset
 from scenegen.description.specs import IMAGE_DTYPES
 from scenegen.rendering.ground_truth import decode_image
 

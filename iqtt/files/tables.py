@@ -16,15 +16,9 @@ from numpy.typing import NDArray
 from iqtt.files.layout import FORMAT_NAME, FORMAT_VERSION, truth_columns
 from iqtt.questions.specs import SPLITS, SplitSpec
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.input_file import StoredArray, checking, open_file, reading
 from scenegen.common.records import check
-from scenegen.common.row_file import (
-    and_more,
-    checking,
-    column_problems,
-    open_file,
-    read_spec,
-    reading,
-)
+from scenegen.common.row_file import and_more, column_problems, read_spec
 
 Array = NDArray[Any]
 PARTS = ("labeled", "unlabeled")
@@ -174,13 +168,13 @@ class TableFile:
         """Check and open questions and answers; return the number of questions."""
         raise NotImplementedError
 
-    def _dataset(self, name: str) -> h5py.Dataset:
+    def _dataset(self, name: str) -> StoredArray:
         """Return a dataset of this part, and note its size."""
         dataset = self._file[f"{self.part}/{name}"]
         if not isinstance(dataset, h5py.Dataset):
             raise FileFormatError(f"{self.path}: {name}", "a group", "a dataset")
         self._stored[name] = (dataset.id.get_storage_size(), dataset.nbytes)
-        return dataset
+        return StoredArray(dataset)
 
     def _take_answers(self, count: int | None = None) -> int:
         """Read all answers; return their number, which must be `count` where that is given."""
@@ -214,7 +208,8 @@ class TableFile:
         if problems:
             raise FileFormatError(f"{self.path}: {name}: {and_more(problems)}")
         for column in columns:
-            dataset = self._datasets[column.name] = group[column.name]
+            dataset = group[column.name]
+            self._datasets[column.name] = StoredArray(dataset)
             self._stored[column.name] = (dataset.id.get_storage_size(), dataset.nbytes)
         self.kind_names = [str(kind) for kind in group["distractor_kind"].attrs["names"]]
 

@@ -1,4 +1,4 @@
-"""Digests of what HDF5 files hold: rows, data sets, some data sets, a file with attributes.
+"""Digests of what HDF5 files hold: of rows, of data sets, and of a file with its attributes.
 
 The digest of a data set is the SHA-256 of the SHA-256s of its rows, so that several processes can
 read rows in any order and still tell the digest of the whole. With plain h5py it is
@@ -9,6 +9,7 @@ It does not depend on how the values are stored (chunks, compression).
 """
 
 import hashlib
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
@@ -49,7 +50,7 @@ def content_digest(file: h5py.File) -> str:
 
     The values of the data sets count through their attribute `sha256`, which
     `row_file.digest_problems` checks. Raises whatever HDF5 raises on a damaged file
-    (`row_file.HDF5_ERRORS`).
+    (`input_file.HDF5_ERRORS`).
     """
     lines = []
     for name, item in (("/", file), *_objects(file)):
@@ -67,12 +68,15 @@ def datasets(file: h5py.File) -> list[tuple[str, h5py.Dataset]]:
     return [(name, item) for name, item in _objects(file) if isinstance(item, h5py.Dataset)]
 
 
-def dataset_digest(dataset: h5py.Dataset) -> str:
-    """Return the `column_digest` of a data set. Raises whatever HDF5 raises where it is damaged."""
+def dataset_digest(dataset: Any) -> str:
+    """Return the `column_digest` of a data set, or of what is read as one (`StoredArray`).
+
+    Raises whatever HDF5 raises where it is damaged.
+    """
     if not dataset.shape:
         return column_digest([row_digest(dataset[()])])
-    count = dataset.shape[0]
-    step = max(1, BLOCK_BYTES * count // max(1, dataset.nbytes))
+    count, *row = dataset.shape
+    step = max(1, BLOCK_BYTES // max(1, math.prod(row) * dataset.dtype.itemsize))
     blocks = (dataset[start : start + step] for start in range(0, count, step))
     return column_digest(row_digest(row) for block in blocks for row in block)
 
@@ -90,7 +94,9 @@ def _bytes(values: Any) -> bytes:
         return values + b"\0"
     array = np.asarray(values)
     if array.dtype.kind in "OUS":
-        return b"".join(_bytes(text) for text in array.reshape(-1).tolist())
+        parts = array.reshape(-1).tolist()
+        known = (str, bytes, np.ndarray)
+        return b"".join(_bytes(x) if isinstance(x, known) else repr(x).encode() for x in parts)
     return np.ascontiguousarray(array, array.dtype.newbyteorder("<")).tobytes()
 
 

@@ -59,7 +59,9 @@ def test_nothing_handed_out_tells_the_test_answers(folder):
             "fingerprint", *versions(),
         }  # fmt: skip
         assert {name: file.attrs[name] for name in versions()} == versions()
-        assert set(file["questions"].attrs) == {"unit", "shape", "frame", "meaning", "scale"}
+        assert set(file["questions"].attrs) == {
+            "unit", "shape", "frame", "meaning", "scale", "sha256",
+        }  # fmt: skip
         assert re.fullmatch("[0-9a-f]{64}", file.attrs["fingerprint"])
     with h5py.File(folder / "iqtt-test-answers.h5") as file:
         assert file.attrs["creation_command"] == COMMAND
