@@ -195,7 +195,7 @@ def info(file: str) -> None:
 @DEVICE
 @click.pass_context
 def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: Any) -> None:
-    """Check the values of every row of a file, and render some rows again.
+    """Check digests and values of every row of a file, and render some rows again.
 
     Rows rendered again must agree bit for bit, or within a stated tolerance where the file was
     rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.
@@ -227,7 +227,7 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     "form",
     type=click.Choice(["exr", "png", "ply", "obj"]),
     required=True,
-    help="exr has all channels; png 16 bits a channel; ply the surfels; obj the scene's mesh.",
+    help="exr has all channels; png 16 bits a channel; ply the surfels; obj and mtl the scene's mesh.",
 )
 @click.option("--out", default=".", show_default=True, help="Folder to write to.")
 @OVERWRITE
