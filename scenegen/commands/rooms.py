@@ -227,7 +227,7 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     "form",
     type=click.Choice(["exr", "png", "ply", "obj"]),
     required=True,
-    help="exr has all channels; png 16 bits a channel; ply the surfels; obj and mtl the scene's mesh.",
+    help="exr has all channels; png 16 bits a channel; ply the surfels; obj the scene's mesh.",
 )
 @click.option("--out", default=".", show_default=True, help="Folder to write to.")
 @OVERWRITE
