@@ -3,10 +3,15 @@
 import importlib
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import click
+
+from scenegen.common.signals import ended_by_signals
+from scenegen.common.streams import for_progress_bars, robust_streams
+from scenegen.common.text_table import printable
 
 # An `epilog` is this and a command line. A paragraph that begins with \b keeps its line breaks.
 EXAMPLE = "\b\nExample:\n  "
@@ -32,20 +37,28 @@ class PackageCommands(click.Group):
         """Return a command by name."""
         return next((command for command in self._loaded() if command.name == cmd_name), None)
 
+    def main(self, *arguments: Any, **attributes: Any) -> Any:
+        """Run a command with streams and signals that keep it from leaving anything half done."""
+        with robust_streams(), ended_by_signals():
+            return super().main(*arguments, **attributes)
+
+    def make_context(self, *arguments: Any, **attributes: Any) -> click.Context:
+        """Read what stands before the command's name; print the help where it is asked for."""
+        with _one_line_errors():
+            return super().make_context(*arguments, **attributes)
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Refuse arguments that no file could hold, before anything is done with them."""
+        for text in args:
+            if re.search("[\0\ud800-\udfff]", text):
+                raise UserError(f"argument {text}: found bytes that are not UTF-8, expected text")
+        return super().parse_args(ctx, args)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; show what it raises for users, and its warnings, as one line each."""
         warnings.showwarning = _show_warning
-        try:
+        with _one_line_errors():
             return super().invoke(ctx)
-        except OSError as error:
-            where = f"{error.filename}: " if error.filename else ""
-            raise UserError(f"{where}{error.strerror or error}") from error
-        except ValueError as error:
-            from scenegen.common.errors import SceneGenError
-
-            if not isinstance(error, SceneGenError):
-                raise
-            raise UserError(str(error)) from error
 
     def _loaded(self) -> list[Any]:
         modules = [importlib.import_module(name) for name in self.modules]
@@ -58,11 +71,29 @@ class UserError(click.ClickException):
     exit_code = 2
 
     def __init__(self, text: str) -> None:
-        super().__init__(" ".join(text.split()))
+        super().__init__(printable(text))
+
+
+@contextmanager
+def _one_line_errors() -> Iterator[None]:
+    """Turn what a user can mend into a UserError."""
+    try:
+        yield
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        raise UserError(f"{where}{error.strerror or error}") from error
+    except MemoryError as error:
+        raise UserError(": ".join(filter(None, ("not enough memory", str(error))))) from error
+    except ValueError as error:
+        from scenegen.common.errors import SceneGenError
+
+        if not isinstance(error, SceneGenError):
+            raise
+        raise UserError(str(error)) from error
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    click.echo(f"note: {message}", err=True)
+    click.echo(f"note: {printable(str(message))}", err=True)
 
 
 class _Parsed(click.ParamType):  # type: ignore[type-arg]
@@ -173,7 +204,8 @@ def progress_bar(count: int | None, unit: str) -> Any:
     """
     from tqdm import tqdm
 
-    return tqdm(total=count, unit=unit, disable=None, leave=False, smoothing=0.1)
+    look = {"unit": unit, "disable": None, "leave": False, "smoothing": 0.1, "dynamic_ncols": True}
+    return tqdm(total=count, file=for_progress_bars(), **look)
 
 
 # fmt: off
