@@ -2,6 +2,7 @@
 
 import importlib
 import re
+import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,12 +10,14 @@ from typing import Any
 
 import click
 
+from scenegen.common.paths import InputPath, OutputFolder
 from scenegen.common.signals import ended_by_signals
 from scenegen.common.streams import for_progress_bars, robust_streams
 from scenegen.common.text_table import printable
 
 # An `epilog` is this and a command line. A paragraph that begins with \b keeps its line breaks.
 EXAMPLE = "\b\nExample:\n  "
+MESH_FILES = (".glb", ".obj", ".off", ".ply", ".stl")
 NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
 MOST_ITEMS = 1_000_000  # numbers of a range; keeps 0-99999999999 from filling the memory
 
@@ -93,7 +96,7 @@ def _one_line_errors() -> Iterator[None]:
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    click.echo(f"note: {printable(str(message))}", err=True)
+    print_line(f"note: {message}", err=True)
 
 
 class _Parsed(click.ParamType):  # type: ignore[type-arg]
@@ -196,6 +199,20 @@ class Color(_Parsed):
         return channels if len(channels) == 3 else channels * 3
 
 
+def print_line(text: str, err: bool = False) -> None:
+    """Print one line, whatever names from files it holds."""
+    click.echo(printable(text), err=err)
+
+
+def creation_command(program: str) -> str:
+    """Return the command line for a file to record, without the batch, which changes no byte."""
+    words = [program, *sys.argv[1:]]
+    while "--batch" in words:
+        at = words.index("--batch")
+        del words[at : at + 2]
+    return " ".join(word for word in words if not word.startswith("--batch="))
+
+
 def progress_bar(count: int | None, unit: str) -> Any:
     """Return a progress bar with rate and time left, to be used in a `with`.
 
@@ -224,14 +241,16 @@ SEED = click.option("--seed", type=int, default=0, show_default=True,
                     help="Seed of every random choice.")
 UP = click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True,
                   help="Axis that points up in the meshes; in ShapeNet it is y.")
-CACHE_DIR = click.option("--cache-dir", help="Folder for cleaned meshes [the user's cache].")
+CACHE_DIR = click.option("--cache-dir", type=OutputFolder(),
+                         help="Folder for cleaned meshes [the user's cache].")
 # fmt: on
 
 
 def MESHES(command: Any) -> Any:  # noqa: N802
     """Add the options that name the folder of meshes that objects are taken from."""
     command = UP(CACHE_DIR(command))  # the last option comes first
-    own = click.option("--objects-root", help="Folder with the objects, a sub-folder per class.")
-    return click.option("--shapenet-root", help="Folder of ShapeNetCore 1 or 2 with the objects.")(
-        own(command)
-    )
+    folder = InputPath(within=MESH_FILES)
+    text = "Folder with the objects, a sub-folder per class."
+    command = click.option("--objects-root", type=folder, help=text)(command)
+    text = "Folder of ShapeNetCore 1 or 2 with the objects."
+    return click.option("--shapenet-root", type=folder, help=text)(command)

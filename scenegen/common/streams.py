@@ -48,7 +48,7 @@ def for_progress_bars() -> Any:
 
 
 class _Shown(io.TextIOWrapper):
-    """A stream of text that shows what a terminal would obey, such as \\x1b, as escapes."""
+    """A stream of text that shows what a terminal would obey as escapes."""
 
     def __init__(self, descriptor: int, like: TextIO | None, name: str) -> None:
         encoding = like.encoding if like else "utf-8"

@@ -20,10 +20,10 @@ _MARKDOWN = {c: f"\\{c}" for c in "\\`*_[]|~$"} | {"&": "&amp;", "<": "&lt;", ">
 
 
 def printable(text: str, keep: str = "") -> str:
-    """Return a text as one line that can do nothing to a terminal, nor pass for several lines.
+    r"""Return a text as one line that can do nothing to a terminal, nor pass for several lines.
 
     Characters that cannot be shown, that turn the direction of the text or that end a line become
-    escapes such as \\x1b, except those of `keep`. Nothing is shortened.
+    escapes such as \x1b, except those of `keep`. Nothing is shortened.
     """
     return "".join(
         c.encode("unicode_escape").decode() if _hidden(c) and c not in keep else c for c in text
@@ -37,9 +37,7 @@ def plain(name: str) -> str:
     dropped, and a name of which nothing is left becomes "(unnamed)".
     """
     kept = "".join(
-        "\ufffd" if _hidden(c) and not c.isspace() else c
-        for c in name
-        if c not in _TEXT_DIRECTIONS
+        "\ufffd" if _hidden(c) and not c.isspace() else c for c in name if c not in _TEXT_DIRECTIONS
     )
     line = " ".join(kept.split()) or UNNAMED
     return line if len(line) <= LONGEST else line[: LONGEST - 3] + "..."

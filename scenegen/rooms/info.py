@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.records import changed_settings
+from scenegen.common.text_table import printable
 from scenegen.layout import FIELDS
 from scenegen.rendering.backend import UNKNOWN, VERSION_ATTRIBUTES
 from scenegen.rooms.reader import RoomsFile
@@ -47,7 +48,7 @@ def describe(path: str | Path) -> str:
             unit = field.unit if len(field.unit) <= 24 else field.unit[:21] + "..."
             ratio = f"{raw / stored:.1f}" if stored else "-"
             lines.append(f"  {field.name:27} {row:14} {unit:24} {size_text(stored):>9} {ratio:>6}")
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))
 
 
 def renderer_text(attributes: Mapping[str, Any]) -> str:
