@@ -42,7 +42,7 @@ class PackageCommands(click.Group):
 
     def main(self, *arguments: Any, **attributes: Any) -> Any:
         """Run a command with streams and signals that keep it from leaving anything half done."""
-        with robust_streams(), ended_by_signals():
+        with ended_by_signals(), robust_streams():
             return super().main(*arguments, **attributes)
 
     def make_context(self, *arguments: Any, **attributes: Any) -> click.Context:

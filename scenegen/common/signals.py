@@ -1,5 +1,6 @@
 """Signals that end a command, so that it leaves nothing half done."""
 
+import os
 import signal
 import threading
 from collections.abc import Iterator
@@ -15,7 +16,9 @@ ENDING = tuple(
 def ended_by_signals() -> Iterator[None]:
     """Let SIGTERM and SIGHUP interrupt the block as Ctrl-C does, and then exit with 128 + number.
 
-    A second signal kills at once. A signal that is ignored, as under nohup, stays ignored.
+    A second signal kills at once. A signal that is ignored, as under nohup, stays ignored. The
+    process ends as the block does: the interpreter's own farewell may crash where threads of a
+    library are still at work.
     """
     received: list[int] = []
 
@@ -35,7 +38,7 @@ def ended_by_signals() -> Iterator[None]:
         for number in before:
             signal.signal(number, signal.SIG_DFL)
         if received:
-            raise SystemExit(128 + received[0])
+            os._exit(128 + received[0])
 
 
 @contextmanager
