@@ -3,7 +3,7 @@
 import click
 
 from baselines.pix2shape.commands import SUBMISSION, WEIGHTS_PATH, predict_to
-from scenegen.common.command_line import EXAMPLE, OVERWRITE, print_line, progress_bar
+from scenegen.common.command_line import EXAMPLE, LARGEST, OVERWRITE, print_line, progress_bar
 from scenegen.common.paths import InputPath
 
 BASELINES = """\b
@@ -33,7 +33,11 @@ Baselines:
 )
 @SUBMISSION
 @click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of chance's answers."
+    "--seed",
+    type=click.IntRange(0, LARGEST),
+    default=0,
+    show_default=True,
+    help="Seed of chance's answers.",
 )
 @click.option(
     "--weights",

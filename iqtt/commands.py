@@ -71,7 +71,7 @@ option = partial(click.option, show_default=True)
 @command_line.IMAGE_DTYPE
 @option("--with-depth", is_flag=True, help="Store planar depth as well.")
 @command_line.COMPRESSION
-@option("--batch", type=click.IntRange(1), default=64, help="Questions rendered at once.")
+@option("--batch", type=click.IntRange(1, 4096), default=64, help="Questions rendered at once.")
 @command_line.DEVICE
 @command_line.OVERWRITE
 def make_split(

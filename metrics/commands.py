@@ -8,7 +8,14 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import EXAMPLE, OVERWRITE, print_line, progress_bar
+from scenegen.common.command_line import (
+    EXAMPLE,
+    LARGEST,
+    MOST_PROCESSES,
+    OVERWRITE,
+    print_line,
+    progress_bar,
+)
 from scenegen.common.paths import InputPath, OutputPath, refuse_inputs
 
 TRUTH = click.option(
@@ -19,7 +26,11 @@ TRUTH = click.option(
 )
 MARKDOWN = click.option("--markdown", is_flag=True, help="Print Markdown instead of aligned text.")
 SEED = click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the bootstrap."
+    "--seed",
+    type=click.IntRange(0, LARGEST),
+    default=0,
+    show_default=True,
+    help="Seed of the bootstrap.",
 )
 
 
@@ -55,7 +66,9 @@ SEED = click.option(
     " then not comparable.",
 )
 @click.option(
-    "--processes", type=click.IntRange(1), help="How many processes score [default: one a core]."
+    "--processes",
+    type=click.IntRange(1, MOST_PROCESSES),
+    help="How many processes score [default: one a core].",
 )
 @OVERWRITE
 def score(

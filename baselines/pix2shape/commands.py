@@ -10,6 +10,8 @@ import click
 
 from scenegen.common.command_line import (
     EXAMPLE,
+    LARGEST,
+    MOST_PROCESSES,
     OVERWRITE,
     Items,
     UserError,
@@ -44,7 +46,7 @@ DEVICE = click.option(
 )
 
 
-def _number(*names: str, least: int, default: int, text: str, most: int | None = None) -> Any:
+def _number(*names: str, least: int, default: int, text: str, most: int = LARGEST) -> Any:
     """Return an option that takes a whole number and shows its default."""
     kind = click.IntRange(least, most)
     return click.option(*names, type=kind, default=default, show_default=True, help=text)
@@ -90,7 +92,7 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
     help="Change one setting of the configuration, such as batch=8 or networks.size=128; the"
     " weights.json of a run lists all settings.",
 )
-@click.option("--seed", type=click.IntRange(0), help="Seed of every random choice  [0].")
+@click.option("--seed", type=click.IntRange(0, LARGEST), help="Seed of every random choice  [0].")
 @_number("--labels", least=0, default=0, text="Labelled questions whose answers may be used.")
 @click.option(
     "--conditional",
@@ -98,10 +100,10 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
     help="Tell the networks the class of the object, in rooms of one object each.",
 )
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint of --out.")
-@_number("--workers", least=0, default=1, text="Processes that read the data.")
+@_number("--workers", least=0, most=MOST_PROCESSES, default=1, text="Processes that read the data.")
 @_number("--every", least=1, default=500, text="Iterations between checkpoints.")
 @DEVICE
-@_number("--devices", least=1, default=1, text="Number of devices.")
+@_number("--devices", least=1, most=MOST_PROCESSES, default=1, text="Number of devices.")
 @click.option(
     "--precision",
     type=click.Choice(["32", "bf16"]),

@@ -11,6 +11,7 @@ from scenegen.common.command_line import (
     CACHE_DIR,
     EXAMPLE,
     MESH_FILES,
+    MOST_PROCESSES,
     OVERWRITE,
     UP,
     Names,
@@ -37,7 +38,11 @@ if TYPE_CHECKING:
 )
 @OVERWRITE
 @click.option(
-    "--jobs", type=click.IntRange(1), default=1, show_default=True, help="Number of processes."
+    "--jobs",
+    type=click.IntRange(1, MOST_PROCESSES),
+    default=1,
+    show_default=True,
+    help="Number of processes.",
 )
 @click.pass_context
 def check_objects(

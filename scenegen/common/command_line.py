@@ -19,6 +19,8 @@ from scenegen.common.text_table import printable
 EXAMPLE = "\b\nExample:\n  "
 MESH_FILES = (".glb", ".obj", ".off", ".ply", ".stl")
 NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
+LARGEST = 2**63 - 1  # whole number that files can hold
+MOST_PROCESSES = 1024
 MOST_ITEMS = 1_000_000  # numbers of a range; keeps 0-99999999999 from filling the memory
 
 
