@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from scenegen.common.errors import SceneGenError
+from scenegen.common.signals import interrupts_kept_from_children
 from scenegen.objects.meshes.cache import MeshCache
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFile, ModelFolder
@@ -118,7 +119,9 @@ def _until_one_dies(
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(jobs, context) as pool:
         try:
-            pool.submit(time.perf_counter).result()
+            with interrupts_kept_from_children():
+                first = pool.submit(time.perf_counter)
+            first.result()
         except BrokenProcessPool as error:  # before any model was read
             hint = 'call it inside `if __name__ == "__main__":`, or with jobs=1'
             raise SceneGenError(
@@ -128,7 +131,8 @@ def _until_one_dies(
             while waiting or running:
                 while waiting and len(running) < 2 * jobs:
                     file = waiting.popleft()
-                    running[pool.submit(_check_in_worker, file, up, cache_dir)] = file
+                    with interrupts_kept_from_children():
+                        running[pool.submit(_check_in_worker, file, up, cache_dir)] = file
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     record = future.result()
                     del running[future]

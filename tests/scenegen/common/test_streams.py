@@ -81,7 +81,7 @@ def test_a_terminal_obeys_progress_bars_alone(tmp_path):
         pass
     os.close(ours)
     assert process.wait() == 3
-    assert b"1/2" in shown
+    assert b"0/2" in shown
     assert b"\r" in shown.split(b"line 0")[0]
     assert rb"line 1 \x1b[2J \u202e" in shown
     assert b"\x1b[2J" not in shown
