@@ -21,6 +21,7 @@ def score(ctx):
         bar.update(1)
         time.sleep(0.2)
         bar.update(1)
+    click.echo("a note", err=True)
     with open("mine.json", "w") as file:
         file.write(str(file.fileno()))
     for i in range(20_000):
@@ -43,7 +44,8 @@ OF_SHELL = {
 
 
 def run(shell, folder):
-    script = f'set -o pipefail; "$0" -c "$1" score {shell}'
+    # In development mode Python also tells what goes wrong when streams are closed at exit.
+    script = f'set -o pipefail; "$0" -X dev -c "$1" score {shell}'
     command = ["bash", "-c", script, sys.executable, COMMAND]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
@@ -52,7 +54,7 @@ def run(shell, folder):
 def test_no_stream_keeps_a_command_from_its_file_and_its_exit_code(tmp_path, shell, code):
     done = run(shell, tmp_path)
     assert done.returncode == code
-    errors = done.stderr.splitlines()
+    errors = [line for line in done.stderr.splitlines() if line != "a note"]
     assert len(errors) == (code == 2), done.stderr
     assert all(line.startswith("Error: standard output: ") for line in errors)
     assert int((tmp_path / "mine.json").read_text()) > 2, "a data file behind a standard stream"
@@ -62,6 +64,23 @@ def test_help_for_a_full_disk_is_one_line(tmp_path):
     done = run("--help > /dev/full", tmp_path)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_full_disk_is_told_once():
+    program = """
+import sys
+from scenegen.common.streams import robust_streams
+with robust_streams():
+    for i in range(3):
+        try:
+            print(i, flush=True)
+        except OSError as error:
+            print(error.filename, file=sys.stderr)
+"""
+    command = [sys.executable, "-c", program]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=True)
+    assert done.stderr == "standard output\n"
 
 
 def test_a_terminal_obeys_progress_bars_alone(tmp_path):
