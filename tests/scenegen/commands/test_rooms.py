@@ -256,3 +256,11 @@ def test_a_picture_is_replaced_only_when_told(run, refuses, rooms_path, tmp_path
     refuses("preview", rooms_path, words=("sheet.png", "--overwrite"))
     assert run("preview", rooms_path, "--overwrite").exit_code == 0
     assert (tmp_path / "sheet.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_info_shows_what_a_file_holds_in_its_own_lines(run, damaged):
+    command = "scenegen\n  fingerprint   0000\x1b[2J"
+    path = damaged(lambda file: file.attrs.modify("creation_command", command))
+    shown = run("info", path).stdout.splitlines()
+    assert r"  command       scenegen\n  fingerprint   0000\x1b[2J" in shown
+    assert sum(line.startswith("  fingerprint") for line in shown) == 1
