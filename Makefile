@@ -9,14 +9,14 @@ WORKERS ?= 2
 demo: $(VENV)/.runtime
 	mkdir -p demo
 	$(BIN)/scenegen render --n 64 --out demo/rooms.h5 --overwrite
-	$(BIN)/scenegen preview demo/rooms.h5 --out demo/rooms.png
+	$(BIN)/scenegen preview demo/rooms.h5 --out demo/rooms.png --overwrite
 	$(BIN)/scenegen verify demo/rooms.h5
 	$(BIN)/scenegen info demo/rooms.h5
 	$(BIN)/scenegen render --n 4 --preset shapenet --views 0,35,80 --out demo/objects.h5 --overwrite
-	$(BIN)/scenegen preview demo/objects.h5 --out demo/objects.png
+	$(BIN)/scenegen preview demo/objects.h5 --out demo/objects.png --overwrite
 	$(BIN)/iqtt make-split --out demo/iqtt --overwrite
 	$(BIN)/iqtt audit demo/iqtt --json demo/audit.json --overwrite
-	$(BIN)/iqtt show demo/iqtt/iqtt-test.h5 --answers --out demo/questions.png
+	$(BIN)/iqtt show demo/iqtt/iqtt-test.h5 --answers --out demo/questions.png --overwrite
 	$(BIN)/scenegen render --n 64 --seed 1 --out demo/train.h5 --overwrite
 	$(BIN)/bench baseline constant --train demo/train.h5 --data demo/rooms.h5 --out demo/constant.h5 --overwrite
 	$(BIN)/bench baseline mean-depth --train demo/train.h5 --data demo/rooms.h5 --out demo/mean-depth.h5 --overwrite
@@ -33,8 +33,8 @@ demo-model: demo $(VENV)/.model
 	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/empty-room.json demo/pix2shape.json
 	$(BIN)/bench baseline pix2shape --data demo/iqtt/iqtt-test.h5 --out demo/answers.h5 --overwrite
 	$(BIN)/bench score demo/answers.h5 --truth demo/iqtt/iqtt-test-answers.h5
-	$(BIN)/pix2shape rotate --data demo/objects.h5 --items 0,3,6,9 --out demo/rotation.gif
-	$(BIN)/pix2shape sample --out demo/samples.png
+	$(BIN)/pix2shape rotate --data demo/objects.h5 --items 0,3,6,9 --out demo/rotation.gif --overwrite
+	$(BIN)/pix2shape sample --out demo/samples.png --overwrite
 	@echo
 	@echo "Look at $(CURDIR)/demo: pix2shape.html, rotation.gif, samples.png"
 

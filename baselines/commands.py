@@ -2,8 +2,9 @@
 
 import click
 
-from baselines.pix2shape.commands import predict_to
-from scenegen.common.command_line import EXAMPLE, OVERWRITE, progress_bar
+from baselines.pix2shape.commands import SUBMISSION, WEIGHTS_PATH, predict_to
+from scenegen.common.command_line import EXAMPLE, LARGEST, OVERWRITE, print_line, progress_bar
+from scenegen.common.paths import InputPath
 
 BASELINES = """\b
 Baselines:
@@ -24,14 +25,23 @@ Baselines:
     "name",
     type=click.Choice(["constant", "mean-depth", "empty-room", "chance", "oracle", "pix2shape"]),
 )
-@click.option("--data", required=True, help="Rooms; or questions, for chance and pix2shape.")
-@click.option("--train", help="Rooms that constant and mean-depth take their means from.")
-@click.option("--out", default="predictions.h5", show_default=True, help="Submission to write.")
 @click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of chance's answers."
+    "--data", type=InputPath(), required=True, help="Rooms; or questions, for chance and pix2shape."
+)
+@click.option(
+    "--train", type=InputPath(), help="Rooms that constant and mean-depth take their means from."
+)
+@SUBMISSION
+@click.option(
+    "--seed",
+    type=click.IntRange(0, LARGEST),
+    default=0,
+    show_default=True,
+    help="Seed of chance's answers.",
 )
 @click.option(
     "--weights",
+    type=WEIGHTS_PATH,
     help="Weights of pix2shape: a .safetensors file or a bundled name"
     "  [the bundled ones that suit the data].",
 )
@@ -64,7 +74,7 @@ def baseline(
         with RoomsFile(data) as rooms, progress_bar(len(rooms), "image") as bar:
             how = {"overwrite": overwrite, "progress": bar.update}
             write_room_baseline(name, data, out, train=train, **how)
-    click.echo(f"{out}: {method} on {data}; score it with `bench score {out} --truth {data}`")
+    print_line(f"{out}: {method} on {data}; score it with `bench score {out} --truth {data}`")
 
 
 COMMANDS = (baseline,)

@@ -3,7 +3,6 @@
 Heavy modules are imported inside the commands, so that `--help` is fast.
 """
 
-import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -12,7 +11,8 @@ from typing import Any
 import click
 
 from scenegen.common import command_line
-from scenegen.common.command_line import EXAMPLE, Color, Items, Range, progress_bar
+from scenegen.common.command_line import EXAMPLE, Color, Items, Range, print_line, progress_bar
+from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_inputs
 
 KNOWN_SEED = (
     "note: whoever knows the seed can make the test answers again; for a test set of which nobody"
@@ -25,7 +25,7 @@ option = partial(click.option, show_default=True)
 @click.command(
     "make-split", epilog=f"{EXAMPLE}iqtt make-split --out iqtt-split --preset small --seed 1"
 )
-@option("--out", default="iqtt-split", help="Folder for the four files.")
+@option("--out", type=OutputFolder(), default="iqtt-split", help="Folder for the four files.")
 @option(
     "--preset",
     type=click.Choice(["small", "v2", "paper"]),
@@ -81,7 +81,7 @@ option = partial(click.option, show_default=True)
 @command_line.IMAGE_DTYPE
 @option("--with-depth", is_flag=True, help="Store planar depth as well.")
 @command_line.COMPRESSION
-@option("--batch", type=click.IntRange(1), default=64, help="Questions rendered at once.")
+@option("--batch", type=click.IntRange(1, 4096), default=64, help="Questions rendered at once.")
 @command_line.DEVICE
 @command_line.OVERWRITE
 def make_split(
@@ -103,7 +103,6 @@ def make_split(
     from iqtt.files import make
     from iqtt.questions import specs
     from scenegen.common.errors import SpecError
-    from scenegen.common.new_file import refuse_inputs
 
     if secret_seed is not None:
         source = click.get_current_context().get_parameter_source("seed")
@@ -123,17 +122,17 @@ def make_split(
             device=device,
             compression=compression,
             overwrite=overwrite,
-            command=" ".join(["iqtt", *sys.argv[1:]]),
+            command=command_line.creation_command("iqtt"),
             secret=secret_seed is not None,
             progress=bar.update,
         )
     seconds = time.perf_counter() - started
     megabytes = sum(path.stat().st_size for path in Path(out).iterdir()) / 1e6
-    click.echo(
+    print_line(
         f"{out}: {spec.train} + {spec.val} + {spec.test} questions ({spec.labeled} of training"
         f" labelled), {megabytes:.1f} MB, {4 * count / seconds:.0f} images/s"
     )
-    click.echo(
+    print_line(
         f"{out}: {tally.refused / max(1, tally.proposed):.0%} of {tally.proposed} proposed views"
         f" hid a cube and were refused"
     )
@@ -144,14 +143,27 @@ def make_split(
 @click.command(
     epilog=f"{EXAMPLE}iqtt show iqtt-split/iqtt-val.h5 --items 0-3 --answers --out questions.png"
 )
-@click.argument("file")
-@option("--out", default="questions.png", help="Picture to write; its suffix names the format.")
+@click.argument("file", type=InputPath())
+@option(
+    "--out",
+    type=OutputPath(),
+    default="questions.png",
+    help="Picture to write; its suffix names the format.",
+)
 @option("--items", type=Items(), help="Questions to show [default: the first 8].")
 @option("--part", type=click.Choice(["labeled", "unlabeled"]), help="Part of a training file.")
 @option(
     "--answers", is_flag=True, help="Mark the right answers, and name the kinds of the wrong ones."
 )
-def show(file: str, out: str, items: list[int] | None, part: str | None, answers: bool) -> None:
+@command_line.OVERWRITE
+def show(
+    file: str,
+    out: str,
+    items: list[int] | None,
+    part: str | None,
+    answers: bool,
+    overwrite: bool,
+) -> None:
     """Draw questions of FILE: the reference on the left, its three answers beside it."""
     from iqtt.files.preview import save_sheet
     from iqtt.files.reader import answers_beside, open_questions, parts
@@ -164,12 +176,12 @@ def show(file: str, out: str, items: list[int] | None, part: str | None, answers
         if answers and not (questions.has_answers or questions.has_truth):
             raise SpecError(file, "no answers, and no file of answers beside it", "answers")
         rows = pick_rows(len(questions), items)[: None if items else SHOWN]
-        save_sheet([questions[row] for row in rows], answers, out)
-    click.echo(f"{out}: {len(rows)} of {file}'s {len(questions)} questions")
+        save_sheet([questions[row] for row in rows], answers, out, overwrite)
+    print_line(f"{out}: {len(rows)} of {file}'s {len(questions)} questions")
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt info iqtt-split/iqtt-val.h5")
-@click.argument("file")
+@click.argument("file", type=InputPath())
 def info(file: str) -> None:
     """Describe FILE: its questions, settings, versions, fingerprints and sizes."""
     from iqtt.files.info import describe
@@ -178,8 +190,10 @@ def info(file: str) -> None:
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt audit iqtt-split --json audit.json")
-@click.argument("splits", nargs=-1, required=True, metavar="SPLIT...")
-@option("--json", "json_path", help="Write all numbers to this JSON file.")
+@click.argument(
+    "splits", nargs=-1, required=True, metavar="SPLIT...", type=InputPath(within=(".h5",))
+)
+@option("--json", "json_path", type=OutputPath(), help="Write all numbers to this JSON file.")
 @option("--markdown", is_flag=True, help="Print the tables as Markdown.")
 @option(
     "--probed",
@@ -212,9 +226,9 @@ def audit(
         check_writable(Path(json_path), overwrite)
     with progress_bar(question_count(splits), "question") as bar:
         found = audit_files(splits, probed=probed, progress=bar.update)
-    click.echo(report.markdown(found) if markdown else report.table(found))
     if json_path:
         write_text(json_path, found.to_json(), overwrite)
+    click.echo(report.markdown(found) if markdown else report.table(found))
     ctx.exit(0 if found.passed else 1)
 
 

@@ -8,25 +8,44 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import EXAMPLE, OVERWRITE, progress_bar
+from scenegen.common.command_line import (
+    EXAMPLE,
+    LARGEST,
+    MOST_PROCESSES,
+    OVERWRITE,
+    print_line,
+    progress_bar,
+)
+from scenegen.common.paths import InputPath, OutputPath, refuse_inputs
 
 TRUTH = click.option(
     "--truth",
+    type=InputPath(),
     help="The rooms file or the file of answers to score against [default: the file that the"
     " submission names].",
 )
 MARKDOWN = click.option("--markdown", is_flag=True, help="Print Markdown instead of aligned text.")
 SEED = click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the bootstrap."
+    "--seed",
+    type=click.IntRange(0, LARGEST),
+    default=0,
+    show_default=True,
+    help="Seed of the bootstrap.",
 )
 
 
 @click.command(epilog=EXAMPLE + "bench score predictions.h5 --json mine.json --html mine.html")
-@click.argument("submissions", nargs=-1, required=True, metavar="PREDICTIONS...")
+@click.argument("submissions", nargs=-1, required=True, type=InputPath(), metavar="PREDICTIONS...")
 @TRUTH
-@click.option("--json", "json_path", help="Write the means and the scores of all items here.")
-@click.option("--csv", "csv_path", help="Write a table of the scores of every item here.")
-@click.option("--html", "html_path", help="Write a page with distributions and pictures here.")
+@click.option(
+    "--json", "json_path", type=OutputPath(), help="Write the means and the scores of all items."
+)
+@click.option(
+    "--csv", "csv_path", type=OutputPath(), help="Write a table of the scores of every item."
+)
+@click.option(
+    "--html", "html_path", type=OutputPath(), help="Write a page with distributions and pictures."
+)
 @MARKDOWN
 @SEED
 @click.option(
@@ -47,7 +66,9 @@ SEED = click.option(
     " then not comparable.",
 )
 @click.option(
-    "--processes", type=click.IntRange(1), help="How many processes score [default: one a core]."
+    "--processes",
+    type=click.IntRange(1, MOST_PROCESSES),
+    help="How many processes score [default: one a core].",
 )
 @OVERWRITE
 def score(
@@ -66,17 +87,18 @@ def score(
     from metrics.scoring.evaluate import count_rows
     from metrics.scoring.evaluate import score as score_files
     from metrics.scoring.runs import Settings
-    from scenegen.common.errors import SpecError
+    from metrics.submissions.reader import open_predictions
+    from metrics.submissions.truths import find_truth
     from scenegen.common.new_file import check_writable, write_text
 
     outputs = [Path(path) for path in (json_path, csv_path, html_path) if path]
     for path in outputs:
         check_writable(path, overwrite)
-    if len({path.resolve() for path in outputs}) < len(outputs):
-        raise SpecError("outputs", ", ".join(map(str, outputs)), "different files")
+    for name in submissions if any(path.exists() for path in outputs) else ():
+        with open_predictions(name) as predictions:
+            refuse_inputs(outputs, [find_truth(predictions, truth).path])
     with progress_bar(count_rows(submissions[0]), "image") as bar:
         found = score_files(submissions, truth, Settings(**settings), bar.update)
-    click.echo(text_report(found, markdown))
     if json_path:
         write_scores(found, json_path, overwrite)
     if csv_path:
@@ -86,10 +108,11 @@ def score(
 
         page = html_report(found, Path(found.meta.truth_path), [Path(p) for p in submissions])
         write_text(html_path, page, overwrite)
+    click.echo(text_report(found, markdown))
 
 
 @click.command(epilog=EXAMPLE + "bench validate predictions.h5 --truth rooms.h5")
-@click.argument("submission", metavar="PREDICTIONS")
+@click.argument("submission", type=InputPath(), metavar="PREDICTIONS")
 @TRUTH
 @click.pass_context
 def validate(ctx: click.Context, submission: str, truth: str | None) -> None:
@@ -101,20 +124,22 @@ def validate(ctx: click.Context, submission: str, truth: str | None) -> None:
 
     problems = problems_of(submission, truth)
     for problem in problems:
-        click.echo(f"{'hint' if problem.is_hint else 'wrong':5}  {problem}")
+        print_line(f"{'hint' if problem.is_hint else 'wrong':5}  {problem}")
     wrong = sum(not problem.is_hint for problem in problems)
     told = f"{wrong} problems" if wrong > 1 else "1 problem"
-    click.echo(f"{submission}: {told if wrong else 'valid'}")
+    print_line(f"{submission}: {told if wrong else 'valid'}")
     ctx.exit(2 if wrong else 0)
 
 
 @click.command(epilog=EXAMPLE + "bench compare baseline.json mine.json --metric chamfer")
-@click.argument("scores", nargs=-1, required=True, metavar="REFERENCE.json OTHER.json...")
+@click.argument(
+    "scores", nargs=-1, required=True, type=InputPath(), metavar="REFERENCE.json OTHER.json..."
+)
 @click.option(
     "--metric", "metrics", multiple=True,
     help="A score to compare; may be repeated [default: the headline scores].",
 )  # fmt: skip
-@click.option("--json", "json_path", help="Write the comparison here.")
+@click.option("--json", "json_path", type=OutputPath(), help="Write the comparison here.")
 @MARKDOWN
 @SEED
 @click.option(
@@ -144,15 +169,15 @@ def compare(
     if json_path:
         check_writable(Path(json_path), overwrite)
     found = compare_files([read_scores(path) for path in scores], metrics or None, **settings)
-    click.echo(text_report(found, markdown))
     if json_path:
         write_text(json_path, to_json(found), overwrite)
+    click.echo(text_report(found, markdown))
 
 
 @click.command(
     epilog=EXAMPLE + "bench leaderboard baseline.json mine.json --format html --out b.html"
 )
-@click.argument("scores", nargs=-1, metavar="[SCORES.json]...")
+@click.argument("scores", nargs=-1, type=InputPath(), metavar="[SCORES.json]...")
 @click.option(
     "--metric", "metrics", multiple=True,
     help="A score to show; may be repeated, and the first one ranks [default: the headline"
@@ -166,7 +191,7 @@ def compare(
     show_default=True,
     help="Format of the tables.",
 )
-@click.option("--out", help="Write to this file instead of printing.")
+@click.option("--out", type=OutputPath(), help="Write to this file instead of printing.")
 @click.option(
     "--recheck",
     is_flag=True,
@@ -209,7 +234,7 @@ def leaderboard(
         click.echo(page)
         return
     write_text(out, page, overwrite)
-    click.echo(f"{out}: {len(scores)} score files")
+    print_line(f"{out}: {len(scores)} score files")
 
 
 @click.command("describe-format", epilog=EXAMPLE + "bench describe-format")

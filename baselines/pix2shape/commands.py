@@ -8,14 +8,35 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import EXAMPLE, OVERWRITE, Items, UserError, progress_bar
+from scenegen.common.command_line import (
+    EXAMPLE,
+    LARGEST,
+    MOST_PROCESSES,
+    OVERWRITE,
+    Items,
+    UserError,
+    print_line,
+    progress_bar,
+)
+from scenegen.common.paths import InputPath, OutputFolder, OutputPath
 
 PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
 A_MODEL = "A .safetensors file with its .json beside it, or the name of bundled weights"
 
-WEIGHTS = click.option("--weights", help=f"{A_MODEL}  [those that suit the data].")
-ROOMS = click.option("--data", required=True, help="Rooms whose images are encoded.")
-PICTURE = "Picture to write."
+WEIGHTS_PATH = InputPath(beside=".json")
+WEIGHTS = click.option(
+    "--weights", type=WEIGHTS_PATH, help=f"{A_MODEL}  [those that suit the data]."
+)
+ROOMS = click.option(
+    "--data", type=InputPath(), required=True, help="Rooms whose images are encoded."
+)
+SUBMISSION = click.option(
+    "--out",
+    type=OutputPath(),
+    default="predictions.h5",
+    show_default=True,
+    help="Submission to write.",
+)
 DEVICE = click.option(
     "--device",
     type=click.Choice(["auto", "cpu", "cuda"]),
@@ -25,10 +46,15 @@ DEVICE = click.option(
 )
 
 
-def _number(*names: str, least: int, default: int, text: str, most: int | None = None) -> Any:
+def _number(*names: str, least: int, default: int, text: str, most: int = LARGEST) -> Any:
     """Return an option that takes a whole number and shows its default."""
     kind = click.IntRange(least, most)
     return click.option(*names, type=kind, default=default, show_default=True, help=text)
+
+
+def _picture(name: str, text: str = "Picture to write.") -> Any:
+    """Return the option `--out` of a command that draws."""
+    return click.option("--out", type=OutputPath(), default=name, show_default=True, help=text)
 
 
 class Setting(click.ParamType):  # type: ignore[type-arg]
@@ -48,8 +74,10 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
 
 
 @click.command(epilog=f"{EXAMPLE}pix2shape train --data rooms.h5 --out run")
-@click.option("--data", required=True, help="Rooms, or iqtt-train.h5, to train on.")
-@click.option("--out", required=True, help="Folder of the run.")
+@click.option(
+    "--data", type=InputPath(), required=True, help="Rooms, or iqtt-train.h5, to train on."
+)
+@click.option("--out", type=OutputFolder(), required=True, help="Folder of the run.")
 @click.option(
     "--config",
     type=click.Choice(["compact", "paper"]),
@@ -64,7 +92,7 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
     help="Change one setting of the configuration, such as batch=8 or networks.size=128; the"
     " weights.json of a run lists all settings.",
 )
-@click.option("--seed", type=click.IntRange(0), help="Seed of every random choice  [0].")
+@click.option("--seed", type=click.IntRange(0, LARGEST), help="Seed of every random choice  [0].")
 @_number("--labels", least=0, default=0, text="Labelled questions whose answers may be used.")
 @click.option(
     "--conditional",
@@ -72,10 +100,10 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
     help="Tell the networks the class of the object, in rooms of one object each.",
 )
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint of --out.")
-@_number("--workers", least=0, default=1, text="Processes that read the data.")
+@_number("--workers", least=0, most=MOST_PROCESSES, default=1, text="Processes that read the data.")
 @_number("--every", least=1, default=500, text="Iterations between checkpoints.")
 @DEVICE
-@_number("--devices", least=1, default=1, text="Number of devices.")
+@_number("--devices", least=1, most=MOST_PROCESSES, default=1, text="Number of devices.")
 @click.option(
     "--precision",
     type=click.Choice(["32", "bf16"]),
@@ -124,7 +152,7 @@ def train(
         bar.update(1)
         if bar.disable and state.iteration % every == 0:  # no terminal, but perhaps a log
             losses_told = ", ".join(f"{name} {value}" for name, value in told.items())
-            click.echo(f"{state.iteration} of {last}, {state.seconds:.0f} s: {losses_told}")
+            print_line(f"{state.iteration} of {last}, {state.seconds:.0f} s: {losses_told}")
 
     try:
         weights = train_run(
@@ -137,18 +165,19 @@ def train(
             progress=show,
         )
     except KeyboardInterrupt:
-        click.echo(f"\nStopped; `--resume` goes on from {out}'s last checkpoint, if it got one.")
+        click.echo()
+        print_line(f"Stopped; `--resume` goes on from {out}'s last checkpoint, if it got one.")
         raise
     finally:
         bar.close()
     if weights is not None:  # None in all processes but the first
-        click.echo(f"{weights}: trained on {data}; now `pix2shape predict --weights {weights} ...`")
+        print_line(f"{weights}: trained on {data}; now `pix2shape predict --weights {weights} ...`")
 
 
 @click.command(epilog=f"{EXAMPLE}pix2shape predict --data rooms.h5 --out predictions.h5")
 @WEIGHTS
-@click.option("--data", required=True, help="Rooms or questions to predict.")
-@click.option("--out", default="predictions.h5", show_default=True, help="Submission to write.")
+@click.option("--data", type=InputPath(), required=True, help="Rooms or questions to predict.")
+@SUBMISSION
 @click.option("--run", default="", help="Name of this run among several of the method.")
 @DEVICE
 @OVERWRITE
@@ -160,7 +189,7 @@ def predict(
     Every view of a room is predicted from one image, the room's view 0, and the cameras.
     """
     weights = predict_to(out, weights, data, run=run, device=device, overwrite=overwrite)
-    click.echo(f"{out}: {weights} on {data}; score it with `bench score {out} --truth {data}`")
+    print_line(f"{out}: {weights} on {data}; score it with `bench score {out} --truth {data}`")
 
 
 def predict_to(out: str, weights: str | None, data: str, **how: Any) -> str:
@@ -181,22 +210,27 @@ def predict_to(out: str, weights: str | None, data: str, **how: Any) -> str:
 
 
 @click.command(epilog=f"{EXAMPLE}pix2shape sample --weights shapes --out samples.png")
-@click.option("--weights", default="shapes", show_default=True, help=f"{A_MODEL}.")
-@click.option("--out", default="samples.png", show_default=True, help=PICTURE)
+@click.option(
+    "--weights", type=WEIGHTS_PATH, default="shapes", show_default=True, help=f"{A_MODEL}."
+)
+@_picture("samples.png")
 @_number("--n", "count", least=1, most=256, default=16, text="Number of samples.")
 @click.option("--class", "label", help="Class that a conditional model samples  [each in turn].")
 @_number("--seed", least=0, default=0, text="Seed of codes, cameras and lights.")
-def sample(weights: str, out: str, count: int, label: str | None, seed: int) -> None:
+@OVERWRITE
+def sample(
+    weights: str, out: str, count: int, label: str | None, seed: int, overwrite: bool
+) -> None:
     """Draw samples of the model's prior, as images, depths and normals."""
     needs_torch()
     from baselines.pix2shape.pictures import check_picture, save_pictures
     from baselines.pix2shape.use.explore import sample_sheet
     from baselines.pix2shape.weights.bundled import open_weights
 
-    check_picture(out)
+    check_picture(out, False, overwrite)
     model, card = open_weights(weights)
-    save_pictures([sample_sheet(model, card, count, seed, label)], out)
-    click.echo(f"{out}: {count} samples")
+    save_pictures([sample_sheet(model, card, count, seed, label)], out, overwrite)
+    print_line(f"{out}: {count} samples")
 
 
 @click.command(
@@ -208,17 +242,20 @@ def sample(weights: str, out: str, count: int, label: str | None, seed: int) -> 
     "--items", type=Items(), default="0,1", show_default=True, help="The two rows to go between."
 )
 @_number("--steps", least=2, most=64, default=8, text="Number of codes.")
-@click.option("--out", default="interpolation.png", show_default=True, help=PICTURE)
-def interpolate(weights: str | None, data: str, items: list[int], steps: int, out: str) -> None:
+@_picture("interpolation.png")
+@OVERWRITE
+def interpolate(
+    weights: str | None, data: str, items: list[int], steps: int, out: str, overwrite: bool
+) -> None:
     """Draw the way from one room's code to another's, seen from the first room's camera."""
     if len(items) != 2:
         raise click.UsageError(f"--items: found {len(items)} rows, expected two such as 0,1")
-    model, rooms, items = _model_and_rooms(weights, data, items, out)
+    model, rooms, items = _model_and_rooms(weights, data, items, out, overwrite)
     from baselines.pix2shape.pictures import save_pictures
     from baselines.pix2shape.use.explore import interpolation_sheet
 
-    save_pictures([interpolation_sheet(model, rooms, items[0], items[1], steps)], out)
-    click.echo(f"{out}: from row {items[0]} to row {items[1]} of {data}")
+    save_pictures([interpolation_sheet(model, rooms, items[0], items[1], steps)], out, overwrite)
+    print_line(f"{out}: from row {items[0]} to row {items[1]} of {data}")
 
 
 @click.command(epilog=f"{EXAMPLE}pix2shape rotate --data rooms.h5 --items 0-5 --out rotation.gif")
@@ -229,22 +266,34 @@ def interpolate(weights: str | None, data: str, items: list[int], steps: int, ou
 )
 @_number("--degrees", least=0, most=90, default=80, text="Camera's turn about the vertical axis.")
 @_number("--frames", least=2, most=200, default=33, text="Number of pictures on the way there.")
-@click.option("--out", default="rotation.gif", show_default=True, help="GIF or WebP to write.")
+@_picture("rotation.gif", "GIF or WebP to write.")
+@OVERWRITE
 def rotate(
-    weights: str | None, data: str, items: list[int], degrees: int, frames: int, out: str
+    weights: str | None,
+    data: str,
+    items: list[int],
+    degrees: int,
+    frames: int,
+    out: str,
+    overwrite: bool,
 ) -> None:
     """Draw an animation in which the camera turns around rooms that the model saw in one image."""
-    model, rooms, items = _model_and_rooms(weights, data, items, out, animated=True)
+    model, rooms, items = _model_and_rooms(weights, data, items, out, overwrite, animated=True)
     from baselines.pix2shape.pictures import save_pictures
     from baselines.pix2shape.use.explore import rotation_frames
 
     angles = [degrees * i / (frames - 1) for i in range(frames)]
-    save_pictures(rotation_frames(model, rooms, items, angles), out)
-    click.echo(f"{out}: {len(items)} scenes turned by {degrees} degrees")
+    save_pictures(rotation_frames(model, rooms, items, angles), out, overwrite)
+    print_line(f"{out}: {len(items)} scenes turned by {degrees} degrees")
 
 
 def _model_and_rooms(
-    weights: str | None, data: str, items: list[int], out: str, animated: bool = False
+    weights: str | None,
+    data: str,
+    items: list[int],
+    out: str,
+    overwrite: bool,
+    animated: bool = False,
 ) -> tuple[Any, Any, list[int]]:
     """Check the picture's name; return model, rooms and the rows, which are checked, too."""
     needs_torch()
@@ -253,7 +302,7 @@ def _model_and_rooms(
     from baselines.pix2shape.weights.bundled import open_weights, suited
     from scenegen.rooms.preview import pick_rows
 
-    check_picture(out, animated)
+    check_picture(out, animated, overwrite)
     model, card = open_weights(weights or suited(data))
     rooms = known_rooms(data, card)
     return model, rooms, pick_rows(len(rooms), items)

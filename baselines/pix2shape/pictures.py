@@ -74,25 +74,25 @@ def training_sheet(model: Pix2Shape, batch: Batch, noise: Tensor, columns: int =
     return sheet([row[:columns] for row in rows])
 
 
-def check_picture(path: str | Path, animated: bool = False) -> None:
+def check_picture(path: str | Path, animated: bool, overwrite: bool) -> None:
     """Raise now what `save_pictures` would raise once all is drawn."""
     path = Path(path)
     if not animated:
         preview.check_picture_name(path)
     elif path.suffix.lower() not in (".gif", ".webp"):
         raise SpecError("out", repr(path.name), "an animation's name such as turn.gif")
-    check_writable(path, overwrite=True)
+    check_writable(path, overwrite)
 
 
-def save_pictures(frames: Sequence[Image.Image], path: str | Path) -> None:
+def save_pictures(frames: Sequence[Image.Image], path: str | Path, overwrite: bool = False) -> None:
     """Write one picture, or several as an animation that plays forwards and backwards.
 
     Raises SpecError for a file name with another ending, OSError for the path.
     """
-    check_picture(path, len(frames) > 1)
+    check_picture(path, len(frames) > 1, overwrite)
     if len(frames) == 1:
-        preview.save_picture(frames[0], path)
+        preview.save_picture(frames[0], path, overwrite)
         return
     rest, pause = [*frames[1:], *frames[-2:0:-1]], FRAME_MILLISECONDS
-    with written_beside(path, overwrite=True) as temporary:
+    with written_beside(path, overwrite) as temporary:
         frames[0].save(temporary, save_all=True, append_images=rest, duration=pause, loop=0)

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from iqtt.audit.audit import Audit
 from iqtt.audit.probes import ERROR_RATE, LIGHT, MIRRORED, OUTLINE, WITHOUT, Probe
-from scenegen.common.text_table import aligned, piped
+from scenegen.common.text_table import aligned, piped, printable
 
 _BLOCKS = (
     (WITHOUT, "answers alone", ("largest", "smallest", "most typical", "odd one out")),
@@ -27,7 +27,7 @@ def table(audit: Audit) -> str:
     lines += aligned([(p.status, p.name, p.detail) for p in audit.proofs])
     for title, rows in _blocks(audit.probes):
         lines += ["", title, *("  " + line for line in aligned(rows))]
-    return "\n".join([*lines, "", _conclusion(audit)])
+    return "\n".join(map(printable, [*lines, "", *_conclusion(audit)]))
 
 
 def markdown(audit: Audit) -> str:
@@ -40,7 +40,7 @@ def markdown(audit: Audit) -> str:
     ]
     for title, rows in _blocks(audit.probes):
         lines += ["", f"{title[0].upper()}{title[1:]}:", "", *piped(rows)]
-    return "\n".join([*lines, "", _conclusion(audit)])
+    return "\n".join(map(printable, [*lines, "", *_conclusion(audit)]))
 
 
 def _blocks(probes: Sequence[Probe]) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
@@ -66,7 +66,7 @@ def _cell(probe: Probe | None) -> str:
     return share + (" *" if probe.beats_chance else "")
 
 
-def _conclusion(audit: Audit) -> str:
+def _conclusion(audit: Audit) -> list[str]:
     failed = [proof.name for proof in audit.proofs if proof.status == "FAIL"]
     lines = [f"FAILED: {', '.join(failed)}." if failed else "No proof failed."]
     if not audit.questions:
@@ -82,4 +82,4 @@ def _conclusion(audit: Audit) -> str:
         )
     else:
         lines.append("No probes: no right answers are known.")
-    return "\n".join(lines)
+    return lines

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from iqtt.files.layout import truth_columns
 from iqtt.files.reader import AnswersFile, QuestionsFile, answers_beside, parts
 from iqtt.files.tables import NoImagesError, TableFile
+from scenegen.common.text_table import printable
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.info import renderer_text, setting_lines, size_text
 
@@ -28,7 +29,7 @@ def describe(path: str | Path) -> str:
         lines = _header(Path(path), tables)
         for table in tables:
             lines += ["", *_table_lines(table)]
-    return "\n".join(lines)
+    return "\n".join(map(printable, lines))
 
 
 def _tables(path: str | Path) -> Iterator[TableFile]:

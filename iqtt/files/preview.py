@@ -43,9 +43,14 @@ def question_sheet(records: Sequence[QuestionRecord], show_answers: bool) -> Ima
     return sheet
 
 
-def save_sheet(records: Sequence[QuestionRecord], show_answers: bool, path: str | Path) -> None:
+def save_sheet(
+    records: Sequence[QuestionRecord],
+    show_answers: bool,
+    path: str | Path,
+    overwrite: bool = False,
+) -> None:
     """Write a sheet; the suffix of `path` names the format. Raises as `save_picture`."""
-    save_picture(question_sheet(records, show_answers), path)
+    save_picture(question_sheet(records, show_answers), path, overwrite)
 
 
 def _draw_question(

@@ -6,7 +6,7 @@ from dataclasses import asdict
 
 from metrics.comparison.compare import ALPHA, CONFIDENCE, POWER, SIGN_FLIP, Comparison, Difference
 from metrics.scoring.metric_names import metric
-from scenegen.common.text_table import laid_out, markdown, number
+from scenegen.common.text_table import laid_out, markdown, number, printable
 
 FORMAT_NAME = "pix2shape-bench/comparison"
 FORMAT_VERSION = "1.0"
@@ -28,7 +28,7 @@ def text_report(comparison: Comparison, as_markdown: bool = False) -> str:
     lines = [_title(comparison, escape), *laid_out(_tables(comparison, escape), as_markdown)]
     notes = [f"- {markdown(n)}" if as_markdown else f"note: {n}" for n in comparison.notes]
     between = [""] if as_markdown and notes else []
-    return "\n".join([*lines, "", *_legend(comparison), *between, *notes])
+    return "\n".join(map(printable, [*lines, "", *_legend(comparison), *between, *notes]))
 
 
 def to_json(comparison: Comparison) -> str:

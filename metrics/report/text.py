@@ -11,7 +11,7 @@ from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import in_order, metric
 from metrics.scoring.records import GROUPINGS, Meta, Score, ScoreFile
 from scenegen.common.new_file import written_beside
-from scenegen.common.text_table import by_number, laid_out, markdown, number, plain
+from scenegen.common.text_table import by_number, laid_out, markdown, number, plain, printable
 
 HEAD = ("score", "value", "95% interval", "std of runs", "unit", "better")
 GROUP_TITLES = {
@@ -32,7 +32,8 @@ def text_report(scores: ScoreFile, as_markdown: bool = False) -> str:
     tables = [("", score_rows(scores, escape))]
     tables += [(GROUP_TITLES[name], rows) for name, rows in group_tables(scores, escape)]
     notes = [f"- {markdown(note)}" if as_markdown else note for note in _notes(scores)]
-    return "\n".join([_title(scores, escape), *laid_out(tables, as_markdown), "", *notes])
+    lines = [_title(scores, escape), *laid_out(tables, as_markdown), "", *notes]
+    return "\n".join(map(printable, lines))
 
 
 def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> None:

@@ -177,7 +177,9 @@ class _RowScorer:
         self._alignments = alignments
         with ExitStack() as opening:  # closes what is open already where a later file is refused
             self._truth = opening.enter_context(RoomsFile(truth_path))
-            self._files = [opening.enter_context(open_predictions(path)) for path in paths]
+            self._files = [
+                opening.enter_context(open_predictions(path, tried=True)) for path in paths
+            ]
             self._stack = opening.pop_all()
         self._entries = [{row: i for i, row in enumerate(f.rows.tolist())} for f in self._files]
 

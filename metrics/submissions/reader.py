@@ -17,9 +17,9 @@ from metrics.measures.depth import Alignment
 from metrics.submissions.inspection import Inspection, inspect
 from metrics.submissions.problems import Problem, first_error
 from metrics.submissions.rules import Ids, as_doubles
+from scenegen.common import trial
 from scenegen.common.errors import FileFormatError
 from scenegen.common.input_file import StoredArray, checking, open_unchecked, reading
-from scenegen.common.trial import try_file
 
 Array = NDArray[np.float64]
 BLOCK_BYTES = 1 << 20
@@ -185,7 +185,7 @@ def inspect_predictions(
         texts, rows, answers, problems = read_answers(path)
         return QuestionPredictions(path, texts, rows, answers) if len(rows) else None, problems
     if not tried:
-        try_file(path)
+        trial.try_file(path)
     file = open_unchecked(path, "submission")
     with checking(file):
         found = inspect(file)

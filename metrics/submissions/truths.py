@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from metrics.submissions.reader import Predictions
 from metrics.submissions.rules import as_doubles
+from scenegen.common import trial
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
@@ -59,7 +60,8 @@ def find_truth(predictions: Predictions, given: str | Path | None = None) -> Fou
     test file without answers it is the file of answers beside it (iqtt-test-answers.h5). Where
     `given` is there, nothing that the submission names is looked at.
 
-    Raises FileFormatError where nothing lies there, with the places that were looked at.
+    Raises FileFormatError where nothing lies there, with the places that were looked at, and as
+    `trial.try_file`.
     """
     advice = "give it with --truth" if given is None else ""
     if given is None and not predictions.truth_path:
@@ -69,6 +71,7 @@ def find_truth(predictions: Predictions, given: str | Path | None = None) -> Fou
     for place in places:
         if os.path.isfile(place):  # so neither a pipe nor a device is ever opened
             source: Literal["given", "submission"] = "submission" if given is None else "given"
+            trial.try_file(place)
             if predictions.task == "rooms":
                 return FoundTruth(place, source)
             from iqtt.files.reader import answers_beside

@@ -7,7 +7,18 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenegen.common.command_line import CACHE_DIR, EXAMPLE, OVERWRITE, UP, Names, progress_bar
+from scenegen.common.command_line import (
+    CACHE_DIR,
+    EXAMPLE,
+    MESH_FILES,
+    MOST_PROCESSES,
+    OVERWRITE,
+    UP,
+    Names,
+    print_line,
+    progress_bar,
+)
+from scenegen.common.paths import InputPath, OutputPath
 
 if TYPE_CHECKING:
     from scenegen.objects.meshes.check import ModelCheck
@@ -18,14 +29,20 @@ if TYPE_CHECKING:
     "check-objects",
     epilog=f"{EXAMPLE}scenegen check-objects ShapeNetCore.v2 --classes mug,bowl --jobs 4",
 )
-@click.argument("folder")
+@click.argument("folder", type=InputPath(within=MESH_FILES))
 @UP
 @click.option("--classes", type=Names(), help="Classes to check, such as bowl,mug [default: all].")
 @CACHE_DIR
-@click.option("--json", "json_path", help="File to write the result for every model to.")
+@click.option(
+    "--json", "json_path", type=OutputPath(), help="File to write the result for every model to."
+)
 @OVERWRITE
 @click.option(
-    "--jobs", type=click.IntRange(1), default=1, show_default=True, help="Number of processes."
+    "--jobs",
+    type=click.IntRange(1, MOST_PROCESSES),
+    default=1,
+    show_default=True,
+    help="Number of processes.",
 )
 @click.pass_context
 def check_objects(
@@ -55,10 +72,10 @@ def check_objects(
     total = sum(map(len, found.models.values()))
     with progress_bar(total, "model") as bar:
         records = check_models(found, cache, jobs, bar.update)
-    for line in _table(found, records):
-        click.echo(line)
     if json_path:
         write_text(json_path, _json(found, records), overwrite)
+    for line in _table(found, records):
+        print_line(line)
     ctx.exit(0 if any(record.ok for record in records) else 1)
 
 

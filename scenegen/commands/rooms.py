@@ -3,7 +3,6 @@
 Each one parses its options, makes one library call, and prints. Heavy imports happen inside.
 """
 
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -24,8 +23,11 @@ from scenegen.common.command_line import (
     Numbers,
     Range,
     Size,
+    creation_command,
+    print_line,
     progress_bar,
 )
+from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_told_inputs
 
 
 # fmt: off
@@ -33,7 +35,8 @@ from scenegen.common.command_line import (
     epilog=f"{EXAMPLE}scenegen render --n 1000 --preset shapenet --seed 1 --out rooms.h5"
 )
 @click.option("--n", "count", type=int, required=True, help="Number of scenes.")
-@click.option("--out", default="rooms.h5", show_default=True, help="File to write.")
+@click.option("--out", type=OutputPath(), default="rooms.h5", show_default=True,
+              help="File to write.")
 @click.option("--preset", default="shapes", show_default=True,
               help="Settings to start from, as `scenegen presets` lists them.")
 @SEED
@@ -127,15 +130,15 @@ def render(
             device=device,
             compression=compression,
             overwrite=overwrite,
-            command=" ".join(["scenegen", *sys.argv[1:]]),
+            command=creation_command("scenegen"),
             objects=source.objects,
             progress=bar.update,
         )
     seconds = time.perf_counter() - started
     megabytes = Path(out).stat().st_size / 1e6
-    click.echo(f"{out}: {images} images, {megabytes:.1f} MB, {images / seconds:.0f} images/s")
+    print_line(f"{out}: {images} images, {megabytes:.1f} MB, {images / seconds:.0f} images/s")
     for line in source.notes():
-        click.echo(line, err=True)
+        print_line(line, err=True)
 
 
 # fmt: on
@@ -149,32 +152,37 @@ def presets() -> None:
 
     width = max(map(len, PRESETS))
     for name, preset in PRESETS.items():
-        click.echo(f"{name:{width}}  {preset.meaning}")
+        print_line(f"{name:{width}}  {preset.meaning}")
         options = (f"{key} {shown(value)}" for key, value in preset.settings.items())
-        click.echo(f"{'':{width}}  {', '.join(options) or 'the defaults'}")
+        print_line(f"{'':{width}}  {', '.join(options) or 'the defaults'}")
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen preview rooms.h5 --random 12 --out sheet.png")
-@click.argument("file")
-@click.option("--out", default="sheet.png", show_default=True, help="Picture to write.")
+@click.argument("file", type=InputPath())
+@click.option(
+    "--out", type=OutputPath(), default="sheet.png", show_default=True, help="Picture to write."
+)
 @click.option("--items", type=Items(), help="Rows to show [default: the first 12].")
 @click.option(
     "--random", "number", type=click.IntRange(1, 400), help="Number of rows to pick at random."
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of --random.")
-def preview(file: str, out: str, items: list[int] | None, number: int | None, seed: int) -> None:
+@OVERWRITE
+def preview(
+    file: str, out: str, items: list[int] | None, number: int | None, seed: int, overwrite: bool
+) -> None:
     """Show some rooms of a file in one picture: image, depth, normals and object ids."""
     from scenegen.rooms.preview import contact_sheet, pick_rows, save_picture
     from scenegen.rooms.reader import RoomsFile
 
     with RoomsFile(file) as rooms:
         rows = pick_rows(len(rooms), items, number, seed)
-        save_picture(contact_sheet([rooms[i] for i in rows]), out)
-    click.echo(f"{out}: {len(rows)} of {file}'s rooms")
+        save_picture(contact_sheet([rooms[i] for i in rows]), out, overwrite)
+    print_line(f"{out}: {len(rows)} of {file}'s rooms")
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen info rooms.h5")
-@click.argument("file")
+@click.argument("file", type=InputPath())
 def info(file: str) -> None:
     """Print what a file holds: settings, ranges of values, units, sizes, versions, fingerprint."""
     from scenegen.rooms.info import describe
@@ -183,7 +191,7 @@ def info(file: str) -> None:
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen verify rooms.h5 --items 20")
-@click.argument("file")
+@click.argument("file", type=InputPath())
 @click.option(
     "--items",
     type=click.IntRange(0),
@@ -210,17 +218,17 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     with progress_bar(count, "image") as bar:
         checks = verify_file(file, items, device, objects, bar.update)
     for check in checks:
-        click.echo(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:26} {check.detail}")
+        print_line(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:26} {check.detail}")
     failed = sum(not check.ok for check in checks)
     outcome = f"{failed} of {len(checks)} checks failed" if failed else "verified"
-    click.echo(f"{file}: {outcome}")
+    print_line(f"{file}: {outcome}")
     ctx.exit(1 if failed else 0)
 
 
 @click.command(
     epilog=f"{EXAMPLE}scenegen export rooms.h5 --items 0,5-7 --format exr --out exported"
 )
-@click.argument("file")
+@click.argument("file", type=InputPath())
 @click.option("--items", type=Items(), required=True, help="Rows to export.")
 @click.option(
     "--format",
@@ -229,7 +237,9 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     required=True,
     help="exr has all channels; png 16 bits a channel; ply the surfels; obj the scene's mesh.",
 )
-@click.option("--out", default=".", show_default=True, help="Folder to write to.")
+@click.option(
+    "--out", type=OutputFolder(), default=".", show_default=True, help="Folder to write to."
+)
 @OVERWRITE
 @MESHES
 def export(
@@ -254,6 +264,7 @@ def export(
                 found = f"models that changed in the folder: {', '.join(changed)}"
                 raise SpecError(f"{file}: row {row}", found, "the files it was made from")
         paths = {row: export_paths(row, out, Path(file).stem, form) for row in rows}
+        refuse_told_inputs(path for some in paths.values() for path in some)
         if not Path(out).exists():
             Path(out).mkdir()
         for some in paths.values():
@@ -262,7 +273,8 @@ def export(
         for row, some in paths.items():
             export_room(rooms[row], some, form, overwrite, objects)
     for some in paths.values():
-        click.echo("\n".join(map(str, some)))
+        for path in some:
+            print_line(str(path))
 
 
 COMMANDS = (render, presets, preview, info, verify, export)

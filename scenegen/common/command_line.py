@@ -2,15 +2,25 @@
 
 import importlib
 import re
+import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import click
 
+from scenegen.common.paths import InputPath, OutputFolder
+from scenegen.common.signals import ended_by_signals
+from scenegen.common.streams import for_progress_bars, robust_streams
+from scenegen.common.text_table import printable
+
 # An `epilog` is this and a command line. A paragraph that begins with \b keeps its line breaks.
 EXAMPLE = "\b\nExample:\n  "
+MESH_FILES = (".glb", ".obj", ".off", ".ply", ".stl")
 NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
+LARGEST = 2**63 - 1  # whole number that files can hold
+MOST_PROCESSES = 1024
 MOST_ITEMS = 1_000_000  # numbers of a range; keeps 0-99999999999 from filling the memory
 
 
@@ -32,20 +42,28 @@ class PackageCommands(click.Group):
         """Return a command by name."""
         return next((command for command in self._loaded() if command.name == cmd_name), None)
 
+    def main(self, *arguments: Any, **attributes: Any) -> Any:
+        """Run a command with streams and signals that keep it from leaving anything half done."""
+        with ended_by_signals(), robust_streams():
+            return super().main(*arguments, **attributes)
+
+    def make_context(self, *arguments: Any, **attributes: Any) -> click.Context:
+        """Read what stands before the command's name; print the help where it is asked for."""
+        with _one_line_errors():
+            return super().make_context(*arguments, **attributes)
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Refuse arguments that no file could hold, before anything is done with them."""
+        for text in args:
+            if re.search("[\0\ud800-\udfff]", text):
+                raise UserError(f"argument {text}: found bytes that are not UTF-8, expected text")
+        return super().parse_args(ctx, args)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; show what it raises for users, and its warnings, as one line each."""
         warnings.showwarning = _show_warning
-        try:
+        with _one_line_errors():
             return super().invoke(ctx)
-        except OSError as error:
-            where = f"{error.filename}: " if error.filename else ""
-            raise UserError(f"{where}{error.strerror or error}") from error
-        except ValueError as error:
-            from scenegen.common.errors import SceneGenError
-
-            if not isinstance(error, SceneGenError):
-                raise
-            raise UserError(str(error)) from error
 
     def _loaded(self) -> list[Any]:
         modules = [importlib.import_module(name) for name in self.modules]
@@ -58,11 +76,29 @@ class UserError(click.ClickException):
     exit_code = 2
 
     def __init__(self, text: str) -> None:
-        super().__init__(" ".join(text.split()))
+        super().__init__(printable(text))
+
+
+@contextmanager
+def _one_line_errors() -> Iterator[None]:
+    """Turn what a user can mend into a UserError."""
+    try:
+        yield
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        raise UserError(f"{where}{error.strerror or error}") from error
+    except MemoryError as error:
+        raise UserError(": ".join(filter(None, ("not enough memory", str(error))))) from error
+    except ValueError as error:
+        from scenegen.common.errors import SceneGenError
+
+        if not isinstance(error, SceneGenError):
+            raise
+        raise UserError(str(error)) from error
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    click.echo(f"note: {message}", err=True)
+    print_line(f"note: {message}", err=True)
 
 
 class _Parsed(click.ParamType):  # type: ignore[type-arg]
@@ -165,6 +201,20 @@ class Color(_Parsed):
         return channels if len(channels) == 3 else channels * 3
 
 
+def print_line(text: str, err: bool = False) -> None:
+    """Print one line, whatever names from files it holds."""
+    click.echo(printable(text), err=err)
+
+
+def creation_command(program: str) -> str:
+    """Return the command line for a file to record, without the batch, which changes no byte."""
+    words = [program, *sys.argv[1:]]
+    while "--batch" in words:
+        at = words.index("--batch")
+        del words[at : at + 2]
+    return " ".join(word for word in words if not word.startswith("--batch="))
+
+
 def progress_bar(count: int | None, unit: str) -> Any:
     """Return a progress bar with rate and time left, to be used in a `with`.
 
@@ -173,7 +223,8 @@ def progress_bar(count: int | None, unit: str) -> Any:
     """
     from tqdm import tqdm
 
-    return tqdm(total=count, unit=unit, disable=None, leave=False, smoothing=0.1)
+    look = {"unit": unit, "disable": None, "leave": False, "smoothing": 0.1, "dynamic_ncols": True}
+    return tqdm(total=count, file=for_progress_bars(), **look)
 
 
 # fmt: off
@@ -192,14 +243,16 @@ SEED = click.option("--seed", type=int, default=0, show_default=True,
                     help="Seed of every random choice.")
 UP = click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True,
                   help="Axis that points up in the meshes; in ShapeNet it is y.")
-CACHE_DIR = click.option("--cache-dir", help="Folder for cleaned meshes [the user's cache].")
+CACHE_DIR = click.option("--cache-dir", type=OutputFolder(),
+                         help="Folder for cleaned meshes [the user's cache].")
 # fmt: on
 
 
 def MESHES(command: Any) -> Any:  # noqa: N802
     """Add the options that name the folder of meshes that objects are taken from."""
     command = UP(CACHE_DIR(command))  # the last option comes first
-    own = click.option("--objects-root", help="Folder with the objects, a sub-folder per class.")
-    return click.option("--shapenet-root", help="Folder of ShapeNetCore 1 or 2 with the objects.")(
-        own(command)
-    )
+    folder = InputPath(within=MESH_FILES)
+    text = "Folder with the objects, a sub-folder per class."
+    command = click.option("--objects-root", type=folder, help=text)(command)
+    text = "Folder of ShapeNetCore 1 or 2 with the objects."
+    return click.option("--shapenet-root", type=folder, help=text)(command)

@@ -2,7 +2,7 @@
 
 import errno
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -63,13 +63,3 @@ def check_name(path: str | Path) -> None:
     for wrong, number, text, where in problems:
         if wrong:
             raise OSError(number, text, str(where))
-
-
-def refuse_inputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path]) -> None:
-    """Raise an OSError for an output that is an input too, by that name or by a link to it."""
-    known = [(os.stat(path), path) for path in inputs if os.path.exists(path)]
-    for output in filter(os.path.exists, outputs):
-        for status, path in known:
-            if os.path.samestat(os.stat(output), status):
-                text = f"is an input of this command too ({path}); name another file"
-                raise OSError(errno.EINVAL, text, str(output))

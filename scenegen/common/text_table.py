@@ -19,6 +19,17 @@ _TEXT_DIRECTIONS = frozenset(
 _MARKDOWN = {c: f"\\{c}" for c in "\\`*_[]|~$"} | {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
 
 
+def printable(text: str, keep: str = "") -> str:
+    r"""Return a text as one line that can do nothing to a terminal, nor pass for several lines.
+
+    Characters that cannot be shown, that turn the direction of the text or that end a line become
+    escapes such as \x1b, except those of `keep`. Nothing is shortened.
+    """
+    return "".join(
+        c.encode("unicode_escape").decode() if _hidden(c) and c not in keep else c for c in text
+    )
+
+
 def plain(name: str) -> str:
     """Return a name as one line of visible characters, shortened to 60 of them.
 
@@ -26,12 +37,14 @@ def plain(name: str) -> str:
     dropped, and a name of which nothing is left becomes "(unnamed)".
     """
     kept = "".join(
-        c if c.isspace() or unicodedata.category(c) not in _HIDDEN_CATEGORIES else "\ufffd"
-        for c in name
-        if c not in _TEXT_DIRECTIONS
+        "\ufffd" if _hidden(c) and not c.isspace() else c for c in name if c not in _TEXT_DIRECTIONS
     )
     line = " ".join(kept.split()) or UNNAMED
     return line if len(line) <= LONGEST else line[: LONGEST - 3] + "..."
+
+
+def _hidden(c: str) -> bool:
+    return c in _TEXT_DIRECTIONS or unicodedata.category(c) in _HIDDEN_CATEGORIES
 
 
 def markdown(text: str) -> str:

@@ -6,6 +6,7 @@ Python code can stop it; so a process that may be killed looks at everything tha
 """
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -19,6 +20,7 @@ SECONDS = 8.0  # for any file
 BYTES_A_SECOND = 20e6  # that a slow disk and honest content take beyond that
 MEMORY = 2**31  # bytes of address space, beyond what Python takes
 OUT_OF_MEMORY = 3  # exit code
+_ACCEPTED: set[tuple[int, int, int, int]] = set()  # by this process
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -30,10 +32,15 @@ def try_file(path: str | Path) -> None:
     """
     if not os.path.isfile(path) or not _is_hdf5(path):
         return
+    status = os.stat(path)
+    identity = status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
+    if identity in _ACCEPTED:
+        return
     limit = SECONDS + os.path.getsize(path) / BYTES_A_SECOND
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     # -P: a file h5py.py in the working directory must not be imported.
-    command = [sys.executable, "-P", "-m", __name__, os.path.abspath(path), str(MEMORY)]
+    command = [sys.executable, "-P", "-m", __name__, os.path.abspath(path)]
+    command += [str(MEMORY), str(int(limit) + 1)]
     try:
         done = subprocess.run(
             command,
@@ -50,6 +57,7 @@ def try_file(path: str | Path) -> None:
         raise _refusal(path, "texts or attributes that take more than 2 GiB of memory")
     if done.returncode < 0:
         raise _refusal(path, f"a structure on which HDF5 crashes (signal {-done.returncode})")
+    _ACCEPTED.add(identity)
 
 
 def _refusal(path: str | Path, found: str) -> FileFormatError:
@@ -90,6 +98,7 @@ def _limit_memory(most: int) -> None:
 if __name__ == "__main__":
     if os.path.exists("/proc/self/statm"):
         _limit_memory(int(sys.argv[2]))
+    signal.alarm(int(sys.argv[3]))  # ends this process where its parent was killed
     try:
         _read_structure(sys.argv[1])
     except HDF5_ERRORS as error:

@@ -5,17 +5,30 @@ import os
 import signal
 import threading
 from concurrent.futures import ProcessPoolExecutor
+from multiprocessing.context import SpawnContext, SpawnProcess
+
+
+class _Worker(SpawnProcess):
+    def start(self) -> None:
+        """Start a process that never sees Ctrl-C, which a terminal sends to all processes."""
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            super().start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class _Spawning(SpawnContext):
+    Process = _Worker
 
 
 def worker_pool(count: int) -> ProcessPoolExecutor:
     """Return a pool of spawned processes: forked ones would share open files and threads' locks."""
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(count, context, initializer=_follow_parent)
+    return ProcessPoolExecutor(count, _Spawning(), initializer=_follow_parent)
 
 
 def _follow_parent() -> None:
-    """Leave Ctrl-C to the process that started this one, and end when it is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """End this process when the one that started it is gone."""
     threading.Thread(target=_end_after_parent, daemon=True).start()
 
 

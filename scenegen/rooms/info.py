@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from scenegen.common.content import CONTENT_DIGEST
 from scenegen.common.records import changed_settings
+from scenegen.common.text_table import printable
 from scenegen.layout import FIELDS, TRUTH_DIGEST
 from scenegen.rendering.backend import UNKNOWN, VERSION_ATTRIBUTES
 from scenegen.rooms.reader import RoomsFile
@@ -47,7 +48,7 @@ def describe(path: str | Path) -> str:
             unit = field.unit if len(field.unit) <= 24 else field.unit[:21] + "..."
             ratio = f"{raw / stored:.1f}" if stored else "-"
             lines.append(f"  {field.name:27} {row:14} {unit:24} {size_text(stored):>9} {ratio:>6}")
-    return "\n".join(map(_printable, lines))
+    return "\n".join(map(printable, lines))
 
 
 _SHOWN = {
@@ -64,11 +65,6 @@ def shown(attributes: Mapping[str, Any], name: str, missing: str = "-") -> str:
     value = attributes.get(name, "")
     text = value if isinstance(value, str) else f"not a text: {value!r}"
     return (text if len(text) <= MOST else text[: MOST - 3] + "...") or missing
-
-
-def _printable(text: str) -> str:
-    """Return a text as one line, its control characters as escapes."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def renderer_text(attributes: Mapping[str, Any]) -> str:

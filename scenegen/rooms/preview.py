@@ -131,12 +131,12 @@ def check_picture_name(path: Path) -> None:
     check(known, "out", repr(path.name), "a picture's name such as sheet.png")
 
 
-def save_picture(picture: Image.Image, path: str | Path) -> None:
+def save_picture(picture: Image.Image, path: str | Path, overwrite: bool = False) -> None:
     """Write a picture; the file appears, or is replaced, when it is complete.
 
     Raises SpecError for an ending that names no picture format, OSError for the path.
     """
     path = Path(path)
     check_picture_name(path)
-    with written_beside(path, overwrite=True) as temporary:
+    with written_beside(path, overwrite) as temporary:
         picture.save(temporary)

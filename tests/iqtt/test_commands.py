@@ -53,7 +53,7 @@ def test_every_option_is_recorded(run, monkeypatch, tmp_path):
     assert files_in(tmp_path / "x") == FILES
     with h5py.File("x/iqtt-test-answers.h5") as file:
         spec = json.loads(file.attrs["spec"])
-        assert file.attrs["creation_command"] == f"iqtt {line}"
+        assert file.attrs["creation_command"] == "iqtt " + line.replace(" --batch 2", "")
         assert file["truth/depth"].shape == (4, 4, 40, 32)
     expected = {
         "seed": 5, "train": 6, "labeled": 2, "val": 3, "test": 4, "cubes": [6, 7],
@@ -248,3 +248,24 @@ def test_reading_and_auditing_need_no_renderer(split, tmp_path):
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ
     )
     assert done.stdout.split() == ["0", "False", "False"]
+
+
+def test_splits_made_in_other_batches_have_equal_bytes(run, monkeypatch, tmp_path):
+    found = []
+    for batch in ("--batch 2", "--batch=5"):
+        shutil.rmtree(tmp_path / "x", ignore_errors=True)
+        words = ["make-split", *TINY.removesuffix("--batch 4").split(), "--out", "x"]
+        words += batch.split()
+        monkeypatch.setattr(sys, "argv", ["iqtt", *words])
+        assert run(*words).exit_code == 0
+        found.append({path.name: path.read_bytes() for path in (tmp_path / "x").iterdir()})
+    assert found[0] == found[1]
+
+
+def test_a_picture_is_replaced_only_when_told(run, split, tmp_path, check_refusal):
+    (tmp_path / "questions.png").write_text("mine")
+    words = ("show", split / "iqtt-val.h5", "--items", "0")
+    refused = run(*words)
+    check_refusal(refused.exit_code, refused.stdout, refused.stderr, ("--overwrite",))
+    assert run(*words, "--overwrite").exit_code == 0
+    assert (tmp_path / "questions.png").read_bytes()[:4] == b"\x89PNG"

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 
@@ -148,3 +149,15 @@ def test_outputs_of_one_name_are_refused_before_anything_is_written(truths, fold
     result = bench("score", "p.h5", "--json", "same", "--csv", "./same")
     check_refusal(result.exit_code, result.stdout, result.stderr, ("outputs", "same, same"))
     assert not (folder / "same").exists()
+
+
+@pytest.mark.parametrize("option", ["--json", "--csv", "--html"])
+def test_scores_never_replace_the_truth_that_a_submission_names(
+    truths, folder, check_refusal, option
+):
+    shutil.copy(truths.rooms, "rooms.h5")
+    assert bench("baseline", "oracle", "--data", "rooms.h5", "--out", "p.h5").exit_code == 0
+    before = (folder / "rooms.h5").read_bytes()
+    result = bench("score", "p.h5", option, "rooms.h5", "--overwrite")
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("rooms.h5", "another file"))
+    assert (folder / "rooms.h5").read_bytes() == before

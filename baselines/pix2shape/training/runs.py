@@ -152,7 +152,7 @@ def fit_prior(model: Pix2Shape, source: Source) -> None:
 def _picture(folder: Path, logs: SummaryWriter, state: State, batch: Batch) -> None:
     noise = draw(len(batch.image), state.model.config.networks.z, 0).to(batch.image.device)
     picture = training_sheet(state.model, batch, noise.code)
-    save_picture(picture, folder / PICTURE)
+    save_picture(picture, folder / PICTURE, overwrite=True)
     logs.add_image("pictures", np.asarray(picture), state.iteration, dataformats="HWC")
 
 

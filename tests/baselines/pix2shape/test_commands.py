@@ -59,11 +59,13 @@ def test_train_predict_score(folder):
     ],
 )
 def test_pictures(folder, line, name):
-    for _ in range(2):
-        done = pix2shape(*line.split())
+    for told in ((), ("--overwrite",)):
+        done = pix2shape(*line.split(), *told)
         assert done.exit_code == 0, done.output
         assert done.stdout.startswith(name)
     assert (folder / name).stat().st_size > 1000
+    refused = pix2shape(*line.split())
+    assert (refused.exit_code, name in refused.stderr) == (2, True)
 
 
 def test_questions(folder):
@@ -101,7 +103,7 @@ def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
     made = bench("baseline", "pix2shape", "--data", "rooms.h5")
     assert "weights shapes, on rooms.h5" in made.stdout, made.output
     assert pix2shape("sample", "--n", 1).exit_code == 0
-    result = pix2shape("sample", "--weights", "chairs")
+    result = pix2shape("sample", "--weights", "chairs", "--overwrite")
     words = ("'chairs'", "shapes, shapes-single")
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
 
@@ -112,8 +114,9 @@ MISTAKES = [
     (f"predict {WITH} --data .", (".: is a folder",)),
     (f"predict {ROOMS} --weights rooms.json", ("'rooms.json'", ".safetensors")),
     (f"predict {ROOMS} --weights text.safetensors", ("text.safetensors",)),
-    (f"predict {WITH} {ROOMS} --out rooms.h5", ("rooms.h5", "--overwrite")),
+    (f"predict {WITH} {ROOMS} --out rooms.h5 --overwrite", ("rooms.h5", "another file")),
     (f"predict {WITH} --data damaged.h5", ("damaged.h5", "image, row 5")),
+    (f"train {ROOMS} --out run --devices {2**200}", ("--devices", "1<=x<=1024")),
     (f"sample {WITH} --class mug", ("class", "'mug'")),
     ("sample --weights classes.safetensors --class sofa", ("'sofa'", "mug, bowl")),
     ("sample --weights questions.safetensors", ("weights",)),

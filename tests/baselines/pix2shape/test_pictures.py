@@ -110,9 +110,11 @@ def test_an_animation_goes_there_and_back(tmp_path, name, count):
 
 def test_one_picture_is_a_picture_and_replaces_another(tmp_path):
     for shade in (3, 9):
-        save_pictures([frame(shade)], tmp_path / "one.png")
+        save_pictures([frame(shade)], tmp_path / "one.png", overwrite=True)
         with Image.open(tmp_path / "one.png") as found:
             assert (np.asarray(found) == np.asarray(frame(shade))).all()
+    with pytest.raises(FileExistsError):
+        save_pictures([frame(5)], tmp_path / "one.png")
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from typing import Any
 import click
 import h5py
 import pytest
+import trimesh
 from click.testing import CliRunner
 
 import cli
@@ -50,7 +51,7 @@ def test_every_option_is_recorded(run, monkeypatch, tmp_path):
         assert set(file["object/count"][:]) <= {1, 2}
         assert list(file["object/shape"].attrs["names"]) == ["box", "teapot"]
         assert set(file["light/count"][:]) == {2}
-    assert root["creation_command"] == f"scenegen {EVERYTHING}"
+    assert root["creation_command"] == "scenegen " + EVERYTHING.replace(" --batch 2", "")
     assert root["variant"] == "llvm_ad_rgb"
     assert root["compression"] == "lzf"
     spec = json.loads(root["spec"])
@@ -227,3 +228,39 @@ def test_progress_shows_rate_and_time_left_on_a_terminal_alone(tmp_path):
     assert piped.stderr == "", "a log stays readable"
     assert piped.stdout.startswith("rooms.h5: 400 images, ")
     assert len(piped.stdout.splitlines()) == 1
+
+
+def test_files_rendered_in_other_batches_have_equal_bytes(run, monkeypatch, tmp_path):
+    """The recorded command is among the bytes; `--overwrite` and the name are the same in both."""
+    found = set()
+    for batch in ("--batch 2", "--batch=8"):
+        words = ["render", "--n", "3", *TINY, *batch.split(), "--out", "x.h5", "--overwrite"]
+        monkeypatch.setattr(sys, "argv", ["scenegen", *words])
+        assert run(*words).exit_code == 0
+        found.add((tmp_path / "x.h5").read_bytes())
+    assert len(found) == 1
+
+
+def test_an_export_never_replaces_what_it_exports(run, refuses, rooms_path, tmp_path):
+    (tmp_path / "meshes" / "mug").mkdir(parents=True)
+    trimesh.creation.box((1, 2, 1)).export(tmp_path / "meshes" / "mug" / "x-000000.obj")
+    meshes = ("--objects-root", "meshes")
+    made = run("render", "--n", 1, *TINY, "--objects", 1, *meshes, "--out", "x.h5")
+    assert made.exit_code == 0, made.output
+    how = ("--items", 0, "--format", "obj", "--out", "meshes/mug", "--overwrite")
+    refuses("export", "x.h5", *how, *meshes, words=("x-000000.obj", "another file"))
+
+
+def test_a_picture_is_replaced_only_when_told(run, refuses, rooms_path, tmp_path):
+    (tmp_path / "sheet.png").write_text("mine")
+    refuses("preview", rooms_path, words=("sheet.png", "--overwrite"))
+    assert run("preview", rooms_path, "--overwrite").exit_code == 0
+    assert (tmp_path / "sheet.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_info_shows_what_a_file_holds_in_its_own_lines(run, damaged):
+    command = "scenegen\n  fingerprint   0000\x1b[2J"
+    path = damaged(lambda file: file.attrs.modify("creation_command", command))
+    shown = run("info", path).stdout.splitlines()
+    assert r"  command       scenegen\n  fingerprint   0000\x1b[2J" in shown
+    assert sum(line.startswith("  fingerprint") for line in shown) == 1

@@ -40,7 +40,7 @@ RENDER_MISTAKES = [
     ("--shapenet-root .", "found no ShapeNet", "--objects-root"),
     ("--objects-root empty", "an empty folder"),
     ("--out .", "is a folder"),
-    ("--out ''", "is a folder"),
+    ("--out ''", "empty path"),
     ("--out none/x.h5", "none: ", "does not exist"),
     ("--out text/x.h5", "text: ", "not a folder"),
     ("--out /proc/x.h5", "/proc"),
@@ -58,7 +58,7 @@ PREVIEW_MISTAKES = [
     ("--out folder.png", "folder.png: ", "is a folder"),
     ("--out s.xyz", "'s.xyz'", "sheet.png"),
     ("--out rooms.h5", "'rooms.h5'", "sheet.png"),
-    ("--out ''", "sheet.png"),
+    ("--out ''", "empty path"),
 ]
 EXPORT_MISTAKES = [
     ("--items 8", "items: found 8", "0 to 7"),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from scenegen.common.new_file import check_writable, refuse_inputs, write_text
+from scenegen.common.new_file import check_writable, write_text
 
 
 @pytest.mark.parametrize(
@@ -40,24 +40,3 @@ def test_a_written_file_has_the_permissions_of_any_other(tmp_path):
     write_text(tmp_path / "first", "")
     (tmp_path / "plain").write_text("")
     assert (tmp_path / "first").stat().st_mode == (tmp_path / "plain").stat().st_mode
-
-
-@pytest.mark.parametrize(
-    ("output", "source"),
-    [
-        ("in.h5", "in.h5"),
-        ("folder/../in.h5", "in.h5"),
-        ("hard.h5", "in.h5"),
-        ("in.h5", "soft.h5"),
-    ],
-)
-def test_an_output_that_is_an_input_is_refused(tmp_path, monkeypatch, output, source):
-    monkeypatch.chdir(tmp_path)
-    Path("folder").mkdir()
-    Path("in.h5").write_text("")
-    os.link("in.h5", "hard.h5")
-    Path("soft.h5").symlink_to("in.h5")
-    with pytest.raises(OSError, match=source) as error:
-        refuse_inputs(["new.h5", output], ["missing.h5", source])
-    assert error.value.filename == output
-    refuse_inputs(["new.h5", "hard.h5"], ["folder", "missing.h5"])

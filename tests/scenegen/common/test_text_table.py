@@ -16,6 +16,7 @@ from scenegen.common.text_table import (
     markdown,
     number,
     plain,
+    printable,
 )
 
 ANY_TEXT = st.text(st.characters(exclude_categories=()), max_size=30)
@@ -38,6 +39,24 @@ ANY_TEXT = st.text(st.characters(exclude_categories=()), max_size=30)
 )
 def test_names_in_one_line(name, shown):
     assert plain(name) == shown
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("a\x1b[2J\r\nb\x9b\x00", r"a\x1b[2J\r\nb\x9b\x00"),
+        ("abc\u202edef \ud800 \u2028", r"abc\u202edef \ud800 \u2028"),
+        ("日本語 é 🎲 C:\\x " + 90 * "y", "日本語 é 🎲 C:\\x " + 90 * "y"),
+    ],
+)
+def test_what_a_terminal_would_obey_is_shown(text, shown):
+    assert printable(text) == shown
+    assert printable(text, keep=text) == text
+
+
+@given(ANY_TEXT)
+def test_any_text_is_one_line(text):
+    assert len(f"x{printable(text)}".splitlines()) == 1
 
 
 @given(ANY_TEXT)

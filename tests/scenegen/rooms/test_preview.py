@@ -154,7 +154,9 @@ def test_impossible_choices_of_rows(items, number):
 def test_saving(tmp_path, name):
     picture = Image.new("RGB", (20, 10), (200, 30, 30))
     save_picture(picture, tmp_path / name)
-    save_picture(picture, tmp_path / name)
+    with pytest.raises(FileExistsError):
+        save_picture(Image.new("RGB", (1, 1)), tmp_path / name)
+    save_picture(picture, tmp_path / name, overwrite=True)
     assert [p.name for p in tmp_path.iterdir()] == [name]
     with Image.open(tmp_path / name) as again:
         assert again.size == (20, 10)

@@ -1,0 +1,120 @@
+"""Paths on the command line: none is empty, and no file that a command writes is one it reads."""
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import click
+
+from scenegen.common.errors import SpecError
+
+Spelling = str | Path
+
+
+@dataclass
+class _Told:
+    """The paths that the running command has been given so far."""
+
+    inputs: list[tuple[Path, tuple[str, ...]]] = field(default_factory=list)
+    outputs: list[Path] = field(default_factory=list)
+
+
+class InputPath(click.ParamType):  # type: ignore[type-arg]
+    """A file that is read, or a folder.
+
+    Args:
+        within: endings of the files that are read in a folder, at any depth.
+        beside: ending of the file that is read beside this one, such as a card of weights.
+    """
+
+    name = "path"
+
+    def __init__(self, within: tuple[str, ...] = (), beside: str = "") -> None:
+        self.within, self.beside = within, beside
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Compare a path with the outputs that are known; keep it for those that follow.
+
+        What is HDF5 is tried in another process first.
+        """
+        told = _told(self, value, param, ctx)
+        read = [Path(value), *([Path(value).with_suffix(self.beside)] if self.beside else [])]
+        told.inputs += [(path, self.within) for path in read]
+        refuse_inputs(told.outputs, read, self.within)
+        from scenegen.common import trial
+
+        trial.try_file(value)
+        return value
+
+
+class OutputFolder(click.ParamType):  # type: ignore[type-arg]
+    """A folder to write to. What is written in it is for the command to compare."""
+
+    name = "path"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Refuse an empty path."""
+        _told(self, value, param, ctx)
+        return value
+
+
+class OutputPath(click.ParamType):  # type: ignore[type-arg]
+    """A file to write."""
+
+    name = "path"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Compare a path with all others that are known; keep it for those that follow."""
+        told = _told(self, value, param, ctx)
+        for other in told.outputs:
+            if _same(Path(value), other):
+                raise SpecError("outputs", f"{other} and {value}, one file", "different files")
+        told.outputs.append(Path(value))
+        for path, within in told.inputs:
+            refuse_inputs([value], [path], within)
+        return value
+
+
+def refuse_inputs(
+    outputs: Iterable[Spelling], inputs: Iterable[Spelling], within: tuple[str, ...] = ()
+) -> None:
+    """Raise SpecError where an output is an input, however either is spelled or linked.
+
+    With `within`, an input that is a folder stands for the files in it that end so.
+    """
+    written = [Path(output) for output in outputs]
+    for path in map(Path, inputs):
+        for output in written:
+            inside = output.suffix.lower() in within and _inside(output, path)
+            if inside or _same(output, path):
+                raise SpecError(output, f"a file to be read, by way of {path}", "another file")
+
+
+def refuse_told_inputs(outputs: Iterable[Spelling]) -> None:
+    """Raise as `refuse_inputs` where an output is one of the running command's own inputs."""
+    for path, within in click.get_current_context().meta[__name__].inputs:
+        refuse_inputs(outputs, [path], within)
+
+
+def _told(
+    kind: click.ParamType,  # type: ignore[type-arg]
+    value: str,
+    param: click.Parameter | None,
+    ctx: click.Context | None,
+) -> _Told:
+    if not value:
+        kind.fail("found an empty path, expected a name", param, ctx)
+    told: _Told = ctx.meta.setdefault(__name__, _Told()) if ctx else _Told()
+    return told
+
+
+def _same(a: Path, b: Path) -> bool:
+    try:
+        return os.path.samefile(a, b)
+    except OSError:  # one of them is not there
+        return os.path.realpath(a) == os.path.realpath(b)
+
+
+def _inside(path: Path, folder: Path) -> bool:
+    return Path(os.path.realpath(folder)) in Path(os.path.realpath(path)).parents

@@ -1,0 +1,100 @@
+"""Standard streams that outlive their readers, and show control characters instead of sending them.
+
+What a command prints holds names from other people's files, and goes to pipes that may close at any
+time. Neither may hurt the terminal, or keep the command from writing its files.
+"""
+
+import codecs
+import errno
+import io
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from types import SimpleNamespace
+from typing import Any, TextIO
+
+from scenegen.common.text_table import printable
+
+
+@contextmanager
+def robust_streams() -> Iterator[None]:
+    """Let all that the block prints to the real standard streams go through streams of this module.
+
+    Descriptors 0 to 2 are opened first where they are closed, so that no data file gets one.
+    """
+    for descriptor in range(3):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # gets the lowest free descriptor: this one
+    before = sys.stdout, sys.stderr
+    if sys.stdout is sys.__stdout__:
+        sys.stdout = _Shown(1, sys.__stdout__, "standard output")
+    if sys.stderr is sys.__stderr__:
+        sys.stderr = _Shown(2, sys.__stderr__, "")
+    try:
+        yield
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError):
+                stream.flush()
+        sys.stdout, sys.stderr = before
+
+
+def for_progress_bars() -> Any:
+    """Return standard error for a program that moves the cursor on purpose."""
+    return sys.stderr.unfiltered() if isinstance(sys.stderr, _Shown) else sys.stderr
+
+
+class _Shown(io.TextIOWrapper):
+    """A stream of text that shows what a terminal would obey as escapes."""
+
+    def __init__(self, descriptor: int, like: TextIO | None, name: str) -> None:
+        encoding = like.encoding if like else "utf-8"
+        if codecs.lookup(encoding).name == "ascii":
+            encoding = "utf-8"  # as click takes it
+        raw = _Lossy(descriptor, name)
+        buffer = io.BufferedWriter(raw)
+        super().__init__(buffer, encoding, "backslashreplace", line_buffering=raw.isatty())
+
+    def write(self, text: str) -> int:
+        # What is no text is left to the class above to refuse; click tries.
+        return super().write(printable(text, keep="\n\t") if isinstance(text, str) else text)
+
+    def unfiltered(self) -> Any:
+        """Return an object that writes to the same place, with control characters as they are."""
+        same = {name: getattr(self, name) for name in ("flush", "isatty", "fileno", "encoding")}
+        return SimpleNamespace(write=super().write, **same)
+
+
+class _Lossy(io.RawIOBase):
+    """A descriptor whose failure is told at most once; all that is written later is dropped.
+
+    A reader that has gone is no failure of standard output. Nothing is one of standard error, whose
+    `name` is empty.
+    """
+
+    def __init__(self, descriptor: int, name: str) -> None:
+        self.descriptor, self.name, self.lost = descriptor, name, False
+
+    def writable(self) -> bool:
+        return True
+
+    def fileno(self) -> int:
+        return self.descriptor
+
+    def isatty(self) -> bool:
+        return os.isatty(self.descriptor)
+
+    def write(self, data: Any) -> int:
+        """Write what the descriptor takes. Raises OSError with `name` as its file."""
+        if not self.lost:
+            try:
+                return os.write(self.descriptor, data)
+            except OSError as error:
+                self.lost = True
+                if self.name and error.errno != errno.EPIPE:
+                    text = f"cannot be written: {error.strerror}"
+                    raise OSError(error.errno, text, self.name) from error
+        return len(data)

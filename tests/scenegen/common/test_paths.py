@@ -1,0 +1,69 @@
+"""Paths of commands: which outputs are refused for being inputs, however they are spelled."""
+
+import os
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from scenegen.common.command_line import MESH_FILES, PackageCommands
+from scenegen.common.paths import InputPath, OutputPath, refuse_told_inputs
+from scenegen.objects.meshes.listing import SUFFIXES
+
+
+@click.command()
+@click.argument("read", type=InputPath(within=MESH_FILES), nargs=-1)
+@click.option("--weights", type=InputPath(beside=".json"))
+@click.option("--out", type=OutputPath())
+@click.option("--json", type=OutputPath())
+@click.option("--derived")
+def command(read, weights, out, json, derived):
+    refuse_told_inputs([derived] if derived else [])
+
+
+@pytest.fixture
+def files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "meshes" / "mug").mkdir(parents=True)
+    for name in ("a.h5", "b.h5", "w.safetensors", "w.json", "meshes/mug/1.obj", "meshes/x.json"):
+        (tmp_path / name).touch()
+    os.link("a.h5", "hard.h5")
+    os.symlink("a.h5", "soft.h5")
+    os.symlink("meshes", "other")
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("a.h5 --out a.h5", ("a.h5", "another file")),
+        ("--out a.h5 b.h5 a.h5", ("a.h5", "another file")),
+        ("a.h5 --out ./meshes/../a.h5", ("another file",)),
+        ("a.h5 --out hard.h5", ("hard.h5", "by way of a.h5")),
+        ("soft.h5 --json a.h5", ("a.h5", "by way of soft.h5")),
+        ("gone.h5 --out ./gone.h5", ("gone.h5",)),
+        ("--out new --json ./new", ("outputs", "different files")),
+        ("--out b.h5 --json b.h5", ("outputs", "different files")),
+        ("--weights w.safetensors --out w.json", ("w.json",)),
+        ("meshes --out meshes/mug/1.obj", ("1.obj", "by way of meshes")),
+        ("other --out meshes/mug/1.obj", ("1.obj", "by way of other")),
+        ("a.h5 --derived a.h5", ("a.h5",)),
+        ("a.h5 --out ''", ("--out", "empty path")),
+        ("''", ("READ", "empty path")),
+        ("a.h5 --out b.h5", None),
+        ("a.h5 a.h5 hard.h5 --out new --json new2 --derived b.h5", None),
+        ("meshes --out meshes/x.json --json meshes/new.h5", None),
+    ],
+)
+def test_an_output_is_no_input(files, check_refusal, line, words):
+    group = PackageCommands("group", modules=())
+    group.get_command = lambda ctx, name: command
+    arguments = [word.strip("'") for word in f"command {line}".split()]
+    done = CliRunner().invoke(group, arguments, catch_exceptions=False)
+    if words is None:
+        assert done.exit_code == 0, done.output
+    else:
+        check_refusal(done.exit_code, done.stdout, done.stderr, words)
+
+
+def test_every_kind_of_mesh_is_known():
+    assert set(MESH_FILES) == set(SUFFIXES)
