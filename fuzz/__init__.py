@@ -1,0 +1,2 @@
+"""Hostile input for every command: what strangers may send must end in one line of error.
+"""
