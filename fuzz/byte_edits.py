@@ -90,7 +90,7 @@ def become(path: Path, kind: str) -> None:
         "empty": path.touch,
         "text": lambda: path.write_text("depth,1,2,3\n" * 99),
         "zeros": lambda: path.write_bytes(bytes(len(old))),
-        "sparse": lambda: (path.write_bytes(old), os.truncate(path, 2**41)),
+        "sparse": lambda: (path.write_bytes(old), os.truncate(path, 2**30)),
         "folder": path.mkdir,
         "fifo": lambda: os.mkfifo(path),
         "dangling link": lambda: path.symlink_to("nowhere"),

@@ -17,9 +17,11 @@ import h5py
 import numpy as np
 
 from fuzz import byte_edits, hdf5_edits, json_edits
+from fuzz.child import call
 from fuzz.programs import OUTPUTS, Target
 
 Rng = np.random.Generator
+SECONDS = 5.0  # that the edits of a case may take
 EDITS = {**byte_edits.EDITS, **hdf5_edits.EDITS, **json_edits.EDITS}
 # Words of a command line. None is a device or an absolute path, which a broken command could
 # replace; the special files are made when the case is put up.
@@ -62,7 +64,10 @@ class Case:
         return Case(arguments=arguments, edits=edits, **told)
 
     def put_up(self, honest: Path, folder: Path) -> list[str]:
-        """Make the folder that the command runs in; return the edits that could not be made."""
+        """Make the folder that the command runs in; return the edits that could not be made.
+
+        Edits are made in a child, which may use up the memory it has, or be ended by HDF5.
+        """
         shutil.copytree(honest, folder, symlinks=True)
         os.mkfifo(folder / "fifo")
         (folder / "folder").mkdir()
@@ -70,13 +75,17 @@ class Case:
         (folder / "dangling").symlink_to("nowhere")
         (folder / "to-input").symlink_to("rooms.h5")
         os.link(folder / "rooms.h5", folder / "hard-input")
-        failed = []
+        if not self.edits:
+            return []
+        done = call(lambda: self._edit(folder), folder, SECONDS)
+        return done.out.decode(errors="replace").splitlines() + ["ended"] * (done.code != 0)
+
+    def _edit(self, folder: Path) -> None:
         for path, name, *arguments in self.edits:
             try:
                 EDITS[name](folder / path, *arguments)
             except Exception as error:  # an edit need not fit a file that others have changed
-                failed.append(f"{path} {name}: {type(error).__name__}: {error}")
-        return failed
+                print(ascii(f"{path} {name}: {type(error).__name__}: {error!s:.100}"))
 
 
 def draw(target: Target, seed: int, number: int, honest: Path) -> Case:

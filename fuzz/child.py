@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 MEMORY = 4 * 2**30  # bytes that a child may ask for beyond what it starts with
-LARGEST_FILE = 2**30  # bytes that it may write
+LARGEST_FILE = 2**31  # bytes that it may write
 GRACE = 2.0  # seconds that helpers of a child, such as multiprocessing's, may outlive it
 
 
@@ -114,7 +114,7 @@ def _be_the_program(
         _limit()
         _redirect(out, err, stdout)
         home = folder / ".home"
-        home.mkdir()
+        home.mkdir(exist_ok=True)
         os.environ.update(HOME=str(home), XDG_CACHE_HOME=str(home), TMPDIR=str(home))
         tempfile.tempdir = None
         code = _exit_code(command)
