@@ -1,2 +1,1 @@
-"""Hostile input for every command: what strangers may send must end in one line of error.
-"""
+"""Hostile input for every command: what strangers may send must end in one line of error."""

@@ -1,7 +1,5 @@
 """The command line of the fuzzer; see the package."""
 
-import itertools
-import json
 import os
 import sys
 import time
@@ -12,7 +10,7 @@ import click
 
 from fuzz.cases import Case
 from fuzz.child import working_folder
-from fuzz.programs import TARGETS
+from fuzz.programs import TARGETS, Target
 from fuzz.runner import Bench, Tally, honest_files, work
 
 REGRESSIONS = Path(__file__).parent / "regressions.jsonl"
@@ -27,7 +25,9 @@ REGRESSIONS = Path(__file__).parent / "regressions.jsonl"
 @click.option("--jobs", type=int, default=os.cpu_count(), help="Processes  [one a core].")
 @click.option("--corpus", type=Path, help="Folder to keep cases with faults in.")
 @click.option("--honest", type=Path, help="Folder of honest files  [made anew].")
-@click.option("--replay", type=Path, multiple=True, help="Run cases of a file of JSON lines instead.")
+@click.option(
+    "--replay", type=Path, multiple=True, help="Run cases of a file of JSON lines instead."
+)
 def main(
     seconds: float,
     cases: int | None,
@@ -39,7 +39,7 @@ def main(
     honest: Path | None,
     replay: tuple[Path, ...],
 ) -> None:
-    """Run commands on hostile input, first the cases that were once faults; exit with 1 at a fault."""
+    """Run commands on hostile input, cases that were once faults first; exit with 1 at a fault."""
     targets = [t for t in TARGETS if not only or t.name.startswith(only)]
     with working_folder() as made:
         bench = Bench(honest) if honest else honest_files(made)
@@ -70,8 +70,17 @@ def replayed(bench: Bench, cases: Iterable[Case]) -> Tally:
     return tally
 
 
-def in_parallel(bench, targets, seed, first, cases, seconds, jobs, corpus) -> Tally:
-    """Share the cases among processes that are forked from this one; each goes on until the time."""
+def in_parallel(
+    bench: Bench,
+    targets: list[Target],
+    seed: int,
+    first: int,
+    cases: int | None,
+    seconds: float,
+    jobs: int,
+    corpus: Path | None,
+) -> Tally:
+    """Share the cases among processes that are forked from this one."""
     until = time.monotonic() + seconds
     total = Tally()
     with working_folder() as results:
@@ -79,14 +88,10 @@ def in_parallel(bench, targets, seed, first, cases, seconds, jobs, corpus) -> Ta
         for job in range(jobs):
             child = os.fork()
             if child == 0:
-                last = first + cases if cases is not None else None
-                numbers = itertools.count(first + job, jobs)
-                if last is not None:
-                    numbers = iter(range(first + job, last, jobs))
-                show = lambda line: click.echo(line, err=True)  # noqa: E731
+                numbers = range(first + job, first + (cases or 10**9), jobs)
                 code = 1
                 try:
-                    tally = work(bench, targets, seed, numbers, until, corpus, show)
+                    tally = work(bench, targets, seed, numbers, until, corpus)
                     (results / str(job)).write_text(tally.to_json())
                     code = 0
                 finally:

@@ -20,6 +20,8 @@ NUMERALS = ("nan", "inf", "-1", "0", "1e999", "1e-999", "1e30", "9" * 30, "21474
             "1_0", "٣", "1/2/3/4", "-0", "1,5", "\x1b[2J", "'")  # fmt: skip
 KINDS = ("empty", "text", "zeros", "sparse", "folder", "fifo", "dangling link", "link to itself",
          "link to /dev/zero", "unreadable", "gone")  # fmt: skip
+CHANCES = {"flip": 0.25, "overwrite": 0.25, "insert": 0.1, "cut": 0.15, "repeat": 0.08,
+           "splice": 0.07, "become": 0.05, "replace": 0.05}  # fmt: skip
 
 
 def _where(rng: Rng) -> float:
@@ -108,13 +110,14 @@ def replace(path: Path, other: str) -> None:
 
 
 def draw(rng: Rng, others: list[str]) -> list[Any]:
-    """Draw a change: its name and its arguments. `others` are paths relative to the file's folder."""
-    kind = str(rng.choice(["flip", "overwrite", "insert", "cut", "repeat", "splice", "become",
-                           "replace"], p=[0.25, 0.25, 0.1, 0.15, 0.08, 0.07, 0.05, 0.05]))  # fmt: skip
+    """Draw a change: its name and its arguments. `others` are paths from the file's folder."""
+    kind = str(rng.choice(list(CHANCES), p=list(CHANCES.values())))
     first, last = sorted((_where(rng), _where(rng)))
     some = str(rng.choice(SPECIAL))
     arguments: dict[str, Callable[[], list[Any]]] = {
-        "flip": lambda: [[_where(rng), int(rng.integers(1, 256))] for _ in range(rng.integers(1, 9))],
+        "flip": lambda: [
+            [_where(rng), int(rng.integers(1, 256))] for _ in range(rng.integers(1, 9))
+        ],
         "overwrite": lambda: [_where(rng), int(rng.choice([1, 4, 8])), some],
         "insert": lambda: [_where(rng), some, int(rng.choice([1, 3, 1000]))],
         "cut": lambda: [first, float(rng.choice([last, 1.0]))],
@@ -132,4 +135,6 @@ def draw_numerals(rng: Rng) -> list[Any]:
     return ["numeral", [[float(rng.random()), str(rng.choice(NUMERALS))] for _ in range(count)]]
 
 
-EDITS = {f.__name__: f for f in (flip, overwrite, insert, cut, repeat, splice, numeral, become, replace)}
+EDITS = {
+    f.__name__: f for f in (flip, overwrite, insert, cut, repeat, splice, numeral, become, replace)
+}

@@ -107,8 +107,7 @@ def draw(target: Target, seed: int, number: int, honest: Path) -> Case:
 
 def _is_read(name: str, arguments: Sequence[str]) -> bool:
     """Return whether a command line names a file, or its folder, or a file that names it."""
-    stem = name.split("/")[0]
-    named = any(word == name or word == stem for word in arguments)
+    named = bool({name, Path(name).parts[0]} & set(arguments))
     return named or (name == "rooms.h5" and {"predictions.h5", "constant.h5"} & {*arguments}) or (
         name == "weights.json" and "weights.safetensors" in arguments
     )  # fmt: skip
@@ -154,7 +153,9 @@ def _change_words(rng: Rng, arguments: list[str]) -> None:
     """Replace, add or remove words of a command line, in place; the program and command stay."""
     inputs = [word for word in arguments[2:] if "." in word and not word.startswith("new")]
     for _ in range(int(rng.integers(1, 4))):
-        word = str(rng.choice(WORDS)) if rng.random() < 0.7 or not inputs else str(rng.choice(inputs))
+        word = (
+            str(rng.choice(WORDS)) if rng.random() < 0.7 or not inputs else str(rng.choice(inputs))
+        )
         values = [i for i in range(2, len(arguments)) if arguments[i - 1].startswith("--")]
         outputs = [i for i in values if arguments[i - 1] in OUTPUTS]
         places = [values, outputs, range(2, len(arguments))][rng.integers(3)]

@@ -23,6 +23,8 @@ LINKS = ("soft to itself", "soft to nothing", "soft to another", "file", "fifo",
 STORAGES = ("raw file", "raw secret", "raw fifo", "virtual", "virtual itself", "virtual fifo",
             "unwritten", "fill value", "bomb", "huge chunk", "short chunk", "unknown filter",
             "many filters", "huge shape", "tiny chunks", "compact", "damaged chunk")  # fmt: skip
+CHANCES = {"attribute": 0.3, "pixels": 0.16, "retype": 0.1, "reshape": 0.1, "swap": 0.04,
+           "remove": 0.04, "add": 0.04, "link": 0.08, "store": 0.14}  # fmt: skip
 
 
 def attribute(path: Path, where: str, name: str, value: str) -> None:
@@ -43,10 +45,14 @@ def pixels(path: Path, where: str, rows: list[float], part: float, value: str) -
             index = int(row * len(data))
             old = np.array(data[index])
             flat = old.reshape(-1)
-            number = float(value) if kind.kind == "f" else int(float(value)) if "." in value else value
+            number = (
+                float(value) if kind.kind == "f" else int(float(value)) if "." in value else value
+            )
             if kind.kind in "iu":
                 limits = np.iinfo(kind)
-                number = int(np.clip(int(float(value)) if value not in NAN else 0, limits.min, limits.max))
+                number = int(
+                    np.clip(int(float(value)) if value not in NAN else 0, limits.min, limits.max)
+                )
             with np.errstate(over="ignore"):
                 flat[: max(1, int(part * flat.size))] = number
             data[index] = flat.reshape(old.shape)
@@ -267,7 +273,9 @@ def data_sets(path: Path) -> list[str]:
     """Return the names of the data sets."""
     found: list[str] = []
     with h5py.File(path, "r") as file:
-        file.visititems(lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None)
+        file.visititems(
+            lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None
+        )
     return found
 
 
@@ -275,8 +283,7 @@ def draw(rng: Rng, path: Path) -> list[Any]:
     """Draw a change of an honest file: its name and its arguments."""
     sets = data_sets(path)
     chosen = str(rng.choice(sets))
-    kind = str(rng.choice(["attribute", "pixels", "retype", "reshape", "swap", "remove", "add", "link",
-                           "store"], p=[0.3, 0.16, 0.1, 0.1, 0.04, 0.04, 0.04, 0.08, 0.14]))  # fmt: skip
+    kind = str(rng.choice(list(CHANCES), p=list(CHANCES.values())))
     arguments: dict[str, Callable[[], list[Any]]] = {
         "attribute": lambda: _draw_attribute(rng, objects(path)),
         "pixels": lambda: [chosen, [float(rng.random()) for _ in range(rng.integers(1, 4))],
@@ -299,4 +306,6 @@ def _draw_attribute(rng: Rng, found: dict[str, list[str]]) -> list[Any]:
     return [where, str(rng.choice(names)), value]
 
 
-EDITS = {f.__name__: f for f in (attribute, pixels, retype, reshape, swap, remove, add, link, store)}
+EDITS = {
+    f.__name__: f for f in (attribute, pixels, retype, reshape, swap, remove, add, link, store)
+}

@@ -1,6 +1,6 @@
-"""The honest files that cases are made from, written by the commands themselves: tiny ones of each kind.
+"""The honest files that cases are made from: tiny, and written by the commands.
 
-    python -m fuzz.honest FOLDER
+python -m fuzz.honest FOLDER
 """
 
 import json

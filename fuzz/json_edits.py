@@ -1,4 +1,4 @@
-"""Changes of JSON: of a file, of a text in an HDF5 file, and of the header of a safetensors file."""
+"""Changes of JSON: of files, of texts in HDF5 files, and of what safetensors files begin with."""
 
 import json
 import re
@@ -14,8 +14,9 @@ from fuzz.values import NUMBERS, TEXTS, any_number, any_text
 
 Rng = np.random.Generator
 Way = tuple[Any, ...]
-ODD = ("null", "true", "[]", "{}", "[[[]]]", '"x"', "[null]", '{"value": 1}', "deep", "wide", "NaN",
-       "-Infinity", "1e999", "digits", r'"\ud800"', r'"\u0000"', "[1,2,3]", "[-1]", "[0.5]")  # fmt: skip
+ODD = ("null", "true", "[]", "{}", "[[[]]]", '"x"', "[null]", '{"value": 1}', "deep", "wide",
+       "NaN", "-Infinity", "1e999", "digits", r'"\ud800"', r'"\u0000"', "[1,2,3]", "[-1]",
+       "[0.5]")  # fmt: skip
 LONG_ODD = {
     "deep": "[" * 5000 + "]" * 5000,
     "wide": "[" + "0," * 300_000 + "0]",

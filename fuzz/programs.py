@@ -104,7 +104,7 @@ TARGETS = (
     ),
     Target(
         "weights",
-        ("pix2shape predict --weights weights.safetensors --data rooms.h5 --device cpu --out new.h5",
+        ("pix2shape predict --weights weights.safetensors --data rooms.h5 --out new.h5",
          "pix2shape sample --weights weights.safetensors --n 1 --out new.png"),
         ("weights.safetensors", "weights.json"),
     ),

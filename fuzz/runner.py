@@ -1,4 +1,4 @@
-"""Cases run one after the other, each in a child of a process that is warm; what they broke is kept.
+"""Cases run one after the other, each in a child of a warm process; what they broke is kept.
 
 `Bench` knows the honest files and what honest runs cost. `Tally` counts what cases did.
 """
@@ -14,7 +14,7 @@ import sys
 import time
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -49,7 +49,7 @@ class Bench:
                         importlib.import_module(name)
 
     def _honest_run(self, line: str, codes: tuple[int, ...]) -> tuple[Run, list[str]]:
-        """Run a command line that must succeed; return also the names of all modules it imported."""
+        """Run a command line that must succeed; return also the names of the modules imported."""
         program, *arguments = line.split()
 
         def command() -> Any:
@@ -101,7 +101,9 @@ class Tally:
     slowest: tuple[float, str] = (0.0, "")
     largest: tuple[float, str] = (0.0, "")
 
-    def add(self, name: str, case: Case, done: Run, found: Sequence[Fault], unmade: int) -> list[str]:
+    def add(
+        self, name: str, case: Case, done: Run, found: Sequence[Fault], unmade: int
+    ) -> list[str]:
         """Count a case; return the distinct faults of which it is among the first."""
         self.cases[case.target] += 1
         self.codes[str(done.code)] += 1
@@ -118,7 +120,11 @@ class Tally:
 
     def merge(self, other: "Tally") -> None:
         """Add the counts of another tally."""
-        for mine, more in ((self.cases, other.cases), (self.codes, other.codes), (self.faults, other.faults)):
+        for mine, more in (
+            (self.cases, other.cases),
+            (self.codes, other.codes),
+            (self.faults, other.faults),
+        ):
             mine.update(more)
         self.unmade += other.unmade
         self.seen = {**other.seen, **self.seen}
@@ -145,7 +151,8 @@ class Tally:
             yield f"{name:14} {count:6} cases"
         yield f"{'all':14} {sum(self.cases.values()):6} cases; exit codes {dict(self.codes)}"
         yield f"{self.unmade} edits did not fit their file"
-        yield f"slowest {self.slowest[0]} s: {self.slowest[1]}; largest {self.largest[0]} MB: {self.largest[1]}"
+        yield f"slowest {self.slowest[0]} s: {self.slowest[1]}"
+        yield f"largest {self.largest[0]} MB: {self.largest[1]}"
         for key, count in self.faults.most_common():
             yield f"FAULT {count:5} x {self.seen[key]}"
         yield f"{len(self.faults)} distinct faults in {sum(self.faults.values())} places"
@@ -157,7 +164,9 @@ def distinct(case: Case, fault: Fault) -> str:
     return f"{' '.join(case.arguments[:2])} {fault.kind}: {seen:.60}"
 
 
-def keep(corpus: Path, name: str, case: Case, done: Run, found: Sequence[Fault], bench: Bench) -> None:
+def keep(
+    corpus: Path, name: str, case: Case, done: Run, found: Sequence[Fault], bench: Bench
+) -> None:
     """Write a case with its faults and its files into a folder of the corpus."""
     import tarfile
 
@@ -178,7 +187,10 @@ def keep(corpus: Path, name: str, case: Case, done: Run, found: Sequence[Fault],
 def honest_files(folder: Path) -> Bench:
     """Make the honest files, in a process of their own as rendering starts threads."""
     done = subprocess.run(
-        [sys.executable, "-m", "fuzz.honest", str(folder)], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "fuzz.honest", str(folder)],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     if done.returncode:
         raise RuntimeError(done.stderr[-2000:])
@@ -189,10 +201,9 @@ def work(
     bench: Bench,
     targets: Sequence[Target],
     seed: int,
-    numbers: Iterator[int],
+    numbers: Iterable[int],
     until: float,
     corpus: Path | None,
-    show: Callable[[str], None] = lambda _: None,
 ) -> Tally:
     """Run case after case of all targets until a time of `time.monotonic`."""
     tally = Tally()
@@ -203,7 +214,7 @@ def work(
         name = f"{target.name} {seed} {number}"
         done, found, unmade = bench.tried(case)
         for key in tally.add(name, case, done, found, len(unmade)):
-            show(f"{name}: {key}")
+            print(f"{name}: {key}", file=sys.stderr, flush=True)
             if corpus:
                 keep(corpus, f"{name} {zlib.crc32(key.encode()):08x}", case, done, found, bench)
     return tally

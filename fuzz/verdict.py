@@ -34,7 +34,9 @@ def files_in(folder: Path) -> Files:
     found = {}
     for path in sorted(folder.rglob("*")):
         name, status = str(path.relative_to(folder)), path.lstat()
-        size, changed = (status.st_size, status.st_mtime_ns) if stat.S_ISREG(status.st_mode) else (0, 0)
+        size, changed = (
+            (status.st_size, status.st_mtime_ns) if stat.S_ISREG(status.st_mode) else (0, 0)
+        )
         if not name.startswith(".home"):
             found[name] = (stat.S_IFMT(status.st_mode), status.st_ino, size, changed)
     return found
@@ -84,7 +86,9 @@ def _printed(case: Case, run: Run) -> Iterator[Fault]:
         if name == "stdout" and case.stdout != "file":
             continue
         text = data.decode(errors="surrogateescape")
-        bad = next((c for c in text if c not in "\n\t" and unicodedata.category(c) in ("Cc", "Cs")), None)
+        bad = next(
+            (c for c in text if c not in "\n\t" and unicodedata.category(c) in ("Cc", "Cs")), None
+        )
         bad = bad or (found[0] if (found := DIRECTIONS.search(text)) else None)
         if bad is not None and "Traceback" not in text:
             at = text.index(bad)
@@ -113,7 +117,12 @@ def _left(case: Case, run: Run, before: Files, after: Files) -> Iterator[Fault]:
     for name, state in before.items():
         gone = after.get(name, (0, 0, 0, 0))
         may = "--overwrite" in words and name in written - read
-        if gone != state and not may and not stat.S_ISDIR(state[0]) and not name.startswith("cache/"):
+        if (
+            gone != state
+            and not may
+            and not stat.S_ISDIR(state[0])
+            and not name.startswith("cache/")
+        ):
             yield Fault("input changed", f"{name} (exit code {run.code})")
     for name in sorted(set(after) - set(before)):
         if name.startswith("cache/"):
