@@ -164,6 +164,7 @@ def _redirect(out: Path, err: Path, stdout: str) -> None:
     sys.stderr = io.TextIOWrapper(
         io.FileIO(2, "w"), "utf-8", "backslashreplace", write_through=True
     )
+    sys.__stdin__, sys.__stdout__, sys.__stderr__ = sys.stdin, sys.stdout, sys.stderr
 
 
 @contextlib.contextmanager

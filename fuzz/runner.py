@@ -5,7 +5,6 @@
 
 import contextlib
 import importlib
-import itertools
 import json
 import os
 import re
@@ -207,7 +206,7 @@ def work(
 ) -> Tally:
     """Run case after case of all targets until a time of `time.monotonic`."""
     tally = Tally()
-    for number, target in itertools.product(numbers, targets):
+    for number, target in ((number, target) for number in numbers for target in targets):
         if time.monotonic() > until:
             break
         case = draw(target, seed, number, bench.honest)
