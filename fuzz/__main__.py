@@ -43,12 +43,17 @@ def main(
     targets = [t for t in TARGETS if not only or t.name.startswith(only)]
     with working_folder() as made:
         bench = Bench(honest) if honest else honest_files(made)
-        bench.warm_up(targets)
-        click.echo(f"honest runs take up to {max(bench.megabytes.values()):.0f} MB", err=True)
         known = [case for file in (replay or [REGRESSIONS]) for case in read_cases(file)]
-        tally = replayed(bench, [case for case in known if case.target in bench.megabytes])
-        if not replay:
-            tally.merge(in_parallel(bench, targets, seed, first, cases, seconds, jobs, corpus))
+        tally = Tally()
+        for some in filter(
+            None, ([t for t in targets if t.imports_torch is x] for x in (False, True))
+        ):
+            names = {target.name for target in some}
+            bench.warm_up(some)
+            tally.merge(replayed(bench, [case for case in known if case.target in names]))
+            if not replay:
+                share = seconds * len(some) / len(targets)
+                tally.merge(in_parallel(bench, some, seed, first, cases, share, jobs, corpus))
     for line in tally.lines():
         click.echo(line)
     sys.exit(1 if tally.faults else 0)
@@ -88,7 +93,7 @@ def in_parallel(
         for job in range(jobs):
             child = os.fork()
             if child == 0:
-                numbers = range(first + job, first + (cases or 10**9), jobs)
+                numbers = range(first + job, first + (10**9 if cases is None else cases), jobs)
                 code = 1
                 try:
                     tally = work(bench, targets, seed, numbers, until, corpus)

@@ -14,12 +14,14 @@ class Target:
         lines: command lines on honest files; a case changes one of them, or its files.
         inputs: what of the honest folder they read, and a case may spoil.
         codes: exit codes that say something about the input, beside 0 and 2.
+        imports_torch: whether it does; a process that has imported torch forks slowly.
     """
 
     name: str
     lines: tuple[str, ...]
     inputs: tuple[str, ...]
     codes: tuple[int, ...] = ()
+    imports_torch: bool = False
 
 
 MESHES = tuple(
@@ -107,5 +109,6 @@ TARGETS = (
         ("pix2shape predict --weights weights.safetensors --data rooms.h5 --out new.h5",
          "pix2shape sample --weights weights.safetensors --n 1 --out new.png"),
         ("weights.safetensors", "weights.json"),
+        imports_torch=True,
     ),
 )  # fmt: skip
