@@ -42,7 +42,9 @@ def main(
     """Run commands on hostile input, cases that were once faults first; exit with 1 at a fault."""
     targets = [t for t in TARGETS if not only or t.name.startswith(only)]
     with working_folder() as made:
-        bench = Bench(honest) if honest else honest_files(made)
+        bench = (
+            Bench(honest) if honest else honest_files(made, any(t.imports_torch for t in targets))
+        )
         known = [case for file in (replay or [REGRESSIONS]) for case in read_cases(file)]
         tally = Tally()
         for some in filter(

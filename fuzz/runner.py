@@ -183,10 +183,11 @@ def keep(
                     packed.add(file, path)
 
 
-def honest_files(folder: Path) -> Bench:
+def honest_files(folder: Path, weights: bool) -> Bench:
     """Make the honest files, in a process of their own as rendering starts threads."""
+    more = ["--weights"] if weights else []
     done = subprocess.run(
-        [sys.executable, "-m", "fuzz.honest", str(folder)],
+        [sys.executable, "-m", "fuzz.honest", str(folder), *more],
         capture_output=True,
         text=True,
         check=False,
