@@ -168,6 +168,12 @@ def compare(
 )
 @click.option("--out", help="Write to this file instead of printing.")
 @click.option(
+    "--recheck",
+    is_flag=True,
+    help="Recompute all means and intervals from the scores of the items first, and refuse files"
+    " where they differ. The standard deviations over runs cannot be recomputed.",
+)
+@click.option(
     "--paper/--no-paper", default=True, help="Show the paper's own figures [default: yes]."
 )
 @OVERWRITE
@@ -176,6 +182,7 @@ def leaderboard(
     metrics: tuple[str, ...],
     form: str,
     out: str | None,
+    recheck: bool,
     paper: bool,
     overwrite: bool,
 ) -> None:
@@ -188,7 +195,15 @@ def leaderboard(
     from metrics.score_file import read_scores
     from scenegen.common.new_file import write_text
 
-    tables = rank([read_scores(path) for path in scores], metrics or None, paper=paper)
+    files = [read_scores(path) for path in scores]
+    if recheck:
+        from metrics.leaderboard.recheck import recheck as recompute
+        from metrics.leaderboard.recheck import steps
+
+        with progress_bar(sum(map(steps, files)), "group") as bar:
+            for file in files:
+                recompute(file, bar.update)
+    tables = rank(files, metrics or None, paper=paper)
     page: str = getattr(text, f"to_{form}")(tables)
     if out is None:
         click.echo(page)

@@ -32,8 +32,9 @@ from metrics.submissions.strict_json import parse_json, read_bytes
 from scenegen.common.new_file import written_beside
 from scenegen.common.text_table import by_number
 
-MOST_BYTES = 256 * 2**20
+MOST_BYTES = 256 * 2**20  # about 250,000 images
 MOST_KEYS = 10_000  # of one object
+WITHOUT_JSON = "about 250,000 images fit; --csv writes the scores of any number of them"
 
 __all__ = [
     "FORMAT_NAME",
@@ -69,7 +70,9 @@ def write_scores(scores: ScoreFile, path: str | Path, overwrite: bool = False) -
         JsonError: the reader would refuse it.
     """
     with written_beside(path, overwrite) as temporary, _naming(path):
-        data = to_json(scores).encode("utf-8", "surrogatepass")  # which `_parsed` refuses
+        data = to_json(scores).encode("ascii")
+        if len(data) > MOST_BYTES:
+            raise JsonError("", f"{len(data)} bytes", f"at most {MOST_BYTES}", WITHOUT_JSON)
         _parsed(data)
         temporary.write_bytes(data)
 
@@ -105,14 +108,12 @@ def to_json(scores: ScoreFile) -> str:
         **{name: _groups(getattr(scores, name)) for name in GROUPINGS.get(scores.task, ())},
         "meta": meta,
     }
-    text = json.dumps(_plain(head), indent=2, ensure_ascii=False, allow_nan=False)
+    # Only ASCII, as one wide character makes the whole text take 4 bytes a character when read.
+    text = json.dumps(_plain(head), indent=2, allow_nan=False)
     first = (*ID_COLUMNS.get(scores.task, ()), *OPTIONAL_COLUMNS.get(scores.task, ()))
     names = [name for name in first if name in scores.items]
     names += in_order(name for name in scores.items if name not in first)
-    lines = [
-        f"    {json.dumps(name, ensure_ascii=False)}: {json.dumps(_column(scores.items[name]))}"
-        for name in names
-    ]
+    lines = [f"    {json.dumps(name)}: {json.dumps(_column(scores.items[name]))}" for name in names]
     return f'{text[:-2]},\n  "items": {{\n' + ",\n".join(lines) + "\n  }\n}\n"
 
 

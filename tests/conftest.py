@@ -15,6 +15,16 @@ TINY = {"height": 32, "width": 32, "min_visible_pixels": 3, "seed": 3}
 Edit = Callable[[h5py.File], Any]
 
 
+@pytest.fixture(autouse=True)
+def _untried(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Open submissions without a trial in another process, except where a test is marked `tried`.
+
+    A trial takes 0.2 s, and most tests are about files that HDF5 can read.
+    """
+    if request.node.get_closest_marker("tried") is None:
+        monkeypatch.setattr("metrics.submissions.reader.try_file", lambda path: None)
+
+
 @pytest.fixture(scope="session")
 def make_rooms() -> Callable[..., Path]:
     """Write a tiny file of rooms; settings override those of TINY, `how` goes to make_dataset."""

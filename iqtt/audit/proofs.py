@@ -71,6 +71,20 @@ def balance(tables: Sequence[AuditTable], right: Sequence[Array]) -> Proof:
     return Proof("answer places", "ok", "balanced: " + "; ".join(shown))
 
 
+def content(tables: Sequence[AuditTable]) -> Proof:
+    """Prove that all datasets and attributes are those that were written, by the files' digests."""
+    rule = "every dataset and attribute is what the digests say"
+    told = [table for table in tables if table.changed is not None]
+    untold = ", ".join(table.name for table in tables if table.changed is None)
+    wrong = [f"{table.name}: {', '.join(table.changed)}" for table in told if table.changed]
+    note = f"; no digests in {untold}" if untold and told else ""
+    if wrong:
+        return Proof("content", "FAIL", f"changed: {'; '.join(wrong)}; expected: {rule}{note}")
+    if not told:
+        return Proof("content", "skipped", "no digests")
+    return Proof("content", "ok", rule + note)
+
+
 def values(tables: Sequence[AuditTable]) -> Proof:
     """Prove that all pixel values are finite and within 0..1."""
     return judge(

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.audit.statistics import measure, silhouettes
-from iqtt.files.layout import NO_CUBE
+from iqtt.files.layout import NO_CUBE, SCORED
 from iqtt.files.reader import QuestionsFile, answers_beside, parts
 from iqtt.questions.specs import SplitSpec
+from scenegen.common.content import column_digest, joint_digest, row_digest
 from scenegen.common.records import check
 
 Array = NDArray[Any]
@@ -54,6 +55,8 @@ class AuditTable:
         spec, split, fingerprint: as in the file; None for a released file.
         answers: which of the three is right, (Q,); None if the file does not tell.
         truth: the datasets `TRUTH` by name, (Q, ...) each; empty if the file has no shapes.
+        changed: datasets and digests that are not as the file's digests say; None for a file that
+            has no digests.
         background: most frequent colour of the images' borders, as stored, (3,).
         digests: hashes of the images, (Q, 4) void.
         silhouette: number of pixels of each image that are not background, (Q, 4).
@@ -70,6 +73,7 @@ class AuditTable:
     image_dtype: str
     answers: Array | None
     truth: dict[str, Array]
+    changed: tuple[str, ...] | None
     background: Array
     measured: Array
     digests: Array
@@ -142,12 +146,14 @@ def read_table(
         chunk = max(1, CHUNK_PIXELS // (4 * questions.height * questions.width))
         first = questions.read("questions", slice(0, min(chunk, source.count)))
         background = _border_color(first)
-        scans = []
+        scans: list[tuple[Array, ...]] = []
+        digests: list[bytes] = []
         for start in range(0, source.count, chunk):
             rows = slice(start, min(start + chunk, source.count))
             images = questions.read("questions", rows)
             wanted = measured[(measured >= rows.start) & (measured < rows.stop)] - start
             scans.append(_scan(images, background, wanted))
+            digests += map(row_digest, images)
             progress(len(images))
         scans = scans or [_scan(first, background, measured)]
         return AuditTable(
@@ -158,10 +164,26 @@ def read_table(
             questions.image_dtype,
             questions.read("answers", everything) if questions.has_answers else None,
             {name: questions.read(name, everything) for name in names},
+            _changed(questions, column_digest(digests)),
             background,
             measured,
             *map(np.concatenate, zip(*scans, strict=True)),
         )
+
+
+def _changed(questions: QuestionsFile, images: str) -> tuple[str, ...] | None:
+    """Return `AuditTable.changed`; images: the digest of the images, which were read before."""
+    if questions.stored_content_digest is None:
+        return None
+    others = [name for name in questions.fields if name != "questions"]
+    found = {"questions": images} | {name: questions.digest(name) for name in others}
+    changed = [name for name in found if found[name] != questions.stored_digest(name)]
+    scored = joint_digest({name: found[name] for name in SCORED if name in found})
+    if questions.has_answers and scored != questions.stored_truth_digest:
+        changed.append("truth_digest")
+    files = filter(None, (questions, questions.beside))
+    altered = [f for f in files if f.content_digest() != f.stored_content_digest]
+    return (*changed, *(f"attributes of {file.path.name}" for file in altered))
 
 
 def _border(pixels: Array) -> Array:

@@ -33,9 +33,8 @@ def rotations(tables: Sequence[AuditTable]) -> Proof:
     wrong = []
     for table in tables:
         matrices = table.truth["world_from_shape"]
-        with np.errstate(all="ignore"):
-            off = np.abs(matrices @ matrices.swapaxes(2, 3) - np.eye(3)).max(axis=(2, 3))
-            good = (off < ORTHONORMAL) & (np.linalg.det(matrices) > 0)
+        off = np.abs(matrices @ matrices.swapaxes(2, 3) - np.eye(3)).max(axis=(2, 3))
+        good = (off < ORTHONORMAL) & (np.linalg.det(matrices) > 0)
         wrong.append(~good.all(axis=1))
     rule = "orthonormal and proper"
     return judge("rotations", rule, tables, wrong, lambda t, row: "one is no rotation")
@@ -156,8 +155,7 @@ def _cast(
     rays = rays @ world_from_camera[:3, :3].T @ view  # from here on, all is in the shape's frame
     eye = world_from_camera[:3, 3] @ view
     low = cubes - (cubes.min(axis=0) + cubes.max(axis=0) + 1) / 2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        a, b = ((low + corner - eye) / rays[:, None] for corner in (0, 1))
+    a, b = ((low + corner - eye) / rays[:, None] for corner in (0, 1))
     enter, leave = np.minimum(a, b), np.maximum(a, b)
     first, last = enter.max(axis=2), leave.min(axis=2)
     depth = np.where(first <= last, first, np.inf)

@@ -59,6 +59,7 @@ def _header(path: Path, tables: Sequence[TableFile]) -> list[str]:
         f"  command       {attributes.get('creation_command') or '-'}",
         f"  split         {tables[0].split}",
         f"  conventions   {attributes.get('conventions')}",
+        f"  content       {tables[0].stored_content_digest or 'no digest'}",
         "",
         "  spec (* differs from the default)",
         *setting_lines(spec),
@@ -100,7 +101,8 @@ def _table_lines(table: TableFile) -> list[str]:
 
 def _facts(table: TableFile) -> dict[str, str]:
     """Return counts and ranges of the values of a table, by name."""
-    facts = {"fingerprint": table.fingerprint} if table.fingerprint else {}
+    told = {"fingerprint": table.fingerprint, "truth digest": table.stored_truth_digest}
+    facts = {name: text for name, text in told.items() if text}
     if len(table) == 0:
         return facts
     everything = slice(0, len(table))

@@ -10,11 +10,21 @@ from numpy.typing import NDArray
 
 from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec
 from iqtt.shapes.polycube import MAX_CUBES
+from scenegen.common.content import CONTENT_DIGEST
 from scenegen.common.row_file import Column, writer_name
+from scenegen.rendering.backend import VERSION_ATTRIBUTES
 
 Array = NDArray[Any]
 FORMAT_NAME = "pix2shape-bench/iqtt"
-FORMAT_VERSION = "1.1"
+FORMAT_VERSION = "1.2"
+DIGESTS_SINCE = 2  # minor version from which on files have digests
+# The datasets that scores depend on; `truth_digest` is the joint digest of those there.
+SCORED = ("answers", "distractor_kind", "angle_degrees")
+# Root attributes, all of them texts; fingerprints and digests of truth have a part's name as well.
+ROOT_TEXTS = (
+    *("format", "format_version", "writer", "variant", *VERSION_ATTRIBUTES),
+    *("spec", "split", "conventions", "creation_command", CONTENT_DIGEST),
+)
 NO_CUBE = -128
 ID_BYTES = 2 * MAX_CUBES
 CONVENTIONS = (
@@ -36,6 +46,17 @@ def question_columns(spec: SplitSpec) -> list[Column]:
     }
     shape = (4, spec.height, spec.width, 3)
     return [Column("questions", shape, spec.image_dtype, True, meaning)]
+
+
+def answer_column() -> Column:
+    """Return the column of the right answers, as in the released files."""
+    meaning = "which of images 1 to 3 shows the reference's shape, from 0"
+    return Column("answers", (), "uint8", attributes={"meaning": meaning})
+
+
+def named(attribute: str, part: str) -> str:
+    """Return the name of a root attribute that each table of a file has, such as "fingerprint"."""
+    return f"{attribute}_{part}".rstrip("_")
 
 
 def truth_columns(spec: SplitSpec) -> list[Column]:

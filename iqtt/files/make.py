@@ -17,6 +17,7 @@ from iqtt.questions.distractors import make_pools
 from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import DEFAULT_BATCH, Rendered, groups, render_questions
+from scenegen.common.content import seal
 from scenegen.common.new_file import check_writable
 from scenegen.common.records import check
 from scenegen.common.row_file import new_file
@@ -70,6 +71,8 @@ def make_split(
             )
             _append_all(writer, rendered, progress)
             writer.close()
+        for file in {images_file, truth_file}:
+            seal(file)
 
     temporary = (folder if folder.is_dir() else folder.parent) / f".iqtt-{os.getpid()}.partial"
     temporary.mkdir()

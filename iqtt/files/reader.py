@@ -8,10 +8,12 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from iqtt.files.attributes import read_root
 from iqtt.files.layout import question_columns
-from iqtt.files.tables import QuestionTruth, TableFile, read_root, table_parts
+from iqtt.files.tables import QuestionTruth, TableFile, table_parts
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.row_file import RowDataset, checking, open_file
+from scenegen.common.input_file import checking, open_file
+from scenegen.common.row_file import RowDataset
 from scenegen.description.specs import IMAGE_DTYPES
 from scenegen.rendering.ground_truth import decode_image
 
@@ -55,7 +57,7 @@ def parts(path: str | Path) -> tuple[str, ...]:
     Raises OSError, FileFormatError as `QuestionsFile`.
     """
     with open_file(path, "question file") as file, checking(file):
-        read_root(Path(path), dict(file.attrs))
+        read_root(file, Path(path))
         return table_parts(file, Path(path), QuestionsFile.CONTENT)
 
 
@@ -81,6 +83,7 @@ class QuestionsFile(TableFile):
     Attributes:
         height, width: size of an image, pixels.
         image_dtype: "uint8", "float16" or "float32".
+        beside: the file with the answers, if it is another one.
     """
 
     CONTENT = "questions"
@@ -103,7 +106,7 @@ class QuestionsFile(TableFile):
                 is given for a file that has its own.
         """
         super().__init__(path, part)
-        self._beside: AnswersFile | None = None
+        self.beside: AnswersFile | None = None
         if answers is not None:
             try:
                 self._join(answers)
@@ -127,8 +130,8 @@ class QuestionsFile(TableFile):
     def close(self) -> None:
         """Close the file, and the file of its answers; idempotent."""
         super().close()
-        if self._beside is not None:
-            self._beside.close()
+        if self.beside is not None:
+            self.beside.close()
 
     def _open_content(self) -> int:
         images = self._datasets["questions"] = self._dataset("questions")
@@ -166,13 +169,14 @@ class QuestionsFile(TableFile):
         """Add answers and truth of another file, if they belong to the questions of this one."""
         if self.has_answers:
             raise SpecError("answers", answers, f"none, as {self.path} has its own")
-        self._beside = beside = AnswersFile(answers, self.part)
+        self.beside = beside = AnswersFile(answers, self.part)
         if (len(beside), beside.fingerprint) != (len(self), self.fingerprint):
             expected = f"{_identity(self)}, as in {self.path}"
             raise FileFormatError(f"{answers}: answers", _identity(beside), expected)
         self._datasets |= beside._datasets
         self._stored |= beside._stored
-        self.kind_names = beside.kind_names
+        self._ranges, self.kind_names = beside._ranges, beside.kind_names
+        self.stored_truth_digest = beside.stored_truth_digest
 
 
 class QuestionsDataset(RowDataset):

@@ -4,6 +4,7 @@ A training file holds two tables, its parts "labeled" and "unlabeled"; other fil
 `reader` has what users open: files of questions, and files of answers.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,22 +14,19 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.files.layout import FORMAT_NAME, FORMAT_VERSION, truth_columns
-from iqtt.questions.specs import SPLITS, SplitSpec
+from iqtt.files.attributes import has_digests, read_digest, read_names, read_root, read_text
+from iqtt.files.layout import SCORED, named, truth_columns
+from scenegen.common import content
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.input_file import StoredArray, checking, open_file, reading
 from scenegen.common.records import check
-from scenegen.common.row_file import (
-    and_more,
-    checking,
-    column_problems,
-    open_file,
-    read_spec,
-    reading,
-)
+from scenegen.common.row_file import and_more, column_problems
+from scenegen.layout import TRUTH_DIGEST
 
 Array = NDArray[Any]
 PARTS = ("labeled", "unlabeled")
 RELEASED = ("questions", "answers")
+DIGESTED = 2**24  # bytes of a dataset that are in memory at once while its digest is made
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,13 +64,17 @@ class TableFile:
 
     Attributes:
         part: which of its tables: "labeled" or "unlabeled", or "" for the only one.
-        attributes: all root attributes.
+        attributes: the root attributes `layout.ROOT_TEXTS` that are there; none are read of a
+            released file.
         spec: the settings it was made with, without the seed unless it is a file of answers; None
             for a released file.
         split: "train", "val" or "test"; None for a released file.
         kind_names: names of the kinds that `distractor_kind` counts; empty where it is not told.
         fingerprint: SHA-256 of settings, shapes, views and answers of this table; None for a
             released file.
+        stored_content_digest: what the file says of all it holds; None before format 1.2.
+        stored_truth_digest: what the file says of the datasets that scores depend on; None before
+            format 1.2 and without answers.
     """
 
     CONTENT: ClassVar[str]  # the dataset that every table has
@@ -88,15 +90,15 @@ class TableFile:
         self.path = Path(path)
         self._file = open_file(path, "question file")
         with checking(self._file):
-            self.attributes: dict[str, Any] = dict(self._file.attrs)
-            self.spec, self.split = read_root(self.path, self.attributes)
+            self.attributes, self.spec, self.split = read_root(self._file, self.path)
             self.part = self._chosen(part)
-            self.fingerprint = self._own_fingerprint()
-            self._datasets: dict[str, Any] = {}
-            self._stored: dict[str, tuple[int, int]] = {}
+            self._datasets: dict[str, Any] = {}  # the answers are in memory
+            self._stored: dict[str, h5py.Dataset] = {}
+            self._ranges: dict[str, tuple[int, int]] = {}
             self.kind_names: list[str] = []
             self._count = self._open_content()
             self._open_truth()
+            self._read_identity()
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -123,16 +125,20 @@ class TableFile:
     def read(self, name: str, rows: int | slice) -> Any:
         """Read rows of one dataset, such as "questions", "answers" or "cubes", as stored.
 
-        Answers come as uint8, whatever integers the file has.
+        Answers come as uint8, whatever integers the file has. Counts, kinds and angles are within
+        their ranges.
 
         Raises:
             IndexError: a row beyond the file.
-            FileFormatError: the rows are damaged.
+            FileFormatError: the rows are damaged, or a value is out of its range.
             SpecError: there is no such dataset.
         """
         self.check_field(name)
         with reading(self.place(name, rows)):
-            return self._datasets[name][rows]
+            values = self._datasets[name][rows]
+        if name in self._ranges:
+            self._check_values(name, rows, values)
+        return values
 
     def truth(self, row: int) -> QuestionTruth | None:
         """Return what the file tells of one question beside images and answer; None if nothing.
@@ -142,14 +148,38 @@ class TableFile:
         if not self.has_truth:
             return None
         values = {name: self.read(name, row) for name in self.fields if name not in RELEASED}
-        try:
-            return _question_truth(values, self.kind_names)
-        except FileFormatError as error:
-            raise error.inside(f"{self.path}: row {row}") from error
+        return _question_truth(values, self.kind_names)
 
     def stored_bytes(self) -> dict[str, tuple[int, int]]:
         """Return for each dataset of this table its bytes on disk and in memory."""
-        return dict(self._stored)
+        with reading(self.path):
+            return {n: (d.id.get_storage_size(), d.nbytes) for n, d in self._stored.items()}
+
+    def digest(self, name: str) -> str:
+        """Return the digest of one dataset, made from what is read now. Raises as `read`."""
+        row = self.read(name, slice(0, 0))
+        step = 1 + DIGESTED // (1 + row.dtype.itemsize * math.prod(row.shape[1:]))
+        parts = (self.read(name, slice(i, i + step)) for i in range(0, len(self), step))
+        return content.column_digest(content.row_digest(row) for part in parts for row in part)
+
+    def stored_digest(self, name: str) -> str | None:
+        """Return what the file says of one dataset; None before format 1.2. Raises as `read`."""
+        place = f"{self.path}: {name}"
+        with reading(place):
+            return read_digest(self._stored[name], content.SHA256, place)
+
+    def truth_digest(self) -> str:
+        """Return the joint digest of what scores depend on, made from what is read now.
+
+        That are the datasets `layout.SCORED` that are there. Raises as `read`.
+        """
+        found = {name: self.digest(name) for name in SCORED if name in self._datasets}
+        return content.joint_digest(found)
+
+    def content_digest(self) -> str:
+        """Return the digest of the whole file, made anew. Raises FileFormatError."""
+        with reading(self.path):
+            return content.content_digest(self._file)
 
     def close(self) -> None:
         """Close the file; idempotent."""
@@ -174,13 +204,13 @@ class TableFile:
         """Check and open questions and answers; return the number of questions."""
         raise NotImplementedError
 
-    def _dataset(self, name: str) -> h5py.Dataset:
+    def _dataset(self, name: str) -> StoredArray:
         """Return a dataset of this part, and note its size."""
         dataset = self._file[f"{self.part}/{name}"]
         if not isinstance(dataset, h5py.Dataset):
             raise FileFormatError(f"{self.path}: {name}", "a group", "a dataset")
-        self._stored[name] = (dataset.id.get_storage_size(), dataset.nbytes)
-        return dataset
+        self._stored[name] = dataset
+        return StoredArray(dataset)
 
     def _take_answers(self, count: int | None = None) -> int:
         """Read all answers; return their number, which must be `count` where that is given."""
@@ -214,18 +244,41 @@ class TableFile:
         if problems:
             raise FileFormatError(f"{self.path}: {name}: {and_more(problems)}")
         for column in columns:
-            dataset = self._datasets[column.name] = group[column.name]
-            self._stored[column.name] = (dataset.id.get_storage_size(), dataset.nbytes)
-        self.kind_names = [str(kind) for kind in group["distractor_kind"].attrs["names"]]
+            dataset = self._stored[column.name] = group[column.name]
+            self._datasets[column.name] = StoredArray(dataset)
+        place = f"{self.path}: {name}/distractor_kind"
+        self.kind_names = read_names(group["distractor_kind"], "names", place)
+        self._ranges = {
+            "cube_count": (1, self.spec.cubes[1]),
+            "light_count": (0, self.spec.lights[1]),
+            "distractor_kind": (-1, len(self.kind_names) - 1),
+            "angle_degrees": (0, 180),
+        }
 
-    def _own_fingerprint(self) -> str | None:
-        if self.spec is None:
-            return None
-        name = f"fingerprint_{self.part}".rstrip("_")
-        found = self.attributes.get(name)
-        if not isinstance(found, str):
-            raise FileFormatError(f"{self.path}: attribute {name!r}", f"{found!r:.40}", "a text")
-        return found
+    def _read_identity(self) -> None:
+        """Read fingerprint and digests, which a file of ours must have."""
+        ours, needed = self.spec is not None, has_digests(self.attributes)
+        self.fingerprint, self.stored_truth_digest, self.stored_content_digest = None, None, None
+        if ours:
+            mark, digest = named("fingerprint", self.part), named(TRUTH_DIGEST, self.part)
+            self.fingerprint = read_text(self._file, mark, self.path, True)
+            self.stored_truth_digest = read_digest(
+                self._file, digest, self.path, needed and self.has_answers
+            )
+            self.stored_content_digest = read_digest(
+                self._file, content.CONTENT_DIGEST, self.path, needed
+            )
+
+    def _check_values(self, name: str, rows: int | slice, values: Array) -> None:
+        """Raise FileFormatError where one of these rows leaves the range of its dataset."""
+        low, high = self._ranges[name]
+        good = (values >= low) & (values <= high)  # NaN is not
+        if np.all(good):
+            return
+        if isinstance(rows, slice):
+            first = int(np.argmin(good.reshape(len(values), -1).all(axis=1)))
+            rows, values = range(len(self))[rows][first], values[first]
+        raise FileFormatError(self.place(name, rows), values.tolist(), f"{low} to {high}")
 
     def place(self, name: str, rows: int | slice) -> str:
         """Return file, dataset and rows as text, for an error's `where`."""
@@ -259,31 +312,8 @@ def table_parts(file: h5py.File, path: Path, content: str) -> tuple[str, ...]:
     raise FileFormatError(path, "no question file", expected)
 
 
-def read_root(path: Path, attributes: dict[str, Any]) -> tuple[SplitSpec | None, str | None]:
-    """Return spec and split of a file of ours; None for a file without `format`, as released."""
-    found = attributes.get("format")
-    if found is None:
-        return None, None
-    if not isinstance(found, str) or found != FORMAT_NAME:
-        expected = f"{FORMAT_NAME!r}, or none, as in the released 3D-IQTT"
-        raise FileFormatError(f"{path}: attribute 'format'", f"{found!r:.60}", expected)
-    spec = read_spec(path, attributes, FORMAT_VERSION, SplitSpec.from_json)
-    split = attributes.get("split")
-    if not isinstance(split, str) or split not in SPLITS:
-        expected = f"one of {', '.join(SPLITS)}"
-        raise FileFormatError(f"{path}: attribute 'split'", f"{split!r:.40}", expected)
-    return spec, split
-
-
 def _question_truth(values: Mapping[str, Any], kind_names: Sequence[str]) -> QuestionTruth:
-    """Return the record of one row of `layout.truth_columns`, without the padding.
-
-    Raises FileFormatError where a count or a kind is beyond its range.
-    """
-    cube_slots, light_slots = values["cubes"].shape[1], values["light_position"].shape[1]
-    _check_range("cube_count", values["cube_count"], 1, cube_slots)
-    _check_range("light_count", values["light_count"], 0, light_slots)
-    _check_range("distractor_kind", values["distractor_kind"], -1, len(kind_names) - 1)
+    """Return the record of one row of `layout.truth_columns`, without the padding."""
     cubes = int(values["cube_count"])
 
     def per_image(name: str) -> tuple[Array, ...]:
@@ -304,8 +334,3 @@ def _question_truth(values: Mapping[str, Any], kind_names: Sequence[str]) -> Que
         visible_pixels=values["visible_pixels"][:, :cubes],
         depth=values.get("depth"),
     )
-
-
-def _check_range(name: str, found: Array, low: int, high: int) -> None:
-    if found.min() < low or found.max() > high:
-        raise FileFormatError(name, found.tolist(), f"{low} to {high}")

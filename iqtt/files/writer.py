@@ -7,17 +7,30 @@ from typing import Any
 import h5py
 import numpy as np
 
-from iqtt.files.layout import ID_BYTES, NO_CUBE, question_columns, truth_attributes, truth_columns
+from iqtt.files.layout import (
+    ID_BYTES,
+    NO_CUBE,
+    SCORED,
+    answer_column,
+    named,
+    question_columns,
+    truth_attributes,
+    truth_columns,
+)
 from iqtt.questions.specs import SplitSpec
 from iqtt.render import Rendered
 from iqtt.shapes.polycube import canonical, canonical_class, set_ids
+from scenegen.common.content import SHA256, joint_digest
 from scenegen.common.row_file import Table
+from scenegen.layout import TRUTH_DIGEST
 
 FINGERPRINTED = ("cubes", "world_from_shape", "light_position", "light_color")
 
 
 class QuestionsWriter:
     """Writes the questions of one table in order; `close` completes the table.
+
+    When all tables of a file are complete, `content.seal` completes the file.
 
     Images go to one file and everything else to another, so that a test file can be handed out; for
     training and validation both are the same file.
@@ -40,35 +53,36 @@ class QuestionsWriter:
         """
         self._spec, self._part = spec, part
         self._files = (images_file, truth_file)
+        answers = [] if part == "unlabeled" else [answer_column()]
         truth = truth_file.require_group(f"truth/{part}")
         truth.attrs.update(truth_attributes(spec))
         images = images_file.require_group(part or "/")
         self._images = Table(images, question_columns(spec), count, compression)
         self._truth = Table(truth, truth_columns(spec), count, compression)
-        self._answers = np.zeros(count, np.uint8)
+        self._answers = Table(truth_file.require_group(part or "/"), answers, count, compression)
         self._digest = hashlib.sha256(f"{spec.public().to_json()} {split} {part}".encode())
 
     def append(self, questions: Sequence[Rendered]) -> int:
         """Write the next questions; return their number."""
         for one, row in zip(questions, _truth_rows(self._spec, questions), strict=True):
             answer = one.question.shapes.answer
-            self._answers[self._images.rows] = answer
             for name in FINGERPRINTED:
                 self._digest.update(np.ascontiguousarray(row[name]).tobytes())
             self._digest.update(bytes([answer]))
             self._images.append({"questions": one.images})
             self._truth.append(row)
+            self._answers.append({"answers": answer})
         return len(questions)
 
     def close(self) -> None:
-        """Write the answers, except those of unlabelled questions, and the fingerprint."""
+        """Write the fingerprint, and beside answers the digest of what scores depend on."""
         images_file, truth_file = self._files
+        for file in {images_file, truth_file}:
+            file.attrs[named("fingerprint", self._part)] = self._digest.hexdigest()
         if self._part != "unlabeled":
-            group = truth_file.require_group(self._part or "/")
-            dataset = group.create_dataset("answers", data=self._answers)
-            dataset.attrs["meaning"] = "which of images 1 to 3 shows the reference's shape, from 0"
-        for file in (images_file, truth_file):
-            file.attrs[f"fingerprint_{self._part}".rstrip("_")] = self._digest.hexdigest()
+            places = (truth_file[self._part or "/"], truth_file[f"truth/{self._part}"])
+            scored = {n: place[n].attrs[SHA256] for place in places for n in SCORED if n in place}
+            truth_file.attrs[named(TRUTH_DIGEST, self._part)] = joint_digest(scored)
 
 
 def _truth_rows(spec: SplitSpec, rendered: Sequence[Rendered]) -> list[dict[str, Any]]:

@@ -34,6 +34,7 @@ def require_same_test(
         for what, found, expected in (
             ("task", file.task, first.task),
             ("truth", file.meta.truth_fingerprint, first.meta.truth_fingerprint),
+            ("truth of digest", file.meta.truth_digest, first.meta.truth_digest),
         ):
             if found != expected:
                 raise ComparisonError(

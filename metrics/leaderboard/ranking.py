@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
+from metrics.leaderboard.names import check_names
 from metrics.leaderboard.paper_tables import REPORTED, SOURCE, TABLES, Figure, PaperTable
 from metrics.leaderboard.table import (
     INCOMPARABLE_MARK,
@@ -18,6 +19,7 @@ from metrics.leaderboard.table import (
     reported_rows,
 )
 from metrics.measures.answers import CHANCE
+from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ID_COLUMNS, ScoreFile
 from scenegen.common.errors import SceneGenError
@@ -33,6 +35,8 @@ def leaderboard(
 ) -> tuple[Table, ...]:
     """Return tables of these scores, grouped by test set in the order of the files.
 
+    A test set is what the digest of its truth says, wherever its file lay and whatever made it.
+
     Args:
         files: any number, of any test sets.
         metrics: the scores to show; the first one ranks. A task that has none of them, or any task
@@ -41,19 +45,22 @@ def leaderboard(
             below all rankings the paper's tables of which some figure found no place.
 
     Raises LeaderboardError where files that claim to score all of one test set score different
-    rows of it, and UnknownMetricError.
+    rows of it, LookAlikeError for names that could be taken for others, and UnknownMetricError.
     """
+    check_names(files)
     chosen = {name: metric(name).task for name in metrics or ()}
     groups: dict[tuple[str, str], list[ScoreFile]] = {}
     for file in files:
-        groups.setdefault((file.task, file.meta.truth_fingerprint), []).append(file)
+        groups.setdefault((file.task, file.meta.truth_digest), []).append(file)
     tables: list[Table] = []
     shown: set[Figure] = set()
-    for (task, _), members in groups.items():
+    for (task, digest), members in groups.items():
         _require_same_rows(members)
         names = [name for name in chosen if chosen[name] == task] or HEADLINE[task]
         figures = [f for t in TABLES for f in t.figures if paper and f.metric in names]
-        for table, used in _tables(members, names, figures):
+        asked = {file.meta.truth_fingerprint for file in members}
+        twins = {f.meta.truth_digest for f in files if f.meta.truth_fingerprint in asked}
+        for table, used in _tables(members, names, figures, sorted(twins - {digest})):
             tables.append(table)
             shown.update(used)
     if paper:
@@ -75,24 +82,29 @@ def _require_same_rows(files: Sequence[ScoreFile]) -> None:
 
 
 def _tables(
-    files: Sequence[ScoreFile], names: Sequence[str], figures: Sequence[Figure]
+    files: Sequence[ScoreFile],
+    names: Sequence[str],
+    figures: Sequence[Figure],
+    twins: Sequence[str],
 ) -> Iterator[tuple[Table, list[Figure]]]:
     """Yield the ranking of a test set, then each score by view angle where any file has that.
 
-    With each table come the figures of the paper that it shows.
+    With each table come the figures of the paper that it shows. The twins are the digests of other
+    test sets, which the same request made.
     """
     labels = distinct([f.method for f in files], [f.path.stem if f.path else "" for f in files])
     ranked = [(_label(files[i], labels[i]), files[i]) for i in _order(files, names[0])]
     first = ranked[0][1]
     what = "Rooms" if first.task == "rooms" else "3D-IQTT"
-    title = f"{what}, truth {plain(first.meta.truth_fingerprint)[:12]}"
+    test = known_test(first.meta.truth_digest)
+    title = f"{what}, {plain(test.name) if test else f'truth {first.meta.truth_digest[:12]}'}"
     used = [f for f in figures if f.view_angle is None]
     table = build_table(
         title,
         {name: (name, column_head(name)) for name in names},
         [(label, file.comparable, file.metrics) for label, file in ranked],
         _by_row(used, _figure_label, lambda figure: figure.metric),
-        list(_notes([file for _, file in ranked], names)),
+        [*_notes([file for _, file in ranked], names), *map(_twin_note, twins)],
         ranked=True,
     )
     yield table, used
@@ -168,6 +180,13 @@ def _notes(files: Sequence[ScoreFile], names: Sequence[str]) -> Iterator[str]:
     floors = [f.meta.chamfer_floor for f in files if f.meta.chamfer_floor is not None]
     if floors and "chamfer" in names:
         yield f"Noise floor of Chamfer at this resolution: {number(max(floors))} scene units."
+
+
+def _twin_note(digest: str) -> str:
+    return (
+        f"Not ranked with truth {digest[:12]}: the same request was rendered with other bits there,"
+        " so these scores are not of the same data."
+    )
 
 
 def _paper_table(table: PaperTable) -> Table:

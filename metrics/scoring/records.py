@@ -81,10 +81,10 @@ class Meta:
         truth_fingerprint: of the test set; never empty. Where the truth file has none (the released
             3D-IQTT), SHA-256 of its answers.
         truth_path: where the truth lay.
-        truth_digest: SHA-256 of the values of the truth that scores depend on, as they were read
-            when they were scored (`truth_digest` of rooms and question files).
-        truth_source: who chose the truth: "given" by the person who scored, "known" to the benchmark
-            by its digest (`known_tests`), or named by the "submission" alone, which is not comparable.
+        truth_digest: SHA-256 of those values of the truth that scores depend on, as they were
+            read (the attribute `truth_digest` of rooms and question files).
+        truth_source: who chose the truth: "given" by the person who scored, "known" to the
+            benchmark by its digest, or named by the "submission" alone, which is not comparable.
         submissions: one for each training run.
         writer: the program and its release.
         versions: releases of the libraries that computed the scores, by package.
@@ -104,9 +104,9 @@ class Meta:
     submissions: Annotated[TupleOf[Submission], Field(min_length=1)]
     writer: Text
     versions: ByKey[str, Text]
-    seed: Annotated[int, Field(strict=True, ge=-LARGEST_WHOLE, le=LARGEST_WHOLE)]
+    seed: Whole
     resamples: Whole
-    confidence: Annotated[Number, Field(gt=0.0, lt=1.0)]
+    confidence: Annotated[Number, Field(ge=0.5, le=0.999)]
     counts: ByKey[str, Whole]
     warnings: TupleOf[Text]
     chamfer_floor: NotNegative | None = None

@@ -1,10 +1,12 @@
 """The content of a score file, held against `records`, and whether its numbers agree.
 
+What costs more than reading the file, the intervals, is left to `metrics.leaderboard.recheck`.
 This module imports pydantic, so the commands import it only when they run.
 """
 
+import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
@@ -14,9 +16,14 @@ from pydantic import Field
 
 from metrics.scoring.metric_names import Metric, UnknownMetricError, metric
 from metrics.scoring.records import GROUPINGS, ID_COLUMNS, OPTIONAL_COLUMNS, Score, ScoreFile, Task
+from metrics.submissions.problems import JsonError
 from metrics.submissions.strict_json import LARGEST_WHOLE, refusal, shown, validated
 
-AGREEMENT = 1e-9  # of a score with the mean of its column, relative
+AGREEMENT = 1e-9  # of numbers that are computed again, relative: other libraries add differently
+RESAMPLES = range(100, 100_001)  # as many as `bench score` takes
+TOTALS = {"rooms": ("rows", "rows_in_truth"), "iqtt": ("questions", "questions_in_truth")}
+SCORE_AGAIN = "score the submission again with this release"
+NOT_COMPARABLE = "not comparable"  # how a warning begins that tells why
 
 
 @dataclass(frozen=True)
@@ -24,13 +31,26 @@ class Head:
     """The keys that say how to read the others."""
 
     format: Literal["pix2shape-bench/scores"]
-    format_version: Annotated[str, Field(pattern=r"^1\.[0-9]{1,4}$")]
+    format_version: Annotated[str, Field(pattern=r"^2\.[0-9]{1,4}$")]
     task: Task
+
+
+def agree(found: float | None, expected: float | None, scale: float) -> bool:
+    """Return whether two numbers differ by rounding only, that of sums of this scale included."""
+    if found is None or expected is None:
+        return found is expected
+    near = AGREEMENT * max(abs(found), abs(expected), abs(scale))
+    return math.isfinite(near) and abs(found - expected) <= near
 
 
 def parse_scores(content: Any) -> ScoreFile:
     """Check the parsed JSON of a score file. Raises JsonError at the first thing that is wrong."""
-    task = validated(Head, content).task
+    try:
+        task = validated(Head, content).task
+    except JsonError as error:
+        if error.where == "format_version" and error.found.startswith("'1."):
+            raise JsonError(error.where, error.found, error.expected, SCORE_AGAIN) from error
+        raise
     body = {key: value for key, value in content.items() if key not in ("format", "format_version")}
     foreign = {"path"}.union(*GROUPINGS.values()).difference(GROUPINGS[task])
     for name in foreign.intersection(body):
@@ -44,32 +64,81 @@ def parse_scores(content: Any) -> ScoreFile:
     if len({submission.sha256 for submission in found.meta.submissions}) < found.runs:
         raise refusal("meta.submissions", "the same sha256 twice", "each submission once")
     found = replace(found, items=_items(found.items, task, found.runs))
-    groups = {"metrics": found.metrics}
-    for grouping in GROUPINGS[task]:
-        for key, scores in getattr(found, grouping).items():
-            groups[f"{grouping}.{key}"] = scores
-    for place, scores in groups.items():
+    _check_counts(found)
+    _check_comparable(found)
+    most = len(np.unique(found.clusters))
+    for place, scores in all_scores(found):
         for name, score in scores.items():
-            _check_score(f"{place}.{name}", name, score, found)
+            _check_score(f"{place}.{name}", name, score, found, most)
     for name, score in found.metrics.items():
-        _check_agreement(found, name, score.value)
+        _check_mean(found, name, score, most)
     return found
 
 
-def _check_score(place: str, name: str, score: Score, file: ScoreFile) -> None:
-    """Raise JsonError unless a score suits its name, its interval, and the number of items."""
-    known, most = _metric(place, name, file.task), len(file.ids)
+def all_scores(file: ScoreFile) -> Iterator[tuple[str, Mapping[str, Score]]]:
+    """Yield the scores of all items, then those of each group, with their place in the file."""
+    yield "metrics", file.metrics
+    for grouping in GROUPINGS[file.task]:
+        for key, scores in getattr(file, grouping).items():
+            yield f"{grouping}.{key}", scores
+
+
+def _check_counts(file: ScoreFile) -> None:
+    """Raise JsonError unless what is counted is what is there, and the bootstrap is one of ours."""
+    scored, all_there = TOTALS[file.task]
+    counts, ids = file.meta.counts, file.ids
+    expected = {scored: len(ids), "runs": file.runs}
+    if file.task == "rooms":
+        expected["scenes"] = len(np.unique(file.clusters))
+    for name, number in expected.items():
+        if counts.get(name) != number:
+            raise _wrong_count(counts, name, f"{number}, as in items and meta.submissions")
+    if counts.get(all_there, 0) <= ids.max():
+        raise _wrong_count(counts, all_there, f"more than {ids.max()}, the largest number in items")
+    if file.task == "rooms" and counts.get("rows_penalised", len(ids) + 1) > len(ids):
+        raise _wrong_count(counts, "rows_penalised", f"at most {len(ids)}")
+    formula = file.task == "iqtt" and file.runs == 1
+    if file.meta.resamples not in ((0,) if formula else RESAMPLES):
+        expected_number = "0, as the interval is Wilson's" if formula else "100 to 100000"
+        raise refusal("meta.resamples", shown(file.meta.resamples), expected_number)
+
+
+def _wrong_count(counts: Mapping[str, int], name: str, expected: str) -> JsonError:
+    found = shown(counts[name]) if name in counts else "no such key"
+    return refusal(f"meta.counts.{name}", found, expected)
+
+
+def _check_comparable(file: ScoreFile) -> None:
+    """Raise JsonError where scores claim to be comparable, and the file says why they are not."""
+    scored, all_there = (file.meta.counts[name] for name in TOTALS[file.task])
+    reasons = {
+        "only the submission named its truth": file.meta.truth_source == "submission",
+        f"{scored} of {all_there} are scored": scored < all_there,
+        "rows are penalised": file.meta.counts.get("rows_penalised", 0) > 0,
+        "meta.warnings tells why": any(w.startswith(NOT_COMPARABLE) for w in file.meta.warnings),
+    }
+    for reason, holds in reasons.items():
+        if file.comparable and holds:
+            raise refusal("comparable", "true", f"false, as {reason}")
+
+
+def _check_score(place: str, name: str, score: Score, file: ScoreFile, most: int) -> None:
+    """Raise JsonError unless a score suits its name, its interval, and the number of clusters."""
+    known = _metric(place, name, file.task)
     if score.unit != known.unit:
         raise refusal(f"{place}.unit", repr(score.unit), repr(known.unit))
     if score.value > known.largest:
         raise refusal(f"{place}.value", shown(score.value), f"at most {known.largest:g}")
     if score.n > most:
-        raise refusal(f"{place}.n", shown(score.n), f"at most {most}, the number of items")
+        what = "scenes" if file.task == "rooms" else "questions"
+        raise refusal(f"{place}.n", shown(score.n), f"at most {most}, the number of {what}")
     if (score.low is None) != (score.high is None):
         raise refusal(place, "one end of an interval", "both, or null for both")
-    if score.low is not None and score.high is not None and score.low > score.high:
-        found = f"low {score.low!r} and high {score.high!r}"
-        raise refusal(place, found, "low to be at most high")
+    if score.low is not None and score.high is not None:
+        slack = AGREEMENT * score.value
+        if not score.low - slack <= score.value <= score.high + slack:
+            found = f"{score.value!r} outside of {score.low!r} to {score.high!r}"
+            raise refusal(f"{place}.value", found, "a value within its interval")
     if score.std is not None and file.runs == 1:
         raise refusal(f"{place}.std", shown(score.std), "null, as there is one run")
 
@@ -143,14 +212,18 @@ def _metric(place: str, name: str, task: str) -> Metric:
     return known
 
 
-def _check_agreement(scores: ScoreFile, name: str, stored: float) -> None:
+def _check_mean(file: ScoreFile, name: str, score: Score, clusters: int) -> None:
     """Raise JsonError unless a score is the mean of its column, over views and then scenes."""
-    column = scores.items.get(name)
-    if column is None or np.isnan(column).any():
-        return
-    index = np.unique(scores.clusters, return_inverse=True)[1]
+    if score.n != clusters:
+        raise refusal(f"metrics.{name}.n", shown(score.n), f"{clusters}, as in items")
+    column = file.items.get(name)
+    if column is None:
+        raise refusal(f"items.{name}", "no such key", f"the column of metrics.{name}")
+    if np.isnan(column).any():
+        raise refusal(f"items.{name}", "null", f"numbers, as metrics.{name} is their mean")
+    index = np.unique(file.clusters, return_inverse=True)[1]
     with np.errstate(over="ignore"):
         mean = float((np.bincount(index, column) / np.bincount(index)).mean())
-    if abs(stored - mean) > AGREEMENT * max(abs(mean), abs(stored)):
+    if not agree(score.value, mean, 0.0):
         expected = f"{mean!r}, the mean of items.{name} over scenes"
-        raise refusal(f"metrics.{name}.value", repr(stored), expected)
+        raise refusal(f"metrics.{name}.value", repr(score.value), expected)

@@ -6,7 +6,7 @@ whole, pixels not at all.
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,10 +17,9 @@ from metrics.measures.answers import answers_from_scores
 from metrics.submissions import layout, rules
 from metrics.submissions.problems import Problem
 from scenegen.common.errors import FileFormatError
-from scenegen.common.row_file import reading
+from scenegen.common.input_file import Fault, StoredArray, faults, reading, slab_bytes
 from scenegen.description.specs import MAX_PIXELS
 
-MOST_BYTES = 256 * 2**20  # to be unpacked for one row
 CHUNK_SLOTS = 10_007
 LEAST_CACHE = 1 << 20
 BLOCK_ROWS = 65_536
@@ -41,7 +40,7 @@ class Inspection:
     texts: dict[str, str] = field(default_factory=dict)
     task: str | None = None
     ids: rules.Ids | None = None
-    found: dict[str, h5py.Dataset] = field(default_factory=dict)
+    found: dict[str, StoredArray] = field(default_factory=dict)
     answers: rules.Ids | None = None
     problems: list[Problem] = field(default_factory=list)
 
@@ -53,9 +52,13 @@ def inspect(file: h5py.File) -> Inspection:
     result.task = result.texts.get("task")
     if result.task is None:
         return result
-    count = None
+    count, all_faults = None, list(faults(file))
+    for fault in all_faults:
+        if fault.rule == "count":  # the objects after these were not looked at
+            result.problems.append(Problem("file", fault.rule, fault.expected, fault.found))
+            return result
     for dataset in layout.datasets(result.task):
-        item, problems = open_dataset(file, dataset, count)
+        item, problems = open_dataset(file, dataset, count, all_faults)
         result.problems += problems
         if item is not None:
             result.found[dataset.name] = item
@@ -145,12 +148,12 @@ def _unreadable(name: str, expected: str, error: FileFormatError) -> Problem:
 
 
 def open_dataset(
-    file: h5py.File, dataset: layout.Dataset, count: int | None
-) -> tuple[h5py.Dataset | None, list[Problem]]:
+    file: h5py.File, dataset: layout.Dataset, count: int | None, faults: Sequence[Fault]
+) -> tuple[StoredArray | None, list[Problem]]:
     """Open a dataset that should have `count` rows, or any number if that is None.
 
-    Returns None with what is wrong with it, or without a problem where it is not there and need
-    not be.
+    `faults` are those of the whole file. Returns None with what is wrong with it, or without a
+    problem where it is not there and need not be.
     """
     name = dataset.name
     try:
@@ -161,7 +164,10 @@ def open_dataset(
                 found = f"no such dataset; found {names(file)}"
                 missing = Problem(name, "present", expected, found)
                 return None, [missing] if dataset.required else []
-            problems = _link_problems(link, name) or _problems(file[name], dataset, count)
+            own = [fault for fault in faults if fault.name == name]
+            problems = [Problem(name, f.rule, f.expected, f.found) for f in own]
+            if not any(problem.rule == "link" for problem in problems):
+                problems = _problems(file[name], dataset, count) or problems
             return None if problems else _open_with_cache(file, name), problems
     except FileFormatError as error:
         return None, [_unreadable(name, dataset.kind, error)]
@@ -173,15 +179,8 @@ def names(file: h5py.File) -> str:
     return ", ".join(first[:8] + ["..."] * (len(first) > 8)) or "none at all"
 
 
-def _link_problems(link: Any, name: str) -> list[Problem]:
-    if isinstance(link, h5py.HardLink):
-        return []
-    where = f" to the file {link.filename!r:.60}" if isinstance(link, h5py.ExternalLink) else ""
-    return [Problem(name, "link", "a dataset in the submission itself", f"a link{where}")]
-
-
 def _problems(item: Any, dataset: layout.Dataset, count: int | None) -> list[Problem]:
-    """Return what is wrong with type, shape and storage."""
+    """Return what is wrong with type and shape."""
     name = dataset.name
     if not isinstance(item, h5py.Dataset):
         return [Problem(name, "type", "a dataset", f"a {type(item).__name__.lower()}")]
@@ -198,7 +197,7 @@ def _problems(item: Any, dataset: layout.Dataset, count: int | None) -> list[Pro
     elif math.prod(shape[1:3]) > MAX_PIXELS:
         found = f"images of {shape[1]}x{shape[2]}"
         problems.append(Problem(name, "shape", f"at most {MAX_PIXELS:,} pixels", found))
-    return problems or _storage_problems(item, name)
+    return problems
 
 
 def _fits(shape: tuple[int, ...], dataset: layout.Dataset) -> bool:
@@ -209,37 +208,17 @@ def _fits(shape: tuple[int, ...], dataset: layout.Dataset) -> bool:
     return all(isinstance(e, str) or e == s for e, s in zip(dataset.shape, sizes, strict=True))
 
 
-def _storage_problems(item: h5py.Dataset, name: str) -> list[Problem]:
-    if item.external or item.is_virtual:
-        expected = "values in the submission itself"
-        return [Problem(name, "link", expected, "values that lie in another file")]
-    size = _slab_bytes(item)
-    if size > MOST_BYTES:
-        found = f"chunks {item.chunks}, so that a row takes {size >> 20} MiB to unpack"
-        expected = f"at most {MOST_BYTES >> 20} MiB (store one row to a chunk)"
-        return [Problem(name, "chunks", expected, found)]
-    if item.size and item.id.get_storage_size() == 0:
-        return [Problem(name, "written", "values", f"shape {item.shape}, but nothing was written")]
-    return []
-
-
-def _slab_bytes(item: h5py.Dataset) -> int:
-    """Return the bytes of all chunks that one row touches; 0 for a dataset without chunks."""
-    if item.chunks is None:
-        return 0
-    padded = [-(-s // c) * c for s, c in zip(item.shape[1:], item.chunks[1:], strict=True)]
-    return int(item.chunks[0] * math.prod(padded) * item.dtype.itemsize)
-
-
-def _open_with_cache(file: h5py.File, name: str) -> h5py.Dataset:
+def _open_with_cache(file: h5py.File, name: str) -> StoredArray:
     """Open a dataset so that chunks of many rows are not unpacked anew for each of them.
 
     It must not be open already: an open dataset keeps the cache that it has.
     """
-    size = _slab_bytes(file[name])
+    stored = file[name]
+    size = slab_bytes(stored.shape, stored.chunks, stored.dtype.itemsize) if stored.chunks else 0
+    del stored
     access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
     access.set_chunk_cache(CHUNK_SLOTS, max(size, LEAST_CACHE), 1.0)
-    return h5py.Dataset(h5py.h5d.open(file.id, name.encode(), access))
+    return StoredArray(h5py.Dataset(h5py.h5d.open(file.id, name.encode(), access)))
 
 
 def _type_name(dtype: np.dtype[Any]) -> str:
@@ -280,7 +259,7 @@ def _take_answers(result: Inspection, ids: rules.Ids) -> None:
     result.answers = from_scores if answers is None else answers
 
 
-def _answers(result: Inspection, scores: h5py.Dataset, ids: rules.Ids) -> rules.Ids:
+def _answers(result: Inspection, scores: StoredArray, ids: rules.Ids) -> rules.Ids:
     """Return the answers (M,) of scores (M, 3), up to the first score that is not finite."""
     answers = np.empty(len(ids), np.int64)
     for start in range(0, len(ids), BLOCK_ROWS):
@@ -295,7 +274,7 @@ def _answers(result: Inspection, scores: h5py.Dataset, ids: rules.Ids) -> rules.
 
 
 def _taken(
-    result: Inspection, name: str, expected: str, read: Callable[[h5py.Dataset], rules.Array]
+    result: Inspection, name: str, expected: str, read: Callable[[StoredArray], rules.Array]
 ) -> rules.Array | None:
     """Return what `read` makes of a dataset; None where there is none, or it is damaged."""
     try:

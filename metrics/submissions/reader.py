@@ -19,7 +19,8 @@ from metrics.submissions.inspection import Inspection, inspect
 from metrics.submissions.problems import Problem, first_error
 from metrics.submissions.rules import Ids, as_doubles
 from scenegen.common.errors import FileFormatError
-from scenegen.common.row_file import checking, open_file, reading
+from scenegen.common.input_file import StoredArray, checking, open_unchecked, reading
+from scenegen.common.trial import try_file
 
 Array = NDArray[np.float64]
 BLOCK_BYTES = 1 << 20
@@ -133,7 +134,7 @@ class QuestionPredictions(Predictions):
         texts: dict[str, str],
         rows: Ids,
         answers: Ids,
-        scores: h5py.Dataset | None = None,
+        scores: StoredArray | None = None,
         file: h5py.File | None = None,
     ) -> None:
         """Take over an open file, or none."""
@@ -149,15 +150,19 @@ class QuestionPredictions(Predictions):
             return as_doubles(self._scores[()])
 
 
-def open_predictions(path: str | Path) -> RoomPredictions | QuestionPredictions:
+def open_predictions(
+    path: str | Path, *, tried: bool = False
+) -> RoomPredictions | QuestionPredictions:
     """Open a submission of either task, HDF5 or JSON, and check what can be checked without truth.
+
+    `tried` says that `trial.try_file` has accepted the file already, as it does here otherwise.
 
     Raises:
         OSError: no such file, or a folder.
         FileFormatError: not a submission, of a newer format, or broken; with the first problem and
             how many follow. `metrics.submissions.validation.validate` returns all.
     """
-    opened, problems = inspect_predictions(path)
+    opened, problems = inspect_predictions(path, tried=tried)
     if opened is None or problems:
         if opened is not None:
             opened.close()
@@ -166,7 +171,7 @@ def open_predictions(path: str | Path) -> RoomPredictions | QuestionPredictions:
 
 
 def inspect_predictions(
-    path: str | Path,
+    path: str | Path, *, tried: bool = False
 ) -> tuple[RoomPredictions | QuestionPredictions | None, list[Problem]]:
     """Open what can be opened of a submission, and return everything that is wrong with it.
 
@@ -180,7 +185,9 @@ def inspect_predictions(
 
         texts, rows, answers, problems = read_answers(path)
         return QuestionPredictions(path, texts, rows, answers) if len(rows) else None, problems
-    file = open_file(path, "submission")
+    if not tried:
+        try_file(path)
+    file = open_unchecked(path, "submission")
     with checking(file):
         found = inspect(file)
     opened: RoomPredictions | QuestionPredictions | None = None

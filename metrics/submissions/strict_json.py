@@ -17,6 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 from metrics.submissions.problems import JsonError
 
 LONGEST_SHOWN = 200  # characters of each part of an error: a file's keys and texts may be huge
+MOST_MEMORY = 5 * 2**28  # bytes that a parsed text may take; 160,000 scored images: 0.8 GB
 LARGEST_WHOLE = 2**53  # beyond it, JSON readers that know only doubles change whole numbers
 _FOUND = {"missing": "no such key", "unexpected_keyword_argument": "an unknown key"}
 _EXPECTED = {
@@ -31,10 +32,11 @@ _EXPECTED = {
 
 
 _PATTERNS = {
-    r"^1\.[0-9]{1,4}$": "a version 1.x",
+    r"^2\.[0-9]{1,4}$": "a version 2.x",
     "^[0-9a-f]{64}$": "64 hexadecimal digits",
     r"\S": "a text that is not blank",
 }
+_STRING = re.compile(rb'"(?:[^"\\]++|\\.)*+"?', re.DOTALL)
 Kind = TypeVar("Kind")
 _adapter: Callable[[Any], TypeAdapter[Any]] = functools.cache(TypeAdapter)
 
@@ -56,10 +58,10 @@ def read_bytes(path: Path, most: int) -> bytes:
     return path.read_bytes()
 
 
-def parse_json(data: bytes, most_keys: int) -> Any:
+def parse_json(data: bytes, most_keys: int, most_memory: int = MOST_MEMORY) -> Any:
     """Parse JSON in UTF-8 without NaN or infinity; no object has a key twice, or too many keys.
 
-    Raises JsonError.
+    Raises JsonError, also for a text that might take more than so many bytes of memory.
     """
 
     def refuse(name: str) -> Any:
@@ -76,6 +78,10 @@ def parse_json(data: bytes, most_keys: int) -> Any:
 
     if data.startswith(b"\x89HDF"):
         raise refusal("", "an HDF5 file", "JSON")
+    memory = memory_needed(data)
+    if memory > most_memory:
+        found = f"JSON that may take {memory:,} bytes of memory"
+        raise refusal("", found, f"at most {most_memory:,}")
     try:
         text = data.decode("utf-8-sig")
         return json.loads(text, parse_constant=refuse, object_pairs_hook=unique)
@@ -86,6 +92,22 @@ def parse_json(data: bytes, most_keys: int) -> Any:
     except ValueError as error:
         kind = "bytes that are not UTF-8" if isinstance(error, UnicodeDecodeError) else "no JSON"
         raise refusal("", f"{kind} ({error!s:.80})", "JSON in UTF-8") from error
+
+
+def memory_needed(data: bytes) -> int:
+    """Return an upper bound, in bytes, of what parsing this JSON takes while it is parsed.
+
+    It is made of counts alone, so nothing of the text has been built yet. The weights are at least
+    what CPython 3.11 was seen to take for the worst text of each kind.
+    """
+    wide, escaped = not data.isascii(), b"\\" in data
+    # Bytes, text, and strings; a text with one wide character is copied into 4 bytes a character.
+    held = 10_000 + len(data) * (7.5 if wide else 3.0)
+    weights = {b",": 50, b":": 200, b"{": 130, b"[": 130, b'"': 32}  # a string has two quotes
+    held += sum(weight * data.count(piece) for piece, weight in weights.items())
+    if wide or escaped:
+        held += 6.5 * sum(match.end() - match.start() for match in _STRING.finditer(data))
+    return int(held)
 
 
 def validated(kind: type[Kind], content: Any) -> Kind:

@@ -1,4 +1,4 @@
-"""Digests of what HDF5 files hold: of a row, a data set, some data sets, and a file with attributes.
+"""Digests of what HDF5 files hold: of rows, of data sets, and of a file with its attributes.
 
 The digest of a data set is the SHA-256 of the SHA-256s of its rows, so that several processes can
 read rows in any order and still tell the digest of the whole. With plain h5py it is
@@ -47,7 +47,7 @@ def content_digest(file: h5py.File) -> str:
     """Return the SHA-256, as hex, of every name, type, shape and attribute of a file but its own.
 
     The values of the data sets count through their attribute `sha256`, which `digest_problems`
-    checks. Raises whatever HDF5 raises on a damaged file (`row_file.HDF5_ERRORS`).
+    checks. Raises whatever HDF5 raises on a damaged file (`input_file.HDF5_ERRORS`).
     """
     lines = []
     for name, item in (("/", file), *_objects(file)):

@@ -1,4 +1,4 @@
-"""HDF5 files that hold rows: written in order, row by row, and opened with clear errors.
+"""HDF5 files that hold rows: written in order, row by row, and what all of ours have in common.
 
 Images are compressed here, by isal, and handed to HDF5 as finished chunks: that is faster than its
 own filter and any HDF5 library reads it. A file gets its name when it is complete.
@@ -20,7 +20,7 @@ from isal import isal_zlib
 from numpy.typing import NDArray
 
 from scenegen.common.content import SHA256, row_digest
-from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
+from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.new_file import written_beside
 
 Array = NDArray[Any]
@@ -28,8 +28,6 @@ Spec = TypeVar("Spec")
 COMPRESSIONS = ("gzip", "lzf", "none")
 DEFLATE_LEVEL = 1
 CLOSING_SLACK = 8192  # bytes that HDF5 may need to close a file beyond what it says it needs
-# What h5py raises on damaged files, by the kind of damage: this tuple is the only list of them.
-HDF5_ERRORS = (OSError, RuntimeError, KeyError, TypeError, ValueError, MemoryError)
 BLOCK_ROWS = 1024  # rows of the small datasets that are kept and written together
 
 
@@ -151,51 +149,6 @@ def new_file(path: str | Path, overwrite: bool = False) -> Iterator[h5py.File]:
             raise
 
 
-def open_file(path: str | Path, kind: str) -> h5py.File:
-    """Open an HDF5 file to read; `kind` is what it should be, such as "rooms file".
-
-    Raises OSError for what is no regular file, FileFormatError for one that is not HDF5 or cut off.
-    """
-    problems = (
-        (not os.path.exists(path), errno.ENOENT, "no such file"),
-        (os.path.isdir(path), errno.EISDIR, f"is a folder; name a {kind}"),
-        (not os.path.isfile(path), errno.EINVAL, "is not a regular file"),
-    )
-    for wrong, number, text in problems:
-        if wrong:
-            raise OSError(number, text, str(path))
-    try:
-        return h5py.File(path, "r")
-    except OSError as error:
-        raise FileFormatError(f"{path}: not a readable HDF5 file ({reason(error)})") from error
-
-
-@contextmanager
-def reading(where: object) -> Iterator[None]:
-    """Turn whatever HDF5 raises on a damaged file into a FileFormatError of one line.
-
-    `where` names the file, the data set and the row as far as they are known.
-    An IndexError passes: a row beyond the end is the caller's mistake, not the file's.
-    """
-    try:
-        yield
-    except SceneGenError:
-        raise
-    except HDF5_ERRORS as error:
-        raise FileFormatError(f"{where}: cannot be read ({reason(error)})") from error
-
-
-@contextmanager
-def checking(file: h5py.File) -> Iterator[None]:
-    """Close the file if the block raises an error. Raises FileFormatError as `reading`."""
-    try:
-        with reading(file.filename):
-            yield
-    except SceneGenError:
-        file.close()
-        raise
-
-
 def column_problems(group: h5py.Group, columns: Sequence[Column], count: int) -> list[str]:
     """Return a sentence for each column that is missing or has the wrong shape or type."""
     problems = []
@@ -244,13 +197,6 @@ def describing(place: str) -> Iterator[None]:
     except SpecError as error:
         where = f"{place}: {error.where}"
         raise FileFormatError(where, error.found, error.expected, error.hint) from error
-
-
-def reason(error: BaseException) -> str:
-    """Return what an error of HDF5 says in its innermost parentheses, on one line."""
-    text = str(error.args[0]) if error.args else type(error).__name__
-    inside = text[text.find("(") + 1 : text.rfind(")")] if "(" in text else text
-    return inside.split("\n")[0]
 
 
 def and_more(problems: Sequence[str]) -> str:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import back_project, transform_points
-from scenegen.common import row_file
+from scenegen.common import input_file, row_file
 from scenegen.common.errors import FileFormatError
+from scenegen.common.input_file import StoredArray
 from scenegen.common.records import check
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
@@ -74,15 +75,16 @@ class RoomsFile:
         or damaged.
         """
         self.path = Path(path)
-        self._file = row_file.open_file(path, "rooms file")
-        with row_file.checking(self._file):
+        self._file = input_file.open_file(path, "rooms file")
+        with input_file.checking(self._file):
             self.attributes: dict[str, Any] = dict(self._file.attrs)
             self.spec = self._check_root()
             problems = _layout_problems(self._file, self.spec)
             if problems:
                 raise FileFormatError(f"{path}: {row_file.and_more(problems)}")
+            self._datasets = {f.name: StoredArray(self._file[f.name]) for f in FIELDS}
         self.fingerprint = str(self.attributes["fingerprint"])
-        self._count = int(self._file["image"].shape[0])
+        self._count = len(self._datasets["image"])
 
     def __len__(self) -> int:
         return self._count
@@ -113,12 +115,12 @@ class RoomsFile:
 
     def read(self, name: str, rows: int | slice) -> Any:
         """Read rows of one dataset. Raises FileFormatError where they are damaged."""
-        with row_file.reading(f"{self.path}: {name}, row {rows}"):
-            return self._file[name][rows]
+        with input_file.reading(f"{self.path}: {name}, row {rows}"):
+            return self._datasets[name][rows]
 
     def problems(self) -> list[str]:
         """Return what is wrong with the layout, the datasets' own descriptions included."""
-        with row_file.reading(self.path):
+        with input_file.reading(self.path):
             return _layout_problems(self._file, self.spec) + _attribute_problems(
                 self._file, self.spec
             )
@@ -129,7 +131,7 @@ class RoomsFile:
         HDF5 does not tell the size of the heaps that hold texts. The dataset "scene" is said to
         take what all others leave of the file.
         """
-        with row_file.reading(self.path):
+        with input_file.reading(self.path):
             sizes = {f.name: self._file[f.name].id.get_storage_size() for f in FIELDS}
             memory = {f.name: self._file[f.name].nbytes for f in FIELDS}
         texts = self.path.stat().st_size - sum(sizes.values()) + sizes["scene"]

@@ -150,7 +150,7 @@ def test_info_describes_every_file(run, split):
     for name in FILES:
         result = run("info", split / name)
         assert result.exit_code == 0, result.output
-        assert "pix2shape-bench/iqtt 1.1" in result.stdout
+        assert "pix2shape-bench/iqtt 1.2" in result.stdout
 
 
 def test_audit_passes_and_writes_json(run, split, tmp_path, check_refusal):

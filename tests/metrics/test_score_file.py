@@ -42,9 +42,9 @@ def test_scores_are_means_over_scenes_not_images(tmp_path):
     scores = made_scores.rooms_scores("m", {"chamfer": [0.1, 0.1, 0.1, 0.5]}, [7, 7, 7, 2])
     assert scores.metrics["chamfer"].value == pytest.approx(0.3)
     write_scores(scores, tmp_path / "s.json")
-    over_images = {"chamfer": replace(scores.metrics["chamfer"], value=0.2)}
-    with refused(JsonError, "s.json: metrics.chamfer.value", found="0.2", expected="0.3"):
-        write_scores(replace(scores, metrics=over_images), tmp_path / "s.json", overwrite=True)
+    other = {"chamfer": replace(scores.metrics["chamfer"], value=0.31)}
+    with refused(JsonError, "s.json: metrics.chamfer.value", found="0.31", expected="0.3"):
+        write_scores(replace(scores, metrics=other), tmp_path / "s.json", overwrite=True)
     empty = {name: column[:0] for name, column in scores.items.items()}
     with refused(JsonError, "s.json: items"):
         write_scores(replace(scores, items=empty), tmp_path / "s.json", overwrite=True)
@@ -111,13 +111,13 @@ def test_numpy_numbers_are_taken(tmp_path):
     odd = Score(
         np.float64(old.value), np.float32(0.0), np.float64(1.0), old.unit, np.int64(2), None
     )
-    counts = {"images": np.int64(4)}
+    counts = {name: np.int64(number) for name, number in scores.meta.counts.items()}
     meta = replace(scores.meta, counts=counts)
     scores = replace(scores, comparable=np.bool_(True), metrics={"chamfer": odd}, meta=meta)
     write_scores(scores, tmp_path / "s.json")
     found = read_scores(tmp_path / "s.json")
     assert found.metrics["chamfer"] == Score(old.value, 0.0, 1.0, old.unit, 2, None)
-    assert found.meta.counts == {"images": 4}
+    assert found.meta.counts == counts
 
 
 def test_what_the_reader_would_refuse_is_not_written(tmp_path):
@@ -140,6 +140,22 @@ def test_what_the_reader_would_refuse_is_not_written(tmp_path):
         assert caught.value.where.startswith(f"{path}"), what
         assert path.read_text() == "before", what
         assert os.listdir(tmp_path) == ["s.json"], what
+
+
+def test_names_beyond_ascii_are_escaped(tmp_path):
+    """One wide character would make the whole text take four times its memory when it is read."""
+    path = tmp_path / "s.json"
+    write_scores(made_scores.simple_rooms("Größe \U0001f600"), path)
+    assert path.read_bytes().isascii()
+    assert read_scores(path).method == "Größe \U0001f600"
+
+
+def test_what_is_too_large_to_read_is_not_written(tmp_path, monkeypatch):
+    scores = made_scores.simple_rooms()
+    monkeypatch.setattr("metrics.score_file.MOST_BYTES", len(to_json(scores)) - 1)
+    with refused(JsonError, "s.json", f"{len(to_json(scores))} bytes", hint="--csv"):
+        write_scores(scores, tmp_path / "s.json")
+    assert os.listdir(tmp_path) == []
 
 
 def test_files_are_replaced_only_when_asked(tmp_path):

@@ -5,6 +5,7 @@ import json
 
 import made_scores
 import pytest
+from refusals import refused
 
 from metrics.score_file import JsonError, read_scores, to_json, write_scores
 from metrics.submissions.strict_json import LONGEST_SHOWN, refusal
@@ -70,12 +71,13 @@ def test_any_value_anywhere_is_refused_in_one_line_or_can_be_written_again(docum
 
 
 ROW = "items/row"
-HIGH = ROOMS["metrics"]["chamfer"]["high"]
+LOW, HIGH = (ROOMS["metrics"]["chamfer"][end] for end in ("low", "high"))
 # What is put where, then where the reader finds fault (if not there), what it found and expected.
 WRONG = [
     ("format", GONE, "", "no such key", "to be there"),
     ("format", "pix2shape-bench/rooms", "", "'pix2shape-bench/rooms'", "'pix2shape-bench/scores'"),
-    ("format_version", "2.0", "", "'2.0'", "1"),
+    ("format_version", "1.0", "", "'1.0'", "2.x"),
+    ("format_version", "3.0", "", "'3.0'", "2.x"),
     ("task", "room", "", "'room'", "'rooms' or 'iqtt'"),
     ("task", ["rooms"], "", "a list of 1", "'rooms' or 'iqtt'"),
     ("method", 3, "", "3", "text"),
@@ -90,14 +92,29 @@ WRONG = [
     ("metrics/iqtt_accuracy", ROOMS["metrics"]["chamfer"], "", "no score of task 'rooms'", "docs"),
     ("metrics/chamfer/value", None, "", "null", "number"),
     ("metrics/chamfer/value", -0.1, "", "-0.1", "equal to 0"),
-    ("metrics/chamfer/value", 0.3, "", "0.3", "0.2, the mean of items.chamfer"),
+    ("metrics/chamfer/value", 0.3, "", f"0.3 outside of {LOW} to {HIGH}", "within its interval"),
+    ("metrics/chamfer/value", 0.21, "", "0.21", "0.2, the mean of items.chamfer"),
     ("metrics/chamfer/value", 10**400, "", "a huge whole number", "number"),
     ("metrics/f_score_0.05/value", 1.5, "", "1.5", "at most 1"),
     ("metrics/chamfer/unit", "m", "", "'m'", "'scene unit'"),
     ("metrics/chamfer/low", None, "metrics.chamfer", "one end of an interval", "both"),
-    ("metrics/chamfer/low", 9.0, "metrics.chamfer", f"low 9.0 and high {HIGH}", "at most high"),
+    (
+        "metrics/chamfer/low",
+        9.0,
+        "metrics.chamfer.value",
+        f"0.2 outside of 9.0 to {HIGH}",
+        "within",
+    ),
+    (
+        "by_view_angle/5/chamfer/low",
+        0.01,
+        "by_view_angle.5.chamfer",
+        "one end of an interval",
+        "both",
+    ),
     ("metrics/chamfer/n", 0, "", "0", "equal to 1"),
-    ("metrics/chamfer/n", 5, "", "5", "at most 4"),
+    ("metrics/chamfer/n", 3, "", "3", "at most 2, the number of scenes"),
+    ("metrics/chamfer/n", 1, "", "1", "2, as in items"),
     ("metrics/chamfer/n", 2.0, "", "2.0", "integer"),
     ("metrics/chamfer/std", -1, "", "-1", "equal to 0"),
     ("metrics/chamfer/std", True, "", "true", "number"),
@@ -120,17 +137,35 @@ WRONG = [
     ("items/chamfer", [0.1, 10**400], "items.chamfer[1]", "a huge whole number", "finite number"),
     ("items/chamfer", [0.1, -0.3, 0.2, 0.2], "items.chamfer[1]", "-0.3", "number from 0"),
     ("items/f_score_0.05", [0.5, 0.25, 1, 1.5], "items.f_score_0.05[3]", "1.5", "from 0 to 1"),
+    ("items/chamfer", [1e308] * 4, "metrics.chamfer.value", "0.2", "inf, the mean"),
+    ("items/chamfer", [0.1, 0.3, 0.2, None], "", "null", "metrics.chamfer is their mean"),
+    ("items/hausdorff", GONE, "", "no such key", "the column of metrics.hausdorff"),
     ("items/chamfer", 0.1, "", "0.1", "a list of numbers"),
     ("items/note", [0, 0, 0, 0], "", "no score of task 'rooms'", "docs/scores.md"),
     ("meta/truth_fingerprint", " ", "", "' '", "not blank"),
     ("meta/seed", 1.5, "", "1.5", "integer"),
     ("meta/seed", True, "", "true", "integer"),
     ("meta/seed", 2**60, "", f"{2**60}", "9007199254740992"),
-    ("meta/confidence", 1, "", "1", "less than 1"),
+    ("meta/seed", -1, "", "-1", "equal to 0"),
+    ("meta/confidence", 1, "", "1", "equal to 0.999"),
+    ("meta/resamples", 99, "", "99", "100 to 100000"),
+    ("meta/resamples", 2**40, "", f"{2**40}", "100 to 100000"),
+    ("meta/truth_digest", "AB", "", "'AB'", "64 hexadecimal"),
+    ("meta/truth_source", "me", "", "'me'", "'given', 'known' or 'submission'"),
+    ("meta/truth_source", "submission", "comparable", "true", "false, as only the submission"),
+    ("meta/warnings", ["not comparable: x"], "comparable", "true", "false, as meta.warnings"),
     ("meta/submissions", [], "", "a list of 0", "at least one"),
     ("meta/submissions/0/sha256", "AB", "meta.submissions[0].sha256", "'AB'", "64 hexadecimal"),
     ("meta/submissions/0", 1, "meta.submissions[0]", "1", "an object"),
-    ("meta/counts/images", "4", "", "'4'", "integer"),
+    ("meta/counts/rows", "4", "", "'4'", "integer"),
+    ("meta/counts/rows", 5, "", "5", "4, as in items"),
+    ("meta/counts/rows", GONE, "", "no such key", "4, as in items"),
+    ("meta/counts/scenes", 4, "", "4", "2, as in items"),
+    ("meta/counts/runs", 1, "", "1", "2, as in items"),
+    ("meta/counts/rows_in_truth", 3, "", "3", "more than 3"),
+    ("meta/counts/rows_in_truth", 5, "comparable", "true", "false, as 4 of 5 are scored"),
+    ("meta/counts/rows_penalised", 1, "comparable", "true", "false, as rows are penalised"),
+    ("meta/counts/rows_penalised", 5, "", "5", "at most 4"),
     ("meta/warnings", "none", "", "'none'", "a list"),
     ("\x1b[31m\n", 1, "\ufffd[31m", "an unknown key", "no key of this name"),
 ]
@@ -138,11 +173,15 @@ WRONG = [
 
 SAME = ROOMS["meta"]["submissions"][:1]
 WRONG += [
-    ("meta/submissions", SAME, "metrics.chamfer.std", "0.002", "one run"),
+    ("meta/submissions", SAME, "meta.counts.runs", "2", "1, as in items"),
     ("meta/submissions", SAME * 2, "", "the same sha256 twice", "each submission once"),
     ("path", "s.json", "", "an unknown key", "no key of this name"),
 ]
 WRONG_QUESTIONS = [
+    ("metrics/iqtt_accuracy/std", 0.1, "", "0.1", "one run"),
+    ("meta/resamples", 2000, "", "2000", "Wilson"),
+    ("meta/counts/questions", 3, "", "3", "4, as in items"),
+    ("meta/counts/questions_in_truth", 5, "comparable", "true", "false, as 4 of 5 are scored"),
     ("items/iqtt_accuracy", [1, 0, 1, 0.5], "", "0.5", "0 or 1"),
     ("alignment", "scale", "", "'scale'", "'none'"),
     ("by_view_angle", {}, "", "an unknown key", "no key of this name"),
@@ -180,6 +219,7 @@ TEXTS = {
     "deep": (b"[" * 100_000, "", "JSON that is nested too deeply"),
     "deep objects": (b'{"a":' * 100_000, "", "JSON that is nested too deeply"),
     "many digits": (b'{"format": ' + b"9" * 10_000 + b"}", "", "no JSON (Exceeds the limit"),
+    "many lists": (b"[" + b"[]," * 8_000_000 + b"[]]", "", "JSON that may take"),
     "HDF5": (b"\x89HDF\r\n\x1a\n" + bytes(100), "", "an HDF5 file"),
 }
 
@@ -189,6 +229,13 @@ def test_text_that_is_no_score_file(text, where, found, tmp_path):
     error = told(tmp_path / "s.json", text)
     assert error[0] == where
     assert error[1].startswith(found)
+
+
+def test_files_of_format_1_are_scored_again(tmp_path):
+    path = tmp_path / "s.json"
+    path.write_text(json.dumps(changed(ROOMS, "format_version", "1.0")))
+    with refused(JsonError, "format_version", hint="score the submission again"):
+        read_scores(path)
 
 
 def test_what_a_file_says_is_cut_short_in_errors():

@@ -144,6 +144,7 @@ OPEN = [
     ("a soft link to nowhere", ["depth", "a link"], linked("depth", h5py.SoftLink("/nowhere"))),
     ("a soft link to itself", ["depth", "a link"], linked("depth", h5py.SoftLink("/depth"))),
     ("a virtual dataset", ["depth", "in another file"], made.virtual),
+    ("an unknown filter", ["depth", "filter 300"], made.unknown_filter),
 ]  # fmt: skip
 
 MATCH_FILES = [
@@ -174,7 +175,6 @@ VALUES = [
     ("normals of length 0", ["normal", "length 0"], put("normal", (6, 5), 0.0)),
     ("a damaged chunk", ["depth", "row 3", "cannot be read"], damaged_chunk("depth", 3)),
     ("a damaged chunk of normals", ["normal", "cannot be read"], damaged_chunk("normal", 3)),
-    ("an unknown filter", ["depth", "cannot be read"], made.unknown_filter),
 ]  # fmt: skip
 
 # `submissions/hints` has the tests of each hint; here is one of each kind for the commands.

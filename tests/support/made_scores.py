@@ -8,18 +8,19 @@ from metrics.score_file import Meta, Score, ScoreFile, Submission
 from metrics.scoring.metric_names import metric
 
 TRUTH = "0123456789abcdef" * 4
+DIGEST = "fedcba9876543210" * 4
 HEADLINE = ("chamfer", "hausdorff", "mse_depth")
 
 
-def make_meta(method, runs=1, truth=TRUTH, **other):
-    digest = f"{sum(map(ord, method)) * 1000:x}"
+def make_meta(method, runs=1, truth=TRUTH, digest=DIGEST, **other):
+    number = f"{sum(map(ord, method)) * 1000:x}"
     submissions = tuple(
-        Submission(f"{method}-{i}.h5", f"{digest}{i:x}".rjust(64, "0"), f"seed {i}")
+        Submission(f"{method}-{i}.h5", f"{number}{i:x}".rjust(64, "0"), f"seed {i}")
         for i in range(runs)
     )
-    told = {"truth_path": "rooms.h5", "writer": "bench 0.1.0", "counts": {"images": 4}}
+    told = {"truth_path": "rooms.h5", "writer": "bench 0.1.0", "truth_digest": digest}
     told |= {"versions": {"numpy": "2.4.6", "h5py": "3.12"}, "warnings": ()}
-    told |= {"seed": 0, "resamples": 2000, "confidence": 0.95}
+    told |= {"truth_source": "given", "seed": 0, "resamples": 2000, "confidence": 0.95}
     return Meta(truth_fingerprint=truth, submissions=submissions, **{**told, **other})
 
 
@@ -38,12 +39,14 @@ def rooms_scores(method, columns, scenes, runs=1, rows=None, **other):
     std = 0.002 if runs > 1 else None
     own = {"comparable": True, "alignment": "none", "by_view_angle": {}, "path": None}
     told = {name: other.pop(name, default) for name, default in own.items()}
+    counts = {"rows": count, "rows_in_truth": max(rows) + 1, "scenes": len(set(scenes))}
+    counts |= {"runs": runs, "rows_penalised": 0}
     return ScoreFile(
         task="rooms",
         method=method,
         metrics={name: make_score(name, column, scenes, std) for name, column in columns.items()},
         items={name: np.asarray(column) for name, column in items.items()},
-        meta=make_meta(method, runs, **other),
+        meta=make_meta(method, runs, **{"counts": counts, **other}),
         **told,
     )
 
@@ -54,6 +57,8 @@ def iqtt_scores(method, right, runs=1, questions=None, **other):
     ids = np.arange(len(values)) if questions is None else np.asarray(questions)
     comparable = other.pop("comparable", True)
     group = {"mirror": {"iqtt_accuracy": Score(CHANCE, None, None, "fraction", len(values), None)}}
+    counts = {"questions": len(ids), "questions_in_truth": int(ids.max()) + 1, "runs": runs}
+    told = {"counts": counts, "resamples": 2000 if runs > 1 else 0}
     return ScoreFile(
         task="iqtt",
         method=method,
@@ -61,7 +66,7 @@ def iqtt_scores(method, right, runs=1, questions=None, **other):
         alignment="none",
         metrics={"iqtt_accuracy": make_score("iqtt_accuracy", values, ids)},
         items={"question": ids, "iqtt_accuracy": values},
-        meta=make_meta(method, runs, **other),
+        meta=make_meta(method, runs, **{**told, **other}),
         by_distractor=group,
     )
 

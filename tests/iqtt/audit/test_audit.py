@@ -22,7 +22,7 @@ BY_CUBES = {
     *("shapes", "one right answer", "answers differ", "stored ids", "splits apart", "rotations"),
     *("angles", "visibility", "cast again"),
 }
-PROOFS = {*OF_IMAGES, *BY_CUBES}
+PROOFS = {"content", *OF_IMAGES, *BY_CUBES}
 Edit = Callable[[h5py.File], Any]
 
 

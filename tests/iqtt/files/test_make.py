@@ -56,10 +56,12 @@ def test_nothing_handed_out_tells_the_test_answers(folder):
         assert list(file) == ["questions"]
         assert set(file.attrs) == {
             "format", "format_version", "writer", "variant", "spec", "conventions", "split",
-            "fingerprint", *versions(),
+            "fingerprint", "content_digest", *versions(),
         }  # fmt: skip
         assert {name: file.attrs[name] for name in versions()} == versions()
-        assert set(file["questions"].attrs) == {"unit", "shape", "frame", "meaning", "scale"}
+        assert set(file["questions"].attrs) == {
+            "unit", "shape", "frame", "meaning", "scale", "sha256",
+        }  # fmt: skip
         assert re.fullmatch("[0-9a-f]{64}", file.attrs["fingerprint"])
     with h5py.File(folder / "iqtt-test-answers.h5") as file:
         assert file.attrs["creation_command"] == COMMAND

@@ -1,5 +1,6 @@
 """Question files read with the reading API, and beside it with plain h5py."""
 
+import hashlib
 import os
 import pickle
 import subprocess
@@ -20,7 +21,7 @@ from iqtt.files.reader import (
 )
 from iqtt.shapes.polycube import canonical, set_ids
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.row_file import open_file
+from scenegen.common.input_file import open_file
 
 TABLES = [  # of the tiny split: file, part, answers told, truth told
     ("iqtt-train.h5", "labeled", True, True),
@@ -312,3 +313,14 @@ def test_torch_loader_with_workers(split_folder):
     images = torch.cat([batch["questions"] for batch in loader])
     with open_questions(split_folder / "iqtt-val.h5") as questions:
         np.testing.assert_array_equal(images.numpy(), questions.read("questions", slice(0, 6)))
+
+
+def test_a_released_truth_is_its_answers_alone(released):
+    answers = np.array([2, 0, 1, 1, 0], np.uint8)
+    path = released("a.h5", {"": (5, answers.astype("i8")[:, None])})
+    rows = (hashlib.sha256(bytes([one])).digest() for one in answers)
+    digest = hashlib.sha256(b"".join(rows)).hexdigest()
+    with AnswersFile(path) as file:
+        expected = hashlib.sha256(f"answers {digest}\n".encode()).hexdigest()
+        assert file.truth_digest() == expected
+        assert file.stored_truth_digest is file.stored_content_digest is None

@@ -89,6 +89,18 @@ def put(name, values):
     return edit
 
 
+NAMES = "truth/distractor_kind: attribute 'names'"
+
+
+def named(names):
+    return lambda file: file["truth/distractor_kind"].attrs.update(names=names)
+
+
+def padded_spec(file):
+    """HDF5 keeps attributes of 64 kB; where a text is longer, it lies elsewhere in the file."""
+    file.attrs["spec"] = file.attrs["spec"] + " " * 4_000_000
+
+
 OURS = {
     "other format": (attribute("format", "other"), "attribute 'format'"),
     "format is an array": (attribute("format", np.arange(3)), "attribute 'format'"),
@@ -119,7 +131,19 @@ OURS = {
     "cubes too few": (put("truth/cubes", np.zeros((6, 4, 3, 3), "i1")), "truth"),
     "cubes of floats": (put("truth/cubes", np.zeros((6, 4, 7, 3))), "truth"),
     "a dead link": (linked("answers", h5py.SoftLink("/nothing")), ""),
-    "no names": (lambda f: f["truth/distractor_kind"].attrs.pop("names"), ""),
+    "no names": (lambda f: f["truth/distractor_kind"].attrs.pop("names"), NAMES),
+    "names are numbers": (named([0, 1, 2]), NAMES),
+    "one name": (named("near"), NAMES),
+    "many names": (named(["near"] * 101), NAMES),
+    "names that cannot be printed": (named(["near", "\x1b[2J", "other"]), NAMES),
+    "a version without a minor one": (attribute("format_version", "1.x"), "attribute 'format_ver"),
+    "command is an array": (attribute("creation_command", np.arange(3)), "attribute 'creation_co"),
+    "variant of two lines": (attribute("variant", "a\nb"), "attribute 'variant'"),
+    "a long writer": (attribute("writer", "w" * 1001), "attribute 'writer'"),
+    "a long spec": (padded_spec, "attribute 'spec'"),
+    "no content digest": (gone("content_digest"), "attribute 'content_digest'"),
+    "no truth digest": (gone("truth_digest"), "attribute 'truth_digest'"),
+    "no hexadecimal digest": (attribute("truth_digest", "x" * 64), "attribute 'truth_digest'"),
 }
 
 
@@ -138,6 +162,8 @@ def test_damaged_layouts(damaged, name):
         ("light_count", -1, "0 to 2"),
         ("distractor_kind", 3, "-1 to 2"),
         ("distractor_kind", -2, "-1 to 2"),
+        ("angle_degrees", np.nan, "0 to 180"),
+        ("angle_degrees", 181, "0 to 180"),
     ],
 )
 def test_damaged_truth_of_one_row(damaged, name, value, expected):
@@ -146,7 +172,10 @@ def test_damaged_truth_of_one_row(damaged, name, value, expected):
         assert questions[3].truth is not None
         with pytest.raises(FileFormatError) as error:
             questions[4]
-    assert (error.value.where, error.value.expected) == (f"{path}: row 4: {name}", expected)
+    assert (error.value.where, error.value.expected) == (f"{path}: {name}, row 4", expected)
+    with open_questions(path) as questions, pytest.raises(FileFormatError) as error:
+        questions.read(name, slice(1, None))
+    assert (error.value.where, error.value.expected) == (f"{path}: {name}, row 4", expected)
 
 
 def test_a_damaged_chunk_spoils_its_row_only(damaged):

@@ -13,6 +13,7 @@ from iqtt.files.make import FILES, make_split
 from iqtt.questions.distractors import make_pools
 from iqtt.questions.specs import SplitSpec
 from iqtt.render import Rendered, render_question
+from scenegen.common.content import content_digest
 
 SPEC = SplitSpec(
     seed=3, train=7, labeled=3, val=4, test=5, cubes=(6, 7), height=24, width=32,
@@ -122,6 +123,36 @@ def test_every_number_says_what_it_is(folder):
             assert spec == (SPEC if "answers" in name else SPEC.public())
             if "questions" in file:
                 assert file["questions"].attrs["scale"] == 1 / 255
+
+
+def plain_digest(dataset):
+    """As the documents tell anyone to make it."""
+    rows = (hashlib.sha256(row.tobytes()).digest() for row in dataset[:])
+    return hashlib.sha256(b"".join(rows)).hexdigest()
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_digests_are_of_what_was_written(folder, name):
+    with h5py.File(folder / name) as file:
+        digests = {}
+        for place, item in everything(file).items():
+            if isinstance(item, h5py.Dataset):
+                digests[place] = item.attrs["sha256"]
+                assert digests[place] == plain_digest(item), place
+        assert file.attrs["content_digest"] == content_digest(file)
+        told = {key for key in file.attrs if key.startswith("truth_digest")}
+        part = {"iqtt-train.h5": "labeled", "iqtt-test.h5": None}.get(name, "")
+        assert told == (set() if part is None else {f"truth_digest_{part}".rstrip("_")})
+        for key in told:
+            paths = (
+                f"truth/{part}/angle_degrees",
+                f"{part}/answers",
+                f"truth/{part}/distractor_kind",
+            )
+            lines = (
+                f"{p.split('/')[-1]} {digests[p.replace('//', '/').strip('/')]}\n" for p in paths
+            )
+            assert file.attrs[key] == hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
 def test_fingerprints_are_of_the_public_settings_and_of_all_that_tables_tell(folder):

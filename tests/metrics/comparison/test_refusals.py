@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_scores import iqtt_scores, rooms_scores
+from made_scores import DIGEST, iqtt_scores, rooms_scores
 from refusals import refused
 
 from metrics.comparison.compare import compare
@@ -35,6 +35,7 @@ def without(file, rows, comparable=False):
 A, B = rooms("a"), rooms("b")
 FEWER = without(B, [1, 4], comparable=True)  # whole, by its own account
 OTHER_TRUTH, OTHER_ROWS = rooms("b", truth="f" * 64), with_items(B, row=A.ids + 100)
+OTHER_BITS = rooms("b", digest="f" * 64)
 OTHER_SCENES = with_items(B, scene_index=[0, 0, 1, 2, 2, 2])
 WITHOUT_ITEMS = replace(B, items={k: v for k, v in B.items.items() if k != "chamfer"})
 NO_NUMBERS = [with_items(B, chamfer=[0.1, bad, 0.1, bad, 0.1, 0.1]) for bad in (np.nan, 1e200)]
@@ -48,6 +49,12 @@ UNUSABLE = "2 of 6 rows without a usable number: 1, 3"
         ([], "comparison", "0 score file", "two or more"),
         ([A], "comparison", "1 score file", "two or more"),
         ([A, OTHER_TRUTH], "b.json", "scores of truth ffffffffffff", "0123456789ab as in a.json"),
+        (
+            [A, OTHER_BITS],
+            "b.json",
+            "scores of truth of digest ffff",
+            f"{DIGEST[:12]} as in a.json",
+        ),
         ([A, iqtt_scores("b", [1, 0])], "b", "scores of task iqtt", "rooms as in a.json"),
         ([A, FEWER], "b.json", "4 rows, without 1, 4", "the 6 of a.json"),
         ([FEWER, A], "a.json", "6 rows, with 1, 4", "the 4 of b.json"),

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_scores import iqtt_scores, rooms_scores
+from made_scores import DIGEST, iqtt_scores, rooms_scores
 from refusals import refused
 
 from metrics.leaderboard.paper_tables import TABLES
 from metrics.leaderboard.ranking import LeaderboardError, leaderboard
 from metrics.score_file import Score
+from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import UnknownMetricError
 
 SCENES = [0, 0, 1, 1]
@@ -34,7 +35,7 @@ def test_ranks_and_best_cells():
     assert best == [[True, True, False], [False, True, True], [False, True, False]]
     assert table.columns[0] == "Chamfer ↓ (scene unit)"
     assert by_label(table)["a"].cells[0].rest == " [0.0900, 0.1100]"
-    assert table.title == "Rooms, truth 0123456789ab"
+    assert table.title == f"Rooms, truth {DIGEST[:12]}"
     assert len(leaderboard(files, paper=False)) == 1
 
 
@@ -60,12 +61,27 @@ def test_what_is_not_comparable_is_never_ranked_nor_best():
 
 
 def test_test_sets_are_never_ranked_together():
-    files = [rooms("a", 0.3), rooms("b", 0.1, truth="f" * 64), rooms("c", 0.2)]
+    other = "f" * 64
+    files = [rooms("a", 0.3), rooms("b", 0.1, truth=other, digest=other), rooms("c", 0.2)]
     first, second = leaderboard(files, paper=False)
+    assert not any(note.startswith("Not ranked with") for note in (*first.notes, *second.notes))
     assert [(row.rank, row.label) for row in first.rows] == [("1", "c"), ("2", "a")]
     assert [(row.rank, row.label) for row in second.rows] == [("1", "b")]
     # One fingerprint, two tasks: still two test sets.
     assert len(leaderboard([rooms("a"), iqtt_scores("b", [1])], paper=False)) == 2
+
+
+def test_truths_of_one_request_but_other_bits_are_not_ranked_together():
+    first, second = leaderboard([rooms("a"), rooms("b", digest="f" * 64)], paper=False)
+    assert [len(table.rows) for table in (first, second)] == [1, 1]
+    for table, other in ((first, "f" * 12), (second, DIGEST[:12])):
+        assert any(note.startswith(f"Not ranked with truth {other}") for note in table.notes)
+
+
+def test_known_test_sets_bear_their_name(monkeypatch):
+    known = KnownTest("rooms-test", "rooms", DIGEST, "scenegen render")
+    monkeypatch.setattr("metrics.scoring.known_tests.KNOWN_TESTS", (known,))
+    assert leaderboard([rooms("a")], paper=False)[0].title == "Rooms, rooms-test"
 
 
 def test_files_that_claim_the_whole_test_set_must_agree_on_it():

@@ -115,7 +115,7 @@ def test_chunks_of_many_rows_are_unpacked_once(by_hand):
         file.create_dataset("depth", data=values, chunks=(8, 400, 600), compression="gzip")
     with h5py.File(path) as file:
         stored = inspect(file).found["depth"]
-        assert stored.id.get_access_plist().get_chunk_cache()[1] == 8 * 800 * 600 * 4
+        assert stored.dataset.id.get_access_plist().get_chunk_cache()[1] == 8 * 800 * 600 * 4
         assert np.array_equal(stored[7], values[7])
 
 

@@ -1,0 +1,295 @@
+"""HDF5 files that anyone may have written: opened and read within bounds, and without links.
+
+A file is one file: links and data sets that lead out of it are refused before they are followed.
+A chunk takes no more memory than the layout says: it is inflated here, up to its size and no
+further, as HDF5's own filter inflates whatever a chunk holds. Chunks that were never written are
+refused, as HDF5 reads them as zeros.
+"""
+
+import errno
+import math
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from h5py import h5d, h5l, h5o, h5z
+from isal import isal_zlib
+from numpy.typing import NDArray
+
+from scenegen.common.errors import FileFormatError, SceneGenError
+
+Array = NDArray[Any]
+# What h5py raises on damaged files, by the kind of damage: this tuple is the only list of them.
+HDF5_ERRORS = (OSError, RuntimeError, KeyError, TypeError, ValueError, MemoryError)
+MOST_OBJECTS = 10_000  # groups and data sets of a file
+MOST_ATTRIBUTES = 1_000  # of one of them
+MOST_BYTES = 256 * 2**20  # to be unpacked for one row
+LZF = 32000
+FILTERS = {
+    h5z.FILTER_SHUFFLE: "shuffle",
+    h5z.FILTER_DEFLATE: "gzip",
+    h5z.FILTER_FLETCHER32: "fletcher32",
+    LZF: "lzf",
+}
+CHECKSUM_BYTES = 4  # that fletcher32 adds to a chunk
+SLACK = 1024  # bytes by which a chunk may grow where it cannot be compressed
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something of a file that is not followed or read.
+
+    Attributes:
+        name: of the object, without a slash before it.
+        rule: in a word, as in `metrics.submissions.problems.Problem`.
+    """
+
+    name: str
+    rule: str
+    found: str
+    expected: str
+
+
+def open_file(path: str | Path, kind: str) -> h5py.File:
+    """Open an HDF5 file of which every object is safe to open; `kind` is what it should be.
+
+    Raises OSError for what is no regular file, FileFormatError for one that is not HDF5, or cut
+    off, or of which something leads out of the file or cannot be read within bounds.
+    """
+    file = open_unchecked(path, kind)
+    with checking(file):
+        fault = next(faults(file), None)
+        if fault is not None:
+            raise FileFormatError(f"{path}: {fault.name}", fault.found, fault.expected)
+    return file
+
+
+def open_unchecked(path: str | Path, kind: str) -> h5py.File:
+    """Open an HDF5 file of which the caller opens only what `faults` does not name."""
+    problems = (
+        (not os.path.exists(path), errno.ENOENT, "no such file"),
+        (os.path.isdir(path), errno.EISDIR, f"is a folder; name a {kind}"),
+        (not os.path.isfile(path), errno.EINVAL, "is not a regular file"),
+    )
+    for wrong, number, text in problems:
+        if wrong:
+            raise OSError(number, text, str(path))
+    try:
+        return h5py.File(path, "r")
+    except OSError as error:
+        raise FileFormatError(f"{path}: not a readable HDF5 file ({reason(error)})") from error
+
+
+@contextmanager
+def reading(where: object) -> Iterator[None]:
+    """Turn whatever HDF5 raises on a damaged file into a FileFormatError of one line.
+
+    `where` names the file, the data set and the row as far as they are known.
+    An IndexError passes: a row beyond the end is the caller's mistake, not the file's.
+    """
+    try:
+        yield
+    except SceneGenError:
+        raise
+    except HDF5_ERRORS as error:
+        raise FileFormatError(f"{where}: cannot be read ({reason(error)})") from error
+
+
+@contextmanager
+def checking(file: h5py.File) -> Iterator[None]:
+    """Close the file if the block raises an error. Raises FileFormatError as `reading`."""
+    try:
+        with reading(file.filename):
+            yield
+    except SceneGenError:
+        file.close()
+        raise
+
+
+def reason(error: BaseException) -> str:
+    """Return what an error of HDF5 says in its innermost parentheses, on one line."""
+    text = str(error.args[0]) if error.args else type(error).__name__
+    inside = text[text.find("(") + 1 : text.rfind(")")] if "(" in text else text
+    return inside.split("\n")[0]
+
+
+def faults(file: h5py.File) -> Iterator[Fault]:
+    """Yield what must not be opened or read, following no link on the way.
+
+    Raises whatever HDF5 raises on a damaged file.
+    """
+    waiting, seen = [("", file.id)], 0
+    known: set[int] = set()
+    yield from _attribute_faults("/", file.id)
+    while waiting:
+        prefix, group = waiting.pop()
+        for raw in group:
+            seen += 1
+            name = f"{prefix}{raw.decode('utf-8', 'backslashreplace')}"
+            if seen > MOST_OBJECTS:
+                yield Fault(name, "count", f"more than {MOST_OBJECTS:,} objects", "fewer")
+                return
+            if group.links.get_info(raw).type != h5l.TYPE_HARD:
+                yield Fault(name, "link", f"a link{_target(group, raw)}", "an object of this file")
+                continue
+            info = h5o.get_info(group, raw)
+            if info.addr in known:
+                continue
+            known.add(info.addr)
+            if info.type == h5o.TYPE_GROUP:
+                child = h5o.open(group, raw)
+                yield from _attribute_faults(name, child)
+                waiting.append((f"{name}/", child))
+            elif info.type == h5o.TYPE_DATASET:
+                dataset = h5d.open(group, raw)
+                yield from _dataset_faults(name, dataset)
+                yield from _attribute_faults(name, dataset)
+
+
+def _target(group: Any, raw: bytes) -> str:
+    link = h5py.Group(group).get(raw, getlink=True)
+    told = f" to the file {link.filename!r:.60}" if isinstance(link, h5py.ExternalLink) else ""
+    return told.encode("utf-8", "backslashreplace").decode()
+
+
+def _attribute_faults(name: str, item: Any) -> Iterator[Fault]:
+    count = h5py.h5a.get_num_attrs(item)
+    if count > MOST_ATTRIBUTES:
+        expected = f"at most {MOST_ATTRIBUTES:,}"
+        yield Fault(name, "attributes", f"{count} attributes", expected)
+
+
+def _dataset_faults(name: str, dataset: Any) -> Iterator[Fault]:
+    """Yield what is wrong with the storage of a data set, whose shape is not asked for too early.
+
+    Asking a virtual data set for its shape would open the files that it is made of.
+    """
+    storage = dataset.get_create_plist()
+    layout = storage.get_layout()
+    if layout == h5d.VIRTUAL or storage.get_external_count():
+        expected = "values in this file itself"
+        yield Fault(name, "link", "values that lie in another file", expected)
+        return
+    shape, size = dataset.shape or (), dataset.dtype.itemsize
+    written = dataset.get_storage_size()
+    if layout == h5d.CONTIGUOUS and 0 < written < math.prod(shape) * size:
+        yield Fault(name, "written", f"{written} bytes for the shape {shape}", "all values")
+    if layout != h5d.CHUNKED:
+        if math.prod(shape) and not written and dataset.shape is not None:
+            yield Fault(name, "written", f"shape {shape}, but nothing was written", "values")
+        return
+    chunks = storage.get_chunk()
+    slab = slab_bytes(shape, chunks, size)
+    if slab > MOST_BYTES:
+        found = f"chunks {chunks}, so that a row takes {slab >> 20} MiB to unpack"
+        expected = f"at most {MOST_BYTES >> 20} MiB (store one row to a chunk)"
+        yield Fault(name, "chunks", found, expected)
+    used = [storage.get_filter(i)[0] for i in range(storage.get_nfilters())]
+    if not set(used) <= set(FILTERS) or len(set(used)) < len(used) or {1, LZF} <= set(used):
+        found = " and ".join(FILTERS.get(code, f"filter {code}") for code in used)
+        yield Fault(name, "filters", found, "gzip or lzf, each filter once, or no compression")
+    expected_chunks = math.prod(-(-s // c) for s, c in zip(shape, chunks, strict=True))
+    there = dataset.get_num_chunks()
+    if there < expected_chunks:
+        found = f"{expected_chunks - there} of {expected_chunks} chunks that were never written"
+        if not there:
+            found = f"shape {shape}, but nothing was written"
+        yield Fault(name, "written", found, "values in all of them")
+
+
+def slab_bytes(shape: tuple[int, ...], chunks: tuple[int, ...], itemsize: int) -> int:
+    """Return the bytes of all chunks that one row touches."""
+    padded = [-(-s // c) * c for s, c in zip(shape[1:], chunks[1:], strict=True)]
+    return int(chunks[0] * math.prod(padded) * itemsize)
+
+
+class StoredArray:
+    """A data set that `faults` does not name; its rows are read within the bounds of its chunks."""
+
+    def __init__(self, dataset: h5py.Dataset) -> None:
+        self.dataset = dataset
+        self.shape: tuple[int, ...] = dataset.shape or ()
+        self.dtype, self.attrs = dataset.dtype, dataset.attrs
+        storage = dataset.id.get_create_plist()
+        self._filters = [storage.get_filter(i)[0] for i in range(storage.get_nfilters())]
+        self._deflated = h5z.FILTER_DEFLATE in self._filters
+        self._own = self._filters in (
+            [h5z.FILTER_DEFLATE],
+            [h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE],
+        )
+        self._one_row = dataset.chunks == (1, *self.shape[1:])
+        self._checked: set[tuple[int, ...]] = set()
+
+    def __len__(self) -> int:
+        return int(self.shape[0])
+
+    def __getitem__(self, rows: int | slice | tuple[()]) -> Any:
+        """Return one row, some, or all for (). Raises IndexError, and as HDF5 does on damage."""
+        rows = slice(None) if isinstance(rows, tuple) else rows
+        if self.dataset.chunks is None or not self._filters:
+            return self.dataset[rows]
+        if self._own and self._one_row and isinstance(rows, (int, np.integer)):
+            return self._row(range(len(self))[rows])
+        chosen = range(len(self))[rows]
+        for start in self._touched(
+            range(chosen, chosen + 1) if isinstance(chosen, int) else chosen
+        ):
+            if start not in self._checked:
+                self._inflated(start)
+                self._checked.add(start)
+        return self.dataset[rows]
+
+    def _row(self, row: int) -> Any:
+        start = (row,) + (0,) * (len(self.shape) - 1)
+        raw = self._inflated(start)
+        if raw is None:
+            return self.dataset[row]
+        size = self.dtype.itemsize
+        values = np.frombuffer(raw, np.uint8)
+        if h5z.FILTER_SHUFFLE in self._filters and size > 1:
+            values = np.ascontiguousarray(values.reshape(size, -1).T)
+        values = values.reshape(-1).view(self.dtype).reshape(self.shape[1:])
+        return (
+            values[()]
+            if values.ndim == 0
+            else values.copy()
+            if not values.flags.writeable
+            else values
+        )
+
+    def _touched(self, rows: range) -> Iterator[tuple[int, ...]]:
+        """Yield where the chunks begin that hold some rows."""
+        first, *others = self.dataset.chunks
+        starts = dict.fromkeys(row // first * first for row in rows)
+        spans = [range(0, s, c) for s, c in zip(self.shape[1:], others, strict=True)]
+        for start in starts:
+            for index in np.ndindex(*(len(span) for span in spans)):
+                yield (start, *(span[i] for span, i in zip(spans, index, strict=True)))
+
+    def _inflated(self, start: tuple[int, ...]) -> bytes | None:
+        """Return the bytes of a chunk that gzip stored; None where it need not be inflated.
+
+        Raises ValueError where they are more, or fewer, than the chunk has.
+        """
+        size = math.prod(self.dataset.chunks) * self.dtype.itemsize
+        mask, stored = self.dataset.id.read_direct_chunk(start)
+        if len(stored) > size + SLACK + size // 8:
+            raise ValueError(f"{len(stored)} bytes stored for a chunk of {size}")
+        if not self._deflated or mask:
+            return None
+        if self._filters[-1] == h5z.FILTER_FLETCHER32:
+            stored = stored[:-CHECKSUM_BYTES]
+        unpacker = isal_zlib.decompressobj()
+        try:
+            raw: bytes = unpacker.decompress(stored, size + 1)
+        except isal_zlib.error as error:  # type: ignore[misc]
+            raise ValueError(f"a chunk that is not compressed by gzip: {error}") from error
+        if len(raw) != size or not unpacker.eof:
+            found = "more" if len(raw) > size else f"{len(raw)} bytes"
+            raise ValueError(f"{found} in a chunk of {size} bytes")
+        return raw

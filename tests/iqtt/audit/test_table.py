@@ -1,0 +1,119 @@
+"""Digests: any bit of a question file that changes after it was written is found."""
+
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+from h5_edits import attribute, gone
+from refusals import refused
+
+from iqtt.audit.proofs import content
+from iqtt.audit.table import find_tables, read_table
+from iqtt.files.reader import AnswersFile
+from scenegen.common.content import column_digest, row_digest, seal
+from scenegen.common.errors import FileFormatError
+
+# Of how many places one is changed: what a training file holds is as in the others, only twice.
+FILES = {"iqtt-train.h5": 5, "iqtt-val.h5": 1, "iqtt-test.h5": 1, "iqtt-test-answers.h5": 1}
+
+
+def judged(*paths):
+    """The proof of the content of some files, alone."""
+    return content([read_table(source, np.zeros(0, int)) for source in find_tables(paths)])
+
+
+def places(path):
+    """Every attribute and every dataset of a file: (name, attribute or None)."""
+    with h5py.File(path) as file:
+        found = [("/", key) for key in file.attrs]
+
+        def add(name, item):
+            found.extend((name, key) for key in item.attrs)
+            if isinstance(item, h5py.Dataset):
+                found.append((name, None))
+
+        file.visititems(add)
+    return found
+
+
+def flipped(value, rng):
+    """The value with one bit changed, of a character or of a number."""
+    if isinstance(value, str):
+        at = int(rng.integers(len(value)))
+        return value[:at] + chr(ord(value[at]) ^ 1) + value[at + 1 :]
+    array = np.array(value)
+    if array.dtype.kind == "O":
+        array[0] = flipped(array[0], rng)
+        return array
+    raw = array.reshape(-1).view(np.uint8)
+    raw[rng.integers(raw.size)] ^= 1 << rng.integers(8)
+    return array
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_changed_bit_is_found(split_folder, tmp_path, name):
+    rng = np.random.default_rng(7)
+    for one in FILES:
+        shutil.copy(split_folder / one, tmp_path)
+    assert judged(tmp_path / name).status == "ok"
+    whole, missed = (split_folder / name).read_bytes(), []
+    for where, key in places(split_folder / name)[:: FILES[name]]:
+        with h5py.File(tmp_path / name, "r+") as file:
+            if key is None:
+                file[where][...] = flipped(file[where][()], rng)
+            else:
+                file[where].attrs[key] = flipped(file[where].attrs[key], rng)
+        try:
+            if judged(tmp_path / name).status != "FAIL":
+                missed.append((where, key))
+        except FileFormatError:
+            pass
+        (tmp_path / name).write_bytes(whole)
+    assert missed == []
+
+
+def test_nothing_may_be_added_taken_away_or_renamed(damaged):
+    edits = {
+        "an attribute more": attribute("note", "mine"),
+        "a dataset more": lambda file: file.create_dataset("x", data=1),
+        "an attribute less": gone("conventions"),
+        "no digest of a dataset": lambda file: file["answers"].attrs.__delitem__("sha256"),
+        "a group renamed": lambda file: file.move("truth", "lies"),
+    }
+    for name, edit in edits.items():
+        assert judged(damaged(edit)).status == "FAIL", name
+
+
+def test_a_forger_who_seals_again_has_another_digest_of_truth(damaged):
+    """That digest is what score files name."""
+
+    def forge(file):
+        file["answers"][:] = (file["answers"][:] + 1) % 3
+        file["answers"].attrs["sha256"] = column_digest(map(row_digest, file["answers"][:]))
+        seal(file)
+
+    path = damaged(forge)
+    (table,) = (read_table(source, np.zeros(0, int)) for source in find_tables([path]))
+    assert table.changed == ("truth_digest",)
+    with AnswersFile(path) as answers:
+        assert answers.truth_digest() != answers.stored_truth_digest
+
+
+def test_files_without_digests_are_not_judged(split_folder, released, damaged):
+    def older(file):
+        file.attrs["format_version"] = "1.1"
+        for name in ("content_digest", "truth_digest"):
+            del file.attrs[name]
+
+    old = damaged(older)
+    assert judged(old).status == judged(released("x.h5")).status == "skipped"
+    both = judged(old, split_folder / "iqtt-train.h5")
+    assert both.status == "ok"
+    assert old.name in both.detail
+
+
+def test_new_files_must_have_their_digests(damaged):
+    for name in ("content_digest", "truth_digest"):
+        with refused(FileFormatError, f"attribute {name!r}", "none"):
+            judged(damaged(gone(name)))

@@ -1,0 +1,55 @@
+"""Files on which HDF5 itself hangs or crashes, found by changing bytes of files that it wrote."""
+
+import zlib
+from pathlib import Path
+
+import h5py
+import pytest
+
+from scenegen.common import trial
+from scenegen.common.errors import FileFormatError
+from scenegen.common.trial import try_file
+
+HOSTILE = Path(__file__).parents[2] / "support" / "hostile"
+
+
+@pytest.fixture
+def broken(tmp_path):
+    """Return a function that unpacks a file of this name."""
+
+    def unpack(name):
+        path = tmp_path / f"{name}.h5"
+        path.write_bytes(zlib.decompress((HOSTILE / f"{path.name}.z").read_bytes()))
+        return path
+
+    return unpack
+
+
+def test_a_file_on_which_hdf5_hangs(broken, monkeypatch):
+    monkeypatch.setattr(trial, "SECONDS", 2.0)
+    with pytest.raises(FileFormatError) as error:
+        try_file(broken("hangs"))
+    assert error.value.where.endswith("hangs.h5")
+    assert "2 s" in error.value.found
+
+
+def test_a_file_on_which_hdf5_crashes(broken):
+    with pytest.raises(FileFormatError) as error:
+        try_file(broken("crashes"))
+    assert "signal 11" in error.value.found
+
+
+def test_texts_that_take_more_memory_than_honest_files(tmp_path, monkeypatch):
+    monkeypatch.setattr(trial, "MEMORY", 2**26)
+    path = tmp_path / "large.h5"
+    with h5py.File(path, "w") as file:
+        file.attrs["spec"] = "x" * 2**26
+    with pytest.raises(FileFormatError) as error:
+        try_file(path)
+    assert "memory" in error.value.found
+
+
+def test_files_that_another_process_can_read(rooms_path, tmp_path):
+    (tmp_path / "text").write_text("no HDF5")
+    for path in (rooms_path, tmp_path / "text", tmp_path / "nothing", tmp_path):
+        try_file(path)
