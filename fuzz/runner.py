@@ -16,7 +16,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from fuzz.cases import Case, draw
 from fuzz.child import Run, call, run, working_folder
@@ -26,48 +25,43 @@ from fuzz.verdict import Fault, faults, files_in
 LIMIT = 10.0  # seconds
 LEFT_OUT = ("mitsuba", "drjit")  # they start threads, which a child would miss
 KEPT = 3  # cases kept of each distinct fault
-HONEST = 60.0  # seconds that an honest run may take, from cold
+HONEST = 300.0  # seconds that all honest runs together may take, from cold
 
 
 @dataclass
 class Bench:
-    """The folder of honest files, and the largest memory of honest runs by target."""
+    """The folder of honest files, and the largest memory of honest runs."""
 
     honest: Path
-    megabytes: dict[str, float] = field(default_factory=dict)
+    megabytes: float = 0.0
 
     def warm_up(self, targets: Sequence[Target]) -> None:
-        """Run the honest command lines, and import in this process what they import."""
-        for target in targets:
-            for line in target.lines:
-                done, names = self._honest_run(line, target.codes)
-                largest = max(self.megabytes.get(target.name, 0), done.megabytes)
-                self.megabytes[target.name] = largest
-                for name in names:
-                    with contextlib.suppress(Exception):  # some modules cannot be imported alone
-                        importlib.import_module(name)
+        """Run the honest command lines in a child, and import in this process what they import."""
+        with working_folder() as around:
+            done = call(lambda: self._run_honest(targets, around), around, HONEST)
+            if done.code != 0:
+                raise RuntimeError(f"an honest command failed: {done.err.decode()}")
+            names = (around / "modules").read_text().split("\n")
+        self.megabytes = max(self.megabytes, done.megabytes)
+        for name in names:
+            if not name.startswith(LEFT_OUT):
+                with contextlib.suppress(Exception):  # some modules cannot be imported alone
+                    importlib.import_module(name)
 
-    def _honest_run(self, line: str, codes: tuple[int, ...]) -> tuple[Run, list[str]]:
-        """Run a command line that must succeed; return also the names of the modules imported."""
-        program, *arguments = line.split()
+    def _run_honest(self, targets: Sequence[Target], around: Path) -> None:
+        import cli
 
-        def command() -> Any:
-            import cli
-
+        lines = [(line.split(), target.codes) for target in targets for line in target.lines]
+        for i, ((program, *arguments), codes) in enumerate(lines):
+            Case("", ()).put_up(self.honest, around / str(i))
+            os.chdir(around / str(i))
             sys.argv = [program, *arguments]
             try:
                 getattr(cli, program).main(arguments, prog_name=program)
-            finally:
-                Path(".home/modules").write_text("\n".join(list(sys.modules)))
-
-        with working_folder() as around:
-            folder = around / "work"
-            Case("", ()).put_up(self.honest, folder)
-            done = call(command, folder, HONEST)
-            if done.code not in (0, *codes):
-                raise RuntimeError(f"{line}: {done.code} {done.err.decode()}")
-            names = (folder / ".home/modules").read_text().split("\n")
-        return done, [name for name in names if not name.startswith(LEFT_OUT)]
+            except SystemExit as end:
+                if end.code not in (0, *codes):
+                    raise RuntimeError(f"{sys.argv} ended with {end.code}") from end
+        (around / "modules").write_text("\n".join(list(sys.modules)))
 
     def run(self, case: Case, limit: float = LIMIT) -> tuple[Run, list[Fault], list[str]]:
         """Run a case; return what came of it, its faults, and the edits that could not be made."""
@@ -78,8 +72,7 @@ class Bench:
             before = files_in(folder)
             done = run(list(case.arguments), folder, limit, case.stdout)
             after = files_in(folder)
-            base = self.megabytes.get(case.target, done.megabytes)
-            found = faults(case, target, done, base, before, after)
+            found = faults(case, target, done, self.megabytes, before, after)
         return done, found, unmade
 
     def tried(self, case: Case, limit: float = LIMIT) -> tuple[Run, list[Fault], list[str]]:

@@ -59,7 +59,7 @@ def planted(how, out):
 cli.planted = planted
 runner.TARGETS = (Target("planted", (), ()),)
 verdict.MOST_MEGABYTES = 100
-bench = runner.Bench(honest, {"planted": 100.0})
+bench = runner.Bench(honest, 100.0)
 found = {}
 for how in sys.argv[2:]:
     case = Case("planted", ("planted", how, "--out", "new"))
