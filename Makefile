@@ -21,15 +21,15 @@ demo: $(VENV)/.runtime
 	$(BIN)/bench baseline constant --train demo/train.h5 --data demo/rooms.h5 --out demo/constant.h5 --overwrite
 	$(BIN)/bench baseline mean-depth --train demo/train.h5 --data demo/rooms.h5 --out demo/mean-depth.h5 --overwrite
 	$(BIN)/bench baseline empty-room --data demo/rooms.h5 --out demo/empty-room.h5 --overwrite
-	for name in constant mean-depth; do $(BIN)/bench score demo/$$name.h5 --json demo/$$name.json --overwrite > /dev/null || exit 1; done
-	$(BIN)/bench score demo/empty-room.h5 --json demo/empty-room.json --html demo/report.html --overwrite
+	for name in constant mean-depth; do $(BIN)/bench score demo/$$name.h5 --truth demo/rooms.h5 --json demo/$$name.json --overwrite > /dev/null || exit 1; done
+	$(BIN)/bench score demo/empty-room.h5 --truth demo/rooms.h5 --json demo/empty-room.json --html demo/report.html --overwrite
 	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/empty-room.json --no-paper
 	@echo
 	@echo "Look at $(CURDIR)/demo: rooms.png, objects.png, questions.png, report.html"
 
 demo-model: demo $(VENV)/.model
 	$(BIN)/bench baseline pix2shape --data demo/rooms.h5 --out demo/pix2shape.h5 --overwrite
-	$(BIN)/bench score demo/pix2shape.h5 --json demo/pix2shape.json --html demo/pix2shape.html --overwrite
+	$(BIN)/bench score demo/pix2shape.h5 --truth demo/rooms.h5 --json demo/pix2shape.json --html demo/pix2shape.html --overwrite
 	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/empty-room.json demo/pix2shape.json
 	$(BIN)/bench baseline pix2shape --data demo/iqtt/iqtt-test.h5 --out demo/answers.h5 --overwrite
 	$(BIN)/bench score demo/answers.h5 --truth demo/iqtt/iqtt-test-answers.h5

@@ -64,7 +64,7 @@ def baseline(
         with RoomsFile(data) as rooms, progress_bar(len(rooms), "image") as bar:
             how = {"overwrite": overwrite, "progress": bar.update}
             write_room_baseline(name, data, out, train=train, **how)
-    click.echo(f"{out}: {method} on {data}; score it with `bench score {out}`")
+    click.echo(f"{out}: {method} on {data}; score it with `bench score {out} --truth {data}`")
 
 
 COMMANDS = (baseline,)

@@ -23,6 +23,8 @@ import click
 import h5py
 import numpy as np
 
+from scenegen.common.new_file import write_text
+
 VOLATILE = (
     "creation_command", "writer", "versions", "submissions", "format_version",
     "mitsuba_version", "drjit_version", "llvm_version",
@@ -85,10 +87,11 @@ def commands(folder: Path) -> Iterator[str]:
     yield f"bench baseline pix2shape --data {answers}.h5 --out pix2shape-answers.h5"
     yield f"bench baseline chance --data {answers}.h5 --out chance.h5"
     for name in ("constant", "mean-depth", "empty-room", "oracle", "pix2shape"):
-        yield f"bench score {name}.h5 --json {name}.json --csv {name}.csv --markdown"
+        outputs = f"--json {name}.json --csv {name}.csv --markdown"
+        yield f"bench score {name}.h5 --truth truth.h5 {outputs}"
     yield "scenegen render --n 6 --seed 6 --out train-2.h5"
     yield "bench baseline constant --data truth.h5 --train train-2.h5 --out constant-2.h5"
-    yield "bench score constant.h5 constant-2.h5 --json runs.json"
+    yield "bench score constant.h5 constant-2.h5 --truth truth.h5 --json runs.json"
     for name in ("chance", "pix2shape-answers"):
         yield f"bench score {name}.h5 --truth {answers}-answers.h5 --json {name}.json"
     yield "bench compare constant.json mean-depth.json empty-room.json --json compare.json"
@@ -179,7 +182,7 @@ def write(out: str, tree: str, keep: str | None) -> None:
             inside = path.relative_to(folder)
             if path.is_file() and not inside.parts[0].startswith("models"):
                 found |= {f"{inside} {part}": value for part, value in digests(path)}
-    Path(out).write_text(json.dumps(found, indent=1) + "\n")
+    write_text(out, json.dumps(found, indent=1) + "\n", overwrite=True)
     print(f"{out}: {len(found):,} digests")
 
 

@@ -33,4 +33,4 @@ except OSError as error:
     parser.exit(2, f"Error: {error.filename}: {error.strerror}\n")
 except scenegen.SceneGenError as error:
     parser.exit(2, f"Error: {error}\n")
-print(f"now: bench score {out}")
+print(f"now: bench score {out} --truth {truth}")

@@ -34,4 +34,4 @@ except OSError as error:
     parser.exit(2, f"Error: {error.filename}: {error.strerror}\n")
 except SceneGenError as error:
     parser.exit(2, f"Error: {error}\n")
-print(f"now: bench score {out}")
+print(f"now: bench score {out} --truth {questions}")

@@ -14,6 +14,10 @@ import click
 from scenegen.common import command_line
 from scenegen.common.command_line import EXAMPLE, Color, Items, Range, progress_bar
 
+KNOWN_SEED = (
+    "note: whoever knows the seed can make the test answers again; for a test set of which nobody"
+    " shall: openssl rand -hex 32 > secret.txt, then --secret-seed secret.txt"
+)
 SHOWN = 8  # questions that `show` draws by default
 option = partial(click.option, show_default=True)
 
@@ -38,6 +42,12 @@ option = partial(click.option, show_default=True)
 @option("--val", type=int, help="Number of validation questions.")
 @option("--test", type=int, help="Number of test questions; their answers are in a separate file.")
 @command_line.SEED
+@option(
+    "--secret-seed",
+    metavar="FILE",
+    help="File whose content is the seed, for test answers that nobody shall know: the seed is then"
+    " in no file.",
+)
 @option("--cubes", type=Range(int), default="5-11", help="Number of cubes of a shape.")
 @option(
     "--shapes",
@@ -82,6 +92,7 @@ def make_split(
     device: str,
     compression: str,
     overwrite: bool,
+    secret_seed: str | None,
     **settings: Any,
 ) -> None:
     """Make a split of mental-rotation questions for training, validation and testing.
@@ -90,10 +101,18 @@ def make_split(
     No shape, nor its mirror image, is in two of training, validation and test.
     """
     from iqtt.files import make
-    from iqtt.questions.specs import preset_spec
+    from iqtt.questions import specs
+    from scenegen.common.errors import SpecError
+    from scenegen.common.new_file import refuse_inputs
 
+    if secret_seed is not None:
+        source = click.get_current_context().get_parameter_source("seed")
+        if source is not click.core.ParameterSource.DEFAULT:
+            raise SpecError("--secret-seed", "--seed too", "one of the two")
+        refuse_inputs((Path(out) / name for name in make.FILES), [secret_seed])
+        settings["seed"] = specs.secret_seed(secret_seed)
     chosen = {name: value for name, value in settings.items() if value is not None}
-    spec = preset_spec(preset, height=size[0], width=size[1], **chosen)
+    spec = specs.preset_spec(preset, height=size[0], width=size[1], **chosen)
     count = spec.train + spec.val + spec.test
     started = time.perf_counter()
     with progress_bar(count, "question") as bar:
@@ -105,6 +124,7 @@ def make_split(
             compression=compression,
             overwrite=overwrite,
             command=" ".join(["iqtt", *sys.argv[1:]]),
+            secret=secret_seed is not None,
             progress=bar.update,
         )
     seconds = time.perf_counter() - started
@@ -117,6 +137,8 @@ def make_split(
         f"{out}: {tally.refused / max(1, tally.proposed):.0%} of {tally.proposed} proposed views"
         f" hid a cube and were refused"
     )
+    if spec.test and secret_seed is None:
+        click.echo(KNOWN_SEED, err=True)
 
 
 @click.command(

@@ -3,16 +3,23 @@
 `python -m scenegen.layout` prints it as the table of `docs/rooms-file.md`.
 """
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from scenegen.common.row_file import Column
+from scenegen.common.content import CONTENT_DIGEST
+from scenegen.common.row_file import COMPRESSIONS, Column
 from scenegen.common.text_table import piped
 from scenegen.description.specs import DatasetSpec
 
 FORMAT_NAME = "pix2shape-bench/rooms"
 FORMAT_VERSION = "2.2"
 TRUTH_DIGEST = "truth_digest"
+CONVENTIONS = (
+    "world: right-handed, y up, room = unit box with floor y = 0 and walls x = 0, z = 0; camera:"
+    " x right, y up, looks along -z; pixels: row 0 on top, centres at +0.5; see docs/conventions.md"
+)
 # The datasets that scores depend on: the root attribute TRUTH_DIGEST is their joint digest.
 SCORED = (
     "depth",
@@ -30,29 +37,41 @@ class Field:
     """One dataset, with a row for each image.
 
     Attributes:
-        shape: of a row; H and W are the image's size, K the object slots, L the light slots.
+        axes: of a row, by size (H and W are the image's, K the object slots, L the light slots) or
+            by name (FIXED).
         dtype: NumPy name; "image" stands for the spec's image type, "text" for UTF-8 strings.
         per_pixel: whether each row is stored as a chunk of its own, as images are.
     """
 
     name: str
-    shape: tuple[str | int, ...]
+    axes: tuple[str, ...]
     dtype: str
     unit: str
     frame: str
     meaning: str
     per_pixel: bool = False
 
+    @property
+    def shape(self) -> tuple[str, ...]:
+        """Sizes of a row's axes, numbers where they are the same in all files."""
+        return tuple(str(FIXED.get(axis, axis)) for axis in self.axes)
+
+
+FIXED = {"channel": 3, "xyz": 3, "matrix_row": 4, "matrix_column": 4, "coefficient": 2}
+NAMES = {"H": "y", "W": "x", "K": "object_slot", "K+1": "material_slot", "L": "light_slot"}
+_MATRIX = ("matrix_row", "matrix_column")
+
 
 # fmt: off
 FIELDS = (
-    Field("image", ("H", "W", 3), "image", "linear radiance, times `scale`", "pixels: row 0 on top",
+    Field("image", ("H", "W", "channel"), "image", "linear radiance, times `scale`",
+          "pixels: row 0 on top",
           "RGB of the shading equation, or of path tracing (`spec`); stored value times"
           " `scale` is radiance (no gamma)", True),
     Field("depth", ("H", "W"), "float32", "scene unit", "camera",
           "planar depth, -z in the camera frame, of the one ray through the pixel's centre;"
           " NaN where it meets nothing", True),
-    Field("normal", ("H", "W", 3), "float32", "1", "camera",
+    Field("normal", ("H", "W", "xyz"), "float32", "1", "camera",
           "unit surface normal of the same hit, facing the viewer; zero where nothing is hit",
           True),
     Field("object_id", ("H", "W"), "int8", "1", "pixels: row 0 on top",
@@ -61,18 +80,19 @@ FIELDS = (
     Field("view_index", (), "int32", "1", "-", "which view of that scene, from 0"),
     Field("view_angle_degrees", (), "float64", "degree", "-",
           "from the scene's input view (view 0), about the vertical axis"),
-    Field("camera/world_from_camera", (4, 4), "float64", "scene unit", "world from camera",
+    Field("camera/world_from_camera", _MATRIX, "float64", "scene unit", "world from camera",
           "rigid transform; the camera looks along -z, x right, y up"),
     Field("camera/fov_y_degrees", (), "float64", "degree", "-",
           "vertical field of view; pixels are square, the principal point is the image's middle"),
     Field("light/count", (), "int32", "1", "-", "number of point lights"),
-    Field("light/position", ("L", 3), "float64", "scene unit", "world",
+    Field("light/position", ("L", "xyz"), "float64", "scene unit", "world",
           "point lights; slots from light/count on are unused"),
-    Field("light/color", ("L", 3), "float64", "radiance", "RGB", "L_j; zero in unused slots"),
-    Field("light/ambient", (3,), "float64", "radiance", "RGB", "L_a"),
-    Field("light/attenuation", (2,), "float64", "1 / scene unit, 1 / scene unit squared", "-",
-          "k_l and k_q"),
-    Field("material/reflectance", ("K+1", 3), "float64", "1", "RGB by object id",
+    Field("light/color", ("L", "channel"), "float64", "radiance", "RGB",
+          "L_j; zero in unused slots"),
+    Field("light/ambient", ("channel",), "float64", "radiance", "RGB", "L_a"),
+    Field("light/attenuation", ("coefficient",), "float64",
+          "1 / scene unit, 1 / scene unit squared", "-", "k_l and k_q"),
+    Field("material/reflectance", ("K+1", "channel"), "float64", "1", "RGB by object id",
           "rho of the room (row 0) and of each object (row k); zero in unused slots"),
     Field("material/specular", ("K+1",), "float64", "1", "by object id",
           "k_s of Phong's lobe; 0 for the room and in unused slots"),
@@ -83,7 +103,8 @@ FIELDS = (
           "basic shape or class, index into the attribute `names`; -1 in unused slots"),
     Field("object/model", ("K",), "text", "-", "-",
           "which model of the class, class/model; the shape's name for a basic shape"),
-    Field("object/world_from_object", ("K", 4, 4), "float64", "scene unit", "world from object",
+    Field("object/world_from_object", ("K", *_MATRIX), "float64", "scene unit",
+          "world from object",
           "similarity that places the unit shape (bounding radius 1); zero in unused slots"),
     Field("object/scale", ("K",), "float64", "scene unit", "-",
           "bounding radius, the scale in world_from_object"),
@@ -96,30 +117,63 @@ FIELDS = (
 def columns(spec: DatasetSpec) -> list[Column]:
     """Return the datasets of a file that answers that spec, with their attributes."""
     slots = spec.object_slots
-    sizes = {"H": spec.height, "W": spec.width, "K": slots, "K+1": slots + 1, "L": spec.light_slots}
+    sizes = {"H": spec.height, "W": spec.width, "K": slots, "K+1": slots + 1}
+    sizes |= {"L": spec.light_slots, **FIXED}
     found = []
     for field in FIELDS:
         attributes: dict[str, Any] = {
             "unit": field.unit,
             "frame": field.frame,
-            "shape": "(" + ", ".join(["N", *map(str, field.shape)]) + ")",
+            "shape": "(" + ", ".join(("N", *field.shape)) + ")",
             "meaning": field.meaning,
         }
         if field.name == "image":
             attributes["scale"] = 1 / 255 if spec.image_dtype == "uint8" else 1.0
         if field.name == "object/shape":
             attributes["names"] = list(spec.shapes)
-        shape = tuple(sizes[n] if isinstance(n, str) else n for n in field.shape)
+        shape = tuple(sizes[axis] for axis in field.axes)
+        names = tuple(NAMES.get(axis, axis) for axis in field.axes)
         dtype = spec.image_dtype if field.dtype == "image" else field.dtype
-        found.append(Column(field.name, shape, dtype, field.per_pixel, attributes))
+        found.append(Column(field.name, shape, dtype, field.per_pixel, attributes, names))
     return found
+
+
+def has_digests(attributes: Mapping[str, Any]) -> bool:
+    """Return whether a file has digests and names of axes; formats 2.0 and 2.1 had none."""
+    return CONTENT_DIGEST in attributes or attributes.get("format_version") not in ("2.0", "2.1")
+
+
+def root_problems(attributes: Mapping[str, Any]) -> list[str]:
+    """Return a sentence for each root attribute that is missing or cannot be true of any file."""
+    expected = {**_ROOT, **(_DIGESTS if has_digests(attributes) else {})}
+    if attributes.get("format_version") != "2.0":
+        expected |= _VERSIONS
+    problems = []
+    for name, pattern in expected.items():
+        found = attributes.get(name)
+        if not (isinstance(found, str) and re.fullmatch(pattern, found, re.DOTALL)):
+            problems.append(f"root attribute {name} is {found!r:.60}")
+    return problems
+
+
+_ROOT = {
+    "format_version": r"2\.\d+",
+    "writer": r"pix2shape-bench \S+",
+    "variant": "(llvm_ad|cuda_ad|scalar)_rgb",
+    "conventions": re.escape(CONVENTIONS),
+    "compression": "|".join(COMPRESSIONS),
+    "creation_command": ".*",
+    "fingerprint": "[0-9a-f]{64}",
+}
+_VERSIONS = dict.fromkeys(("mitsuba_version", "drjit_version", "llvm_version"), r"unknown|\d\S*")
+_DIGESTS = dict.fromkeys((TRUTH_DIGEST, CONTENT_DIGEST), "[0-9a-f]{64}")
 
 
 def markdown_table() -> str:
     """Return the layout as a Markdown table."""
     rows = [("dataset", "row", "type", "unit", "frame", "meaning")]
     for f in FIELDS:
-        row = "(" + ", ".join(map(str, f.shape)) + ")"
+        row = "(" + ", ".join(f.shape) + ")"
         dtype = {"image": "`--image-dtype`", "text": "UTF-8 string"}.get(f.dtype, f.dtype)
         rows.append((f"`{f.name}`", row, dtype, f.unit, f.frame, f.meaning))
     return "\n".join(piped(rows))

@@ -10,6 +10,7 @@ import pytest
 
 from metrics.score_file import read_scores
 from metrics.scoring.evaluate import score
+from metrics.scoring.known_tests import known_test
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES, SAMPLE = ROOT / "examples", ROOT / "examples" / "sample"
@@ -35,8 +36,8 @@ def run(name, *arguments, folder):
 def test_an_example_writes_what_can_be_scored(name, truths, tmp_path):
     truth = truths.rooms if name == "submit" else truths.iqtt
     done = run(name, truth, "out.h5", folder=tmp_path)
-    assert (done.returncode, done.stdout) == (0, "now: bench score out.h5\n")
-    assert score([tmp_path / "out.h5"]).metrics
+    assert (done.returncode, done.stdout) == (0, f"now: bench score out.h5 --truth {truth}\n")
+    assert score([tmp_path / "out.h5"], truth).comparable
 
 
 @pytest.mark.parametrize(
@@ -68,7 +69,7 @@ def test_a_mistake_ends_in_one_line_and_exit_code_2(name, mistake, words, truths
 
 
 def test_the_sample_has_its_documented_scores(tmp_path):
-    """Moved elsewhere, so that the truth is found beside the submission."""
+    """Moved elsewhere; the truth is found beside the submission, and known by its digest."""
     for name in ("rooms.h5", "empty-room.h5"):
         shutil.copy(SAMPLE / name, tmp_path)
     found, told = score([tmp_path / "empty-room.h5"]), read_scores(SAMPLE / "empty-room.json")
@@ -77,6 +78,9 @@ def test_the_sample_has_its_documented_scores(tmp_path):
         for part in ("value", "low", "high"):
             wanted = pytest.approx(getattr(expected, part), rel=1e-9, abs=1e-12)
             assert getattr(found.metrics[name], part) == wanted, (name, part)
+    assert (found.comparable, found.meta.truth_source) == (True, "known")
+    assert known_test(found.meta.truth_digest).name == "examples/sample"
+    assert found.meta.truth_digest == told.meta.truth_digest
     assert found.meta.truth_fingerprint == told.meta.truth_fingerprint
     assert found.meta.submissions[0].sha256 == told.meta.submissions[0].sha256
 

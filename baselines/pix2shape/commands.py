@@ -160,7 +160,7 @@ def predict(
     Every view of a room is predicted from one image, the room's view 0, and the cameras.
     """
     weights = predict_to(out, weights, data, run=run, device=device, overwrite=overwrite)
-    click.echo(f"{out}: {weights} on {data}; score it with `bench score {out}`")
+    click.echo(f"{out}: {weights} on {data}; score it with `bench score {out} --truth {data}`")
 
 
 def predict_to(out: str, weights: str | None, data: str, **how: Any) -> str:

@@ -1,8 +1,5 @@
 """Make the files of a split: draw, render and write questions, the three at the same time."""
 
-import errno
-import os
-import shutil
 from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -18,7 +15,7 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import DEFAULT_BATCH, Rendered, groups, render_questions
 from scenegen.common.content import seal
-from scenegen.common.new_file import check_writable
+from scenegen.common.new_folder import folder_written_beside
 from scenegen.common.records import check
 from scenegen.common.row_file import new_file
 from scenegen.rendering.backend import select_variant, versions
@@ -36,16 +33,19 @@ def make_split(
     overwrite: bool = False,
     compression: str = "gzip",
     command: str = "",
+    secret: bool = False,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> Tally:
-    """Write the files of a split to a folder, where they appear when all of them are complete.
+    """Write the files of a split to a folder; it appears when all of them are complete.
 
-    Seed and command would tell the test answers, so only the file of the test answers has them.
+    Seed and command would tell the test answers, so only the file of the test answers has them. How
+    an older split is replaced, `new_folder.folder_written_beside` says.
 
     Args:
         batch: questions in one wavefront; bounds the memory, never changes a byte of the files.
         device, compression: as in `backend.DEVICES` and `row_file.COMPRESSIONS`.
         command: what to record as the command that made the files.
+        secret: keep the seed out of the file of the test answers too.
         progress: is called with the number of questions that were written since the last call.
 
     Returns how many views were proposed and refused.
@@ -55,28 +55,27 @@ def make_split(
         PlacementError: the bounded search found no question that meets the spec.
         OSError: the folder, or the disk.
     """
-    folder, count = Path(folder), spec.train + spec.val + spec.test
+    count = spec.train + spec.val + spec.test
     check(count > 0, "train, val and test", count, "at least 1 question in all")
-    _check_folder(folder, overwrite)
-    renderer = {"variant": select_variant(device), **versions()}
-    pools, tally = make_pools(spec), Tally()
-    public = root_attributes(spec.public(), renderer, "")
-    private = root_attributes(spec, renderer, command)
+    with folder_written_beside(folder, FILES, overwrite) as temporary:
+        renderer = {"variant": select_variant(device), **versions()}
+        pools, tally = make_pools(spec), Tally()
+        public = root_attributes(spec.public(), renderer, "")
+        private = root_attributes(spec.public() if secret else spec, renderer, command)
 
-    def write(split: str, images_file: h5py.File, truth_file: h5py.File) -> None:
-        for part, (first, count) in groups(spec, split).items():
-            writer = QuestionsWriter(images_file, truth_file, spec, split, part, count, compression)
-            rendered = render_questions(
-                spec, pools, split, first, count, batch=batch, device=device, tally=tally
-            )
-            _append_all(writer, rendered, progress)
-            writer.close()
-        for file in {images_file, truth_file}:
-            seal(file)
+        def write(split: str, images_file: h5py.File, truth_file: h5py.File) -> None:
+            for part, (first, count) in groups(spec, split).items():
+                writer = QuestionsWriter(
+                    images_file, truth_file, spec, split, part, count, compression
+                )
+                rendered = render_questions(
+                    spec, pools, split, first, count, batch=batch, device=device, tally=tally
+                )
+                _append_all(writer, rendered, progress)
+                writer.close()
+            for file in {images_file, truth_file}:
+                seal(file)
 
-    temporary = (folder if folder.is_dir() else folder.parent) / f".iqtt-{os.getpid()}.partial"
-    temporary.mkdir()
-    try:
         for split in ("train", "val"):
             with new_file(temporary / f"iqtt-{split}.h5") as file:
                 file.attrs.update({**public, "split": split})
@@ -88,19 +87,6 @@ def make_split(
             test.attrs.update({**public, "split": "test"})
             answers.attrs.update({**private, "split": "test"})
             write("test", test, answers)
-        _check_folder(folder, overwrite, temporary.name)
-        if folder.is_dir():
-            for name in FILES:
-                os.replace(temporary / name, folder / name)
-        else:
-            os.replace(temporary, folder)
-    except OSError as error:
-        told = Path(str(error.filename))
-        if told.parent != temporary:
-            raise
-        raise OSError(error.errno, error.strerror, str(folder / told.name)) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
     return tally
 
 
@@ -116,26 +102,3 @@ def _append_all(
                 progress(writing.popleft().result())
         while writing:
             progress(writing.popleft().result())
-
-
-def _check_folder(folder: Path, overwrite: bool, own: str = "") -> None:
-    """Raise an OSError where the folder cannot be written to: better before rendering than after.
-
-    `own` is the name of a file of this run, which may lie in the folder.
-    """
-    if not folder.is_dir():
-        if folder.is_symlink() and not folder.exists():
-            raise FileNotFoundError(errno.ENOENT, "is a link to nothing", str(folder))
-        if folder.exists():
-            raise NotADirectoryError(errno.ENOTDIR, "is a file; name a folder", str(folder))
-        check_writable(folder, overwrite)
-        return
-    if not overwrite:
-        text = "exists already; say --overwrite to replace it"
-        raise FileExistsError(errno.EEXIST, text, str(folder))
-    ours = {own, *(name for name in FILES if (folder / name).is_file())}
-    strangers = sorted(set(os.listdir(folder)) - ours)
-    if strangers:
-        raise FileExistsError(errno.EEXIST, f"holds other files too ({strangers[0]})", str(folder))
-    if not os.access(folder, os.W_OK):
-        raise PermissionError(errno.EACCES, "cannot be written to", str(folder))

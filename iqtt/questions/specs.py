@@ -1,7 +1,9 @@
 """The settings of a split: a frozen, checked dataclass, stored as JSON; lengths in cube edges."""
 
+import hashlib
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, get_args
 
 from iqtt.shapes.chains_and_trees import Kind
@@ -13,6 +15,7 @@ from scenegen.description.specs import IMAGE_DTYPES, MAX_LIGHTS, DatasetSpec
 SPLITS = ("train", "val", "test")
 DISTRACTOR_KINDS = ("other", "near", "mirror")
 DISTRACTORS = (*DISTRACTOR_KINDS, "mixed")
+SMALLEST_SECRET, LARGEST_SECRET = 16, 1_000_000  # bytes of a file whose content is a seed
 MAX_QUESTIONS = 10**8  # of each of train, val and test
 PRESETS: dict[str, dict[str, int]] = {
     # training questions in all, labelled ones among them, validation, test
@@ -27,7 +30,7 @@ class SplitSpec:
     """The settings of a split; with a seed they decide every bit of its files.
 
     Attributes:
-        seed: seed of every random choice, 0 to 2**63 - 1; None in files that must not tell it
+        seed: seed of every random choice, 0 to 2**256 - 1; None in files that must not tell it
             (see `public`).
         train, val, test: numbers of questions; at least one question in all.
         labeled: how many of the training questions have answers.
@@ -74,7 +77,7 @@ class SplitSpec:
         normalise(self)
         if self.seed is not None:
             object.__setattr__(self, "seed", int(self.seed))
-        check(self.seed is None or 0 <= self.seed < 2**63, "seed", self.seed, "0 to 2**63 - 1")
+        check(self.seed is None or 0 <= self.seed < 2**256, "seed", self.seed, "0 to 2**256 - 1")
         for name in ("train", "val", "test"):
             _check_within(name, getattr(self, name), 0, MAX_QUESTIONS, " questions")
         _check_within("labeled", self.labeled, 0, self.train, " training questions")
@@ -154,6 +157,19 @@ class SplitSpec:
     def from_json(cls, text: str | bytes) -> "SplitSpec":
         """Read what `to_json` wrote. Raises SpecError on anything else."""
         return from_json(cls, text, "split spec")
+
+
+def secret_seed(path: str | Path) -> int:
+    """Return the seed that the content of a file makes, blanks at its ends aside.
+
+    Raises OSError, and SpecError for a file with little or far too much in it.
+    """
+    with Path(path).open("rb") as file:
+        content = file.read(LARGEST_SECRET + 1)
+    secret = content.strip()
+    _check_within(str(path), len(content), 0, LARGEST_SECRET, " bytes")
+    _check_within(str(path), len(secret), SMALLEST_SECRET, LARGEST_SECRET, " bytes")
+    return int.from_bytes(hashlib.sha256(secret).digest())
 
 
 def preset_spec(preset: str, **settings: Any) -> SplitSpec:

@@ -103,13 +103,18 @@ def abs_rel(pair: DepthPair) -> float:
 def silog(pair: DepthPair) -> float:
     """Return the scale-invariant logarithmic error 100 sqrt(var d), with d = ln p - ln t.
 
-    Multiplying the prediction by a constant does not change it. Depths below 0.001 scene units
-    count as 0.001, so that depth at or behind the camera gets a score, a bad one. Source: the KITTI
-    depth benchmark (Uhrig et al. 2017): the root of the scale-invariant error of Eigen et al. 2014,
-    section 3.2, times 100.
+    Multiplying a prediction above 0.001 scene units by a constant does not change it. Other depths
+    count as 0.001, and at its full difference from the truth: the mean that the variance leaves out
+    is that of the others, or 0 without any, so that no scale is found for depth at or behind the
+    camera. Source: the KITTI depth benchmark (Uhrig et al. 2017): the root of the scale-invariant
+    error of Eigen et al. 2014, section 3.2, times 100.
     """
-    logs = np.log(np.maximum(pair.predicted, SMALLEST_LOG_DEPTH))
-    return float(100.0 * np.sqrt(np.var(logs - np.log(np.maximum(pair.true, SMALLEST_LOG_DEPTH)))))
+    predicted, true = (np.maximum(d, SMALLEST_LOG_DEPTH) for d in (pair.predicted, pair.true))
+    difference = np.log(predicted) - np.log(true)
+    seen = pair.predicted > SMALLEST_LOG_DEPTH
+    if seen.any():
+        difference = np.where(seen, difference - difference[seen].mean(), difference)
+    return float(100.0 * np.sqrt(np.square(difference).mean()))
 
 
 def delta(pair: DepthPair, power: int) -> float:

@@ -67,8 +67,9 @@ def bootstrap_interval(
 
     The ends are bias-corrected and accelerated percentiles of the bootstrapped mean. Sources: Efron
     1987; Efron and Tibshirani 1993, equations 14.9 to 14.15. Columns share their resamples, and a
-    column's interval does not depend on the others. The same seed gives the same interval. Both
-    ends are NaN for a single cluster, which tells nothing about the spread.
+    column's interval does not depend on the others. The same seed gives the same interval, which
+    always holds the mean. Both ends are NaN for a single cluster, which tells nothing about the
+    spread.
 
     Whole clusters are resampled, because the errors of the views of one scene are correlated
     (Davison and Hinkley 1997, section 3.8); resampling views would give intervals that are too
@@ -94,7 +95,8 @@ def bootstrap_interval(
     resampled = _resampled_means(deviations, seed, resamples)
     ends = [_bca_ends(d, r, z) for d, r in zip(deviations.T, resampled.T, strict=True)]
     low, high = np.array(ends).T
-    return centre + low, centre + high
+    # Values that differ in their last digit only may all lie on one side of their rounded mean.
+    return centre + np.minimum(low, 0.0), centre + np.maximum(high, 0.0)
 
 
 def _resampled_means(values: Array, seed: int, resamples: int) -> Array:

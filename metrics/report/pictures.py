@@ -28,7 +28,7 @@ def view_pictures(radiance: Array, true: Array, predicted: Array) -> list[str]:
     known = np.isfinite(true)
     near, far = (true[known].min(), true[known].max()) if known.any() else (0.0, 1.0)
     span = max(float(far - near), 1e-9)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         grey = [np.clip((depth - near) / span, 0, 1) for depth in (true, predicted)]
         error = np.clip(np.abs(predicted - true) / (0.1 * span), 0, 1)
     shades = [np.repeat(_bytes(255 * np.nan_to_num(g))[..., None], 3, axis=2) for g in grey]

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from metrics.measures.answers import CHANCE
+from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import in_order, metric
-from metrics.scoring.records import GROUPINGS, Score, ScoreFile
+from metrics.scoring.records import GROUPINGS, Meta, Score, ScoreFile
 from scenegen.common.new_file import written_beside
 from scenegen.common.text_table import by_number, laid_out, markdown, number, plain
 
@@ -112,4 +113,19 @@ def _notes(scores: ScoreFile) -> Iterator[str]:
     else:
         yield f"intervals: bootstrap over questions, {meta.resamples} resamples, seed {meta.seed}"
     submissions = ", ".join(f"{one.path} {one.sha256[:12]}" for one in meta.submissions)
-    yield f"truth {meta.truth_fingerprint[:12]}; {plain(submissions)}"
+    yield (
+        f"truth: {plain(meta.truth_path)}, digest {meta.truth_digest[:12]}, {chooser(meta)};"
+        f" fingerprint {meta.truth_fingerprint[:12]}"
+    )
+    yield f"submissions: {plain(submissions)}"
+
+
+def chooser(meta: Meta) -> str:
+    """Return in words who says that this is the truth."""
+    known = known_test(meta.truth_digest)
+    name = f" ({known.name})" if known else ""
+    return {
+        "given": "given to be scored against",
+        "known": "known to the benchmark",
+        "submission": "chosen by the submission itself",
+    }[meta.truth_source] + name

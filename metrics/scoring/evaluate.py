@@ -11,9 +11,9 @@ from metrics.scoring.runs import Progress, ScoringError, Settings
 from metrics.submissions.reader import (
     QuestionPredictions,
     RoomPredictions,
-    find_truth,
     open_predictions,
 )
+from metrics.submissions.truths import find_truth
 
 
 def score(
@@ -30,14 +30,16 @@ def score(
 
     Args:
         paths: submissions of one method, task and alignment.
-        truth: where the truth lies, unless the submissions say so.
+        truth: where the truth lies. Without it the first submission says so, and scores are not
+            comparable unless the truth is one of `known_tests`.
         settings: None for the defaults.
         progress: called with the number of rows that were scored since it was last called.
 
     Raises:
         OSError: a file that is not there.
         FileFormatError: a file that is none of ours, or broken.
-        ScoringError: the wrong truth, rows that are missing or unknown, values that are not finite.
+        ScoringError: the wrong truth, or a changed one; rows that are missing or unknown; values
+            that are not finite; two copies of one run.
     """
     settings = settings or Settings()
     with ExitStack() as stack:
@@ -46,12 +48,12 @@ def score(
             files.append(open_predictions(path))
             stack.callback(files[-1].close)
         _check_alike(files)
-        truth_path = find_truth(files[0], truth)
+        found = find_truth(files[0], truth)
         rooms = [file for file in files if isinstance(file, RoomPredictions)]
         if rooms:
-            return score_rooms(rooms, truth_path, settings, progress)
+            return score_rooms(rooms, found, settings, progress)
         answers = [file for file in files if isinstance(file, QuestionPredictions)]
-        return score_questions(answers, truth_path, settings, progress)
+        return score_questions(answers, found, settings, progress)
 
 
 def count_rows(path: str | Path) -> int:

@@ -1,45 +1,24 @@
 """All scores of one image: predicted depth and normals against the true ones."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.chamfer_hausdorff import chamfer, nearest_distances, point_scores
-from metrics.measures.checks import LARGEST_MAGNITUDE
 from metrics.measures.depth import Alignment, compare_depth, depth_scores
 from metrics.measures.image_search import nearest_distances_on_image
 from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_depth
+from metrics.submissions.problems import PredictionError
+from metrics.submissions.rules import depth_faults, normal_faults, refuse_faults
+from metrics.submissions.truths import TrueView
 from scenegen.camera import back_project, pixel_directions
 
 Array = NDArray[Any]
 NonFinite = Literal["error", "penalise"]
 F_SCORE_THRESHOLDS = (0.01, 0.02, 0.05)  # scene units: edges of the room
 ALIGNMENTS: tuple[Alignment, ...] = ("none", "scale", "scale_shift")
-
-
-@dataclass(frozen=True, eq=False)
-class TrueView:
-    """The true depth, normals and objects of one image.
-
-    Attributes:
-        depth: planar depth, (H, W), scene units; the pixels where it is finite are scored.
-        normal: (H, W, 3), camera frame, unit, facing the viewer.
-        object_id: (H, W).
-        fov_y_degrees: vertical field of view.
-    """
-
-    depth: Array
-    normal: Array
-    object_id: Array
-    fov_y_degrees: float
-
-    @property
-    def mask(self) -> Array:
-        """The scored pixels, (H, W) bool."""
-        return np.isfinite(self.depth)
 
 
 def score_view(
@@ -60,18 +39,22 @@ def score_view(
         normal: predicted normals, (H, W, 3), camera frame; None where the method gives none.
         truth: what it is compared with.
         alignments: the alignments after which depth is scored; points are never aligned.
-        non_finite: what to do with values that are not finite at a scored pixel. "penalise" scores
+        non_finite: what to do with scored pixels that break `submissions.rules`. "penalise" scores
             them at the worst: depth as 0 (at the camera), a normal as opposite to the true one.
 
-    Raises NonFiniteError with the count and the first pixel, unless they are penalised, and
+    Raises PredictionError with the count and the first pixel, unless they are penalised, and
     ValueError on other shapes than the truth's.
     """
     mask = truth.mask
-    if non_finite == "penalise":
-        depth = np.where(_finite(depth) | ~mask, depth, 0.0)
-        if normal is not None:
-            good = _finite(normal).all(axis=-1) & np.any(normal != 0, axis=-1)
-            normal = np.where((good | ~mask)[..., None], normal, -truth.normal)
+    faults = depth_faults(depth, mask)
+    if non_finite == "error":
+        refuse_faults(faults, PredictionError, "predicted depth")
+    depth = np.where(_any(faults, mask), 0.0, depth)
+    if normal is not None:
+        faults = normal_faults(normal, mask)
+        if non_finite == "error":
+            refuse_faults(faults, PredictionError, "predicted normals")
+        normal = np.where(_any(faults, mask)[..., None], -truth.normal, normal)
     nearest = nearest_distances_on_image(depth, truth.depth, truth.fov_y_degrees, mask)
     scores = point_scores(nearest, F_SCORE_THRESHOLDS)
     pair = compare_depth(depth, truth.depth, mask)
@@ -109,5 +92,6 @@ def chamfer_floor(truth: TrueView) -> float:
     return chamfer(nearest_distances(corners, centres))
 
 
-def _finite(values: Array) -> Array:
-    return np.asarray(np.abs(values) <= LARGEST_MAGNITUDE)
+def _any(faults: Mapping[str, Array], mask: Array) -> Array:
+    """Return at which pixels (H, W) any rule is broken."""
+    return np.asarray(np.logical_or.reduce([np.zeros_like(mask), *faults.values()]))

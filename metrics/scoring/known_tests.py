@@ -21,7 +21,14 @@ class KnownTest:
     command: str
 
 
-KNOWN_TESTS: tuple[KnownTest, ...] = ()
+KNOWN_TESTS = (
+    KnownTest(
+        "examples/sample",
+        "rooms",
+        "0e194769a7c81a70b9e02670e315fd7eca4eb27da765c258be1d4696503b4270",
+        "scenegen render --n 8 --size 48 --out rooms.h5",
+    ),
+)
 
 
 def known_test(digest: str) -> KnownTest | None:

@@ -97,8 +97,8 @@ _DEPTH = (
     _distance("abs_rel", "AbsRel",
               "mean of absolute difference of depth divided by true depth.", "ratio"),
     _distance("silog", "SILog",
-              "standard deviation of ln predicted - ln true depth, times 100; depths below 0.001"
-              " count as 0.001.", "100 ln"),
+              "standard deviation of ln predicted - ln true depth, times 100; predicted depths up"
+              " to 0.001 count as 0.001 and are left out of the mean it subtracts.", "100 ln"),
     *(_share(f"delta_{power}", f"delta {power}",
              "fraction of pixels whose predicted and true depth differ by a factor below"
              f" {factor}.")

@@ -3,8 +3,7 @@
 import hashlib
 import itertools
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,28 +19,38 @@ from metrics.scoring.runs import (
     known,
     matched_rows,
     meta_of,
+    refuse_copies,
     warnings_of,
 )
+from metrics.scoring.truth_digests import answers_digest
 from metrics.submissions.reader import QuestionPredictions
+from metrics.submissions.truths import FoundTruth
+from scenegen.common.errors import FileFormatError
+
+if TYPE_CHECKING:
+    from iqtt.files.reader import AnswersFile
 
 Array = NDArray[Any]
+LABELS = ("distractor_kind", "angle_degrees")  # by which accuracy is told, where a file has them
 ANGLE_BINS = (0, 30, 60, 90, 120, 150, 180)  # degrees, of IQTT's rotations
 
 
 def score_questions(
-    files: Sequence[QuestionPredictions], truth_path: Path, settings: Settings, progress: Progress
+    files: Sequence[QuestionPredictions], found: FoundTruth, settings: Settings, progress: Progress
 ) -> ScoreFile:
     """Score runs of one method on a file of answers; raises as `evaluate.score`."""
     from iqtt.files.reader import AnswersFile
 
-    with AnswersFile(truth_path) as truth:
-        true = np.asarray(truth.read("answers", slice(None))).astype(np.int64)
-        fingerprint = truth.fingerprint
-        kinds, names, angles = None, truth.kind_names, None
+    with AnswersFile(found.path) as truth:
+        names = ("answers", *(LABELS if truth.has_truth else ()))
+        columns = {name: np.asarray(truth.read(name, slice(None))) for name in names}
+        fingerprint, kind_names = truth.fingerprint, truth.kind_names
         if truth.has_truth:
-            kinds = truth.read("distractor_kind", slice(None))
-            angles = truth.read("angle_degrees", slice(None))
-    rows, whole = matched_rows(files, truth_path, fingerprint, len(true), settings.allow_partial)
+            _check_kinds(truth, columns["distractor_kind"], columns["answers"])
+        digest = answers_digest(truth, columns)
+    true = columns["answers"].astype(np.int64)
+    rows, whole = matched_rows(files, found.path, fingerprint, len(true), settings.allow_partial)
+    refuse_copies(files, lambda i, j: _same(files[i], files[j]))
     answers = np.full((len(files), len(true)), ABSTAINED)
     for given, file in zip(answers, files, strict=True):
         given[file.rows] = file.answers
@@ -55,14 +64,15 @@ def score_questions(
         }
 
     groups: dict[str, Any] = {"by_position": grouped(true[rows])}
-    if kinds is not None and angles is not None:
-        by_kind = np.array([_kinds(row, names) for row in kinds[rows]])
-        bins = np.clip(np.digitize(angles[rows], ANGLE_BINS) - 1, 0, len(ANGLE_BINS) - 2)
+    if len(columns) > 1:
+        kinds, angles = (columns[name][rows] for name in LABELS)
+        by_kind = np.array([_kinds(row, kind_names) for row in kinds])
+        bins = np.clip(np.digitize(angles, ANGLE_BINS) - 1, 0, len(ANGLE_BINS) - 2)
         spans = np.array([f"{a}-{b}" for a, b in itertools.pairwise(ANGLE_BINS)])
         groups |= {"by_distractor": grouped(by_kind), "by_rotation_angle": grouped(spans[bins])}
     if not fingerprint:  # that of a truth that has none is SHA-256 of its answers
         fingerprint = hashlib.sha256(true.astype(np.uint8).tobytes()).hexdigest()
-    warnings = warnings_of(whole, len(rows), len(true), ())
+    warnings = warnings_of(whole, len(rows), len(true), (), found, digest)
     counts = {
         "questions": len(rows),
         "questions_in_truth": len(true),
@@ -77,7 +87,7 @@ def score_questions(
         metrics={"iqtt_accuracy": _accuracy(right, settings)},
         **groups,
         items={"question": rows, "iqtt_accuracy": right.mean(axis=0)},
-        meta=meta_of(files, truth_path, fingerprint, settings, counts, warnings, None),
+        meta=meta_of(files, found, fingerprint, digest, settings, counts, warnings, None),
     )
 
 
@@ -95,7 +105,28 @@ def _accuracy(right: Array, settings: Settings) -> Score:
     means = right.mean(axis=0)[:, None]
     low, high = bootstrap_interval(means, settings.seed, settings.resamples, CONFIDENCE)
     std = float(right.mean(axis=1).std(ddof=1))
-    return Score(float(means.mean()), known(low[0]), known(high[0]), unit, questions, std)
+    return Score(float(means.mean(axis=0)[0]), known(low[0]), known(high[0]), unit, questions, std)
+
+
+def _same(one: QuestionPredictions, other: QuestionPredictions) -> bool:
+    """Return whether two submissions answer alike, and give no scores that differ."""
+    a, b = (np.argsort(file.rows) for file in (one, other))
+    pairs: list[tuple[Array, Array]] = [
+        (one.rows[a], other.rows[b]),
+        (one.answers[a], other.answers[b]),
+    ]
+    if one.scores is not None and other.scores is not None:
+        pairs.append((one.scores[a], other.scores[b]))
+    return all(np.array_equal(x, y) for x, y in pairs)
+
+
+def _check_kinds(truth: "AnswersFile", kinds: Array, answers: Array) -> None:
+    """Raise FileFormatError where a right answer has a kind of wrong ones, or a wrong one none."""
+    right = np.arange(kinds.shape[1]) == answers[:, None]
+    for row in np.flatnonzero(((kinds < 0) != right).any(axis=1))[:1].tolist():
+        where = truth.place("distractor_kind", row)
+        expected = f"-1 for the right answer, {answers[row]}, alone"
+        raise FileFormatError(where, kinds[row].tolist(), expected)
 
 
 def _kinds(row: Array, names: Sequence[str]) -> str:

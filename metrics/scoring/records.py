@@ -20,6 +20,7 @@ FORMAT_VERSION = "2.0"
 LONGEST_NAME = 200  # characters of method, run and fingerprint
 LONGEST_TEXT = 10_000
 Task = Literal["rooms", "iqtt"]
+TruthSource = Literal["given", "known", "submission"]
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 Name = Annotated[str, Field(max_length=LONGEST_NAME)]
@@ -100,7 +101,7 @@ class Meta:
     truth_fingerprint: Annotated[Name, Field(pattern=r"\S")]
     truth_path: Text
     truth_digest: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-    truth_source: Literal["given", "known", "submission"]
+    truth_source: TruthSource
     submissions: Annotated[TupleOf[Submission], Field(min_length=1)]
     writer: Text
     versions: ByKey[str, Text]
@@ -126,7 +127,8 @@ class ScoreFile:
 
     Attributes:
         method: its name; any text.
-        comparable: whether all of the test set was scored, and nothing penalised.
+        comparable: whether all of the test set was scored, nothing penalised, and the truth not
+            chosen by the submission.
         alignment: what the method says it cannot know; "none" for questions.
         metrics: by name, see `metric_names`.
         items: columns of equal length with an entry for each image or question: the integers of

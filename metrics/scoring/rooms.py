@@ -2,21 +2,20 @@
 
 import atexit
 import functools
-import multiprocessing
 import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, closing
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures.checks import NoDirectionError, NonFiniteError
 from metrics.measures.depth import Alignment
 from metrics.measures.statistics import bootstrap_interval, cluster_means
-from metrics.scoring.image_scores import ALIGNMENTS, TrueView, chamfer_floor, score_view
+from metrics.scoring.image_scores import ALIGNMENTS, chamfer_floor, score_view
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import Score, ScoreFile
 from metrics.scoring.runs import (
@@ -28,10 +27,15 @@ from metrics.scoring.runs import (
     matched_rows,
     meta_of,
     refuse,
+    refuse_copies,
     warnings_of,
 )
+from metrics.scoring.truth_digests import RowDigests, rooms_digest, view_digests
 from metrics.submissions.missing_rows import size_problems
+from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import RoomPredictions, open_predictions
+from metrics.submissions.truths import FoundTruth, read_true_view
+from scenegen.common.worker_pool import worker_pool
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
@@ -45,33 +49,36 @@ IDS_SHOWN = 8
 
 
 def score_rooms(
-    files: Sequence[RoomPredictions], truth_path: Path, settings: Settings, progress: Progress
+    files: Sequence[RoomPredictions], found: FoundTruth, settings: Settings, progress: Progress
 ) -> ScoreFile:
     """Score runs of one method on a rooms file; raises as `evaluate.score`."""
-    with RoomsFile(truth_path) as truth:
+    with RoomsFile(found.path) as truth:
         count, fingerprint = len(truth), truth.fingerprint
         for file in files:
             refuse(file.path, size_problems(file, truth))
-    rows, whole = matched_rows(files, truth_path, fingerprint, count, settings.allow_partial)
+    rows, whole = matched_rows(files, found.path, fingerprint, count, settings.allow_partial)
     for file in files:
         if file.has_normals != files[0].has_normals:
-            found, expected = ("normals", "none") if file.has_normals else ("none", "normals")
-            raise ScoringError(f"{file.path}: normal", found, f"{expected} as in {files[0].path}")
+            told, expected = ("normals", "none") if file.has_normals else ("none", "normals")
+            raise ScoringError(f"{file.path}: normal", told, f"{expected} as in {files[0].path}")
     alignment, paths = files[0].alignment, [file.path for file in files]
-    scores, bad = score_rows(paths, truth_path, rows, alignment, settings.processes, progress)
+    scored = score_rows(paths, found.path, rows, alignment, settings.processes, progress)
+    scores, bad = scored.scores, scored.bad
     if bad and settings.non_finite == "error":
         first = next(iter(bad.values()))
         shown = ", ".join(map(str, list(bad)[:IDS_SHOWN])) + ", ..." * (len(bad) > IDS_SHOWN)
         told = f"rows that cannot be scored, {len(bad)} in all: {shown}"
         advice = "mend them, or score them at the worst with --non-finite penalise"
         raise ScoringError(first.where, first.found, first.expected, f"{told}; {advice}")
-    with RoomsFile(truth_path) as truth:
+    refuse_copies(files, lambda i, j: all((each[i] == each[j]).all() for each in scores.values()))
+    with RoomsFile(found.path) as truth:
+        digest = rooms_digest(truth, scored.digests)
         scene = truth.read("scene_index", slice(None))
         view = truth.read("view_index", slice(None))
         angle = view_angles(scene, view, truth.read("camera/world_from_camera", slice(None)))[rows]
         scene, view = scene[rows], view[rows]
         some = rows[np.unique(np.linspace(0, len(rows) - 1, FLOOR_ROWS).astype(int))]
-        floors = np.array([chamfer_floor(_true_view(truth, int(row))) for row in some])
+        floors = np.array([chamfer_floor(read_true_view(truth, int(row))) for row in some])
     floors = floors[np.isfinite(floors)]
     by_angle = {}
     if len(np.unique(view)) > 1:
@@ -79,7 +86,7 @@ def score_rooms(
             some = angle == degrees
             of_angle = {name: runs[:, some] for name, runs in scores.items()}
             by_angle[str(degrees)] = _estimates(of_angle, scene[some], settings)
-    warnings = warnings_of(whole, len(rows), count, list(bad))
+    warnings = warnings_of(whole, len(rows), count, list(bad), found, digest)
     items = {
         "row": rows,
         "scene_index": scene,
@@ -103,8 +110,24 @@ def score_rooms(
         metrics=_estimates(scores, scene, settings),
         by_view_angle=by_angle,
         items=items,
-        meta=meta_of(files, truth_path, fingerprint, settings, counts, warnings, floor),
+        meta=meta_of(files, found, fingerprint, digest, settings, counts, warnings, floor),
     )
+
+
+@dataclass
+class ScoredRows:
+    """Scores of M rows of R submissions, and what was found on the way.
+
+    Attributes:
+        scores: by name, (R, M).
+        bad: for each row with values that are not finite, or normals of length 0, what is wrong;
+            such values have the worst score.
+        digests: of what was read of the truth, by row.
+    """
+
+    scores: dict[str, Array] = field(default_factory=dict)
+    bad: dict[int, ScoringError] = field(default_factory=dict)
+    digests: dict[int, RowDigests] = field(default_factory=dict)
 
 
 def score_rows(
@@ -114,23 +137,21 @@ def score_rows(
     alignment: str,
     processes: int | None = None,
     progress: Progress = lambda done: None,
-) -> tuple[dict[str, Array], dict[int, ScoringError]]:
-    """Score these M rows in each of R submissions; the numbers do not depend on `processes`.
-
-    Returns the scores by name, (R, M), and for each row with values that are not finite, or normals
-    of length 0, what is wrong; such values have the worst score.
-    """
+) -> ScoredRows:
+    """Score these M rows in each of R submissions; the numbers do not depend on `processes`."""
     alignments = tuple(a for a in get_args(Alignment) if a in (*ALIGNMENTS, alignment))
     job = tuple(paths), truth_path, alignments
     chunks = [rows[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
     table: list[list[dict[str, float]]] = []
-    bad: dict[int, ScoringError] = {}
-    for scored, problems in _in_processes(job, chunks, processes):
+    found = ScoredRows()
+    for scored, bad, digests in _in_processes(job, chunks, processes):
         table += scored
-        bad |= problems
+        found.bad |= bad
+        found.digests |= digests
         progress(len(scored))
-    names = list(table[0][0])
-    return {name: np.array([[run[name] for run in row] for row in table]).T for name in names}, bad
+    for name in table[0][0]:
+        found.scores[name] = np.array([[run[name] for run in row] for row in table]).T
+    return found
 
 
 def view_angles(scene_index: Array, view_index: Array, world_from_camera: Array) -> Array:
@@ -164,14 +185,17 @@ class _RowScorer:
         """Close the files."""
         self._stack.close()
 
-    def score(self, rows: Array) -> tuple[list[list[dict[str, float]]], dict[int, ScoringError]]:
-        """Return for each row, for each file its scores; and what is not finite, by row.
+    def score(
+        self, rows: Array
+    ) -> tuple[list[list[dict[str, float]]], dict[int, ScoringError], dict[int, RowDigests]]:
+        """Return for each row, for each file its scores; what is not finite, and digests, by row.
 
         Values that are not finite are penalised; the caller decides whether that shall count.
         """
-        table, bad = [], {}
+        table, bad, digests = [], {}, {}
         for row in rows.tolist():
-            view = _true_view(self._truth, row)
+            view = read_true_view(self._truth, row)
+            digests[row] = view_digests(view)
             line = []
             for file, entries in zip(self._files, self._entries, strict=True):
                 assert isinstance(file, RoomPredictions)
@@ -182,13 +206,13 @@ class _RowScorer:
                 )
                 try:
                     scores = score()
-                except (NonFiniteError, NoDirectionError) as error:
+                except PredictionError as error:
                     where = f"{file.path}: row {row}: {error.where}"
                     bad[row] = ScoringError(where, error.found, error.expected, error.hint)
                     scores = score(non_finite="penalise")
                 line.append(scores)
             table.append(line)
-        return table, bad
+        return table, bad, digests
 
 
 def _in_processes(job: Job, chunks: Sequence[Array], processes: int | None) -> Iterator[Any]:
@@ -198,9 +222,12 @@ def _in_processes(job: Job, chunks: Sequence[Array], processes: int | None) -> I
         with closing(_RowScorer(*job)) as scorer:
             yield from map(scorer.score, chunks)
         return
-    # Spawned, as forked processes would share open files and threads' locks.
-    with ProcessPoolExecutor(count, multiprocessing.get_context("spawn")) as pool:
-        yield from pool.map(functools.partial(_score_in_worker, job), chunks)
+    try:
+        with worker_pool(count) as pool:
+            yield from pool.map(functools.partial(_score_in_worker, job), chunks)
+    except BrokenProcessPool as error:
+        hint = "memory may be short: take fewer --processes"
+        raise ScoringError(job[0][0], "a process that scores was killed", "", hint) from error
 
 
 def _score_in_worker(job: Job, rows: Array) -> Any:
@@ -213,15 +240,6 @@ def _scorer_of_this_process(job: Job) -> _RowScorer:
     scorer = _RowScorer(*job)
     atexit.register(scorer.close)
     return scorer
-
-
-def _true_view(truth: RoomsFile, row: int) -> TrueView:
-    return TrueView(
-        truth.read("depth", row),
-        truth.read("normal", row),
-        truth.read("object_id", row),
-        float(truth.read("camera/fov_y_degrees", row)),
-    )
 
 
 def _estimates(scores: dict[str, Array], scene: Array, settings: Settings) -> dict[str, Score]:

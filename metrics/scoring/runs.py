@@ -1,6 +1,7 @@
 """What scoring rooms and scoring questions share: settings, rows to score, what is recorded."""
 
 import importlib.metadata
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +12,12 @@ from numpy.typing import NDArray
 
 from metrics.measures.statistics import RESAMPLES
 from metrics.scoring.image_scores import NonFinite
-from metrics.scoring.records import Meta, Submission
+from metrics.scoring.known_tests import known_test
+from metrics.scoring.records import Meta, Submission, TruthSource
 from metrics.submissions.missing_rows import match_problems
 from metrics.submissions.problems import Problem, first_error
 from metrics.submissions.reader import Predictions
+from metrics.submissions.truths import FoundTruth
 from scenegen.common.errors import SceneGenError
 from scenegen.common.row_file import writer_name
 
@@ -83,9 +86,31 @@ def known(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def warnings_of(whole: bool, scored: int, count: int, penalised: Sequence[int]) -> list[str]:
+def refuse_copies(files: Sequence[Predictions], same: Callable[[int, int], Any]) -> None:
+    """Raise ScoringError where two submissions, told apart by `same`, are one training run."""
+    for i, j in itertools.combinations(range(len(files)), 2):
+        if same(i, j):
+            found = f"the same predictions as in {files[i].path}"
+            raise ScoringError(files[j].path, found, "each training run once")
+
+
+def source_of(truth: FoundTruth, digest: str) -> TruthSource:
+    """Return who says that this is the truth."""
+    if truth.source == "submission" and known_test(digest) is not None:
+        return "known"
+    return truth.source
+
+
+def warnings_of(
+    whole: bool, scored: int, count: int, penalised: Sequence[int], truth: FoundTruth, digest: str
+) -> list[str]:
     """Return why the scores are not comparable, if they are not."""
     found = []
+    if source_of(truth, digest) == "submission":
+        found.append(
+            f"not comparable: the submission itself chose the truth, {truth.path} with the digest"
+            f" {digest:.12}; give the test file with --truth"
+        )
     if not whole:
         found.append(f"not comparable: only {scored} of {count} rows were answered by all runs")
     if penalised:
@@ -95,8 +120,9 @@ def warnings_of(whole: bool, scored: int, count: int, penalised: Sequence[int]) 
 
 def meta_of(
     files: Sequence[Predictions],
-    truth_path: Path,
+    truth: FoundTruth,
     fingerprint: str,
+    digest: str,
     settings: Settings,
     counts: dict[str, int],
     warnings: list[str],
@@ -106,7 +132,9 @@ def meta_of(
     resampled = files[0].task == "rooms" or len(files) > 1
     return Meta(
         truth_fingerprint=fingerprint,
-        truth_path=str(truth_path),
+        truth_path=str(truth.path),
+        truth_digest=digest,
+        truth_source=source_of(truth, digest),
         submissions=tuple(Submission(str(file.path), file.sha256, file.run) for file in files),
         writer=writer_name(),
         versions={name: importlib.metadata.version(name) for name in LIBRARIES},

@@ -88,7 +88,8 @@ ATTRIBUTES = (
     Attribute("truth_fingerprint", "the attribute `fingerprint` of the truth file; empty if that"
               " has none, as the released 3D-IQTT", may_be_empty=True),
     Attribute("truth_path", "where the truth lay; looked up from the submission's folder, then the"
-              " working directory", required=False, may_be_empty=True),
+              " working directory, unless --truth is given; scores are not comparable without that",
+              required=False, may_be_empty=True),
     Attribute("alignment", "what the method cannot know, and the truth may decide for it",
               required=False, tasks=("rooms",), choices=ALIGNMENTS),
     Attribute("writer", "the program that wrote the file", required=False, may_be_empty=True),
@@ -98,8 +99,8 @@ DATASETS = (
     Dataset("rooms", "row", (), "iu", "int64", "1", "-", "row of the truth file; in any order"),
     Dataset("rooms", "depth", ("H", "W"), "f", "float32", "scene unit", "camera",
             "planar depth, -z in the camera frame (not the distance along the ray), of the ray"
-            " through the pixel's centre; finite wherever the truth shows a surface, and above 0 to"
-            " lie in front of the camera"),
+            " through the pixel's centre; finite in float32 wherever the truth shows a surface, and"
+            " above 0 to lie in front of the camera"),
     Dataset("rooms", "normal", ("H", "W", 3), "f", "float32", "1", "camera",
             "surface normal, x right, y up, z towards the viewer; faces the viewer; of any length"
             " but 0 wherever the truth has a normal", required=False),

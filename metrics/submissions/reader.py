@@ -5,7 +5,6 @@ truth, except for the pixels, which are read one row at a time.
 """
 
 import hashlib
-import os
 from functools import cached_property
 from pathlib import Path
 from typing import Self, cast
@@ -199,33 +198,6 @@ def inspect_predictions(
     if opened is None:
         file.close()
     return opened, found.problems
-
-
-def find_truth(predictions: Predictions, given: str | Path | None = None) -> Path:
-    """Return where the truth of a submission lies.
-
-    That is `given`, or the path recorded in the submission, taken from the submission's folder and
-    then from the working directory. For a test file without answers it is the file of answers
-    beside it (iqtt-test-answers.h5). Only the fingerprint tells whether it is the right truth.
-
-    Raises FileFormatError where nothing lies there, with the places that were looked at.
-    """
-    advice = "give it with --truth" if given is None else ""
-    if given is None and not predictions.truth_path:
-        raise FileFormatError(predictions.path, "no path of a truth", "one", advice)
-    recorded = Path(predictions.truth_path)
-    places = [predictions.path.parent / recorded, recorded] if given is None else [Path(given)]
-    for place in places:
-        if os.path.isfile(place):
-            if predictions.task == "rooms":
-                return place
-            from iqtt.files.reader import answers_beside
-
-            return answers_beside(place) or place
-    looked = " and ".join(dict.fromkeys(str(place) for place in places))
-    raise FileFormatError(
-        f"{predictions.path}: truth", f"no file at {looked}", "the file that is predicted", advice
-    )
 
 
 def _looks_like_json(path: Path) -> bool:

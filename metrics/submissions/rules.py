@@ -1,5 +1,6 @@
 """What the values of a submission must be: writers, the reader and `validate` ask for the same."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -8,11 +9,15 @@ from numpy.typing import NDArray
 from metrics.measures.answers import ABSTAINED, CANDIDATES
 from metrics.measures.checks import LARGEST_MAGNITUDE
 from metrics.submissions.problems import Problem, first_ids
+from scenegen.common.errors import SceneGenError
 
 Array = NDArray[Any]
 Ids = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+# Of depths and normals: what single precision holds. All scores of such values are finite, and so
+# are the squares that intervals need of them.
+LARGEST = float(np.finfo(np.float32).max)
 EXPECTED = {
     "finite": "finite numbers wherever the truth shows a surface",
     "length": "normals of a length above 0 wherever the truth shows a surface",
@@ -32,6 +37,14 @@ def normal_faults(normal: Array, mask: Mask) -> dict[str, Mask]:
     """Return which rules predicted normals (H, W, 3) break, and at which pixels (H, W)."""
     good = _finite(normal).all(axis=-1)
     return _broken({"finite": ~good & mask, "length": good & ~normal.any(axis=-1) & mask})
+
+
+def refuse_faults(faults: Mapping[str, Mask], kind: type[SceneGenError], where: str) -> None:
+    """Raise an error of this kind with the first of the faults, if there are any."""
+    for rule, at in faults.items():
+        first = tuple(np.argwhere(at)[0].tolist())
+        found = f"{FOUND[rule]} at {np.count_nonzero(at)} pixels, the first at {first}"
+        raise kind(where, found, EXPECTED[rule])
 
 
 def faces_away(depth: Array, mask: Mask) -> bool:
@@ -70,7 +83,7 @@ def answer_problems(answers: Array, ids: Ids, name: str = "answer") -> list[Prob
 
 def score_problems(scores: Array, ids: Ids) -> list[Problem]:
     """Return which scores (M, 3) are not finite numbers."""
-    wrong = ~_finite(scores).all(axis=1)
+    wrong = ~_finite(scores, LARGEST_MAGNITUDE).all(axis=1)
     if not wrong.any():
         return []
     found = f"NaN, infinite or huge at {np.count_nonzero(wrong)} questions"
@@ -93,8 +106,8 @@ def as_doubles(values: Array) -> NDArray[np.float64]:
         return values.astype(np.float64)
 
 
-def _finite(values: Array) -> Mask:
-    return np.asarray(np.abs(as_doubles(values)) <= LARGEST_MAGNITUDE)
+def _finite(values: Array, largest: float = LARGEST) -> Mask:
+    return np.asarray(np.abs(as_doubles(values)) <= largest)
 
 
 def _broken(faults: dict[str, Mask]) -> dict[str, Mask]:

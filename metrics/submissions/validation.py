@@ -11,14 +11,14 @@ import numpy as np
 from metrics.submissions.hints.questions import answer_hints
 from metrics.submissions.hints.rooms import room_hints
 from metrics.submissions.missing_rows import match_problems, size_problems
-from metrics.submissions.problems import MOST_IDS, Problem
+from metrics.submissions.problems import HINT, MOST_IDS, Problem
 from metrics.submissions.reader import (
     QuestionPredictions,
     RoomPredictions,
-    find_truth,
     inspect_predictions,
 )
 from metrics.submissions.rules import EXPECTED, FOUND, Array, depth_faults, normal_faults
+from metrics.submissions.truths import FoundTruth, find_truth, read_true_view
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.rooms.reader import RoomsFile
 
@@ -37,7 +37,8 @@ def validate(
 
     Args:
         path: the submission, HDF5 or JSON.
-        truth_path: its truth; by default the one that the submission names (`find_truth`).
+        truth_path: its truth; by default the one that the submission names (`find_truth`), which a
+            hint then says.
         progress: called with 1 after every row.
 
     Raises OSError where `path` is no file. What is wrong inside is returned, never raised.
@@ -52,13 +53,23 @@ def validate(
         try:
             truth = find_truth(predictions, truth_path)
             if isinstance(predictions, RoomPredictions):
-                return problems + _against_rooms(predictions, truth, progress)
-            return problems + _against_questions(predictions, truth)
+                problems += _against_rooms(predictions, truth.path, progress)
+            else:
+                problems += _against_questions(predictions, truth.path)
+            return problems + _hints_on_source(truth)
         except (SceneGenError, OSError) as error:
             found, expected = _short(error, path), "the file that is predicted"
             if isinstance(error, SceneGenError) and error.expected == expected:
                 found = error.found + (f" ({error.hint})" if error.hint else "")
             return [*problems, Problem("truth", "readable", expected, found)]
+
+
+def _hints_on_source(truth: FoundTruth) -> list[Problem]:
+    """Return a hint where nobody but the submission says that this is the truth."""
+    if truth.source == "given":
+        return []
+    found = f"{truth.path}, which the submission names itself"
+    return [Problem("truth", HINT, "the test file, given with --truth", found)]
 
 
 def _against_rooms(
@@ -84,7 +95,7 @@ def _faults(
     predictions: RoomPredictions, i: int, row: int, truth: RoomsFile
 ) -> Iterator[tuple[str, str, int, str]]:
     """Yield dataset, rule, number of pixels, and why a row cannot be read where that is so."""
-    mask = np.isfinite(truth.read("depth", row))
+    mask = read_true_view(truth, row).mask
     rules: list[tuple[str, Callable[[int], Array], Callable[[Array, Array], dict[str, Array]]]]
     rules = [("depth", predictions.depth, depth_faults)]
     if predictions.has_normals:

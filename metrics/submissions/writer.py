@@ -87,13 +87,15 @@ class RoomPredictionWriter:
         where = f"{self._path}: row {row}"
         mask = np.isfinite(self._truth.read("depth", row))
         values = {"depth": _checked_floats(depth, mask.shape, f"{where}: depth")}
-        _refuse(rules.depth_faults(values["depth"], mask), f"{where}: depth")
+        faults = rules.depth_faults(values["depth"], mask)
+        rules.refuse_faults(faults, PredictionError, f"{where}: depth")
         if self._texts["alignment"] != "scale_shift" and rules.faces_away(values["depth"], mask):
             expected = "planar depth, which is positive in front of the camera"
             raise PredictionError(f"{where}: depth", "most of it at or below 0", expected)
         if normal is not None:
             values["normal"] = _checked_floats(normal, (*mask.shape, 3), f"{where}: normal")
-            _refuse(rules.normal_faults(values["normal"], mask), f"{where}: normal")
+            faults = rules.normal_faults(values["normal"], mask)
+            rules.refuse_faults(faults, PredictionError, f"{where}: normal")
         if self._table is None:
             self._table = self._new_table(values)
         with_normal = "normal" in self._columns
@@ -260,13 +262,6 @@ def _checked_floats(
         raise PredictionError(where, f"type {array.dtype}", "floats")
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused as infinite
         return array.astype(dtype)
-
-
-def _refuse(faults: Mapping[str, rules.Array], where: str) -> None:
-    for rule, at in faults.items():
-        first = tuple(int(i) for i in np.argwhere(at)[0])
-        found = f"{rules.FOUND[rule]} at {np.count_nonzero(at)} pixels, the first at {first}"
-        raise PredictionError(where, found, rules.EXPECTED[rule])
 
 
 def _write_columns(file: h5py.File, task: str, values: Mapping[str, rules.Array]) -> None:

@@ -195,7 +195,7 @@ def info(file: str) -> None:
 @DEVICE
 @click.pass_context
 def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: Any) -> None:
-    """Check the values of every row of a file, and render some rows again.
+    """Check digests and values of every row of a file, and render some rows again.
 
     Rows rendered again must agree bit for bit, or within a stated tolerance where the file was
     rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.

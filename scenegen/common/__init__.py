@@ -1,8 +1,9 @@
 """Helpers that every part of every package uses; none of them knows about rooms or questions.
 
 Errors with fields (`errors`), records as JSON and back (`records`), random streams (`seeding`),
-files that appear only when complete (`new_file`), HDF5 files of rows (`row_file`), options and
-error lines of commands (`command_line`), text tables, and rotations.
+files and folders that appear only when complete (`new_file`, `new_folder`), HDF5 files of rows
+(`row_file`), options and error lines of commands (`command_line`), worker processes, text tables,
+and rotations.
 
 It imports nothing else of this project. Start with `errors` and `row_file`.
 """

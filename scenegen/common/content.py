@@ -9,6 +9,7 @@ It does not depend on how the values are stored (chunks, compression).
 """
 
 import hashlib
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
@@ -17,6 +18,7 @@ import numpy as np
 
 SHA256 = "sha256"  # attribute of each data set
 CONTENT_DIGEST = "content_digest"  # attribute of the root
+BLOCK_BYTES = 2**24  # of a data set that are in memory at once
 
 
 def row_digest(values: Any) -> bytes:
@@ -46,18 +48,37 @@ def seal(file: h5py.File) -> None:
 def content_digest(file: h5py.File) -> str:
     """Return the SHA-256, as hex, of every name, type, shape and attribute of a file but its own.
 
-    The values of the data sets count through their attribute `sha256`, which `digest_problems`
-    checks. Raises whatever HDF5 raises on a damaged file (`input_file.HDF5_ERRORS`).
+    The values of the data sets count through their attribute `sha256`, which
+    `row_file.digest_problems` checks. Raises whatever HDF5 raises on a damaged file
+    (`input_file.HDF5_ERRORS`).
     """
     lines = []
     for name, item in (("/", file), *_objects(file)):
-        if isinstance(item, h5py.Dataset):
-            lines.append(f"{name} {item.dtype.str} {item.shape}".encode())
+        kind = f"{item.dtype.str} {item.shape}" if isinstance(item, h5py.Dataset) else "group"
+        lines.append(f"{name} {kind}".encode())
         for key in sorted(item.attrs):
             if (name, key) != ("/", CONTENT_DIGEST):
                 value = b"".join(_described(item.attrs[key], file))
                 lines.append(f"{name}@{key} ".encode() + hashlib.sha256(value).digest())
     return column_digest(hashlib.sha256(line).digest() for line in lines)
+
+
+def datasets(file: h5py.File) -> list[tuple[str, h5py.Dataset]]:
+    """Return the data sets of a file with their names, in the order of these."""
+    return [(name, item) for name, item in _objects(file) if isinstance(item, h5py.Dataset)]
+
+
+def dataset_digest(dataset: Any) -> str:
+    """Return the `column_digest` of a data set, or of what is read as one (`StoredArray`).
+
+    Raises whatever HDF5 raises where it is damaged.
+    """
+    if not dataset.shape:
+        return column_digest([row_digest(dataset[()])])
+    count, *row = dataset.shape
+    step = max(1, BLOCK_BYTES // max(1, math.prod(row) * dataset.dtype.itemsize))
+    blocks = (dataset[start : start + step] for start in range(0, count, step))
+    return column_digest(row_digest(row) for block in blocks for row in block)
 
 
 def _objects(file: h5py.File) -> list[tuple[str, Any]]:
@@ -73,14 +94,16 @@ def _bytes(values: Any) -> bytes:
         return values + b"\0"
     array = np.asarray(values)
     if array.dtype.kind in "OUS":
-        return b"".join(_bytes(text) for text in array.reshape(-1).tolist())
+        parts = array.reshape(-1).tolist()
+        known = (str, bytes, np.ndarray)
+        return b"".join(_bytes(x) if isinstance(x, known) else repr(x).encode() for x in parts)
     return np.ascontiguousarray(array, array.dtype.newbyteorder("<")).tobytes()
 
 
 def _described(value: Any, file: h5py.File) -> Iterator[bytes]:
     """Yield an attribute's kind and value; references count as the names that they point to."""
     if isinstance(value, h5py.Reference):
-        yield b"to " + str(file[value].name).encode() + b"\0"
+        yield b"to " + (h5py.h5r.get_name(value, file.id) or b"nothing") + b"\0"
     elif isinstance(value, (str, bytes)):
         yield b"text " + _bytes(value)
     elif isinstance(value, h5py.Empty):

@@ -1,39 +1,31 @@
 """Files that appear under their name only when they are complete."""
 
 import errno
-import itertools
 import os
-import re
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-_NUMBERS = itertools.count()
+from scenegen.common.workspace import workspace
+
+EXISTS = "exists already; say --overwrite to replace it"
 
 
 @contextmanager
 def written_beside(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
-    """Give a hidden path in the same folder to write to; it is renamed when the block ends well.
+    """Give a hidden path to write to; it is renamed to `path` when the block ends well.
 
-    Whatever goes wrong, nothing is left under either name that was not there before. Raises OSError
-    as `check_writable` or as the disk does, with `path` in place of the hidden path.
+    Whatever goes wrong, nothing is left under either name that was not there before; what a killed
+    process leaves, the next one removes that writes to the folder. Raises OSError as
+    `check_writable` or as the disk does, with `path` in place of the hidden path.
     """
-    path = Path(path)
     check_writable(path, overwrite)
-    temporary = path.with_name(f".{os.getpid()}-{next(_NUMBERS)}.partial{path.suffix[:8]}")
-    try:
+    path = Path(path)
+    with workspace(path.parent, path) as folder:
+        temporary = folder / f"file{path.suffix[:8]}"
         yield temporary
         check_writable(path, overwrite)
         os.replace(temporary, path)
-    except (OSError, RuntimeError) as error:
-        reason = _reason(error)
-        if reason is None or (isinstance(error, OSError) and str(error.filename) == str(path)):
-            raise
-        number = error.errno if isinstance(error, OSError) and error.errno else errno.EIO
-        raise OSError(number, reason, str(path)) from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
 def write_text(path: str | Path, text: str, overwrite: bool = False) -> None:
@@ -42,33 +34,42 @@ def write_text(path: str | Path, text: str, overwrite: bool = False) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-def _reason(error: Exception) -> str | None:
-    """Return why the disk refused, from an error of the system or of HDF5; None for others."""
-    text = str(error)
-    told = re.search(r"error message = '([^']*)'|Cannot open image file [^ ]* (.*)", text)
-    if told:
-        return f"cannot be written: {told.group(1) or told.group(2)}"
-    if isinstance(error, OSError):
-        return f"cannot be written: {error.strerror}" if error.strerror else None
-    return None
-
-
-def check_writable(path: Path, overwrite: bool) -> None:
+def check_writable(path: str | Path, overwrite: bool) -> None:
     """Raise an OSError where a file cannot be written, so that it is known before a long run."""
-    parent = path.parent
+    check_name(path)
+    path = Path(path)
+    problems = (
+        (path.is_dir(), errno.EISDIR, "is a folder; name a file in it"),
+        (path.exists() and not overwrite, errno.EEXIST, EXISTS),
+        (path.exists() and not path.is_file(), errno.EINVAL, "is not a regular file"),
+    )
+    for wrong, number, text in problems:
+        if wrong:
+            raise OSError(number, text, str(path))
+    if not os.access(path.parent, os.W_OK):
+        raise OSError(errno.EACCES, "cannot be written to", str(path.parent))
+
+
+def check_name(path: str | Path) -> None:
+    """Raise an OSError for a path that no file and no folder can be written to."""
+    if not str(path):
+        raise OSError(errno.ENOENT, "an output has an empty path; name it")
+    parent = Path(path).parent
     problems = (
         (not parent.exists(), errno.ENOENT, "the folder does not exist; create it first", parent),
         (not parent.is_dir(), errno.ENOTDIR, "is not a folder", parent),
-        (path.is_dir(), errno.EISDIR, "is a folder; name a file in it", path),
-        (
-            path.exists() and not overwrite,
-            errno.EEXIST,
-            "exists already; say --overwrite to replace it",
-            path,
-        ),
-        (path.exists() and not path.is_file(), errno.EINVAL, "is not a regular file", path),
-        (not os.access(parent, os.W_OK), errno.EACCES, "cannot be written to", parent),
+        (Path(path).is_symlink(), errno.ELOOP, "is a symbolic link; name what it leads to", path),
     )
     for wrong, number, text, where in problems:
         if wrong:
             raise OSError(number, text, str(where))
+
+
+def refuse_inputs(outputs: Iterable[str | Path], inputs: Iterable[str | Path]) -> None:
+    """Raise an OSError for an output that is an input too, by that name or by a link to it."""
+    known = [(os.stat(path), path) for path in inputs if os.path.exists(path)]
+    for output in filter(os.path.exists, outputs):
+        for status, path in known:
+            if os.path.samestat(os.stat(output), status):
+                text = f"is an input of this command too ({path}); name another file"
+                raise OSError(errno.EINVAL, text, str(output))

@@ -19,8 +19,17 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
-from scenegen.common.content import SHA256, row_digest
+from scenegen.common.axes import name_axes
+from scenegen.common.content import (
+    CONTENT_DIGEST,
+    SHA256,
+    content_digest,
+    dataset_digest,
+    datasets,
+    row_digest,
+)
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.input_file import StoredArray, reading
 from scenegen.common.new_file import written_beside
 
 Array = NDArray[Any]
@@ -40,6 +49,7 @@ class Column:
         dtype: NumPy name, or "text" for UTF-8 strings.
         own_chunk: whether each row is a compressed chunk of its own, as images are.
         attributes: HDF5 attributes.
+        axes: names of a row's axes (`axes.name_axes`); the axis of rows is called "row".
     """
 
     name: str
@@ -47,6 +57,7 @@ class Column:
     dtype: str
     own_chunk: bool = False
     attributes: Mapping[str, Any] = field(default_factory=dict)
+    axes: tuple[str, ...] | None = None
 
 
 class Table:
@@ -104,6 +115,8 @@ class Table:
         dtype = h5py.string_dtype() if text else column.dtype
         dataset = group.create_dataset(column.name, (self.count, *column.shape), dtype, **options)
         dataset.attrs.update(column.attributes)
+        if column.axes is not None:
+            name_axes(group, dataset, ("row", *column.axes))
         return dataset
 
     def _write_chunk(self, name: str, values: Array) -> None:
@@ -164,6 +177,33 @@ def column_problems(group: h5py.Group, columns: Sequence[Column], count: int) ->
             problems.append(f"{column.name}: type {dataset.dtype}, expected {column.dtype}")
         if column.dtype == "text" and h5py.check_string_dtype(dataset.dtype) is None:
             problems.append(f"{column.name}: type {dataset.dtype}, expected strings")
+    return problems
+
+
+def digest_problems(file: h5py.File, known: Mapping[str, str]) -> list[str]:
+    """Return a sentence for each dataset that is not as it was sealed, and one for the attributes.
+
+    `known` are the `content.column_digest`s of datasets that the caller has read already. Raises
+    FileFormatError where the attributes cannot be read.
+    """
+    problems = []
+    with reading(file.filename):
+        for name, dataset in datasets(file):
+            told = dataset.attrs.get(SHA256)
+            try:
+                with reading(name):
+                    found = known.get(name) or dataset_digest(StoredArray(dataset))
+            except FileFormatError as error:
+                problems.append(str(error))
+                continue
+            if told is None:
+                problems.append(f"{name}: attribute {SHA256!r} is missing")
+            elif not (isinstance(told, str) and told == found):
+                problems.append(f"{name}: values are not those of its attribute {SHA256!r}")
+        told = file.attrs.get(CONTENT_DIGEST)
+        if not (isinstance(told, str) and told == content_digest(file)):
+            what = "the attributes, or the names, types and shapes of the datasets,"
+            problems.append(f"{what} are not those of the attribute {CONTENT_DIGEST!r}")
     return problems
 
 

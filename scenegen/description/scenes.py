@@ -85,7 +85,7 @@ class SceneSpec:
     background: Vector3 = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        check(self.index >= 0, "index", self.index, "0 or more")
+        check(0 <= self.index < 2**63, "index", self.index, "0 or more, below 2**63")
         check(len(self.cameras) > 0, "cameras", "none", "at least one")
 
     def to_json(self) -> str:

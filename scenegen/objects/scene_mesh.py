@@ -1,6 +1,7 @@
 """A whole scene, room and objects, as one triangle mesh: for export and for other ray casters."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import trimesh
@@ -10,6 +11,21 @@ from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scenes import SceneSpec
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.solids import UnitShape
+
+
+@dataclass(frozen=True, eq=False)
+class ScenePart:
+    """A plane of the room, or an object, in the world frame.
+
+    Attributes:
+        object_id: 0 for the room, k for the k-th object.
+        normals: unit normals at the corners of the mesh's faces, (F, 3, 3).
+    """
+
+    name: str
+    object_id: int
+    mesh: trimesh.Trimesh
+    normals: NDArray[np.float64]
 
 
 def welded(shape: UnitShape) -> trimesh.Trimesh:
@@ -24,21 +40,37 @@ def scene_mesh(
     scene: SceneSpec, shape_of: Callable[[str], UnitShape] = unit_shape
 ) -> trimesh.Trimesh:
     """Return the room and the objects of a scene as one mesh in the world frame."""
-    parts = [] if scene.room_reflectance is None else [room_mesh()]
-    for item in scene.objects:
-        mesh = welded(shape_of(item.shape))
+    return trimesh.util.concatenate([part.mesh for part in scene_parts(scene, shape_of)])
+
+
+def scene_parts(
+    scene: SceneSpec, shape_of: Callable[[str], UnitShape] = unit_shape
+) -> list[ScenePart]:
+    """Return the planes of the room, if there is one, and the objects of a scene."""
+    parts = [] if scene.room_reflectance is None else _planes()
+    for k, item in enumerate(scene.objects, start=1):
+        shape = shape_of(item.shape)
+        mesh = welded(shape)
         mesh.apply_transform(world_from_object(item.position, item.rotation, item.scale))
-        parts.append(mesh)
-    return trimesh.util.concatenate(parts)
+        normals = shape.normals @ rotation_matrix(item.rotation).T
+        parts.append(ScenePart(f"object_{k}_{item.shape}", k, mesh, normals))
+    return parts
 
 
 def room_mesh() -> trimesh.Trimesh:
     """Return the floor y = 0 and the walls x = 0 and z = 0 of the unit box, facing inwards."""
+    return trimesh.util.concatenate([plane.mesh for plane in _planes()])
+
+
+def _planes() -> list[ScenePart]:
     faces = np.array([[0, 1, 2], [0, 2, 3]])
     floor = np.array([[0, 0, 0], [0, 0, 1], [1, 0, 1], [1, 0, 0]], float)
-    # Cyclic permutations of the axes keep the winding.
-    planes = [np.roll(floor, shift, axis=1) for shift in (0, 2, 1)]
-    return trimesh.util.concatenate([trimesh.Trimesh(p, faces, process=False) for p in planes])
+    planes = []
+    for name, axis in (("floor", 1), ("wall_x", 0), ("wall_z", 2)):
+        corners = np.roll(floor, axis - 1, axis=1)  # a cyclic permutation keeps the winding
+        mesh = trimesh.Trimesh(corners, faces, process=False)
+        planes.append(ScenePart(name, 0, mesh, np.broadcast_to(np.eye(3)[axis], (2, 3, 3))))
+    return planes
 
 
 def world_from_object(

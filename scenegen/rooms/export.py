@@ -1,7 +1,6 @@
 """Write one row of a file of rooms in the formats of other tools: EXR, PNG, PLY, OBJ."""
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,7 @@ from numpy.typing import NDArray
 from scenegen.camera import transform_vectors
 from scenegen.common.new_file import written_beside
 from scenegen.objects.catalogue import Objects, built_in_shape
-from scenegen.objects.scene_mesh import scene_mesh
-from scenegen.objects.solids import UnitShape
+from scenegen.rooms.obj_file import write_mtl, write_obj
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import Room
 
@@ -25,10 +23,8 @@ PNG_DEPTH_UNIT = 1e-4  # scene units for each step of a 16-bit depth: it reaches
 
 def export_paths(row: int, folder: str | Path, stem: str, form: str) -> list[Path]:
     """Return the paths of the files that one row is written to in a format (one of FORMATS)."""
-    name = f"{stem}-{row:06d}"
-    if form != "png":
-        return [Path(folder) / f"{name}.{form}"]
-    return [Path(folder) / f"{name}-{kind}.png" for kind in _PNG]
+    endings = {"png": [f"-{kind}.png" for kind in _PNG], "obj": [".obj", ".mtl"]}
+    return [Path(folder) / f"{stem}-{row:06d}{end}" for end in endings.get(form, [f".{form}"])]
 
 
 def export_room(
@@ -43,10 +39,16 @@ def export_room(
     "obj" needs the `objects` of the scene, unless they are built in.
     """
     shape_of = objects.shape if objects else built_in_shape
-    obj = partial(write_mesh_obj, shape_of=shape_of)
-    one: dict[str, Writer] = {"exr": write_exr, "ply": write_surfels_ply, "obj": obj}
-    writers = list(_PNG.values()) if form == "png" else [one[form]]
-    for path, write in zip(paths, writers, strict=True):
+    writers: dict[str, list[Writer]] = {
+        "exr": [write_exr],
+        "png": list(_PNG.values()),
+        "ply": [write_surfels_ply],
+        "obj": [
+            lambda room, path: write_obj(room.scene, path, paths[-1].name, shape_of),
+            lambda room, path: write_mtl(room.scene, path),
+        ],
+    }
+    for path, write in zip(paths, writers[form], strict=True):
         with written_beside(path, overwrite) as temporary:
             write(room, temporary)
 
@@ -77,8 +79,8 @@ def write_surfels_ply(room: Room, path: str | Path) -> None:
     """Write the surfels in the world frame: position, normal, colour (sRGB), object id."""
     hit = room.object_id >= 0
     names = ("x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "object_id")
-    kinds = 6 * ["float"] + 3 * ["uchar"] + ["char"]
-    types = {"float": "<f4", "uchar": "u1", "char": "i1"}
+    kinds = 6 * ["float"] + 4 * ["uchar"]  # Open3D reads no "char"
+    types = {"float": "<f4", "uchar": "u1"}
     points = room.points_world[hit]
     normals = transform_vectors(room.world_from_camera, room.normal[hit])
     columns = (*points.T, *normals.T, *srgb_bytes(room.radiance)[hit].T, room.object_id[hit])
@@ -88,21 +90,12 @@ def write_surfels_ply(room: Room, path: str | Path) -> None:
         "ply",
         "format binary_little_endian 1.0",
         f"comment surfels of room {room.index}: world frame, y up, scene units",
+        "comment object_id: 0 the room, k the k-th object; pixels without a hit are left out",
         f"element vertex {len(vertices)}",
         *(f"property {kind} {name}" for name, kind in named),
         "end_header",
     ]
     Path(path).write_bytes("\n".join([*header, ""]).encode() + vertices.tobytes())
-
-
-def write_mesh_obj(
-    room: Room, path: str | Path, shape_of: Callable[[str], UnitShape] = built_in_shape
-) -> None:
-    """Write room and objects as triangles in the world frame."""
-    text = scene_mesh(room.scene, shape_of).export(
-        file_type="obj", include_normals=False, header=None
-    )
-    Path(path).write_text(f"# scene of room {room.index}: world frame, y up, scene units\n{text}")
 
 
 def _write_png16(path: Path, values: Array) -> None:

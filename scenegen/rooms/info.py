@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.common.content import CONTENT_DIGEST
 from scenegen.common.records import changed_settings
-from scenegen.layout import FIELDS
+from scenegen.layout import FIELDS, TRUTH_DIGEST
 from scenegen.rendering.backend import UNKNOWN, VERSION_ATTRIBUTES
 from scenegen.rooms.reader import RoomsFile
 
 SAMPLED = 64  # rows that are read to tell the ranges of values
+MOST = 1000  # letters of an attribute that are shown
 
 
 def describe(path: str | Path) -> str:
@@ -29,12 +31,10 @@ def describe(path: str | Path) -> str:
             f"{path}: {len(rooms)} images of {rooms.spec.height}x{rooms.spec.width},"
             f" {Path(path).stat().st_size / 1e6:.1f} MB",
             "",
-            f"  format        {attributes['format']} {attributes['format_version']}",
-            f"  written by    {attributes['writer']}, {attributes.get('variant')}",
-            f"  rendered by   {renderer_text(attributes)}",
-            f"  command       {attributes.get('creation_command') or '-'}",
-            f"  fingerprint   {rooms.fingerprint}",
-            f"  conventions   {attributes.get('conventions')}",
+            f"  format          {attributes['format']} {shown(attributes, 'format_version')}",
+            f"  written by      {shown(attributes, 'writer')}, {shown(attributes, 'variant')}",
+            f"  rendered by     {renderer_text(attributes)}",
+            *(f"  {name:15} {shown(attributes, key)}" for name, key in _SHOWN.items()),
             "",
             "  spec (* differs from the default)",
         ]
@@ -43,17 +43,38 @@ def describe(path: str | Path) -> str:
         lines += [f"    {name:10} {low:.4g} to {high:.4g}" for name, (low, high) in ranges.items()]
         lines += ["", f"  {'dataset':27} {'row':14} {'unit':24} {'stored':>9} {'ratio':>6}"]
         for field, (stored, raw) in zip(FIELDS, rooms.stored_bytes().values(), strict=True):
-            row = "(" + ", ".join(map(str, field.shape)) + ")"
+            row = "(" + ", ".join(field.shape) + ")"
             unit = field.unit if len(field.unit) <= 24 else field.unit[:21] + "..."
             ratio = f"{raw / stored:.1f}" if stored else "-"
             lines.append(f"  {field.name:27} {row:14} {unit:24} {size_text(stored):>9} {ratio:>6}")
-    return "\n".join(lines)
+    return "\n".join(map(_printable, lines))
+
+
+_SHOWN = {
+    "command": "creation_command",
+    "fingerprint": "fingerprint",
+    "truth digest": TRUTH_DIGEST,
+    "content digest": CONTENT_DIGEST,
+    "conventions": "conventions",
+}
+
+
+def shown(attributes: Mapping[str, Any], name: str, missing: str = "-") -> str:
+    """Return a root attribute of a file, which may hold anything, as text for one line."""
+    value = attributes.get(name, "")
+    text = value if isinstance(value, str) else f"not a text: {value!r}"
+    return (text if len(text) <= MOST else text[: MOST - 3] + "...") or missing
+
+
+def _printable(text: str) -> str:
+    """Return a text as one line, its control characters as escapes."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def renderer_text(attributes: Mapping[str, Any]) -> str:
     """Return the versions that rendered a file of rooms or questions; old files do not say."""
     named = zip(("Mitsuba", "Dr.Jit", "LLVM"), VERSION_ATTRIBUTES, strict=True)
-    return ", ".join(f"{name} {attributes.get(key, UNKNOWN)}" for name, key in named)
+    return ", ".join(f"{name} {shown(attributes, key, UNKNOWN)}" for name, key in named)
 
 
 def setting_lines(spec: Any) -> list[str]:

@@ -1,6 +1,7 @@
 """Read a file of rooms: typed records by index, and a map-style dataset for training loops."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,12 +13,22 @@ from numpy.typing import NDArray
 
 from scenegen.camera import back_project, transform_points
 from scenegen.common import input_file, row_file
+from scenegen.common.content import SHA256, joint_digest
 from scenegen.common.errors import FileFormatError
 from scenegen.common.input_file import StoredArray
 from scenegen.common.records import check
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
-from scenegen.layout import FIELDS, FORMAT_NAME, FORMAT_VERSION, columns
+from scenegen.layout import (
+    FIELDS,
+    FORMAT_NAME,
+    FORMAT_VERSION,
+    SCORED,
+    TRUTH_DIGEST,
+    columns,
+    has_digests,
+    root_problems,
+)
 from scenegen.rendering.ground_truth import decode_image
 
 Array = NDArray[Any]
@@ -91,18 +102,21 @@ class RoomsFile:
 
     def __getitem__(self, index: int) -> Room:
         """Read one row; negative indices count from the end. Raises IndexError, FileFormatError."""
-        row = range(len(self))[index]
+        return self.room(range(len(self))[index], self.read)
+
+    def room(self, row: int, read: Callable[[str, int], Any]) -> Room:
+        """Return one row, its values read by `read`, which is as this file's."""
         return Room(
             index=row,
-            view_index=int(self.read("view_index", row)),
-            view_angle_degrees=float(self.read("view_angle_degrees", row)),
-            image=self.read("image", row),
-            depth=self.read("depth", row),
-            normal=self.read("normal", row),
-            object_id=self.read("object_id", row),
-            world_from_camera=self.read("camera/world_from_camera", row),
-            fov_y_degrees=float(self.read("camera/fov_y_degrees", row)),
-            scene=self.scene(row),
+            view_index=int(read("view_index", row)),
+            view_angle_degrees=float(read("view_angle_degrees", row)),
+            image=read("image", row),
+            depth=read("depth", row),
+            normal=read("normal", row),
+            object_id=read("object_id", row),
+            world_from_camera=read("camera/world_from_camera", row),
+            fov_y_degrees=float(read("camera/fov_y_degrees", row)),
+            scene=self._described(row, read("scene", row)),
         )
 
     def __iter__(self) -> Iterator[Room]:
@@ -110,8 +124,11 @@ class RoomsFile:
 
     def scene(self, index: int) -> SceneSpec:
         """Return the description of the scene that row `index` shows."""
-        with row_file.describing(f"{self.path}: scene, row {index}"):
-            return SceneSpec.from_json(self.read("scene", index))
+        return self._described(index, self.read("scene", index))
+
+    def _described(self, row: int, text: bytes) -> SceneSpec:
+        with row_file.describing(f"{self.path}: scene, row {row}"):
+            return SceneSpec.from_json(text)
 
     def read(self, name: str, rows: int | slice) -> Any:
         """Read rows of one dataset. Raises FileFormatError where they are damaged."""
@@ -119,11 +136,30 @@ class RoomsFile:
             return self._datasets[name][rows]
 
     def problems(self) -> list[str]:
-        """Return what is wrong with the layout, the datasets' own descriptions included."""
+        """Return what is wrong with the layout and with the attributes of root and datasets."""
         with input_file.reading(self.path):
-            return _layout_problems(self._file, self.spec) + _attribute_problems(
-                self._file, self.spec
-            )
+            problems = _layout_problems(self._file, self.spec) + root_problems(self.attributes)
+            stored = self._file["image"].compression or "none"
+            if stored != self.attributes.get("compression"):
+                problems.append(f"root attribute compression is not {stored!r}, as of the images")
+            return problems + _attribute_problems(self._file, self.spec)
+
+    def content_problems(self, digests: Mapping[str, str]) -> list[str]:
+        """Return what differs from the digests in the file, which must have them.
+
+        `digests` are the `content.column_digest`s of datasets that were read already.
+        """
+        problems = row_file.digest_problems(self._file, digests)
+        with input_file.reading(self.path):
+            if self.attributes.get(TRUTH_DIGEST) != truth_digest(self._file):
+                problems.append(f"the digests of {', '.join(SCORED)} do not give {TRUTH_DIGEST!r}")
+        return problems
+
+    def stored_digests(self) -> dict[str, str]:
+        """Return the digest that each dataset got when it was written; none in older files."""
+        with input_file.reading(self.path):
+            found = {name: data.attrs.get(SHA256) for name, data in self._datasets.items()}
+        return {name: str(digest) for name, digest in found.items() if digest is not None}
 
     def stored_bytes(self) -> dict[str, tuple[int, int]]:
         """Return the bytes on disk and in memory of each dataset, by name.
@@ -176,15 +212,50 @@ def _layout_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
     return problems
 
 
+def truth_digest(file: h5py.File) -> str:
+    """Return the joint digest of the scored datasets, from their attributes `sha256`."""
+    return joint_digest({name: str(file[name].attrs.get(SHA256)) for name in SCORED})
+
+
 def _attribute_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:
     """Return a sentence for each attribute of a dataset that is not as in `layout.columns`."""
     problems = []
+    labels = has_digests(file.attrs)
     for column in columns(spec):
-        for name, expected in column.attributes.items():
+        attributes = dict(column.attributes)
+        if labels:
+            attributes["DIMENSION_LABELS"] = ["row", *(column.axes or ())]
+        for name, expected in attributes.items():
             found = file[column.name].attrs.get(name)
             if found is None or not np.array_equal(np.asarray(found), np.asarray(expected)):
                 problems.append(f"{column.name}: attribute {name} is {found!r:.60}")
     return problems
+
+
+class RowBlock:
+    """Some rows in a row of a file, each dataset read at once.
+
+    Attributes:
+        values: by name; without the datasets of which some of these rows are damaged.
+    """
+
+    def __init__(self, rooms: RoomsFile, rows: range) -> None:
+        """Read the rows."""
+        self.rows, self._file = rows, rooms
+        self.values: dict[str, Sequence[Any]] = {}
+        for field in FIELDS:
+            with suppress(FileFormatError):
+                if field.per_pixel:  # each row is a chunk
+                    self.values[field.name] = [rooms.read(field.name, row) for row in rows]
+                else:
+                    every = slice(rows.start, rows.stop)
+                    self.values[field.name] = rooms.read(field.name, every)
+
+    def read(self, name: str, row: int) -> Any:
+        """Return one row, perhaps of another block, as `RoomsFile.read`."""
+        if name in self.values and row in self.rows:
+            return self.values[name][row - self.rows.start]
+        return self._file.read(name, row)
 
 
 class RoomsDataset(row_file.RowDataset):

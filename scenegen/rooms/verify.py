@@ -1,11 +1,13 @@
-"""Check a file of rooms: its layout, the values of every row, and some rows rendered again.
+"""Check a file of rooms: its layout, digests and rows, and some rows rendered again.
 
-For every row: the arrays agree with the scene's description; depths, normals and object ids are
-possible and agree with one another; and shading them gives the image. For some rows: the seed
-still gives the description, and the description the pixels.
+Every row keeps the rules of `row_rules`. For some rows: the seed still gives the description, and
+the description the pixels.
 """
 
-from collections.abc import Callable, Iterable
+import hashlib
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,25 +16,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import pixel_directions, transform_points, transform_vectors
-from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
+from scenegen.common.content import row_digest
+from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.specs import DatasetSpec, Fingerprint
-from scenegen.objects.catalogue import Objects, changed_meshes, objects_of
+from scenegen.layout import FIELDS, has_digests
+from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.rendering.backend import select_variant, versions
-from scenegen.rendering.ground_truth import visible_pixels
-from scenegen.rendering.packing import SceneBatch, pack
+from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import render
-from scenegen.rendering.shading import shade
-from scenegen.rooms.reader import Room, RoomsFile
-from scenegen.rooms.writer import described
+from scenegen.rooms.reader import Room, RoomsFile, RowBlock
+from scenegen.rooms.row_rules import (
+    LOBE_TOLERANCE,
+    PIXELS,
+    RADIANCE_TOLERANCE,
+    row_problems,
+    row_rules,
+)
 from scenegen.sampling.scenes import MAX_ATTEMPTS, sample_scene
 
 Array = NDArray[Any]
-UNIT_TOLERANCE = 1e-5  # by which the length of a normal may differ from 1
-PLANE_TOLERANCE = 1e-5  # scene units that float32 depths may put a surfel off its plane
-RADIANCE_TOLERANCE = 1e-5  # float32's rounding in the shading equation, for radiance up to 1
-LOBE_TOLERANCE = 4e-7  # relative rounding of a highlight for each unit of its exponent
 # Rows rendered again agree bit for bit where variant and versions are those that wrote the file.
 # Elsewhere a pixel agrees where its object id is equal, its depth and each component of its normal
 # differ by no more than this, and its image by no more than one step of uint8 or, for floats, this
@@ -43,6 +46,8 @@ IMAGE_TOLERANCE = {"uint8": 0.0, "float16": 2.0**-10, "float32": 1e-4}
 PATH_TOLERANCE = 0.1  # share by which the mean of a path-traced image's channel may differ
 EDGE_SHARE = 1e-3  # of a row's pixels that may disagree
 SHOWN = 5  # problems that a message names; of more it gives the number
+BLOCK_PIXELS = 2**20  # of the rows that are read at once
+BATCH_PIXELS = 2**22  # of the rows that are rendered at once
 
 
 @dataclass(frozen=True)
@@ -72,23 +77,28 @@ def verify_file(
     """
     with RoomsFile(path) as rooms:
         objects = objects or objects_of(rooms.spec)
-        broken: dict[str, list[str]] = {name: [] for name in _ROW_RULES}
+        rules = row_rules(rooms.spec)
+        broken: dict[str, list[str]] = {name: [] for name in rules}
         fingerprint = Fingerprint(rooms.spec)
-        for i in range(len(rooms)):
-            if rooms.read("view_index", i) == 0:
-                fingerprint.add(rooms.read("scene", i))
-            for name, problem in _row_problems(rooms, i, objects):
-                broken[name].append(f"row {i}: {problem}")
-            progress(1)
-        wrong = rooms.problems()
+        digests = {field.name: hashlib.sha256() for field in FIELDS}
+        step = max(1, BLOCK_PIXELS // (rooms.spec.height * rooms.spec.width))
+        for start in range(0, len(rooms), step):
+            block = RowBlock(rooms, range(start, min(start + step, len(rooms))))
+            digests = {name: x for name, x in digests.items() if name in block.values}
+            for name, digest in digests.items():
+                for row in block.values[name]:
+                    digest.update(row_digest(row))
+            for i in block.rows:
+                if block.read("view_index", i) == 0:
+                    fingerprint.add(block.read("scene", i))
+                for name, problem in row_problems(rooms, block, i, objects):
+                    broken[name].append(f"row {i}: {problem}")
+                progress(1)
         layout = f"{len(rooms)} rows, format {rooms.attributes['format_version']}"
-        checks = [Check("layout", not wrong, "; ".join(wrong[:SHOWN]) or layout)]
-        rules = dict(_ROW_RULES)
-        if rooms.spec.shading == "path":
-            rules["image"] = "finite and not negative"
-        elif rooms.spec.spp > 1 or rooms.spec.shadows:
-            rules["image"] = "finite, and no darker than ambient light alone"
-        checks += [_row_check(name, rules[name], broken[name], len(rooms)) for name in rules]
+        checks = [_check("layout", layout, rooms.problems())]
+        checks.append(_content(rooms, {name: x.hexdigest() for name, x in digests.items()}))
+        for name, rule in rules.items():
+            checks.append(_check(name, f"{rule} ({len(rooms)} rows)", broken[name]))
         same = fingerprint.hex == rooms.fingerprint
         checks.append(Check("fingerprint", same, rooms.fingerprint if same else "does not match"))
         rows = np.unique(np.linspace(0, len(rooms) - 1, min(items, len(rooms))).round().astype(int))
@@ -98,144 +108,20 @@ def verify_file(
     return checks
 
 
-_PIXELS = ("image", "depth", "normal", "object_id")
-_ROW_RULES = {
-    "description": "the scene's JSON can be read and agrees with the arrays",
-    "depth": "finite and positive where something is hit, NaN elsewhere",
-    "normal": "unit and facing the viewer where something is hit, zero elsewhere",
-    "object_id": "from -1 to the object count; every object shows enough pixels",
-    "image": "finite, not negative, and the shading equation of the other values",
-}
-
-
-def _row_check(name: str, rule: str, problems: list[str], count: int) -> Check:
+def _check(name: str, detail: str, problems: Sequence[str]) -> Check:
     if not problems:
-        return Check(name, True, f"{rule} ({count} rows)")
+        return Check(name, True, detail)
     more = f" and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
     return Check(name, False, "; ".join(problems[:SHOWN]) + more)
 
 
-def _row_problems(rooms: RoomsFile, i: int, objects: Objects) -> Iterable[tuple[str, str]]:
-    try:
-        room = rooms[i]
-        batch = pack(rooms.spec, [room.scene], (room.view_index,), objects)
-    except (SceneGenError, IndexError) as error:
-        readable = True
-        for name in _PIXELS:
-            try:
-                rooms.read(name, i)
-            except FileFormatError:
-                readable = False
-                yield name, f"{name} cannot be read"
-        if readable:
-            yield "description", str(error)
-        return
-    found = {
-        "description": _description_problems(rooms, room, batch, objects),
-        "depth": _depth_problems(room),
-        "normal": _normal_problems(room),
-        "object_id": _object_problems(rooms, room),
-        "image": _image_problems(rooms, room, batch),
-    }
-    with np.errstate(all="ignore"):  # a damaged number may overflow, and is found all the same
-        yield from ((name, problem) for name, some in found.items() for problem in some)
-
-
-def _description_problems(
-    rooms: RoomsFile, room: Room, batch: SceneBatch, objects: Objects
-) -> Iterable[str]:
-    changed = changed_meshes(objects, room.scene)
-    if changed:
-        yield f"made from other files than the folder's: {', '.join(changed)}"
-    views = len(rooms.spec.views)
-    first = room.index - room.index % views
-    if room.view_index != room.index - first or len(room.scene.cameras) != views:
-        yield f"view_index or the number of cameras is not that of the {views} views"
-        return
-    if room.view_index and rooms.read("scene", room.index) != rooms.read("scene", first):
-        yield "the scene's description differs from that of its first view"
-    for name, expected in described(batch, 0, room.scene).items():
-        found = rooms.read(name, room.index)
-        if name == "object/model":
-            same = [model.decode("utf-8", "replace") for model in found] == expected
-        else:
-            same = np.allclose(found, expected, rtol=0, atol=1e-12)
-        if not same:
-            yield f"{name} differs from the scene's description"
-
-
-def _depth_problems(room: Room) -> Iterable[str]:
-    hit = room.object_id >= 0
-    if not (np.isfinite(room.depth[hit]).all() and (room.depth[hit] > 0).all()):
-        yield "a hit pixel's depth is not a positive number"
-    if not np.isnan(room.depth[~hit]).all():
-        yield "a pixel without a hit has a depth"
-    walls = np.abs(room.points_world[room.object_id == 0])
-    if walls.size and not (walls.min(axis=1) < PLANE_TOLERANCE).all():
-        yield "a surfel of the room lies off floor and walls"
-
-
-def _normal_problems(room: Room) -> Iterable[str]:
-    hit = room.object_id >= 0
-    length = np.linalg.norm(room.normal.astype(np.float64), axis=-1)
-    if not (np.abs(length[hit] - 1) < UNIT_TOLERANCE).all():
-        yield f"a normal's length is off 1 by {np.nanmax(np.abs(length[hit] - 1)):.1e}"
-    if not (room.normal[~hit] == 0).all():
-        yield "a pixel without a hit has a normal"
-    rays = pixel_directions(room.depth.shape[0], room.depth.shape[1], room.fov_y_degrees)
-    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    if not ((room.normal * rays).sum(-1)[hit] < UNIT_TOLERANCE).all():
-        yield "a normal faces away from the viewer"
-
-
-def _object_problems(rooms: RoomsFile, room: Room) -> Iterable[str]:
-    count = len(room.scene.objects)
-    if room.object_id.min() < -1 or room.object_id.max() > count:
-        yield f"object ids {room.object_id.min()} to {room.object_id.max()}, {count} objects"
-    visible = visible_pixels(room.object_id[None], rooms.spec.object_slots)[0]
-    if not np.array_equal(visible, rooms.read("object/visible_pixels", room.index)):
-        yield "object/visible_pixels does not count them"
-    if (visible[:count] < rooms.spec.min_visible_pixels).any():
-        yield f"an object shows {visible[:count].min()} pixels"
-
-
-def _image_problems(rooms: RoomsFile, room: Room, batch: SceneBatch) -> Iterable[str]:
-    radiance = room.radiance
-    if not np.isfinite(radiance).all() or (radiance < 0).any():
-        yield "a value is negative or not finite"
-        return
-    if rooms.spec.shading == "path":
-        return
-    if rooms.spec.spp > 1 or rooms.spec.shadows:
-        # With shadows, or the mean of several samples, only a lower bound is known: ambient light.
-        darkest = (batch.reflectance[0, : batch.object_count[0] + 1] * batch.ambient[0]).min(axis=0)
-        if (room.object_id >= 0).all() and (radiance < darkest - 0.5 / 255 - 1e-3).any():
-            yield "a pixel is darker than ambient light alone"
-        return
-    material = np.maximum(room.object_id, 0)
-    specular, shininess = batch.gloss[0, material, 0], batch.gloss[0, material, 1]
-    matte = (
-        transform_points(room.world_from_camera, np.nan_to_num(room.points)),
-        transform_vectors(room.world_from_camera, room.normal),
-        batch.reflectance[0, material],
-        batch.light_position[0, : batch.light_count[0]],
-        batch.light_color[0, : batch.light_count[0]],
-        batch.ambient[0],
-        batch.attenuation[0],
-    )
-    reference = shade(*matte)
-    tolerance = RADIANCE_TOLERANCE * np.maximum(reference, 1.0)
-    if rooms.spec.specular[1] > 0:
-        shine = shade(*matte, specular, shininess, room.world_from_camera[:3, 3]) - reference
-        tolerance += LOBE_TOLERANCE * shininess[..., None] * shine
-        reference += shine
-    reference[room.object_id < 0] = room.scene.background
-    step = {"uint8": 0.5 / 255, "float16": 2.0**-11, "float32": 0.0}[rooms.spec.image_dtype]
-    if rooms.spec.image_dtype == "uint8":
-        reference = reference.clip(0, 1)
-    off = np.abs(radiance - reference) - step * np.maximum(reference, 1.0) - tolerance
-    if (off > 0).any():
-        yield f"{int((off > 0).any(-1).sum())} pixels are not what the shading equation gives"
+def _content(rooms: RoomsFile, digests: dict[str, str]) -> Check:
+    """Check that the file's values and attributes are those that were written, bit for bit."""
+    if not has_digests(rooms.attributes):
+        version = rooms.attributes["format_version"]
+        return Check("content", True, f"not checked: format {version} has no digests")
+    problems = rooms.content_problems(digests)
+    return _check("content", "every value and attribute as written, by SHA-256", problems)
 
 
 def _sampled_again(rooms: RoomsFile, rows: Array, objects: Objects) -> Check:
@@ -260,15 +146,13 @@ def _rendered_again(rooms: RoomsFile, rows: Array, device: str, objects: Objects
     stored = {name: str(rooms.attributes.get(name, "not stored")) for name in here}
     others = [f"{x} {stored[x]}, here {here[x]}" for x in here if stored[x] != here[x]]
     wrong, off = [], 0
+    again = _render(rooms, rows.tolist(), device, objects)
     for i in rows.tolist():
-        try:
-            room = rooms[i]
-            with np.errstate(all="ignore"):
-                again = render(pack(rooms.spec, [room.scene], (room.view_index,), objects), device)
-        except (FileFormatError, SpecError, BadMeshError):
-            wrong.append(f"row {i} (cannot be read)")
+        if i not in again:
+            wrong.append(f"row {i} (cannot be rendered)")
             continue
-        pairs = {name: (getattr(room, name), getattr(again, name)[0]) for name in _PIXELS}
+        room, pixels = again[i]
+        pairs = {name: (getattr(room, name), pixels[name]) for name in PIXELS}
         differs = [
             name for name, pair in pairs.items() if not np.array_equal(*pair, equal_nan=True)
         ]
@@ -282,6 +166,40 @@ def _rendered_again(rooms: RoomsFile, rows: Array, device: str, objects: Objects
     detail = "differ: " + ", ".join(wrong) if wrong else f"{len(rows)} rows, {what}"
     remark = f" (the file's {'; '.join(others)})" if others else ""
     return Check("rendered again", not wrong, detail + remark)
+
+
+def _render(
+    rooms: RoomsFile, rows: list[int], device: str, objects: Objects
+) -> dict[int, tuple[Room, dict[str, Array]]]:
+    """Return the rooms of some rows and their pixels rendered again, where that is possible.
+
+    Rows that show the same view of their scenes are rendered together, as most time goes into
+    preparing a batch.
+    """
+    views = defaultdict[int, list[Room]](list)
+    for i in rows:
+        with suppress(FileFormatError):
+            room = rooms[i]
+            views[room.view_index].append(room)
+    most = max(1, BATCH_PIXELS // (rooms.spec.height * rooms.spec.width))
+    found: dict[int, tuple[Room, dict[str, Array]]] = {}
+
+    def draw(view: int, some: list[Room]) -> None:
+        try:
+            with np.errstate(all="ignore"):
+                batch = pack(rooms.spec, [room.scene for room in some], (view,), objects)
+                pixels = vars(render(batch, device))
+        except (SpecError, BadMeshError):
+            for room in some if len(some) > 1 else ():
+                draw(view, [room])
+            return
+        for k, room in enumerate(some):
+            found[room.index] = room, {name: pixels[name][k] for name in PIXELS}
+
+    for view, same in views.items():
+        for start in range(0, len(same), most):
+            draw(view, same[start : start + most])
+    return found
 
 
 def _within_tolerance(name: str, stored: Array, again: Array, spec: DatasetSpec) -> bool:

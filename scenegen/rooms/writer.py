@@ -9,20 +9,23 @@ from typing import Any
 import h5py
 from numpy.typing import NDArray
 
-from scenegen.common.content import SHA256, joint_digest, seal
+from scenegen.common.content import seal
 from scenegen.common.records import check
 from scenegen.common.row_file import Table, new_file, writer_name
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec, Fingerprint
-from scenegen.layout import FORMAT_NAME, FORMAT_VERSION, SCORED, TRUTH_DIGEST, columns
+from scenegen.layout import (
+    CONVENTIONS,
+    FORMAT_NAME,
+    FORMAT_VERSION,
+    TRUTH_DIGEST,
+    columns,
+)
 from scenegen.rendering.packing import SceneBatch
+from scenegen.rooms.reader import truth_digest
 
 Array = NDArray[Any]
 MAX_COUNT = 100_000_000
-CONVENTIONS = (
-    "world: right-handed, y up, room = unit box with floor y = 0 and walls x = 0, z = 0; camera:"
-    " x right, y up, looks along -z; pixels: row 0 on top, centres at +0.5; see docs/conventions.md"
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,5 +129,5 @@ def create_rooms(
         if writer.table.rows != rows:
             raise RuntimeError(f"{path}: got {writer.table.rows} of {rows} rows")
         file.attrs["fingerprint"] = writer.fingerprint.hex
-        file.attrs[TRUTH_DIGEST] = joint_digest({name: file[name].attrs[SHA256] for name in SCORED})
+        file.attrs[TRUTH_DIGEST] = truth_digest(file)
         seal(file)

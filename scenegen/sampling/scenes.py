@@ -57,8 +57,7 @@ def refusal(
     spec: DatasetSpec, index: int, placed_but_hidden: int, objects: Objects | None = None
 ) -> PlacementError:
     """Return why item `index` got no scene, `placed_but_hidden` of its proposals being rendered."""
-    unplaced = sample_objects(spec, index, objects or objects_of(spec))
-    wanted = len(unplaced)
+    wanted = len(sample_objects(spec, index, objects or objects_of(spec)))
     if placed_but_hidden:
         return PlacementError(
             f"item {index}",
@@ -67,11 +66,9 @@ def refusal(
             f"{spec.min_visible_pixels} pixels or more of every object",
             "try fewer --objects, a larger --object-radius or fewer --min-visible-pixels",
         )
-    cameras = sample_cameras(spec, index)
-    best = max(len(_place_objects(spec, index, k, cameras, unplaced)) for k in range(10))
     return PlacementError(
         f"item {index}",
-        f"room for at most {best} of its {wanted} objects in {MAX_ATTEMPTS} proposals",
+        f"no room for its {wanted} objects in {MAX_ATTEMPTS} proposals",
         "room for all of them inside the walls and the image, touching nothing",
         "try fewer --objects, a smaller --object-radius or --allow-cropped",
     )

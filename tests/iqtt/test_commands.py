@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 import cli
+from iqtt.questions.specs import secret_seed
 
 TINY = "--train 6 --labeled 3 --val 3 --test 3 --size 32 --batch 4"
 FILES = ["iqtt-test-answers.h5", "iqtt-test.h5", "iqtt-train.h5", "iqtt-val.h5"]
@@ -66,6 +67,48 @@ def test_every_option_is_recorded(run, monkeypatch, tmp_path):
         assert file["labeled/questions"].dtype == "float32"
         assert file["labeled/questions"].compression == "lzf"
         assert np.unique(file["truth/labeled/light_count"][:]).max() <= 3
+
+
+def test_a_secret_seed(run, tmp_path):
+    """The same content gives the same questions, blanks aside; tools that read cope without a seed;
+    only a split whose seed is known gets a note.
+    """
+    for name, content in (("a", "0123456789abcdef"), ("b", " 0123456789abcdef\n"), ("c", "z" * 16)):
+        (tmp_path / name).write_text(content)
+        made = run("make-split", *TINY.split(), "--out", f"{name}x", "--secret-seed", name)
+        assert made.exit_code == 0, made.output
+        assert "note" not in made.stderr
+    raw = {name: (tmp_path / f"{name}x/iqtt-test.h5").read_bytes() for name in "abc"}
+    assert raw["a"] == raw["b"] != raw["c"]
+    told = run("info", "ax/iqtt-test-answers.h5")
+    assert told.exit_code == 0
+    assert str(secret_seed("a")) not in told.stdout
+    assert run("audit", "ax").exit_code == 0
+    known = run("make-split", *TINY.split(), "--out", "known")
+    assert "note: " in known.stderr
+    assert "--secret-seed" in known.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("--secret-seed short", ["short", "14", "16"]),
+        ("--secret-seed missing", ["missing", "No such file"]),
+        ("--secret-seed long --seed 0", ["--secret-seed", "--seed"]),
+        ("--secret-seed x/iqtt-val.h5 --out x --overwrite", ["x/iqtt-val.h5", "input"]),
+        ("--secret-seed vast", ["vast", "1000001"]),
+    ],
+)
+def test_a_secret_that_is_none(run, tmp_path, options, words, check_refusal):
+    (tmp_path / "short").write_text("  14 characters.\n")
+    (tmp_path / "long").write_text("z" * 20)
+    (tmp_path / "vast").write_text("z" * 2_000_000)
+    (tmp_path / "x").mkdir()
+    (tmp_path / "x/iqtt-val.h5").write_text("z" * 20)
+    before = sorted(tmp_path.rglob("*"))
+    result = run("make-split", *TINY.split(), *options.split())
+    check_refusal(result.exit_code, result.stdout, result.stderr, tuple(words))
+    assert sorted(tmp_path.rglob("*")) == before
 
 
 @pytest.mark.parametrize(

@@ -55,9 +55,10 @@ def test_a_baseline_goes_all_the_way(truths, folder):
         made = bench("baseline", name, "--data", truths.rooms, "--out", f"{name}.h5")
         assert made.exit_code == 0, made.output
         assert f"bench score {name}.h5" in made.stdout
-        assert bench("validate", f"{name}.h5").stdout == f"{name}.h5: valid\n"
+        truth = ("--truth", truths.rooms)
+        assert bench("validate", f"{name}.h5", *truth).stdout == f"{name}.h5: valid\n"
         outputs = ("--json", f"{name}.json", "--csv", f"{name}.csv", "--html", f"{name}.html")
-        scored = bench("score", f"{name}.h5", *outputs)
+        scored = bench("score", f"{name}.h5", *truth, *outputs)
         assert scored.exit_code == 0, scored.output
         assert "chamfer" in scored.stdout
         for ending in ("json", "csv", "html"):

@@ -170,6 +170,8 @@ VALUES = [
     ("a signalling NaN", ["depth", "finite", "4"],
      put("depth", (4, 2, 2), np.array(0x7FA00001, "u4").view("f4"))),
     ("absurd magnitude", ["depth", "finite"], replaced("depth", lambda v: v.astype("f8") * 1e200)),
+    ("beyond single precision", ["depth", "finite"],
+     replaced("depth", lambda v: np.full(v.shape, 9e99))),
     ("overflow of half precision", ["depth", "finite"], replaced("depth", made.halved_precision)),
     ("NaN in a normal", ["normal", "finite", "2"], put("normal", (2, 5, 7, 1), np.nan)),
     ("normals of length 0", ["normal", "length 0"], put("normal", (6, 5), 0.0)),

@@ -106,7 +106,8 @@ def swap_rows(a, b, *names):
 
     def edit(file):
         found = []
-        file.visititems(lambda name, x: found.append(name) if hasattr(x, "dtype") else None)
+        rows = lambda x: hasattr(x, "dtype") and not x.is_scale  # noqa: E731
+        file.visititems(lambda name, x: found.append(name) if rows(x) else None)
         for name in names or found:
             rows = file[name][:]
             rows[[a, b]] = rows[[b, a]]

@@ -17,7 +17,7 @@ from torch import Tensor
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.new_file import written_beside
+from scenegen.common.new_file import write_text, written_beside
 from scenegen.common.records import check, from_json, normalise
 
 FORMAT_VERSION = 1
@@ -85,8 +85,7 @@ def save_tensors(path: str | Path, tensors: Mapping[str, Tensor], notes: dict[st
 def save_card(path: str | Path, card: Card) -> None:
     """Write the JSON beside weights, or replace it."""
     text = json.dumps(card, default=vars, indent=1, sort_keys=True)
-    with written_beside(Path(path).with_suffix(".json"), overwrite=True) as temporary:
-        temporary.write_text(text + "\n")
+    write_text(Path(path).with_suffix(".json"), text + "\n", overwrite=True)
 
 
 def load_card(path: str | Path) -> Card:

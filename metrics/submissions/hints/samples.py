@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures.checks import LARGEST_MAGNITUDE
 from metrics.submissions.reader import RoomPredictions
+from metrics.submissions.rules import LARGEST
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
@@ -69,7 +69,7 @@ def _sample(predictions: RoomPredictions, i: int, truth: RoomsFile) -> Sample | 
     grid = np.ix_(mirrored_grid(height, SIDE), mirrored_grid(width, SIDE))
     fov = float(truth.read("camera/fov_y_degrees", row))
     true_depth = truth.read("depth", row)[grid].astype(np.float64)
-    usable = np.isfinite(true_depth) & (np.abs(depth[grid]) <= LARGEST_MAGNITUDE)
+    usable = np.isfinite(true_depth) & (np.abs(depth[grid]) <= LARGEST)
     if 2 * np.count_nonzero(usable) < usable.size:
         return None
     return Sample(

@@ -1,6 +1,6 @@
 """A cache of cleaned models on disk, one file each, named by the hash of the original's content.
 
-Several processes may share a folder: each writes to a temporary name and then renames. A damaged
+Several processes may share a folder, as an entry gets its name when it is complete. A damaged
 entry is made again. If the folder cannot be written to, a warning is given and nothing is cached.
 """
 
@@ -8,16 +8,15 @@ import errno
 import hashlib
 import json
 import os
-import secrets
 import threading
 import warnings
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from scenegen.common.new_file import written_beside
 from scenegen.objects.meshes.clean import clean_mesh
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.hull import hull_points
@@ -97,27 +96,23 @@ class MeshCache:
             self._give_up(error)
 
     def _write(self, entry: Path, model: CachedModel) -> None:
-        temporary = entry.with_name(f".{secrets.token_hex(8)}.partial")
         about = {"mended": dict(model.mended), "refusal": model.refusal}
         try:
             entry.parent.mkdir(parents=True, exist_ok=True)
-            with temporary.open("xb") as file:
+            with written_beside(entry, overwrite=True) as temporary, temporary.open("xb") as file:
                 arrays = {name: getattr(model, name) for name in _ARRAYS}
                 text = np.frombuffer(json.dumps(about).encode(), np.uint8)
                 np.savez(file, **arrays, about=text)
-            os.replace(temporary, entry)
         except OSError as error:
             self._give_up(error)
-        finally:
-            with suppress(OSError):
-                temporary.unlink(missing_ok=True)
 
     def _give_up(self, error: OSError) -> None:
         with self._lock:
             folder, self.folder = self.folder, None
         if folder is not None:
+            reason = os.strerror(error.errno or errno.EIO)
             warnings.warn(
-                f"{folder}: cannot be written to ({error.strerror}), so models are cleaned again in"
+                f"{folder}: cannot be written to ({reason}), so models are cleaned again in"
                 " every process; choose another --cache-dir",
                 stacklevel=2,
             )

@@ -1,16 +1,16 @@
 """Try every model of a folder: which can be used, what was mended, why others are refused."""
 
-import multiprocessing
 import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from scenegen.common.errors import SceneGenError
+from scenegen.common.worker_pool import worker_pool
 from scenegen.objects.meshes.cache import MeshCache
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFile, ModelFolder
@@ -114,9 +114,7 @@ def _until_one_dies(
 ) -> Iterator[ModelCheck]:
     """Check the files that wait. If a process dies, stop and put the unfinished ones in `lost`."""
     running: dict[Future[ModelCheck], ModelFile] = {}
-    # Spawned, as forking a process that has threads, such as a renderer's, is not safe.
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, context) as pool:
+    with worker_pool(jobs) as pool:
         try:
             pool.submit(time.perf_counter).result()
         except BrokenProcessPool as error:  # before any model was read

@@ -17,8 +17,10 @@ from iqtt.files.make import FILES, make_split
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.splits import TooFewShapesError
 from scenegen.common.errors import PlacementError, SpecError
+from scenegen.common.workspace import remove_leftovers
 from scenegen.rendering.backend import versions
 
+ENDS = ("little", "big")
 SECRET = 8_123_456_789_012_345
 SPEC = SplitSpec(
     seed=SECRET, train=7, labeled=3, val=4, test=5, cubes=(6, 7), height=24, width=32,
@@ -30,6 +32,13 @@ import sys
 from iqtt.questions.specs import SplitSpec
 from iqtt.files.make import make_split
 make_split(sys.argv[1], SplitSpec.from_json(sys.argv[2]), batch=3, command=sys.argv[3])
+"""
+KILLED = """
+import os, signal, sys
+from iqtt.questions.specs import SplitSpec
+from iqtt.files.make import make_split
+kill = lambda done: os.kill(os.getpid(), signal.SIGKILL)
+make_split(sys.argv[1], SplitSpec.from_json(sys.argv[2]), batch=1, overwrite=True, progress=kill)
 """
 TINY = SplitSpec(
     seed=1, train=3, labeled=2, val=2, test=2, cubes=(6, 6), height=16, width=16, min_cube_pixels=0
@@ -70,6 +79,23 @@ def test_nothing_handed_out_tells_the_test_answers(folder):
         assert (str(SECRET).encode() in raw) == secret
         assert (SECRET.to_bytes(8, "little") in raw) is False
         assert (b"creation_command" in raw) == secret
+
+
+def test_a_secret_seed_is_in_no_file(folder, tmp_path):
+    """Nor anything that follows from it but the questions; these are those of any seed."""
+    make_split(tmp_path / "secret", SPEC, command="iqtt make-split", secret=True)
+    for name, raw in contents(tmp_path / "secret").items():
+        for seed in (str(SECRET).encode(), *(SECRET.to_bytes(8, order) for order in ENDS)):
+            assert seed not in raw, name
+        if "answers" not in name:
+            assert raw == (folder / name).read_bytes()
+    with (
+        h5py.File(folder / "iqtt-test-answers.h5") as told,
+        h5py.File(tmp_path / "secret" / "iqtt-test-answers.h5") as file,
+    ):
+        assert SplitSpec.from_json(file.attrs["spec"]) == SPEC.public()
+        assert file["answers"][:].tobytes() == told["answers"][:].tobytes()
+        assert file.attrs["fingerprint"] == told.attrs["fingerprint"]
 
 
 def test_the_same_request_gives_the_same_bytes(folder, tmp_path):
@@ -195,21 +221,32 @@ def test_an_older_split_is_replaced_only_on_request(old, tmp_path):
     beside = set()
     look = lambda _: beside.update(os.listdir(tmp_path))  # noqa: E731
     make_split(old, replace(TINY, seed=2), overwrite=True, progress=look)
-    assert beside == {"old"}, "made inside, as another disk may be mounted there"
+    assert len(beside) == 2, "the new one is made beside the old one"
     after = listing(tmp_path)
     assert set(after) == set(before)
     assert all(after[f"old/{name}"] != before[f"old/{name}"] for name in FILES)
 
 
-def test_a_linked_or_empty_folder_is_filled_where_it_is(old, tmp_path, monkeypatch):
-    (tmp_path / "link").symlink_to(old)
-    make_split(tmp_path / "link", replace(TINY, seed=2), overwrite=True)
-    assert (tmp_path / "link").is_symlink()
-    assert sorted(os.listdir(old)) == sorted(FILES)
+def test_the_folder_that_one_is_in_is_filled_where_it_is(old, tmp_path, monkeypatch):
     (tmp_path / "empty").mkdir()
     monkeypatch.chdir(tmp_path / "empty")
-    make_split(".", replace(TINY, seed=2), overwrite=True)
+    make_split(".", TINY, overwrite=True)
     assert listing(Path()) == listing(old)
+
+
+def test_a_killed_run_is_in_nobody_s_way(old, tmp_path):
+    """Killed while it makes the split, and then started again."""
+    command = [sys.executable, "-c", KILLED, old, replace(TINY, seed=2).to_json()]
+    for folder in (old, tmp_path / "new"):
+        before = listing(old)
+        command[3] = str(folder)
+        assert subprocess.run(command, check=False, capture_output=True).returncode == -9
+        assert listing(old) == before
+        assert len(os.listdir(tmp_path)) == 2, "the split and what the killed run left"
+        with pytest.warns(UserWarning, match="partial"):
+            remove_leftovers(tmp_path)
+        make_split(folder, replace(TINY, seed=2), overwrite=True)
+        assert sorted(os.listdir(folder)) == sorted(FILES)
 
 
 @pytest.mark.parametrize(
@@ -239,7 +276,7 @@ def test_places_that_cannot_be_a_folder_are_refused_before_anything_is_made(tmp_
             ("file", NotADirectoryError),
             ("file/split", NotADirectoryError),
             ("missing/split", FileNotFoundError),
-            ("nowhere", FileNotFoundError),
+            ("nowhere", OSError),
         ):
             with pytest.raises(kind):
                 make_split(tmp_path / name, TINY, overwrite=overwrite)

@@ -14,7 +14,7 @@ from scenegen.common.errors import SpecError
 
 NAN, INF = math.nan, math.inf
 REFUSED = {
-    "seed": ("seed", (-1, 2**63)),
+    "seed": ("seed", (-1, 2**256)),
     "train": ("train", (-1, 10**8 + 1)),
     "val": ("val", (-1, 10**8 + 1)),
     "test": ("test", (-1, 10**8 + 1)),
@@ -37,7 +37,7 @@ REFUSED = {
     },
 }
 EDGES = [
-    *({"seed": seed} for seed in (0, 2**63 - 1)),
+    *({"seed": seed} for seed in (0, 2**63 - 1, 2**256 - 1)),
     *({"train": 0, "labeled": 0, "val": 0, "test": 0} | {name: 1} for name in SPLITS),
     dict.fromkeys(("train", "labeled", "val", "test"), 10**8),
     *({"cubes": cubes, "shapes": "tree"} for cubes in ((3, 3), (16, 16), (3, 16))),

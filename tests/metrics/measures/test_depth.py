@@ -91,6 +91,31 @@ def test_depth_behind_the_camera_scores_badly():
     assert scores["silog"] > 100.0
 
 
+@pytest.mark.parametrize("alignment", ["none", "median_scale", "scale"])
+def test_a_lost_sign_scores_worse_than_its_positive_twin(alignment):
+    true = np.linspace(1.0, 3.0, 50)
+    name = "silog" if alignment == "none" else f"silog_after_{alignment}"
+    for depth in (np.full(50, 1.5), true):
+        good, bad = (depth_scores(compare_depth(s * depth, true), alignment)[name] for s in (1, -1))
+        assert bad > 500.0 > 100.0 > good
+
+
+def test_pixels_behind_the_camera_find_no_scale():
+    """The others are aligned without them: half of the pixels at ln 1000 each from a truth of 1."""
+    true = np.ones(4)
+    expected = 100.0 * np.sqrt(np.log(1000.0) ** 2 / 2.0)
+    for scale in (1.0, 7.0):
+        pair = compare_depth([scale, scale, -scale, 0.0], true)
+        assert silog(pair) == pytest.approx(expected)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_silog_of_positive_depth_is_a_standard_deviation(seed):
+    """To the bit, so that no score of depth in front of the camera has changed."""
+    pair = random_pair(seed)
+    assert silog(pair) == 100.0 * np.sqrt(np.var(np.log(pair.predicted) - np.log(pair.true)))
+
+
 def test_only_the_mask_is_scored():
     true = np.array([[1.0, 2.0], [np.nan, 4.0]])
     predicted = np.array([[1.0, 3.0], [np.nan, np.inf]])

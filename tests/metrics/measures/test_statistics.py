@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.stats import binomtest, bootstrap
 
@@ -87,6 +87,22 @@ def test_the_interval_moves_with_the_values_and_holds_the_mean(seed, shift, scal
     ends = bootstrap_interval(scale * (values + shift), 1, 200)
     assert ends[0] == pytest.approx(scale * (low + shift), rel=1e-6, abs=1e-6 * scale)
     assert ends[1] == pytest.approx(scale * (high + shift), rel=1e-6, abs=1e-6 * scale)
+
+
+@example([1 / 3, 1 / 3 + 1e-16, 1 / 3 - 5e-17], 0, 43)
+@given(
+    st.lists(
+        st.sampled_from([0.0, 1 / 3, 1 / 3 + 1e-16, 1 / 3 - 5e-17, 1e-162, -2e-162, 1e90, 5e-324]),
+        min_size=1,
+    ),
+    st.integers(0, 2**32 - 1),
+    st.integers(1, 40),
+)
+def test_the_mean_of_odd_values_lies_in_its_interval(some, seed, count):
+    values = np.random.default_rng(seed).choice(some, (count, 1))
+    low, high = bootstrap_interval(values, seed, 100)
+    mean = values.mean(axis=0)
+    assert np.isnan(low).all() if count == 1 else (low <= mean).all() and (mean <= high).all()
 
 
 def test_columns_do_not_disturb_each_other():

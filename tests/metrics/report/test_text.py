@@ -26,6 +26,8 @@ def test_the_text_shows_every_score_and_its_reference():
         assert cells[name][1:3] == [number(score.value), f"[{number(score.low, score.value)},"]
     assert cells["noise"][:3] == ["noise", "floor", "0.0123"]
     assert "warning: mind the gap" in notes.splitlines()
+    (told,) = (line for line in notes.splitlines() if line.startswith("truth: "))
+    assert all(word in told for word in ("rooms.h5", scores.meta.truth_digest[:12], "given"))
     questions = iqtt_scores("many", [1, 0], runs=3, counts={"questions": 2})
     text = text_report(questions)
     assert text.startswith("many: 2 questions of rooms.h5, mean of 3 runs\n")

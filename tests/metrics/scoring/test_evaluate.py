@@ -1,6 +1,8 @@
 """Submissions against truths: what is averaged over what, and what is refused."""
 
+import json
 import shutil
+import warnings
 from importlib.metadata import version
 
 import h5py
@@ -19,7 +21,9 @@ from metrics.scoring.evaluate import score
 from metrics.scoring.metric_names import metric
 from metrics.scoring.rooms import view_angles
 from metrics.scoring.runs import ScoringError, Settings
+from metrics.submissions.validation import validate
 from scenegen.camera import Camera, back_project
+from scenegen.layout import TRUTH_DIGEST
 from scenegen.rooms.reader import RoomsFile
 
 
@@ -52,7 +56,7 @@ def questions(tmp_path_factory):
 
 
 def test_the_truth_is_perfect(folder):
-    found = score([folder / "oracle.h5"])
+    found = score([folder / "oracle.h5"], folder / "rooms.h5")
     assert found.comparable
     for name, value in found.metrics.items():
         best = 1.0 if metric(name).higher_is_better else 0.0
@@ -135,6 +139,7 @@ def test_views_are_averaged_within_scenes_and_told_by_angle(folder, tmp_path):
     with h5py.File(truth, "r+") as file:
         file["scene_index"][:4] = 0
         file["view_index"][:4] = np.arange(4)
+        del file.attrs[TRUTH_DIGEST]
         for row, degrees in enumerate((10, 45, 45, 90)):
             azimuth = np.radians(degrees)
             position = 3 * np.array([np.sin(azimuth), 0.5, np.cos(azimuth)])
@@ -173,13 +178,13 @@ def test_missing_rows_are_refused_or_stamped(folder, tmp_path):
             out.add(row, rooms[row].depth)
     with refused(ScoringError, f"{path}: row", found="5 of 8 missing", hint="--allow-partial"):
         score([path])
-    found = score([path], settings=Settings(allow_partial=True))
+    found = score([path], truth, Settings(allow_partial=True))
     assert not found.comparable
     assert found.items["row"].tolist() == [1, 4, 6]
     assert "3 of 8" in found.meta.warnings[0]
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e200])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 9e99, -4e38])
 def test_what_is_not_finite_is_refused_with_its_rows_or_penalised(folder, tmp_path, bad):
     path = tmp_path / "bad.h5"
     shutil.copy(folder / "oracle.h5", path)
@@ -189,7 +194,10 @@ def test_what_is_not_finite_is_refused_with_its_rows_or_penalised(folder, tmp_pa
         row = int(file["row"][5])
     with refused(ScoringError, f"{path}: row {row}: predicted depth", hint="--non-finite penalise"):
         score([path])
-    found = score([path], settings=Settings(non_finite="penalise"))
+    truth = folder / "rooms.h5"
+    (problem,) = validate(path, truth)
+    assert (problem.dataset, problem.rule, problem.ids) == ("depth", "finite", (row,))
+    found = score([path], truth, Settings(non_finite="penalise"))
     assert not found.comparable
     assert found.meta.counts["rows_penalised"] == 1
     with RoomsFile(folder / "rooms.h5") as rooms:
@@ -274,3 +282,65 @@ def test_answers_may_come_as_json_and_several_runs_are_averaged(questions, tmp_p
     ]
     assert runs.metrics["iqtt_accuracy"].value == pytest.approx(np.mean(each))
     assert runs.metrics["iqtt_accuracy"].std == pytest.approx(np.std(each, ddof=1))
+
+
+def copied(source, path, **attributes):
+    """The same predictions in a file of other bytes."""
+    shutil.copy(source, path)
+    with h5py.File(path, "r+") as file:
+        for name in ("row", "depth", "normal"):
+            if name in file:
+                replaced(name, lambda values: values[::-1])(file)
+        file.attrs.update(attributes)
+    return path
+
+
+def test_two_copies_of_one_run_are_not_two_runs(folder, questions, tmp_path):
+    """Whatever their bytes, names and order of rows; nor are answers that lost their scores."""
+    first = folder / "noisy-0.h5"
+    copy = copied(first, tmp_path / "copy.h5", run="another", notes="really")
+    with refused(ScoringError, "copy.h5", found="noisy-0.h5", expected="once"):
+        score([folder / "noisy-1.h5", first, copy])
+    answers = questions / "split/iqtt-test-answers.h5"
+    given = np.random.default_rng(0).random((2, 30, 3)).argsort(axis=-1)
+    paths = [tmp_path / f"{name}.h5" for name in "ab"]
+    for path, scores in zip(paths, (given[0], 2.0 * given[0]), strict=True):
+        write_answers(path, answers, method="m", scores=scores.astype(float))
+    (tmp_path / "c.json").write_text(
+        json.dumps({"answers": given[0].argmax(axis=1).tolist(), "method": "m"})
+    )
+    assert score(paths, answers).runs == 2  # which differ by scores alone
+    with refused(ScoringError, "c.json", found="a.h5"):
+        score([paths[0], tmp_path / "c.json"], answers)
+
+
+def test_the_largest_depth_that_may_be_is_scored(folder, tmp_path):
+    """With neither a warning nor a number that is not finite, intervals included."""
+    path = tmp_path / "large.h5"
+    shutil.copy(folder / "noisy-0.h5", path)
+    with h5py.File(path, "r+") as file:
+        file["depth"][...] = np.finfo("f4").max
+        file["depth"][1, ::2] *= -1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = score([path], folder / "rooms.h5")
+    assert found.comparable
+    for one in found.metrics.values():
+        assert np.isfinite([one.value, one.low, one.high]).all()
+
+
+def test_every_score_has_its_column_and_lies_in_its_interval(questions, tmp_path):
+    """As the reader of score files asks; runs that nearly agree are where rounding would show."""
+    rng = np.random.default_rng(4)
+    answers = questions / "split/iqtt-test-answers.h5"
+    for runs in (2, 3, 7):
+        paths = [tmp_path / f"{runs}-{run}.h5" for run in range(runs)]
+        given = np.full((runs, 30), rng.integers(3, size=30))
+        given[np.arange(runs), np.arange(runs)] = -1
+        for path, answer in zip(paths, given, strict=True):
+            write_answers(path, answers, method="m", answer=answer)
+        found = score(paths, answers)
+        groups = [found.metrics, *found.by_position.values(), *found.by_distractor.values()]
+        for one in (group["iqtt_accuracy"] for group in groups):
+            assert one.low is None or one.low <= one.value <= one.high
+        assert set(found.metrics) <= set(found.items)

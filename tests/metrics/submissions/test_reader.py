@@ -1,4 +1,4 @@
-"""Submissions as a stranger writes them, with plain h5py or as JSON, and where their truth is."""
+"""Submissions as a stranger writes them, with plain h5py or as JSON."""
 
 import hashlib
 import json
@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from h5_edits import attribute, damaged_chunk, gone, put
+from h5_edits import damaged_chunk, gone, put
 from refusals import refused
 from submissions import as_json, edited, good_answers, good_rooms
 
@@ -18,7 +18,6 @@ from metrics.submissions.missing_rows import match_problems, size_problems
 from metrics.submissions.reader import (
     QuestionPredictions,
     RoomPredictions,
-    find_truth,
     open_predictions,
 )
 from scenegen.common.errors import FileFormatError
@@ -144,11 +143,12 @@ def test_reading_loads_little(truths, tmp_path):
     answers = good_answers(tmp_path, truths.iqtt)
     code = f"""
 import sys
-from metrics.submissions.reader import find_truth, open_predictions
+from metrics.submissions.reader import open_predictions
+from metrics.submissions.truths import find_truth
 from metrics.submissions.validation import validate
 for path in {[str(rooms), str(answers)]!r}:
     find_truth(open_predictions(path))
-    assert validate(path) == []
+    assert all(problem.is_hint for problem in validate(path))
 import metrics.score_file
 heavy = "mitsuba drjit torch scipy pykdtree trimesh click PIL tqdm jinja2".split()
 print(*[name for name in heavy if name in sys.modules])
@@ -241,53 +241,3 @@ def test_json_under_any_name(tmp_path, name, start):
     path.write_text(start + json.dumps([0, 1]), encoding="utf-8")
     with open_predictions(path) as found:
         assert found.answers.tolist() == [0, 1]
-
-
-# ---- where the truth lies ----
-
-
-def test_truth_beside_the_submission_comes_first(truths, tmp_path, monkeypatch):
-    (tmp_path / "here").mkdir()
-    monkeypatch.chdir(tmp_path)
-    path = good_rooms(tmp_path / "here", truths.rooms)
-    with h5py.File(path, "r+") as file:
-        file.attrs["truth_path"] = "data/rooms.h5"
-    with open_predictions("here/predictions.h5") as found:
-        places = [Path("here/data/rooms.h5"), Path("data/rooms.h5")]
-        for place in (*places[::-1], None):
-            if place is not None:
-                place.parent.mkdir()
-                place.touch()
-                assert find_truth(found) == place
-        for place in places:
-            place.unlink()
-        with pytest.raises(FileFormatError) as caught:
-            find_truth(found)
-        assert all(str(place) in caught.value.found for place in places)
-        assert "--truth" in caught.value.hint
-
-
-def test_truth_as_given(truths, tmp_path):
-    with open_predictions(good_rooms(tmp_path, truths.rooms)) as found:
-        assert find_truth(found) == truths.rooms
-        assert find_truth(found, truths.iqtt) == truths.iqtt
-        for nothing in (tmp_path / "none.h5", tmp_path):
-            with refused(FileFormatError, ": truth", found=str(nothing)):
-                find_truth(found, nothing)
-
-
-def test_answers_beside_the_test_file_are_the_truth(truths, tmp_path):
-    with open_predictions(good_answers(tmp_path, truths.iqtt)) as found:
-        expected = truths.iqtt.with_name("iqtt-test-answers.h5")
-        assert find_truth(found) == expected
-        assert find_truth(found, truths.iqtt) == expected
-        assert find_truth(found, expected) == expected
-        val = truths.iqtt.with_name("iqtt-val.h5")
-        assert find_truth(found, val) == val
-
-
-@pytest.mark.parametrize("path", ["x" * 5000, "~/rooms.h5", ".", "/"])
-def test_a_strange_path_is_not_found(truths, tmp_path, path):
-    path = edited(attribute("truth_path", path))(tmp_path, truths.rooms)
-    with open_predictions(path) as found, refused(FileFormatError, ": truth"):
-        find_truth(found)

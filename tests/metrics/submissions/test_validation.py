@@ -12,7 +12,8 @@ from submissions import edited, good_answers, good_rooms
 from iqtt.files.reader import AnswersFile
 from metrics.submissions.layout import ATTRIBUTES, DATASETS
 from metrics.submissions.missing_rows import match_problems, size_problems
-from metrics.submissions.reader import find_truth, open_predictions
+from metrics.submissions.reader import open_predictions
+from metrics.submissions.truths import find_truth
 from metrics.submissions.validation import validate
 from scenegen.common.errors import SceneGenError
 from scenegen.rooms.reader import RoomsFile
@@ -67,7 +68,7 @@ def opened_or_refused(case, path, given):
     else:
         with open_predictions(path) as predictions:
             try:
-                problems = problems_with_truth(predictions, find_truth(predictions, given))
+                problems = problems_with_truth(predictions, find_truth(predictions, given).path)
                 line = str(problems[0]) if problems else ""
             except SceneGenError as error:
                 line = str(error)
@@ -93,9 +94,13 @@ def problems_with_truth(predictions, truth_path):
 def test_a_good_submission(truths, tmp_path, normals):
     steps = []
     path = good_rooms(tmp_path, truths.rooms, normals=normals)
-    assert validate(path, progress=steps.append) == []
+    assert validate(path, truths.rooms, progress=steps.append) == []
     assert steps == [1] * 8
-    assert validate(good_answers(tmp_path, truths.iqtt)) == []
+    path = good_answers(tmp_path, truths.iqtt)
+    assert validate(path, truths.iqtt) == []
+    (told,) = validate(path)  # which takes the submission's word for its truth
+    assert (told.dataset, told.is_hint) == ("truth", True)
+    assert "iqtt-test-answers.h5" in told.found
 
 
 def test_everything_at_once(truths, tmp_path):
@@ -110,7 +115,7 @@ def test_everything_at_once(truths, tmp_path):
         file["normal"][6, 1, 1, 2] = np.nan
 
     path = edited(spoil)(tmp_path, truths.rooms)
-    problems = validate(path)
+    problems = validate(path, truths.rooms)
     assert [(one.dataset, one.rule, one.ids) for one in problems] == [
         ("method", "value", ()),
         ("alignment", "value", ()),
@@ -139,13 +144,13 @@ def test_ids_are_rows_of_the_truth(truths, tmp_path):
             file[name][...] = file[name][()][::-1]
         file["depth"][0, 0, 0] = np.nan
 
-    (problem,) = validate(edited(spoil)(tmp_path, truths.rooms))
+    (problem,) = validate(edited(spoil)(tmp_path, truths.rooms), truths.rooms)
     assert problem.ids == (7,)
 
 
 def test_only_the_first_few_ids_are_told(truths, tmp_path):
     path = edited(put("depth", np.s_[:, 0, 0], np.nan))(tmp_path, truths.rooms)
-    (problem,) = (one for one in validate(path) if one.dataset == "depth")
+    (problem,) = (one for one in validate(path, truths.rooms) if one.dataset == "depth")
     assert problem.ids == (0, 1, 2, 3, 4)
     assert "8 pixels of 8 rows" in problem.found
     assert str(problem).startswith(f"depth: {problem.found} (ids 0, 1, 2, 3, 4), expected ")
@@ -156,7 +161,7 @@ def test_a_damaged_row_does_not_hide_the_others(truths, tmp_path):
         damaged_chunk("depth", 3)(file)
         file["depth"][6, 0, 0] = np.nan
 
-    problems = validate(edited(spoil)(tmp_path, truths.rooms))
+    problems = validate(edited(spoil)(tmp_path, truths.rooms), truths.rooms)
     assert [(one.dataset, one.rule, one.ids) for one in problems] == [
         ("depth", "finite", (6,)),
         ("depth", "readable", (3,)),
@@ -202,7 +207,7 @@ def test_another_truth_is_told_alone(truths, tmp_path):
             del file[name]
             file[name] = half
 
-    (problem,) = validate(edited(spoil)(tmp_path, truths.rooms))
+    (problem,) = validate(edited(spoil)(tmp_path, truths.rooms), truths.rooms)
     assert problem.rule == "match"
 
 
@@ -225,9 +230,9 @@ def test_memory_does_not_grow_with_rows(make_rooms, tmp_path):
     for count in (6, 48):
         truth = make_rooms(tmp_path / f"rooms{count}.h5", count)
         path = good_rooms(tmp_path, truth, f"predictions{count}.h5")
-        validate(path)
+        validate(path, truth)
         tracemalloc.start()
-        assert validate(path) == []
+        assert validate(path, truth) == []
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     # What hints look at is kept: 24 samples, and 64 pixels of every row.

@@ -137,13 +137,13 @@ def test_refused_at_write_time(writer, tmp_path, kind):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_refused_row_may_be_mended(writer, tmp_path):
+def test_a_refused_row_may_be_mended(writer, truths, tmp_path):
     with writer() as out:
         for row in range(8):
             with pytest.raises(PredictionError):
                 out.add(row, spoiled(np.nan))
             out.add(row, noise(row, *SIZE))
-    assert validate(tmp_path / "predictions.h5") == []
+    assert validate(tmp_path / "predictions.h5", truths.rooms) == []
 
 
 def test_anything_goes_where_the_truth_shows_nothing(truths, tmp_path):
@@ -153,11 +153,12 @@ def test_anything_goes_where_the_truth_shows_nothing(truths, tmp_path):
     with h5py.File(truth, "r+") as file:
         file["depth"][:, 3, 4] = np.nan
         file["normal"][:, 3, 4] = 0.0
+        file["object_id"][:, 3, 4] = -1
     path = tmp_path / "predictions.h5"
     with RoomPredictionWriter(path, truth, method="m") as out:
         for row, odd in enumerate([np.inf, np.nan, -1.0, -np.inf, 0.0, 1e39, 1e30, 1.0]):
             out.add(row, spoiled(odd), spoiled(odd if row % 2 else 0.0, (3, 4), GOOD_NORMAL))
-    assert validate(path) == []
+    assert validate(path, truth) == []
     other = tmp_path / "other.h5"
     with pytest.raises(PredictionError), RoomPredictionWriter(other, truth, method="m") as out:
         out.add(0, spoiled(np.nan, (3, 5)))
@@ -182,7 +183,7 @@ def test_missing_rows_are_an_error(writer, tmp_path, partial, rows, found):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_missing_rows_where_that_is_allowed(writer, tmp_path):
+def test_missing_rows_where_that_is_allowed(writer, truths, tmp_path):
     with writer(allow_partial=True) as out:
         for row in (6, 1):
             out.add(row, noise(row, *SIZE), GOOD_NORMAL)
@@ -191,7 +192,7 @@ def test_missing_rows_where_that_is_allowed(writer, tmp_path):
         assert found.rows.tolist() == [6, 1]
         assert np.array_equal(found.depth(1), noise(1, *SIZE).astype("f4"))
         assert found.normal(1).shape == (*SIZE, 3)
-    (problem,) = validate(path)
+    (problem,) = validate(path, truths.rooms)
     assert (problem.dataset, problem.rule, problem.ids) == ("row", "complete", (0, 2, 3, 4, 5))
 
 
@@ -268,7 +269,7 @@ def test_answers(truths, tmp_path, name):
     answer = scores.argmax(axis=1).tolist()
     path = tmp_path / "answers.h5"
     write_answers(path, file, method="m", run="1", notes="n", answer=answer, scores=scores)
-    assert validate(path) == []
+    assert validate(path, file) == []
     truth_name = "iqtt-val.h5" if "val" in name else "iqtt-test-answers.h5"
     with open_predictions(path) as found, AnswersFile(file.with_name(truth_name)) as truth:
         assert found.rows.tolist() == list(range(6))
@@ -291,7 +292,7 @@ def test_answers_to_a_file_as_released(truths, tmp_path):
     with open_predictions(tmp_path / "a.h5") as found:
         assert found.truth_fingerprint is None
         assert found.answers.tolist() == [0, 1, 2, -1, 0, 1]
-    assert validate(tmp_path / "a.h5") == []
+    assert validate(tmp_path / "a.h5", file) == []
 
 
 EYE = np.eye(3)[[0, 1, 2, 0, 1, 2]]
@@ -336,7 +337,7 @@ def test_answers_keep_an_existing_file(truths, tmp_path):
     with pytest.raises(FileExistsError):
         write_answers(tmp_path / "a.h5", truths.iqtt, **given)
     write_answers(tmp_path / "a.h5", truths.iqtt, overwrite=True, **given)
-    assert validate(tmp_path / "a.h5") == []
+    assert validate(tmp_path / "a.h5", truths.iqtt) == []
 
 
 def test_a_submission_never_replaces_what_it_is_about(truths, tmp_path):

@@ -40,14 +40,17 @@ def test_a_killed_render_leaves_nothing_under_the_final_name(tmp_path):
     command = [sys.executable, "-c", "import cli; cli.scenegen()", *RENDER, "--n", "100000"]
     process = subprocess.Popen([*command, "--out", "x.h5"], cwd=tmp_path, stderr=subprocess.DEVNULL)
     try:
-        wait_until(lambda: any(p.stat().st_size > 100_000 for p in tmp_path.iterdir()), process)
+        wait_until(lambda: any(p.stat().st_size > 100_000 for p in tmp_path.rglob("*.h5")), process)
     finally:
         process.send_signal(signal.SIGKILL)
         process.wait()
     assert not (tmp_path / "x.h5").exists()
     assert list(tmp_path.iterdir()), "the run was killed before it wrote anything: a weak test"
-    subprocess.run([*command[:-1], "2", "--out", "x.h5"], cwd=tmp_path, check=True)
-    assert (tmp_path / "x.h5").exists()
+    left = next(tmp_path.iterdir()).name
+    command = [*command[:-1], "2", "--out", "x.h5"]
+    done = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True)
+    assert [line for line in done.stderr.splitlines() if line.startswith("note: ") and left in line]
+    assert [path.name for path in tmp_path.iterdir()] == ["x.h5"]
 
 
 @pytest.fixture
@@ -88,6 +91,18 @@ def test_a_full_disk_is_one_clear_line(
         assert ".partial" not in line
         assert len(line) < 200, "a line for a person"
         assert list(disk.iterdir()) == []
+
+
+@LINUX
+@pytest.mark.parametrize("form", ["exr", "png", "ply", "obj"])
+def test_an_export_to_a_full_disk_is_one_clear_line(small_disk, check_refusal, rooms_path, form):
+    disk = small_disk(4096)
+    (disk / "full").write_bytes(bytes(4096))
+    command = [sys.executable, "-c", "import cli; cli.scenegen()", "export", rooms_path]
+    command += ["--items", "0", "--format", form, "--out", "."]
+    done = subprocess.run(command, cwd=disk, capture_output=True, text=True, check=False)
+    check_refusal(done.returncode, done.stdout, done.stderr, (form, "No space left"))
+    assert [path.name for path in disk.iterdir()] == ["full"]
 
 
 def wait_until(condition, process, seconds=60):

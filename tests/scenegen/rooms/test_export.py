@@ -89,6 +89,7 @@ def test_ply_has_the_surfels(tmp_path, holey):
     np.testing.assert_allclose(cloud.vertices, holey.points_world[hit], atol=1e-6)
     elements = cloud.metadata["_ply_raw"]["vertex"]["data"]
     ids = elements["object_id"].ravel()
+    assert ids.dtype == np.uint8, "a type that Open3D reads"
     np.testing.assert_array_equal(ids, holey.object_id[hit])
     on_room = np.abs(np.asarray(cloud.vertices)[ids == 0]).min(axis=1)
     assert on_room.max() < 1e-5
@@ -135,11 +136,66 @@ def check_depth_by_embree(path, mesh_of):
 
 def test_obj_cast_by_another_engine_gives_the_depth(tmp_path, make_rooms):
     def mesh_of(room):
-        (obj,) = export(room, tmp_path, "obj", overwrite=True)
+        obj, _ = export(room, tmp_path, "obj", overwrite=True)
         return trimesh.load(obj, force="mesh", process=False)
 
     path = make_rooms(tmp_path / "x.h5", 3, height=64, width=64, seed=11)
     assert len(check_depth_by_embree(path, mesh_of)) >= 4
+
+
+@pytest.fixture(scope="module")
+def glossy(make_rooms, tmp_path_factory):
+    """A room with a sphere and a box of other materials."""
+    path = tmp_path_factory.mktemp("glossy") / "x.h5"
+    make_rooms(path, 8, shapes=("sphere", "box"), objects=(2, 2), random_reflectance=True,
+               specular=(0.2, 0.4), shininess=(5, 20))  # fmt: skip
+    with open_rooms(path) as file:
+        rooms = [r for r in file if {item.shape for item in r.scene.objects} == {"sphere", "box"}]
+    return rooms[0]
+
+
+def test_obj_has_names_materials_and_smooth_normals(tmp_path, glossy):
+    """Read by trimesh, and by hand."""
+    obj, mtl = export(glossy, tmp_path, "obj")
+    meshes = trimesh.load(obj, process=False).geometry  # by material
+    names = [f"object_{k}_{item.shape}" for k, item in enumerate(glossy.scene.objects, start=1)]
+    assert [name for [name] in words(obj, "o")] == ["floor", "wall_x", "wall_z", *names]
+    materials = [words(mtl, "newmtl"), words(mtl, "Kd"), words(mtl, "Ks"), words(mtl, "Ns")]
+    assert materials[0] == [["room"], ["object_1"], ["object_2"]]
+    assert set(meshes) == {"room", "object_1", "object_2"}
+    assert words(obj, "usemtl") == [["room"]] * 3 + materials[0][1:]
+    assert words(obj, "mtllib") == [[mtl.name]]
+    for k, item in enumerate(glossy.scene.objects, start=1):
+        mesh = meshes[f"object_{k}"]
+        assert [float(x) for x in materials[1][k]] == list(item.reflectance)
+        assert [float(x) for x in materials[2][k]] == [item.specular] * 3
+        assert [float(x) for x in materials[3][k]] == [item.shininess]
+        color = np.clip(np.array(item.reflectance) * 255, 0, 255)
+        np.testing.assert_allclose(mesh.visual.material.diffuse[:3], color, atol=1)
+        if item.shape == "sphere":
+            expected = (mesh.vertices - np.array(item.position)) / item.scale
+        else:
+            expected = mesh.vertex_normals  # made by trimesh if the file had none
+            assert len(np.unique(expected.round(4), axis=0)) == 6, "flat sides stay flat"
+        np.testing.assert_allclose(mesh.vertex_normals, expected, atol=1e-3)
+
+
+def test_normals_of_obj_are_those_of_the_corners(tmp_path, glossy):
+    """Of both ends of each face's line `f v//n v//n v//n`, against the surfaces they lie on."""
+    obj, _ = export(glossy, tmp_path, "obj")
+    v, vn = (np.array(words(obj, key), float) for key in ("v", "vn"))
+    corners = np.array([[w.split("//") for w in face] for face in words(obj, "f")], int) - 1
+    assert (corners.reshape(-1, 2).max(axis=0) == [len(v) - 1, len(vn) - 1]).all()
+    np.testing.assert_allclose(np.linalg.norm(vn, axis=1), 1, atol=1e-6)
+    points, normals = v[corners[..., 0]], vn[corners[..., 1]]
+    face = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    assert (np.einsum("fi,fki->fk", face, normals) > 0).all(), "wound and facing alike"
+
+
+def words(path, key):
+    """The words after a keyword, line by line."""
+    lines = [line.split() for line in path.read_text().splitlines()]
+    return [line[1:] for line in lines if line[:1] == [key]]
 
 
 @pytest.mark.slow
@@ -151,12 +207,15 @@ def test_meshes_of_100_rooms_give_the_depth(tmp_path, make_rooms):
 @pytest.mark.parametrize("form", ["exr", "png", "ply", "obj"])
 def test_existing_files_are_kept_without_overwrite(tmp_path, room, form):
     paths = export(room, tmp_path, form)
-    paths[-1].write_text("mine")
-    with pytest.raises(FileExistsError):
-        export(room, tmp_path, form)
-    assert paths[-1].read_text() == "mine"
-    export(room, tmp_path, form, overwrite=True)
-    assert paths[-1].read_bytes()[:4] != b"mine"
+    for path in paths:
+        path.write_text("mine")
+        others = [other.unlink() or other for other in paths if other != path]
+        with pytest.raises(FileExistsError):
+            export(room, tmp_path, form)
+        assert path.read_text() == "mine"
+        export(room, tmp_path, form, overwrite=True)
+        assert path.read_bytes()[:4] != b"mine"
+        assert all(other.exists() for other in others)
     assert sorted(tmp_path.iterdir()) == sorted(paths), "no temporary files"
 
 

@@ -23,8 +23,10 @@ def test_header_and_spec(float_path):
     size = float_path.stat().st_size / 1e6
     assert text.splitlines()[0] == f"{float_path}: 5 images of 48x40, {size:.1f} MB"
     assert value(text, "fingerprint") == root["fingerprint"]
+    assert value(text, "truth digest") == root["truth_digest"]
+    assert value(text, "content digest") == root["content_digest"]
     assert value(text, "command") == "tests"
-    assert value(text, "format") == "pix2shape-bench/rooms 2.1"
+    assert value(text, "format") == "pix2shape-bench/rooms 2.2"
     assert value(text, "written by") == f"{root['writer']}, {root['variant']}"
     assert "y up" in value(text, "conventions")
     for name, setting in json.loads(root["spec"]).items():
@@ -88,3 +90,30 @@ def test_the_command_prints_it(run, rooms_path):
     result = run("info", rooms_path)
     assert result.exit_code == 0
     assert result.output == describe(rooms_path) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "odd", "line"),
+    [
+        ("creation_command", np.arange(3), "command         not a text: array([0, 1, 2])"),
+        ("creation_command", "a\x1b[31m\nb", r"command         a\x1b[31m\nb"),
+        ("creation_command", h5py.Empty("S1"), "command         not a text"),
+        ("creation_command", "x" * 60_000, "command         xxx"),
+        ("truth_digest", None, "truth digest    -"),
+        ("content_digest", b"\xff", "content digest  not a text"),
+        ("conventions", None, "conventions     -"),
+        ("mitsuba_version", np.array(["3", "8"], object), "rendered by     Mitsuba not a text"),
+        ("llvm_version", 3, "rendered by     Mitsuba"),
+        ("writer", 3.5, "written by      not a text"),
+    ],
+)
+def test_odd_attributes_are_shown_on_one_short_line(damaged, name, odd, line):
+    def edit(file):
+        del file.attrs[name]
+        if odd is not None:
+            file.attrs[name] = np.void(odd) if isinstance(odd, bytes) else odd
+
+    text = describe(damaged(edit))
+    [found] = [one for one in text.split("\n") if one.startswith(f"  {line}")]
+    assert len(found) < 1100
+    assert all(one.isprintable() for one in text.split("\n"))

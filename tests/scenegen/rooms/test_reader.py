@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from scenegen import RoomsDataset, open_rooms
+from scenegen.common.content import datasets
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
 from scenegen.description.specs import DatasetSpec
@@ -47,11 +48,22 @@ LAYOUT = [
 ]
 
 
+AXES = {
+    "image": ["row", "y", "x", "channel"],
+    "normal": ["row", "y", "x", "xyz"],
+    "object_id": ["row", "y", "x"],
+    "scene": ["row"],
+    "camera/world_from_camera": ["row", "matrix_row", "matrix_column"],
+    "light/color": ["row", "light_slot", "channel"],
+    "light/attenuation": ["row", "coefficient"],
+    "material/reflectance": ["row", "material_slot", "channel"],
+    "object/model": ["row", "object_slot"],
+}
+
+
 def test_every_dataset_and_its_attributes(rooms_path):
-    found = {}
     with h5py.File(rooms_path) as file:
-        file.visititems(lambda name, item: found.update({name: item}))
-        found = {name: item for name, item in found.items() if isinstance(item, h5py.Dataset)}
+        found = {name: item for name, item in datasets(file) if not item.is_scale}
         assert sorted(found) == sorted(name for name, *_ in LAYOUT)
         for name, row, dtype, unit in LAYOUT:
             dataset = found[name]
@@ -65,6 +77,11 @@ def test_every_dataset_and_its_attributes(rooms_path):
             assert dataset.chunks == per_image, f"{name}: one chunk to an image"
         assert file["image"].attrs["scale"] == 1 / 255
         assert list(file["object/shape"].attrs["names"]) == list(SHAPE_NAMES)
+        assert {name: [axis.label for axis in found[name].dims] for name in AXES} == AXES
+        for name, dataset in found.items():
+            for axis, length in zip(dataset.dims, dataset.shape, strict=True):
+                assert file[axis.label] == axis[0], f"{name}: {axis.label}"
+                np.testing.assert_array_equal(axis[0][:], np.arange(length))
     assert [field.name for field in FIELDS] == [name for name, *_ in LAYOUT]
 
 
@@ -72,7 +89,7 @@ def test_root_attributes(rooms_path):
     with h5py.File(rooms_path) as file:
         root = dict(file.attrs)
     assert root["format"] == "pix2shape-bench/rooms"
-    assert root["format_version"] == "2.1"
+    assert root["format_version"] == "2.2"
     assert root["writer"].startswith("pix2shape-bench ")
     assert root["count"] == 8
     assert root["creation_command"] == "tests"

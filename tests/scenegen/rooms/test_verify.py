@@ -13,7 +13,7 @@ from h5_edits import attribute, damaged_chunk, edit_scene, put, swap_rows, value
 from scenegen.rendering.backend import VERSION_ATTRIBUTES
 from scenegen.rooms.verify import verify_file
 
-ROWS = {"layout", "description", "depth", "normal", "object_id", "image", "fingerprint"}
+ROWS = {"layout", "content", "description", "depth", "normal", "object_id", "image", "fingerprint"}
 ALL = ROWS | {"drawn again from the seed", "rendered again"}
 
 

@@ -96,6 +96,6 @@ def test_highlights_that_are_not_the_stored_materials_are_found(name: str, tmp_p
         for row in range(3):
             edit_scene(row, lambda s: [o.update({key: 0.5 * o[key]}) for o in s["objects"]])(file)
     found = {c.name: c.detail for c in verify_file(tmp_path / "x.h5", 0) if not c.ok}
-    assert set(found) == {"image", "fingerprint"}
+    assert set(found) == {"content", "image", "fingerprint"}
     assert "not what the shading equation gives" in found["image"]
     assert np.isfinite(values).all()

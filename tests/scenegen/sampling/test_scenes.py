@@ -174,17 +174,16 @@ def test_a_crowd_is_refused_after_bounded_work(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(sampling, "find_place", counted)
     assert all(sample_scene(CROWD, 0, attempt) is None for attempt in range(10))
     assert 0 < calls <= 10 * 40 * POSES_PER_OBJECT
+    before = calls
     error = refusal(CROWD, 0, 0)
     assert isinstance(error, PlacementError)
-    assert calls <= 20 * 40 * POSES_PER_OBJECT
+    assert calls == before, "it is not tried again"
 
 
 def test_refusals_say_what_and_what_to_try() -> None:
     crowded = refusal(CROWD, 7, 0)
     assert crowded.where == "item 7"
-    placed, wanted, attempts = map(int, re.findall(r"\d+", crowded.found))
-    assert 1 <= placed < wanted == 40
-    assert attempts == MAX_ATTEMPTS
+    assert re.findall(r"\d+", crowded.found) == ["40", str(MAX_ATTEMPTS)]
     for option in ("--objects", "--object-radius", "--allow-cropped"):
         assert option in crowded.hint
     hidden = refusal(DatasetSpec(objects=(2, 2), min_visible_pixels=9000), 3, 12)

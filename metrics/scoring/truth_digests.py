@@ -1,0 +1,70 @@
+"""The digest of a truth, made of the values that were read to score, and held against the file's.
+
+docs/rooms-file.md and docs/iqtt.md say which data sets it covers.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import NDArray
+
+from metrics.scoring.runs import ScoringError
+from metrics.submissions.truths import TrueView
+from scenegen.common.content import column_digest, joint_digest, row_digest
+from scenegen.layout import SCORED, TRUTH_DIGEST
+from scenegen.rooms.reader import RoomsFile
+
+if TYPE_CHECKING:
+    from iqtt.files.reader import AnswersFile
+
+PER_PIXEL = ("depth", "normal", "object_id")
+RowDigests = tuple[bytes, ...]  # of PER_PIXEL
+
+
+def view_digests(view: TrueView) -> RowDigests:
+    """Return the digest of each array of a row that was read to be scored."""
+    return tuple(row_digest(getattr(view, name)) for name in PER_PIXEL)
+
+
+def rooms_digest(truth: RoomsFile, scored: Mapping[int, RowDigests]) -> str:
+    """Return the digest of a truth of which some rows were scored; the others are read here.
+
+    Raises ScoringError where it is not the one that was written with the file.
+    """
+    columns = {}
+    for name in SCORED:
+        if name in PER_PIXEL:
+            place = PER_PIXEL.index(name)
+            rows = [
+                scored[row][place] if row in scored else row_digest(truth.read(name, row))
+                for row in range(len(truth))
+            ]
+        else:
+            rows = [row_digest(values) for values in truth.read(name, slice(None))]
+        columns[name] = column_digest(rows)
+    return _checked(truth.path, columns, truth.attributes.get(TRUTH_DIGEST), truth.stored_digests())
+
+
+def answers_digest(truth: "AnswersFile", columns: Mapping[str, NDArray[Any]]) -> str:
+    """Return the digest of the answers and what else their scores depend on, columns of Q rows.
+
+    Raises ScoringError where it is not the one that was written with the file.
+    """
+    found = {name: column_digest(map(row_digest, rows)) for name, rows in columns.items()}
+    own = {name: truth.stored_digest(name) for name in columns}
+    told = {name: digest for name, digest in own.items() if digest is not None}
+    return _checked(truth.path, found, truth.stored_truth_digest, told)
+
+
+def _checked(path: Path, found: Mapping[str, str], stored: Any, own: Mapping[str, str]) -> str:
+    digest = joint_digest(found)
+    if stored is None or str(stored) == digest:  # files of older formats have none
+        return digest
+    changed = [name for name in own if own[name] != found.get(name, own[name])]
+    raise ScoringError(
+        f"{path}: {TRUTH_DIGEST}",
+        f"content with the digest {digest:.12}",
+        f"{stored!r:.14}, with which the file was written",
+        f"what was changed since: {', '.join(changed)}" if changed else "",
+    )

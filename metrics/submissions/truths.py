@@ -1,0 +1,135 @@
+"""The truth of a submission: where it lies, who says so, and its views, checked when read.
+
+What is wrong with a truth is an error: left alone, it would change which pixels are scored.
+"""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.submissions.reader import Predictions
+from metrics.submissions.rules import as_doubles
+from scenegen.common.errors import FileFormatError
+from scenegen.rooms.reader import RoomsFile
+
+Array = NDArray[Any]
+UNIT_TOLERANCE = 1e-3  # by which the squared length of a normal may differ from 1
+RIGID_TOLERANCE = 1e-6  # by which R^T R may differ from the identity, R being a camera's rotation
+
+
+@dataclass(frozen=True)
+class FoundTruth:
+    """Where a truth lies, and who chose it: the person who scores, or the submission."""
+
+    path: Path
+    source: Literal["given", "submission"]
+
+
+@dataclass(frozen=True, eq=False)
+class TrueView:
+    """The true depth, normals and objects of one image, as stored.
+
+    Attributes:
+        depth: planar depth, (H, W), scene units; the pixels where it is finite are scored.
+        normal: (H, W, 3), camera frame, unit, facing the viewer.
+        object_id: (H, W).
+        fov_y_degrees: vertical field of view.
+    """
+
+    depth: Array
+    normal: Array
+    object_id: Array
+    fov_y_degrees: float
+
+    @property
+    def mask(self) -> Array:
+        """The scored pixels, (H, W) bool."""
+        return np.isfinite(self.depth)
+
+
+def find_truth(predictions: Predictions, given: str | Path | None = None) -> FoundTruth:
+    """Return where the truth of a submission lies.
+
+    That is `given`, or else the path recorded in the submission, taken from the submission's folder
+    and then from the working directory. Only a regular file, or a link to one, is a truth. For a
+    test file without answers it is the file of answers beside it (iqtt-test-answers.h5). Where
+    `given` is there, nothing that the submission names is looked at.
+
+    Raises FileFormatError where nothing lies there, with the places that were looked at.
+    """
+    advice = "give it with --truth" if given is None else ""
+    if given is None and not predictions.truth_path:
+        raise FileFormatError(predictions.path, "no path of a truth", "one", advice)
+    recorded = Path(predictions.truth_path)
+    places = [predictions.path.parent / recorded, recorded] if given is None else [Path(given)]
+    for place in places:
+        if os.path.isfile(place):  # so neither a pipe nor a device is ever opened
+            source: Literal["given", "submission"] = "submission" if given is None else "given"
+            if predictions.task == "rooms":
+                return FoundTruth(place, source)
+            from iqtt.files.reader import answers_beside
+
+            return FoundTruth(answers_beside(place) or place, source)
+    looked = " and ".join(dict.fromkeys(str(place) for place in places))
+    raise FileFormatError(
+        f"{predictions.path}: truth", f"no file at {looked}", "the file that is predicted", advice
+    )
+
+
+def read_true_view(truth: RoomsFile, row: int) -> TrueView:
+    """Read the truth of one row.
+
+    Raises FileFormatError, naming file, dataset and row, where it is damaged or no truth: a depth
+    that is not above 0 where an object id is stored, any depth where none is, a normal that is not
+    unit where there is depth, an image without any surface, an impossible camera.
+    """
+    view = TrueView(
+        truth.read("depth", row),
+        truth.read("normal", row),
+        truth.read("object_id", row),
+        float(truth.read("camera/fov_y_degrees", row)),
+    )
+    depth, surface = view.depth, view.object_id >= 0
+    normal = as_doubles(view.normal)
+    not_unit = ~(np.abs(np.einsum("ijk,ijk->ij", normal, normal) - 1.0) <= UNIT_TOLERANCE)
+    pixels = (
+        ("depth", surface & ~((depth > 0) & np.isfinite(depth)), "above 0 where an object is seen"),
+        ("depth", ~surface & ~np.isnan(depth), "NaN where no object is seen"),
+        ("normal", surface & not_unit, "vectors of length 1 where an object is seen"),
+    )
+    for name, wrong, expected in pixels:
+        if wrong.any():
+            first = tuple(np.argwhere(wrong)[0].tolist())
+            value = np.asarray(getattr(view, name)[first]).tolist()
+            found = f"{value} at pixel {first}, one of {np.count_nonzero(wrong)}"
+            raise FileFormatError(_place(truth, name, row), found, expected)
+    if not surface.any():
+        raise FileFormatError(_place(truth, "object_id", row), "no surface", "a pixel to be scored")
+    _check_camera(truth, row, view.fov_y_degrees)
+    return view
+
+
+def _check_camera(truth: RoomsFile, row: int, fov_y_degrees: float) -> None:
+    if not 0.0 < fov_y_degrees < 180.0:
+        where = _place(truth, "camera/fov_y_degrees", row)
+        raise FileFormatError(where, fov_y_degrees, "between 0 and 180")
+    name = "camera/world_from_camera"
+    matrix = truth.read(name, row)
+    rotation = np.clip(matrix[:3, :3], -2.0, 2.0)  # beyond which it is none, and squares overflow
+    rigid = (
+        np.isfinite(matrix).all()
+        and (matrix[3] == (0.0, 0.0, 0.0, 1.0)).all()
+        and (np.abs(rotation.T @ rotation - np.eye(3)) <= RIGID_TOLERANCE).all()
+        and np.linalg.det(rotation) > 0.0
+    )
+    if not rigid:
+        found = "a matrix that is no rotation and shift"
+        raise FileFormatError(_place(truth, name, row), found, "a rigid transform")
+
+
+def _place(truth: RoomsFile, name: str, row: int) -> str:
+    return f"{truth.path}: {name}, row {row}"
