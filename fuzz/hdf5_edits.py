@@ -1,6 +1,7 @@
 """Changes of what an HDF5 file holds: attributes, data sets, links, and how values are stored."""
 
 import os
+import struct
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -204,8 +205,8 @@ def store(path: Path, where: str, how: str) -> None:
             _replaced(file, where, shape=shape, dtype=kind, chunks=row)
         elif how == "fill value":
             _replaced(file, where, shape=shape, dtype=kind, chunks=row, fillvalue=1)
-        elif how == "bomb":  # each row is 256 MB of zeros, in 250 kB
-            _bomb(file, where, kind, shape, (2**28 // kind.itemsize, *shape[1:]))
+        elif how == "bomb":  # one chunk of 3 GB of zeros, in 3 MB
+            _bomb(file, where, kind, shape, (3 * 2**30 // kind.itemsize, *shape[1:]))
         elif how == "huge chunk":
             _replaced(file, where, shape=shape, dtype=kind, maxshape=(None, *shape[1:]),
                       chunks=(2**31 // max(1, size // shape[0]), *shape[1:]))  # fmt: skip
@@ -256,8 +257,17 @@ def _bomb(file: h5py.File, where: str, kind: Any, shape: Any, chunk: Any) -> Non
     chunk = (rows, *shape[1:])
     _replaced(file, where, shape=shape, dtype=kind, chunks=chunk, maxshape=(None, *shape[1:]),
               compression="gzip")  # fmt: skip
-    packed = zlib.compress(bytes(int(np.prod(chunk)) * kind.itemsize), 9)
+    packed = _zeros(int(np.prod(chunk)) * kind.itemsize)
     file[where].id.write_direct_chunk((0,) * len(shape), packed)
+
+
+def _zeros(count: int) -> bytes:
+    """Return many zeros, packed by zlib, at no more cost than packing a few."""
+    packer, size = zlib.compressobj(9, zlib.DEFLATED, -15), 2**20
+    block = packer.compress(bytes(size)) + packer.flush(zlib.Z_FULL_FLUSH)
+    rest = zlib.compressobj(9, zlib.DEFLATED, -15)
+    last = rest.compress(bytes(count % size)) + rest.flush()
+    return b"\x78\xda" + block * (count // size) + last + struct.pack(">HH", count % 65521, 1)
 
 
 def objects(path: Path) -> dict[str, list[str]]:
