@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 WORKERS ?= 2
 
-.PHONY: demo demo-model test test-all check bench clean
+.PHONY: demo demo-model test test-all check bench fuzz clean
 
 demo: $(VENV)/.runtime
 	mkdir -p demo
@@ -57,6 +57,9 @@ bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.nearest
 	$(BIN)/python -m benchmarks.surfels
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.score_rows
+
+fuzz: $(VENV)/.test
+	$(BIN)/python -m fuzz --seconds 600 --corpus fuzz-corpus
 
 clean:
 	rm -rf $(VENV) demo build dist *.egg-info

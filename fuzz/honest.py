@@ -1,0 +1,94 @@
+"""The honest files that cases are made from: tiny, and written by the commands.
+
+python -m fuzz.honest FOLDER
+"""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import click
+import h5py
+import numpy as np
+
+import cli
+
+STEPS = (
+    "scenegen render --n 4 --size 32 --views 0,35 --seed 3 --out rooms.h5",
+    "scenegen render --n 3 --size 32 --seed 9 --out train.h5",
+    "scenegen render --n 3 --size 16 --objects-root meshes --cache-dir cache --seed 4"
+    " --out models.h5",
+    "iqtt make-split --train 6 --labeled 3 --val 6 --test 6 --size 32 --cubes 5-6"
+    " --min-cube-pixels 2 --seed 987654321 --out iqtt",
+    "bench baseline empty-room --data rooms.h5 --out predictions.h5",
+    "bench baseline constant --train train.h5 --data rooms.h5 --out constant.h5",
+    "bench baseline chance --data iqtt/iqtt-test.h5 --out answers.h5",
+)
+SCORES = (
+    "bench score predictions.h5 --truth rooms.h5 --json scores.json",
+    "bench score constant.h5 --truth rooms.h5 --json other.json",
+    "bench score answers.h5 --truth iqtt/iqtt-test-answers.h5 --json answer-scores.json",
+)
+
+
+def make(folder: Path, weights: bool) -> None:
+    """Write the honest files into an existing folder; weights take seconds, as torch does."""
+    os.chdir(folder)
+    _meshes(Path("meshes"))
+    for step in (*STEPS, *SCORES):
+        _run(step)
+    Path("answers.json").write_text(json.dumps([0, 1, 2, 2, 1, 0]))
+    named = {"answers": {str(i): i % 3 for i in range(6)}, "method": "mine", "run": "seed 0"}
+    Path("named.json").write_text(json.dumps(named))
+    with h5py.File("released.h5", "w") as file:  # nothing but images and answers
+        file["questions"] = np.random.default_rng(3).random((4, 4, 16, 16, 3)).astype("f4")
+        file["answers"] = np.arange(4) % 3
+    if weights:
+        _weights(Path("weights.safetensors"))
+
+
+def _run(step: str) -> None:
+    program, *arguments = step.split()
+    getattr(cli, program).main(arguments, standalone_mode=False)
+
+
+def _meshes(root: Path) -> None:
+    """Write a model in each format that is read."""
+    import trimesh
+
+    shapes = {
+        "box.obj": trimesh.creation.box((1, 2, 1)),
+        "cylinder.stl": trimesh.creation.cylinder(1, 2, sections=8),
+        "ball.ply": trimesh.creation.icosphere(1),
+        "cone.off": trimesh.creation.cone(1, 1, sections=8),
+        "ring.glb": trimesh.creation.annulus(0.5, 1, 1, sections=8),
+    }
+    for name, shape in shapes.items():
+        path = root / "mug" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        shape.export(path)
+    shapes["cylinder.stl"].export(root / "mug" / "text.stl", file_type="stl_ascii")
+    shapes["ball.ply"].export(root / "mug" / "text.ply", encoding="ascii")
+
+
+def _weights(path: Path) -> None:
+    """Write untrained weights of the smallest networks, and their card."""
+    from baselines.pix2shape.network.architecture import NetworkSpec
+    from baselines.pix2shape.network.config import ModelConfig
+    from baselines.pix2shape.training.state import new_state
+    from baselines.pix2shape.weights.storage import Card, save_weights
+
+    config = ModelConfig(
+        networks=NetworkSpec(size=32, width=0.05), iterations=4, batch=4, critic_steps=1
+    )
+    with h5py.File("rooms.h5") as rooms:
+        known = {"data": rooms.attrs["spec"], "fingerprint": rooms.attrs["fingerprint"]}
+    save_weights(path, new_state(config).model, Card(config, **known))
+
+
+if __name__ == "__main__":
+    try:
+        make(Path(sys.argv[1]), "--weights" in sys.argv)
+    except click.ClickException as error:
+        raise SystemExit(f"no honest files: {error.format_message()}") from error
