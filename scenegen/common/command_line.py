@@ -19,6 +19,7 @@ from scenegen.common.text_table import printable
 EXAMPLE = "\b\nExample:\n  "
 MESH_FILES = (".glb", ".obj", ".off", ".ply", ".stl")
 NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
+LONGEST_ERROR = 2000  # characters; what a file holds may be of any length
 LARGEST = 2**63 - 1  # whole number that files can hold
 MOST_PROCESSES = 1024
 MOST_ITEMS = 1_000_000  # numbers of a range; keeps 0-99999999999 from filling the memory
@@ -76,7 +77,10 @@ class UserError(click.ClickException):
     exit_code = 2
 
     def __init__(self, text: str) -> None:
-        super().__init__(printable(text))
+        line = printable(text)
+        if len(line) > LONGEST_ERROR:
+            line = f"{line[: LONGEST_ERROR // 2]} ... {line[-LONGEST_ERROR // 2 :]}"
+        super().__init__(line)
 
 
 @contextmanager
@@ -84,6 +88,9 @@ def _one_line_errors() -> Iterator[None]:
     """Turn what a user can mend into a UserError."""
     try:
         yield
+    except click.UsageError as error:
+        line = UserError(" ".join(error.format_message().split())).message
+        raise click.UsageError(line, error.ctx) from error
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         raise UserError(f"{where}{error.strerror or error}") from error

@@ -27,6 +27,7 @@ Array = NDArray[Any]
 # What h5py raises on damaged files, by the kind of damage: this tuple is the only list of them.
 HDF5_ERRORS = (OSError, RuntimeError, KeyError, TypeError, ValueError, MemoryError)
 MOST_OBJECTS = 10_000  # groups and data sets of a file
+DEEPEST = 8  # groups within groups
 MOST_ATTRIBUTES = 1_000  # of one of them
 MOST_BYTES = 256 * 2**20  # to be unpacked for one row
 LZF = 32000
@@ -144,6 +145,9 @@ def faults(file: h5py.File) -> Iterator[Fault]:
             if info.type == h5o.TYPE_GROUP:
                 child = h5o.open(group, raw)
                 yield from _attribute_faults(name, child)
+                if name.count("/") >= DEEPEST:
+                    yield Fault(name, "count", f"groups {DEEPEST} deep", "fewer")
+                    return
                 waiting.append((f"{name}/", child))
             elif info.type == h5o.TYPE_DATASET:
                 dataset = h5d.open(group, raw)

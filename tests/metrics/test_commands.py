@@ -147,7 +147,7 @@ def test_scoring_loads_neither_renderer_nor_torch(truths, folder):
 def test_outputs_of_one_name_are_refused_before_anything_is_written(truths, folder, check_refusal):
     bench("baseline", "empty-room", "--data", truths.rooms, "--out", "p.h5")
     result = bench("score", "p.h5", "--json", "same", "--csv", "./same")
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("outputs", "same, same"))
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("outputs", "same and ./same"))
     assert not (folder / "same").exists()
 
 

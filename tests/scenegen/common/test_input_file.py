@@ -107,6 +107,7 @@ def test_a_chunk_takes_the_bytes_of_its_shape_and_no_more(payload, path):
         (lambda f: f.create_dataset("depth", (0, 4), "f4", maxshape=(None, 4)), None),
         (lambda f: f.create_dataset("depth", data=h5py.Empty("f4")), None),
         (lambda f: [f.create_group(f"g{i}") for i in range(11)], "count"),
+        (lambda f: f.create_group("/g" * 1500), "count"),
         (lambda f: [f.attrs.__setitem__(f"a{i}", i) for i in range(6)], "attributes"),
     ],
 )

@@ -53,7 +53,7 @@ def test_a_render_that_is_terminated_leaves_nothing(tmp_path):
     command = [sys.executable, "-c", "import cli; cli.scenegen()", *RENDER]
     process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
     end = time.monotonic() + 60
-    while not any(path.stat().st_size > 100_000 for path in tmp_path.iterdir()):
+    while not any(path.stat().st_size > 100_000 for path in tmp_path.rglob("*.h5")):
         assert process.poll() is None, process.stderr.read()
         assert time.monotonic() < end
         time.sleep(0.02)
