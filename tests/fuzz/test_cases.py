@@ -73,7 +73,7 @@ def scene(path):
         (("b.json", "become", "fifo"), lambda path: path.is_fifo()),
         (("b.json", "numeral", [[0.0, "nan"]]), lambda path: "[nan, 2" in path.read_text()),
     ],
-    ids=str,
+    ids=lambda part: " ".join(map(str, part[1:])) if isinstance(part, tuple) else "seen",
 )  # fmt: skip
 def test_edits_do_what_they_say(honest, tmp_path, edit, seen):
     path, name, *arguments = edit
