@@ -11,10 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import h5py
-
 from scenegen.common.errors import FileFormatError
-from scenegen.common.input_file import HDF5_ERRORS, faults
 
 SECONDS = 8.0  # for any file
 BYTES_A_SECOND = 20e6  # that a slow disk and honest content take beyond that
@@ -65,27 +62,44 @@ def _refusal(path: str | Path, found: str) -> FileFormatError:
 
 
 def _is_hdf5(path: str | Path) -> bool:
+    """Return whether the signature is at 0, 512, 1024, 2048, ...: other bytes may come first."""
+    place = 0
     with open(path, "rb") as file:
-        return file.read(len(SIGNATURE)) == SIGNATURE or h5py.is_hdf5(path)
+        while start := os.pread(file.fileno(), len(SIGNATURE), place):
+            if start == SIGNATURE:
+                return True
+            place = max(512, 2 * place)
+    return False
 
 
-def _read_structure(path: str) -> None:
-    """Read everything of a file but the values that are numbers."""
-    with h5py.File(path, "r") as file:
-        unsafe = {fault.name for fault in faults(file)}
-        dict(file.attrs)
+def _read_structure(path: str, memory: int) -> None:
+    """Read everything of a file but the values that are numbers; the child alone loads h5py.
 
-        def look(_name: str, item: h5py.Group | h5py.Dataset) -> None:
-            dict(item.attrs)
-            if isinstance(item, h5py.Dataset):
-                if item.chunks:
-                    item.id.chunk_iter(lambda chunk: None)
-                if h5py.check_string_dtype(item.dtype) is not None:
-                    for row in range(len(item) if item.shape else 0):
-                        item[row]
+    Errors of HDF5 are left to the caller, who will meet and tell them, but for those of memory.
+    """
+    import h5py
 
-        if not unsafe:
-            file.visititems(look)
+    from scenegen.common.input_file import HDF5_ERRORS, faults
+
+    def look(_name: str, item: h5py.Group | h5py.Dataset) -> None:
+        dict(item.attrs)
+        if isinstance(item, h5py.Dataset):
+            if item.chunks:
+                item.id.chunk_iter(lambda chunk: None)
+            if h5py.check_string_dtype(item.dtype) is not None:
+                for row in range(len(item) if item.shape else 0):
+                    item[row]
+
+    if os.path.exists("/proc/self/statm"):
+        _limit_memory(memory)
+    try:
+        with h5py.File(path, "r") as file:
+            dict(file.attrs)
+            if not list(faults(file)):
+                file.visititems(look)
+    except HDF5_ERRORS as error:
+        if isinstance(error, MemoryError) or "alloc" in str(error):
+            sys.exit(OUT_OF_MEMORY)
 
 
 def _limit_memory(most: int) -> None:
@@ -96,12 +110,5 @@ def _limit_memory(most: int) -> None:
 
 
 if __name__ == "__main__":
-    if os.path.exists("/proc/self/statm"):
-        _limit_memory(int(sys.argv[2]))
     signal.alarm(int(sys.argv[3]))  # ends this process where its parent was killed
-    try:
-        _read_structure(sys.argv[1])
-    except HDF5_ERRORS as error:
-        if isinstance(error, MemoryError) or "alloc" in str(error):
-            sys.exit(OUT_OF_MEMORY)
-        # The caller will meet all other errors, and tell them.
+    _read_structure(sys.argv[1], int(sys.argv[2]))

@@ -39,7 +39,8 @@ def test_train_predict_score(folder):
     on = ("--data", "large.h5", "--weights", "run/weights.safetensors")
     done = pix2shape("predict", *on, "--run", "one")
     assert done.exit_code == 0, done.output
-    assert bench("validate", "predictions.h5").stdout == "predictions.h5: valid\n"
+    truth = ("--truth", "large.h5")
+    assert bench("validate", "predictions.h5", *truth).stdout == "predictions.h5: valid\n"
     assert "chamfer" in bench("score", "predictions.h5").stdout
     other = bench("baseline", "pix2shape", *on, "--out", "b.h5")
     assert other.exit_code == 0, other.output

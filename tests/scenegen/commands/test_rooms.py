@@ -262,5 +262,5 @@ def test_info_shows_what_a_file_holds_in_its_own_lines(run, damaged):
     command = "scenegen\n  fingerprint   0000\x1b[2J"
     path = damaged(lambda file: file.attrs.modify("creation_command", command))
     shown = run("info", path).stdout.splitlines()
-    assert r"  command       scenegen\n  fingerprint   0000\x1b[2J" in shown
+    assert r"  command         scenegen\n  fingerprint   0000\x1b[2J" in shown
     assert sum(line.startswith("  fingerprint") for line in shown) == 1

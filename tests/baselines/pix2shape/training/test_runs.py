@@ -196,7 +196,7 @@ def test_the_prior_is_that_of_codes_where_no_critic_ties_them(rooms_path, folder
 
 
 def test_a_picture_that_cannot_be_written_leaves_the_checkpoint(rooms_path, folder, monkeypatch):
-    def full(*_: Any) -> None:
+    def full(*_: Any, **__: Any) -> None:
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
