@@ -22,7 +22,7 @@ TRUTH = click.option(
     "--truth",
     type=InputPath(),
     help="The rooms file or the file of answers to score against [default: the file that the"
-    " submission names].",
+    " submission names; scores are then comparable only if it is a known test set].",
 )
 MARKDOWN = click.option("--markdown", is_flag=True, help="Print Markdown instead of aligned text.")
 SEED = click.option(
@@ -34,7 +34,9 @@ SEED = click.option(
 )
 
 
-@click.command(epilog=EXAMPLE + "bench score predictions.h5 --json mine.json --html mine.html")
+@click.command(
+    epilog=EXAMPLE + "bench score predictions.h5 --truth rooms.h5 --json mine.json --html mine.html"
+)
 @click.argument("submissions", nargs=-1, required=True, type=InputPath(), metavar="PREDICTIONS...")
 @TRUTH
 @click.option(

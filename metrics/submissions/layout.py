@@ -162,7 +162,10 @@ def describe_format() -> str:
         "",
         "Rows may come in any order, each once; all rows of the truth are scored, so a missing one"
         " is an error.",
-        "A submission is one file: links and data outside it are refused.",
+        "A submission is one file: links and data outside it are refused, and so are datasets of"
+        " which a part was never written.",
+        "Datasets are compressed by gzip or lzf, with or without shuffle and fletcher32, or not at"
+        " all.",
         "iqtt takes JSON as well: a list of answers; an object from index to answer; or",
         '  {"method": "...", "run": "...", "answers": a list or an object}',
         "  JSON names no truth: give it with --truth.",

@@ -18,6 +18,7 @@ class _Told:
 
     inputs: list[tuple[Path, tuple[str, ...]]] = field(default_factory=list)
     outputs: list[Path] = field(default_factory=list)
+    folders: list[Path] = field(default_factory=list)  # to write to
 
 
 class InputPath(click.ParamType):  # type: ignore[type-arg]
@@ -54,8 +55,10 @@ class OutputFolder(click.ParamType):  # type: ignore[type-arg]
     name = "path"
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Refuse an empty path."""
-        _told(self, value, param, ctx)
+        """Refuse an empty path, and one that is a file to be written."""
+        told = _told(self, value, param, ctx)
+        _refuse_twice(value, told.outputs)
+        told.folders.append(Path(value))
         return value
 
 
@@ -67,9 +70,7 @@ class OutputPath(click.ParamType):  # type: ignore[type-arg]
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Compare a path with all others that are known; keep it for those that follow."""
         told = _told(self, value, param, ctx)
-        for other in told.outputs:
-            if _same(Path(value), other):
-                raise SpecError("outputs", f"{other} and {value}, one file", "different files")
+        _refuse_twice(value, [*told.outputs, *told.folders])
         told.outputs.append(Path(value))
         for path, within in told.inputs:
             refuse_inputs([value], [path], within)
@@ -107,6 +108,12 @@ def _told(
         kind.fail("found an empty path, expected a name", param, ctx)
     told: _Told = ctx.meta.setdefault(__name__, _Told()) if ctx else _Told()
     return told
+
+
+def _refuse_twice(output: str, others: Iterable[Path]) -> None:
+    for other in others:
+        if _same(Path(output), other):
+            raise SpecError("outputs", f"{other} and {output}, one path", "different paths")
 
 
 def _same(a: Path, b: Path) -> bool:

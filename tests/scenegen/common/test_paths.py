@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from scenegen.common.command_line import MESH_FILES, PackageCommands
-from scenegen.common.paths import InputPath, OutputPath, refuse_told_inputs
+from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_told_inputs
 from scenegen.objects.meshes.listing import SUFFIXES
 
 
@@ -16,8 +16,9 @@ from scenegen.objects.meshes.listing import SUFFIXES
 @click.option("--weights", type=InputPath(beside=".json"))
 @click.option("--out", type=OutputPath())
 @click.option("--json", type=OutputPath())
+@click.option("--folder", type=OutputFolder())
 @click.option("--derived")
-def command(read, weights, out, json, derived):
+def command(read, weights, out, json, folder, derived):
     refuse_told_inputs([derived] if derived else [])
 
 
@@ -41,8 +42,9 @@ def files(tmp_path, monkeypatch):
         ("a.h5 --out hard.h5", ("hard.h5", "by way of a.h5")),
         ("soft.h5 --json a.h5", ("a.h5", "by way of soft.h5")),
         ("gone.h5 --out ./gone.h5", ("gone.h5",)),
-        ("--out new --json ./new", ("outputs", "different files")),
-        ("--out b.h5 --json b.h5", ("outputs", "different files")),
+        ("--out new --json ./new", ("outputs", "different paths")),
+        ("--out b.h5 --json b.h5", ("outputs", "different paths")),
+        ("--json new --folder ./new", ("outputs", "different paths")),
         ("--weights w.safetensors --out w.json", ("w.json",)),
         ("meshes --out meshes/mug/1.obj", ("1.obj", "by way of meshes")),
         ("other --out meshes/mug/1.obj", ("1.obj", "by way of other")),
