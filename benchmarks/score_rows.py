@@ -20,6 +20,7 @@ import numpy as np
 
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.scoring.rooms import score_rows
+from metrics.submissions.reader import open_predictions
 from scenegen.common.row_file import Table, new_file
 from scenegen.description.specs import DatasetSpec
 from scenegen.layout import columns
@@ -66,8 +67,9 @@ def main() -> None:
             write_truth(truth, folder / "rendered.h5", count)
             write_predictions(predictions, truth)
             rows = np.unique(np.linspace(0, count - 1, SCORED).astype(np.int64))
-            start, cpu = time.perf_counter(), time.process_time()
-            score_rows([predictions], truth, rows, "none", 1)
+            with open_predictions(predictions) as file:
+                start, cpu = time.perf_counter(), time.process_time()
+                score_rows([file], truth, rows, "none", 1)
             spent = (time.perf_counter() - start, time.process_time() - cpu)
             wall, own = (1e3 * seconds / len(rows) for seconds in spent)
             print(f"{count:8d}  {wall:8.2f}  {own:17.2f}", flush=True)

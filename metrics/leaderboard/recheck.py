@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from metrics.measures.statistics import bootstrap_interval, cluster_means, wilson_interval
 from metrics.scoring.records import GROUPINGS, Score, ScoreFile
-from metrics.scoring.schema import SCORE_AGAIN, agree
+from metrics.scoring.schema import AGREEMENT, SCORE_AGAIN, agree
 from scenegen.common.errors import SceneGenError
 
 Found = tuple[str, float | None, float | None]
@@ -39,6 +39,7 @@ def recheck(file: ScoreFile, progress: Callable[[int], Any] = lambda done: None)
     everything = np.ones(len(file.ids), bool)
     with np.errstate(all="ignore"):
         _compare(file, "metrics", file.metrics, everything)
+        _compare_columns(file)
         progress(1)
         for degrees, scores in file.by_view_angle.items():
             place = f"by_view_angle.{degrees}"
@@ -93,6 +94,30 @@ def _intervals(
         means, file.meta.seed, file.meta.resamples, file.meta.confidence
     )
     return lows.tolist(), highs.tolist()
+
+
+def _compare_columns(file: ScoreFile) -> None:
+    """Require what holds between the scores of each image; means over runs keep sums alone."""
+    columns = file.items
+    derived: dict[str, tuple[tuple[str, ...], Callable[..., NDArray[np.float64]]]] = {
+        "chamfer": (("accuracy_distance", "completeness_distance"), np.add),
+    }
+    if file.runs == 1:
+        derived |= {
+            "hausdorff": (("hausdorff_forward", "hausdorff_reverse"), np.maximum),
+            "rmse": (("mse_depth",), np.sqrt),
+        }
+    for name, (parts, function) in derived.items():
+        if not {name, *parts} <= set(columns):
+            continue
+        expected = function(*(columns[part] for part in parts))
+        scale = np.maximum(np.abs(expected), np.abs(columns[name]))
+        wrong = ~(np.abs(columns[name] - expected) <= AGREEMENT * scale + AGREEMENT**2)
+        if wrong.any():
+            i = int(np.argmax(wrong))
+            where = f"{file.place}: items.{name}[{i}]"
+            told = f"{float(expected[i])!r}, as {' and '.join(parts)} say"
+            raise RecheckError(where, repr(float(columns[name][i])), told, SCORE_AGAIN)
 
 
 def _compare_questions(

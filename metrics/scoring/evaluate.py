@@ -37,7 +37,7 @@ def score(
 
     Raises:
         OSError: a file that is not there.
-        FileFormatError: a file that is none of ours, or broken.
+        FileFormatError: a file that is none of ours, or broken, or that changes meanwhile.
         ScoringError: the wrong truth, or a changed one; rows that are missing or unknown; values
             that are not finite; two copies of one run.
     """
@@ -51,9 +51,13 @@ def score(
         found = find_truth(files[0], truth)
         rooms = [file for file in files if isinstance(file, RoomPredictions)]
         if rooms:
-            return score_rooms(rooms, found, settings, progress)
-        answers = [file for file in files if isinstance(file, QuestionPredictions)]
-        return score_questions(answers, found, settings, progress)
+            scores = score_rooms(rooms, found, settings, progress)
+        else:
+            answers = [file for file in files if isinstance(file, QuestionPredictions)]
+            scores = score_questions(answers, found, settings, progress)
+        for file in files:
+            file.require_unchanged()
+        return scores
 
 
 def count_rows(path: str | Path) -> int:

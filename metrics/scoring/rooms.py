@@ -33,15 +33,15 @@ from metrics.scoring.runs import (
 from metrics.scoring.truth_digests import RowDigests, rooms_digest, view_digests
 from metrics.submissions.missing_rows import size_problems
 from metrics.submissions.problems import PredictionError
-from metrics.submissions.reader import RoomPredictions, open_predictions
+from metrics.submissions.reader import Identity, RoomPredictions, open_predictions
 from metrics.submissions.truths import FoundTruth, read_true_view
 from scenegen.common.worker_pool import worker_pool
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
-# What a process must know to score rows, small, as it is sent along with each chunk: the paths of
-# the submissions, that of the truth, and the alignments after which depth is scored.
-Job = tuple[tuple[Path, ...], Path, tuple[Alignment, ...]]
+# What a process must know to score rows, small, as it is sent along with each chunk: the paths and
+# identities of the submissions, the path of the truth, and the alignments of scored depth.
+Job = tuple[tuple[tuple[Path, Identity], ...], Path, tuple[Alignment, ...]]
 CHUNK = 8  # rows scored between two reports of progress
 FEW = 32  # rows that are not worth starting processes for
 FLOOR_ROWS = 16  # rows on which the noise floor is measured
@@ -61,8 +61,8 @@ def score_rooms(
         if file.has_normals != files[0].has_normals:
             told, expected = ("normals", "none") if file.has_normals else ("none", "normals")
             raise ScoringError(f"{file.path}: normal", told, f"{expected} as in {files[0].path}")
-    alignment, paths = files[0].alignment, [file.path for file in files]
-    scored = score_rows(paths, found.path, rows, alignment, settings.processes, progress)
+    alignment = files[0].alignment
+    scored = score_rows(files, found.path, rows, alignment, settings.processes, progress)
     scores, bad = scored.scores, scored.bad
     if bad and settings.non_finite == "error":
         first = next(iter(bad.values()))
@@ -131,7 +131,7 @@ class ScoredRows:
 
 
 def score_rows(
-    paths: Sequence[Path],
+    files: Sequence[RoomPredictions],
     truth_path: Path,
     rows: Array,
     alignment: str,
@@ -140,7 +140,7 @@ def score_rows(
 ) -> ScoredRows:
     """Score these M rows in each of R submissions; the numbers do not depend on `processes`."""
     alignments = tuple(a for a in get_args(Alignment) if a in (*ALIGNMENTS, alignment))
-    job = tuple(paths), truth_path, alignments
+    job = tuple((file.path, file.identity) for file in files), truth_path, alignments
     chunks = [rows[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
     table: list[list[dict[str, float]]] = []
     found = ScoredRows()
@@ -172,13 +172,17 @@ class _RowScorer:
     """The files of a job, open in one process, and where each row lies in each submission."""
 
     def __init__(
-        self, paths: tuple[Path, ...], truth_path: Path, alignments: tuple[Alignment, ...]
+        self,
+        submissions: tuple[tuple[Path, Identity], ...],
+        truth_path: Path,
+        alignments: tuple[Alignment, ...],
     ) -> None:
         self._alignments = alignments
         with ExitStack() as opening:  # closes what is open already where a later file is refused
             self._truth = opening.enter_context(RoomsFile(truth_path))
             self._files = [
-                opening.enter_context(open_predictions(path, tried=True)) for path in paths
+                opening.enter_context(open_predictions(path, tried=identity))
+                for path, identity in submissions
             ]
             self._stack = opening.pop_all()
         self._entries = [{row: i for i, row in enumerate(f.rows.tolist())} for f in self._files]
@@ -229,7 +233,7 @@ def _in_processes(job: Job, chunks: Sequence[Array], processes: int | None) -> I
             yield from pool.map(functools.partial(_score_in_worker, job), chunks)
     except BrokenProcessPool as error:
         hint = "memory may be short: take fewer --processes"
-        raise ScoringError(job[0][0], "a process that scores was killed", "", hint) from error
+        raise ScoringError(job[0][0][0], "a process that scores was killed", "", hint) from error
 
 
 def _score_in_worker(job: Job, rows: Array) -> Any:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from metrics.measures.statistics import cluster_means
+from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import Metric, UnknownMetricError, metric
 from metrics.scoring.records import GROUPINGS, ID_COLUMNS, OPTIONAL_COLUMNS, Score, ScoreFile, Task
 from metrics.submissions.problems import JsonError
@@ -112,6 +112,13 @@ def _wrong_count(counts: Mapping[str, int], name: str, expected: str) -> JsonErr
 def _check_comparable(file: ScoreFile) -> None:
     """Raise JsonError where scores claim to be comparable, and the file says why they are not."""
     scored, all_there = (file.meta.counts[name] for name in TOTALS[file.task])
+    known = known_test(file.meta.truth_digest)
+    if file.meta.truth_source == "known" and (known is None or known.task != file.task):
+        expected = "given, or submission, as this release does not know the digest"
+        raise refusal("meta.truth_source", "'known'", expected)
+    if known is not None and known.rows != all_there:
+        place = f"meta.counts.{TOTALS[file.task][1]}"
+        raise refusal(place, str(all_there), f"{known.rows}, as {known.name} has")
     reasons = {
         "only the submission named its truth": file.meta.truth_source == "submission",
         f"{scored} of {all_there} are scored": scored < all_there,
@@ -222,8 +229,9 @@ def _check_mean(file: ScoreFile, name: str, score: Score, clusters: int) -> None
         raise refusal(f"items.{name}", "no such key", f"the column of metrics.{name}")
     if np.isnan(column).any():
         raise refusal(f"items.{name}", "null", f"numbers, as metrics.{name} is their mean")
-    with np.errstate(over="ignore"):
-        mean = float(cluster_means(column, file.clusters).mean())
+    index = np.unique(file.clusters, return_inverse=True)[1]
+    with np.errstate(over="ignore"):  # `cluster_means` refuses columns whose sum overflows
+        mean = float((np.bincount(index, column) / np.bincount(index)).mean())
     if not agree(score.value, mean, 0.0):
         expected = f"{mean!r}, the mean of items.{name} over scenes"
         raise refusal(f"metrics.{name}.value", repr(score.value), expected)

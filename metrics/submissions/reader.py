@@ -5,6 +5,7 @@ truth, except for the pixels, which are read one row at a time.
 """
 
 import hashlib
+import os
 from functools import cached_property
 from pathlib import Path
 from typing import Self, cast
@@ -23,6 +24,12 @@ from scenegen.common.input_file import StoredArray, checking, open_unchecked, re
 
 Array = NDArray[np.float64]
 BLOCK_BYTES = 1 << 20
+Identity = tuple[int, int, int, int]  # device, inode, size, and time of the last change
+
+
+def _identity(place: Path | int) -> Identity:
+    status = os.stat(place)
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
 class Predictions:
@@ -34,6 +41,7 @@ class Predictions:
         truth_path: where the truth lay when the submission was written; empty where not recorded.
         rows: (M,) int64: which row of the truth, or which question, each entry answers; every one
             at least 0 and there once.
+        identity: which file it was when it was opened, whatever has its path now.
     """
 
     task = ""
@@ -47,18 +55,30 @@ class Predictions:
         self.truth_fingerprint = texts.get("truth_fingerprint") or None
         self.rows = rows
         self._file = file
+        self.identity = _identity(path if file is None else file.id.get_vfd_handle())
 
     def __len__(self) -> int:
         return len(self.rows)
 
     @cached_property
     def sha256(self) -> str:
-        """SHA-256 of the file, as hex."""
+        """SHA-256 of the file, as hex. Raises FileFormatError as `require_unchanged`."""
         digest = hashlib.sha256()
         with self.path.open("rb") as file:
+            self.require(_identity(file.fileno()))
             while block := file.read(BLOCK_BYTES):
                 digest.update(block)
         return digest.hexdigest()
+
+    def require_unchanged(self) -> None:
+        """Raise FileFormatError where the path has another file than the one that was opened."""
+        self.require(_identity(self.path))
+
+    def require(self, identity: Identity) -> None:
+        """Raise FileFormatError unless this is the identity of the file that was opened."""
+        if identity != self.identity:
+            found = "another file than the one that was opened"
+            raise FileFormatError(self.path, found, "one that does not change while it is scored")
 
     def close(self) -> None:
         """Close the file; idempotent."""
@@ -150,22 +170,27 @@ class QuestionPredictions(Predictions):
 
 
 def open_predictions(
-    path: str | Path, *, tried: bool = False
+    path: str | Path, *, tried: Identity | None = None
 ) -> RoomPredictions | QuestionPredictions:
     """Open a submission of either task, HDF5 or JSON, and check what can be checked without truth.
 
-    `tried` says that `trial.try_file` has accepted the file already, as it does here otherwise.
+    `tried` is the identity of a file that was opened in another process, and which this must be.
 
     Raises:
         OSError: no such file, or a folder.
         FileFormatError: not a submission, of a newer format, or broken; with the first problem and
             how many follow. `metrics.submissions.validation.validate` returns all.
     """
-    opened, problems = inspect_predictions(path, tried=tried)
-    if opened is None or problems:
+    opened, problems = inspect_predictions(path, tried=tried is not None)
+    try:
+        if opened is None or problems:
+            raise first_error(FileFormatError, path, problems)
+        if tried is not None:
+            opened.require(tried)
+    except FileFormatError:
         if opened is not None:
             opened.close()
-        raise first_error(FileFormatError, path, problems)
+        raise
     return opened
 
 

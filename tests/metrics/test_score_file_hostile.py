@@ -8,6 +8,7 @@ import pytest
 from refusals import refused
 
 from metrics.score_file import JsonError, read_scores, to_json, write_scores
+from metrics.scoring.known_tests import KNOWN_TESTS
 from metrics.submissions.strict_json import LONGEST_SHOWN, refusal
 
 ROOMS = json.loads(to_json(made_scores.simple_rooms(runs=2, chamfer_floor=0.01)))
@@ -152,6 +153,8 @@ WRONG = [
     ("meta/resamples", 2**40, "", f"{2**40}", "100 to 100000"),
     ("meta/truth_digest", "AB", "", "'AB'", "64 hexadecimal"),
     ("meta/truth_source", "me", "", "'me'", "'given', 'known' or 'submission'"),
+    ("meta/truth_source", "known", "", "'known'", "given, or submission"),
+    ("meta/truth_digest", KNOWN_TESTS[0].digest, "meta.counts.rows_in_truth", "4", "8, as"),
     ("meta/truth_source", "submission", "comparable", "true", "false, as only the submission"),
     ("meta/warnings", ["not comparable: x"], "comparable", "true", "false, as meta.warnings"),
     ("meta/submissions", [], "", "a list of 0", "at least one"),

@@ -79,7 +79,7 @@ def test_truths_of_one_request_but_other_bits_are_not_ranked_together():
 
 
 def test_known_test_sets_bear_their_name(monkeypatch):
-    known = KnownTest("rooms-test", "rooms", DIGEST, "scenegen render")
+    known = KnownTest("rooms-test", "rooms", DIGEST, 3, "scenegen render")
     monkeypatch.setattr("metrics.scoring.known_tests.KNOWN_TESTS", (known,))
     assert leaderboard([rooms("a")], paper=False)[0].title == "Rooms, rooms-test"
 

@@ -127,6 +127,18 @@ def test_each_number_is_held_against_the_items(file, place, part):
         recheck(forged(file, place, **{part: number * (1 + 1e-12)}))
 
 
+@pytest.mark.parametrize("name", ["chamfer", "hausdorff", "rmse"])
+def test_scores_of_one_image_agree_with_each_other(truths, tmp_path, name):
+    """A column that is best everywhere, with a mean and an interval to go with it."""
+    write_room_baseline("empty-room", truths.rooms, tmp_path / "rooms.h5")
+    file = score([tmp_path / "rooms.h5"], truths.rooms)
+    best = replace(file.metrics[name], value=0.0, low=0.0, high=0.0)
+    items = {**file.items, name: np.zeros(len(file.ids))}
+    forged = replace(file, items=items, metrics={**file.metrics, name: best}, by_view_angle={})
+    with refused(RecheckError, f"items.{name}[0]", found="0.0"):
+        recheck(forged)
+
+
 def test_intervals_cannot_be_left_out():
     with refused(RecheckError, "metrics.chamfer.low", "null", "0."):
         recheck(forged(made_rooms(), "metrics/chamfer", low=None, high=None))

@@ -20,6 +20,7 @@ from metrics.scoring.evaluate import score
 from metrics.scoring.records import Submission
 from scenegen.rooms.preview import NOTHING
 
+CONTROLS = "\x1b[2J\x9b\u202e\u2066\x07"
 HOSTILE = "</title></style><script>alert(1)</script>\"'><img src=http://x.y>&"
 
 
@@ -30,6 +31,9 @@ def test_the_page_is_whole_escapes_names_and_loads_nothing(rooms_path, tmp_path)
     runs = (Submission(HOSTILE, "0" * 64, HOSTILE),)
     meta = replace(found.meta, truth_path=HOSTILE, warnings=(HOSTILE,), submissions=runs)
     text = html_report(replace(found, method=HOSTILE, meta=meta), rooms_path, [path])
+    meta = replace(meta, truth_path=CONTROLS, warnings=(CONTROLS,))
+    controls = html_report(replace(found, method=CONTROLS, meta=meta), rooms_path, [path])
+    assert set(controls).isdisjoint(CONTROLS.replace("[2J", ""))
     page = Page(text)
     assert len(page.addresses) == 3 * 3 * 4
     assert all(address.startswith("data:image/png;base64,") for address in page.addresses)

@@ -1,6 +1,7 @@
 """Submissions against truths: what is averaged over what, and what is refused."""
 
 import json
+import os
 import shutil
 import warnings
 from importlib.metadata import version
@@ -17,12 +18,14 @@ from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.score_file import read_scores, to_json, write_scores
+from metrics.scoring import rooms
 from metrics.scoring.evaluate import score
 from metrics.scoring.metric_names import metric
 from metrics.scoring.rooms import view_angles
 from metrics.scoring.runs import ScoringError, Settings
 from metrics.submissions.validation import validate
 from scenegen.camera import Camera, back_project
+from scenegen.common.errors import FileFormatError
 from scenegen.layout import TRUTH_DIGEST
 from scenegen.rooms.reader import RoomsFile
 
@@ -293,6 +296,30 @@ def copied(source, path, **attributes):
                 replaced(name, lambda values: values[::-1])(file)
         file.attrs.update(attributes)
     return path
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+@pytest.mark.parametrize("back", [False, True])
+def test_a_submission_that_changes_while_it_is_scored(
+    truths, tmp_path, monkeypatch, back, processes
+):
+    """Another file gets its name after it was opened; at the end the first has it again, or not."""
+    mine, other = tmp_path / "mine.h5", tmp_path / "other.h5"
+    write_room_baseline("empty-room", truths.rooms, mine)
+    write_room_baseline("oracle", truths.rooms, other)
+    real = rooms.score_rows
+
+    def swapped(files, *rest):
+        os.rename(mine, tmp_path / "kept")
+        os.rename(other, mine)
+        found = real(files, *rest)
+        if back:
+            os.rename(tmp_path / "kept", mine)
+        return found
+
+    monkeypatch.setattr(rooms, "score_rows", swapped)
+    with refused(FileFormatError, str(mine), found="another file"):
+        score([mine], truths.rooms, Settings(processes=processes))
 
 
 def test_two_copies_of_one_run_are_not_two_runs(folder, questions, tmp_path):

@@ -124,7 +124,7 @@ def test_a_truth_that_only_the_submission_names_is_not_comparable(truth, monkeyp
     (warning,) = found.meta.warnings
     assert all(word in warning for word in (str(truth), digest[:12], "--truth"))
     assert score([path], truth).comparable
-    known = KnownTest("mine", "rooms", digest, "scenegen render")
+    known = KnownTest("mine", "rooms", digest, 8, "scenegen render")
     monkeypatch.setattr(known_tests, "KNOWN_TESTS", (known,))
     found = score([path])
     assert (found.comparable, found.meta.truth_source, found.meta.warnings) == (True, "known", ())

@@ -11,7 +11,7 @@ from metrics.submissions.reader import QuestionPredictions
 def answered(scores, rows=None):
     """A submission with these scores (Q, 3)."""
     rows = np.arange(len(scores)) if rows is None else rows
-    return QuestionPredictions(Path("answers.h5"), {}, rows, 0 * rows, scores)
+    return QuestionPredictions(Path(__file__), {}, rows, 0 * rows, scores)
 
 
 def test_scores_that_are_distances():
