@@ -5,7 +5,6 @@ own filter and any HDF5 library reads it. A file gets its name when it is comple
 """
 
 import errno
-import hashlib
 import importlib.metadata
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -23,10 +22,10 @@ from scenegen.common.axes import name_axes
 from scenegen.common.content import (
     CONTENT_DIGEST,
     SHA256,
+    ColumnDigest,
     content_digest,
     dataset_digest,
     datasets,
-    row_digest,
 )
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.input_file import StoredArray, reading
@@ -80,7 +79,7 @@ class Table:
         self._columns, self._compression = columns, compression
         self._datasets = {column.name: self._create(group, column) for column in columns}
         self._block: dict[str, list[Any]] = {c.name: [] for c in columns if not c.own_chunk}
-        self._digests = {column.name: hashlib.sha256() for column in columns}
+        self._digests = {column.name: ColumnDigest() for column in columns}
         if not count:
             self._write_digests()
 
@@ -99,7 +98,7 @@ class Table:
 
     def _write_digests(self) -> None:
         for name, digest in self._digests.items():
-            self._datasets[name].attrs[SHA256] = digest.hexdigest()
+            self._datasets[name].attrs[SHA256] = digest.hex
 
     def _create(self, group: h5py.Group, column: Column) -> h5py.Dataset:
         text = column.dtype == "text"
@@ -122,7 +121,7 @@ class Table:
     def _write_chunk(self, name: str, values: Array) -> None:
         dataset = self._datasets[name]
         raw = np.ascontiguousarray(values, dataset.dtype)
-        self._digests[name].update(row_digest(raw))
+        self._digests[name].update([raw])
         if self._compression == "lzf":
             dataset[self.rows] = raw
             return
@@ -139,8 +138,7 @@ class Table:
                 text = h5py.check_string_dtype(dataset.dtype) is not None
                 values = np.array(rows, object) if text else np.stack(rows).astype(dataset.dtype)
                 dataset[self.rows - len(rows) : self.rows] = values
-                for row in values:
-                    self._digests[name].update(row_digest(row))
+                self._digests[name].update(values)
                 rows.clear()
 
 

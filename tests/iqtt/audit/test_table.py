@@ -77,6 +77,7 @@ def test_nothing_may_be_added_taken_away_or_renamed(damaged):
     edits = {
         "an attribute more": attribute("note", "mine"),
         "a dataset more": lambda file: file.create_dataset("x", data=1),
+        "a name more": lambda file: file.__setitem__("zz", file["questions"]),
         "an attribute less": gone("conventions"),
         "no digest of a dataset": lambda file: file["answers"].attrs.__delitem__("sha256"),
         "a group renamed": lambda file: file.move("truth", "lies"),
