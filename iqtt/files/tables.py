@@ -13,9 +13,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.files.attributes import has_digests, read_digest, read_names, read_root, read_text
+from iqtt.files.attributes import has_digests, read_root
 from iqtt.files.layout import SCORED, named, truth_columns
 from scenegen.common import content
+from scenegen.common.attributes import read_digest, read_names, read_text
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.input_file import StoredArray, checking, open_file, reading
 from scenegen.common.records import check

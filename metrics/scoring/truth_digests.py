@@ -42,7 +42,7 @@ def rooms_digest(truth: RoomsFile, scored: Mapping[int, RowDigests]) -> str:
             )
         else:
             columns[name] = dataset_digest(truth.read(name, slice(None)))
-    return _checked(truth.path, columns, truth.attributes.get(TRUTH_DIGEST), truth.stored_digests())
+    return _checked(truth.path, columns, truth.stored_truth_digest(), truth.stored_digests())
 
 
 def answers_digest(truth: "AnswersFile", columns: Mapping[str, NDArray[Any]]) -> str:
@@ -56,9 +56,11 @@ def answers_digest(truth: "AnswersFile", columns: Mapping[str, NDArray[Any]]) ->
     return _checked(truth.path, found, truth.stored_truth_digest, told)
 
 
-def _checked(path: Path, found: Mapping[str, str], stored: Any, own: Mapping[str, str]) -> str:
+def _checked(
+    path: Path, found: Mapping[str, str], stored: str | None, own: Mapping[str, str]
+) -> str:
     digest = joint_digest(found)
-    if stored is None or str(stored) == digest:  # files of older formats have none
+    if stored is None or stored == digest:  # files of older formats have none
         return digest
     changed = [name for name in own if own[name] != found.get(name, own[name])]
     raise ScoringError(

@@ -206,25 +206,25 @@ def digest_problems(file: h5py.File, known: Mapping[str, str]) -> list[str]:
 
 
 def read_spec(
-    path: Path, attributes: Mapping[str, Any], version: str, from_json: Callable[[str], Spec]
+    path: Path, texts: Mapping[str, str], version: str, from_json: Callable[[str], Spec]
 ) -> Spec:
-    """Return the request that a file answers, from the root attributes that all our files have.
+    """Return the request that a file answers, from the root's texts, which all our files have.
 
     Raises FileFormatError for a major version other than `version`'s, a missing attribute and a
     request that `from_json` refuses.
     """
-    found, major = str(attributes.get("format_version")), version.split(".", maxsplit=1)[0]
+    found, major = str(texts.get("format_version")), version.split(".", maxsplit=1)[0]
     if found.split(".", maxsplit=1)[0] != major:
         raise FileFormatError(
             f"{path}: format version {found}",
             expected=f"{major}.x",
-            hint=f"read it with the release that wrote it ({attributes.get('writer')})",
+            hint=f"read it with the release that wrote it ({texts.get('writer')})",
         )
     for name in ("spec", "writer"):
-        if name not in attributes:
+        if name not in texts:
             raise FileFormatError(f"{path}: attribute {name!r}", "none", "a text")
     with describing(f"{path}: attribute 'spec'"):
-        return from_json(str(attributes["spec"]))
+        return from_json(texts["spec"])
 
 
 @contextmanager

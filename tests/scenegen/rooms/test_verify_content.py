@@ -200,7 +200,7 @@ def test_a_new_format_without_digests_fails(spoilt):
         put("object_id", (2, 5, 5), 127),
         put("object_id", (2, 5, 5), -128),
         put("scene_index", 2, 2**63 - 1),
-        attribute("fingerprint", h5py.Empty("S1")),
+        attribute("variant", h5py.Empty("S1")),
         put("camera/world_from_camera", 2, 1e308),
     ],
 )
