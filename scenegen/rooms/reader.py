@@ -163,12 +163,12 @@ class RoomsFile:
 
     def stored_digests(self) -> dict[str, str]:
         """Return the digest that each dataset got when it was written; none in older files."""
-        digests = {}
-        for name, data in self._datasets.items():
-            place = f"{self.path}: {name}"
-            with input_file.reading(place):
-                digests[name] = read_digest(data, SHA256, place)
-        return {name: digest for name, digest in digests.items() if digest is not None}
+        with input_file.reading(self.path):
+            found = {
+                name: read_digest(data, SHA256, f"{self.path}: {name}")
+                for name, data in self._datasets.items()
+            }
+        return {name: digest for name, digest in found.items() if digest is not None}
 
     def stored_truth_digest(self) -> str | None:
         """Return what the file says of the datasets that scores depend on; None if older."""
