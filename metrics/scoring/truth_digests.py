@@ -66,6 +66,6 @@ def _checked(
     raise ScoringError(
         f"{path}: {TRUTH_DIGEST}",
         f"content with the digest {digest:.12}",
-        f"{stored!r:.14}, with which the file was written",
+        f"{stored!s:.12}, with which the file was written",
         f"what was changed since: {', '.join(changed)}" if changed else "",
     )
