@@ -74,7 +74,7 @@ def balance(tables: Sequence[AuditTable], right: Sequence[Array]) -> Proof:
 def content(tables: Sequence[AuditTable]) -> Proof:
     """Prove that all datasets and attributes are those that were written, by the files' digests."""
     rule = "every dataset and attribute is what the digests say"
-    untold = [table.name for table in tables if table.contents is None]
+    untold = [table.name for table in tables if not table.contents]
     if len(untold) == len(tables):
         return Proof("content", "skipped", "no digests")
     wrong = content_problems(tables)

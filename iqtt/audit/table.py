@@ -58,8 +58,8 @@ class AuditTable:
         spec, split, fingerprint: as in the file; None for a released file.
         answers: which of the three is right, (Q,); None if the file does not tell.
         truth: the datasets `TRUTH` by name, (Q, ...) each; empty if the file has no shapes.
-        contents: digest of each dataset that was read, by its file and its name there; None for a
-            file that has no digests.
+        contents: digest of each dataset that was read, by its file and its name there; empty if
+            the file has no digests to compare them with.
         truth_changed: whether the file's `truth_digest` is another one than that of its answers.
         background: most frequent colour of the images' borders, as stored, (3,).
         digests: hashes of the images, (Q, 4) void.
@@ -77,7 +77,7 @@ class AuditTable:
     image_dtype: str
     answers: Array | None
     truth: dict[str, Array]
-    contents: dict[tuple[Path, str], str] | None
+    contents: dict[tuple[Path, str], str]
     truth_changed: bool
     background: Array
     measured: Array
@@ -178,7 +178,7 @@ def read_table(
             questions.image_dtype,
             answers,
             truth,
-            contents if told else None,
+            contents if told else {},
             told and questions.has_answers and scored != questions.stored_truth_digest,
             background,
             measured,
@@ -193,7 +193,7 @@ def content_problems(tables: Sequence[AuditTable]) -> list[str]:
     """
     wrong = "the answers, and what else scores depend on, are not those of its truth_digest"
     problems = [f"{table.name}: {wrong}" for table in tables if table.truth_changed]
-    known = {place: digest for table in tables for place, digest in (table.contents or {}).items()}
+    known = {place: digest for table in tables for place, digest in table.contents.items()}
     for path in dict.fromkeys(path for path, _ in known):
         digests = {name: digest for (where, name), digest in known.items() if where == path}
         with open_file(path, "question file") as file:

@@ -97,10 +97,9 @@ def dataset_digest(dataset: Any) -> str:
 
     Raises whatever HDF5 raises where it is damaged.
     """
-    digest = ColumnDigest()
     if not dataset.shape:
-        digest.update([dataset[()]])
-        return digest.hex
+        return column_digest([row_digest(dataset[()])])
+    digest = ColumnDigest()
     count, *row = dataset.shape
     step = max(1, BLOCK_BYTES // max(1, math.prod(row) * dataset.dtype.itemsize))
     for start in range(0, count, step):
