@@ -14,8 +14,10 @@ from iqtt.files.layout import NO_CUBE, SCORED
 from iqtt.files.reader import QuestionsFile, answers_beside, parts
 from iqtt.questions.specs import SplitSpec
 from scenegen.common import trial
-from scenegen.common.content import column_digest, joint_digest, row_digest
+from scenegen.common.content import ColumnDigest, dataset_digest, joint_digest
+from scenegen.common.input_file import open_file
 from scenegen.common.records import check
+from scenegen.common.row_file import digest_problems
 
 Array = NDArray[Any]
 CHUNK_PIXELS = 2**20  # pixels of questions in memory at once
@@ -56,8 +58,9 @@ class AuditTable:
         spec, split, fingerprint: as in the file; None for a released file.
         answers: which of the three is right, (Q,); None if the file does not tell.
         truth: the datasets `TRUTH` by name, (Q, ...) each; empty if the file has no shapes.
-        changed: datasets and digests that are not as the file's digests say; None for a file that
-            has no digests.
+        contents: digest of each dataset that was read, by its file and its name there; empty if
+            the file has no digests to compare them with.
+        truth_changed: whether the file's `truth_digest` is another one than that of its answers.
         background: most frequent colour of the images' borders, as stored, (3,).
         digests: hashes of the images, (Q, 4) void.
         silhouette: number of pixels of each image that are not background, (Q, 4).
@@ -74,7 +77,8 @@ class AuditTable:
     image_dtype: str
     answers: Array | None
     truth: dict[str, Array]
-    changed: tuple[str, ...] | None
+    contents: dict[tuple[Path, str], str]
+    truth_changed: bool
     background: Array
     measured: Array
     digests: Array
@@ -149,43 +153,52 @@ def read_table(
         first = questions.read("questions", slice(0, min(chunk, source.count)))
         background = _border_color(first)
         scans: list[tuple[Array, ...]] = []
-        digests: list[bytes] = []
+        images_digest = ColumnDigest()
         for start in range(0, source.count, chunk):
             rows = slice(start, min(start + chunk, source.count))
             images = questions.read("questions", rows)
             wanted = measured[(measured >= rows.start) & (measured < rows.stop)] - start
             scans.append(_scan(images, background, wanted))
-            digests += map(row_digest, images)
+            images_digest.update(images)
             progress(len(images))
         scans = scans or [_scan(first, background, measured)]
+        truth = {name: questions.read(name, everything) for name in names}
+        answers = questions.read("answers", everything) if questions.has_answers else None
+        read = truth if answers is None else {"answers": answers, **truth}
+        digests = {name: dataset_digest(values) for name, values in read.items()}
+        digests["questions"] = images_digest.hex
+        contents = {questions.stored_at(name): digest for name, digest in digests.items()}
+        told = questions.stored_content_digest is not None
+        scored = joint_digest({name: digests[name] for name in SCORED if name in digests})
         return AuditTable(
             source,
             questions.spec,
             questions.split,
             questions.fingerprint,
             questions.image_dtype,
-            questions.read("answers", everything) if questions.has_answers else None,
-            {name: questions.read(name, everything) for name in names},
-            _changed(questions, column_digest(digests)),
+            answers,
+            truth,
+            contents if told else {},
+            told and questions.has_answers and scored != questions.stored_truth_digest,
             background,
             measured,
             *map(np.concatenate, zip(*scans, strict=True)),
         )
 
 
-def _changed(questions: QuestionsFile, images: str) -> tuple[str, ...] | None:
-    """Return `AuditTable.changed`; images: the digest of the images, which were read before."""
-    if questions.stored_content_digest is None:
-        return None
-    others = [name for name in questions.fields if name != "questions"]
-    found = {"questions": images} | {name: questions.digest(name) for name in others}
-    changed = [name for name in found if found[name] != questions.stored_digest(name)]
-    scored = joint_digest({name: found[name] for name in SCORED if name in found})
-    if questions.has_answers and scored != questions.stored_truth_digest:
-        changed.append("truth_digest")
-    files = filter(None, (questions, questions.beside))
-    altered = [f for f in files if f.content_digest() != f.stored_content_digest]
-    return (*changed, *(f"attributes of {file.path.name}" for file in altered))
+def content_problems(tables: Sequence[AuditTable]) -> list[str]:
+    """Return what is not as the digests of the tables' files say; each file is opened once.
+
+    Raises OSError and FileFormatError as `open_file`.
+    """
+    wrong = "the answers, and what else scores depend on, are not those of its truth_digest"
+    problems = [f"{table.name}: {wrong}" for table in tables if table.truth_changed]
+    known = {place: digest for table in tables for place, digest in table.contents.items()}
+    for path in dict.fromkeys(path for path, _ in known):
+        digests = {name: digest for (where, name), digest in known.items() if where == path}
+        with open_file(path, "question file") as file:
+            problems += [f"{path.name}: {text}" for text in digest_problems(file, digests)]
+    return problems
 
 
 def _border(pixels: Array) -> Array:

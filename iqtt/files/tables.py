@@ -4,7 +4,6 @@ A training file holds two tables, its parts "labeled" and "unlabeled"; other fil
 `reader` has what users open: files of questions, and files of answers.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +13,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.files.attributes import has_digests, read_digest, read_names, read_root, read_text
+from iqtt.files.attributes import has_digests, read_root
 from iqtt.files.layout import SCORED, named, truth_columns
 from scenegen.common import content
+from scenegen.common.attributes import read_digest, read_names, read_text
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.input_file import StoredArray, checking, open_file, reading
 from scenegen.common.records import check
@@ -26,7 +26,6 @@ from scenegen.layout import TRUTH_DIGEST
 Array = NDArray[Any]
 PARTS = ("labeled", "unlabeled")
 RELEASED = ("questions", "answers")
-DIGESTED = 2**24  # bytes of a dataset that are in memory at once while its digest is made
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,12 +154,10 @@ class TableFile:
         with reading(self.path):
             return {n: (d.id.get_storage_size(), d.nbytes) for n, d in self._stored.items()}
 
-    def digest(self, name: str) -> str:
-        """Return the digest of one dataset, made from what is read now. Raises as `read`."""
-        row = self.read(name, slice(0, 0))
-        step = 1 + DIGESTED // (1 + row.dtype.itemsize * math.prod(row.shape[1:]))
-        parts = (self.read(name, slice(i, i + step)) for i in range(0, len(self), step))
-        return content.column_digest(content.row_digest(row) for part in parts for row in part)
+    def stored_at(self, name: str) -> tuple[Path, str]:
+        """Return the file that holds one dataset, and the name of the dataset there."""
+        stored = self._stored[name]
+        return Path(stored.file.filename), stored.name.lstrip("/")
 
     def stored_digest(self, name: str) -> str | None:
         """Return what the file says of one dataset; None before format 1.2. Raises as `read`."""
@@ -173,13 +170,9 @@ class TableFile:
 
         That are the datasets `layout.SCORED` that are there. Raises as `read`.
         """
-        found = {name: self.digest(name) for name in SCORED if name in self._datasets}
-        return content.joint_digest(found)
-
-    def content_digest(self) -> str:
-        """Return the digest of the whole file, made anew. Raises FileFormatError."""
-        with reading(self.path):
-            return content.content_digest(self._file)
+        scored = [name for name in SCORED if name in self._datasets]
+        values = {name: self.read(name, slice(None)) for name in scored}
+        return content.joint_digest({n: content.dataset_digest(v) for n, v in values.items()})
 
     def close(self) -> None:
         """Close the file; idempotent."""

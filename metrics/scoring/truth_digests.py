@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from metrics.scoring.runs import ScoringError
 from metrics.submissions.truths import TrueView
-from scenegen.common.content import column_digest, joint_digest, row_digest
+from scenegen.common.content import column_digest, dataset_digest, joint_digest, row_digest
 from scenegen.layout import SCORED, TRUTH_DIGEST
 from scenegen.rooms.reader import RoomsFile
 
@@ -36,14 +36,13 @@ def rooms_digest(truth: RoomsFile, scored: Mapping[int, RowDigests]) -> str:
     for name in SCORED:
         if name in PER_PIXEL:
             place = PER_PIXEL.index(name)
-            rows = [
+            columns[name] = column_digest(
                 scored[row][place] if row in scored else row_digest(truth.read(name, row))
                 for row in range(len(truth))
-            ]
+            )
         else:
-            rows = [row_digest(values) for values in truth.read(name, slice(None))]
-        columns[name] = column_digest(rows)
-    return _checked(truth.path, columns, truth.attributes.get(TRUTH_DIGEST), truth.stored_digests())
+            columns[name] = dataset_digest(truth.read(name, slice(None)))
+    return _checked(truth.path, columns, truth.stored_truth_digest(), truth.stored_digests())
 
 
 def answers_digest(truth: "AnswersFile", columns: Mapping[str, NDArray[Any]]) -> str:
@@ -51,15 +50,17 @@ def answers_digest(truth: "AnswersFile", columns: Mapping[str, NDArray[Any]]) ->
 
     Raises ScoringError where it is not the one that was written with the file.
     """
-    found = {name: column_digest(map(row_digest, rows)) for name, rows in columns.items()}
+    found = {name: dataset_digest(rows) for name, rows in columns.items()}
     own = {name: truth.stored_digest(name) for name in columns}
     told = {name: digest for name, digest in own.items() if digest is not None}
     return _checked(truth.path, found, truth.stored_truth_digest, told)
 
 
-def _checked(path: Path, found: Mapping[str, str], stored: Any, own: Mapping[str, str]) -> str:
+def _checked(
+    path: Path, found: Mapping[str, str], stored: str | None, own: Mapping[str, str]
+) -> str:
     digest = joint_digest(found)
-    if stored is None or str(stored) == digest:  # files of older formats have none
+    if stored is None or stored == digest:  # files of older formats have none
         return digest
     changed = [name for name in own if own[name] != found.get(name, own[name])]
     raise ScoringError(

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import h5py
 import numpy as np
 
-from scenegen.common.content import SHA256, column_digest, row_digest
+from scenegen.common.content import SHA256, dataset_digest
 
 
 def name_axes(group: h5py.Group, dataset: h5py.Dataset, axes: Sequence[str]) -> None:
@@ -27,4 +27,4 @@ def _make_scale(group: h5py.Group, name: str, length: int) -> None:
     values = np.arange(length, dtype=np.int32)
     scale = group.create_dataset(name, data=values)
     scale.make_scale(name)
-    scale.attrs[SHA256] = column_digest(map(row_digest, values))
+    scale.attrs[SHA256] = dataset_digest(values)

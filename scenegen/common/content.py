@@ -21,16 +21,36 @@ CONTENT_DIGEST = "content_digest"  # attribute of the root
 BLOCK_BYTES = 2**24  # of a data set that are in memory at once
 
 
-def row_digest(values: Any) -> bytes:
-    """Return the SHA-256 of one row: its bytes in C order, little-endian, or its texts.
+class ColumnDigest:
+    """The digest of a data set whose rows are given one after another, in their order."""
 
-    Each text counts as its UTF-8 followed by a zero byte.
+    def __init__(self) -> None:
+        self._hash = hashlib.sha256()
+
+    def update(self, rows: Iterable[Any]) -> None:
+        """Take the next rows."""
+        for row in rows:
+            self._hash.update(row_digest(row))
+
+    @property
+    def hex(self) -> str:
+        """The digest of the rows so far."""
+        return self._hash.hexdigest()
+
+
+def row_digest(values: Any) -> bytes:
+    """Return the SHA-256 of the values of one row.
+
+    Numbers count as their bytes in C order, little-endian; each text as its UTF-8 and a zero byte.
     """
     return hashlib.sha256(_bytes(values)).digest()
 
 
 def column_digest(rows: Iterable[bytes]) -> str:
-    """Return the digest of a data set, as hex, from the `row_digest` of each row in order."""
+    """Return the digest of a data set, as hex, from the `row_digest`s of all its rows.
+
+    They must be in the order of the rows: in another order they give another digest.
+    """
     return hashlib.sha256(b"".join(rows)).hexdigest()
 
 
@@ -64,30 +84,46 @@ def content_digest(file: h5py.File) -> str:
 
 
 def datasets(file: h5py.File) -> list[tuple[str, h5py.Dataset]]:
-    """Return the data sets of a file with their names, in the order of these."""
-    return [(name, item) for name, item in _objects(file) if isinstance(item, h5py.Dataset)]
+    """Return each data set of a file with the first of its names, in the order of these."""
+    names: dict[h5py.Dataset, str] = {}
+    for name, item in _objects(file):
+        if isinstance(item, h5py.Dataset):
+            names.setdefault(item, name)
+    return [(name, dataset) for dataset, name in names.items()]
 
 
 def dataset_digest(dataset: Any) -> str:
-    """Return the `column_digest` of a data set, or of what is read as one (`StoredArray`).
+    """Return the digest of a data set, or of what is read as one (a `StoredArray`, an array).
 
     Raises whatever HDF5 raises where it is damaged.
     """
     if not dataset.shape:
         return column_digest([row_digest(dataset[()])])
+    digest = ColumnDigest()
     count, *row = dataset.shape
     step = max(1, BLOCK_BYTES // max(1, math.prod(row) * dataset.dtype.itemsize))
-    blocks = (dataset[start : start + step] for start in range(0, count, step))
-    return column_digest(row_digest(row) for block in blocks for row in block)
+    for start in range(0, count, step):
+        digest.update(dataset[start : start + step])
+    return digest.hex
 
 
 def _objects(file: h5py.File) -> list[tuple[str, Any]]:
-    found: list[tuple[str, Any]] = []
-    file.visititems(lambda name, item: found.append((name, item)))
+    """Return every name in a file and its object, sorted by name.
+
+    An object may have several names; a group that has several is entered by one of them.
+    """
+    found, groups, waiting = [], {file["/"]}, [("", file["/"])]
+    while waiting:
+        prefix, group = waiting.pop()
+        for key, item in group.items():
+            found.append((f"{prefix}{key}", item))
+            if isinstance(item, h5py.Group) and item not in groups:
+                groups.add(item)
+                waiting.append((f"{prefix}{key}/", item))
     return sorted(found, key=lambda pair: pair[0])
 
 
-def _bytes(values: Any) -> bytes:
+def _bytes(values: Any) -> bytes | memoryview:
     if isinstance(values, str):
         return values.encode() + b"\0"
     if isinstance(values, bytes):  # as h5py reads texts
@@ -97,15 +133,17 @@ def _bytes(values: Any) -> bytes:
         parts = array.reshape(-1).tolist()
         known = (str, bytes, np.ndarray)
         return b"".join(_bytes(x) if isinstance(x, known) else repr(x).encode() for x in parts)
-    return np.ascontiguousarray(array, array.dtype.newbyteorder("<")).tobytes()
+    numbers = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
+    return numbers.reshape(-1).view(np.uint8).data
 
 
-def _described(value: Any, file: h5py.File) -> Iterator[bytes]:
+def _described(value: Any, file: h5py.File) -> Iterator[bytes | memoryview]:
     """Yield an attribute's kind and value; references count as the names that they point to."""
     if isinstance(value, h5py.Reference):
         yield b"to " + (h5py.h5r.get_name(value, file.id) or b"nothing") + b"\0"
     elif isinstance(value, (str, bytes)):
-        yield b"text " + _bytes(value)
+        yield b"text "
+        yield _bytes(value)
     elif isinstance(value, h5py.Empty):
         yield b"empty"
     else:
@@ -117,4 +155,5 @@ def _described(value: Any, file: h5py.File) -> Iterator[bytes]:
                 for member in parts:
                     yield from _described(member, file)
         else:
-            yield f"{array.dtype.str} {array.shape} ".encode() + _bytes(array)
+            yield f"{array.dtype.str} {array.shape} ".encode()
+            yield _bytes(array)

@@ -234,21 +234,25 @@ class StoredArray:
 
     def __getitem__(self, rows: int | slice | tuple[()]) -> Any:
         """Return one row, some, or all for (). Raises IndexError, and as HDF5 does on damage."""
-        rows = slice(None) if isinstance(rows, tuple) else rows
         if self.dataset.chunks is None or not self._filters:
             return self.dataset[rows]
-        if self._own and self._one_row and isinstance(rows, (int, np.integer)):
-            return self._row(range(len(self))[rows])
-        chosen = range(len(self))[rows]
-        for start in self._touched(
-            range(chosen, chosen + 1) if isinstance(chosen, int) else chosen
-        ):
+        if isinstance(rows, (int, np.integer)):
+            row = range(len(self))[rows]
+            return self[row : row + 1][0]
+        chosen = range(len(self))[slice(None) if isinstance(rows, tuple) else rows]
+        if self._own and self._one_row and chosen.step > 0:
+            values = np.empty((len(chosen), *self.shape[1:]), self.dtype)
+            for place, row in enumerate(chosen):
+                values[place] = self._row(row)
+            return values
+        for start in self._touched(chosen):
             if start not in self._checked:
                 self._inflated(start)
                 self._checked.add(start)
         return self.dataset[rows]
 
     def _row(self, row: int) -> Any:
+        """Return one row of a data set that stores each as a chunk, perhaps one not to write to."""
         start = (row,) + (0,) * (len(self.shape) - 1)
         raw = self._inflated(start)
         if raw is None:
@@ -257,14 +261,7 @@ class StoredArray:
         values = np.frombuffer(raw, np.uint8)
         if h5z.FILTER_SHUFFLE in self._filters and size > 1:
             values = np.ascontiguousarray(values.reshape(size, -1).T)
-        values = values.reshape(-1).view(self.dtype).reshape(self.shape[1:])
-        return (
-            values[()]
-            if values.ndim == 0
-            else values.copy()
-            if not values.flags.writeable
-            else values
-        )
+        return values.reshape(-1).view(self.dtype).reshape(self.shape[1:])
 
     def _touched(self, rows: range) -> Iterator[tuple[int, ...]]:
         """Yield where the chunks begin that hold some rows."""

@@ -5,7 +5,6 @@ own filter and any HDF5 library reads it. A file gets its name when it is comple
 """
 
 import errno
-import hashlib
 import importlib.metadata
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -23,10 +22,10 @@ from scenegen.common.axes import name_axes
 from scenegen.common.content import (
     CONTENT_DIGEST,
     SHA256,
+    ColumnDigest,
     content_digest,
     dataset_digest,
     datasets,
-    row_digest,
 )
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.input_file import StoredArray, reading
@@ -80,7 +79,7 @@ class Table:
         self._columns, self._compression = columns, compression
         self._datasets = {column.name: self._create(group, column) for column in columns}
         self._block: dict[str, list[Any]] = {c.name: [] for c in columns if not c.own_chunk}
-        self._digests = {column.name: hashlib.sha256() for column in columns}
+        self._digests = {column.name: ColumnDigest() for column in columns}
         if not count:
             self._write_digests()
 
@@ -99,7 +98,7 @@ class Table:
 
     def _write_digests(self) -> None:
         for name, digest in self._digests.items():
-            self._datasets[name].attrs[SHA256] = digest.hexdigest()
+            self._datasets[name].attrs[SHA256] = digest.hex
 
     def _create(self, group: h5py.Group, column: Column) -> h5py.Dataset:
         text = column.dtype == "text"
@@ -122,7 +121,7 @@ class Table:
     def _write_chunk(self, name: str, values: Array) -> None:
         dataset = self._datasets[name]
         raw = np.ascontiguousarray(values, dataset.dtype)
-        self._digests[name].update(row_digest(raw))
+        self._digests[name].update([raw])
         if self._compression == "lzf":
             dataset[self.rows] = raw
             return
@@ -139,8 +138,7 @@ class Table:
                 text = h5py.check_string_dtype(dataset.dtype) is not None
                 values = np.array(rows, object) if text else np.stack(rows).astype(dataset.dtype)
                 dataset[self.rows - len(rows) : self.rows] = values
-                for row in values:
-                    self._digests[name].update(row_digest(row))
+                self._digests[name].update(values)
                 rows.clear()
 
 
@@ -208,25 +206,25 @@ def digest_problems(file: h5py.File, known: Mapping[str, str]) -> list[str]:
 
 
 def read_spec(
-    path: Path, attributes: Mapping[str, Any], version: str, from_json: Callable[[str], Spec]
+    path: Path, texts: Mapping[str, str], version: str, from_json: Callable[[str], Spec]
 ) -> Spec:
-    """Return the request that a file answers, from the root attributes that all our files have.
+    """Return the request that a file answers, from the root's texts, which all our files have.
 
     Raises FileFormatError for a major version other than `version`'s, a missing attribute and a
     request that `from_json` refuses.
     """
-    found, major = str(attributes.get("format_version")), version.split(".", maxsplit=1)[0]
+    found, major = str(texts.get("format_version")), version.split(".", maxsplit=1)[0]
     if found.split(".", maxsplit=1)[0] != major:
         raise FileFormatError(
             f"{path}: format version {found}",
             expected=f"{major}.x",
-            hint=f"read it with the release that wrote it ({attributes.get('writer')})",
+            hint=f"read it with the release that wrote it ({texts.get('writer')})",
         )
     for name in ("spec", "writer"):
-        if name not in attributes:
+        if name not in texts:
             raise FileFormatError(f"{path}: attribute {name!r}", "none", "a text")
     with describing(f"{path}: attribute 'spec'"):
-        return from_json(str(attributes["spec"]))
+        return from_json(texts["spec"])
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from scenegen.camera import back_project, transform_points
 from scenegen.common import input_file, row_file
+from scenegen.common.attributes import check_attribute, read_digest, read_text, read_texts
 from scenegen.common.content import SHA256, joint_digest
 from scenegen.common.errors import FileFormatError
 from scenegen.common.input_file import StoredArray
@@ -32,6 +33,7 @@ from scenegen.layout import (
 from scenegen.rendering.ground_truth import decode_image
 
 Array = NDArray[Any]
+NEEDED = ("format_version", "writer", "spec", "fingerprint")  # root attributes, beside the format
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +91,16 @@ class RoomsFile:
         self._file = input_file.open_file(path, "rooms file")
         with input_file.checking(self._file):
             self.attributes: dict[str, Any] = dict(self._file.attrs)
-            self.spec = self._check_root()
+            self._check_format()
+            texts = read_texts(self._file, NEEDED, self.path)
+            self.spec = row_file.read_spec(self.path, texts, FORMAT_VERSION, DatasetSpec.from_json)
+            mark = texts.get("fingerprint")
+            check_attribute(path, "fingerprint", mark, mark is not None, "a text")
+            self.fingerprint = texts["fingerprint"]
             problems = _layout_problems(self._file, self.spec)
             if problems:
                 raise FileFormatError(f"{path}: {row_file.and_more(problems)}")
             self._datasets = {f.name: StoredArray(self._file[f.name]) for f in FIELDS}
-        self.fingerprint = str(self.attributes["fingerprint"])
         self._count = len(self._datasets["image"])
 
     def __len__(self) -> int:
@@ -158,8 +164,16 @@ class RoomsFile:
     def stored_digests(self) -> dict[str, str]:
         """Return the digest that each dataset got when it was written; none in older files."""
         with input_file.reading(self.path):
-            found = {name: data.attrs.get(SHA256) for name, data in self._datasets.items()}
-        return {name: str(digest) for name, digest in found.items() if digest is not None}
+            found = {
+                name: read_digest(data, SHA256, f"{self.path}: {name}")
+                for name, data in self._datasets.items()
+            }
+        return {name: digest for name, digest in found.items() if digest is not None}
+
+    def stored_truth_digest(self) -> str | None:
+        """Return what the file says of the datasets that scores depend on; None if older."""
+        with input_file.reading(self.path):
+            return read_digest(self._file, TRUTH_DIGEST, self.path)
 
     def stored_bytes(self) -> dict[str, tuple[int, int]]:
         """Return the bytes on disk and in memory of each dataset, by name.
@@ -185,18 +199,14 @@ class RoomsFile:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _check_root(self) -> DatasetSpec:
-        found = self.attributes.get("format")
-        if not isinstance(found, str) or found != FORMAT_NAME:
+    def _check_format(self) -> None:
+        found = read_text(self._file, "format", self.path)
+        if found != FORMAT_NAME:
             raise FileFormatError(
                 f"{self.path}: not a rooms file",
                 "no format attribute" if found is None else f"format {found!r:.60}",
                 f"{FORMAT_NAME!r}, as scenegen render writes it",
             )
-        spec = row_file.read_spec(self.path, self.attributes, FORMAT_VERSION, DatasetSpec.from_json)
-        if "fingerprint" not in self.attributes:
-            raise FileFormatError(f"{self.path}: attribute 'fingerprint'", "none", "a text")
-        return spec
 
 
 def _layout_problems(file: h5py.File, spec: DatasetSpec) -> list[str]:

@@ -9,7 +9,7 @@ from h5_edits import attribute, gone
 from refusals import refused
 
 from iqtt.audit.proofs import content
-from iqtt.audit.table import find_tables, read_table
+from iqtt.audit.table import content_problems, find_tables, read_table
 from iqtt.files.reader import AnswersFile
 from scenegen.common.content import column_digest, row_digest, seal
 from scenegen.common.errors import FileFormatError
@@ -77,6 +77,7 @@ def test_nothing_may_be_added_taken_away_or_renamed(damaged):
     edits = {
         "an attribute more": attribute("note", "mine"),
         "a dataset more": lambda file: file.create_dataset("x", data=1),
+        "a name more": lambda file: file.__setitem__("zz", file["questions"]),
         "an attribute less": gone("conventions"),
         "no digest of a dataset": lambda file: file["answers"].attrs.__delitem__("sha256"),
         "a group renamed": lambda file: file.move("truth", "lies"),
@@ -95,9 +96,16 @@ def test_a_forger_who_seals_again_has_another_digest_of_truth(damaged):
 
     path = damaged(forge)
     (table,) = (read_table(source, np.zeros(0, int)) for source in find_tables([path]))
-    assert table.changed == ("truth_digest",)
+    assert table.truth_changed
+    assert len(content_problems([table])) == 1
     with AnswersFile(path) as answers:
         assert answers.truth_digest() != answers.stored_truth_digest
+
+
+def test_what_changed_in_a_file_of_two_tables_is_told_once(damaged):
+    path = damaged(attribute("note", "mine"), "iqtt-train.h5")
+    tables = [read_table(source, np.zeros(0, int)) for source in find_tables([path])]
+    assert (len(tables), len(content_problems(tables))) == (2, 1)
 
 
 def test_files_without_digests_are_not_judged(split_folder, released, damaged):

@@ -104,7 +104,7 @@ def test_the_command_prints_it(run, rooms_path):
         ("conventions", None, "conventions     -"),
         ("mitsuba_version", np.array(["3", "8"], object), "rendered by     Mitsuba not a text"),
         ("llvm_version", 3, "rendered by     Mitsuba"),
-        ("writer", 3.5, "written by      not a text"),
+        ("variant", 3.5, "written by      pix2shape-bench"),
     ],
 )
 def test_odd_attributes_are_shown_on_one_short_line(damaged, name, odd, line):

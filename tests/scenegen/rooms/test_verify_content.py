@@ -68,6 +68,9 @@ EDITS = {
     "an empty dataset more": lambda file: file.create_dataset("more", data=h5py.Empty("f4")),
     "a type more": lambda file: file.__setitem__("more", np.dtype("f4")),
     "a reference more": lambda file: file.create_dataset("more", data=file["depth"].ref),
+    "another name of a dataset": lambda file: file.__setitem__("zz", file["depth"]),
+    "another name of a group": lambda file: file.__setitem__("camera/zz", file["light"]),
+    "a name of the root": lambda file: file.__setitem__("zz", file["/"]),
     "a dataset less": gone("y"),
     "a group more": lambda file: file.create_group("more"),
     "an attribute of a group more": lambda file: file["camera"].attrs.update(x=1),
@@ -197,7 +200,7 @@ def test_a_new_format_without_digests_fails(spoilt):
         put("object_id", (2, 5, 5), 127),
         put("object_id", (2, 5, 5), -128),
         put("scene_index", 2, 2**63 - 1),
-        attribute("fingerprint", h5py.Empty("S1")),
+        attribute("variant", h5py.Empty("S1")),
         put("camera/world_from_camera", 2, 1e308),
     ],
 )

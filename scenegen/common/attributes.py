@@ -1,0 +1,82 @@
+"""Attributes of HDF5 files: the kind and size of each are checked before it is read."""
+
+import re
+from collections.abc import Iterable
+from typing import Any
+
+import h5py
+
+from scenegen.common.errors import FileFormatError
+from scenegen.common.records import LONGEST_JSON
+
+LONGEST = 1_000  # characters of a text, but for these:
+LONGER = ("spec", "creation_command")
+MOST_NAMES = 100  # in a list
+
+
+def read_texts(item: Any, names: Iterable[str], place: object) -> dict[str, str]:
+    """Return the attributes that are there, each of which holds a text. Raises as `read_text`."""
+    found = {name: read_text(item, name, place) for name in names}
+    return {name: text for name, text in found.items() if text is not None}
+
+
+def read_text(item: Any, name: str, place: object, needed: bool = False) -> str | None:
+    """Return an attribute that holds one text; None where there is none and none is needed.
+
+    Raises FileFormatError for another kind of value, and for a text that is too long or, as a
+    line, cannot be printed.
+    """
+    if name not in item.attrs:
+        check_attribute(place, name, None, not needed, "a text")
+        return None
+    most = LONGEST_JSON if name in LONGER else LONGEST
+    (text,) = _texts(item, name, place, (), most)
+    check_attribute(
+        place, name, text, name in LONGER or text.isprintable(), "one line that can be printed"
+    )
+    return text
+
+
+def read_digest(item: Any, name: str, place: object, needed: bool = False) -> str | None:
+    """Return an attribute that holds a SHA-256, as hex. Raises as `read_text`."""
+    text = read_text(item, name, place, needed)
+    good = text is None or re.fullmatch("[0-9a-f]{64}", text) is not None
+    check_attribute(place, name, text, good, "64 hexadecimal digits")
+    return text
+
+
+def read_names(item: Any, name: str, place: object) -> list[str]:
+    """Return an attribute that holds a list of names. Raises as `read_text`."""
+    check_attribute(place, name, None, name in item.attrs, "names")
+    names = _texts(item, name, place, (slice(None),), LONGEST)
+    check_attribute(
+        place, name, names, all(map(str.isprintable, names)), "names that can be printed"
+    )
+    return names
+
+
+def _texts(item: Any, name: str, place: object, shape: tuple[Any, ...], most: int) -> list[str]:
+    """Return the texts of an attribute that has as many dimensions as `shape`."""
+    kind = item.attrs.get_id(name)
+    found = f"{kind.dtype} {kind.shape}"
+    texts = h5py.check_string_dtype(kind.dtype) is not None and kind.dtype.itemsize <= most
+    size = kind.get_space().get_simple_extent_npoints()
+    ok = texts and len(kind.shape or ()) == len(shape) and 0 < size <= MOST_NAMES
+    check_attribute(place, name, found, ok, "texts" if shape else "a text")
+    value = item.attrs[name]
+    values = value.reshape(-1).tolist() if shape else [value]
+    lines = [v.decode(errors="surrogateescape") if isinstance(v, bytes) else v for v in values]
+    good = all(len(line) <= most and _is_unicode(line) for line in lines)
+    check_attribute(place, name, "another one", good, f"UTF-8 of at most {most:,} characters")
+    return lines
+
+
+def _is_unicode(text: str) -> bool:
+    return not re.search("[\ud800-\udfff]", text)
+
+
+def check_attribute(place: object, name: str, found: object, ok: bool, expected: str) -> None:
+    """Raise FileFormatError unless an attribute is as it must be; `found` None is none."""
+    if not ok:
+        shown = "none" if found is None else f"{found!r:.60}"
+        raise FileFormatError(f"{place}: attribute {name!r}", shown, expected)
