@@ -17,7 +17,7 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5d, h5l, h5o, h5z
+from h5py import h5d, h5l, h5o, h5t, h5z
 from isal import isal_zlib
 from numpy.typing import NDArray
 
@@ -31,14 +31,15 @@ DEEPEST = 8  # groups within groups
 MOST_ATTRIBUTES = 1_000  # of one of them
 MOST_BYTES = 256 * 2**20  # to be unpacked for one row
 LZF = 32000
+# Names of the filters, and their places in a pipeline, each of which is taken once.
 FILTERS = {
-    h5z.FILTER_SHUFFLE: "shuffle",
-    h5z.FILTER_DEFLATE: "gzip",
-    h5z.FILTER_FLETCHER32: "fletcher32",
-    LZF: "lzf",
+    h5z.FILTER_SHUFFLE: ("shuffle", 0),
+    h5z.FILTER_DEFLATE: ("gzip", 1),
+    LZF: ("lzf", 1),
+    h5z.FILTER_FLETCHER32: ("fletcher32", 2),
 }
 CHECKSUM_BYTES = 4  # that fletcher32 adds to a chunk
-SLACK = 1024  # bytes by which a chunk may grow where it cannot be compressed
+TEXT_BYTES = 16  # of a text of any length, in a chunk: its length and where it lies
 
 
 @dataclass(frozen=True)
@@ -179,7 +180,7 @@ def _dataset_faults(name: str, dataset: Any) -> Iterator[Fault]:
         expected = "values in this file itself"
         yield Fault(name, "link", "values that lie in another file", expected)
         return
-    shape, size = dataset.shape or (), dataset.dtype.itemsize
+    shape, size = dataset.shape or (), stored_bytes(dataset)
     written = dataset.get_storage_size()
     if layout == h5d.CONTIGUOUS and 0 < written < math.prod(shape) * size:
         yield Fault(name, "written", f"{written} bytes for the shape {shape}", "all values")
@@ -194,9 +195,11 @@ def _dataset_faults(name: str, dataset: Any) -> Iterator[Fault]:
         expected = f"at most {MOST_BYTES >> 20} MiB (store one row to a chunk)"
         yield Fault(name, "chunks", found, expected)
     used = [storage.get_filter(i)[0] for i in range(storage.get_nfilters())]
-    if not set(used) <= set(FILTERS) or len(set(used)) < len(used) or {1, LZF} <= set(used):
-        found = " and ".join(FILTERS.get(code, f"filter {code}") for code in used)
-        yield Fault(name, "filters", found, "gzip or lzf, each filter once, or no compression")
+    known = [FILTERS.get(code, (f"filter {code}", -1)) for code in used]
+    places = [place for _, place in known]
+    if -1 in places or places != sorted(set(places)):
+        expected = "shuffle or not, gzip or lzf or neither, fletcher32 or not, in this order"
+        yield Fault(name, "filters", " and ".join(text for text, _ in known), expected)
     expected_chunks = math.prod(-(-s // c) for s, c in zip(shape, chunks, strict=True))
     there = dataset.get_num_chunks()
     if there < expected_chunks:
@@ -204,6 +207,11 @@ def _dataset_faults(name: str, dataset: Any) -> Iterator[Fault]:
         if not there:
             found = f"shape {shape}, but nothing was written"
         yield Fault(name, "written", found, "values in all of them")
+
+
+def stored_bytes(dataset: Any) -> int:
+    """Return the bytes that an element of a low-level data set takes in a chunk."""
+    return TEXT_BYTES if dataset.dtype.kind == "O" else int(dataset.get_type().get_size())
 
 
 def slab_bytes(shape: tuple[int, ...], chunks: tuple[int, ...], itemsize: int) -> int:
@@ -221,12 +229,9 @@ class StoredArray:
         self.dtype, self.attrs = dataset.dtype, dataset.attrs
         storage = dataset.id.get_create_plist()
         self._filters = [storage.get_filter(i)[0] for i in range(storage.get_nfilters())]
-        self._deflated = h5z.FILTER_DEFLATE in self._filters
-        self._own = self._filters in (
-            [h5z.FILTER_DEFLATE],
-            [h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE],
-        )
-        self._one_row = dataset.chunks == (1, *self.shape[1:])
+        plain = {h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE}.issuperset(self._filters)
+        as_stored = self.dtype.kind in "iuf" and dataset.id.get_type() == h5t.py_create(self.dtype)
+        self._own = plain and as_stored and dataset.chunks == (1, *self.shape[1:])
         self._checked: set[tuple[int, ...]] = set()
 
     def __len__(self) -> int:
@@ -234,34 +239,27 @@ class StoredArray:
 
     def __getitem__(self, rows: int | slice | tuple[()]) -> Any:
         """Return one row, some, or all for (). Raises IndexError, and as HDF5 does on damage."""
-        if self.dataset.chunks is None or not self._filters:
+        if self.dataset.chunks is None:
             return self.dataset[rows]
         if isinstance(rows, (int, np.integer)):
             row = range(len(self))[rows]
             return self[row : row + 1][0]
         chosen = range(len(self))[slice(None) if isinstance(rows, tuple) else rows]
-        if self._own and self._one_row and chosen.step > 0:
+        if self._own and chosen.step > 0:
             values = np.empty((len(chosen), *self.shape[1:]), self.dtype)
             for place, row in enumerate(chosen):
                 values[place] = self._row(row)
             return values
         for start in self._touched(chosen):
             if start not in self._checked:
-                self._inflated(start)
+                self._unpacked(start)
                 self._checked.add(start)
         return self.dataset[rows]
 
     def _row(self, row: int) -> Any:
         """Return one row of a data set that stores each as a chunk, perhaps one not to write to."""
-        start = (row,) + (0,) * (len(self.shape) - 1)
-        raw = self._inflated(start)
-        if raw is None:
-            return self.dataset[row]
-        size = self.dtype.itemsize
-        values = np.frombuffer(raw, np.uint8)
-        if h5z.FILTER_SHUFFLE in self._filters and size > 1:
-            values = np.ascontiguousarray(values.reshape(size, -1).T)
-        return values.reshape(-1).view(self.dtype).reshape(self.shape[1:])
+        raw = self._unpacked((row,) + (0,) * (len(self.shape) - 1))
+        return np.frombuffer(raw, self.dtype).reshape(self.shape[1:])
 
     def _touched(self, rows: range) -> Iterator[tuple[int, ...]]:
         """Yield where the chunks begin that hold some rows."""
@@ -272,25 +270,51 @@ class StoredArray:
             for index in np.ndindex(*(len(span) for span in spans)):
                 yield (start, *(span[i] for span, i in zip(spans, index, strict=True)))
 
-    def _inflated(self, start: tuple[int, ...]) -> bytes | None:
-        """Return the bytes of a chunk that gzip stored; None where it need not be inflated.
+    def _unpacked(self, start: tuple[int, ...]) -> bytes:
+        """Return the bytes of a chunk; those of lzf as they are stored.
 
-        Raises ValueError where they are more, or fewer, than the chunk has.
+        Raises ValueError where they unpack to more or fewer than the chunk has: HDF5 would take any
+        memory for more, and return whatever its memory held before for fewer.
         """
-        size = math.prod(self.dataset.chunks) * self.dtype.itemsize
-        mask, stored = self.dataset.id.read_direct_chunk(start)
-        if len(stored) > size + SLACK + size // 8:
-            raise ValueError(f"{len(stored)} bytes stored for a chunk of {size}")
-        if not self._deflated or mask:
-            return None
-        if self._filters[-1] == h5z.FILTER_FLETCHER32:
-            stored = stored[:-CHECKSUM_BYTES]
-        unpacker = isal_zlib.decompressobj()
-        try:
-            raw: bytes = unpacker.decompress(stored, size + 1)
-        except isal_zlib.error as error:  # type: ignore[misc]
-            raise ValueError(f"a chunk that is not compressed by gzip: {error}") from error
-        if len(raw) != size or not unpacker.eof:
-            found = "more" if len(raw) > size else f"{len(raw)} bytes"
+        size = math.prod(self.dataset.chunks) * stored_bytes(self.dataset.id)
+        mask, raw = self.dataset.id.read_direct_chunk(start)
+        # A filter that did not make a chunk smaller was left out of it, as its mask says.
+        used = [code for i, code in enumerate(self._filters) if not mask >> i & 1]
+        if h5z.FILTER_FLETCHER32 in used:
+            raw = raw[:-CHECKSUM_BYTES]
+        length = len(raw)
+        if h5z.FILTER_DEFLATE in used:
+            raw = _inflated(raw, size)
+            length = len(raw)
+        elif LZF in used:
+            length = _lzf_length(raw)
+        if length != size:
+            found = "more" if length > size else f"{length} bytes"
             raise ValueError(f"{found} in a chunk of {size} bytes")
-        return raw
+        if h5z.FILTER_SHUFFLE in used and self._own:
+            raw = np.frombuffer(raw, np.uint8).reshape(self.dtype.itemsize, -1).T.tobytes()
+        return bytes(raw)
+
+
+def _inflated(data: bytes, most: int) -> bytes:
+    """Return what gzip's stream holds, a byte more than `most` at most."""
+    unpacker = isal_zlib.decompressobj()
+    try:
+        raw: bytes = unpacker.decompress(data, most + 1)
+    except isal_zlib.error as error:  # type: ignore[misc]
+        raise ValueError(f"a chunk that is not compressed by gzip: {error}") from error
+    return raw if unpacker.eof else raw + b" "  # so that its length is wrong, too
+
+
+def _lzf_length(data: bytes) -> int:
+    """Return how many bytes an LZF stream unpacks to: runs of bytes, and copies of earlier ones."""
+    length = place = 0
+    while place < len(data):
+        control = data[place]
+        if control < 32:
+            length, place = length + control + 1, place + control + 2
+        else:
+            long = control >= 224 and place + 1 < len(data)
+            length += (control >> 5) + 2 + (data[place + 1] if long else 0)
+            place += 3 if control >= 224 else 2
+    return length
