@@ -248,7 +248,7 @@ def test_an_export_never_replaces_what_it_exports(run, refuses, rooms_path, tmp_
     made = run("render", "--n", 1, *TINY, "--objects", 1, *meshes, "--out", "x.h5")
     assert made.exit_code == 0, made.output
     how = ("--items", 0, "--format", "obj", "--out", "meshes/mug", "--overwrite")
-    refuses("export", "x.h5", *how, *meshes, words=("x-000000.obj", "another file"))
+    refuses("export", "x.h5", *how, *meshes, words=("x-000000.obj", "not an input"))
 
 
 def test_a_picture_is_replaced_only_when_told(run, refuses, rooms_path, tmp_path):
