@@ -13,6 +13,7 @@ from iqtt.audit.statistics import measure, silhouettes
 from iqtt.files.layout import NO_CUBE, SCORED
 from iqtt.files.reader import QuestionsFile, answers_beside, parts
 from iqtt.questions.specs import SplitSpec
+from scenegen.common import trial
 from scenegen.common.content import column_digest, joint_digest, row_digest
 from scenegen.common.records import check
 
@@ -119,6 +120,7 @@ def find_tables(paths: Sequence[str | Path]) -> list[Source]:
     names = [path.name for path in files.values()]
     sources = []
     for path in files.values():
+        trial.try_file(path)
         shown = path.name if names.count(path.name) == 1 else str(path)
         for part in parts(path):
             beside = answers_beside(path)

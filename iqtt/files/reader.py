@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from iqtt.files.attributes import read_root
 from iqtt.files.layout import question_columns
 from iqtt.files.tables import QuestionTruth, TableFile, table_parts
+from scenegen.common import trial
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.input_file import checking, open_file
 from scenegen.common.row_file import RowDataset
@@ -62,10 +63,16 @@ def parts(path: str | Path) -> tuple[str, ...]:
 
 
 def answers_beside(path: str | Path) -> Path | None:
-    """Return the file of answers beside a test file, such as iqtt-test-answers.h5, if any."""
+    """Return the file of answers beside a test file, such as iqtt-test-answers.h5, if any.
+
+    Raises FileFormatError as `trial.try_file`: nobody named this file.
+    """
     path = Path(path)
     beside = path.with_name(f"{path.stem}-answers{path.suffix}")
-    return beside if beside.is_file() else None
+    if not beside.is_file():
+        return None
+    trial.try_file(beside)
+    return beside
 
 
 class AnswersFile(TableFile):

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from metrics.measures.statistics import cluster_means
 from metrics.scoring.metric_names import Metric, UnknownMetricError, metric
 from metrics.scoring.records import GROUPINGS, ID_COLUMNS, OPTIONAL_COLUMNS, Score, ScoreFile, Task
 from metrics.submissions.problems import JsonError
@@ -221,9 +222,8 @@ def _check_mean(file: ScoreFile, name: str, score: Score, clusters: int) -> None
         raise refusal(f"items.{name}", "no such key", f"the column of metrics.{name}")
     if np.isnan(column).any():
         raise refusal(f"items.{name}", "null", f"numbers, as metrics.{name} is their mean")
-    index = np.unique(file.clusters, return_inverse=True)[1]
     with np.errstate(over="ignore"):
-        mean = float((np.bincount(index, column) / np.bincount(index)).mean())
+        mean = float(cluster_means(column, file.clusters).mean())
     if not agree(score.value, mean, 0.0):
         expected = f"{mean!r}, the mean of items.{name} over scenes"
         raise refusal(f"metrics.{name}.value", repr(score.value), expected)

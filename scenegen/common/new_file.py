@@ -25,6 +25,19 @@ def written_beside(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
         temporary = folder / f"file{path.suffix[:8]}"
         yield temporary
         check_writable(path, overwrite)
+        if overwrite:
+            os.replace(temporary, path)
+        else:
+            _take_name(temporary, path)
+
+
+def _take_name(temporary: Path, path: Path) -> None:
+    """Give a file a name that is free; of two runs that want the same one, the second fails."""
+    try:
+        os.link(temporary, path)
+    except FileExistsError as error:
+        raise FileExistsError(errno.EEXIST, EXISTS, str(path)) from error
+    except OSError:  # a disk without hard links
         os.replace(temporary, path)
 
 

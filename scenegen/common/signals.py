@@ -16,9 +16,10 @@ ENDING = tuple(
 def ended_by_signals() -> Iterator[None]:
     """Let SIGTERM and SIGHUP interrupt the block as Ctrl-C does, and then exit with 128 + number.
 
-    A second signal kills at once. A signal that is ignored, as under nohup, stays ignored. The
-    process ends as the block does: the interpreter's own farewell may crash where threads of a
-    library are still at work.
+    A second signal kills. Python sees a signal only when the library that is running returns, so
+    that nothing but SIGKILL ends a process that hangs in one. A signal that is ignored, as under
+    nohup, stays ignored. The process ends as the block does: the interpreter's own farewell may
+    crash where threads of a library are still at work.
     """
     received: list[int] = []
 

@@ -16,6 +16,7 @@ from scenegen.common.errors import FileFormatError
 SECONDS = 8.0  # for any file
 BYTES_A_SECOND = 20e6  # that a slow disk and honest content take beyond that
 MEMORY = 2**31  # bytes of address space, beyond what Python takes
+BLOCK_ROWS = 1024  # of texts, read at once
 OUT_OF_MEMORY = 3  # exit code
 _ACCEPTED: set[tuple[int, int, int, int]] = set()  # by this process
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -54,6 +55,8 @@ def try_file(path: str | Path) -> None:
         raise _refusal(path, "texts or attributes that take more than 2 GiB of memory")
     if done.returncode < 0:
         raise _refusal(path, f"a structure on which HDF5 crashes (signal {-done.returncode})")
+    if done.returncode:
+        raise _refusal(path, f"a structure that h5py cannot look at (exit code {done.returncode})")
     _ACCEPTED.add(identity)
 
 
@@ -65,10 +68,11 @@ def _is_hdf5(path: str | Path) -> bool:
     """Return whether the signature is at 0, 512, 1024, 2048, ...: other bytes may come first."""
     place = 0
     with open(path, "rb") as file:
-        while start := os.pread(file.fileno(), len(SIGNATURE), place):
+        while start := file.read(len(SIGNATURE)):
             if start == SIGNATURE:
                 return True
             place = max(512, 2 * place)
+            file.seek(place)
     return False
 
 
@@ -87,8 +91,8 @@ def _read_structure(path: str, memory: int) -> None:
             if item.chunks:
                 item.id.chunk_iter(lambda chunk: None)
             if h5py.check_string_dtype(item.dtype) is not None:
-                for row in range(len(item) if item.shape else 0):
-                    item[row]
+                for first in range(0, len(item) if item.shape else 0, BLOCK_ROWS):
+                    item[first : first + BLOCK_ROWS]
 
     if os.path.exists("/proc/self/statm"):
         _limit_memory(memory)
@@ -110,5 +114,6 @@ def _limit_memory(most: int) -> None:
 
 
 if __name__ == "__main__":
-    signal.alarm(int(sys.argv[3]))  # ends this process where its parent was killed
+    if hasattr(signal, "alarm"):
+        signal.alarm(int(sys.argv[3]))  # ends this process where its parent was killed
     _read_structure(sys.argv[1], int(sys.argv[2]))

@@ -11,6 +11,9 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 class _Worker(SpawnProcess):
     def start(self) -> None:
         """Start a process that never sees Ctrl-C, which a terminal sends to all processes."""
+        if not hasattr(signal, "pthread_sigmask"):  # Windows
+            super().start()
+            return
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             super().start()

@@ -25,6 +25,8 @@ except ImportError:  # Windows: nothing is locked there, and nothing that is lef
 
 NAME = re.compile(r"\.pix2shape-bench-[0-9a-f]{8}-[0-9a-f]{16}\.partial")
 LOCK = "lock"
+# What a disk may say when it is written to; other errors without a path are not about the output.
+DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
 @contextmanager
@@ -49,7 +51,7 @@ def workspace(parent: Path, path: Path) -> Iterator[Path]:
         named = error.filename if isinstance(error, OSError) else None
         inside = () if named is None else _hidden_parts(named, parent)
         number = None if inside is None else _disk_errno(error)
-        if inside is None or number is None:
+        if inside is None or number is None or (named is None and number not in DISK_ERRORS):
             raise
         where = str(path.joinpath(*inside))
         raise OSError(number, f"cannot be written: {os.strerror(number)}", where) from error
@@ -95,7 +97,7 @@ def _disk_errno(error: Exception) -> int | None:
 
 @functools.cache
 def _prefix() -> str:
-    """Return how names begin on this machine since it was started."""
+    """Return how names begin on this machine, on Linux since it was started."""
     try:
         about = Path("/proc/sys/kernel/random/boot_id").read_text()
     except OSError:
@@ -163,9 +165,10 @@ def _clean(folder: Path) -> str | None:
             text = "seems to be left by a run on another machine, or from before a restart"
             return f"{folder}: {text} {size}; remove it if no run writes there"
         _empty(folder)
+        (folder / LOCK).unlink()  # before it is let go: its maker may be about to lock it
     finally:
         os.close(lock)
-    _remove(folder)
+    folder.rmdir()
     return f"removed what an earlier run left unfinished: {folder} {size}" if files else None
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from scenegen.common.new_file import check_writable, write_text
+from scenegen.common.new_file import check_writable, write_text, written_beside
 
 
 @pytest.mark.parametrize(
@@ -40,3 +40,18 @@ def test_a_written_file_has_the_permissions_of_any_other(tmp_path):
     write_text(tmp_path / "first", "")
     (tmp_path / "plain").write_text("")
     assert (tmp_path / "first").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def test_of_two_runs_that_want_one_name_the_second_fails(tmp_path, monkeypatch):
+    """The first takes the name after the second has seen that it is free."""
+    path, link = tmp_path / "x", os.link
+
+    def links(*arguments: object) -> None:
+        path.write_text("first")
+        link(*arguments)
+
+    monkeypatch.setattr(os, "link", links)
+    with pytest.raises(FileExistsError) as error, written_beside(path) as temporary:
+        temporary.write_text("second")
+    assert error.value.filename == str(path)
+    assert path.read_text() == "first"

@@ -1,11 +1,15 @@
 """Files on which HDF5 itself hangs or crashes, found by changing bytes of files that it wrote."""
 
+import shutil
 import zlib
 from pathlib import Path
 
 import h5py
+import numpy as np
 import pytest
+from click.testing import CliRunner
 
+import cli
 from scenegen.common import trial
 from scenegen.common.errors import FileFormatError
 from scenegen.common.trial import try_file
@@ -53,3 +57,30 @@ def test_files_that_another_process_can_read(rooms_path, tmp_path):
     (tmp_path / "text").write_text("no HDF5")
     for path in (rooms_path, tmp_path / "text", tmp_path / "nothing", tmp_path):
         try_file(path)
+
+
+@pytest.mark.tried
+@pytest.mark.parametrize(
+    "command",
+    [
+        "scenegen info hangs.h5",
+        "iqtt audit split",
+        "iqtt show split/iqtt-test.h5 --answers",
+        "bench score a.json --truth split/iqtt-test.h5",
+        "bench validate hangs.h5",
+    ],
+)
+def test_whatever_a_command_reads_is_tried_first(command, broken, tmp_path, monkeypatch):
+    """A file that is named, that lies in a folder that is named, or beside a file that is named."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(trial, "SECONDS", 2.0)
+    hangs = broken("hangs")
+    (tmp_path / "split").mkdir()
+    shutil.copy(hangs, "split/iqtt-test-answers.h5")
+    with h5py.File("split/iqtt-test.h5", "w") as file:
+        file["questions"] = np.zeros((1, 4, 2, 2, 3), "u1")
+    Path("a.json").write_text("[0]")
+    program, *arguments = command.split()
+    done = CliRunner().invoke(getattr(cli, program), arguments)
+    assert done.exit_code == 2
+    assert "HDF5 had not read" in done.output

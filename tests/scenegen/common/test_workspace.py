@@ -192,6 +192,34 @@ def test_a_cleaner_between_making_and_locking(tmp_path, monkeypatch, moment):
     assert (tmp_path / "next.txt").read_text() == "mine"
 
 
+@LINUX
+def test_a_cleaner_that_lets_go_while_a_run_locks(tmp_path, monkeypatch):
+    """The cleaner has closed its lock and not yet removed the folder when the run locks it."""
+    real_close, real_flock = os.close, module.fcntl.flock
+    let_go, inside, cleaners = threading.Event(), threading.Event(), []
+
+    def closes(descriptor: int) -> None:
+        real_close(descriptor)
+        if threading.current_thread() in cleaners:
+            let_go.set()
+            inside.wait(10)
+
+    def flocks(*arguments: object) -> None:
+        if not cleaners:
+            cleaners.append(threading.Thread(target=remove_leftovers, args=(tmp_path,)))
+            cleaners[0].start()
+            assert let_go.wait(10)
+        real_flock(*arguments)
+
+    monkeypatch.setattr(module.os, "close", closes)
+    monkeypatch.setattr(module.fcntl, "flock", flocks)
+    with written_beside(tmp_path / "next.txt") as temporary:
+        inside.set()
+        cleaners[0].join()
+        temporary.write_text("mine")
+    assert (tmp_path / "next.txt").read_text() == "mine"
+
+
 def test_a_disk_without_room_for_a_workspace(tmp_path, monkeypatch):
     def refuses(path: Path, *_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
