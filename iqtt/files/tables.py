@@ -293,6 +293,10 @@ class NoImagesError(FileFormatError):
     """The file holds answers but no images; these are in another file."""
 
 
+class NoAnswersError(FileFormatError):
+    """The file holds questions but no answers; these are in another file."""
+
+
 def table_parts(file: h5py.File, path: Path, content: str) -> tuple[str, ...]:
     """Return the parts of a file that hold a dataset; ("",) if it is at the root.
 
@@ -307,7 +311,8 @@ def table_parts(file: h5py.File, path: Path, content: str) -> tuple[str, ...]:
         hint = f"open {what} instead, with this file for answers"
         raise NoImagesError(path, "answers but no images", "questions", hint)
     if content == "answers" and "questions" in file:
-        raise FileFormatError(path, "questions but no answers", "answers")
+        hint = "whoever made the questions has the file of their answers"
+        raise NoAnswersError(path, "questions but no answers", "answers", hint)
     expected = f"a dataset {content!r}, 'labeled/{content}' or 'unlabeled/{content}'"
     raise FileFormatError(path, "no question file", expected)
 

@@ -89,6 +89,7 @@ class Comparison:
 
     task: str
     truth_fingerprint: str
+    truth_digest: str
     reference: str
     methods: tuple[str, ...]
     items: int
@@ -157,6 +158,7 @@ def compare(
     return Comparison(
         task=files[0].task,
         truth_fingerprint=files[0].meta.truth_fingerprint,
+        truth_digest=files[0].meta.truth_digest,
         reference=labels[0],
         methods=tuple(labels[1:]),
         items=len(clusters),

@@ -41,15 +41,12 @@ def require_same_test(
                     file.place,
                     f"scores of {what} {plain(found)[:12]}",
                     f"{plain(expected)[:12]} as in {first.place}",
-                    "only scores of one test set compare",
+                    "only scores of one test set compare: score all submissions with one --truth",
                 )
         if not file.comparable and not allow_incomparable:
-            why = f": {plain(file.meta.warnings[0])}" if file.meta.warnings else ""
+            why = "; ".join(file.meta.warnings) or "not comparable"
             raise ComparisonError(
-                file.place,
-                f"scores that are not comparable{why}",
-                "comparable ones",
-                "score all rows without penalties, or say --allow-incomparable",
+                file.place, f"scores that are {why}", hint="or say --allow-incomparable"
             )
     names = tuple(dict.fromkeys(metrics or HEADLINE[first.task]))
     for name in names:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict
 
 from metrics.comparison.compare import ALPHA, CONFIDENCE, POWER, SIGN_FLIP, Comparison, Difference
+from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import metric
 from scenegen.common.text_table import laid_out, markdown, number, printable
 
@@ -55,8 +56,9 @@ def _title(comparison: Comparison, escape: Callable[[str], str]) -> str:
     else:
         size = f"{comparison.items:,} questions"
     stamp = "" if comparison.comparable else " NOT COMPARABLE, compared all the same."
-    fingerprint = escape(comparison.truth_fingerprint[:12])
-    return f"Against {escape(comparison.reference)}, over {size} (truth {fingerprint}).{stamp}"
+    known = known_test(comparison.truth_digest)
+    truth = escape(known.name if known else comparison.truth_digest[:12])
+    return f"Against {escape(comparison.reference)}, over {size} (truth {truth}).{stamp}"
 
 
 def _tables(

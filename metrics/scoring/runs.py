@@ -108,8 +108,9 @@ def warnings_of(
     found = []
     if source_of(truth, digest) == "submission":
         found.append(
-            f"not comparable: the submission itself chose the truth, {truth.path} with the digest"
-            f" {digest:.12}; give the test file with --truth"
+            f"not comparable: without --truth these scores are not ranked: {truth.path}, digest"
+            f" {digest:.12}, was used because the submission names it; if it is the right file,"
+            f" score again with --truth {truth.path}"
         )
     if not whole:
         found.append(f"not comparable: only {scored} of {count} rows were answered by all runs")

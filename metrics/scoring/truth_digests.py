@@ -65,6 +65,6 @@ def _checked(path: Path, found: Mapping[str, str], stored: Any, own: Mapping[str
     raise ScoringError(
         f"{path}: {TRUTH_DIGEST}",
         f"content with the digest {digest:.12}",
-        f"{stored!r:.14}, with which the file was written",
+        f"{stored!s:.12}, with which the file was written",
         f"what was changed since: {', '.join(changed)}" if changed else "",
     )

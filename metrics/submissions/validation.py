@@ -68,8 +68,9 @@ def _hints_on_source(truth: FoundTruth) -> list[Problem]:
     """Return a hint where nobody but the submission says that this is the truth."""
     if truth.source == "given":
         return []
-    found = f"{truth.path}, which the submission names itself"
-    return [Problem("truth", HINT, "the test file, given with --truth", found)]
+    found = f"{truth.path}, which was used because the submission names it"
+    expected = f"--truth {truth.path} if it is the right file; else scores are not ranked"
+    return [Problem("truth", HINT, expected, found)]
 
 
 def _against_rooms(
@@ -134,11 +135,18 @@ class _Tally:
 
 
 def _against_questions(predictions: QuestionPredictions, truth_path: Path) -> list[Problem]:
-    from iqtt.files.reader import AnswersFile
+    from iqtt.files.reader import AnswersFile, QuestionsFile
+    from iqtt.files.tables import NoAnswersError
 
-    with AnswersFile(truth_path) as truth:
+    try:
+        truth_file: AnswersFile | QuestionsFile = AnswersFile(truth_path)
+    except NoAnswersError:  # those who take part have the questions alone
+        truth_file = QuestionsFile(truth_path)
+    with truth_file as truth:
         problems = match_problems(predictions, truth_path, truth.fingerprint, len(truth))
         if any(problem.rule == "match" for problem in problems):
+            return problems
+        if not truth.has_answers:
             return problems
         return problems + answer_hints(predictions, truth.read("answers", slice(None)))
 

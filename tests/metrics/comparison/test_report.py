@@ -26,7 +26,7 @@ def comparison():
 
 def test_the_table_says_everything_in_aligned_lines(comparison):
     lines = text_report(comparison).splitlines()
-    assert lines[0] == "Against first, over 20 images of 10 scenes (truth 0123456789ab)."
+    assert lines[0] == "Against first, over 20 images of 10 scenes (truth fedcba987654)."
     assert lines[2] == "chamfer (scene unit, lower is better)"
     assert "mse_depth (scene unit squared, lower is better)" in lines
     shown = [line for line in lines if "0/10/0" in line]
@@ -71,7 +71,7 @@ def test_json_holds_every_attribute_and_no_nan(comparison):
 def test_questions_and_what_is_not_comparable_say_so():
     files = [iqtt_scores("a", [1, 0] * 10), iqtt_scores("b", [1, 1] * 10, comparable=False)]
     text = text_report(compare(files, allow_incomparable=True))
-    assert text.startswith("Against a, over 20 questions (truth 0123456789ab). NOT COMPARABLE")
+    assert text.startswith("Against a, over 20 questions (truth fedcba987654). NOT COMPARABLE")
     assert "iqtt_accuracy (fraction, higher is better)" in text
     assert "10/0/10" in text
     assert "p: exact McNemar test, two-sided" in text
