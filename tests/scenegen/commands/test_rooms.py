@@ -116,6 +116,18 @@ def test_options_reach_the_request(run, monkeypatch, option, setting):
     assert json.loads(asked[0].to_json())[setting[0]] == setting[1]
 
 
+@pytest.mark.parametrize(
+    ("line", "option"),
+    [
+        ("--n 0", "--n: "),
+        ("--n 1 --preset none", "--preset: "),
+        ("--n 1 --object-radius 5", "--object-radius: "),
+    ],
+)
+def test_errors_name_options(refuses, line, option):
+    refuses("render", *line.split(), words=(option,))
+
+
 def test_images_are_counted_by_views(run):
     result = run("render", "--n", 2, "--size", 16, "--views", "0,10,20")
     assert result.stdout.startswith("rooms.h5: 6 images, ")
