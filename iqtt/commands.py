@@ -108,7 +108,7 @@ def make_split(
     if secret_seed is not None:
         source = click.get_current_context().get_parameter_source("seed")
         if source is not click.core.ParameterSource.DEFAULT:
-            raise SpecError("--secret-seed", "--seed too", "one of the two")
+            raise SpecError("--secret-seed", "--seed as well", "only one of the two")
         refuse_command_inputs(Path(out) / name for name in make.FILES)
         settings["seed"] = specs.secret_seed(secret_seed)
     chosen = {name: value for name, value in settings.items() if value is not None}

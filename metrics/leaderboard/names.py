@@ -27,7 +27,7 @@ _DAGGERS = {"DAGGER", "CROSS", "ALVEOLAR"}  # words in the names of what looks l
 
 
 class LookAlikeError(SceneGenError):
-    """A method's name that the leaderboard does not show."""
+    """A method's name that the leaderboard does not accept."""
 
 
 def check_names(files: Sequence[ScoreFile]) -> None:
