@@ -1,5 +1,6 @@
-"""Hostile input for every command, as docs/security.md promises. The packages import nothing of it.
+"""Hostile input for the commands listed in `programs`; docs/security.md says what must hold.
 
+The packages import nothing of it.
 `make fuzz` runs it for 10 minutes; `make test` for some seconds, after the cases that were faults
 before (`regressions.jsonl`). A case is a command line that succeeds on honest files, and what was
 done to it or to the files. Seed, target and number give the case:

@@ -3,7 +3,7 @@
 import os
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -11,8 +11,9 @@ import click
 from fuzz.cases import Case
 from fuzz.child import working_folder
 from fuzz.programs import TARGETS, Target
-from fuzz.runner import Bench, Tally, honest_files, work
+from fuzz.runner import Bench, Tally, honest_files, try_case, work
 
+Known = Sequence[tuple[str, Case]]
 REGRESSIONS = Path(__file__).parent / "regressions.jsonl"
 
 
@@ -45,17 +46,19 @@ def main(
         bench = (
             Bench(honest) if honest else honest_files(made, any(t.imports_torch for t in targets))
         )
-        known = [case for file in (replay or [REGRESSIONS]) for case in read_cases(file)]
+        read = [case for file in (replay or [REGRESSIONS]) for case in read_cases(file)]
+        known = [(f"known case {i} of {case.target}", case) for i, case in enumerate(read)]
         tally = Tally()
-        for some in filter(
-            None, ([t for t in targets if t.imports_torch is x] for x in (False, True))
-        ):
-            names = {target.name for target in some}
+        for imports_torch in (False, True):
+            some = [target for target in targets if target.imports_torch is imports_torch]
+            if not some:
+                continue
             bench.warm_up(some)
-            tally.merge(replayed(bench, [case for case in known if case.target in names]))
-            if not replay:
-                share = seconds * len(some) / len(targets)
-                tally.merge(in_parallel(bench, some, seed, first, cases, share, jobs, corpus))
+            names = {target.name for target in some}
+            mine = [(name, case) for name, case in known if case.target in names]
+            share = seconds * len(some) / len(targets)
+            number = 0 if replay else cases
+            tally.merge(in_parallel(bench, some, mine, seed, first, number, share, jobs, corpus))
     for line in tally.lines():
         click.echo(line)
     sys.exit(1 if tally.faults else 0)
@@ -66,20 +69,19 @@ def read_cases(path: Path) -> list[Case]:
     return [Case.from_json(line) for line in path.read_text().splitlines() if line.strip()]
 
 
-def replayed(bench: Bench, cases: Iterable[Case]) -> Tally:
+def replayed(bench: Bench, known: Known, corpus: Path | None) -> Tally:
     """Run known cases."""
     tally = Tally()
-    for i, case in enumerate(cases):
-        done, found, unmade = bench.tried(case)
-        tally.add(f"known case {i} of {case.target}", case, done, found, len(unmade))
-        for line in [*unmade, *map(str, found)]:
-            click.echo(f"known case {i} of {case.target}: {line}", err=True)
+    for name, case in known:
+        for line in try_case(bench, tally, name, case, corpus):
+            click.echo(f"{name}: {line}", err=True)
     return tally
 
 
 def in_parallel(
     bench: Bench,
     targets: list[Target],
+    known: Known,
     seed: int,
     first: int,
     cases: int | None,
@@ -87,8 +89,7 @@ def in_parallel(
     jobs: int,
     corpus: Path | None,
 ) -> Tally:
-    """Share the cases among processes that are forked from this one."""
-    until = time.monotonic() + seconds
+    """Share known cases, then new ones, among processes that are forked from this one."""
     total = Tally()
     with working_folder() as results:
         children = []
@@ -98,7 +99,9 @@ def in_parallel(
                 numbers = range(first + job, first + (10**9 if cases is None else cases), jobs)
                 code = 1
                 try:
-                    tally = work(bench, targets, seed, numbers, until, corpus)
+                    tally = replayed(bench, known[job::jobs], corpus)
+                    until = time.monotonic() + seconds
+                    tally.merge(work(bench, targets, seed, numbers, until, corpus))
                     (results / str(job)).write_text(tally.to_json())
                     code = 0
                 finally:

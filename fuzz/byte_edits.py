@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 Rng = np.random.Generator
+HOSTILE = Path(__file__).parents[1] / "tests" / "support" / "hostile"  # what HDF5 cannot read
 SPECIAL = (
     "00000000", "ffffffff", "ffffff7f", "00000080", "01000000", "0000c07f", "0000807f",
     "ffffffffffffffff", "0000000000000000", "ffffffffffffff7f", "0000000000000080",
@@ -19,7 +21,7 @@ SPECIAL = (
 NUMERALS = ("nan", "inf", "-1", "0", "1e999", "1e-999", "1e30", "9" * 30, "2147483648", "0x10",
             "1_0", "٣", "1/2/3/4", "-0", "1,5", "\x1b[2J", "'")  # fmt: skip
 KINDS = ("empty", "text", "zeros", "sparse", "folder", "fifo", "dangling link", "link to itself",
-         "link to /dev/zero", "unreadable", "gone")  # fmt: skip
+         "link to /dev/zero", "unreadable", "gone", "hangs.h5", "crashes.h5")  # fmt: skip
 CHANCES = {"flip": 0.25, "overwrite": 0.25, "insert": 0.1, "cut": 0.15, "repeat": 0.08,
            "splice": 0.07, "become": 0.05, "replace": 0.05}  # fmt: skip
 
@@ -100,8 +102,14 @@ def become(path: Path, kind: str) -> None:
         "link to /dev/zero": lambda: path.symlink_to("/dev/zero"),
         "unreadable": lambda: (path.write_bytes(old), path.chmod(0)),
         "gone": lambda: None,
+        "hangs.h5": lambda: path.write_bytes(_unpacked(kind)),
+        "crashes.h5": lambda: path.write_bytes(_unpacked(kind)),
     }
     makers[kind]()
+
+
+def _unpacked(name: str) -> bytes:
+    return zlib.decompress((HOSTILE / f"{name}.z").read_bytes())
 
 
 def replace(path: Path, other: str) -> None:

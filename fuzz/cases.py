@@ -22,6 +22,12 @@ from fuzz.programs import OUTPUTS, Target
 
 Rng = np.random.Generator
 SECONDS = 5.0  # that the edits of a case may take
+# Files that a command finds by way of others.
+FOUND_BY = {
+    "rooms.h5": ("predictions.h5", "constant.h5"),
+    "weights.json": ("weights.safetensors",),
+    "iqtt/iqtt-test-answers.h5": ("iqtt/iqtt-test.h5",),
+}
 EDITS = {**byte_edits.EDITS, **hdf5_edits.EDITS, **json_edits.EDITS}
 # Words of a command line. None is a device or an absolute path, which a broken command could
 # replace; the special files are made when the case is put up.
@@ -107,10 +113,7 @@ def draw(target: Target, seed: int, number: int, honest: Path) -> Case:
 
 def _is_read(name: str, arguments: Sequence[str]) -> bool:
     """Return whether a command line names a file, or its folder, or a file that names it."""
-    named = bool({name, Path(name).parts[0]} & set(arguments))
-    return named or (name == "rooms.h5" and {"predictions.h5", "constant.h5"} & {*arguments}) or (
-        name == "weights.json" and "weights.safetensors" in arguments
-    )  # fmt: skip
+    return not {name, Path(name).parts[0], *FOUND_BY.get(name, ())}.isdisjoint(arguments)
 
 
 def _draw_edit(rng: Rng, honest: Path, path: str, inputs: Sequence[str]) -> list[Any]:

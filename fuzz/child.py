@@ -22,6 +22,7 @@ from typing import Any
 
 MEMORY = 4 * 2**30  # bytes that a child may ask for beyond what it starts with
 LARGEST_FILE = 2**31  # bytes that it may write
+TRIAL = 3.0  # seconds after which an HDF5 file counts as one on which HDF5 hangs; cases are tiny
 GRACE = 2.0  # seconds that helpers of a child, such as multiprocessing's, may outlive it
 
 
@@ -51,7 +52,9 @@ def run(arguments: list[str], folder: Path, limit: float, stdout: str = "file") 
 
     def command() -> Any:
         import cli
+        from scenegen.common import trial
 
+        trial.SECONDS = TRIAL
         program = arguments[0]
         sys.argv = list(arguments)
         return getattr(cli, program).main(arguments[1:], prog_name=program)

@@ -46,20 +46,21 @@ def pixels(path: Path, where: str, rows: list[float], part: float, value: str) -
             index = int(row * len(data))
             old = np.array(data[index])
             flat = old.reshape(-1)
-            number = (
-                float(value) if kind.kind == "f" else int(float(value)) if "." in value else value
-            )
-            if kind.kind in "iu":
-                limits = np.iinfo(kind)
-                number = int(
-                    np.clip(int(float(value)) if value not in NAN else 0, limits.min, limits.max)
-                )
             with np.errstate(over="ignore"):
-                flat[: max(1, int(part * flat.size))] = number
+                flat[: max(1, int(part * flat.size))] = _number(value, kind)
             data[index] = flat.reshape(old.shape)
 
 
-NAN = ("nan", "inf", "-inf")
+def _number(value: str, kind: np.dtype[Any]) -> float | str:
+    """Return a number nearest to what a text says that the type can hold, or the text."""
+    if kind.kind == "f":
+        return float(value)
+    if kind.kind not in "iu":
+        return value
+    if value in ("nan", "inf", "-inf"):
+        return 0
+    limits = np.iinfo(kind)
+    return min(max(int(float(value)), int(limits.min)), int(limits.max))
 
 
 def retype(path: Path, where: str, dtype: str) -> None:

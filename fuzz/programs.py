@@ -44,8 +44,9 @@ TARGETS = (
         "score answers",
         ("bench score answers.h5 --truth iqtt/iqtt-test-answers.h5 --json new.json",
          "bench score answers.json --truth iqtt/iqtt-test-answers.h5 --csv new.csv",
+         "bench score answers.h5 --truth iqtt/iqtt-test.h5",
          "bench score named.json --truth iqtt/iqtt-val.h5 --allow-partial"),
-        ("answers.h5", "answers.json", "named.json", SPLIT[1], SPLIT[3]),
+        ("answers.h5", "answers.json", "named.json", *SPLIT[1:]),
     ),
     Target(
         "validate",
@@ -65,12 +66,15 @@ TARGETS = (
         "leaderboard",
         ("bench leaderboard scores.json other.json answer-scores.json",
          "bench leaderboard scores.json other.json --format html --out new.html",
-         "bench leaderboard answer-scores.json --format latex --no-paper"),
+         "bench leaderboard answer-scores.json --format latex --no-paper",
+         "bench leaderboard scores.json other.json answer-scores.json --recheck"),
         ("scores.json", "other.json", "answer-scores.json"),
     ),
     Target(
         "baselines",
         ("bench baseline constant --train train.h5 --data rooms.h5 --out new.h5",
+         "bench baseline mean-depth --train train.h5 --data rooms.h5 --out new.h5",
+         "bench baseline empty-room --data rooms.h5 --out new.h5",
          "bench baseline oracle --data rooms.h5 --out new.h5",
          "bench baseline chance --data iqtt/iqtt-test.h5 --out new.h5"),
         ("rooms.h5", "train.h5", SPLIT[2]),
@@ -97,6 +101,7 @@ TARGETS = (
         ("iqtt info iqtt/iqtt-train.h5",
          "iqtt info iqtt/iqtt-test.h5",
          "iqtt show iqtt/iqtt-val.h5 --answers --out new.png",
+         "iqtt show iqtt/iqtt-test.h5 --answers --out new.png",
          "iqtt show iqtt/iqtt-train.h5 --part labeled --answers --out new.png",
          "iqtt show released.h5 --out new.png",
          "iqtt audit iqtt --json new.json",
@@ -107,8 +112,13 @@ TARGETS = (
     Target(
         "weights",
         ("pix2shape predict --weights weights.safetensors --data rooms.h5 --out new.h5",
-         "pix2shape sample --weights weights.safetensors --n 1 --out new.png"),
-        ("weights.safetensors", "weights.json"),
+         "pix2shape sample --weights weights.safetensors --n 1 --out new.png",
+         "pix2shape interpolate --weights weights.safetensors --data rooms.h5 --steps 2"
+         " --out new.png",
+         "pix2shape rotate --weights weights.safetensors --data rooms.h5 --items 0 --frames 2"
+         " --out new.gif",
+         "bench baseline pix2shape --weights weights.safetensors --data rooms.h5 --out new.h5"),
+        ("weights.safetensors", "weights.json", "rooms.h5"),
         imports_torch=True,
     ),
 )  # fmt: skip

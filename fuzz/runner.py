@@ -190,6 +190,16 @@ def honest_files(folder: Path, weights: bool) -> Bench:
     return Bench(folder)
 
 
+def try_case(bench: Bench, tally: Tally, name: str, case: Case, corpus: Path | None) -> list[str]:
+    """Run and count a case, and keep its first faults; return the edits that could not be made."""
+    done, found, unmade = bench.tried(case)
+    for key in tally.add(name, case, done, found, len(unmade)):
+        print(f"{name}: {key}", file=sys.stderr, flush=True)
+        if corpus:
+            keep(corpus, f"{name} {zlib.crc32(key.encode()):08x}", case, done, found, bench)
+    return unmade
+
+
 def work(
     bench: Bench,
     targets: Sequence[Target],
@@ -204,10 +214,5 @@ def work(
         if time.monotonic() > until:
             break
         case = draw(target, seed, number, bench.honest)
-        name = f"{target.name} {seed} {number}"
-        done, found, unmade = bench.tried(case)
-        for key in tally.add(name, case, done, found, len(unmade)):
-            print(f"{name}: {key}", file=sys.stderr, flush=True)
-            if corpus:
-                keep(corpus, f"{name} {zlib.crc32(key.encode()):08x}", case, done, found, bench)
+        try_case(bench, tally, f"{target.name} {seed} {number}", case, corpus)
     return tally

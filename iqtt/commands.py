@@ -12,11 +12,11 @@ import click
 
 from scenegen.common import command_line
 from scenegen.common.command_line import EXAMPLE, Color, Items, Range, print_line, progress_bar
-from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_inputs
+from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
 
 KNOWN_SEED = (
-    "note: whoever knows the seed can make the test answers again; for a test set of which nobody"
-    " shall: openssl rand -hex 32 > secret.txt, then --secret-seed secret.txt"
+    "note: anyone who knows the seed can recreate the test answers. For a private test set, run"
+    " `openssl rand -hex 32 > secret.txt` and pass --secret-seed secret.txt."
 )
 SHOWN = 8  # questions that `show` draws by default
 option = partial(click.option, show_default=True)
@@ -44,9 +44,10 @@ option = partial(click.option, show_default=True)
 @command_line.SEED
 @option(
     "--secret-seed",
+    type=InputPath(),
     metavar="FILE",
-    help="File whose content is the seed, for test answers that nobody shall know: the seed is then"
-    " in no file.",
+    help="File whose content is the seed, for a private test set. No file that is written holds the"
+    " seed.",
 )
 @option("--cubes", type=Range(int), default="5-11", help="Number of cubes of a shape.")
 @option(
@@ -107,8 +108,8 @@ def make_split(
     if secret_seed is not None:
         source = click.get_current_context().get_parameter_source("seed")
         if source is not click.core.ParameterSource.DEFAULT:
-            raise SpecError("--secret-seed", "--seed too", "one of the two")
-        refuse_inputs((Path(out) / name for name in make.FILES), [secret_seed])
+            raise SpecError("--secret-seed", "--seed as well", "only one of the two")
+        refuse_command_inputs(Path(out) / name for name in make.FILES)
         settings["seed"] = specs.secret_seed(secret_seed)
     chosen = {name: value for name, value in settings.items() if value is not None}
     spec = specs.preset_spec(preset, height=size[0], width=size[1], **chosen)

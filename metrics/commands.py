@@ -35,7 +35,7 @@ SEED = click.option(
 
 
 @click.command(
-    epilog=EXAMPLE + "bench score predictions.h5 --truth rooms.h5 --json mine.json --html mine.html"
+    epilog=EXAMPLE + "bench score predictions.h5 --truth rooms.h5 --json mine.json --html me.html"
 )
 @click.argument("submissions", nargs=-1, required=True, type=InputPath(), metavar="PREDICTIONS...")
 @TRUTH

@@ -38,8 +38,8 @@ def make_split(
 ) -> Tally:
     """Write the files of a split to a folder; it appears when all of them are complete.
 
-    Seed and command would tell the test answers, so only the file of the test answers has them. How
-    an older split is replaced, `new_folder.folder_written_beside` says.
+    Seed and command would reveal the test answers, so only the file of the test answers has them.
+    `new_folder.folder_written_beside` says how an older split is replaced.
 
     Args:
         batch: questions in one wavefront; bounds the memory, never changes a byte of the files.

@@ -304,7 +304,7 @@ def table_parts(file: h5py.File, path: Path, content: str) -> tuple[str, ...]:
         hint = f"open {what} instead, with this file for answers"
         raise NoImagesError(path, "answers but no images", "questions", hint)
     if content == "answers" and "questions" in file:
-        hint = "whoever made the questions has the file of their answers"
+        hint = "ask those who made the questions for the file of answers"
         raise NoAnswersError(path, "questions but no answers", "answers", hint)
     expected = f"a dataset {content!r}, 'labeled/{content}' or 'unlabeled/{content}'"
     raise FileFormatError(path, "no question file", expected)

@@ -27,7 +27,7 @@ _DAGGERS = {"DAGGER", "CROSS", "ALVEOLAR"}  # words in the names of what looks l
 
 
 class LookAlikeError(SceneGenError):
-    """A method's name that the leaderboard does not show."""
+    """A method's name that the leaderboard does not accept."""
 
 
 def check_names(files: Sequence[ScoreFile]) -> None:
@@ -40,11 +40,11 @@ def check_names(files: Sequence[ScoreFile]) -> None:
         mark = _own_mark(file.method)
         if mark:
             expected = f"a name without {mark}, as the leaderboard adds that itself"
-            raise LookAlikeError(file.place, _shown(file.method), expected, RENAME)
+            raise LookAlikeError(file.place, ascii(file.method), expected, RENAME)
         name, whose = seen.setdefault(skeleton(file.method), (file.method, file.place))
         if name != file.method:
-            expected = f"a name that does not look like {_shown(name)} of {whose}"
-            raise LookAlikeError(file.place, _shown(file.method), expected, RENAME)
+            expected = f"a name that does not look like {name!a} of {whose}"
+            raise LookAlikeError(file.place, ascii(file.method), expected, RENAME)
 
 
 def skeleton(name: str) -> str:
@@ -99,7 +99,3 @@ def _endings() -> re.Pattern[str]:
     told = "|".join(map(skeleton, ("runs", "claims depth")))
     digits = "".join(map(skeleton, "0123456789"))
     return re.compile(rf"(\[[^\[\]]*\]|#[{digits}]+|\([^()]*\b({told})\b[^()]*\))$")
-
-
-def _shown(name: str) -> str:
-    return f"{name!a:.100}"

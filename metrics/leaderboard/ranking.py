@@ -59,8 +59,10 @@ def leaderboard(
         names = [name for name in chosen if chosen[name] == task] or HEADLINE[task]
         figures = [f for t in TABLES for f in t.figures if paper and f.metric in names]
         asked = {file.meta.truth_fingerprint for file in members}
-        twins = {f.meta.truth_digest for f in files if f.meta.truth_fingerprint in asked}
-        for table, used in _tables(members, names, figures, sorted(twins - {digest})):
+        same_request = {f.meta.truth_digest for f in files if f.meta.truth_fingerprint in asked} - {
+            digest
+        }
+        for table, used in _tables(members, names, figures, sorted(same_request)):
             tables.append(table)
             shown.update(used)
     if paper:
@@ -85,12 +87,12 @@ def _tables(
     files: Sequence[ScoreFile],
     names: Sequence[str],
     figures: Sequence[Figure],
-    twins: Sequence[str],
+    same_request: Sequence[str],
 ) -> Iterator[tuple[Table, list[Figure]]]:
     """Yield the ranking of a test set, then each score by view angle where any file has that.
 
-    With each table come the figures of the paper that it shows. The twins are the digests of other
-    test sets, which the same request made.
+    With each table come the figures of the paper that it shows. `same_request` has the digests
+    of other test sets, which the same request made.
     """
     labels = distinct([f.method for f in files], [f.path.stem if f.path else "" for f in files])
     ranked = [(_label(files[i], labels[i]), files[i]) for i in _order(files, names[0])]
@@ -104,7 +106,7 @@ def _tables(
         {name: (name, column_head(name)) for name in names},
         [(label, file.comparable, file.metrics) for label, file in ranked],
         _by_row(used, _figure_label, lambda figure: figure.metric),
-        [*_notes([file for _, file in ranked], names), *map(_twin_note, twins)],
+        [*_notes([file for _, file in ranked], names), *map(_same_request_note, same_request)],
         ranked=True,
     )
     yield table, used
@@ -182,10 +184,10 @@ def _notes(files: Sequence[ScoreFile], names: Sequence[str]) -> Iterator[str]:
         yield f"Noise floor of Chamfer at this resolution: {number(max(floors))} scene units."
 
 
-def _twin_note(digest: str) -> str:
+def _same_request_note(digest: str) -> str:
     return (
-        f"Not ranked with truth {digest[:12]}: the same request was rendered with other bits there,"
-        " so these scores are not of the same data."
+        f"Not ranked with truth {digest[:12]}: it answers the same request, but its content"
+        " differs, so its scores are ranked separately."
     )
 
 

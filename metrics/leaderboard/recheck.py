@@ -46,7 +46,7 @@ def recheck(file: ScoreFile, progress: Callable[[int], Any] = lambda done: None)
             angles = file.items.get("view_angle_degrees")
             chosen = ~everything if angles is None else angles == int(degrees)
             if not chosen.any():
-                found, expected = "scores", f"an image of {int(degrees)} view_angle_degrees"
+                found, expected = "scores", f"an image whose view angle is {int(degrees)} degrees"
                 raise RecheckError(f"{file.place}: {place}", found, expected, SCORE_AGAIN)
             _compare(file, place, scores, chosen)
             progress(1)

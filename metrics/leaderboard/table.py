@@ -97,8 +97,8 @@ def build_table(
     if not all(comparable for _, comparable, _ in entries):
         told.append(
             f"{INCOMPARABLE_MARK} not comparable, so not ranked: not all of the test set was"
-            " scored, or values that are not finite were scored at the worst, or the truth was"
-            " named by the submission alone (score it again with --truth)."
+            " scored, or values that are not finite were given the worst score, or only the"
+            " submission named the truth (score it again with --truth)."
         )
     if figures:
         shares = {"iqtt_accuracy"}.issuperset(name for name, _ in columns.values())

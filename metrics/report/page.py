@@ -9,7 +9,7 @@ import numpy as np
 from metrics.report.charts import Svg, histogram, intervals
 from metrics.report.html import render
 from metrics.report.pictures import view_pictures
-from metrics.report.text import GROUP_SCORES, GROUP_TITLES, chooser, group_tables, score_rows
+from metrics.report.text import GROUP_SCORES, GROUP_TITLES, group_tables, score_rows, source_text
 from metrics.scoring.metric_names import HEADLINE, in_order, metric
 from metrics.scoring.records import Groups, ScoreFile
 from metrics.submissions.reader import RoomPredictions, open_predictions
@@ -30,7 +30,7 @@ def html_report(scores: ScoreFile, truth_path: Path, submissions: Sequence[Path]
     return render(
         "report.html",
         scores=scores,
-        chooser=chooser(scores.meta),
+        source_text=source_text(scores.meta),
         score_rows=score_rows(scores),
         groups=[
             (GROUP_TITLES[grouping].capitalize(), rows, list(_over_angle(scores, grouping)))

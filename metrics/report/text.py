@@ -115,14 +115,14 @@ def _notes(scores: ScoreFile) -> Iterator[str]:
         yield f"intervals: bootstrap over questions, {meta.resamples} resamples, seed {meta.seed}"
     submissions = ", ".join(f"{one.path} {one.sha256[:12]}" for one in meta.submissions)
     yield (
-        f"truth: {plain(meta.truth_path)}, digest {meta.truth_digest[:12]}, {chooser(meta)};"
+        f"truth: {plain(meta.truth_path)}, digest {meta.truth_digest[:12]}, {source_text(meta)};"
         f" fingerprint {meta.truth_fingerprint[:12]}"
     )
     yield f"submissions: {plain(submissions)}"
 
 
-def chooser(meta: Meta) -> str:
-    """Return in words who says that this is the truth."""
+def source_text(meta: Meta) -> str:
+    """Return in words where the truth comes from."""
     known = known_test(meta.truth_digest)
     name = f" ({known.name})" if known else ""
     return {

@@ -3,6 +3,7 @@
 `docs/scores.md` shows the same table, made by `markdown_table`.
 """
 
+import difflib
 import math
 import re
 from collections.abc import Iterable
@@ -164,7 +165,9 @@ def metric(name: str) -> Metric:
     if threshold is not None:
         return replace(ALL[F_SCORE], name=name, title=f"F-score at {threshold:g}")
     if name not in ALL or name == F_SCORE:
-        raise UnknownMetricError("score", f"{name!r:.60}", "a name listed in docs/scores.md")
+        close = ", ".join(difflib.get_close_matches(name[:60], ALL))
+        hint = f"close to {close}" if close else ""
+        raise UnknownMetricError("score", f"{name!r:.60}", "a name listed in docs/scores.md", hint)
     return ALL[name]
 
 

@@ -121,11 +121,11 @@ def _same(one: QuestionPredictions, other: QuestionPredictions) -> bool:
 
 
 def _check_kinds(truth: "AnswersFile", kinds: Array, answers: Array) -> None:
-    """Raise FileFormatError where a right answer has a kind of wrong ones, or a wrong one none."""
+    """Raise FileFormatError unless the wrong answers, and only they, have a kind."""
     right = np.arange(kinds.shape[1]) == answers[:, None]
     for row in np.flatnonzero(((kinds < 0) != right).any(axis=1))[:1].tolist():
         where = truth.place("distractor_kind", row)
-        expected = f"-1 for the right answer, {answers[row]}, alone"
+        expected = f"-1 for the right answer, {answers[row]}, and for no other"
         raise FileFormatError(where, kinds[row].tolist(), expected)
 
 

@@ -95,7 +95,7 @@ def refuse_copies(files: Sequence[Predictions], same: Callable[[int, int], Any])
 
 
 def source_of(truth: FoundTruth, digest: str) -> TruthSource:
-    """Return who says that this is the truth."""
+    """Return where the truth comes from."""
     if truth.source == "submission" and known_test(digest) is not None:
         return "known"
     return truth.source

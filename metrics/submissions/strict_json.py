@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from metrics.submissions.problems import JsonError
+from scenegen.common.text_table import printable
 
 LONGEST_SHOWN = 200  # characters of each part of an error: a file's keys and texts may be huge
 MOST_MEMORY = 5 * 2**28  # bytes that a parsed text may take; 160,000 scored images: 0.8 GB
@@ -131,8 +132,8 @@ def validated(kind: type[Kind], content: Any) -> Kind:
 
 def refusal(place: str, found: str, expected: str) -> JsonError:
     """Return the error about a place in a file; what a file says is made short and printable."""
-    lines = (" ".join(field.split())[:LONGEST_SHOWN] for field in (place, found, expected))
-    return JsonError(*("".join(c if c.isprintable() else "\ufffd" for c in s) for s in lines))
+    fields = (" ".join(field.split()) for field in (place, found, expected))
+    return JsonError(*(printable(field)[:LONGEST_SHOWN] for field in fields))
 
 
 def shown(value: Any) -> str:

@@ -65,7 +65,7 @@ def find_truth(predictions: Predictions, given: str | Path | None = None) -> Fou
     """
     advice = "give it with --truth" if given is None else ""
     if given is None and not predictions.truth_path:
-        raise FileFormatError(predictions.path, "no path of a truth", "one", advice)
+        raise FileFormatError(predictions.path, "no path of a truth file", "a path", advice)
     recorded = Path(predictions.truth_path)
     places = [predictions.path.parent / recorded, recorded] if given is None else [Path(given)]
     for place in places:
@@ -86,7 +86,7 @@ def find_truth(predictions: Predictions, given: str | Path | None = None) -> Fou
 def read_true_view(truth: RoomsFile, row: int) -> TrueView:
     """Read the truth of one row.
 
-    Raises FileFormatError, naming file, dataset and row, where it is damaged or no truth: a depth
+    Raises FileFormatError, naming file, dataset and row, where it is damaged or impossible: a depth
     that is not above 0 where an object id is stored, any depth where none is, a normal that is not
     unit where there is depth, an image without any surface, an impossible camera.
     """

@@ -27,7 +27,7 @@ from scenegen.common.command_line import (
     print_line,
     progress_bar,
 )
-from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_told_inputs
+from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
 
 
 # fmt: off
@@ -264,7 +264,7 @@ def export(
                 found = f"models that changed in the folder: {', '.join(changed)}"
                 raise SpecError(f"{file}: row {row}", found, "the files it was made from")
         paths = {row: export_paths(row, out, Path(file).stem, form) for row in rows}
-        refuse_told_inputs(path for some in paths.values() for path in some)
+        refuse_command_inputs(path for some in paths.values() for path in some)
         if not Path(out).exists():
             Path(out).mkdir()
         for some in paths.values():

@@ -63,8 +63,23 @@ class PackageCommands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; show what it raises for users, and its warnings, as one line each."""
         warnings.showwarning = _show_warning
-        with _one_line_errors():
+        with _one_line_errors(), self._options_named(ctx):
             return super().invoke(ctx)
+
+    @contextmanager
+    def _options_named(self, ctx: click.Context) -> Iterator[None]:
+        """Let an error about a setting name the option of the command that sets it."""
+        try:
+            yield
+        except ValueError as error:
+            from scenegen.common.errors import SceneGenError
+
+            command = self.get_command(ctx, ctx.invoked_subcommand or "")
+            options = {name for param in command.params for name in param.opts} if command else ()
+            if isinstance(error, SceneGenError):
+                option = "--" + re.sub("[ _]", "-", error.where)
+                error.where = option if option in options else error.where
+            raise
 
     def _loaded(self) -> list[Any]:
         modules = [importlib.import_module(name) for name in self.modules]

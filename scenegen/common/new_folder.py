@@ -71,7 +71,7 @@ def check_folder(path: str | Path, names: Collection[str], overwrite: bool, own:
 
 
 def _can_be_renamed(folder: Path) -> bool:
-    """Return what a rename says that must fail, as its target is a folder that is not empty."""
+    """Return whether a rename fails only because its target, made for this, is not empty."""
     if folder.samefile(os.curdir):
         return False
     with suppress(OSError), workspace(folder.parent, folder) as made:

@@ -13,7 +13,7 @@ Spelling = str | Path
 
 
 @dataclass
-class _Told:
+class CommandPaths:
     """The paths that the running command has been given so far."""
 
     inputs: list[tuple[Path, tuple[str, ...]]] = field(default_factory=list)
@@ -39,10 +39,10 @@ class InputPath(click.ParamType):  # type: ignore[type-arg]
 
         What is HDF5 is tried in another process first.
         """
-        told = _told(self, value, param, ctx)
+        paths = _command_paths(self, value, param, ctx)
         read = [Path(value), *([Path(value).with_suffix(self.beside)] if self.beside else [])]
-        told.inputs += [(path, self.within) for path in read]
-        refuse_inputs(told.outputs, read, self.within)
+        paths.inputs += [(path, self.within) for path in read]
+        refuse_inputs(paths.outputs, read, self.within)
         from scenegen.common import trial
 
         trial.try_file(value)
@@ -50,15 +50,18 @@ class InputPath(click.ParamType):  # type: ignore[type-arg]
 
 
 class OutputFolder(click.ParamType):  # type: ignore[type-arg]
-    """A folder to write to. What is written in it is for the command to compare."""
+    """A folder to write to.
+
+    The command itself compares the files that it writes there with its inputs.
+    """
 
     name = "path"
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Refuse an empty path, and one that is a file to be written."""
-        told = _told(self, value, param, ctx)
-        _refuse_twice(value, told.outputs)
-        told.folders.append(Path(value))
+        paths = _command_paths(self, value, param, ctx)
+        _refuse_twice(value, paths.outputs)
+        paths.folders.append(Path(value))
         return value
 
 
@@ -69,10 +72,10 @@ class OutputPath(click.ParamType):  # type: ignore[type-arg]
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Compare a path with all others that are known; keep it for those that follow."""
-        told = _told(self, value, param, ctx)
-        _refuse_twice(value, [*told.outputs, *told.folders])
-        told.outputs.append(Path(value))
-        for path, within in told.inputs:
+        paths = _command_paths(self, value, param, ctx)
+        _refuse_twice(value, [*paths.outputs, *paths.folders])
+        paths.outputs.append(Path(value))
+        for path, within in paths.inputs:
             refuse_inputs([value], [path], within)
         return value
 
@@ -89,25 +92,27 @@ def refuse_inputs(
         for output in written:
             inside = output.suffix.lower() in within and _inside(output, path)
             if inside or _same(output, path):
-                raise SpecError(output, f"a file to be read, by way of {path}", "another file")
+                raise SpecError(
+                    output, f"the same file as the input {path}", "an output that is not an input"
+                )
 
 
-def refuse_told_inputs(outputs: Iterable[Spelling]) -> None:
+def refuse_command_inputs(outputs: Iterable[Spelling]) -> None:
     """Raise as `refuse_inputs` where an output is one of the running command's own inputs."""
     for path, within in click.get_current_context().meta[__name__].inputs:
         refuse_inputs(outputs, [path], within)
 
 
-def _told(
+def _command_paths(
     kind: click.ParamType,  # type: ignore[type-arg]
     value: str,
     param: click.Parameter | None,
     ctx: click.Context | None,
-) -> _Told:
+) -> CommandPaths:
     if not value:
         kind.fail("found an empty path, expected a name", param, ctx)
-    told: _Told = ctx.meta.setdefault(__name__, _Told()) if ctx else _Told()
-    return told
+    paths: CommandPaths = (ctx.meta if ctx else {}).setdefault(__name__, CommandPaths())
+    return paths
 
 
 def _refuse_twice(output: str, others: Iterable[Path]) -> None:

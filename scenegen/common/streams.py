@@ -1,7 +1,9 @@
 """Standard streams that outlive their readers, and show control characters instead of sending them.
 
 What a command prints holds names from other people's files, and goes to pipes that may close at any
-time. Neither may hurt the terminal, or keep the command from writing its files.
+time. Neither may hurt the terminal, or keep the command from writing its files. The streams escape
+all control characters but ends of lines and tabs; what must stay one line, such as an error or a
+row of a table, is made so before, by `text_table.printable`.
 """
 
 import codecs

@@ -1,7 +1,7 @@
 """Tables of names and numbers as text, for terminals and as Markdown.
 
-Names come from other people's files. Whatever a name holds, it stays within one cell and is shown
-as it is.
+Names come from other people's files. Whatever a name holds, it stays within one cell, and what
+cannot be shown in it becomes an escape.
 """
 
 import math
@@ -31,15 +31,11 @@ def printable(text: str, keep: str = "") -> str:
 
 
 def plain(name: str) -> str:
-    """Return a name as one line of visible characters, shortened to 60 of them.
+    """Return a name as `printable` shows it, its white space as single spaces, in 60 characters.
 
-    Characters that cannot be shown become U+FFFD, marks that turn the direction of the text are
-    dropped, and a name of which nothing is left becomes "(unnamed)".
+    A name of nothing but white space becomes "(unnamed)".
     """
-    kept = "".join(
-        "\ufffd" if _hidden(c) and not c.isspace() else c for c in name if c not in _TEXT_DIRECTIONS
-    )
-    line = " ".join(kept.split()) or UNNAMED
+    line = printable(" ".join(name.split())) or UNNAMED
     return line if len(line) <= LONGEST else line[: LONGEST - 3] + "..."
 
 

@@ -5,7 +5,7 @@
   `meshes` reads models from files.
 - `catalogue` says which models a data set draws from; `sources` turns the command line's options
   on objects into such a catalogue.
-- `scene_mesh` gives a whole scene as one mesh, for export and for other ray casters.
+- `scene_mesh` gives the parts of a scene as meshes, for export and for other ray casters.
 
 Start with `catalogue.objects_of`. These files import `common` and `description`, and no renderer.
 """

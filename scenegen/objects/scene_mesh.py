@@ -1,4 +1,4 @@
-"""A whole scene, room and objects, as one triangle mesh: for export and for other ray casters."""
+"""Planes and objects of a scene as triangle meshes, for export and for other ray casters."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -34,13 +34,6 @@ def welded(shape: UnitShape) -> trimesh.Trimesh:
     mesh = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
     mesh.merge_vertices()
     return mesh
-
-
-def scene_mesh(
-    scene: SceneSpec, shape_of: Callable[[str], UnitShape] = unit_shape
-) -> trimesh.Trimesh:
-    """Return the room and the objects of a scene as one mesh in the world frame."""
-    return trimesh.util.concatenate([part.mesh for part in scene_parts(scene, shape_of)])
 
 
 def scene_parts(

@@ -95,7 +95,7 @@ def test_a_secret_seed(run, tmp_path):
         ("--secret-seed short", ["short", "14", "16"]),
         ("--secret-seed missing", ["missing", "No such file"]),
         ("--secret-seed long --seed 0", ["--secret-seed", "--seed"]),
-        ("--secret-seed x/iqtt-val.h5 --out x --overwrite", ["x/iqtt-val.h5", "another file"]),
+        ("--secret-seed x/iqtt-val.h5 --out x --overwrite", ["x/iqtt-val.h5", "not an input"]),
         ("--secret-seed vast", ["vast", "1000001"]),
     ],
 )

@@ -159,5 +159,5 @@ def test_scores_never_replace_the_truth_that_a_submission_names(
     assert bench("baseline", "oracle", "--data", "rooms.h5", "--out", "p.h5").exit_code == 0
     before = (folder / "rooms.h5").read_bytes()
     result = bench("score", "p.h5", option, "rooms.h5", "--overwrite")
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("rooms.h5", "another file"))
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("rooms.h5", "not an input"))
     assert (folder / "rooms.h5").read_bytes() == before

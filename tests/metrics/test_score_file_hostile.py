@@ -170,7 +170,7 @@ WRONG = [
     ("meta/counts/rows_penalised", 1, "comparable", "true", "false, as rows are penalised"),
     ("meta/counts/rows_penalised", 5, "", "5", "at most 4"),
     ("meta/warnings", "none", "", "'none'", "a list"),
-    ("\x1b[31m\n", 1, "\ufffd[31m", "an unknown key", "no key of this name"),
+    ("\x1b[31m\n", 1, r"\x1b[31m", "an unknown key", "no key of this name"),
 ]
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 from scipy.ndimage import grey_dilation, grey_erosion
 from trimesh.ray.ray_pyembree import RayMeshIntersector
@@ -16,7 +17,7 @@ from scenegen.camera import pixel_directions
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.basic_shapes import unit_shape
-from scenegen.objects.scene_mesh import scene_mesh
+from scenegen.objects.scene_mesh import scene_parts
 from scenegen.objects.solids import UnitShape
 from scenegen.rendering import renderer
 from scenegen.rendering.ground_truth import GroundTruth
@@ -41,7 +42,7 @@ def cast_whole_scene(
     camera, size = scene.cameras[0], (spec.height, spec.width)
     matrix = camera.world_from_camera
     rays = pixel_directions(*size, camera.fov_y_degrees).reshape(-1, 3) @ matrix[:3, :3].T
-    mesh = scene_mesh(scene, shape_of)
+    mesh = trimesh.util.concatenate([part.mesh for part in scene_parts(scene, shape_of)])
     points, hit, faces = RayMeshIntersector(mesh).intersects_location(
         np.broadcast_to(matrix[:3, 3], rays.shape), rays, multiple_hits=False
     )

@@ -115,7 +115,7 @@ MISTAKES = [
     (f"predict {WITH} --data .", (".: is a folder",)),
     (f"predict {ROOMS} --weights rooms.json", ("'rooms.json'", ".safetensors")),
     (f"predict {ROOMS} --weights text.safetensors", ("text.safetensors",)),
-    (f"predict {WITH} {ROOMS} --out rooms.h5 --overwrite", ("rooms.h5", "another file")),
+    (f"predict {WITH} {ROOMS} --out rooms.h5 --overwrite", ("rooms.h5", "not an input")),
     (f"predict {WITH} --data damaged.h5", ("damaged.h5", "image, row 5")),
     (f"train {ROOMS} --out run --devices {2**200}", ("--devices", "1<=x<=1024")),
     (f"sample {WITH} --class mug", ("class", "'mug'")),

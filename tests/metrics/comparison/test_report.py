@@ -33,7 +33,7 @@ def test_the_table_says_everything_in_aligned_lines(comparison):
     assert len(shown) == 2
     assert "+0.03000 [+0.03000, +0.03000]" in shown[0]
     assert shown[0].endswith("worse")
-    assert "a|b_*<script>&\ufffd[31m 近" in shown[0]
+    assert r"a|b_*<script>&\x1b[31m \u202e近" in shown[0]
     same = next(line for line in lines if line.startswith("  same"))
     assert " ".join(same.split()[2:]) == "0 [0, 0] 0/0/10 1.0000 1.0000 none not shown"
     assert all(line.isprintable() for line in lines)

@@ -154,7 +154,7 @@ def test_another_bootstrap_gives_other_intervals():
 def test_groups_rest_on_items():
     file = made_rooms()
     unknown = replace(file, by_view_angle={"80": by_angle(0)})
-    with refused(RecheckError, "m.json: by_view_angle.80", expected="80 view_angle_degrees"):
+    with refused(RecheckError, "m.json: by_view_angle.80", expected="80 degrees"):
         recheck(unknown)
     bare = {name: c for name, c in file.items.items() if name != "view_angle_degrees"}
     with refused(RecheckError, "by_view_angle.0"):

@@ -1,7 +1,8 @@
 """Scoring in several processes that the machine stops."""
 
-import os
 import signal
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -13,15 +14,13 @@ from metrics.scoring.runs import ScoringError
 from metrics.submissions.reader import open_predictions
 
 
-def kill(job: object, rows: object) -> None:
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="sends signals")
 def test_a_killed_worker_is_an_error_and_no_traceback(tmp_path, rooms_path, monkeypatch):
     """As Linux does where memory is short."""
     write_room_baseline("oracle", rooms_path, tmp_path / "oracle.h5")
-    monkeypatch.setattr(module, "_score_in_worker", kill)
+    killed = {"initializer": signal.raise_signal, "initargs": (signal.SIGKILL,)}
+    pool = ProcessPoolExecutor(2, get_context("spawn"), **killed)
+    monkeypatch.setattr(module, "worker_pool", lambda count: pool)
     monkeypatch.setattr(module, "CHUNK", 2)
     with (
         open_predictions(tmp_path / "oracle.h5") as file,

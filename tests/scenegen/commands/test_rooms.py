@@ -116,6 +116,18 @@ def test_options_reach_the_request(run, monkeypatch, option, setting):
     assert json.loads(asked[0].to_json())[setting[0]] == setting[1]
 
 
+@pytest.mark.parametrize(
+    ("line", "option"),
+    [
+        ("--n 0", "--n: "),
+        ("--n 1 --preset none", "--preset: "),
+        ("--n 1 --object-radius 5", "--object-radius: "),
+    ],
+)
+def test_errors_name_options(refuses, line, option):
+    refuses("render", *line.split(), words=(option,))
+
+
 def test_images_are_counted_by_views(run):
     result = run("render", "--n", 2, "--size", 16, "--views", "0,10,20")
     assert result.stdout.startswith("rooms.h5: 6 images, ")
@@ -248,7 +260,7 @@ def test_an_export_never_replaces_what_it_exports(run, refuses, rooms_path, tmp_
     made = run("render", "--n", 1, *TINY, "--objects", 1, *meshes, "--out", "x.h5")
     assert made.exit_code == 0, made.output
     how = ("--items", 0, "--format", "obj", "--out", "meshes/mug", "--overwrite")
-    refuses("export", "x.h5", *how, *meshes, words=("x-000000.obj", "another file"))
+    refuses("export", "x.h5", *how, *meshes, words=("x-000000.obj", "not an input"))
 
 
 def test_a_picture_is_replaced_only_when_told(run, refuses, rooms_path, tmp_path):

@@ -1,5 +1,6 @@
 """Folders that replace older ones: at every moment all files are of one run, or none is there."""
 
+import errno
 import os
 import subprocess
 import sys
@@ -7,14 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from scenegen.common import new_folder as module
 from scenegen.common.new_folder import folder_written_beside
 
 NAMES = ("a", "b", "c")
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="uses Linux system calls")
 # Writes a folder, and is killed as it is about to change the number-th name, or not at all.
 KILLED = """
-import os, signal, sys
+import ctypes, errno, os, signal, sys
 from pathlib import Path
 from scenegen.common import new_folder
 path, number, exchanges, moves = sys.argv[1], *map(int, sys.argv[2:])
@@ -27,9 +27,11 @@ def counted(name):
         return real[name](*arguments, **named)
     return call
 if not exchanges:
-    new_folder._exchanged = lambda one, other: False
+    ctypes.CDLL = lambda name: None
+def busy(*names):
+    raise OSError(errno.EBUSY, "busy")
 if not moves:
-    new_folder._can_be_renamed = lambda folder: False
+    os.rename = busy
 with new_folder.folder_written_beside(path, "abc", overwrite=True) as made:
     for name in "abc":
         (made / name).write_text("new")
@@ -118,9 +120,14 @@ def test_a_folder_keeps_its_permissions(tmp_path):
 
 @pytest.mark.parametrize("renames", [True, False])
 def test_what_others_put_there_meanwhile_is_not_lost(tmp_path, monkeypatch, renames):
-    monkeypatch.setattr(module, "_can_be_renamed", lambda path: renames)
     folder = tmp_path / "split"
     write(folder, "old")
+
+    def busy(*_: object) -> None:
+        raise OSError(errno.EBUSY, "busy")
+
+    if not renames:
+        monkeypatch.setattr(os, "rename", busy)
 
     def write_and_be_disturbed() -> None:
         with folder_written_beside(folder, NAMES, overwrite=True) as made:

@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from scenegen.common.command_line import MESH_FILES, PackageCommands
-from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_told_inputs
+from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
 from scenegen.objects.meshes.listing import SUFFIXES
 
 
@@ -19,7 +19,7 @@ from scenegen.objects.meshes.listing import SUFFIXES
 @click.option("--folder", type=OutputFolder())
 @click.option("--derived")
 def command(read, weights, out, json, folder, derived):
-    refuse_told_inputs([derived] if derived else [])
+    refuse_command_inputs([derived] if derived else [])
 
 
 @pytest.fixture
@@ -36,18 +36,18 @@ def files(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("a.h5 --out a.h5", ("a.h5", "another file")),
-        ("--out a.h5 b.h5 a.h5", ("a.h5", "another file")),
-        ("a.h5 --out ./meshes/../a.h5", ("another file",)),
-        ("a.h5 --out hard.h5", ("hard.h5", "by way of a.h5")),
-        ("soft.h5 --json a.h5", ("a.h5", "by way of soft.h5")),
+        ("a.h5 --out a.h5", ("a.h5", "not an input")),
+        ("--out a.h5 b.h5 a.h5", ("a.h5", "not an input")),
+        ("a.h5 --out ./meshes/../a.h5", ("not an input",)),
+        ("a.h5 --out hard.h5", ("hard.h5", "the input a.h5")),
+        ("soft.h5 --json a.h5", ("a.h5", "the input soft.h5")),
         ("gone.h5 --out ./gone.h5", ("gone.h5",)),
         ("--out new --json ./new", ("outputs", "different paths")),
         ("--out b.h5 --json b.h5", ("outputs", "different paths")),
         ("--json new --folder ./new", ("outputs", "different paths")),
         ("--weights w.safetensors --out w.json", ("w.json",)),
-        ("meshes --out meshes/mug/1.obj", ("1.obj", "by way of meshes")),
-        ("other --out meshes/mug/1.obj", ("1.obj", "by way of other")),
+        ("meshes --out meshes/mug/1.obj", ("1.obj", "the input meshes")),
+        ("other --out meshes/mug/1.obj", ("1.obj", "the input other")),
         ("a.h5 --derived a.h5", ("a.h5",)),
         ("a.h5 --out ''", ("--out", "empty path")),
         ("''", ("READ", "empty path")),

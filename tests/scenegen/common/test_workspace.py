@@ -137,14 +137,14 @@ def test_two_runs_that_draw_the_same_names_at_once(tmp_path):
 
 
 @LINUX
-def test_runs_and_their_cleaners_at_once(tmp_path, monkeypatch):
+def test_runs_and_their_cleaners_at_once(tmp_path):
     """Whenever a cleaner looks, it takes nothing from a run that lives."""
-    monkeypatch.setattr(module, "_first_look", remove_leftovers)
     failed: list[BaseException] = []
 
     def write(name: str) -> None:
         try:
             for i in range(150):
+                remove_leftovers(tmp_path)
                 write_text(tmp_path / f"{name}-{i}", name)
         except BaseException as error:
             failed.append(error)

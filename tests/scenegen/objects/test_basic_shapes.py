@@ -14,7 +14,7 @@ from scenegen.common.errors import SpecError
 from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scenes import SHAPE_NAMES, PlacedObject, SceneSpec
 from scenegen.objects.basic_shapes import unit_shape
-from scenegen.objects.scene_mesh import room_mesh, scene_mesh, welded, world_from_object
+from scenegen.objects.scene_mesh import room_mesh, scene_parts, welded, world_from_object
 
 Array = NDArray[np.float64]
 CURVED = ("sphere", "cone", "torus", "cylinder", "capsule")
@@ -166,7 +166,7 @@ def test_the_room_is_three_unit_squares_facing_inwards() -> None:
     assert room.bounds.tolist() == [[0, 0, 0], [1, 1, 1]]
 
 
-def test_scene_mesh_is_the_room_and_every_object_in_its_place() -> None:
+def test_the_parts_of_a_scene_are_the_room_and_every_object_in_its_place() -> None:
     half = 0.5**0.5
     objects = (
         PlacedObject("box", (0.5, 0.25, 0.5), (half, 0.0, half, 0.0), 0.1, (1, 1, 1)),
@@ -174,7 +174,7 @@ def test_scene_mesh_is_the_room_and_every_object_in_its_place() -> None:
     )
     camera = Camera((1.0, 1.0, 1.0), (0.0, 0.0, 0.0), 30.0)
     scene = SceneSpec(0, (camera,), objects, (), (0, 0, 0), (1, 1), (1, 1, 1))
-    corners = scene_mesh(scene).triangles
+    corners = np.concatenate([part.mesh.triangles for part in scene_parts(scene)])
     assert len(corners) == 6 + 12 + len(unit_shape("cone").triangles)
     np.testing.assert_array_equal(corners[:6], room_mesh().triangles)
     side = 0.1 / 3**0.5

@@ -9,7 +9,7 @@ import trimesh
 from scenegen import open_rooms
 from scenegen.camera import pixel_directions, transform_vectors
 from scenegen.description.scenes import SHAPE_NAMES
-from scenegen.objects.scene_mesh import scene_mesh
+from scenegen.objects.scene_mesh import scene_parts
 from scenegen.rooms.export import PNG_DEPTH_UNIT, export_paths, export_room
 
 
@@ -201,7 +201,11 @@ def words(path, key):
 @pytest.mark.slow
 def test_meshes_of_100_rooms_give_the_depth(tmp_path, make_rooms):
     path = make_rooms(tmp_path / "x.h5", 100, height=64, width=64, seed=12)
-    assert check_depth_by_embree(path, lambda room: scene_mesh(room.scene)) == set(SHAPE_NAMES)
+
+    def mesh(room):
+        return trimesh.util.concatenate([part.mesh for part in scene_parts(room.scene)])
+
+    assert check_depth_by_embree(path, mesh) == set(SHAPE_NAMES)
 
 
 @pytest.mark.parametrize("form", ["exr", "png", "ply", "obj"])
