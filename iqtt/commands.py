@@ -19,6 +19,15 @@ KNOWN_SEED = (
     " `openssl rand -hex 32 > secret.txt` and pass --secret-seed secret.txt."
 )
 SHOWN = 8  # questions that `show` draws by default
+
+
+def _with_answers(path: Path) -> list[Path]:
+    """Return where the questions and the answers lie that belong to one file of either."""
+    questions = path.stem.removesuffix("-answers")
+    return [path.with_name(f"{stem}{path.suffix}") for stem in (questions, f"{questions}-answers")]
+
+
+QUESTIONS = InputPath(within=(".h5",), beside=_with_answers)
 option = partial(click.option, show_default=True)
 
 
@@ -144,7 +153,7 @@ def make_split(
 @click.command(
     epilog=f"{EXAMPLE}iqtt show iqtt-split/iqtt-val.h5 --items 0-3 --answers --out questions.png"
 )
-@click.argument("file", type=InputPath())
+@click.argument("file", type=QUESTIONS)
 @option(
     "--out",
     type=OutputPath(),
@@ -182,7 +191,7 @@ def show(
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt info iqtt-split/iqtt-val.h5")
-@click.argument("file", type=InputPath())
+@click.argument("file", type=QUESTIONS)
 def info(file: str) -> None:
     """Describe FILE: its questions, settings, versions, fingerprints and sizes."""
     from iqtt.files.info import describe
@@ -191,9 +200,7 @@ def info(file: str) -> None:
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt audit iqtt-split --json audit.json")
-@click.argument(
-    "splits", nargs=-1, required=True, metavar="SPLIT...", type=InputPath(within=(".h5",))
-)
+@click.argument("splits", nargs=-1, required=True, metavar="SPLIT...", type=QUESTIONS)
 @option("--json", "json_path", type=OutputPath(), help="Write all numbers to this JSON file.")
 @option("--markdown", is_flag=True, help="Print the tables as Markdown.")
 @option(

@@ -23,7 +23,7 @@ from scenegen.common.paths import InputPath, OutputFolder, OutputPath
 PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
 A_MODEL = "A .safetensors file with its .json beside it, or the name of bundled weights"
 
-WEIGHTS_PATH = InputPath(beside=".json")
+WEIGHTS_PATH = InputPath(beside=lambda path: [path.with_suffix(".json")])
 WEIGHTS = click.option(
     "--weights", type=WEIGHTS_PATH, help=f"{A_MODEL}  [those that suit the data]."
 )

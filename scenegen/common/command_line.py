@@ -109,6 +109,10 @@ def _one_line_errors() -> Iterator[None]:
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         raise UserError(f"{where}{error.strerror or error}") from error
+    except ImportError as error:
+        if "map segment" not in str(error) and "allocate memory" not in str(error):
+            raise
+        raise UserError(f"not enough memory: {error}") from error
     except MemoryError as error:
         raise UserError(": ".join(filter(None, ("not enough memory", str(error))))) from error
     except ValueError as error:

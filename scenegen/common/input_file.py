@@ -207,6 +207,9 @@ def _dataset_faults(name: str, dataset: Any) -> Iterator[Fault]:
         if not there:
             found = f"shape {shape}, but nothing was written"
         yield Fault(name, "written", found, "values in all of them")
+    elif not used and written != there * math.prod(chunks) * size:
+        found = f"{written} bytes in {there} chunks of {math.prod(chunks) * size}"
+        yield Fault(name, "written", found, "chunks of the size that their shape has")
 
 
 def stored_bytes(dataset: Any) -> int:

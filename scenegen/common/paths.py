@@ -1,7 +1,7 @@
 """Paths on the command line: none is empty, and no file that a command writes is one it reads."""
 
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -26,12 +26,16 @@ class InputPath(click.ParamType):  # type: ignore[type-arg]
 
     Args:
         within: endings of the files that are read in a folder, at any depth.
-        beside: ending of the file that is read beside this one, such as a card of weights.
+        beside: which other files are read with one, such as a card of weights.
     """
 
     name = "path"
 
-    def __init__(self, within: tuple[str, ...] = (), beside: str = "") -> None:
+    def __init__(
+        self,
+        within: tuple[str, ...] = (),
+        beside: Callable[[Path], Iterable[Path]] = lambda path: (),
+    ) -> None:
         self.within, self.beside = within, beside
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
@@ -40,7 +44,7 @@ class InputPath(click.ParamType):  # type: ignore[type-arg]
         What is HDF5 is tried in another process first.
         """
         paths = _command_paths(self, value, param, ctx)
-        read = [Path(value), *([Path(value).with_suffix(self.beside)] if self.beside else [])]
+        read = [Path(value), *self.beside(Path(value))]
         paths.inputs += [(path, self.within) for path in read]
         refuse_inputs(paths.outputs, read, self.within)
         from scenegen.common import trial
@@ -90,8 +94,7 @@ def refuse_inputs(
     written = [Path(output) for output in outputs]
     for path in map(Path, inputs):
         for output in written:
-            inside = output.suffix.lower() in within and _inside(output, path)
-            if inside or _same(output, path):
+            if _same(output, path) or _inside(output, path, within):
                 raise SpecError(
                     output, f"the same file as the input {path}", "an output that is not an input"
                 )
@@ -128,5 +131,12 @@ def _same(a: Path, b: Path) -> bool:
         return os.path.realpath(a) == os.path.realpath(b)
 
 
-def _inside(path: Path, folder: Path) -> bool:
-    return Path(os.path.realpath(folder)) in Path(os.path.realpath(path)).parents
+def _inside(output: Path, folder: Path, endings: tuple[str, ...]) -> bool:
+    """Return whether a file is one of those in a folder that end so, or a hard link to one."""
+    within = Path(os.path.realpath(folder)) in Path(os.path.realpath(output)).parents
+    if within and output.suffix.lower() in endings:
+        return True
+    if not (endings and output.is_file() and output.stat().st_nlink > 1):
+        return False
+    there = (path for path in folder.rglob("*") if path.suffix.lower() in endings)
+    return any(_same(output, path) for path in there)

@@ -69,6 +69,24 @@ def test_every_option_is_recorded(run, monkeypatch, tmp_path):
         assert np.unique(file["truth/labeled/light_count"][:]).max() <= 3
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        "audit x/iqtt-test.h5 --json x/iqtt-test-answers.h5 --overwrite",
+        "audit x/iqtt-test-answers.h5 --json x/iqtt-test.h5 --overwrite",
+        "audit x --json x/iqtt-test-answers.h5 --overwrite",
+        "show x/iqtt-test.h5 --answers --out x/iqtt-test-answers.h5 --overwrite",
+    ],
+)
+def test_files_that_are_read_beside_another_are_no_outputs(run, tmp_path, line, check_refusal):
+    (tmp_path / "x").mkdir()
+    for name in ("iqtt-test.h5", "iqtt-test-answers.h5"):
+        (tmp_path / "x" / name).write_text(name)
+    result = run(*line.split())
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("not an input",))
+    assert (tmp_path / "x/iqtt-test-answers.h5").read_text() == "iqtt-test-answers.h5"
+
+
 def test_a_secret_seed(run, tmp_path):
     """The same content gives the same questions, blanks aside; tools that read cope without a seed;
     only a split whose seed is known gets a note.

@@ -120,6 +120,46 @@ def test_what_is_refused_before_a_value_is_read(make, rule, path, monkeypatch):
         assert [fault.rule for fault in faults(file)] == ([rule] if rule else [])
 
 
+BOMB = zlib.compress(bytes(300_000_000))
+
+
+@pytest.mark.parametrize("rows", [1, 2000])
+@pytest.mark.parametrize(
+    "options", [{}, {"compression": "gzip", "shuffle": True}, {"compression": "lzf"}]
+)
+@pytest.mark.parametrize("mask", [0, 1, 2, 3])
+@pytest.mark.parametrize("payload", [BOMB, b"x", b"", b"\xff\xff\x00" * 70_000])
+def test_no_mask_of_filters_makes_room_for_other_bytes(path, rows, options, mask, payload):
+    """Neither more than the chunk has, nor fewer: for these HDF5 gives what its memory held."""
+    with h5py.File(path, "w") as file:
+        maximum = (None, 8, 8)
+        options = {**options, "chunks": (rows, 8, 8), "maxshape": maximum}
+        made = file.create_dataset("depth", (1, 8, 8), "f4", **options)
+        if payload:
+            made.id.write_direct_chunk((0, 0, 0), payload, mask)
+    with open_unchecked(path, "rooms file") as file:
+        if next(faults(file), None) is None:
+            tracemalloc.start()
+            with pytest.raises(FileFormatError), reading("depth"):
+                StoredArray(file["depth"])[0]
+            assert tracemalloc.get_traced_memory()[1] < 5e6
+            tracemalloc.stop()
+
+
+def test_chunks_that_cannot_be_compressed_and_texts_that_are(path):
+    """HDF5 may leave a filter out of a chunk, and says so in its mask."""
+    values = np.frombuffer(np.random.default_rng(0).bytes(2 * 64 * 4), "u4").reshape(2, 8, 8)
+    with h5py.File(path, "w") as file:
+        for name in ("gzip", "lzf"):
+            file.create_dataset(name, data=values, chunks=(1, 8, 8), compression=name)
+        texts = np.array(["long " * 50, "x"] * 8, object)
+        file.create_dataset("scene", data=texts, dtype=h5py.string_dtype(), compression="gzip")
+    with open_file(path, "file") as file:
+        for name in ("gzip", "lzf"):
+            assert np.array_equal(StoredArray(file[name])[1], values[1])
+        assert StoredArray(file["scene"])[0] == texts[0].encode()
+
+
 def test_some_chunks_that_were_never_written(path):
     with h5py.File(path, "w") as file:
         file.create_dataset("depth", (4, 9), "f4", chunks=(1, 9))[1] = 1.0

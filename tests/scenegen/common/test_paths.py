@@ -13,7 +13,7 @@ from scenegen.objects.meshes.listing import SUFFIXES
 
 @click.command()
 @click.argument("read", type=InputPath(within=MESH_FILES), nargs=-1)
-@click.option("--weights", type=InputPath(beside=".json"))
+@click.option("--weights", type=InputPath(beside=lambda path: [path.with_suffix(".json")]))
 @click.option("--out", type=OutputPath())
 @click.option("--json", type=OutputPath())
 @click.option("--folder", type=OutputFolder())
@@ -29,6 +29,8 @@ def files(tmp_path, monkeypatch):
     for name in ("a.h5", "b.h5", "w.safetensors", "w.json", "meshes/mug/1.obj", "meshes/x.json"):
         (tmp_path / name).touch()
     os.link("a.h5", "hard.h5")
+    os.link("meshes/mug/1.obj", "hard.obj")
+    os.link("meshes/mug/1.obj", "hard.json")
     os.symlink("a.h5", "soft.h5")
     os.symlink("meshes", "other")
 
@@ -47,6 +49,8 @@ def files(tmp_path, monkeypatch):
         ("--json new --folder ./new", ("outputs", "different paths")),
         ("--weights w.safetensors --out w.json", ("w.json",)),
         ("meshes --out meshes/mug/1.obj", ("1.obj", "the input meshes")),
+        ("meshes --out hard.obj", ("hard.obj", "meshes")),
+        ("--json hard.json meshes", ("hard.json", "meshes")),
         ("other --out meshes/mug/1.obj", ("1.obj", "the input other")),
         ("a.h5 --derived a.h5", ("a.h5",)),
         ("a.h5 --out ''", ("--out", "empty path")),
