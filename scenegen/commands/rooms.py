@@ -4,6 +4,8 @@ Each one parses its options, makes one library call, and prints. Heavy imports h
 """
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -265,16 +267,30 @@ def export(
                 raise SpecError(f"{file}: row {row}", found, "the files it was made from")
         paths = {row: export_paths(row, out, Path(file).stem, form) for row in rows}
         refuse_command_inputs(path for some in paths.values() for path in some)
-        if not Path(out).exists():
-            Path(out).mkdir()
-        for some in paths.values():
-            for path in some:
-                check_writable(path, overwrite)
-        for row, some in paths.items():
-            export_room(rooms[row], some, form, overwrite, objects)
+        with _folder_made(Path(out)):
+            for some in paths.values():
+                for path in some:
+                    check_writable(path, overwrite)
+            for row, some in paths.items():
+                export_room(rooms[row], some, form, overwrite, objects)
     for some in paths.values():
         for path in some:
             print_line(str(path))
+
+
+@contextmanager
+def _folder_made(folder: Path) -> Iterator[None]:
+    """Make a folder if it is not there; remove it if the block fails before it holds anything."""
+    new = not folder.exists()
+    if new:
+        folder.mkdir()
+    try:
+        yield
+    except BaseException:
+        if new:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
 
 
 COMMANDS = (render, presets, preview, info, verify, export)

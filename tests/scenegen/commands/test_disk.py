@@ -99,7 +99,7 @@ def test_an_export_to_a_full_disk_is_one_clear_line(small_disk, check_refusal, r
     disk = small_disk(4096)
     (disk / "full").write_bytes(bytes(4096))
     command = [sys.executable, "-c", "import cli; cli.scenegen()", "export", rooms_path]
-    command += ["--items", "0", "--format", form, "--out", "."]
+    command += ["--items", "0", "--format", form, "--out", "new"]
     done = subprocess.run(command, cwd=disk, capture_output=True, text=True, check=False)
     check_refusal(done.returncode, done.stdout, done.stderr, (form, "No space left"))
     assert [path.name for path in disk.iterdir()] == ["full"]
