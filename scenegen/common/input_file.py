@@ -39,7 +39,7 @@ FILTERS = {
     h5z.FILTER_FLETCHER32: ("fletcher32", 2),
 }
 CHECKSUM_BYTES = 4  # that fletcher32 adds to a chunk
-TEXT_BYTES = 16  # of a text of any length, in a chunk: its length and where it lies
+TEXT_BYTES = 16  # of a text of any length, where it is stored: its length and where it lies
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,8 @@ def _dataset_faults(name: str, dataset: Any) -> Iterator[Fault]:
 
 def stored_bytes(dataset: Any) -> int:
     """Return the bytes that an element of a low-level data set takes in a chunk."""
-    return TEXT_BYTES if dataset.dtype.kind == "O" else int(dataset.get_type().get_size())
+    of_any_length = h5py.check_vlen_dtype(dataset.dtype) is not None
+    return TEXT_BYTES if of_any_length else int(dataset.get_type().get_size())
 
 
 def slab_bytes(shape: tuple[int, ...], chunks: tuple[int, ...], itemsize: int) -> int:

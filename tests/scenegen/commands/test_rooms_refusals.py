@@ -32,7 +32,7 @@ RENDER_MISTAKES = [
     ("--classes MUG", "classes: found 'MUG'", "mug"),
     ("--shapes box --classes mug", "--shapes beside --classes", "one of them"),
     ("--shapes box --objects-root .", "--shapes beside", "folder of meshes", "one of them"),
-    ("--object-split train", "object split: found train", "'all' for shapes"),
+    ("--object-split train", "--object-split: found train", "'all' for shapes"),
     ("--shapenet-root . --objects-root .", "--shapenet-root and --objects-root", "one of them"),
     ("--shapenet-root . --up z", "up: found 'z'", "expected 'y' with --shapenet-root"),
     ("--up z", "without a folder of meshes"),
