@@ -52,7 +52,7 @@ def run(arguments: list[str], folder: Path, limit: float, stdout: str = "file") 
 
     def command() -> Any:
         import cli
-        from scenegen.common import trial
+        from scenegen.common.hdf5 import trial
 
         trial.SECONDS = TRIAL
         program = arguments[0]

@@ -19,7 +19,7 @@ from iqtt.audit.proofs import Proof
 from iqtt.audit.shape_proofs import Shapes
 from iqtt.audit.statistics import SHAPE_STATISTICS, shape_statistics
 from iqtt.audit.table import AuditTable, find_tables, read_table
-from scenegen.common.row_file import writer_name
+from scenegen.common.hdf5.row_file import writer_name
 
 Array = NDArray[Any]
 FORMAT = {"format": "pix2shape-bench/iqtt-audit", "format_version": "1.0"}

@@ -13,11 +13,11 @@ from iqtt.audit.statistics import measure, silhouettes
 from iqtt.files.layout import NO_CUBE, SCORED
 from iqtt.files.reader import QuestionsFile, answers_beside, parts
 from iqtt.questions.specs import SplitSpec
-from scenegen.common import trial
-from scenegen.common.content import ColumnDigest, dataset_digest, joint_digest
-from scenegen.common.input_file import open_file
+from scenegen.common.hdf5 import trial
+from scenegen.common.hdf5.content import ColumnDigest, dataset_digest, joint_digest
+from scenegen.common.hdf5.input_file import open_file
+from scenegen.common.hdf5.row_file import digest_problems
 from scenegen.common.records import check
-from scenegen.common.row_file import digest_problems
 
 Array = NDArray[Any]
 CHUNK_PIXELS = 2**20  # pixels of questions in memory at once

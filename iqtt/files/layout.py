@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec
 from iqtt.shapes.polycube import MAX_CUBES
-from scenegen.common.content import CONTENT_DIGEST
-from scenegen.common.row_file import Column, writer_name
+from scenegen.common.hdf5.content import CONTENT_DIGEST
+from scenegen.common.hdf5.row_file import Column, writer_name
 from scenegen.rendering.backend import VERSION_ATTRIBUTES
 
 Array = NDArray[Any]

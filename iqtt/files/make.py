@@ -14,10 +14,10 @@ from iqtt.questions.distractors import make_pools
 from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import DEFAULT_BATCH, Rendered, groups, render_questions
-from scenegen.common.content import seal
+from scenegen.common.hdf5.content import seal
+from scenegen.common.hdf5.row_file import new_file
 from scenegen.common.new_folder import folder_written_beside
 from scenegen.common.records import check
-from scenegen.common.row_file import new_file
 from scenegen.rendering.backend import select_variant, versions
 
 FILES = ("iqtt-train.h5", "iqtt-val.h5", "iqtt-test.h5", "iqtt-test-answers.h5")

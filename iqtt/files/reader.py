@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from iqtt.files.attributes import read_root
 from iqtt.files.layout import question_columns
 from iqtt.files.tables import QuestionTruth, TableFile, table_parts
-from scenegen.common import trial
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.input_file import checking, open_file
-from scenegen.common.row_file import RowDataset
+from scenegen.common.hdf5 import trial
+from scenegen.common.hdf5.input_file import checking, open_file
+from scenegen.common.hdf5.row_file import RowDataset
 from scenegen.description.specs import IMAGE_DTYPES
 from scenegen.rendering.ground_truth import decode_image
 

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from iqtt.files.attributes import has_digests, read_root
 from iqtt.files.layout import SCORED, named, truth_columns
-from scenegen.common import content
-from scenegen.common.attributes import read_digest, read_names, read_text
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.input_file import StoredArray, checking, open_file, reading
+from scenegen.common.hdf5 import content
+from scenegen.common.hdf5.attributes import read_digest, read_names, read_text
+from scenegen.common.hdf5.input_file import StoredArray, checking, open_file, reading
+from scenegen.common.hdf5.row_file import and_more, column_problems
 from scenegen.common.records import check
-from scenegen.common.row_file import and_more, column_problems
 from scenegen.layout import TRUTH_DIGEST
 
 Array = NDArray[Any]

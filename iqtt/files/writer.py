@@ -20,8 +20,8 @@ from iqtt.files.layout import (
 from iqtt.questions.specs import SplitSpec
 from iqtt.render import Rendered
 from iqtt.shapes.polycube import canonical, canonical_class, set_ids
-from scenegen.common.content import SHA256, joint_digest
-from scenegen.common.row_file import Table
+from scenegen.common.hdf5.content import SHA256, joint_digest
+from scenegen.common.hdf5.row_file import Table
 from scenegen.layout import TRUTH_DIGEST
 
 FINGERPRINTED = ("cubes", "world_from_shape", "light_position", "light_color")

@@ -19,7 +19,7 @@ from metrics.submissions.problems import Problem, first_error
 from metrics.submissions.reader import Predictions
 from metrics.submissions.truths import FoundTruth
 from scenegen.common.errors import SceneGenError
-from scenegen.common.row_file import writer_name
+from scenegen.common.hdf5.row_file import writer_name
 
 Array = NDArray[Any]
 Progress = Callable[[int], Any]

@@ -17,7 +17,7 @@ from metrics.measures.answers import answers_from_scores
 from metrics.submissions import layout, rules
 from metrics.submissions.problems import Problem
 from scenegen.common.errors import FileFormatError
-from scenegen.common.input_file import Fault, StoredArray, faults, reading, slab_bytes
+from scenegen.common.hdf5.input_file import Fault, StoredArray, faults, reading, slab_bytes
 from scenegen.description.specs import MAX_PIXELS
 
 CHUNK_SLOTS = 10_007

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, get_args
 
 from metrics.measures.depth import Alignment
-from scenegen.common.row_file import Column
+from scenegen.common.hdf5.row_file import Column
 
 FORMAT_NAME = "pix2shape-bench/predictions"
 FORMAT_VERSION = "1.0"

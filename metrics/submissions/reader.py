@@ -18,9 +18,9 @@ from metrics.measures.depth import Alignment
 from metrics.submissions.inspection import Inspection, inspect
 from metrics.submissions.problems import Problem, first_error
 from metrics.submissions.rules import Ids, as_doubles
-from scenegen.common import trial
 from scenegen.common.errors import FileFormatError
-from scenegen.common.input_file import StoredArray, checking, open_unchecked, reading
+from scenegen.common.hdf5 import trial
+from scenegen.common.hdf5.input_file import StoredArray, checking, open_unchecked, reading
 
 Array = NDArray[np.float64]
 BLOCK_BYTES = 1 << 20

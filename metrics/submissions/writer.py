@@ -18,7 +18,7 @@ from metrics.measures.answers import ABSTAINED, CANDIDATES, answers_from_scores
 from metrics.measures.depth import Alignment
 from metrics.submissions import layout, rules
 from metrics.submissions.problems import PredictionError, first_error, first_ids
-from scenegen.common.row_file import Table, new_file, writer_name
+from scenegen.common.hdf5.row_file import Table, new_file, writer_name
 from scenegen.rooms.reader import RoomsFile
 
 

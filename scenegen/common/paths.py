@@ -47,7 +47,7 @@ class InputPath(click.ParamType):  # type: ignore[type-arg]
         read = [Path(value), *self.beside(Path(value))]
         paths.inputs += [(path, self.within) for path in read]
         refuse_inputs(paths.outputs, read, self.within)
-        from scenegen.common import trial
+        from scenegen.common.hdf5 import trial
 
         trial.try_file(value)
         return value

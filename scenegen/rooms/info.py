@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.content import CONTENT_DIGEST
+from scenegen.common.hdf5.content import CONTENT_DIGEST
 from scenegen.common.records import changed_settings
 from scenegen.common.text_table import printable
 from scenegen.layout import FIELDS, TRUTH_DIGEST

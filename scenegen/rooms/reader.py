@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import back_project, transform_points
-from scenegen.common import input_file, row_file
-from scenegen.common.attributes import check_attribute, read_digest, read_text, read_texts
-from scenegen.common.content import SHA256, joint_digest
 from scenegen.common.errors import FileFormatError
-from scenegen.common.input_file import StoredArray
+from scenegen.common.hdf5 import input_file, row_file
+from scenegen.common.hdf5.attributes import check_attribute, read_digest, read_text, read_texts
+from scenegen.common.hdf5.content import SHA256, joint_digest
+from scenegen.common.hdf5.input_file import StoredArray
 from scenegen.common.records import check
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.content import ColumnDigest
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.hdf5.content import ColumnDigest
 from scenegen.description.specs import DatasetSpec, Fingerprint
 from scenegen.layout import FIELDS, has_digests
 from scenegen.objects.catalogue import Objects, objects_of

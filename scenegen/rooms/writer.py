@@ -9,9 +9,9 @@ from typing import Any
 import h5py
 from numpy.typing import NDArray
 
-from scenegen.common.content import seal
+from scenegen.common.hdf5.content import seal
+from scenegen.common.hdf5.row_file import Table, new_file, writer_name
 from scenegen.common.records import check
-from scenegen.common.row_file import Table, new_file, writer_name
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec, Fingerprint
 from scenegen.layout import (

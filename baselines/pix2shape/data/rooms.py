@@ -20,7 +20,7 @@ from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Views, mapped
 from baselines.pix2shape.network.surfels import Scene
 from scenegen.common.errors import SpecError
-from scenegen.common.input_file import open_file
+from scenegen.common.hdf5.input_file import open_file
 from scenegen.common.seeding import Purpose, item_rng
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsDataset, RoomsFile

@@ -21,7 +21,7 @@ from iqtt.files.reader import (
 )
 from iqtt.shapes.polycube import canonical, set_ids
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.input_file import open_file
+from scenegen.common.hdf5.input_file import open_file
 
 TABLES = [  # of the tiny split: file, part, answers told, truth told
     ("iqtt-train.h5", "labeled", True, True),

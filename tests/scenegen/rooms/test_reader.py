@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from scenegen import RoomsDataset, open_rooms
-from scenegen.common.content import datasets
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.hdf5.content import datasets
 from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.layout import FIELDS

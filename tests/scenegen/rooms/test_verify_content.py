@@ -10,8 +10,8 @@ from h5_edits import attribute, edit_scene, gone, put, swap_rows, values
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from scenegen.common.content import CONTENT_DIGEST, SHA256, content_digest, datasets, seal
 from scenegen.common.errors import FileFormatError
+from scenegen.common.hdf5.content import CONTENT_DIGEST, SHA256, content_digest, datasets, seal
 from scenegen.rooms.verify import verify_file
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import h5py
 import numpy as np
 
-from scenegen.common.content import SHA256, dataset_digest
+from scenegen.common.hdf5.content import SHA256, dataset_digest
 
 
 def name_axes(group: h5py.Group, dataset: h5py.Dataset, axes: Sequence[str]) -> None:

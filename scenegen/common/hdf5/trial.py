@@ -83,7 +83,7 @@ def _read_structure(path: str, memory: int) -> None:
     """
     import h5py
 
-    from scenegen.common.input_file import HDF5_ERRORS, faults
+    from scenegen.common.hdf5.input_file import HDF5_ERRORS, faults
 
     def look(_name: str, item: h5py.Group | h5py.Dataset) -> None:
         dict(item.attrs)

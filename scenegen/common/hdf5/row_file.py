@@ -18,8 +18,9 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
-from scenegen.common.axes import name_axes
-from scenegen.common.content import (
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.hdf5.axes import name_axes
+from scenegen.common.hdf5.content import (
     CONTENT_DIGEST,
     SHA256,
     ColumnDigest,
@@ -27,8 +28,7 @@ from scenegen.common.content import (
     dataset_digest,
     datasets,
 )
-from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.input_file import StoredArray, reading
+from scenegen.common.hdf5.input_file import StoredArray, reading
 from scenegen.common.new_file import written_beside
 
 Array = NDArray[Any]

@@ -10,11 +10,11 @@ import pytest
 from click.testing import CliRunner
 
 import cli
-from scenegen.common import trial
 from scenegen.common.errors import FileFormatError
-from scenegen.common.trial import try_file
+from scenegen.common.hdf5 import trial
+from scenegen.common.hdf5.trial import try_file
 
-HOSTILE = Path(__file__).parents[2] / "support" / "hostile"
+HOSTILE = Path(__file__).parents[3] / "support" / "hostile"
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenegen.common import input_file
 from scenegen.common.errors import FileFormatError
-from scenegen.common.input_file import StoredArray, faults, open_file, open_unchecked, reading
+from scenegen.common.hdf5 import input_file
+from scenegen.common.hdf5.input_file import StoredArray, faults, open_file, open_unchecked, reading
 
 VALUES = np.random.default_rng(0).random((6, 5, 4)).astype("f4")
 
