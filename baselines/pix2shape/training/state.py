@@ -12,6 +12,7 @@ from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.weights import storage
 from baselines.pix2shape.weights.storage import Card
+from baselines.tensor_files import load_tensors, save_tensors
 from scenegen.common.errors import FileFormatError
 from scenegen.common.seeding import Purpose, item_seed
 
@@ -58,7 +59,7 @@ def save_state(folder: Path, state: State, card: Card) -> None:
         for index, values in moments.items():
             tensors |= {f"{kind}.{index}.{name}": value for name, value in values.items()}
     storage.save_card(folder / CHECKPOINT, card)
-    storage.save_tensors(folder / CHECKPOINT, tensors, notes)
+    save_tensors(folder / CHECKPOINT, tensors, notes)
 
 
 def load_state(folder: Path) -> tuple[State, Card]:
@@ -67,7 +68,7 @@ def load_state(folder: Path) -> tuple[State, Card]:
     if not path.is_file():
         raise FileNotFoundError(errno.ENOENT, "holds no checkpoint to resume", str(folder))
     card = storage.load_card(path)
-    tensors, notes = storage.load_tensors(path)
+    tensors, notes = load_tensors(path)
     own = {k.removeprefix("model."): v for k, v in tensors.items() if k.startswith("model.")}
     state = _with_optimisers(storage.load_into(card, own, path))
     try:

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
 from torch import Tensor
 
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
+from baselines.tensor_files import check_tensors, load_tensors, save_tensors, shortened
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.new_file import write_text, written_beside
+from scenegen.common.new_file import write_text
 from scenegen.common.records import check, from_json, normalise
 
 FORMAT_VERSION = 1
@@ -66,20 +65,9 @@ def save_weights(
         path: ends in .safetensors; the card gets the same name with .json.
         dtype: type of the stored numbers; tensors beyond its range keep their own.
     """
-    tensors: dict[str, Tensor] = {}
-    for name, value in model.state_dict().items():
-        if name.split(".")[0] in KEPT:
-            short = value.to(dtype) if value.is_floating_point() else value
-            tensors[name] = short if torch.isfinite(short).all() else value
-    save_tensors(path, tensors, {})
+    kept = {k: v for k, v in model.state_dict().items() if k.split(".")[0] in KEPT}
+    save_tensors(path, shortened(kept, dtype), {})
     save_card(path, card)
-
-
-def save_tensors(path: str | Path, tensors: Mapping[str, Tensor], notes: dict[str, str]) -> None:
-    """Write tensors and notes; the file appears, or is replaced, when it is complete."""
-    kept = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
-    with written_beside(path, overwrite=True) as temporary:
-        temporary.write_bytes(save(kept, metadata=notes or None))
 
 
 def save_card(path: str | Path, card: Card) -> None:
@@ -112,18 +100,6 @@ def _check_version(path: Path, text: bytes) -> None:
         raise FileFormatError(path, f"format version {version!r:.20}", str(FORMAT_VERSION))
 
 
-def load_tensors(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
-    """Read tensors and notes. Raises OSError, FileFormatError."""
-    path = Path(path)
-    with path.open("rb"):  # raises Python's own errors for a missing file or a folder
-        pass
-    try:
-        with safe_open(path, "pt") as file:
-            return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118
-    except SafetensorError as error:
-        raise FileFormatError(path, f"no safetensors file, or a damaged one ({error})") from error
-
-
 def load_model(path: str | Path) -> tuple[Pix2Shape, Card]:
     """Read weights and their card; the model is in evaluation mode.
 
@@ -149,23 +125,7 @@ def load_into(
     with torch.device("meta"):
         own: dict[str, Any] = Pix2Shape(card.config).state_dict()
     wanted = {name: value for name, value in own.items() if name.split(".")[0] in parts}
-    missing, unknown = sorted(wanted.keys() - tensors), sorted(tensors.keys() - own)
-    other = "these are weights of another configuration than the card's"
-    if missing:
-        raise FileFormatError(f"{path}: {missing[0]}", "nothing", "a tensor", other)
-    if unknown:
-        raise FileFormatError(f"{path}: {unknown[0]}", "a tensor", "nothing", other)
-    for name, value in wanted.items():
-        found = tensors[name]
-        if found.shape != value.shape:
-            shape, expected = (f"shape {tuple(one.shape)}" for one in (found, value))
-            raise FileFormatError(f"{path}: {name}", shape, expected, other)
-        kinds = [(v.is_floating_point(), v.is_complex()) for v in (found, value)]
-        if kinds[0] != kinds[1] or (found.element_size() == 1 and value.element_size() > 1):
-            raise FileFormatError(f"{path}: {name}", found.dtype, value.dtype)
-        cast = found.to(value.dtype)
-        if not torch.isfinite(cast).all() or (name.endswith("running_var") and (cast < 0).any()):
-            raise FileFormatError(f"{path}: {name}", "NaN, infinity or a variance below 0")
+    check_tensors(path, tensors, wanted, own.keys())
     model = Pix2Shape(card.config)
     for name, value in model.state_dict().items():
         if name in wanted:

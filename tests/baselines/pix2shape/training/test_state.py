@@ -18,7 +18,8 @@ from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
 from baselines.pix2shape.training import loop as training  # noqa: E402
 from baselines.pix2shape.training.loop import train  # noqa: E402
 from baselines.pix2shape.training.state import CHECKPOINT, load_state, new_state, save_state  # noqa: E402
-from baselines.pix2shape.weights.storage import Card, load_tensors, save_tensors  # noqa: E402
+from baselines.pix2shape.weights.storage import Card  # noqa: E402
+from baselines.tensor_files import load_tensors, save_tensors  # noqa: E402
 
 TINY = tiny(iterations=3)
 TWO = """
