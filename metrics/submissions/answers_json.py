@@ -23,7 +23,7 @@ from metrics.submissions.strict_json import (
 )
 
 MOST_BYTES = 32 * 2**20
-_EXPECTED = "0, 1, 2 or -1 for each question"
+_EXPECTED = "a whole number for each question: the answer from 0, or -1"
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ def test_what_plain_h5py_sees(writer, truths, tmp_path):
         root = dict(file.attrs)
         assert root.pop("writer").startswith("pix2shape-bench ")
         assert root == {
-            "format": "pix2shape-bench/predictions", "format_version": "1.0", "task": "rooms",
+            "format": "pix2shape-bench/predictions", "format_version": "1.1", "task": "rooms",
             "method": "mine", "run": "", "notes": "", "alignment": "none",
             "truth_path": str(truths.rooms), "truth_fingerprint": rooms.fingerprint,
         }  # fmt: skip
