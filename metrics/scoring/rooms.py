@@ -101,7 +101,7 @@ def score_rooms(
         "runs": len(files),
         "rows_penalised": len(bad),
     }
-    floor = float(np.mean(floors)) if len(floors) else None
+    noise_floors = {"chamfer": float(np.mean(floors))} if len(floors) else {}
     return ScoreFile(
         task="rooms",
         method=files[0].method,
@@ -110,7 +110,7 @@ def score_rooms(
         metrics=_estimates(scores, scene, settings),
         by_view_angle=by_angle,
         items=items,
-        meta=meta_of(files, found, fingerprint, digest, settings, counts, warnings, floor),
+        meta=meta_of(files, found, fingerprint, digest, settings, counts, warnings, noise_floors),
     )
 
 

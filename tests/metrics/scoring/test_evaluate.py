@@ -52,7 +52,7 @@ def test_the_truth_is_perfect(folder):
         best = 1.0 if metric(name).higher_is_better else 0.0
         assert value.value == pytest.approx(best, abs=1e-10), name
     assert {"normal_mean_degrees", "derived_normal_mean_degrees"} <= set(found.metrics)
-    assert 0 < found.meta.chamfer_floor < 0.1
+    assert 0 < found.meta.noise_floors["chamfer"] < 0.1
 
 
 def test_points_are_those_of_scipy_and_means_those_of_numpy(folder):

@@ -1,0 +1,3 @@
+"""Scores of the objects alone."""
+
+LEAST_PIXELS = 16
