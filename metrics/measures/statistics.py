@@ -73,6 +73,8 @@ def design_effect(values: ArrayLike, clusters: ArrayLike) -> float:
     """
     table, sums, sizes = _cluster_sums(values, clusters)
     count, number = len(table), len(sizes)
+    if number == count:
+        return 1.0
     if number == 1:
         return float(count)
     independent = float(np.square(table - table.mean()).sum()) / (count - 1) / count

@@ -33,7 +33,7 @@ TupleOf = Annotated[tuple[Value, ...], FailFast()]
 ByKey = Annotated[Mapping[Key, Value], FailFast()]
 # Columns of `ScoreFile.items` that identify each entry; no two entries share the first one.
 ID_COLUMNS = {"rooms": ("row", "scene_index", "view_index"), "iqtt": ("question",)}
-OPTIONAL_COLUMNS = {"rooms": ("view_angle_degrees",), "iqtt": ()}
+OPTIONAL_COLUMNS = {"rooms": ("view_angle_degrees",), "iqtt": ("shape",)}
 # Columns of `ScoreFile.objects`, beside its scores: whole numbers, and a text.
 OBJECT_COLUMNS = ("row", "object", "pixels")
 SHAPE_COLUMN = "shape"
@@ -159,7 +159,8 @@ class ScoreFile:
         alignment: what the method says it cannot know; "none" for questions.
         metrics: by name, see `metric_names`.
         items: columns of equal length with an entry for each image or question: the integers of
-            `ID_COLUMNS`, maybe those of `OPTIONAL_COLUMNS` (-1 where not known), and float64 by
+            `ID_COLUMNS`, maybe those of `OPTIONAL_COLUMNS` (-1 where not known; `shape` numbers the
+            shapes of references, by which intervals are clustered), and float64 by
             name of the metric, means over the runs; NaN where a row has no such score.
         skills: by name of the score, for some of `metrics`.
         objects: rooms only: columns of equal length with an entry for each object that is scored
