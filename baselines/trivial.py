@@ -65,10 +65,10 @@ def write_room_baseline(
 
 
 def write_chance(data: str | Path, out: str | Path, seed: int = 0, overwrite: bool = False) -> None:
-    """Write random answers to the questions of a file; each of the three is equally likely."""
+    """Write random answers to the questions of a file; each answer is equally likely."""
     with open_questions(data) as questions:
-        count = len(questions)
-    answers = item_rng(seed, 0, Purpose.ANSWERS).integers(3, size=count)
+        count, offered = len(questions), questions.answers
+    answers = item_rng(seed, 0, Purpose.ANSWERS).integers(offered, size=count)
     write_answers(out, data, method="chance", answer=answers, overwrite=overwrite)
 
 

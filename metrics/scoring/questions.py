@@ -35,7 +35,7 @@ from metrics.scoring.runs import (
 from metrics.scoring.truth_digests import answers_digest
 from metrics.submissions.missing_rows import candidate_problems
 from metrics.submissions.reader import QuestionPredictions
-from metrics.submissions.truths import FoundTruth, candidates_of
+from metrics.submissions.truths import FoundTruth
 from scenegen.common.errors import FileFormatError
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def score_questions(
     with AnswersFile(found.path) as truth:
         names = ("answers", *(LABELS if truth.has_truth else ()))
         columns = {name: np.asarray(truth.read(name, slice(None))) for name in names}
-        fingerprint, candidates = truth.fingerprint, candidates_of(truth)
+        fingerprint, candidates = truth.fingerprint, truth.answers
         if truth.has_truth:
             _check_kinds(truth, columns["distractor_kind"], columns["answers"])
         digest = answers_digest(truth, columns)

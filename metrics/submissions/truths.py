@@ -6,7 +6,7 @@ What is wrong with a truth is an error: left alone, it would change which pixels
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,6 @@ from metrics.submissions.rules import as_doubles
 from scenegen.common.errors import FileFormatError
 from scenegen.common.hdf5 import trial
 from scenegen.rooms.reader import RoomsFile
-
-if TYPE_CHECKING:
-    from iqtt.files.tables import TableFile
 
 Array = NDArray[Any]
 UNIT_TOLERANCE = 1e-3  # by which the squared length of a normal may differ from 1
@@ -84,11 +81,6 @@ def find_truth(predictions: Predictions, given: str | Path | None = None) -> Fou
     raise FileFormatError(
         f"{predictions.path}: truth", f"no file at {looked}", "the file that is predicted", advice
     )
-
-
-def candidates_of(questions: "TableFile") -> int:
-    """Return how many answers each question of a file offers; three in the released files."""
-    return getattr(questions.spec, "answers", 3)
 
 
 def read_true_view(truth: RoomsFile, row: int) -> TrueView:

@@ -22,7 +22,7 @@ from metrics.submissions.reader import (
     inspect_predictions,
 )
 from metrics.submissions.rules import EXPECTED, FOUND, Array, depth_faults, normal_faults
-from metrics.submissions.truths import FoundTruth, candidates_of, find_truth, read_true_view
+from metrics.submissions.truths import FoundTruth, find_truth, read_true_view
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.rooms.reader import RoomsFile
 
@@ -150,7 +150,7 @@ def _against_questions(predictions: QuestionPredictions, truth_path: Path) -> li
         problems = match_problems(predictions, truth_path, truth.fingerprint, len(truth))
         if any(problem.rule == "match" for problem in problems):
             return problems
-        wrong = candidate_problems(predictions, candidates_of(truth))
+        wrong = candidate_problems(predictions, truth.answers)
         problems += wrong
         if wrong or not truth.has_answers:
             return problems

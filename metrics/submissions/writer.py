@@ -18,7 +18,6 @@ from metrics.measures.answers import ABSTAINED, answers_from_scores
 from metrics.measures.depth import Alignment
 from metrics.submissions import layout, rules
 from metrics.submissions.problems import PredictionError, first_error, first_ids
-from metrics.submissions.truths import candidates_of
 from scenegen.common.hdf5.row_file import Table, new_file, writer_name
 from scenegen.rooms.reader import RoomsFile
 
@@ -223,10 +222,10 @@ def _questions(path: str | Path) -> tuple[int, int, str]:
 
     try:
         with QuestionsFile(path) as questions:
-            return len(questions), candidates_of(questions), questions.fingerprint or ""
+            return len(questions), questions.answers, questions.fingerprint or ""
     except NoImagesError:
         with AnswersFile(path) as answers:
-            return len(answers), candidates_of(answers), answers.fingerprint or ""
+            return len(answers), answers.answers, answers.fingerprint or ""
 
 
 def _check_elsewhere(path: str | Path, truth: str | Path) -> None:

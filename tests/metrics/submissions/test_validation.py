@@ -13,7 +13,7 @@ from iqtt.files.reader import AnswersFile
 from metrics.submissions.layout import ATTRIBUTES, DATASETS
 from metrics.submissions.missing_rows import candidate_problems, match_problems, size_problems
 from metrics.submissions.reader import open_predictions
-from metrics.submissions.truths import candidates_of, find_truth
+from metrics.submissions.truths import find_truth
 from metrics.submissions.validation import validate
 from scenegen.common.errors import SceneGenError
 from scenegen.rooms.reader import RoomsFile
@@ -82,7 +82,7 @@ def problems_with_truth(predictions, truth_path):
     if predictions.task == "iqtt":
         with AnswersFile(truth_path) as truth:
             found = match_problems(predictions, truth_path, truth.fingerprint, len(truth))
-            return found + candidate_problems(predictions, candidates_of(truth))
+            return found + candidate_problems(predictions, truth.answers)
     with RoomsFile(truth_path) as truth:
         found = size_problems(predictions, truth)
         return found + match_problems(predictions, truth_path, truth.fingerprint, len(truth))
