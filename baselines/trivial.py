@@ -46,7 +46,9 @@ def write_room_baseline(
     if name not in ROOM_BASELINES:
         raise SpecError("baseline", repr(name), f"one of {', '.join(ROOM_BASELINES)}")
     if learns and train is None:
-        raise SpecError("train", "none", f"a training file, whose means {name} predicts")
+        expected = f"rooms to learn from, as {name} predicts their mean depth"
+        hint = "such as those of: scenegen render --n 1000 --seed 1 --out train.h5"
+        raise SpecError("train", "none", expected, hint)
     if not learns and train is not None:
         raise SpecError("train", train, "none", f"{name} learns nothing")
     with RoomsFile(data) as rooms:

@@ -1,11 +1,15 @@
 """Floors beside scores: the empty room, noise, chance, and probes that know nothing of 3D."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+
+import numpy as np
 
 from metrics.leaderboard.table import Cell, Row, Table
+from metrics.measures.statistics import cluster_means
 from metrics.report.text import RELIEF
 from metrics.scoring import floors
 from metrics.scoring.floors import floor_of_kind
+from metrics.scoring.metric_names import EMPTY_ROOM
 from metrics.scoring.records import FLOOR_NAME, ScoreFile
 from metrics.scoring.schema import SCORE_AGAIN, agree
 from scenegen.common.errors import SceneGenError
@@ -44,11 +48,27 @@ def floor_rows(file: ScoreFile, names: Sequence[str]) -> FloorRows:
     return rows
 
 
-def kind_floor_rows(kinds: Sequence[str], counts: Mapping[str, int]) -> FloorRows:
-    """Return the best floor of each kind of question, and chance, by label, then by kind."""
-    if "answers" not in counts:
+def angle_floor_rows(file: ScoreFile, name: str) -> FloorRows:
+    """Return what the empty room scores by view angle: by label, then by whole degrees."""
+    label, angles = FLOOR + FLOOR_NAME, file.items.get("view_angle_degrees")
+    if name in RELIEF:
+        return {label: dict.fromkeys(file.by_view_angle, 0.0)}
+    column = file.items.get(EMPTY_ROOM + name)
+    if angles is None or column is None:
         return {}
-    answers = counts["answers"]
+    found = {}
+    for degrees in file.by_view_angle:
+        chosen = (angles == int(degrees)) & np.isfinite(column)
+        if chosen.any():
+            found[degrees] = float(cluster_means(column[chosen], file.clusters[chosen]).mean())
+    return {label: found}
+
+
+def kind_floor_rows(file: ScoreFile, kinds: Sequence[str]) -> FloorRows:
+    """Return the best floor of each kind of question, and chance, by label, then by kind."""
+    if "answers" not in file.meta.counts:
+        return {}
+    answers = file.meta.counts["answers"]
     best = {kind: floor_of_kind(kind, answers)[0] for kind in kinds}
     chance = dict.fromkeys(kinds, 1.0 / answers)
     return {CHANCE: chance} if best == chance else {f"{FLOOR}best": best, CHANCE: chance}

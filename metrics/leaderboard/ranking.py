@@ -13,6 +13,7 @@ import numpy as np
 
 from metrics.leaderboard.floors import (
     SKILL_OF,
+    angle_floor_rows,
     floor_rows,
     floors_table,
     kind_floor_rows,
@@ -39,6 +40,7 @@ from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import by_number, distinct, plain
 
 Paper = Literal["all", "task", "none"]
+ABLATIONS = 4  # the table of the paper on parts of its model, which only stands by itself
 ANGLES = "Angle between each view and its scene's first one."
 KINDS = 'Kinds of wrong answers; "-2" ends those of questions with two answers.'
 
@@ -79,7 +81,12 @@ def leaderboard(
         require_same_floors(members)
         names = [name for name in chosen if chosen[name] == task]
         columns = _columns(members, names or HEADLINE[task], headline=not names)
-        figures = [f for t in TABLES for f in t.figures if paper != "none" and f.metric in columns]
+        figures = [
+            figure
+            for table in TABLES
+            for figure in table.figures
+            if paper != "none" and figure.table != ABLATIONS and figure.metric in columns
+        ]
         asked = {file.meta.truth_fingerprint for file in members}
         same_request = {f.meta.truth_digest for f in files if f.meta.truth_fingerprint in asked} - {
             digest
@@ -192,7 +199,7 @@ def _tables(
             f"{title}: {column.head} by {'view angle' if by_angle else 'kind of question'}",
             {key: replace(column, head=f"{key}°" if by_angle else key) for key in keys},
             entries,
-            {} if by_angle else kind_floor_rows(keys, first.meta.counts),
+            angle_floor_rows(first, name) if by_angle else kind_floor_rows(first, keys),
             _by_row(used, _figure_label, lambda figure: str(figure.view_angle)),
             [ANGLES if by_angle else KINDS, "Rows as in the ranking."],
             ranked=False,
@@ -270,8 +277,8 @@ def _notes(files: Sequence[ScoreFile]) -> Iterator[str]:
     )
     if first.meta.noise_floors:
         yield (
-            "Noise floor: the score of the true surface, sampled elsewhere, against itself. It and"
-            " the other floors are what the score files state; all of them state the same."
+            "Noise floor: the score of the true surface, sampled elsewhere, against itself. Floors"
+            " are as the score files state them; files that disagree are refused."
         )
 
 

@@ -77,8 +77,8 @@ def _floor_text(scores: ScoreFile, name: str) -> str:
     """Return the floor of a score that has a skill, and what chance or noise gives."""
     skill, score = scores.skills[name], scores.metrics[name]
     text = f"{number(skill.floor, score.value)}: {skill.floor_name}"
-    if name in (beside := references(scores)):
-        label, value = beside[name]
+    label, value = references(scores).get(name, ("", 0.0))
+    if label and not skill.floor_name.startswith(label):
         text += f"; {label} {number(value, score.value)}"
     return text
 

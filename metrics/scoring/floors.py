@@ -5,6 +5,7 @@ The methods are probes that look at outlines (`bench baseline outline`, which le
 measured them. Skill says how much of the way from the floor to perfect a method has gone.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -61,16 +62,14 @@ def floor_of_questions(counts: Mapping[str, int], answers: int) -> tuple[float, 
             in the released files.
         answers: how many answers each question offers.
     """
-    kinds_of: dict[str, list[str]] = {}
-    total = 0.0
-    for kind in sorted(counts):
-        floor, name = floor_of_kind(kind, answers)
-        kinds_of.setdefault(name, []).append(kind)
-        total += counts[kind] * floor
     if not counts:
         return 1.0 / answers, CHANCE_ONLY
-    if len(kinds_of) == 1:
-        (name,) = kinds_of
-    else:
-        name = "; ".join(f"{name} ({', '.join(kinds)})" for name, kinds in kinds_of.items())
-    return total / sum(counts.values()), name
+    found = {kind: floor_of_kind(kind, answers) for kind in sorted(counts)}
+    if len(set(found.values())) == 1:
+        return next(iter(found.values()))
+    mean = math.fsum(counts[kind] * floor for kind, (floor, _) in found.items())
+    names = (
+        f"{name} ({', '.join(kind for kind, (_, theirs) in found.items() if theirs == name)})"
+        for name in dict.fromkeys(name for _, name in found.values())
+    )
+    return mean / sum(counts.values()), "; ".join(names)

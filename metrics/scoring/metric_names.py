@@ -160,7 +160,7 @@ _RELIEF = (
 _ACCURACY = _share(
     "iqtt_accuracy",
     "IQTT accuracy",
-    "1 where the right answer is given, else 0, abstentions included; chance is 1/3.",
+    "1 where the right answer is given, else 0, abstentions included; chance is 1 / answers.",
     "iqtt",
 )
 

@@ -219,6 +219,8 @@ ANSWERS_MATCH = [
 JSON_OPEN = [
     ("JSON: malformed", ["no JSON"], "[0, 1, 2"),
     ("JSON: empty", ["no JSON"], ""),
+    ("JSON: a score file", ["the scores of a submission", "bench leaderboard"],
+     {"format": "pix2shape-bench/scores", "method": "m"}),
     ("JSON: nested deeply", ["nested too deeply"], "[" * 200_000),
     ("JSON: nested", ["expected a whole number for each question"], [[0], [1], [2], [0], [1], [2]]),
     ("JSON: NaN", ["NaN"], "[0, 1, NaN, 0, 1, 2]"),

@@ -156,6 +156,15 @@ def test_skill_stands_before_the_score_and_floors_below_the_methods():
     assert rows["floor: chance"] == ["-", "0.3333"]
 
 
+def test_the_floor_by_view_angle_is_the_empty_rooms_at_that_angle():
+    items = {"view_angle_degrees": np.array([0, 35, 0, 35])}
+    items["empty_room_chamfer"] = np.array([0.1, 0.5, 0.3, 0.7])
+    file = rooms("a", by_view_angle=angles(0.2))
+    _, table = leaderboard([replace(file, items={**file.items, **items})], paper="none")
+    floor = by_label(table)["floor: empty-room"]
+    assert [cell.value for cell in floor.cells] == ["0.2000", "-", "0.6000"]  # 0, 5 and 35 degrees
+
+
 def test_a_test_set_has_one_floor():
     """Which every comparable file of it states; another one is forged, or of another release."""
     skill = Skill(0.9, 0.8, 1.0, 2.0, "empty-room")
