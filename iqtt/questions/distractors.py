@@ -71,7 +71,8 @@ class Pools:
         classes: the shape classes of training, validation and test, by number of cubes.
         matched: for the same, the rows of matched classes (`matched_rows`); empty where no question
             needs them.
-        sizes: for each kind of question, the numbers of cubes that allow it in every split.
+        sizes: for each kind of question, the numbers of cubes that allow it in every split; kinds
+            that no number allows are left out.
     """
 
     classes: dict[int, tuple[Array, ...]]
@@ -96,16 +97,18 @@ def make_pools(spec: SplitSpec) -> Pools:
         matched = {n: tuple(map(matched_rows, parts)) for n, parts in classes.items()}
     pools = Pools(classes, matched, {})
     for kind in spec.kinds:
-        pools.sizes[kind] = tuple(n for n in classes if _allows(spec, pools, kind, n))
-        if not pools.sizes[kind]:
-            raise TooFewShapesError(
-                "cubes",
-                f"too few {spec.shapes} shapes of {spec.cubes[0]}-{spec.cubes[1]} cubes within"
-                f" radius {spec.max_radius:g}",
-                f"enough for {kind!r} questions with shapes of their own in each of"
-                f" {', '.join(SPLITS)}",
-                "take more --cubes, or a larger --max-radius",
-            )
+        allowed = tuple(n for n in classes if _allows(spec, pools, kind, n))
+        if allowed:
+            pools.sizes[kind] = allowed
+    if not pools.sizes:
+        raise TooFewShapesError(
+            "cubes",
+            f"too few {spec.shapes} shapes of {spec.cubes[0]}-{spec.cubes[1]} cubes within"
+            f" radius {spec.max_radius:g}",
+            f"enough for {spec.distractors!r} questions with shapes of their own in each of"
+            f" {', '.join(SPLITS)}",
+            "take more --cubes, or a larger --max-radius",
+        )
     return pools
 
 

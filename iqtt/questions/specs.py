@@ -49,7 +49,7 @@ class SplitSpec:
         cubes: fewest and most cubes of a shape; every number in between is equally likely.
         shapes: "chain" for self-avoiding chains of cubes, "tree" for shapes that may branch.
         distractors: kind of the questions, one of QUESTION_KINDS, or "mixed", where every question
-            draws one of these.
+            draws one of those that `cubes` allow.
         answers: number of answers, 3 or 2; one of them is right.
         height, width: size of an image, pixels.
         image_dtype: "uint8", "float16" or "float32"; radiance lies within 0..1.
