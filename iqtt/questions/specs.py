@@ -49,7 +49,7 @@ class SplitSpec:
         cubes: fewest and most cubes of a shape; every number in between is equally likely.
         shapes: "chain" for self-avoiding chains of cubes, "tree" for shapes that may branch.
         distractors: kind of the questions, one of QUESTION_KINDS, or "mixed", where every question
-            draws one of these.
+            draws one of those that `cubes` allow.
         answers: number of answers, 3 or 2; one of them is right.
         height, width: size of an image, pixels.
         image_dtype: "uint8", "float16" or "float32"; radiance lies within 0..1.
@@ -78,13 +78,13 @@ class SplitSpec:
     width: int = 128
     image_dtype: str = "uint8"
     min_angle_degrees: float = 30.0
-    min_cube_pixels: int = 12
+    min_cube_pixels: int = 30
     max_radius: float = 3.5
     lights: tuple[int, int] = (2, 2)
     background: Vector3 = (1.0, 1.0, 1.0)
-    ambient: Vector3 = (0.25, 0.25, 0.25)
+    ambient: Vector3 = (0.2, 0.2, 0.2)
     reflectance: Vector3 = (0.8, 0.8, 0.8)
-    light_level: float = 0.75
+    light_level: float = 0.85
     fov_degrees: float = 28.0
     with_depth: bool = False
 

@@ -26,7 +26,7 @@ LISTED_CUBES: dict[Kind, int] = {"chain": 11, "tree": 9}
 TAG = b"3D-IQTT split "
 SHARES = 3  # training, validation and test
 
-_TRIES_PER_CLASS, _AT_ONCE = 60, 65_536
+_TRIES_PER_CLASS, _MOST_AT_ONCE = 60, 65_536
 
 
 class TooFewShapesError(SceneGenError):
@@ -75,8 +75,9 @@ def split_classes(
         split = split_of(pool, kind == "chain")
         return tuple(pool[split == i] for i in range(SHARES))
     pool, split = np.zeros((0, cubes, 3), np.int8), np.zeros(0, np.intp)
-    for _ in range(-(-_TRIES_PER_CLASS * most // _AT_ONCE)):
-        drawn = _within(random_shapes(rng, _AT_ONCE, cubes, kind), max_radius)
+    batch = min(10 * most, _MOST_AT_ONCE)
+    for _ in range(-(-_TRIES_PER_CLASS * most // batch)):
+        drawn = _within(random_shapes(rng, batch, cubes, kind), max_radius)
         pool = distinct(np.concatenate([pool, canonical_class(drawn)]))
         split = split_of(pool, kind == "chain")
         if np.bincount(split, minlength=SHARES).min() >= most:
