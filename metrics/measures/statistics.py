@@ -108,7 +108,8 @@ def _cluster_sums(values: ArrayLike, clusters: ArrayLike) -> tuple[Array, Array,
     require_some(len(table), "values")
     require_finite(table, "values")
     index = np.unique(labels, return_inverse=True)[1]
-    return table, np.bincount(index, table), np.bincount(index).astype(np.float64)
+    sums = np.bincount(index, table)
+    return table, sums.astype(np.float64), np.bincount(index).astype(np.float64)
 
 
 def normal_quantile(confidence: float) -> float:
