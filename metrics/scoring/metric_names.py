@@ -12,7 +12,10 @@ from typing import Literal
 
 from scenegen.common.errors import SceneGenError
 
-HEADLINE = {"rooms": ("chamfer", "hausdorff", "mse_depth"), "iqtt": ("iqtt_accuracy",)}
+HEADLINE = {
+    "rooms": ("relief_iou", "relief_correlation", "chamfer", "hausdorff", "mse_depth"),
+    "iqtt": ("iqtt_accuracy",),
+}
 RECALL_WITHIN = ("0.02", "0.05")  # scene units
 OBJECT_SCORES = (
     "object_depth_error",

@@ -110,6 +110,10 @@ def _check_counts(file: ScoreFile) -> None:
     expected = {scored: len(ids), "runs": file.runs}
     if file.task == "rooms":
         expected["scenes"] = len(np.unique(file.clusters))
+    if file.objects:
+        rows = file.objects["row"]
+        expected["objects"] = len(rows)
+        expected["rows_without_objects"] = len(ids) - len(np.unique(rows))
     for name, number in expected.items():
         if counts.get(name) != number:
             raise _wrong_count(counts, name, f"{number}, as in items and meta.submissions")
@@ -117,6 +121,10 @@ def _check_counts(file: ScoreFile) -> None:
         raise _wrong_count(counts, all_there, f"more than {ids.max()}, the largest number in items")
     if file.task == "rooms" and counts.get("rows_penalised", len(ids) + 1) > len(ids):
         raise _wrong_count(counts, "rows_penalised", f"at most {len(ids)}")
+    if file.objects and len(file.objects["row"]):
+        shown_by = np.bincount(np.unique(rows, return_inverse=True)[1], file.objects["pixels"])
+        if counts.get("pixels", 0) < shown_by.max():
+            raise _wrong_count(counts, "pixels", f"at least {shown_by.max():.0f}, as in objects")
     formula = file.task == "iqtt" and file.runs == 1
     if file.meta.resamples not in ((0,) if formula else RESAMPLES):
         expected_number = "0, as the interval is Wilson's" if formula else "100 to 100000"
