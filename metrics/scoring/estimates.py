@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from metrics.measures.objects import size_range
 from metrics.measures.skill import skill, skill_interval
 from metrics.measures.statistics import bootstrap_interval, cluster_means
-from metrics.scoring.metric_names import EMPTY_ROOM, OBJECT_SCORES, SKILLED, metric
-from metrics.scoring.records import FLOOR_NAME, SHAPE_COLUMN, Groups, Score, Skill
+from metrics.scoring.metric_names import OBJECT_SCORES, SKILLED, metric
+from metrics.scoring.records import SHAPE_COLUMN, Groups, Score, Skill
 from metrics.scoring.runs import known
 
 Array = NDArray[Any]
@@ -61,25 +61,28 @@ def estimates(
 def skills(
     items: Mapping[str, Array], scene: Array, seed: int, resamples: int, confidence: float
 ) -> dict[str, Skill]:
-    """Return the skills of rooms from columns of items, (N,) each, the empty room's among them.
+    """Return the skills of rooms from columns of items, (N,) each, those of floors among them.
 
     There is none where no image shows an object that counts: the empty room is then the truth.
     """
     found: dict[str, Skill] = {}
-    names = [name for name in SKILLED if {name, EMPTY_ROOM + name} <= items.keys()]
+    names = [name for name in SKILLED if {name, SKILLED[name] + name} <= items.keys()]
     of_objects = [name for name in names if name in OBJECT_SCORES]
     if not any(np.isfinite(items[name]).any() for name in of_objects):
         return found
     for name in names:
-        scores, floors = items[name], items[EMPTY_ROOM + name]
-        there = ~np.isnan(floors)
-        table = np.stack([scores[there], floors[there]], axis=-1)
-        means = cluster_means(table, scene[there])
+        column, higher = SKILLED[name] + name, metric(name).higher_is_better
+        table = np.stack([items[name], items[column]], axis=-1)
+        there = ~np.isnan(table).any(axis=-1)
+        if not there.any():
+            continue
+        means = cluster_means(table[there], scene[there])
         score, floor = (float(value) for value in means.mean(axis=0))
-        value = skill(score, floor, metric(name).higher_is_better)
+        value = skill(score, floor, higher)
         if value is not None:
-            low, high = skill_interval(means[:, 0], means[:, 1], seed, resamples, confidence)
-            found[name] = Skill(value, known(low), known(high), floor, FLOOR_NAME)
+            errors, floors = (1.0 - means if higher else means).T
+            ends = skill_interval(errors, floors, seed, resamples, confidence)
+            found[name] = Skill(value, known(ends[0]), known(ends[1]), floor, column)
     return found
 
 

@@ -20,7 +20,7 @@ from metrics.measures.image_search import nearest_distances_on_image
 from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_depth
 from metrics.measures.objects import counted_objects, object_means, single_objects
 from metrics.measures.relief import relief_scores
-from metrics.scoring.metric_names import SKILLED
+from metrics.scoring.metric_names import OF_EMPTY_ROOM, OTHER_SCENE
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.rules import depth_faults, normal_faults, refuse_faults
 from metrics.submissions.truths import TrueView
@@ -51,7 +51,7 @@ class EmptyRoom:
 
     Attributes:
         depth: planar, (H, W), scene units.
-        scores: those of `metric_names.SKILLED`, by name.
+        scores: those of `metric_names.OF_EMPTY_ROOM`, by name.
     """
 
     depth: Array
@@ -66,7 +66,13 @@ def score_empty_room(truth: TrueView) -> EmptyRoom:
     scores = {"chamfer": chamfer(nearest), "hausdorff": hausdorff(nearest)}
     scores["mse_depth"] = mse_depth(compare_depth(depth, truth.depth, truth.mask))
     scores |= object_means(_single_objects(depth, truth, nearest))
-    return EmptyRoom(depth, {name: scores[name] for name in SKILLED})
+    return EmptyRoom(depth, {name: scores[name] for name in OF_EMPTY_ROOM})
+
+
+def true_relief(depth: Array, world_from_camera: Array, fov_y_degrees: float) -> Array:
+    """Return the relief of a true view of this depth, (H, W), scene units; NaN where no depth."""
+    empty, _ = empty_room(world_from_camera, fov_y_degrees, *depth.shape)
+    return np.asarray(empty - depth)
 
 
 def score_view(
@@ -74,6 +80,7 @@ def score_view(
     normal: Array | None,
     truth: TrueView,
     empty: Array,
+    other_relief: Array | None = None,
     *,
     alignments: Sequence[Alignment] = ALIGNMENTS,
     non_finite: NonFinite = "error",
@@ -88,6 +95,8 @@ def score_view(
         normal: predicted normals, (H, W, 3), camera frame; None where the method gives none.
         truth: what it is compared with.
         empty: planar depth of the empty room, (H, W), scene units.
+        other_relief: true relief of another scene, (H, W), scene units, NaN where it has none; None
+            where there is no other scene.
         alignments: the alignments after which depth is scored; points and relief are never
             aligned.
         non_finite: what to do with scored pixels that break `submissions.rules`. "penalise" scores
@@ -113,12 +122,21 @@ def score_view(
     pair = compare_depth(depth, truth.depth, mask)
     for alignment in alignments:
         scores |= depth_scores(pair, alignment)
-    relief = relief_scores(depth, truth.depth, empty, mask)
+    said = empty - depth
+    relief = relief_scores(said[mask], (empty - truth.depth)[mask])
     if broken.any():  # else they would count as relief, at the camera
         worst = {"relief_correlation": -1.0, "relief_iou": 0.0}
         relief = {name: value if np.isnan(value) else worst[name] for name, value in relief.items()}
     objects = _single_objects(depth, truth, nearest)
     scores |= relief | object_means(objects)
+    if other_relief is not None:
+        both = mask & np.isfinite(other_relief)
+        with_other = relief_scores(said[both], other_relief[both]) if both.any() else relief
+        # Nothing of the prediction is in a picture where nothing stands out.
+        other = {name: 0.0 if np.isnan(value) else value for name, value in with_other.items()}
+        scores |= {
+            OTHER_SCENE + name: np.nan if np.isnan(relief[name]) else other[name] for name in relief
+        }
     counted = counted_objects(truth.object_id)
     if normal is not None:
         angles = angular_errors_degrees(normal, truth.normal, mask)

@@ -14,7 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.depth import Alignment
-from metrics.scoring.image_scores import ALIGNMENTS, ImageScores, score_empty_room, score_view
+from metrics.scoring.image_scores import (
+    ALIGNMENTS,
+    ImageScores,
+    score_empty_room,
+    score_view,
+    true_relief,
+)
 from metrics.scoring.metric_names import OBJECT_SCORES
 from metrics.scoring.runs import Progress, ScoringError
 from metrics.scoring.truth_digests import RowDigests, view_digests
@@ -73,7 +79,12 @@ def score_rows(
     """Score these M rows in each of R submissions; the numbers do not depend on `processes`."""
     alignments = tuple(a for a in get_args(Alignment) if a in (*ALIGNMENTS, alignment))
     job = tuple((file.path, file.identity) for file in files), truth_path, alignments
-    chunks = [rows[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
+    with RoomsFile(truth_path) as truth:
+        scene, view = (
+            truth.read(name, slice(None))[rows] for name in ("scene_index", "view_index")
+        )
+    pairs = np.stack([rows, rows[other_scenes(scene, view)]], axis=-1)
+    chunks = [pairs[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
     table: list[_ScoredRow] = []
     for scored in _in_processes(job, chunks, processes):
         table += scored
@@ -96,6 +107,21 @@ def score_rows(
         ]
         found.objects[name] = np.stack(columns) if name in OBJECT_SCORES else columns[0]
     return found
+
+
+def other_scenes(scene_index: Array, view_index: Array) -> Array:
+    """Return for each of N rows, (N,) each, one of another scene, as indices (N,).
+
+    It is the next scene's in the same view; each row is that of exactly one other. So a prediction
+    that is the same for all rows scores the same with these as with its own, on average. Each row
+    is its own where there is one scene only, or views are so uneven that this pairs a scene with
+    itself.
+    """
+    order = np.lexsort((scene_index, view_index))
+    found = np.empty_like(order)
+    found[order] = np.roll(order, -1)
+    same = scene_index[found] == scene_index
+    return np.arange(len(found)) if same.any() else found
 
 
 class _RowScorer:
@@ -121,23 +147,25 @@ class _RowScorer:
         """Close the files."""
         self._stack.close()
 
-    def score(self, rows: Array) -> list[_ScoredRow]:
-        """Return what is found in each of these rows.
+    def score(self, pairs: Array) -> list[_ScoredRow]:
+        """Return what is found in each of these rows, (N, 2) with a row of another scene each.
 
         Values that are not finite are penalised; the caller decides whether that shall count.
         """
-        return [self._score_row(row) for row in rows.tolist()]
+        return [self._score_row(row, other) for row, other in pairs.tolist()]
 
-    def _score_row(self, row: int) -> _ScoredRow:
+    def _score_row(self, row: int, other: int) -> _ScoredRow:
         view = read_true_view(self._truth, row)
+        read = functools.partial(self._truth.read, rows=other)
+        names = ("depth", "camera/world_from_camera", "camera/fov_y_degrees")
+        relief = true_relief(*map(read, names)) if other != row else None
         empty, bad, runs = score_empty_room(view), None, []
         for file, entries in zip(self._files, self._entries, strict=True):
             assert isinstance(file, RoomPredictions)
             i = entries[row]
             depth, normal = file.depth(i), file.normal(i) if file.has_normals else None
-            score = functools.partial(
-                score_view, depth, normal, view, empty.depth, alignments=self._alignments
-            )
+            known = depth, normal, view, empty.depth, relief
+            score = functools.partial(score_view, *known, alignments=self._alignments)
             try:
                 runs.append(score())
             except PredictionError as error:

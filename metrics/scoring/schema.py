@@ -14,9 +14,8 @@ from pydantic import Field
 
 from metrics.measures.skill import skill
 from metrics.scoring.known_tests import known_test
-from metrics.scoring.metric_names import EMPTY_ROOM, SKILLED, metric
+from metrics.scoring.metric_names import SKILLED, metric
 from metrics.scoring.records import (
-    FLOOR_NAME,
     GROUPINGS,
     Score,
     ScoreFile,
@@ -212,16 +211,20 @@ def _check_skill(file: ScoreFile, name: str, found: Skill) -> None:
     """Raise JsonError unless a skill follows from a score of the file and from its floor."""
     place = f"skills.{name}"
     known = known_metric(f"skills.{name:.60}", name, file.task)
+    if not known.smallest <= found.floor <= known.largest:
+        expected = f"a number {within(known.smallest, known.largest)}"
+        raise refusal(f"{place}.floor", shown(found.floor), expected)
     if name not in file.metrics:
         raise refusal(place, "the skill of no score", f"metrics.{name}")
     if file.task == "rooms":
         if name not in SKILLED:
             raise refusal(place, "a score without skill", f"one of {', '.join(SKILLED)}")
-        if found.floor_name != FLOOR_NAME:
-            raise refusal(f"{place}.floor_name", repr(found.floor_name), repr(FLOOR_NAME))
-        floor, _ = _mean(file, EMPTY_ROOM + name, f"{place}.floor")
+        column = SKILLED[name] + name
+        if found.floor_name != column:
+            raise refusal(f"{place}.floor_name", repr(found.floor_name), repr(column))
+        floor, _ = _mean(file, column, f"{place}.floor")
         if not agree(found.floor, floor, 0.0):
-            expected = f"{floor!r}, the mean of items.{EMPTY_ROOM}{name} over scenes"
+            expected = f"{floor!r}, the mean of items.{column} over scenes"
             raise refusal(f"{place}.floor", repr(found.floor), expected)
     expected_value = skill(file.metrics[name].value, found.floor, known.higher_is_better)
     if expected_value is None or not agree(found.value, expected_value, 1.0):
