@@ -34,7 +34,10 @@ def skill_interval(
 ) -> tuple[float, float]:
     """Return the BCa interval of 1 - mean(scores) / mean(floors), of S clusters.
 
-    It is paired: each resample draws clusters with both of their values. Its acceleration comes
+    Of scores of which 1 is perfect, give what they lack: 1 - score.
+
+    It is paired: each resample draws clusters with both of their
+    values. Its acceleration comes
     from the ratio's empirical influence values (Efron and Tibshirani 1993, equation 22.28). Both
     ends are NaN for a single cluster, and where a resample has floors of 0 only.
 

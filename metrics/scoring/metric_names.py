@@ -12,7 +12,10 @@ from typing import Literal
 
 from scenegen.common.errors import SceneGenError
 
-HEADLINE = {"rooms": ("chamfer", "hausdorff", "mse_depth"), "iqtt": ("iqtt_accuracy",)}
+HEADLINE = {
+    "rooms": ("relief_iou", "relief_correlation", "chamfer", "hausdorff", "mse_depth"),
+    "iqtt": ("iqtt_accuracy",),
+}
 RECALL_WITHIN = ("0.02", "0.05")  # scene units
 OBJECT_SCORES = (
     "object_depth_error",
@@ -20,8 +23,11 @@ OBJECT_SCORES = (
     *(f"object_recall_{limit}" for limit in RECALL_WITHIN),
 )  # of single objects, too
 EMPTY_ROOM = "empty_room_"  # begins the names of the empty room's own scores
-# Scores that have a skill, the floor being the empty room. It has a relief of 0 by definition.
-SKILLED = ("chamfer", "hausdorff", "mse_depth", "object_depth_error", "object_completeness")
+OTHER_SCENE = "other_scene_"  # begins the names of scores against another scene's relief
+OF_EMPTY_ROOM = ("chamfer", "hausdorff", "mse_depth", "object_depth_error", "object_completeness")
+RELIEF = ("relief_correlation", "relief_iou")
+# Scores that have a skill: what begins the name of the floor's column, by name.
+SKILLED = dict.fromkeys(RELIEF, OTHER_SCENE) | dict.fromkeys(OF_EMPTY_ROOM, EMPTY_ROOM)
 F_SCORE = "f_score_<threshold>"
 DERIVED = "derived_"
 _NEAREST = "the predicted depth of an image nearest to the true depth in least squares."
@@ -205,7 +211,16 @@ ALL |= {
         title=f"{ALL[name].title}, empty room",
         definition=f"`{name}` of the empty room, drawn from the true camera.",
     )
-    for name in SKILLED
+    for name in OF_EMPTY_ROOM
+}
+ALL |= {
+    OTHER_SCENE + name: replace(
+        ALL[name],
+        name=OTHER_SCENE + name,
+        title=f"{ALL[name].title}, other scene",
+        definition=f"`{name}` of the same prediction with the relief of another scene.",
+    )
+    for name in RELIEF
 }
 _PLACES = {name: place for place, name in enumerate(ALL)}
 
@@ -254,7 +269,9 @@ def markdown_table() -> str:
         (f"<depth score>{ending}", "the same", "the same", definition)
         for ending, (_, definition) in _ALIGNED.items()
     ]
-    floor = f"the score of the empty room; in `items` alone, for {', '.join(SKILLED)}."
+    of_these = ", ".join(f"`{name}`" for name in OF_EMPTY_ROOM)
+    floor = f"the same of the empty room, for {of_these}; in `items` alone."
+    other = "the same of the prediction with the relief of another scene, seen in the same view."
     derived = "the same of normals derived from the predicted and from the true depth."
     rows = [
         *map(_cells, (*_POINTS, *_DEPTH)),
@@ -262,6 +279,7 @@ def markdown_table() -> str:
         *map(_cells, _NORMALS),
         (f"{DERIVED}<normal score>", "the same", "the same", derived),
         *map(_cells, (*_OBJECTS, *_RELIEF)),
+        (f"{OTHER_SCENE}<relief score>", "the same", "-", other),
         (f"{EMPTY_ROOM}<score>", "the same", "the same", floor),
         _cells(_ACCURACY),
     ]

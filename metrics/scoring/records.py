@@ -37,7 +37,6 @@ OPTIONAL_COLUMNS = {"rooms": ("view_angle_degrees",), "iqtt": ("shape",)}
 # Columns of `ScoreFile.objects`, beside its scores: whole numbers, and a text.
 OBJECT_COLUMNS = ("row", "object", "pixels")
 SHAPE_COLUMN = "shape"
-FLOOR_NAME = "empty-room"  # of the skills of rooms
 GROUPINGS = {
     "rooms": ("by_view_angle", "by_object_shape", "by_object_size"),
     "iqtt": ("by_distractor", "by_rotation_angle", "by_position"),
@@ -78,14 +77,14 @@ class Skill:
         low, high: ends of the interval at `Meta.confidence`; None where there is none. That of
             rooms is paired: it resamples the scenes of score and floor together.
         floor: the floor's score on the same items, in the unit of the score.
-        floor_name: what has that score, such as "empty-room".
+        floor_name: what has that score, such as "empty_room".
     """
 
     __pydantic_config__ = _CONFIG
     value: Annotated[Number, Field(le=1.0)]
     low: Number | None
     high: Number | None
-    floor: NotNegative
+    floor: Number
     floor_name: Annotated[Name, Field(pattern=r"\S")]
 
 

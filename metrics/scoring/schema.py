@@ -14,9 +14,8 @@ from pydantic import Field
 
 from metrics.measures.skill import skill
 from metrics.scoring.known_tests import known_test
-from metrics.scoring.metric_names import EMPTY_ROOM, SKILLED, metric
+from metrics.scoring.metric_names import SKILLED, metric
 from metrics.scoring.records import (
-    FLOOR_NAME,
     GROUPINGS,
     Score,
     ScoreFile,
@@ -110,6 +109,10 @@ def _check_counts(file: ScoreFile) -> None:
     expected = {scored: len(ids), "runs": file.runs}
     if file.task == "rooms":
         expected["scenes"] = len(np.unique(file.clusters))
+    if file.objects:
+        rows = file.objects["row"]
+        expected["objects"] = len(rows)
+        expected["rows_without_objects"] = len(ids) - len(np.unique(rows))
     for name, number in expected.items():
         if counts.get(name) != number:
             raise _wrong_count(counts, name, f"{number}, as in items and meta.submissions")
@@ -117,6 +120,10 @@ def _check_counts(file: ScoreFile) -> None:
         raise _wrong_count(counts, all_there, f"more than {ids.max()}, the largest number in items")
     if file.task == "rooms" and counts.get("rows_penalised", len(ids) + 1) > len(ids):
         raise _wrong_count(counts, "rows_penalised", f"at most {len(ids)}")
+    if file.objects and len(file.objects["row"]):
+        shown_by = np.bincount(np.unique(rows, return_inverse=True)[1], file.objects["pixels"])
+        if counts.get("pixels", 0) < shown_by.max():
+            raise _wrong_count(counts, "pixels", f"at least {shown_by.max():.0f}, as in objects")
     formula = file.task == "iqtt" and file.runs == 1
     if file.meta.resamples not in ((0,) if formula else RESAMPLES):
         expected_number = "0, as the interval is Wilson's" if formula else "100 to 100000"
@@ -204,16 +211,20 @@ def _check_skill(file: ScoreFile, name: str, found: Skill) -> None:
     """Raise JsonError unless a skill follows from a score of the file and from its floor."""
     place = f"skills.{name}"
     known = known_metric(f"skills.{name:.60}", name, file.task)
+    if not known.smallest <= found.floor <= known.largest:
+        expected = f"a number {within(known.smallest, known.largest)}"
+        raise refusal(f"{place}.floor", shown(found.floor), expected)
     if name not in file.metrics:
         raise refusal(place, "the skill of no score", f"metrics.{name}")
     if file.task == "rooms":
         if name not in SKILLED:
             raise refusal(place, "a score without skill", f"one of {', '.join(SKILLED)}")
-        if found.floor_name != FLOOR_NAME:
-            raise refusal(f"{place}.floor_name", repr(found.floor_name), repr(FLOOR_NAME))
-        floor, _ = _mean(file, EMPTY_ROOM + name, f"{place}.floor")
+        column = SKILLED[name] + name
+        if found.floor_name != column:
+            raise refusal(f"{place}.floor_name", repr(found.floor_name), repr(column))
+        floor, _ = _mean(file, column, f"{place}.floor")
         if not agree(found.floor, floor, 0.0):
-            expected = f"{floor!r}, the mean of items.{EMPTY_ROOM}{name} over scenes"
+            expected = f"{floor!r}, the mean of items.{column} over scenes"
             raise refusal(f"{place}.floor", repr(found.floor), expected)
     expected_value = skill(file.metrics[name].value, found.floor, known.higher_is_better)
     if expected_value is None or not agree(found.value, expected_value, 1.0):

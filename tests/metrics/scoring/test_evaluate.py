@@ -101,7 +101,7 @@ def test_files_are_opened_once_however_many_rows_they_have(folder, monkeypatch):
     counts = []
     for chunk in (8, 1):
         opened.clear()
-        monkeypatch.setattr("metrics.scoring.rooms.CHUNK", chunk)
+        monkeypatch.setattr("metrics.scoring.rows.CHUNK", chunk)
         score([folder / "empty-room.h5"], settings=Settings(processes=1))
         counts.append(len(opened))
     assert counts[0] == counts[1]
