@@ -30,6 +30,7 @@ from metrics.leaderboard.table import (
     INCOMPARABLE_MARK,
     REPORTED_MARK,
     Column,
+    Entry,
     Table,
     build_table,
     reported_rows,
@@ -186,13 +187,13 @@ def _tables(
     first = ranked[0][1]  # comparable, if any is
     title, names = _title(first), [name for name in columns if not name.startswith(SKILL_OF)]
     notes = [*_notes([file for _, file in ranked]), *map(_same_request_note, same_request)]
-    entries = [(label, file.comparable, _shown(file), own_floors(file)) for label, file in ranked]
+    shown = [(label, file.comparable, _shown(file), own_floors(file)) for label, file in ranked]
     for i, part in enumerate(_parts(columns)):
         used = [f for f in figures if f.view_angle is None and f.metric in part]
         table = build_table(
             f"{title}: scores" if i else title,
             part,
-            entries,
+            shown,
             {k: row for k, row in floor_rows(first, names).items() if row.keys() & part.keys()},
             _by_row(used, _figure_label, lambda figure: figure.metric),
             ["Rows as in the ranking."] if i else notes,
@@ -201,7 +202,7 @@ def _tables(
         yield table, used
     by_angle = first.task == "rooms"
     for name in names:
-        entries = []
+        entries: list[Entry] = []
         for label, file in ranked:
             groups = file.by_view_angle if by_angle else file.by_distractor
             found = {key: scores[name] for key, scores in groups.items() if name in scores}
