@@ -200,7 +200,7 @@ WRONG_OBJECTS = [
     ("skills/chamfer/low", 0.4, "skills.chamfer.value", f"{SKILL['value']!r} outside", "within"),
     ("skills/chamfer/low", None, "skills.chamfer", "one end of an interval", "both"),
     ("skills/chamfer/floor", 0.4, "", "0.4", "the mean of items.empty_room_chamfer"),
-    ("skills/chamfer/floor", -1, "", "-1", "a number from 0"),
+    ("skills/chamfer/floor", -1.0, "", "-1.0", "a number from 0"),
     ("skills/chamfer/floor_name", "mine", "", "'mine'", "'empty_room_chamfer'"),
     ("skills/relief_iou", SKILL, "skills.relief_iou.floor_name", "'empty_room_chamfer'", "other"),
     ("skills/rmse", SKILL, "", "the skill of no score", "metrics.rmse"),

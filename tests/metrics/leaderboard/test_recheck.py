@@ -17,7 +17,7 @@ from metrics.measures.statistics import bootstrap_interval, cluster_means, wilso
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import Score, read_scores, write_scores
 from metrics.scoring.evaluate import score
-from metrics.scoring.metric_names import metric
+from metrics.scoring.metric_names import OBJECT_SCORES, metric
 from scenegen.rooms.reader import RoomsFile
 
 SCENES = np.repeat(np.arange(9), 2)
@@ -143,7 +143,7 @@ def test_scores_of_one_image_agree_with_each_other(truths, tmp_path, name):
 
 @pytest.fixture(scope="module")
 def scored_rooms(truths, tmp_path_factory):
-    """What the program says of a guess: lifted by a tenth, so that no score is 0 or 1."""
+    """What the program says of objects moved back and walls moved forth; few scores are 0 or 1."""
     path = tmp_path_factory.mktemp("recheck") / "p.h5"
     with (
         RoomsFile(truths.rooms) as rooms,
@@ -179,9 +179,7 @@ def test_groups_of_objects_follow_from_the_objects(scored_rooms, grouping):
         recheck(replace(scored_rooms, **{grouping: unknown}))
 
 
-@pytest.mark.parametrize(
-    "name", ["object_completeness", "object_depth_error", "object_recall_0.05"]
-)
+@pytest.mark.parametrize("name", OBJECT_SCORES)
 def test_scores_of_images_follow_from_their_objects(scored_rooms, name):
     """A table of objects that says better than the column does."""
     better = 0.5 * scored_rooms.objects[name] + 0.25 * ("recall" in name)
