@@ -162,3 +162,21 @@ def test_the_same_numbers_every_time_and_others_with_another_seed():
     files = three_methods(scenes=30)
     assert compare(files, ["chamfer"]) == compare(files, ["chamfer"])
     assert compare(files, ["chamfer"], seed=1) != compare(files, ["chamfer"])
+
+
+def test_rows_without_the_score_are_left_out():
+    """A whole scene, and a view of another; values below 0 are as good as any."""
+    nan = float("nan")
+    ours = np.array([-0.5, nan, 0.25, 0.5, nan, nan, 0.75, 0.125])
+    theirs = ours - np.array([0.25, 0.0, 0.5, -0.5, 0.0, 0.0, 0.125, 0.125])
+    scenes = [0, 0, 1, 1, 2, 2, 3, 3]
+    files = [rooms_scores(name, {"chamfer": np.zeros(8)}, scenes) for name in ("theirs", "ours")]
+    files = [
+        replace(file, items={**file.items, "relief_correlation": column})
+        for file, column in zip(files, (theirs, ours), strict=True)
+    ]
+    (found,) = compare(files, ["relief_correlation"]).differences
+    assert (found.wins, found.losses, found.ties) == (2, 0, 1)
+    assert found.difference == pytest.approx(np.mean([0.25, 0.0, 0.125]))
+    assert found.value == pytest.approx(np.mean([-0.5, 0.375, 0.4375]))
+    assert found.low <= found.difference <= found.high

@@ -14,9 +14,11 @@ import cli
 from baselines.trivial import write_chance, write_room_baseline
 from metrics.leaderboard.recheck import RecheckError, recheck, steps
 from metrics.measures.statistics import bootstrap_interval, cluster_means, wilson_interval
+from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import Score, read_scores, write_scores
 from metrics.scoring.evaluate import score
-from metrics.scoring.metric_names import metric
+from metrics.scoring.metric_names import OBJECT_SCORES, metric
+from scenegen.rooms.reader import RoomsFile
 
 SCENES = np.repeat(np.arange(9), 2)
 ANGLES = np.tile([0, 35], 9)
@@ -137,6 +139,67 @@ def test_scores_of_one_image_agree_with_each_other(truths, tmp_path, name):
     forged = replace(file, items=items, metrics={**file.metrics, name: best}, by_view_angle={})
     with refused(RecheckError, f"items.{name}[0]", found="0.0"):
         recheck(forged)
+
+
+@pytest.fixture(scope="module")
+def scored_rooms(truths, tmp_path_factory):
+    """What the program says of objects moved back and walls moved forth; few scores are 0 or 1."""
+    path = tmp_path_factory.mktemp("recheck") / "p.h5"
+    with (
+        RoomsFile(truths.rooms) as rooms,
+        RoomPredictionWriter(path, truths.rooms, method="m") as p,
+    ):
+        for row, room in enumerate(rooms):
+            p.add(row, np.where(room.object_id > 0, 1.04, 0.98) * np.nan_to_num(room.depth, nan=3))
+    return replace(score([path], truths.rooms), path=Path("m.json"))
+
+
+@pytest.mark.parametrize("part", ["value", "low", "high", "floor"])
+@pytest.mark.parametrize("name", ["chamfer", "object_completeness", "relief_iou"])
+def test_skills_follow_from_the_items(scored_rooms, name, part):
+    recheck(scored_rooms)
+    found = scored_rooms.skills[name]
+    other = replace(found, **{part: getattr(found, part) + 1e-6})
+    with refused(RecheckError, f"m.json: skills.{name}.{part}"):
+        recheck(replace(scored_rooms, skills={**scored_rooms.skills, name: other}))
+
+
+@pytest.mark.parametrize("grouping", ["by_object_shape", "by_object_size"])
+def test_groups_of_objects_follow_from_the_objects(scored_rooms, grouping):
+    groups = getattr(scored_rooms, grouping)
+    key = next(iter(groups))
+    for part in ("value", "low", "n"):
+        score = groups[key]["object_completeness"]
+        changed = (getattr(score, part) or 0) + (1 if part == "n" else 1e-6)
+        scores = {**groups[key], "object_completeness": replace(score, **{part: changed})}
+        with refused(RecheckError, f"{grouping}.{key}.object_completeness.{part}"):
+            recheck(replace(scored_rooms, **{grouping: {**groups, key: scores}}))
+    unknown = {**groups, "99-100": groups[key]}
+    with refused(RecheckError, f"{grouping}.99-100", expected="objects of this group"):
+        recheck(replace(scored_rooms, **{grouping: unknown}))
+
+
+@pytest.mark.parametrize("name", OBJECT_SCORES)
+def test_scores_of_images_follow_from_their_objects(scored_rooms, name):
+    """A table of objects that says better than the column does."""
+    better = 0.5 * scored_rooms.objects[name] + 0.25 * ("recall" in name)
+    objects = {**scored_rooms.objects, name: better}
+    with refused(RecheckError, f"items.{name}[0]", expected="as objects say"):
+        recheck(replace(scored_rooms, objects=objects))
+
+
+def test_without_objects_no_skill_follows(scored_rooms):
+    gone = np.full(len(scored_rooms.ids), np.nan)
+    names = {name for name in scored_rooms.items if "object_" in name}
+    items = {**scored_rooms.items, **dict.fromkeys(names, gone)}
+    less = {name: s for name, s in scored_rooms.metrics.items() if name not in names}
+    bare = replace(
+        scored_rooms, items=items, metrics=less, objects={}, by_view_angle={},
+        by_object_shape={}, by_object_size={},
+    )  # fmt: skip
+    with refused(RecheckError, "skills.chamfer", "a skill", "none"):
+        recheck(replace(bare, skills={"chamfer": scored_rooms.skills["chamfer"]}))
+    recheck(replace(bare, skills={}))
 
 
 def test_intervals_cannot_be_left_out():
