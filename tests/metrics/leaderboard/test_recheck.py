@@ -13,11 +13,18 @@ from refusals import refused
 import cli
 from baselines.trivial import write_chance, write_room_baseline
 from metrics.leaderboard.recheck import RecheckError, recheck, steps
-from metrics.measures.statistics import bootstrap_interval, cluster_means, wilson_interval
+from metrics.measures.statistics import (
+    bootstrap_interval,
+    cluster_means,
+    clustered_wilson_interval,
+    linearised_means,
+    wilson_interval,
+)
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import Score, read_scores, write_scores
 from metrics.scoring.evaluate import score
 from metrics.scoring.metric_names import OBJECT_SCORES, metric
+from metrics.scoring.questions import question_skill
 from scenegen.rooms.reader import RoomsFile
 
 SCENES = np.repeat(np.arange(9), 2)
@@ -243,6 +250,51 @@ def test_groups_of_questions_add_up(groups, found, expected):
         recheck(replace(made_questions(), by_position=groups))
     with refused(RecheckError, "by_position.0.iqtt_accuracy", "no such key"):
         recheck(replace(made_questions(), by_position={"0": {}}))
+
+
+def shaped(runs=1):
+    """Six questions about three shapes, with the skill over chance."""
+    file = made_questions(runs)
+    shapes, right = np.array([0, 0, 1, 1, 2, 2]), file.items["iqtt_accuracy"]
+    if runs == 1:
+        low, high = clustered_wilson_interval(right, shapes)
+    else:
+        low, high = (end[0] for end in bootstrap_interval(linearised_means(right, shapes), 0))
+    accuracy = replace(file.metrics["iqtt_accuracy"], low=float(low), high=float(high))
+    known = {"iqtt_accuracy": question_skill(accuracy, {}, 3)}
+    items = {**file.items, "shape": shapes}
+    return replace(file, items=items, metrics={"iqtt_accuracy": accuracy}, skills=known)
+
+
+@pytest.mark.parametrize("runs", [1, 2])
+def test_intervals_of_questions_rest_on_their_shapes(runs, tmp_path):
+    file = shaped(runs)
+    write_scores(replace(file, items={n: c[::-1] for n, c in file.items.items()}), tmp_path / "s")
+    recheck(read_scores(tmp_path / "s"))
+    others = {**file.items, "shape": np.array([0, 1, 0, 0, 0, 0])}
+    with refused(RecheckError, "metrics.iqtt_accuracy.low"):
+        recheck(replace(file, items=others))
+
+
+def test_skills_of_questions_are_recomputed():
+    file = shaped()
+    for part, value in (("value", 0.9), ("low", 0.0), ("floor", 0.2), ("floor_name", "best")):
+        forged = {"iqtt_accuracy": replace(file.skills["iqtt_accuracy"], **{part: value})}
+        with refused(RecheckError, f"q.json: skills.iqtt_accuracy.{part}"):
+            recheck(replace(file, skills=forged))
+    counts = {name: number for name, number in file.meta.counts.items() if name != "answers"}
+    with refused(RecheckError, "meta.counts.answers"):
+        recheck(replace(file, meta=replace(file.meta, counts=counts)))
+
+
+def test_intervals_of_groups_are_those_of_one_to_all_questions():
+    file = shaped()
+    low, high = wilson_interval(3, 4)
+    wider = {"low": low - 0.05, "high": high + 0.005}
+    recheck(forged(file, "by_position/2", **wider))
+    for part, value in (("low", low + 0.01), ("high", high - 0.01), ("low", 0.0)):
+        with refused(RecheckError, f"by_position.2.iqtt_accuracy.{part}"):
+            recheck(forged(file, "by_position/2", **{part: value}))
 
 
 def test_the_leaderboard_refuses_what_does_not_follow(tmp_path, check_refusal):
