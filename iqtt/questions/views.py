@@ -294,7 +294,8 @@ def draw_lights(
 
     They are far away, on the camera's side, in uniform directions within bounds: the first at an
     angle of 26 to 46 degrees to the camera, so that most of what it sees is lit and the faces of a
-    cube differ; the others at 37 to 90 degrees, on the other side of the camera. Unused slots are zero.
+    cube differ; the others at 37 to 90 degrees, on the other side of the camera. Unused slots
+    are zero.
     """
     most, distance = spec.lights[1], LIGHT_DISTANCE * camera_distance
     count = rng.integers(spec.lights[0], most, images, endpoint=True)
