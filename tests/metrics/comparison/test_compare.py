@@ -123,6 +123,22 @@ def test_answers_averaged_over_runs_go_by_sign_flips():
     assert compare([files[0], agreeing]).differences[0].test == "sign flips"
 
 
+def test_questions_about_one_shape_are_not_independent():
+    """Eight questions about each of 6 shapes, answered alike: as if there were 6 questions."""
+    shapes = np.repeat(np.arange(6), 8)
+    right = np.repeat([[1, 0], [1, 0], [1, 0], [1, 0], [1, 0], [1, 1]], 8, axis=0)
+    plain = [iqtt_scores(name, right[:, k]) for k, name in ((1, "b"), (0, "a"))]
+    files = [replace(file, items={**file.items, "shape": shapes}) for file in plain]
+    (each,), (alike,) = (compare(some).differences for some in (plain, files))
+    assert each.difference == alike.difference == pytest.approx(5 / 6)
+    assert (each.test, alike.test) == ("exact McNemar", "sign flips")
+    assert each.p_value < 1e-10
+    assert alike.p_value == 2 / 2**5
+    assert alike.high - alike.low > 2 * (each.high - each.low)
+    single = [replace(file, items={**file.items, "shape": np.arange(48)}) for file in plain]
+    assert compare(single).differences == compare(plain).differences
+
+
 def test_rows_in_another_order_are_paired_by_number():
     rng = np.random.default_rng(1)
     columns = {"chamfer": rng.random(16)}
