@@ -47,6 +47,7 @@ from scenegen.common.text_table import by_number, distinct, plain
 Paper = Literal["all", "task", "none"]
 WIDEST = 6  # columns of scores in one table
 ABLATIONS = 4  # the table of the paper on parts of its model, which only stands by itself
+PAPER_KINDS = {"other"}  # of the paper's questions; its figures stand beside no other kind
 ANGLES = "Angle between each view and its scene's first one."
 KINDS = 'Kinds of wrong answers; "-2" ends those of questions with two answers.'
 
@@ -94,6 +95,8 @@ def leaderboard(
             for figure in table.figures
             if paper != "none" and figure.table != ABLATIONS and figure.metric in columns
         ]
+        if any(set(file.by_distractor) - PAPER_KINDS for file in members):
+            figures = []
         asked = {file.meta.truth_fingerprint for file in members}
         same_request = {f.meta.truth_digest for f in files if f.meta.truth_fingerprint in asked} - {
             digest
