@@ -142,7 +142,8 @@ def compare(
         means = sums = apart
         if files[0].task == "iqtt":
             means = linearised_means(apart, shapes[there])[:, 0]
-            sums = np.bincount(np.unique(shapes[there], return_inverse=True)[1], apart)
+            index = np.unique(shapes[there], return_inverse=True)[1]
+            sums = np.bincount(index, apart).astype(np.float64)
         ends = bootstrap_interval(means[:, None], seed, resamples, CONFIDENCE)
         low, high = (None if math.isnan(end) else float(end) for (end,) in ends)
         better = apart if metric(name).higher_is_better else -apart

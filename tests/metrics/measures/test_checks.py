@@ -37,7 +37,7 @@ def on_image(predicted, true, fov=20.0, mask=None):
 
 WRONG_KINDS = [["a"], [1j], [True], [[1], [1, 2]], [None], b"12", {}]
 WRONG_CLOUDS = [np.zeros(3), np.zeros((2, 2)), np.zeros((2, 3, 1)), 1.0, [["a"] * 3], None]
-WRONG_SCORES = [[[1.0, 2.0]], [1.0, 2.0, 3.0], np.zeros((2, 3, 1)), [["a", "b", "c"]]]
+WRONG_SCORES = [[[1.0, 2.0, 3.0, 4.0]], [1.0, 2.0, 3.0], np.zeros((2, 3, 1)), [["a", "b", "c"]]]
 WRONG_MASKS = [np.ones((4, 5)), np.ones(5, dtype=bool), np.ones((4, 5), dtype=np.uint8)]
 CASES = [
     *((MeasureError, "it", as_float64, bad, "it") for bad in WRONG_KINDS),
