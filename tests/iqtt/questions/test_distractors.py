@@ -150,7 +150,7 @@ def test_a_question_depends_on_itself_alone():
             SPEC, make_pools(SPEC) if i == 3 else pools_of(SPEC), "val", [request]
         )
         assert (cubes.tobytes(), kinds.tobytes()) == key[i]
-    others = replace(SPEC, train=5, labeled=5, val=9, test=2, height=64, min_angle_degrees=3)
+    others = replace(SPEC, train=5, labeled=5, val=9, test=2, width=256, min_angle_degrees=3)
     again = draw_shapes(others, make_pools(others), "val", requests)
     assert [c.tobytes() for c, _ in again] == [c for c, _ in key]
     assert draw_shapes(SPEC, pools_of(SPEC), "val", []) == []
