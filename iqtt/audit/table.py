@@ -1,6 +1,7 @@
 """Find tables of questions, and read them for the audit: images once, in chunks."""
 
 import hashlib
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,18 +57,19 @@ class AuditTable:
 
     Attributes:
         spec, split, fingerprint: as in the file; None for a released file.
-        answers: which of the three is right, (Q,); None if the file does not tell.
+        images: number of images of a question: the reference, and its answers.
+        answers: which of the answers is right, (Q,); None if the file does not tell.
         truth: the datasets `TRUTH` by name, (Q, ...) each; empty if the file has no shapes.
         contents: digest of each dataset that was read, by its file and its name there; empty if
             the file has no digests to compare them with.
         truth_changed: whether the file's `truth_digest` is another one than that of its answers.
         background: most frequent colour of the images' borders, as stored, (3,).
-        digests: hashes of the images, (Q, 4) void.
-        silhouette: number of pixels of each image that are not background, (Q, 4).
-        on_border: number of those pixels on the image's border, (Q, 4).
-        unfit: number of values of each image that are not finite, or outside 0..1, (Q, 4).
+        digests: hashes of the images, (Q, I) void.
+        silhouette: number of pixels of each image that are not background, (Q, I).
+        on_border: number of those pixels on the image's border, (Q, I).
+        unfit: number of values of each image that are not finite, or outside 0..1, (Q, I).
         measured: rows that `statistics` describe.
-        statistics: `STATISTICS` of those rows.
+        statistics: of those rows, as `statistics.measure` gives them.
     """
 
     source: Source
@@ -75,6 +77,7 @@ class AuditTable:
     split: str | None
     fingerprint: str | None
     image_dtype: str
+    images: int
     answers: Array | None
     truth: dict[str, Array]
     contents: dict[tuple[Path, str], str]
@@ -94,8 +97,9 @@ class AuditTable:
 
     @property
     def cubes(self) -> Array:
-        """Cubes of the four shapes as stored, (Q, 4, most, 3); NO_CUBE if the file has none."""
-        return self.truth["cubes"] if self.truth else np.full((len(self), 4, 1, 3), NO_CUBE)
+        """Cubes of the images' shapes as stored, (Q, I, most, 3); NO_CUBE if the file has none."""
+        blank = (len(self), self.images, 1, 3)
+        return self.truth["cubes"] if self.truth else np.full(blank, NO_CUBE)
 
     def __len__(self) -> int:
         return self.source.count
@@ -149,7 +153,8 @@ def read_table(
     with source.open() as questions:
         everything = slice(0, source.count)
         names = TRUTH if questions.has_truth else ()
-        chunk = max(1, CHUNK_PIXELS // (4 * questions.height * questions.width))
+        first = questions.read("questions", slice(0, min(1, source.count)))
+        chunk = max(1, CHUNK_PIXELS // math.prod(first.shape[1:4]))
         first = questions.read("questions", slice(0, min(chunk, source.count)))
         background = _border_color(first)
         scans: list[tuple[Array, ...]] = []
@@ -176,6 +181,7 @@ def read_table(
             questions.split,
             questions.fingerprint,
             questions.image_dtype,
+            first.shape[1],
             answers,
             truth,
             contents if told else {},
@@ -202,7 +208,7 @@ def content_problems(tables: Sequence[AuditTable]) -> list[str]:
 
 
 def _border(pixels: Array) -> Array:
-    """Return the pixels on the border of images, (Q, 4, H, W, ...) to (Q, 4, B, ...)."""
+    """Return the pixels on the border of images, (Q, I, H, W, ...) to (Q, I, B, ...)."""
     sides = (pixels[:, :, 0], pixels[:, :, -1], pixels[:, :, 1:-1, 0], pixels[:, :, 1:-1, -1])
     return np.concatenate(sides, axis=2)
 

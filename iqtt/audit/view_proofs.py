@@ -119,7 +119,7 @@ def _difference(questions: QuestionsFile, row: int, count: int) -> str:
     images, cubes, views, visible = (questions.read(name, row) for name in names)
     lamps = ("light_count", "light_position", "light_color")
     lights, light_position, light_color = (questions.read(name, row) for name in lamps)
-    for k in range(4):
+    for k in range(len(images)):
         used = slice(0, int(lights[k]))
         hit, radiance, sure = _cast(
             spec, cubes[k, :count], views[k], light_position[k, used], light_color[k, used]
