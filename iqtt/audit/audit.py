@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit import proofs, shape_proofs, view_proofs
+from iqtt.audit import kind_proofs, proofs, shape_proofs, view_proofs
+from iqtt.audit.frames import stored_frames
 from iqtt.audit.probes import Evidence, Probe, run_probes
 from iqtt.audit.proofs import Proof
 from iqtt.audit.shape_proofs import Shapes
@@ -26,7 +27,8 @@ FORMAT = {"format": "pix2shape-bench/iqtt-audit", "format_version": "1.0"}
 PROBED = 20_000  # questions that probes look at, by default
 CAST = 48  # questions whose images are ray-cast again
 _BY_CUBES = (
-    *("shapes", "one right answer", "answers differ", "stored ids", "splits apart"),
+    *("shapes", "one right answer", "answers differ", "mirror images", "matched", "stored ids"),
+    "splits apart",
     *("rotations", "angles", "visibility", "cast again"),
 )
 
@@ -160,7 +162,9 @@ def _prove(
     by_cubes = [
         shape_proofs.whole_shapes(told, shapes),
         shape_proofs.one_right_answer(told, shapes),
-        shape_proofs.distractors_differ(told, shapes),
+        kind_proofs.answers_differ(told, shapes),
+        kind_proofs.mirror_images(told, shapes),
+        kind_proofs.matched(told, shapes),
         shape_proofs.stored_ids(told, shapes),
         shape_proofs.splits_share_nothing(told, shapes),
         view_proofs.rotations(told),
@@ -187,15 +191,25 @@ def _evidence(
         known = place[table.measured] >= 0
         rows = table.measured[known]
         mirrored = _mirror_images(one, place, rows)
-        parts.append((table.statistics[known], place[rows], mirrored, described[rows]))
-    statistics, places, mirrored, cubes = map(np.concatenate, zip(*parts, strict=True))
+        stored = _frames(table, one, rows)
+        parts.append((table.statistics[known], place[rows], mirrored, described[rows], stored))
+    statistics, places, mirrored, cubes, frames = map(np.concatenate, zip(*parts, strict=True))
     return Evidence(
         statistics=statistics,
         right=places,
         mirrored=mirrored,
         cubes={name: cubes[:, :, i] for i, name in enumerate(SHAPE_STATISTICS)},
+        frames=frames,
         places=[place[place >= 0] for place in right],
     )
+
+
+def _frames(table: AuditTable, shapes: Shapes, rows: Array) -> Array:
+    """Return `frames.stored_frames` of some rows; NaN where the file does not tell the shapes."""
+    if not table.truth:
+        return np.full((len(rows), table.images - 1, 19), np.nan)
+    views = table.truth["world_from_shape"][rows]
+    return stored_frames(table.cubes[rows], views, shapes.whole[rows])
 
 
 def _mirror_images(shapes: Shapes, place: Array, rows: Array) -> Array:

@@ -18,11 +18,13 @@ from iqtt.audit.table import AuditTable
 from iqtt.questions.specs import DISTRACTOR_KINDS
 
 Array = NDArray[Any]
-GYRATION = 0.05  # cube edges; largest difference of matched shapes' principal radii of gyration
+# Largest distance of the principal radii of gyration of two answers, cube edges: twice that of two
+# matched shapes, as two answers may both be matched to a third.
+GYRATION = 0.1
 
 
 def answers_differ(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
-    """Prove that no two answers show the same shape, but for the two wrong ones of a mirror-pair."""
+    """Prove that no two answers show the same shape, but for a mirror-pair's wrong ones."""
     same = [_twins(table, one) for table, one in zip(tables, shapes, strict=True)]
     return judge(
         "answers differ",

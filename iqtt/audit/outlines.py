@@ -50,7 +50,7 @@ def nearest_outline(distances: Array) -> Array:
     Args:
         distances: as `outlines` gives them, (..., len(DISTANCES)).
     """
-    return np.asarray(distances[..., 4:].min(axis=-1))
+    return np.asarray(distances[..., DISTANCES.index("area in polar cells")])
 
 
 def _describe(masks: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -100,8 +100,7 @@ def _describe(masks: NDArray[np.bool_]) -> tuple[Array, Array]:
 def _distances(signature: Array) -> Array:
     """Return how far apart signatures are, turned as well as may be, (Q, I, I, len(DISTANCES)).
 
-    For each part of the signature there are two numbers: as it is, and with one of the two flipped
-    as in a mirror, since an outline seen from behind is its own mirror image.
+    One of the two may also be flipped, as an outline seen from behind is its own mirror image.
 
     Args:
         signature: (Q, I, C, DIRECTIONS).
@@ -114,10 +113,10 @@ def _distances(signature: Array) -> Array:
             norm = (signature[:, [a, b], rows] ** 2).sum(axis=(1, 2, 3))
             one, other = waves[:, a, rows], waves[:, b, rows]
             # The correlation at all turns at once; without the conjugate, with the mirror image.
-            for flipped, factor in enumerate((other.conj(), other)):
-                alike = np.fft.irfft((one * factor).sum(axis=1), DIRECTIONS).max(axis=1)
-                apart = np.sqrt(np.maximum(norm - 2 * alike, 0))
-                result[:, a, b, 2 * k + flipped] = result[:, b, a, 2 * k + flipped] = apart
+            same = np.fft.irfft((one * other.conj()).sum(axis=1), DIRECTIONS).max(axis=1)
+            mirrored = np.fft.irfft((one * other).sum(axis=1), DIRECTIONS).max(axis=1)
+            apart = np.sqrt(np.maximum(norm - 2 * np.maximum(same, mirrored), 0))
+            result[:, a, b, k] = result[:, b, a, k] = apart
     return result
 
 
@@ -132,10 +131,7 @@ FEATURES = (
     *(f"moment {order}, {fold}-fold" for order, fold in ((3, 1), (3, 3), (4, 0), (4, 2), (4, 4))),
     *(f"power spectrum, ring {k}" for k in range(RINGS)),
 )
-DISTANCES = (
-    *("reach, turned", "reach, flipped", "boundary, turned", "boundary, flipped"),
-    *("polar cells, turned", "polar cells, flipped"),
-)
+DISTANCES = ("reach in all directions", "boundary in all directions", "area in polar cells")
 _SIGNATURE_PARTS = (slice(0, 1), slice(1, 2), slice(2, None))
 
 

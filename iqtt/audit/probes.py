@@ -255,9 +255,8 @@ def _by_network(statistics: Array, right: Array) -> Array:
     hits = np.zeros(len(rows), np.bool_)
     for k in range(2):
         network = SmallNetwork().fit(pictures[half != k], right[rows[half != k]])
-        hits[half == k] = (
-            network.scores(pictures[half == k]).argmax(axis=1) == right[rows][half == k]
-        )
+        chosen = network.scores(pictures[half == k]).argmax(axis=1)
+        hits[half == k] = chosen == right[rows[half == k]]
     return hits
 
 

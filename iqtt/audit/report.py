@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from iqtt.audit.audit import Audit
-from iqtt.audit.probes import ERROR_RATE, LIGHT, MIRRORED, OUTLINE, WITHOUT, Probe
+from iqtt.audit.probes import ERROR_RATE, FRAMES, LIGHT, MIRRORED, OUTLINE, WITHOUT, Probe
 from scenegen.common.text_table import aligned, piped, printable
 
 _BLOCKS = (
@@ -16,7 +16,8 @@ _BLOCKS = (
         "the right answer or its mirror image, next to the reference",
         ("nearest", "farthest"),
     ),
-    (OUTLINE, "next to the reference, by outline", ("nearest", "farthest")),
+    (FRAMES, "by the frames in which shapes are stored", ("nearest", "farthest", "learned")),
+    (OUTLINE, "next to the reference, by outline", ("nearest", "farthest", "learned")),
 )
 
 

@@ -22,8 +22,9 @@ class Shapes:
     """What the cubes of the Q questions of a table say about their shapes.
 
     Attributes:
-        whole: whether a question's shapes, one an image, are connected and have the same number of cubes,
-            (Q,) bool. The other attributes have a meaning for these questions only.
+        whole: whether a question's shapes, one for each image, are connected and have the same
+            number of cubes, (Q,) bool. The other attributes have a meaning for these questions
+            only.
         count: number of cubes of each of a question's shapes, (Q,).
         right: which answers are congruent to the reference, (Q, K) bool.
         shape_name: numbers for the shapes, (Q, 1 + K), equal if and only if the shapes are

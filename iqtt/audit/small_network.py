@@ -2,9 +2,9 @@
 
 Two layers of convolutions with stride 2 and rectifiers, then the mean and the largest value of each
 of 16 channels. An answer's score is linear in these, in how they differ from the mean of the
-answers, and in the squares of that; the scores of a question's answers go through a softmax. It is trained
-by Adam (Kingma & Ba 2015) on the logarithmic loss. So it finds small marks in pictures, wherever
-they are, which the trees, on whole thumbnails and statistics, may miss.
+answers, and in the squares of that; the scores of a question's answers go through a softmax. It is
+trained by Adam (Kingma & Ba 2015) on the logarithmic loss. So it finds small marks in pictures,
+wherever they are, which the trees, on whole thumbnails and statistics, may miss.
 """
 
 from typing import Any
@@ -45,11 +45,11 @@ class SmallNetwork:
                 for rows in np.split(order, range(BATCH, len(order), BATCH)):
                     step += 1
                     slopes = self._gradients(pictures[rows], right[rows])
-                    size = STEP * np.sqrt(1 - 0.999**step) / (1 - 0.9**step)
-                    for w, m, v, g in zip(self._weights, first, second, slopes, strict=True):
-                        m += 0.1 * (g - m)
-                        v += 0.001 * (g * g - v)
-                        w -= (size * m / (np.sqrt(v) + 1e-8)).astype(np.float32)
+                    size = np.float32(STEP * np.sqrt(1 - 0.999**step) / (1 - 0.9**step))
+                    for i, slope in enumerate(slopes):
+                        first[i] += 0.1 * (slope - first[i])
+                        second[i] += 0.001 * (slope**2 - second[i])
+                        self._weights[i] -= size * first[i] / (np.sqrt(second[i]) + 1e-8)
         return self
 
     def scores(self, pictures: Array) -> Array:

@@ -39,6 +39,21 @@ def statistics_record(images: int) -> np.dtype[np.void]:
     return np.dtype([(name, kind, (images, *more)) for name, kind, more in columns])
 
 
+def border(pixels: Array) -> Array:
+    """Return the pixels on the border of images, (Q, I, H, W, ...) to (Q, I, B, ...)."""
+    sides = (pixels[:, :, 0], pixels[:, :, -1], pixels[:, :, 1:-1, 0], pixels[:, :, 1:-1, -1])
+    return np.concatenate(sides, axis=2)
+
+
+def border_color(images: Array) -> Array:
+    """Return the most frequent colour on the images' borders, (3,); zero if there is no image."""
+    colors = border(images).reshape(-1, 3)
+    if not len(colors):
+        return np.zeros(3, images.dtype)
+    distinct, counts = np.unique(colors, axis=0, return_counts=True)
+    return np.asarray(distinct[counts.argmax()])
+
+
 def silhouettes(images: Array, background: Array) -> NDArray[np.bool_]:
     """Return which pixels differ from the background, (Q, I, H, W).
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit.statistics import measure, silhouettes
+from iqtt.audit.statistics import border, border_color, measure, silhouettes
 from iqtt.files.layout import NO_CUBE, SCORED
 from iqtt.files.reader import QuestionsFile, answers_beside, parts
 from iqtt.questions.specs import SplitSpec
@@ -156,7 +156,7 @@ def read_table(
         first = questions.read("questions", slice(0, min(1, source.count)))
         chunk = max(1, CHUNK_PIXELS // math.prod(first.shape[1:4]))
         first = questions.read("questions", slice(0, min(chunk, source.count)))
-        background = _border_color(first)
+        background = border_color(first)
         scans: list[tuple[Array, ...]] = []
         images_digest = ColumnDigest()
         for start in range(0, source.count, chunk):
@@ -207,21 +207,6 @@ def content_problems(tables: Sequence[AuditTable]) -> list[str]:
     return problems
 
 
-def _border(pixels: Array) -> Array:
-    """Return the pixels on the border of images, (Q, I, H, W, ...) to (Q, I, B, ...)."""
-    sides = (pixels[:, :, 0], pixels[:, :, -1], pixels[:, :, 1:-1, 0], pixels[:, :, 1:-1, -1])
-    return np.concatenate(sides, axis=2)
-
-
-def _border_color(images: Array) -> Array:
-    """Return the most frequent colour on the images' borders, (3,); zero if there is no image."""
-    colors = _border(images).reshape(-1, 3)
-    if not len(colors):
-        return np.zeros(3, images.dtype)
-    distinct, counts = np.unique(colors, axis=0, return_counts=True)
-    return np.asarray(distinct[counts.argmax()])
-
-
 def _scan(images: Array, background: Array, wanted: Array) -> tuple[Array, ...]:
     """Return the arrays of `AuditTable`, from `digests` on, of some questions.
 
@@ -242,7 +227,7 @@ def _scan(images: Array, background: Array, wanted: Array) -> tuple[Array, ...]:
     return (
         np.array(digests, "V16").reshape(images.shape[:2]),
         np.count_nonzero(shown, axis=(2, 3)),
-        np.count_nonzero(_border(shown), axis=2),
+        np.count_nonzero(border(shown), axis=2),
         unfit,
         measure(images[wanted], shown[wanted]),
     )

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 FOLDS = 5  # of the cross-validation
-ENSEMBLE = 3  # sets of trees whose scores are added, each with other random choices of columns
 
 
 class AnswerTrees:
     """Trees that score the answers of questions (scikit-learn's HistGradientBoosting)."""
 
-    def __init__(self) -> None:
+    def __init__(self, ensemble: int = 1) -> None:
+        """Choose how many sets of trees to learn, each with other random choices of columns."""
+        self._ensemble = ensemble
         self._trees: list[Any] = []
 
     def fit(self, columns: Array, right: Array) -> "AnswerTrees":
@@ -43,12 +44,13 @@ class AnswerTrees:
                     max_iter=int(np.interp(count, (200, 1000, 5000), (60, 100, 200))),
                     max_leaf_nodes=int(np.interp(count, (200, 1000, 5000), (4, 8, 12))),
                     max_features=0.3,
+                    max_bins=64,
                     min_samples_leaf=20,
                     l2_regularization=5.0,
                     early_stopping=False,
                     random_state=seed,
                 ).fit(columns.reshape(-1, width), is_right.reshape(-1))
-                for seed in range(ENSEMBLE)
+                for seed in range(self._ensemble)
             ]
         return self
 
@@ -72,7 +74,11 @@ def choose(columns: Array, right: Array) -> Array:
 
 
 def among_others(features: Array) -> Array:
-    """Return each answer's features, and how they stand to the others', (N, K, D) to (N, K, 4 D)."""
+    """Return each answer's features, and how they stand to the others', (N, K, 4 D).
+
+    Args:
+        features: (N, K, D).
+    """
     wide = features.astype(np.float32)
     count = wide.shape[1]
     others = (wide.sum(axis=1, keepdims=True) - wide) / (count - 1)
@@ -95,27 +101,6 @@ def next_to_reference(features: Array, distances: Array) -> Array:
     far = np.sqrt(((apart / unit) ** 2).sum(axis=2, keepdims=True))
     both = np.concatenate([apart, distances, far], axis=2).astype(np.float32)
     return np.concatenate([both, answers + reference, both - _least_of_others(both)], axis=2)
-
-
-def both_ways(features: Array, distances: Array, right: Array) -> tuple[Array, Array, Array]:
-    """Return questions twice: as they are, and with the reference and the right answer swapped.
-
-    What is asked of the second is as true as of the first, so trees learn from twice as many.
-
-    Args:
-        features, right: (N, 1 + K, D) and (N,).
-        distances: between any two images, (N, 1 + K, 1 + K, P).
-    """
-    rows = np.arange(len(right))
-    order = np.tile(np.arange(features.shape[1]), (len(right), 1))
-    order[rows, 0], order[rows, 1 + right] = 1 + right, 0
-    swapped = np.take_along_axis(features, order[:, :, None], axis=1)
-    moved = distances[rows[:, None, None], order[:, :, None], order[:, None, :]]
-    return (
-        np.concatenate([features, swapped]),
-        np.concatenate([distances, moved]),
-        np.concatenate([right, right]),
-    )
 
 
 def _mean_of_others(values: Array) -> Array:
