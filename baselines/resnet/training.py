@@ -5,7 +5,6 @@ goes on after a kill as if it had never stopped.
 """
 
 import errno
-import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -165,7 +164,6 @@ def _steps(method: Method, state: State, source: LabelledQuestions) -> Iterator[
     card = state.card
     draws = Draws(len(source), card.batch, card.seed, card.iteration)
     batches = iter(DataLoader(source, batch_sampler=draws))
-    began = time.monotonic() - card.seconds
     device = next(state.network.parameters()).device
     state.network.train()
     for number in range(card.iteration, card.iterations):
@@ -180,8 +178,7 @@ def _steps(method: Method, state: State, source: LabelledQuestions) -> Iterator[
         state.optimiser.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
         state.optimiser.step()
-        seconds = round(time.monotonic() - began, 3)
-        state.card = replace(state.card, iteration=number + 1, seconds=seconds)
+        state.card = replace(state.card, iteration=number + 1)
         yield float(loss.detach())
 
 
