@@ -92,7 +92,8 @@ def baseline(
                 bar.update(done)
 
             write = _package(name).write_submission
-            write(data, out, weights, overwrite=overwrite, progress=show)
+            given = {} if weights is None else {"weights": weights}
+            write(data, out, **given, overwrite=overwrite, progress=show)
     elif name == "chance":
         from baselines.trivial import write_chance
 

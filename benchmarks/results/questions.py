@@ -23,6 +23,7 @@ TRAINING = Step(
 )
 SUITE = Step("iqtt make-split --preset suite --out suite", "suite")
 TRAIN = "mixed/iqtt-train.h5"
+LABELS = (0, 200, 1000)
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,8 @@ class Method:
         labels: numbers of labelled questions.
         answer: the command that writes a submission for {test}, to {out}.
         train: the command that trains in folder {run}; empty where nothing is trained.
+        start: what is added to it where labels are used, if all but a last layer is that of the run
+            without labels, whose weights are {start}; or empty.
         runs: how many seeds at most; one where the seed changes nothing.
         paper: its name in the paper's Table 3.
         answers: numbers of answers that it can choose from.
@@ -43,6 +46,7 @@ class Method:
     labels: tuple[int, ...]
     answer: str
     train: str = ""
+    start: str = ""
     runs: int = 10
     paper: str = ""
     answers: tuple[int, ...] = (2, 3)
@@ -63,16 +67,16 @@ METHODS = (
     Method(
         "outline-trees",
         (200, 1000),
-        "bench baseline outline-trees --train {train} --labels {labels} --data {test} --seed {seed}"
-        " --out {out}",
+        "bench baseline outline-trees --train {train} --labels {labels} --data {test} --out {out}",
+        runs=1,
     ),
     _trained("cnn", (200, 1000), paper="CNN", answers=(3,)),
     _trained("siamese", (200, 1000), paper="Siamese CNN"),
-    _trained("ptn", (0, 200, 1000), paper="Persp. Transf. Nets"),
-    _trained("rezende", (0, 200, 1000), paper="Rezende et al."),
+    _trained("ptn", LABELS, paper="Persp. Transf. Nets", start="""--set 'networks="{start}"'"""),
+    _trained("rezende", LABELS, paper="Rezende et al.", start="""--set 'start="{start}"'"""),
     Method(
         "pix2shape",
-        (0, 200, 1000),
+        LABELS,
         "bench baseline pix2shape --data {test} --weights {run}/weights.safetensors --out {out}",
         "pix2shape train --data {train} --labels {labels} --seed {seed} --set iterations=1500"
         " --out {run}",
@@ -108,13 +112,12 @@ def _cell(folder: Path, method: Method, labels: int, kind: str, seeds: int) -> d
     """Return the scores of a method on a kind of questions, as means over its runs."""
     test = f"suite/{kind}/iqtt-test.h5"
     numbers = range(min(seeds, method.runs))
-    names = {seed: f"{method.name}-{labels}-{seed}" for seed in numbers}
     settings = {
         "method": method.name,
         "labels": labels,
         "kind": kind,
         "seeds": len(numbers),
-        "train": method.train,
+        "train": method.train + (f" {method.start}" if labels else ""),
         "answer": method.answer,
         "files": {path: mark(folder / path) for path in (TRAIN, test)},
         "bundled": "" if method.train else bundled_mark(method.name),
@@ -122,15 +125,10 @@ def _cell(folder: Path, method: Method, labels: int, kind: str, seeds: int) -> d
 
     def score() -> dict[str, Any]:
         outs = []
-        for seed, name in names.items():
-            words = {"train": TRAIN, "labels": labels, "seed": seed, "run": name, "test": test}
-            out = f"{name}/answers-{kind}.h5"
-            reads = [test]
-            if method.train:
-                weights = f"{name}/weights.safetensors"
-                step = Step(method.train.format(**words), weights, (TRAIN,), run=name)
-                made(folder, step)
-                reads.append(weights)
+        for seed in numbers:
+            run, out = _run(method, labels, seed), f"{_run(method, labels, seed)}/answers-{kind}.h5"
+            reads = [test, *([_weights(folder, method, labels, seed)] if method.train else [])]
+            words = {"train": TRAIN, "labels": labels, "seed": seed, "run": run, "test": test}
             made(folder, Step(method.answer.format(**words, out=out), out, tuple(reads)))
             outs.append(out)
         truth = test.replace(".h5", "-answers.h5")
@@ -141,6 +139,23 @@ def _cell(folder: Path, method: Method, labels: int, kind: str, seeds: int) -> d
         return {name: scores.get(name, {}) for name in ("metrics", "skills")}
 
     return record(_place(folder, method.name, labels, kind), settings, score)
+
+
+def _run(method: Method, labels: int, seed: int) -> str:
+    return f"{method.name}-{labels}-{seed}"
+
+
+def _weights(folder: Path, method: Method, labels: int, seed: int) -> str:
+    """Train a method, unless it is trained; return the path of its weights."""
+    run, command, reads = _run(method, labels, seed), method.train, [TRAIN]
+    words = {"train": TRAIN, "labels": labels, "seed": seed, "run": run}
+    if labels and method.start:
+        start = _weights(folder, method, 0, seed)
+        command, words["start"] = f"{command} {method.start}", start
+        reads.append(start)
+    weights = f"{run}/weights.safetensors"
+    made(folder, Step(command.format(**words), weights, tuple(reads), run=run))
+    return weights
 
 
 def _place(folder: Path, method: str, labels: int, kind: str) -> Path:
