@@ -26,6 +26,8 @@ UNTRAINED = {
     "empty-room": "the room's walls and floor, which it is told, without objects",
     "oracle": "the truth itself, which must score perfectly",
     "chance": "random answers to questions",
+    "outline": "answers to questions: the nearest outline, without any label or 3D",
+    "outline-trees": "answers to questions: trees on features of outlines, learned from --train",
     "pix2shape": "the reference model, which `pix2shape train` trains",
 }
 # Packages `baselines.<name>`, - written as _, whose functions `train` and `write_submission` make
@@ -49,7 +51,14 @@ def _listed(baselines: Mapping[str, str]) -> str:
 @click.argument("name", type=click.Choice(list(ALL)))
 @click.option("--data", type=InputPath(), required=True, help="Rooms or questions to predict.")
 @click.option(
-    "--train", type=InputPath(), help="Rooms that constant and mean-depth take their means from."
+    "--train",
+    type=InputPath(),
+    help="What is learned from: rooms for constant and mean-depth, questions for outline-trees.",
+)
+@click.option(
+    "--labels",
+    type=click.IntRange(1, LARGEST),
+    help="Labelled questions of --train that outline-trees learns from  [all].",
 )
 @SUBMISSION
 @click.option(
@@ -70,6 +79,7 @@ def baseline(
     name: str,
     data: str,
     train: str | None,
+    labels: int | None,
     out: str,
     seed: int,
     weights: str | None,
@@ -81,8 +91,12 @@ def baseline(
     if train is not None and name in ("pix2shape", *TRAINED):
         command = "pix2shape train" if name == "pix2shape" else f"bench train {name}"
         raise click.UsageError(f"--train: {name} is trained already; see {command}")
+    if labels is not None and name != "outline-trees":
+        raise click.UsageError(f"--labels: {name} learns from none")
     method = name
-    if name == "pix2shape":
+    if name in ("outline", "outline-trees"):
+        _answer_by_outline(name, data, out, train, labels, overwrite)
+    elif name == "pix2shape":
         method += f", weights {predict_to(out, weights, data, overwrite=overwrite)},"
     elif name in TRAINED:
         with progress_bar(None, "row") as bar:
@@ -106,6 +120,21 @@ def baseline(
             how = {"overwrite": overwrite, "progress": bar.update}
             write_room_baseline(name, data, out, train=train, **how)
     print_line(f"{out}: {method} on {data}; score it with `bench score {out} --truth {data}`")
+
+
+def _answer_by_outline(
+    name: str, data: str, out: str, train: str | None, labels: int | None, overwrite: bool
+) -> None:
+    from baselines.outline.submission import write_outline, write_outline_trees
+
+    if (train is None) == (name == "outline-trees"):
+        needs = "needs" if train is None else "uses no"
+        raise click.UsageError(f"--train: {name} {needs} labelled questions")
+    with progress_bar(None, "question") as bar:
+        if train is None:
+            write_outline(data, out, overwrite=overwrite, progress=bar.update)
+        else:
+            write_outline_trees(data, out, train, labels, overwrite=overwrite, progress=bar.update)
 
 
 @click.command(

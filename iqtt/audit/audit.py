@@ -13,7 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit import kind_proofs, proofs, shape_proofs, view_proofs
+from iqtt.audit import (
+    explanations,
+    kind_proofs,
+    proofs,
+    shape_proofs,
+    split_proofs,
+    view_proofs,
+)
 from iqtt.audit.frames import stored_frames
 from iqtt.audit.probes import Evidence, Probe, run_probes
 from iqtt.audit.proofs import Proof
@@ -26,10 +33,11 @@ Array = NDArray[Any]
 FORMAT = {"format": "pix2shape-bench/iqtt-audit", "format_version": "1.0"}
 PROBED = 20_000  # questions that probes look at, by default
 CAST = 48  # questions whose images are ray-cast again
+EXPLAINED = 2_000  # questions whose wrong answers are laid on the reference
 _BY_CUBES = (
     *("shapes", "one right answer", "answers differ", "mirror images", "matched", "stored ids"),
-    "splits apart",
-    *("rotations", "angles", "visibility", "cast again"),
+    *("splits apart", "splits for ever", "rotations", "angles", "visibility", "cast again"),
+    "one explanation",
 )
 
 
@@ -158,7 +166,8 @@ def _prove(
     shapes = [one for table, one in zip(tables, shapes, strict=True) if table.truth]
     if not told:
         return [Proof(name, "skipped", "no shape descriptions") for name in _BY_CUBES] + found
-    sample = _spread([len(table) for table in told], CAST)
+    counts = [len(table) for table in told]
+    sample = _spread(counts, CAST)
     by_cubes = [
         shape_proofs.whole_shapes(told, shapes),
         shape_proofs.one_right_answer(told, shapes),
@@ -166,11 +175,13 @@ def _prove(
         kind_proofs.mirror_images(told, shapes),
         kind_proofs.matched(told, shapes),
         shape_proofs.stored_ids(told, shapes),
-        shape_proofs.splits_share_nothing(told, shapes),
+        split_proofs.splits_share_nothing(told, shapes),
+        split_proofs.splits_for_ever(told, shapes),
         view_proofs.rotations(told),
         view_proofs.angles(told, shapes),
         proofs.visibility(told),
         view_proofs.cast_again(told, shapes, sample),
+        explanations.no_other_explanation(told, shapes, _spread(counts, EXPLAINED)),
     ]
     untold = [table.name for table in tables if not table.truth]
     note = f"; not told of {', '.join(untold)}" if untold else ""

@@ -152,32 +152,3 @@ def _not_one_to_one(a: Array, b: Array) -> Array:
     joins = (a[order][1:] == a[order][:-1]) & (b[order][1:] != b[order][:-1])
     bad = np.unique(a[order][1:][joins])
     return np.asarray(np.isin(a, bad))
-
-
-def splits_share_nothing(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
-    """Prove that no shape, nor its mirror image, is in two splits."""
-    names = [table.split or "" for table in tables]
-    owned: dict[str, Array] = dict.fromkeys(sorted(set(names)), np.zeros(0, np.int64))
-    if len(owned) < 2:
-        return Proof("splits apart", "skipped", f"one split alone: {', '.join(owned)}")
-    for split, one in zip(names, shapes, strict=True):
-        owned[split] = np.union1d(owned[split], one.class_name[one.whole])
-    every, times = np.unique(np.concatenate(list(owned.values())), return_counts=True)
-    shared = every[times > 1]
-    rule = "no shape, nor its mirror image, in two splits"
-    number = ", ".join(f"{split} {len(own):,}" for split, own in owned.items())
-    return judge(
-        "splits apart",
-        f"{rule} (classes: {number})",
-        tables,
-        [np.isin(s.class_name, shared).any(axis=1) & s.whole for s in shapes],
-        lambda t, row: (
-            f"its shape is in {_elsewhere(owned, shapes[t].class_name[row], names[t])} too"
-        ),
-    )
-
-
-def _elsewhere(owned: dict[str, Array], classes: Array, split: str) -> str:
-    return " and ".join(
-        name for name, own in owned.items() if name != split and np.isin(classes, own).any()
-    )

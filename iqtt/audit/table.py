@@ -24,7 +24,7 @@ Array = NDArray[Any]
 CHUNK_PIXELS = 2**20  # pixels of questions in memory at once
 TRUTH = (
     *("cubes", "shape_id", "class_id", "world_from_shape"),
-    *("distractor_kind", "angle_degrees", "visible_pixels"),
+    *("distractor_kind", "angle_degrees", "visible_pixels", "camera_distance"),
 )
 
 
@@ -56,7 +56,7 @@ class AuditTable:
     """What was read of a table of Q questions: everything except the pixels.
 
     Attributes:
-        spec, split, fingerprint: as in the file; None for a released file.
+        spec, split, fingerprint, format_version: as in the file; None for a released file.
         images: number of images of a question: the reference, and its answers.
         answers: which of the answers is right, (Q,); None if the file does not tell.
         truth: the datasets `TRUTH` by name, (Q, ...) each; empty if the file has no shapes.
@@ -76,6 +76,7 @@ class AuditTable:
     spec: SplitSpec | None
     split: str | None
     fingerprint: str | None
+    format_version: str | None
     image_dtype: str
     images: int
     answers: Array | None
@@ -172,7 +173,8 @@ def read_table(
         read = truth if answers is None else {"answers": answers, **truth}
         digests = {name: dataset_digest(values) for name, values in read.items()}
         digests["questions"] = images_digest.hex
-        contents = {questions.stored_at(name): digest for name, digest in digests.items()}
+        stored = questions.stored_bytes()  # files before format 2.0 hold no camera_distance
+        contents = {questions.stored_at(n): digest for n, digest in digests.items() if n in stored}
         told = questions.stored_content_digest is not None
         scored = joint_digest({name: digests[name] for name in SCORED if name in digests})
         return AuditTable(
@@ -180,6 +182,7 @@ def read_table(
             questions.spec,
             questions.split,
             questions.fingerprint,
+            questions.attributes.get("format_version"),
             questions.image_dtype,
             first.shape[1],
             answers,
