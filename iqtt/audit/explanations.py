@@ -22,10 +22,13 @@ from iqtt.audit.congruence import cube_codes, cube_rotations
 from iqtt.audit.proofs import Proof, judge
 from iqtt.audit.shape_proofs import Shapes
 from iqtt.audit.table import AuditTable
+from iqtt.questions.specs import SplitSpec
+from scenegen.camera import pixel_directions
 
 Array = NDArray[Any]
 MOVED = 3  # cubes of a wrong answer that may lie elsewhere than the reference's
-GRID = 12  # rays a side at each cube that does not coincide
+GRID = 12  # rays a side at each cube that does not coincide, for a rough count
+ROUGH = 4  # where the rough count is below so many times the limit, pixels are counted
 REACH = 0.87  # half the side of the square of rays, cube edges: no cube reaches farther
 _QUESTIONS, _CANDIDATES = 64, 64  # at a time: bounds the memory
 
@@ -99,82 +102,80 @@ def _laid_on(table: AuditTable, shapes: Shapes, rows: Array, n: int) -> tuple[Ar
 
 
 def _looks_alike(table: AuditTable, question: Array, cubes: Array, n: int) -> tuple[Array, Array]:
-    """Return which candidates look like the reference, and which show all their cubes, (M,) each."""
-    spec = table.spec
-    assert spec is not None
-    alike, shown = np.zeros((2, len(question)), np.bool_)
+    """Return which candidates give the reference's picture, and which show all cubes, (M,) each."""
+    spec, found = table.spec, np.zeros((2, len(question)), np.bool_)
+    if spec is None:
+        return found[0], found[1]
     for start in range(0, len(question), _CANDIDATES):
-        part = slice(start, start + _CANDIDATES)
-        row, candidate = question[part], cubes[part]
+        row, candidate = (values[start : start + _CANDIDATES] for values in (question, cubes))
         reference = table.cubes[row, 0, :n].astype(np.int64)
-        eye, across = _camera(table, row)
+        eye, axes = _camera(table, row)
         centre = (reference.min(axis=1) + reference.max(axis=1) + 1) / 2
-        sets = [(c - centre[:, None] + 0.5).astype(np.float32) for c in (reference, candidate)]
-        apart = (candidate[:, :, None] != reference[:, None]).any(axis=3).all(axis=2)
-        gone = (reference[:, :, None] != candidate[:, None]).any(axis=3).all(axis=2)
-        pixels = np.zeros((2, len(row)))
-        least = np.full(len(row), np.inf)
-        # Of the reference, the pixels of cubes that the candidate lacks; and the other way round.
-        for k, (own, other, moved) in enumerate(
-            ((sets[0], sets[1], gone), (sets[1], sets[0], apart))
-        ):
-            for i in range(n):
-                some = np.flatnonzero(moved[:, i])
-                if len(some):
-                    size, sees, same = _pixels_of(
-                        own[some], other[some], i, eye[some], across[some], spec
-                    )
-                    pixels[k, some] += ((sees & ~same).sum(axis=1)) * size
-                    if k:
-                        least[some] = np.minimum(least[some], sees.sum(axis=1) * size)
-        alike[part] = pixels.max(axis=0) < spec.min_cube_pixels
-        shown[part] = least >= spec.min_cube_pixels
-        # The cubes that coincide may be hidden by those that do not: looked at only if need be.
-        for i in range(n):
-            some = np.flatnonzero(alike[part] & shown[part] & ~apart[:, i])
-            if len(some):
-                size, sees, _ = _pixels_of(
-                    sets[1][some], sets[0][some], i, eye[some], across[some], spec
-                )
-                shown[start + some] &= sees.sum(axis=1) * size >= spec.min_cube_pixels
-    return alike, shown
+        own, other = (
+            (c + 0.5 - centre[:, None]).astype(np.float32) for c in (reference, candidate)
+        )
+        differing = np.maximum(
+            _pixels_apart(own, other, eye, axes, spec), _pixels_apart(other, own, eye, axes, spec)
+        )
+        for k in np.flatnonzero(differing < ROUGH * spec.min_cube_pixels).tolist():
+            rays = (_pixel_rays(spec) @ axes[k])[None].astype(np.float32)
+            _, face = _first_hits(own[k : k + 1], eye[k : k + 1], rays)
+            cube, other_face = _first_hits(other[k : k + 1], eye[k : k + 1], rays)
+            least = np.bincount(cube[cube >= 0], minlength=n).min()
+            found[0, start + k] = np.count_nonzero(face != other_face) < spec.min_cube_pixels
+            found[1, start + k] = least >= spec.min_cube_pixels
+    return found[0], found[1]
 
 
-def _camera(table: AuditTable, row: Array) -> tuple[Array, Array]:
-    """Return the eye, (M, 3), and the picture's two axes, (M, 2, 3), in the references' frames."""
-    spec, view = table.spec, table.truth["world_from_shape"][row, 0]
-    assert spec is not None
-    distance = table.truth["camera_distance"][row]
-    pose = np.stack([spec.camera(float(d)).world_from_camera for d in distance])
-    eye = (pose[:, None, :3, 3] @ view)[:, 0]
-    return eye, pose[:, :3, :2].swapaxes(1, 2) @ view
-
-
-def _pixels_of(
-    own: Array, other: Array, i: int, eye: Array, across: Array, spec: Any
-) -> tuple[Array, Array, Array]:
-    """Cast a grid of rays at cube i of each of M shapes.
+def _pixels_apart(own: Array, other: Array, eye: Array, axes: Array, spec: SplitSpec) -> Array:
+    """Return roughly how many pixels of cubes that the other shape lacks it shows in another way.
 
     Args:
-        own, other: centres of the cubes of the shape, and of the one to compare with, (M, n, 3).
+        own, other: centres of the cubes of two shapes in one frame, (M, n, 3).
+        eye, axes: as `_camera` gives them.
 
-    Returns the pixels that a ray stands for, (M,); which rays see the cube, (M, GRID**2) bool; and
-    which see a face of the same direction of the other shape.
+    Returns (M,) pixels, of which a ray of the grid stands for several.
     """
     step = ((np.arange(GRID) + 0.5) / GRID * 2 - 1) * REACH
     s, t = (v.reshape(-1, 1) for v in np.meshgrid(step, step))
-    aim = own[:, i, None] + s * across[:, None, 0] + t * across[:, None, 1]
-    rays = (aim - eye[:, None]).astype(np.float32)
-    cube, face = _first_hits(own, eye.astype(np.float32), rays)
-    _, other_face = _first_hits(other, eye.astype(np.float32), rays)
-    forward = np.cross(across[:, 0], across[:, 1])
-    depth = np.abs(((own[:, i] - eye) * forward).sum(axis=1))
-    edge = min(spec.height, spec.width) / 2 / math.tan(math.radians(spec.fov_degrees) / 2) / depth
-    return (2 * REACH / GRID * edge) ** 2, cube == i, face == other_face
+    square = (s * axes[:, None, 0] + t * axes[:, None, 1]).astype(np.float32)
+    result = np.zeros(len(own))
+    focal = min(spec.height, spec.width) / 2 / math.tan(math.radians(spec.fov_degrees) / 2)
+    lacks = (np.abs(own[:, :, None] - other[:, None]) > 0.5).any(axis=3).all(axis=2)
+    for i in range(own.shape[1]):
+        some = np.flatnonzero(lacks[:, i])
+        rays = own[some, i, None] + square[some] - eye[some, None]
+        cube, face = _first_hits(own[some], eye[some], rays)
+        _, other_face = _first_hits(other[some], eye[some], rays)
+        depth = -((own[some, i] - eye[some]) * axes[some, 2]).sum(axis=1)
+        pixels = (2 * REACH / GRID * focal / depth) ** 2
+        result[some] += np.count_nonzero((cube == i) & (face != other_face), axis=1) * pixels
+    return result
+
+
+def _camera(table: AuditTable, row: Array) -> tuple[Array, Array]:
+    """Return the eye, (M, 3), and the camera's three axes, (M, 3, 3), in the references' frames."""
+    view = table.truth["world_from_shape"][row, 0]
+    distance = table.truth["camera_distance"][row]
+    eye = (
+        distance[:, None] * view[:, 2]
+    )  # the camera lies on the world's +z and looks at the origin
+    return eye.astype(np.float32), view
+
+
+def _pixel_rays(spec: SplitSpec) -> Array:
+    """Return the ray of each pixel in the axes of the camera, x right, y up, z back, (H W, 3)."""
+    rays = pixel_directions(spec.height, spec.width, spec.fov_y_degrees).reshape(-1, 3)
+    return np.asarray(rays @ spec.camera(1.0).world_from_camera[:3, :3].T)
 
 
 def _first_hits(cubes: Array, eye: Array, rays: Array) -> tuple[Array, Array]:
-    """Return the nearest cube of each ray, (M, P), and its face's direction, 0 to 5; -1 for none."""
+    """Return the cube that each ray sees, (M, P), and its face's direction, 0 to 5; -1 for none.
+
+    Args:
+        cubes: centres, (M, n, 3).
+        eye, rays: where rays begin, (M, 3), and where they go, (M, P, 3).
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = 1 / rays[:, :, None]
         to_middle = (cubes - eye[:, None])[:, None] * inverse

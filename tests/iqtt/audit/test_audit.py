@@ -193,7 +193,7 @@ def test_a_fair_split_passes_and_all_is_told(split_folder: Path) -> None:
         ("iqtt-train.h5 unlabeled", "from the cubes", 6),
         ("iqtt-val.h5", "stored", 6),
     ]
-    record = json.loads(found.to_json())
+    record = json.loads(to_json([found]))
     assert record["format"] == "pix2shape-bench/iqtt-audit"
     assert record["passed"] is True
     assert {proof["name"] for proof in record["proofs"]} == PROOFS
@@ -203,7 +203,7 @@ def test_a_fair_split_passes_and_all_is_told(split_folder: Path) -> None:
         for proof in found.proofs:
             assert proof.detail in text
         assert all(probe.statistic in text for probe in found.probes)
-    assert audit([split_folder]).to_json() == found.to_json()
+    assert to_json([audit([split_folder])]) == to_json([found])
 
 
 def test_files_that_cannot_be_audited(tmp_path: Path) -> None:
@@ -277,7 +277,7 @@ def test_an_audit_of_no_questions_does_not_pass(tmp_path: Path) -> None:
         file["questions"], file["answers"] = plain(0), np.zeros(0, np.uint8)
     found = audit([tmp_path])
     assert not found.passed
-    assert json.loads(found.to_json())["passed"] is False
+    assert json.loads(to_json([found]))["passed"] is False
     assert {proof.status for proof in found.proofs} <= {"ok", "skipped"}
     assert "there are no questions" in table(found)
 
