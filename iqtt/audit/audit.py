@@ -26,11 +26,11 @@ from iqtt.audit.probes import Evidence, Probe, run_probes
 from iqtt.audit.proofs import Proof
 from iqtt.audit.shape_proofs import Shapes
 from iqtt.audit.statistics import SHAPE_STATISTICS, shape_statistics
-from iqtt.audit.table import AuditTable, find_tables, read_table
+from iqtt.audit.table import AuditTable, find_tables, lacking, read_table
 from scenegen.common.hdf5.row_file import writer_name
 
 Array = NDArray[Any]
-FORMAT = {"format": "pix2shape-bench/iqtt-audit", "format_version": "1.0"}
+FORMAT = {"format": "pix2shape-bench/iqtt-audit", "format_version": "2.0"}
 PROBED = 20_000  # questions that probes look at, by default
 CAST = 48  # questions whose images are ray-cast again
 EXPLAINED = 2_000  # questions whose wrong answers are laid on the reference
@@ -61,11 +61,16 @@ class AuditedTable:
 
 @dataclass(frozen=True)
 class Audit:
-    """The result of an audit."""
+    """The result of an audit.
+
+    Attributes:
+        lacking: for each folder without some of a split's four files, a line that says which.
+    """
 
     tables: tuple[AuditedTable, ...]
     proofs: tuple[Proof, ...]
     probes: tuple[Probe, ...]
+    lacking: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -82,20 +87,25 @@ class Audit:
         """The probes that beat chance though they must not."""
         return tuple(probe for probe in self.probes if probe.is_shortcut)
 
-    def to_json(self) -> str:
-        """Return all numbers as indented JSON."""
+    def record(self) -> dict[str, Any]:
+        """Return all numbers, ready for JSON."""
         probes = [
             {**asdict(p), "accuracy": p.accuracy, "is_shortcut": p.is_shortcut} for p in self.probes
         ]
-        record = {
-            **FORMAT,
-            "writer": writer_name(),
+        return {
             "passed": self.passed,
+            "lacking": list(self.lacking),
             "tables": [asdict(table) for table in self.tables],
             "proofs": [asdict(proof) for proof in self.proofs],
             "probes": probes,
         }
-        return json.dumps(record, indent=2) + "\n"
+
+
+def to_json(audits: Sequence[Audit]) -> str:
+    """Return the numbers of one or more audits as indented JSON."""
+    passed, records = all(one.passed for one in audits), [one.record() for one in audits]
+    record = {**FORMAT, "writer": writer_name(), "passed": passed, "audits": records}
+    return json.dumps(record, indent=2) + "\n"
 
 
 def question_count(paths: Sequence[str | Path]) -> int:
@@ -114,14 +124,15 @@ def audit(
     Files of answers are found beside the files of questions. Images are read once, in chunks.
 
     Args:
-        paths: question files, or folders with files iqtt-*.h5.
+        paths: question files, or folders of them; all ask questions of as many answers. Of a folder
+            of splits, audit each that `find_splits` gives.
         probed: largest number of questions that probes look at, spread evenly.
         progress: is called with the number of questions that were read since the last call.
 
     Raises:
         OSError: no such file or folder, or a folder without question files.
         FileFormatError: a file that is no question file, or damaged.
-        SpecError: no paths.
+        SpecError: no paths, or questions of different numbers of answers.
     """
     sources = find_tables(paths)
     measured = _spread([source.count if source.answered else 0 for source in sources], probed)
@@ -135,7 +146,8 @@ def audit(
     ]
     found = _prove(tables, shapes, right)
     probes = run_probes(_evidence(tables, shapes, right))
-    return Audit(tuple(map(_audited, tables, right)), tuple(found), probes)
+    lacks = tuple(lacking(paths))
+    return Audit(tuple(map(_audited, tables, right)), tuple(found), probes, lacks)
 
 
 def _spread(counts: Sequence[int], most: int) -> list[Array]:

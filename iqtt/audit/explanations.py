@@ -157,9 +157,7 @@ def _camera(table: AuditTable, row: Array) -> tuple[Array, Array]:
     """Return the eye, (M, 3), and the camera's three axes, (M, 3, 3), in the references' frames."""
     view = table.truth["world_from_shape"][row, 0]
     distance = table.truth["camera_distance"][row]
-    eye = (
-        distance[:, None] * view[:, 2]
-    )  # the camera lies on the world's +z and looks at the origin
+    eye = distance[:, None] * view[:, 2]  # the camera lies on the world's +z axis
     return eye.astype(np.float32), view
 
 

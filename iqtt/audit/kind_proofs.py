@@ -20,7 +20,7 @@ from iqtt.questions.specs import DISTRACTOR_KINDS
 Array = NDArray[Any]
 # Largest distance of the principal radii of gyration of two answers, cube edges: twice that of two
 # matched shapes, as two answers may both be matched to a third.
-GYRATION = 0.1
+GYRATION = 0.12
 
 
 def answers_differ(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:

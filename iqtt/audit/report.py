@@ -24,7 +24,7 @@ _BLOCKS = (
 def table(audit: Audit) -> str:
     """Return proofs and probes as text with aligned columns."""
     files = [(t.name, f"{t.questions:,} questions", t.split or "released") for t in audit.tables]
-    lines = [*aligned(files), ""]
+    lines = [*aligned(files), *audit.lacking, ""]
     lines += aligned([(p.status, p.name, p.detail) for p in audit.proofs])
     for title, rows in _blocks(audit.probes):
         lines += ["", title, *("  " + line for line in aligned(rows))]
@@ -35,6 +35,7 @@ def markdown(audit: Audit) -> str:
     """Return proofs and probes as Markdown tables."""
     files = [(t.name, f"{t.questions:,}", f"{t.probed:,}") for t in audit.tables]
     lines = piped([("table", "questions", "probed"), *files])
+    lines += [*(f"\n{line}" for line in audit.lacking)]
     lines += [
         "",
         *piped([("", "proof", "found"), *((p.status, p.name, p.detail) for p in audit.proofs)]),

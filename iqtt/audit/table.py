@@ -1,7 +1,6 @@
 """Find tables of questions, and read them for the audit: images once, in chunks."""
 
 import hashlib
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ from scenegen.common.hdf5.row_file import digest_problems
 from scenegen.common.records import check
 
 Array = NDArray[Any]
+ROLES = ("train", "val", "test", "test-answers")
 CHUNK_PIXELS = 2**20  # pixels of questions in memory at once
 TRUTH = (
     *("cubes", "shape_id", "class_id", "world_from_shape"),
@@ -37,6 +37,7 @@ class Source:
         part: "labeled" or "unlabeled" of a training file, else "".
         answers: the file with the answers, if it is another one.
         answered: whether the right answers are known, from answers or from shapes.
+        count, images: number of questions, and of images of each.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Source:
     answers: Path | None
     answered: bool
     count: int
+    images: int
 
     def open(self) -> QuestionsFile:
         """Open the table. Raises as `QuestionsFile`."""
@@ -57,7 +59,6 @@ class AuditTable:
 
     Attributes:
         spec, split, fingerprint, format_version: as in the file; None for a released file.
-        images: number of images of a question: the reference, and its answers.
         answers: which of the answers is right, (Q,); None if the file does not tell.
         truth: the datasets `TRUTH` by name, (Q, ...) each; empty if the file has no shapes.
         contents: digest of each dataset that was read, by its file and its name there; empty if
@@ -78,7 +79,6 @@ class AuditTable:
     fingerprint: str | None
     format_version: str | None
     image_dtype: str
-    images: int
     answers: Array | None
     truth: dict[str, Array]
     contents: dict[tuple[Path, str], str]
@@ -97,6 +97,11 @@ class AuditTable:
         return self.source.name
 
     @property
+    def images(self) -> int:
+        """Number of images of a question: the reference, and its answers."""
+        return self.source.images
+
+    @property
     def cubes(self) -> Array:
         """Cubes of the images' shapes as stored, (Q, I, most, 3); NO_CUBE if the file has none."""
         blank = (len(self), self.images, 1, 3)
@@ -107,9 +112,10 @@ class AuditTable:
 
 
 def find_tables(paths: Sequence[str | Path]) -> list[Source]:
-    """Find the tables of question files; of a folder, those of all its files iqtt-*.h5.
+    """Find the tables of question files; of a folder, those of all its files.
 
-    A file of answers stands for the file of questions beside it.
+    Of a folder that `iqtt make-split` wrote these are iqtt-*.h5, of another all its *.h5, such as
+    the released ones. A file of answers stands for the file of questions beside it.
 
     Raises:
         OSError: no such file or folder, or a folder without question files.
@@ -119,15 +125,15 @@ def find_tables(paths: Sequence[str | Path]) -> list[Source]:
     check(len(paths) > 0, "paths", "none", "question files, or folders of them")
     files: dict[Path, Path] = {}
     for path in map(Path, paths):
-        found = sorted(path.glob("iqtt-*.h5")) if path.is_dir() else [path]
+        found = _files(path) if path.is_dir() else [path]
         if not found:
-            raise FileNotFoundError(2, "holds no iqtt-*.h5", str(path))
+            raise FileNotFoundError(2, "holds no question files *.h5", str(path))
         for file in found:
             asked = file.with_name(file.stem.removesuffix("-answers") + file.suffix)
             chosen = asked if asked.is_file() else file
             files.setdefault(chosen.resolve(), chosen)
     names = [path.name for path in files.values()]
-    sources = []
+    sources: list[Source] = []
     for path in files.values():
         trial.try_file(path)
         shown = path.name if names.count(path.name) == 1 else str(path)
@@ -136,8 +142,47 @@ def find_tables(paths: Sequence[str | Path]) -> list[Source]:
             with QuestionsFile(path, part, beside) as questions:
                 name = f"{shown} {part}".rstrip()
                 answered = questions.has_answers or questions.has_truth
-                sources.append(Source(name, path, part, beside, answered, len(questions)))
+                images = questions.read("questions", slice(0, 0)).shape[1]
+                sources.append(Source(name, path, part, beside, answered, len(questions), images))
+    counts = sorted({source.images - 1 for source in sources})
+    expected = "the same number in every file; audit the others apart"
+    check(len(counts) == 1, "answers of a question", " and ".join(map(str, counts)), expected)
     return sources
+
+
+def find_splits(paths: Sequence[str | Path]) -> list[list[Path]]:
+    """Return what to audit together: all paths, but of a folder of splits, each split alone.
+
+    Such a folder, as `iqtt make-split --preset suite` writes it, holds folders with question files,
+    and none itself.
+    """
+    splits: list[list[Path]] = []
+    single: list[Path] = []
+    for path in map(Path, paths):
+        inner = [one for one in sorted(path.iterdir()) if _files(one)] if path.is_dir() else []
+        if inner and not _files(path):
+            splits += [[one] for one in inner]
+        else:
+            single.append(path)
+    return [single, *splits] if single or not splits else splits
+
+
+def lacking(paths: Sequence[str | Path]) -> list[str]:
+    """Return, for each folder that lacks some of a split's four files, a line that says which."""
+    lines = []
+    for path in map(Path, paths):
+        stems = [file.stem for file in _files(path)] if path.is_dir() else []
+        lacks = [
+            role for role in ROLES if not any(s == role or s.endswith(f"-{role}") for s in stems)
+        ]
+        if stems and lacks:
+            lines.append(f"{path}: no file for {', '.join(lacks)}")
+    return lines
+
+
+def _files(folder: Path) -> list[Path]:
+    """Return a folder's question files by name; none if it is no folder."""
+    return sorted(folder.glob("iqtt-*.h5")) or sorted(folder.glob("*.h5"))
 
 
 def read_table(
@@ -154,8 +199,7 @@ def read_table(
     with source.open() as questions:
         everything = slice(0, source.count)
         names = TRUTH if questions.has_truth else ()
-        first = questions.read("questions", slice(0, min(1, source.count)))
-        chunk = max(1, CHUNK_PIXELS // math.prod(first.shape[1:4]))
+        chunk = max(1, CHUNK_PIXELS // (source.images * questions.height * questions.width))
         first = questions.read("questions", slice(0, min(chunk, source.count)))
         background = border_color(first)
         scans: list[tuple[Array, ...]] = []
@@ -184,7 +228,6 @@ def read_table(
             questions.fingerprint,
             questions.attributes.get("format_version"),
             questions.image_dtype,
-            first.shape[1],
             answers,
             truth,
             contents if told else {},

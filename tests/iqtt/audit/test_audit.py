@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from polycubes import are_congruent
 
-from iqtt.audit.audit import audit, question_count
+from iqtt.audit.audit import audit, question_count, to_json
 from iqtt.audit.report import markdown, table
 from iqtt.files.layout import NO_CUBE
 from iqtt.shapes.polycube import ROTATIONS, canonical, canonical_class, is_chiral, mirror, set_ids
@@ -19,8 +19,9 @@ from scenegen.common.errors import FileFormatError, SpecError
 
 OF_IMAGES = ("answer places", "pixel values", "framing", "distinct images", "distinct questions")
 BY_CUBES = {
-    *("shapes", "one right answer", "answers differ", "stored ids", "splits apart", "rotations"),
-    *("angles", "visibility", "cast again"),
+    *("shapes", "one right answer", "answers differ", "mirror images", "matched", "stored ids"),
+    *("splits apart", "splits for ever", "rotations", "angles", "visibility", "cast again"),
+    "one explanation",
 }
 PROOFS = {"content", *OF_IMAGES, *BY_CUBES}
 Edit = Callable[[h5py.File], Any]
@@ -193,8 +194,8 @@ def test_a_fair_split_passes_and_all_is_told(split_folder: Path) -> None:
         ("iqtt-train.h5 unlabeled", "from the cubes", 6),
         ("iqtt-val.h5", "stored", 6),
     ]
-    record = json.loads(to_json([found]))
-    assert record["format"] == "pix2shape-bench/iqtt-audit"
+    (record,) = json.loads(to_json([found]))["audits"]
+    assert json.loads(to_json([found]))["format"] == "pix2shape-bench/iqtt-audit"
     assert record["passed"] is True
     assert {proof["name"] for proof in record["proofs"]} == PROOFS
     assert all(0 <= p["low"] <= p["accuracy"] <= p["high"] <= 1 for p in record["probes"])
