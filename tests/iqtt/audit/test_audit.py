@@ -124,7 +124,7 @@ DAMAGES: list[tuple[str, Edit, str]] = [
     (VAL, changed("answers", ALL, np.zeros_like), "one right answer, answer places"),
     (VAL, second_right_answer, "one right answer, answers differ, ..."),
     (TRAIN, unlabeled_second_right_answer, "one right answer, ..."),
-    (TRAIN, changed("truth/unlabeled/distractor_kind", 2, np.flip), "one right answer"),
+    (TRAIN, changed("truth/unlabeled/distractor_kind", 2, np.flip), "one right answer, ..."),
     (VAL, distractors_alike, "answers differ, ..."),
     (VAL, changed("truth/cubes", 3, in_pieces), "shapes, ..."),
     (VAL, changed("truth/shape_id", 4, lambda ids: ids[[1, 2, 3, 0]]), "stored ids"),

@@ -25,7 +25,9 @@ def fair(seed: int, count: int = 300, answers: int = 3, **changes: Any) -> Evide
     for name in ("pixel_distance", "outline_distance"):
         statistics[name] += statistics[name].swapaxes(1, 2).copy()
     right = rng.permutation(np.arange(count) % answers)
-    mirrored = np.where(rng.random(count) < 0.5, (right + rng.integers(1, answers, count)) % answers, -1)
+    mirrored = np.where(
+        rng.random(count) < 0.5, (right + rng.integers(1, answers, count)) % answers, -1
+    )
     cubes = {name: rng.integers(0, 6, (count, answers)).astype(float) for name in SHAPE_STATISTICS}
     frames = rng.random((count, answers, 19))
     return replace(Evidence(statistics, right, mirrored, cubes, frames, [right]), **changes)
