@@ -245,23 +245,31 @@ def audit(
 ) -> None:
     """Prove that the questions of files or folders are right, and try to guess their answers.
 
+    SPLIT is a question file, a folder of them, also the released ones, or a folder of such folders,
+    each of which is then audited alone.
+
     Proofs recompute what must hold, with code that is independent of the generator. Probes try to
     find the right answers without comparing shapes. The exit code is 1 if a proof
     fails, or if there are no questions.
     """
     from iqtt.audit import report
     from iqtt.audit.audit import audit as audit_files
-    from iqtt.audit.audit import question_count
+    from iqtt.audit.audit import question_count, to_json
+    from iqtt.audit.table import find_splits
     from scenegen.common.new_file import check_writable, write_text
 
     if json_path:
         check_writable(Path(json_path), overwrite)
-    with progress_bar(question_count(splits), "question") as bar:
-        found = audit_files(splits, probed=probed, progress=bar.update)
+    groups = find_splits(splits)
+    with progress_bar(sum(map(question_count, groups)), "question") as bar:
+        found = [audit_files(group, probed=probed, progress=bar.update) for group in groups]
     if json_path:
-        write_text(json_path, found.to_json(), overwrite)
-    click.echo(report.markdown(found) if markdown else report.table(found))
-    ctx.exit(0 if found.passed else 1)
+        write_text(json_path, to_json(found), overwrite)
+    for group, one in zip(groups, found, strict=True):
+        if len(groups) > 1:
+            click.echo(f"{'## ' if markdown else ''}{', '.join(map(str, group))}\n")
+        click.echo(report.markdown(one) if markdown else report.table(one))
+    ctx.exit(0 if all(one.passed for one in found) else 1)
 
 
 COMMANDS = (make_split, show, info, audit)

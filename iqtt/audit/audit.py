@@ -13,21 +13,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit import proofs, shape_proofs, view_proofs
+from iqtt.audit import (
+    explanations,
+    kind_proofs,
+    proofs,
+    shape_proofs,
+    split_proofs,
+    view_proofs,
+)
+from iqtt.audit.frames import stored_frames
 from iqtt.audit.probes import Evidence, Probe, run_probes
 from iqtt.audit.proofs import Proof
 from iqtt.audit.shape_proofs import Shapes
 from iqtt.audit.statistics import SHAPE_STATISTICS, shape_statistics
-from iqtt.audit.table import AuditTable, find_tables, read_table
+from iqtt.audit.table import AuditTable, find_tables, lacking, read_table
 from scenegen.common.hdf5.row_file import writer_name
 
 Array = NDArray[Any]
-FORMAT = {"format": "pix2shape-bench/iqtt-audit", "format_version": "1.0"}
+FORMAT = {"format": "pix2shape-bench/iqtt-audit", "format_version": "2.0"}
 PROBED = 20_000  # questions that probes look at, by default
 CAST = 48  # questions whose images are ray-cast again
+EXPLAINED = 2_000  # questions whose wrong answers are laid on the reference
 _BY_CUBES = (
-    *("shapes", "one right answer", "answers differ", "stored ids", "splits apart"),
-    *("rotations", "angles", "visibility", "cast again"),
+    *("shapes", "one right answer", "answers differ", "mirror images", "matched", "stored ids"),
+    *("splits apart", "splits for ever", "rotations", "angles", "visibility", "cast again"),
+    "one explanation",
 )
 
 
@@ -51,11 +61,16 @@ class AuditedTable:
 
 @dataclass(frozen=True)
 class Audit:
-    """The result of an audit."""
+    """The result of an audit.
+
+    Attributes:
+        lacking: for each folder without some of a split's four files, a line that says which.
+    """
 
     tables: tuple[AuditedTable, ...]
     proofs: tuple[Proof, ...]
     probes: tuple[Probe, ...]
+    lacking: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -72,20 +87,25 @@ class Audit:
         """The probes that beat chance though they must not."""
         return tuple(probe for probe in self.probes if probe.is_shortcut)
 
-    def to_json(self) -> str:
-        """Return all numbers as indented JSON."""
+    def record(self) -> dict[str, Any]:
+        """Return all numbers, ready for JSON."""
         probes = [
             {**asdict(p), "accuracy": p.accuracy, "is_shortcut": p.is_shortcut} for p in self.probes
         ]
-        record = {
-            **FORMAT,
-            "writer": writer_name(),
+        return {
             "passed": self.passed,
+            "lacking": list(self.lacking),
             "tables": [asdict(table) for table in self.tables],
             "proofs": [asdict(proof) for proof in self.proofs],
             "probes": probes,
         }
-        return json.dumps(record, indent=2) + "\n"
+
+
+def to_json(audits: Sequence[Audit]) -> str:
+    """Return the numbers of one or more audits as indented JSON."""
+    passed, records = all(one.passed for one in audits), [one.record() for one in audits]
+    record = {**FORMAT, "writer": writer_name(), "passed": passed, "audits": records}
+    return json.dumps(record, indent=2) + "\n"
 
 
 def question_count(paths: Sequence[str | Path]) -> int:
@@ -104,14 +124,15 @@ def audit(
     Files of answers are found beside the files of questions. Images are read once, in chunks.
 
     Args:
-        paths: question files, or folders with files iqtt-*.h5.
+        paths: question files, or folders of them; all ask questions of as many answers. Of a folder
+            of splits, audit each that `find_splits` gives.
         probed: largest number of questions that probes look at, spread evenly.
         progress: is called with the number of questions that were read since the last call.
 
     Raises:
         OSError: no such file or folder, or a folder without question files.
         FileFormatError: a file that is no question file, or damaged.
-        SpecError: no paths.
+        SpecError: no paths, or questions of different numbers of answers.
     """
     sources = find_tables(paths)
     measured = _spread([source.count if source.answered else 0 for source in sources], probed)
@@ -125,7 +146,8 @@ def audit(
     ]
     found = _prove(tables, shapes, right)
     probes = run_probes(_evidence(tables, shapes, right))
-    return Audit(tuple(map(_audited, tables, right)), tuple(found), probes)
+    lacks = tuple(lacking(paths))
+    return Audit(tuple(map(_audited, tables, right)), tuple(found), probes, lacks)
 
 
 def _spread(counts: Sequence[int], most: int) -> list[Array]:
@@ -156,17 +178,22 @@ def _prove(
     shapes = [one for table, one in zip(tables, shapes, strict=True) if table.truth]
     if not told:
         return [Proof(name, "skipped", "no shape descriptions") for name in _BY_CUBES] + found
-    sample = _spread([len(table) for table in told], CAST)
+    counts = [len(table) for table in told]
+    sample = _spread(counts, CAST)
     by_cubes = [
         shape_proofs.whole_shapes(told, shapes),
         shape_proofs.one_right_answer(told, shapes),
-        shape_proofs.distractors_differ(told, shapes),
+        kind_proofs.answers_differ(told, shapes),
+        kind_proofs.mirror_images(told, shapes),
+        kind_proofs.matched(told, shapes),
         shape_proofs.stored_ids(told, shapes),
-        shape_proofs.splits_share_nothing(told, shapes),
+        split_proofs.splits_share_nothing(told, shapes),
+        split_proofs.splits_for_ever(told, shapes),
         view_proofs.rotations(told),
         view_proofs.angles(told, shapes),
         proofs.visibility(told),
         view_proofs.cast_again(told, shapes, sample),
+        explanations.no_other_explanation(told, shapes, _spread(counts, EXPLAINED)),
     ]
     untold = [table.name for table in tables if not table.truth]
     note = f"; not told of {', '.join(untold)}" if untold else ""
@@ -187,15 +214,25 @@ def _evidence(
         known = place[table.measured] >= 0
         rows = table.measured[known]
         mirrored = _mirror_images(one, place, rows)
-        parts.append((table.statistics[known], place[rows], mirrored, described[rows]))
-    statistics, places, mirrored, cubes = map(np.concatenate, zip(*parts, strict=True))
+        stored = _frames(table, one, rows)
+        parts.append((table.statistics[known], place[rows], mirrored, described[rows], stored))
+    statistics, places, mirrored, cubes, frames = map(np.concatenate, zip(*parts, strict=True))
     return Evidence(
         statistics=statistics,
         right=places,
         mirrored=mirrored,
         cubes={name: cubes[:, :, i] for i, name in enumerate(SHAPE_STATISTICS)},
+        frames=frames,
         places=[place[place >= 0] for place in right],
     )
+
+
+def _frames(table: AuditTable, shapes: Shapes, rows: Array) -> Array:
+    """Return `frames.stored_frames` of some rows; NaN where the file does not tell the shapes."""
+    if not table.truth:
+        return np.full((len(rows), table.images - 1, 19), np.nan)
+    views = table.truth["world_from_shape"][rows]
+    return stored_frames(table.cubes[rows], views, shapes.whole[rows])
 
 
 def _mirror_images(shapes: Shapes, place: Array, rows: Array) -> Array:

@@ -9,6 +9,9 @@ What a probe looks at decides what its success means:
 - MIRRORED: it chooses between the right answer and its mirror image, by what a mirror keeps: size,
   framing, light and outline. Turned at random, both have the same distribution of these, so beating
   chance, 1/2 here, is a fault of the images.
+- FRAMES: it looks at the frames in which the file stores shapes: the rotations of the answers next
+  to the reference's, and the order of their cubes. A submission never sees these, but whoever
+  trains on the truth does. Beating chance is a fault.
 - OUTLINE: it compares size, framing and outline of the answers with the reference's. All images
   have one camera and one size of cubes, so these depend on the shape: a long shape has a long
   silhouette. Such a probe may beat chance; its share says how much can be seen without rotating
@@ -23,21 +26,26 @@ fifth more on noise than those of independent guesses.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from iqtt.audit.outlines import nearest_outline
+from iqtt.audit.small_network import SmallNetwork
+from iqtt.audit.statistics import THUMBNAIL
+from iqtt.audit.trees import FOLDS, among_others, choose, next_to_reference, one_thread
+
 Array = NDArray[Any]
-WITHOUT, LIGHT, MIRRORED, OUTLINE = "without the reference", "light", "mirrored", "outline"
-FAULTS = (WITHOUT, LIGHT, MIRRORED)
+WITHOUT, LIGHT, MIRRORED = "without the reference", "light", "mirrored"
+FRAMES, OUTLINE = "stored frames", "outline"
+FAULTS = (WITHOUT, LIGHT, MIRRORED, FRAMES)
 """Kinds of probes that must not beat chance."""
 ERROR_RATE = 0.01  # probability that some probe of a fair set of questions seems to beat chance
-FOLDS = 5  # of the cross-validation
 LEAST_QUESTIONS = 50  # a classifier learns nothing from fewer
 COMPONENTS = 24  # principal components of thumbnails that classifiers see
+NETWORK_QUESTIONS = 2_000  # that the small network looks at, half to learn and half to answer
 
 _LIGHT = {
     "brightness": "shape's brightness",
@@ -62,7 +70,7 @@ class Probe:
     Attributes:
         statistic: what it looks at.
         rule: how it chooses.
-        sees: the kind of probe: WITHOUT, LIGHT, MIRRORED or OUTLINE.
+        sees: the kind of probe: WITHOUT, LIGHT, MIRRORED, FRAMES or OUTLINE.
         correct, n: number of questions answered rightly, and of all that were tried.
         chance: share of right answers of a guess.
         low, high: 95% Wilson interval of the share of right answers.
@@ -97,11 +105,13 @@ class Evidence:
     """What probes may look at, of N questions.
 
     Attributes:
-        statistics: `statistics.STATISTICS` of the images, (N,).
+        statistics: of the images, as `statistics.measure` gives them, (N,).
         right: which answer is right, (N,).
         mirrored: which answer is the right one's mirror image, (N,); -1 for none.
-        cubes: numbers that describe the answers' shapes, (N, 3) each, by name; NaN where the file
+        cubes: numbers that describe the answers' shapes, (N, K) each, by name; NaN where the file
             does not tell the shapes.
+        frames: numbers that describe how the answers' shapes are stored next to the reference's,
+            (N, K, D), as `frames.stored_frames` gives them; NaN where the file does not tell them.
         places: positions of the right answers of whole tables, in their order, (Q,) each.
     """
 
@@ -109,7 +119,13 @@ class Evidence:
     right: Array
     mirrored: Array
     cubes: dict[str, Array]
+    frames: Array
     places: Sequence[Array]
+
+    @property
+    def answers(self) -> int:
+        """How many answers a question has, K."""
+        return int(self.statistics.dtype["area"].shape[0]) - 1
 
 
 _Guess: TypeAlias = tuple[str, str, str, Array]
@@ -119,18 +135,19 @@ _Guess: TypeAlias = tuple[str, str, str, Array]
 def run_probes(evidence: Evidence) -> tuple[Probe, ...]:
     """Run all probes that the evidence allows; none without questions."""
     guesses = [*_by_rule(evidence), *_by_mirror(evidence), *_learned(evidence)]
-    guesses += _by_place(evidence.places)
-    probes = [_probe(*guess) for guess in guesses if len(guess[3])]
+    guesses += _by_place(evidence.places, evidence.answers)
+    chance = 1 / evidence.answers
+    probes = [_probe(*guess, chance) for guess in guesses if len(guess[3])]
     faults = [probe for probe in probes if probe.sees in FAULTS]
     others = [probe for probe in probes if probe.sees not in FAULTS]
     return (*_judged(faults), *_judged(others))
 
 
-def _probe(statistic: str, rule: str, sees: str, hits: Array) -> Probe:
+def _probe(statistic: str, rule: str, sees: str, hits: Array, chance: float) -> Probe:
     from scipy.stats import binomtest
 
     correct, n = int(np.count_nonzero(hits)), len(hits)
-    chance = 1 / 2 if sees == MIRRORED else 1 / 3
+    chance = 1 / 2 if sees == MIRRORED else chance
     test = binomtest(correct, n, chance, alternative="greater")
     interval = binomtest(correct, n, chance).proportion_ci(0.95, method="wilson")
     numbers = (float(interval.low), float(interval.high), float(test.pvalue))
@@ -157,10 +174,15 @@ def _by_rule(evidence: Evidence) -> Iterator[_Guess]:
             yield from _by_cost(title, WITHOUT, _SIZE, -values[:, 1:], right)
         yield from _by_distance(title, sees, _distances(values), right)
     yield from _by_distance("pixel distance", OUTLINE, statistics["pixel_distance"], right)
+    apart = nearest_outline(statistics["outline_distance"])
+    yield from _by_distance("whole outline, turned or flipped", OUTLINE, apart, right)
     for title, values in evidence.cubes.items():
         told = np.isfinite(values).all(axis=1)
         yield from _by_cost(title, WITHOUT, _SIZE, -values[told], right[told])
         yield from _by_company(title, _distances(values[told]), right[told])
+    told = np.isfinite(evidence.frames).all(axis=(1, 2))
+    turns = evidence.frames[told, :, 0]
+    yield from _by_cost("stored rotation", FRAMES, _NEARNESS, turns, right[told])
 
 
 def _by_cost(
@@ -172,13 +194,15 @@ def _by_cost(
 
 
 def _by_company(title: str, apart: Array, right: Array) -> Iterator[_Guess]:
-    """Guess by how far each answer is from the other two; apart: distances, (N, 3, 3)."""
+    """Guess by how far each answer is from the others; apart: distances, (N, K, K)."""
+    if apart.shape[1] < 3:  # of two answers, none is odd
+        return
     rules = ("most typical", "odd one out")
     yield from _by_cost(title, WITHOUT, rules, apart.sum(axis=2), right)
 
 
 def _by_distance(title: str, sees: str, apart: Array, right: Array) -> Iterator[_Guess]:
-    """Guess by the distances between the four images; apart: (N, 4, 4)."""
+    """Guess by the distances between the images; apart: (N, 1 + K, 1 + K)."""
     yield from _by_company(title, apart[:, 1:, 1:], right)
     yield from _by_cost(title, sees, _NEARNESS, apart[:, 0, 1:], right)
 
@@ -193,30 +217,56 @@ def _by_mirror(evidence: Evidence) -> Iterator[_Guess]:
 
 
 def _learned(evidence: Evidence) -> Iterator[_Guess]:
-    right = evidence.right
+    statistics, right = evidence.statistics, evidence.right
     if len(right) < LEAST_QUESTIONS:
         return
-    summary = [evidence.statistics[name][:, 1:] for name in _SUMMARY]
-    wide = np.concatenate([v.reshape(len(right), 3, -1) for v in summary], axis=2)
-    pixels = components(evidence.statistics["thumbnails"][:, 1:])
-    features = {"low-resolution pixels": pixels, "all statistics": wide}
+    alone = (len(right), evidence.answers, -1)
+    outline, apart = statistics["outline"], statistics["outline_distance"]
+    features = {
+        "low-resolution pixels": components(statistics["thumbnails"][:, 1:]),
+        "all statistics": np.concatenate(
+            [statistics[name][:, 1:].reshape(alone) for name in _SUMMARY], axis=2
+        ),
+        "outlines of the answers": np.concatenate(
+            [outline[:, 1:], apart[:, 1:, 1:].sum(axis=2)], axis=2
+        ),
+    }
     for title, values in features.items():
-        hits = choose(values, right) == right
-        yield (title, "learned", WITHOUT, hits)
+        yield (title, "learned", WITHOUT, choose(among_others(values), right) == right)
+    yield ("pictures, small network", "learned", WITHOUT, _by_network(statistics, right))
+    columns = next_to_reference(outline, apart[:, 0, 1:])
+    yield ("outlines, by trees", "learned", OUTLINE, choose(columns, right) == right)
     cubes = np.stack(list(evidence.cubes.values()), axis=2)
-    told = np.isfinite(cubes).all(axis=(1, 2))
-    if np.count_nonzero(told) >= LEAST_QUESTIONS:
-        hits = choose(cubes[told], right[told]) == right[told]
-        yield ("answers' cubes", "learned", WITHOUT, hits)
+    for title, values, sees in (
+        ("answers' cubes", cubes, WITHOUT),
+        ("rotations and order of cubes", evidence.frames, FRAMES),
+    ):
+        told = np.isfinite(values).all(axis=(1, 2))
+        if np.count_nonzero(told) >= LEAST_QUESTIONS:
+            chosen = choose(among_others(values[told]), right[told])
+            yield (title, "learned", sees, chosen == right[told])
 
 
-def _by_place(places: Sequence[Array]) -> list[_Guess]:
+def _by_network(statistics: Array, right: Array) -> Array:
+    """Return which questions two small networks answer rightly, each those the other learns."""
+    rows = np.linspace(0, len(right) - 1, min(len(right), NETWORK_QUESTIONS)).astype(np.int64)
+    pictures = statistics["thumbnails"][rows, 1:].reshape(len(rows), -1, THUMBNAIL, THUMBNAIL)
+    half = np.arange(len(rows)) % 2
+    hits = np.zeros(len(rows), np.bool_)
+    for k in range(2):
+        network = SmallNetwork().fit(pictures[half != k], right[rows[half != k]])
+        chosen = network.scores(pictures[half == k]).argmax(axis=1)
+        hits[half == k] = chosen == right[rows[half == k]]
+    return hits
+
+
+def _by_place(places: Sequence[Array], answers: int) -> list[_Guess]:
     def hits(context: Callable[[Array], Array]) -> Array:
-        right = [likely_places(one, context(one)) == one for one in places]
+        right = [likely_places(one, context(one), answers) == one for one in places]
         return np.concatenate([np.zeros(0, np.bool_), *right])
 
     def before(one: Array) -> Array:
-        return np.concatenate([[3], one[:-1]]) if len(one) else one
+        return np.concatenate([[answers], one[:-1]]) if len(one) else one
 
     return [
         ("place", "commonest", WITHOUT, hits(np.zeros_like)),
@@ -244,76 +294,26 @@ def _least(costs: Array) -> Array:
     return np.asarray(order[row, found])
 
 
-def choose(features: Array, right: Array) -> Array:
-    """Return which answer gradient-boosted trees prefer in each question, cross-validated, (N,).
-
-    They score each answer by its features and by how these stand to the features of the other two.
-    The same input gives the same output: there is no random choice, and one thread.
-
-    Args:
-        features: features of the answers, (N, 3, D).
-        right: which answer is right, (N,).
-    """
-    from sklearn.ensemble import HistGradientBoostingClassifier
-
-    seen = _among_others(features.astype(np.float32))
-    is_right = np.arange(3) == right[:, None]
-    fold = np.arange(len(right)) % FOLDS
-    chosen = np.zeros(len(right), np.int64)
-    with _one_thread():
-        for k in range(FOLDS):
-            trees = HistGradientBoostingClassifier(
-                max_iter=60,
-                max_leaf_nodes=8,
-                min_samples_leaf=20,
-                l2_regularization=1.0,
-                early_stopping=False,
-                random_state=0,
-            )
-            known, asked = fold != k, fold == k
-            trees.fit(seen[known].reshape(-1, seen.shape[2]), is_right[known].reshape(-1))
-            score = trees.predict_proba(seen[asked].reshape(-1, seen.shape[2]))[:, 1]
-            chosen[asked] = score.reshape(-1, 3).argmax(axis=1)
-    return chosen
-
-
 def components(thumbnails: Array) -> Array:
-    """Return the images' principal components, (N, 3, P) to (N, 3, at most COMPONENTS)."""
+    """Return the images' principal components, (N, K, P) to (N, K, at most COMPONENTS)."""
     flat = thumbnails.reshape(-1, thumbnails.shape[2]).astype(np.float64)
     flat = flat - flat.mean(axis=0)
-    with _one_thread():
+    with one_thread():
         _, axes = np.linalg.eigh(flat.T @ flat)
         found = flat @ axes[:, ::-1][:, :COMPONENTS]
     return np.asarray(found.reshape(*thumbnails.shape[:2], -1))
 
 
-def likely_places(answers: Array, context: Array) -> Array:
+def likely_places(right: Array, context: Array, answers: int) -> Array:
     """Return the most frequent right answer in the same context in other questions, (Q,).
 
     Args:
-        answers: right answers, (Q,).
+        right: right answers, (Q,).
         context: small whole numbers, (Q,).
+        answers: how many each question has.
     """
-    fold = np.arange(len(answers)) % FOLDS
-    counts = np.zeros((FOLDS, context.max(initial=0) + 1, 3), np.int64)
-    np.add.at(counts, (fold, context, answers), 1)
+    fold = np.arange(len(right)) % FOLDS
+    counts = np.zeros((FOLDS, context.max(initial=0) + 1, answers), np.int64)
+    np.add.at(counts, (fold, context, right), 1)
     learned = (counts.sum(axis=0) - counts).argmax(axis=2)
     return np.asarray(learned[fold, context])
-
-
-def _among_others(features: Array) -> Array:
-    """Return each answer's features, and how they stand to those of the other two, (N, 3, 4 D)."""
-    second, third = (np.roll(features, -k, axis=1) for k in (1, 2))
-    apart = np.abs(features - second) + np.abs(features - third)
-    return np.concatenate(
-        [features, features - (second + third) / 2, apart, np.abs(second - third)], axis=2
-    )
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Use one thread: sums then have one order, so that the same input gives the same bits."""
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(1):
-        yield

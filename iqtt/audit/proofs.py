@@ -59,14 +59,17 @@ def balance(tables: Sequence[AuditTable], right: Sequence[Array]) -> Proof:
     Args:
         right: for each table the positions of the right answers, (Q,); -1 where unknown.
     """
-    counts = [np.bincount(places[places >= 0], minlength=3) for places in right]
+    counts = [
+        np.bincount(places[places >= 0], minlength=table.images - 1)
+        for table, places in zip(tables, right, strict=True)
+    ]
     known = [i for i in range(len(tables)) if counts[i].sum()]
     shown = [f"{tables[i].name}: {'/'.join(map(str, counts[i]))}" for i in known]
     uneven = [text for i, text in zip(known, shown, strict=True) if np.ptp(counts[i]) > 1]
     if not known:
         return Proof("answer places", "skipped", "no answers")
     if uneven:
-        detail = f"{'; '.join(uneven)} at places 0/1/2; expected: counts differ by at most 1"
+        detail = f"{'; '.join(uneven)} at places 0/1/...; expected: counts differ by at most 1"
         return Proof("answer places", "FAIL", detail)
     return Proof("answer places", "ok", "balanced: " + "; ".join(shown))
 
@@ -143,12 +146,14 @@ def visibility(tables: Sequence[AuditTable]) -> Proof:
 def distinct_images(tables: Sequence[AuditTable]) -> Proof:
     """Prove that no image is stored twice, in all tables together."""
     first = _first_copies(np.concatenate([table.digests.reshape(-1) for table in tables]))
-    return _no_copies(tables, "distinct images", "no image stored twice", first.reshape(-1, 4))
+    shown = first.reshape(-1, tables[0].images)
+    return _no_copies(tables, "distinct images", "no image stored twice", shown)
 
 
 def distinct_questions(tables: Sequence[AuditTable]) -> Proof:
     """Prove that no question is asked twice, even with its answers in another order."""
-    words = np.concatenate([table.digests for table in tables]).view(np.uint64).reshape(-1, 4, 2)
+    words = np.concatenate([table.digests for table in tables]).view(np.uint64)
+    words = words.reshape(-1, tables[0].images, 2)
     # A sum of hashes does not depend on their order.
     keys = np.concatenate([words[:, 0], words[:, 1:].sum(axis=1, dtype=np.uint64)], axis=1)
     first = _first_copies(keys.view("V32").reshape(-1))

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from iqtt.audit.audit import Audit
-from iqtt.audit.probes import ERROR_RATE, LIGHT, MIRRORED, OUTLINE, WITHOUT, Probe
+from iqtt.audit.probes import ERROR_RATE, FRAMES, LIGHT, MIRRORED, OUTLINE, WITHOUT, Probe
 from scenegen.common.text_table import aligned, piped, printable
 
 _BLOCKS = (
@@ -16,14 +16,15 @@ _BLOCKS = (
         "the right answer or its mirror image, next to the reference",
         ("nearest", "farthest"),
     ),
-    (OUTLINE, "next to the reference, by outline", ("nearest", "farthest")),
+    (FRAMES, "by the frames in which shapes are stored", ("nearest", "farthest", "learned")),
+    (OUTLINE, "next to the reference, by outline", ("nearest", "farthest", "learned")),
 )
 
 
 def table(audit: Audit) -> str:
     """Return proofs and probes as text with aligned columns."""
     files = [(t.name, f"{t.questions:,} questions", t.split or "released") for t in audit.tables]
-    lines = [*aligned(files), ""]
+    lines = [*aligned(files), *audit.lacking, ""]
     lines += aligned([(p.status, p.name, p.detail) for p in audit.proofs])
     for title, rows in _blocks(audit.probes):
         lines += ["", title, *("  " + line for line in aligned(rows))]
@@ -34,6 +35,7 @@ def markdown(audit: Audit) -> str:
     """Return proofs and probes as Markdown tables."""
     files = [(t.name, f"{t.questions:,}", f"{t.probed:,}") for t in audit.tables]
     lines = piped([("table", "questions", "probed"), *files])
+    lines += [*(f"\n{line}" for line in audit.lacking)]
     lines += [
         "",
         *piped([("", "proof", "found"), *((p.status, p.name, p.detail) for p in audit.proofs)]),

@@ -1,6 +1,5 @@
 """Proofs about shapes, recomputed from the stored cubes with `congruence`."""
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -23,11 +22,12 @@ class Shapes:
     """What the cubes of the Q questions of a table say about their shapes.
 
     Attributes:
-        whole: whether a question's four shapes are connected and have the same number of cubes,
-            (Q,) bool. The other attributes have a meaning for these questions only.
-        count: number of cubes of each of the four shapes, (Q,).
-        right: which answers are congruent to the reference, (Q, 3) bool.
-        shape_name: numbers for the four shapes, (Q, 4), equal if and only if the shapes are
+        whole: whether a question's shapes, one for each image, are connected and have the same
+            number of cubes, (Q,) bool. The other attributes have a meaning for these questions
+            only.
+        count: number of cubes of each of a question's shapes, (Q,).
+        right: which answers are congruent to the reference, (Q, K) bool.
+        shape_name: numbers for the shapes, (Q, 1 + K), equal if and only if the shapes are
             congruent, in all tables together; -1 unless `whole`.
         class_name: the same, but equal for mirror images too.
     """
@@ -50,27 +50,28 @@ def compare_shapes(tables: Sequence[AuditTable]) -> list[Shapes]:
     for table in tables:
         cubes = table.cubes
         whole, count = _whole(cubes)
-        right = np.zeros((len(table), 3), np.bool_)
+        right = np.zeros((len(table), table.images - 1), np.bool_)
         for n in np.unique(count[whole]).tolist():
             rows = np.flatnonzero(whole & (count == n))
-            for k in range(3):
+            for k in range(table.images - 1):
                 right[rows, k] = congruent_rows(cubes[rows, 0, :n], cubes[rows, 1 + k, :n])
-        nameless = np.full((2, len(table), 4), -1)
+        nameless = np.full((2, len(table), table.images), -1)
         results.append(Shapes(whole, count, right, *nameless))
     sizes = {n for s in results for n in np.unique(s.count[s.whole]).tolist()}
+    images = tables[0].images if tables else 1
     for n in sorted(sizes):
         chosen = [np.flatnonzero(s.whole & (s.count == n)) for s in results]
         alike = [t.cubes[r, :, :n].reshape(-1, n, 3) for t, r in zip(tables, chosen, strict=True)]
         names = name_shapes(np.concatenate(alike))
         ends = np.cumsum([len(rows) for rows in chosen])[:-1]
-        shape, mirrored = (np.split(v.reshape(-1, 4) * MOST_CUBES + n, ends) for v in names)
+        shape, mirrored = (np.split(v.reshape(-1, images) * MOST_CUBES + n, ends) for v in names)
         for i, one in enumerate(results):
             one.shape_name[chosen[i]], one.class_name[chosen[i]] = shape[i], mirrored[i]
     return results
 
 
 def _whole(cubes: Array) -> tuple[Array, Array]:
-    """Return `Shapes.whole` and `Shapes.count` of stored cubes, (Q, 4, most, 3)."""
+    """Return `Shapes.whole` and `Shapes.count` of stored cubes, (Q, I, most, 3)."""
     used = (cubes != NO_CUBE).all(axis=3)
     count = used.sum(axis=2)
     whole = (used == (np.arange(cubes.shape[2]) < count[..., None])).all(axis=(1, 2))
@@ -99,7 +100,7 @@ def whole_shapes(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proo
     ]
     return judge(
         "shapes",
-        "in one piece, all four of a question of as many cubes, and as many as specified",
+        "in one piece, all of a question of as many cubes, and as many as specified",
         tables,
         wrong,
         lambda t, row: (
@@ -127,22 +128,6 @@ def one_right_answer(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> 
     return judge("one right answer", rule, tables, wrong, found_instead)
 
 
-def distractors_differ(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
-    """Prove that no two answers of a question show the same shape."""
-    pairs = list(itertools.combinations((1, 2, 3), 2))
-    same = [
-        np.stack([(s.shape_name[:, a] == s.shape_name[:, b]) & s.whole for a, b in pairs], axis=1)
-        for s in shapes
-    ]
-    return judge(
-        "answers differ",
-        "no two answers congruent to each other",
-        tables,
-        [mask.any(axis=1) for mask in same],
-        lambda t, row: f"images {pairs[int(same[t][row].argmax())]} show the same shape",
-    )
-
-
 def stored_ids(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     """Prove that stored ids are equal if and only if the shapes, or their classes, are the same."""
     wrong = [np.zeros(len(table), np.bool_) for table in tables]
@@ -155,7 +140,7 @@ def stored_ids(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
         _, given = np.unique(keys, return_inverse=True)
         bad = np.zeros(len(whole), np.bool_)
         clash = _not_one_to_one(given, own) | _not_one_to_one(own, given)
-        bad[whole] = clash.reshape(-1, 4).any(axis=1)
+        bad[whole] = clash.reshape(-1, tables[0].images).any(axis=1)
         wrong = [a | b for a, b in zip(wrong, np.split(bad, ends), strict=True)]
     rule = "shape_id and class_id equal just where the cubes say so"
     return judge("stored ids", rule, tables, wrong, lambda t, row: "its ids are not")
@@ -167,32 +152,3 @@ def _not_one_to_one(a: Array, b: Array) -> Array:
     joins = (a[order][1:] == a[order][:-1]) & (b[order][1:] != b[order][:-1])
     bad = np.unique(a[order][1:][joins])
     return np.asarray(np.isin(a, bad))
-
-
-def splits_share_nothing(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
-    """Prove that no shape, nor its mirror image, is in two splits."""
-    names = [table.split or "" for table in tables]
-    owned: dict[str, Array] = dict.fromkeys(sorted(set(names)), np.zeros(0, np.int64))
-    if len(owned) < 2:
-        return Proof("splits apart", "skipped", f"one split alone: {', '.join(owned)}")
-    for split, one in zip(names, shapes, strict=True):
-        owned[split] = np.union1d(owned[split], one.class_name[one.whole])
-    every, times = np.unique(np.concatenate(list(owned.values())), return_counts=True)
-    shared = every[times > 1]
-    rule = "no shape, nor its mirror image, in two splits"
-    number = ", ".join(f"{split} {len(own):,}" for split, own in owned.items())
-    return judge(
-        "splits apart",
-        f"{rule} (classes: {number})",
-        tables,
-        [np.isin(s.class_name, shared).any(axis=1) & s.whole for s in shapes],
-        lambda t, row: (
-            f"its shape is in {_elsewhere(owned, shapes[t].class_name[row], names[t])} too"
-        ),
-    )
-
-
-def _elsewhere(owned: dict[str, Array], classes: Array, split: str) -> str:
-    return " and ".join(
-        name for name, own in owned.items() if name != split and np.isin(classes, own).any()
-    )

@@ -8,39 +8,57 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iqtt.audit.outlines import DISTANCES, FEATURES, outlines
 from iqtt.files.layout import NO_CUBE
 from scenegen.rendering.ground_truth import decode_image
 
 Array = NDArray[Any]
-THUMBNAIL = 16  # pixels a side
+THUMBNAIL = 32  # pixels a side
 LEVELS = 4  # levels of each channel in a colour histogram
 SAME = 1 / 512  # how far a channel of a floating-point image may differ from the background's
 SHAPE_STATISTICS = ("contacts of cubes", "spread of cubes", "shape met elsewhere")
 
 
-STATISTICS = np.dtype(
-    [
-        ("area", "f8", 4),  # of the silhouette, as a share of the image
-        ("extent", "f8", 4),  # diagonal of the silhouette's bounding box, pixels
-        ("offset", "f8", 4),  # from the middle of the image to the middle of that box, pixels
-        ("image_brightness", "f4", 4),  # mean of all pixels and channels
-        ("brightness", "f8", 4),  # mean of the silhouette's pixels and channels
-        ("mean_color", "f8", (4, 3)),  # mean of the silhouette's pixels
-        ("contrast", "f8", 4),  # standard deviation of the grey of the silhouette's pixels
-        ("colors", "f8", (4, LEVELS**3)),  # colour histogram of the silhouette's pixels, shares
-        ("moments", "f8", (4, 4)),  # lengths from the silhouette's second and third moments
-        ("thumbnails", "f4", (4, THUMBNAIL**2)),  # small grey images
-        ("pixel_distance", "f8", (4, 4)),  # root mean square differences of the four images
+def statistics_record(images: int) -> np.dtype[np.void]:
+    """Return the type of one question's statistics: of so many images, the reference first."""
+    columns: list[tuple[str, str, tuple[int, ...]]] = [
+        ("area", "f8", ()),  # of the silhouette, as a share of the image
+        ("extent", "f8", ()),  # diagonal of the silhouette's bounding box, pixels
+        ("offset", "f8", ()),  # from the middle of the image to the middle of that box, pixels
+        ("image_brightness", "f4", ()),  # mean of all pixels and channels
+        ("brightness", "f8", ()),  # mean of the silhouette's pixels and channels
+        ("mean_color", "f8", (3,)),  # mean of the silhouette's pixels
+        ("contrast", "f8", ()),  # standard deviation of the grey of the silhouette's pixels
+        ("colors", "f8", (LEVELS**3,)),  # colour histogram of the silhouette's pixels, shares
+        ("moments", "f8", (4,)),  # lengths from the silhouette's second and third moments
+        ("thumbnails", "f4", (THUMBNAIL**2,)),  # small grey images
+        ("pixel_distance", "f8", (images,)),  # root mean square differences of the images
+        ("outline", "f4", (len(FEATURES),)),  # as `outlines.outlines` gives them
+        ("outline_distance", "f4", (images, len(DISTANCES))),
     ]
-)
-"""Statistics of a question's images: the reference, then three answers."""
+    return np.dtype([(name, kind, (images, *more)) for name, kind, more in columns])
+
+
+def border(pixels: Array) -> Array:
+    """Return the pixels on the border of images, (Q, I, H, W, ...) to (Q, I, B, ...)."""
+    sides = (pixels[:, :, 0], pixels[:, :, -1], pixels[:, :, 1:-1, 0], pixels[:, :, 1:-1, -1])
+    return np.concatenate(sides, axis=2)
+
+
+def border_color(images: Array) -> Array:
+    """Return the most frequent colour on the images' borders, (3,); zero if there is no image."""
+    colors = border(images).reshape(-1, 3)
+    if not len(colors):
+        return np.zeros(3, images.dtype)
+    distinct, counts = np.unique(colors, axis=0, return_counts=True)
+    return np.asarray(distinct[counts.argmax()])
 
 
 def silhouettes(images: Array, background: Array) -> NDArray[np.bool_]:
-    """Return which pixels differ from the background, (Q, 4, H, W).
+    """Return which pixels differ from the background, (Q, I, H, W).
 
     Args:
-        images: (Q, 4, H, W, 3), as stored.
+        images: (Q, I, H, W, 3), as stored.
         background: (3,), as stored.
     """
     if images.dtype == np.uint8:
@@ -51,19 +69,20 @@ def silhouettes(images: Array, background: Array) -> NDArray[np.bool_]:
 
 
 def measure(images: Array, shown: NDArray[np.bool_]) -> Array:
-    """Return the STATISTICS of the images of Q questions, (Q,).
+    """Return the statistics of the images of Q questions, (Q,), as `statistics_record` has them.
 
     Args:
-        images: (Q, 4, H, W, 3), as stored; values that are not finite count as 0.
-        shown: silhouettes, (Q, 4, H, W).
+        images: (Q, I, H, W, 3), as stored; values that are not finite count as 0.
+        shown: silhouettes, (Q, I, H, W).
     """
-    questions, height, width = len(images), *images.shape[2:4]
+    questions, count, height, width = images.shape[:4]
     radiance = decode_image(images)
     if images.dtype != np.uint8:
         radiance = np.nan_to_num(radiance, nan=0.0, posinf=0.0, neginf=0.0).clip(0, 1)
-    flat = radiance.reshape(questions, 4, height * width * 3)
-    result = np.zeros(questions, STATISTICS)
-    for a, b in itertools.combinations(range(4), 2):
+    flat = radiance.reshape(questions, count, height * width * 3)
+    result = np.zeros(questions, statistics_record(count))
+    result["outline"], result["outline_distance"] = outlines(shown)
+    for a, b in itertools.combinations(range(count), 2):
         apart = np.linalg.norm(flat[:, a] - flat[:, b], axis=1) / math.sqrt(flat.shape[2])
         result["pixel_distance"][:, a, b] = result["pixel_distance"][:, b, a] = apart
     radiance = radiance.reshape(-1, height, width, 3)
@@ -153,7 +172,7 @@ def _moments(mask: NDArray[np.bool_]) -> Array:
 def shape_statistics(
     cubes: Sequence[Array], class_names: Sequence[Array], whole: Sequence[Array]
 ) -> list[Array]:
-    """Return for each table the SHAPE_STATISTICS of its answers, (Q, 3, 3); NaN unless whole.
+    """Return for each table the SHAPE_STATISTICS of its answers, (Q, K, 3); NaN unless whole.
 
     They are the number of pairs of cubes that share a face; the cubes' mean squared distance from
     their middle; and how many answers of other questions, in all tables, show the shape or its
@@ -161,7 +180,7 @@ def shape_statistics(
     so they would tell which answers of other questions are right.
 
     Args:
-        cubes: for each table its cubes, (Q, 4, most, 3), as stored.
+        cubes: for each table its cubes, (Q, 1 + K, most, 3), as stored.
         class_names, whole: for each table, as in `shape_proofs.Shapes`.
     """
     everything = np.concatenate([names[:, 1:].reshape(-1) for names in class_names])

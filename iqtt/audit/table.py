@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit.statistics import measure, silhouettes
+from iqtt.audit.statistics import border, border_color, measure, silhouettes
 from iqtt.files.layout import NO_CUBE, SCORED
 from iqtt.files.reader import QuestionsFile, answers_beside, parts
 from iqtt.questions.specs import SplitSpec
@@ -20,10 +20,11 @@ from scenegen.common.hdf5.row_file import digest_problems
 from scenegen.common.records import check
 
 Array = NDArray[Any]
+ROLES = ("train", "val", "test", "test-answers")
 CHUNK_PIXELS = 2**20  # pixels of questions in memory at once
 TRUTH = (
     *("cubes", "shape_id", "class_id", "world_from_shape"),
-    *("distractor_kind", "angle_degrees", "visible_pixels"),
+    *("distractor_kind", "angle_degrees", "visible_pixels", "camera_distance"),
 )
 
 
@@ -36,6 +37,7 @@ class Source:
         part: "labeled" or "unlabeled" of a training file, else "".
         answers: the file with the answers, if it is another one.
         answered: whether the right answers are known, from answers or from shapes.
+        count, images: number of questions, and of images of each.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Source:
     answers: Path | None
     answered: bool
     count: int
+    images: int
 
     def open(self) -> QuestionsFile:
         """Open the table. Raises as `QuestionsFile`."""
@@ -55,25 +58,26 @@ class AuditTable:
     """What was read of a table of Q questions: everything except the pixels.
 
     Attributes:
-        spec, split, fingerprint: as in the file; None for a released file.
-        answers: which of the three is right, (Q,); None if the file does not tell.
+        spec, split, fingerprint, format_version: as in the file; None for a released file.
+        answers: which of the answers is right, (Q,); None if the file does not tell.
         truth: the datasets `TRUTH` by name, (Q, ...) each; empty if the file has no shapes.
         contents: digest of each dataset that was read, by its file and its name there; empty if
             the file has no digests to compare them with.
         truth_changed: whether the file's `truth_digest` is another one than that of its answers.
         background: most frequent colour of the images' borders, as stored, (3,).
-        digests: hashes of the images, (Q, 4) void.
-        silhouette: number of pixels of each image that are not background, (Q, 4).
-        on_border: number of those pixels on the image's border, (Q, 4).
-        unfit: number of values of each image that are not finite, or outside 0..1, (Q, 4).
+        digests: hashes of the images, (Q, I) void.
+        silhouette: number of pixels of each image that are not background, (Q, I).
+        on_border: number of those pixels on the image's border, (Q, I).
+        unfit: number of values of each image that are not finite, or outside 0..1, (Q, I).
         measured: rows that `statistics` describe.
-        statistics: `STATISTICS` of those rows.
+        statistics: of those rows, as `statistics.measure` gives them.
     """
 
     source: Source
     spec: SplitSpec | None
     split: str | None
     fingerprint: str | None
+    format_version: str | None
     image_dtype: str
     answers: Array | None
     truth: dict[str, Array]
@@ -93,18 +97,25 @@ class AuditTable:
         return self.source.name
 
     @property
+    def images(self) -> int:
+        """Number of images of a question: the reference, and its answers."""
+        return self.source.images
+
+    @property
     def cubes(self) -> Array:
-        """Cubes of the four shapes as stored, (Q, 4, most, 3); NO_CUBE if the file has none."""
-        return self.truth["cubes"] if self.truth else np.full((len(self), 4, 1, 3), NO_CUBE)
+        """Cubes of the images' shapes as stored, (Q, I, most, 3); NO_CUBE if the file has none."""
+        blank = (len(self), self.images, 1, 3)
+        return self.truth["cubes"] if self.truth else np.full(blank, NO_CUBE)
 
     def __len__(self) -> int:
         return self.source.count
 
 
 def find_tables(paths: Sequence[str | Path]) -> list[Source]:
-    """Find the tables of question files; of a folder, those of all its files iqtt-*.h5.
+    """Find the tables of question files; of a folder, those of all its files.
 
-    A file of answers stands for the file of questions beside it.
+    Of a folder that `iqtt make-split` wrote these are iqtt-*.h5, of another all its *.h5, such as
+    the released ones. A file of answers stands for the file of questions beside it.
 
     Raises:
         OSError: no such file or folder, or a folder without question files.
@@ -114,15 +125,15 @@ def find_tables(paths: Sequence[str | Path]) -> list[Source]:
     check(len(paths) > 0, "paths", "none", "question files, or folders of them")
     files: dict[Path, Path] = {}
     for path in map(Path, paths):
-        found = sorted(path.glob("iqtt-*.h5")) if path.is_dir() else [path]
+        found = _files(path) if path.is_dir() else [path]
         if not found:
-            raise FileNotFoundError(2, "holds no iqtt-*.h5", str(path))
+            raise FileNotFoundError(2, "holds no question files *.h5", str(path))
         for file in found:
             asked = file.with_name(file.stem.removesuffix("-answers") + file.suffix)
             chosen = asked if asked.is_file() else file
             files.setdefault(chosen.resolve(), chosen)
     names = [path.name for path in files.values()]
-    sources = []
+    sources: list[Source] = []
     for path in files.values():
         trial.try_file(path)
         shown = path.name if names.count(path.name) == 1 else str(path)
@@ -131,8 +142,47 @@ def find_tables(paths: Sequence[str | Path]) -> list[Source]:
             with QuestionsFile(path, part, beside) as questions:
                 name = f"{shown} {part}".rstrip()
                 answered = questions.has_answers or questions.has_truth
-                sources.append(Source(name, path, part, beside, answered, len(questions)))
+                images = questions.read("questions", slice(0, 0)).shape[1]
+                sources.append(Source(name, path, part, beside, answered, len(questions), images))
+    counts = sorted({source.images - 1 for source in sources})
+    expected = "the same number in every file; audit the others apart"
+    check(len(counts) == 1, "answers of a question", " and ".join(map(str, counts)), expected)
     return sources
+
+
+def find_splits(paths: Sequence[str | Path]) -> list[list[Path]]:
+    """Return what to audit together: all paths, but of a folder of splits, each split alone.
+
+    Such a folder, as `iqtt make-split --preset suite` writes it, holds folders with question files,
+    and none itself.
+    """
+    splits: list[list[Path]] = []
+    single: list[Path] = []
+    for path in map(Path, paths):
+        inner = [one for one in sorted(path.iterdir()) if _files(one)] if path.is_dir() else []
+        if inner and not _files(path):
+            splits += [[one] for one in inner]
+        else:
+            single.append(path)
+    return [single, *splits] if single or not splits else splits
+
+
+def lacking(paths: Sequence[str | Path]) -> list[str]:
+    """Return, for each folder that lacks some of a split's four files, a line that says which."""
+    lines = []
+    for path in map(Path, paths):
+        stems = [file.stem for file in _files(path)] if path.is_dir() else []
+        lacks = [
+            role for role in ROLES if not any(s == role or s.endswith(f"-{role}") for s in stems)
+        ]
+        if stems and lacks:
+            lines.append(f"{path}: no file for {', '.join(lacks)}")
+    return lines
+
+
+def _files(folder: Path) -> list[Path]:
+    """Return a folder's question files by name; none if it is no folder."""
+    return sorted(folder.glob("iqtt-*.h5")) or sorted(folder.glob("*.h5"))
 
 
 def read_table(
@@ -149,9 +199,9 @@ def read_table(
     with source.open() as questions:
         everything = slice(0, source.count)
         names = TRUTH if questions.has_truth else ()
-        chunk = max(1, CHUNK_PIXELS // (4 * questions.height * questions.width))
+        chunk = max(1, CHUNK_PIXELS // (source.images * questions.height * questions.width))
         first = questions.read("questions", slice(0, min(chunk, source.count)))
-        background = _border_color(first)
+        background = border_color(first)
         scans: list[tuple[Array, ...]] = []
         images_digest = ColumnDigest()
         for start in range(0, source.count, chunk):
@@ -167,7 +217,8 @@ def read_table(
         read = truth if answers is None else {"answers": answers, **truth}
         digests = {name: dataset_digest(values) for name, values in read.items()}
         digests["questions"] = images_digest.hex
-        contents = {questions.stored_at(name): digest for name, digest in digests.items()}
+        stored = questions.stored_bytes()  # files before format 2.0 hold no camera_distance
+        contents = {questions.stored_at(n): digest for n, digest in digests.items() if n in stored}
         told = questions.stored_content_digest is not None
         scored = joint_digest({name: digests[name] for name in SCORED if name in digests})
         return AuditTable(
@@ -175,6 +226,7 @@ def read_table(
             questions.spec,
             questions.split,
             questions.fingerprint,
+            questions.attributes.get("format_version"),
             questions.image_dtype,
             answers,
             truth,
@@ -201,21 +253,6 @@ def content_problems(tables: Sequence[AuditTable]) -> list[str]:
     return problems
 
 
-def _border(pixels: Array) -> Array:
-    """Return the pixels on the border of images, (Q, 4, H, W, ...) to (Q, 4, B, ...)."""
-    sides = (pixels[:, :, 0], pixels[:, :, -1], pixels[:, :, 1:-1, 0], pixels[:, :, 1:-1, -1])
-    return np.concatenate(sides, axis=2)
-
-
-def _border_color(images: Array) -> Array:
-    """Return the most frequent colour on the images' borders, (3,); zero if there is no image."""
-    colors = _border(images).reshape(-1, 3)
-    if not len(colors):
-        return np.zeros(3, images.dtype)
-    distinct, counts = np.unique(colors, axis=0, return_counts=True)
-    return np.asarray(distinct[counts.argmax()])
-
-
 def _scan(images: Array, background: Array, wanted: Array) -> tuple[Array, ...]:
     """Return the arrays of `AuditTable`, from `digests` on, of some questions.
 
@@ -236,7 +273,7 @@ def _scan(images: Array, background: Array, wanted: Array) -> tuple[Array, ...]:
     return (
         np.array(digests, "V16").reshape(images.shape[:2]),
         np.count_nonzero(shown, axis=(2, 3)),
-        np.count_nonzero(_border(shown), axis=2),
+        np.count_nonzero(border(shown), axis=2),
         unfit,
         measure(images[wanted], shown[wanted]),
     )

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from polycubes import are_congruent
 
-from iqtt.audit.audit import audit, question_count
+from iqtt.audit.audit import audit, question_count, to_json
 from iqtt.audit.report import markdown, table
 from iqtt.files.layout import NO_CUBE
 from iqtt.shapes.polycube import ROTATIONS, canonical, canonical_class, is_chiral, mirror, set_ids
@@ -19,8 +19,9 @@ from scenegen.common.errors import FileFormatError, SpecError
 
 OF_IMAGES = ("answer places", "pixel values", "framing", "distinct images", "distinct questions")
 BY_CUBES = {
-    *("shapes", "one right answer", "answers differ", "stored ids", "splits apart", "rotations"),
-    *("angles", "visibility", "cast again"),
+    *("shapes", "one right answer", "answers differ", "mirror images", "matched", "stored ids"),
+    *("splits apart", "splits for ever", "rotations", "angles", "visibility", "cast again"),
+    "one explanation",
 }
 PROOFS = {"content", *OF_IMAGES, *BY_CUBES}
 Edit = Callable[[h5py.File], Any]
@@ -123,7 +124,7 @@ DAMAGES: list[tuple[str, Edit, str]] = [
     (VAL, changed("answers", ALL, np.zeros_like), "one right answer, answer places"),
     (VAL, second_right_answer, "one right answer, answers differ, ..."),
     (TRAIN, unlabeled_second_right_answer, "one right answer, ..."),
-    (TRAIN, changed("truth/unlabeled/distractor_kind", 2, np.flip), "one right answer"),
+    (TRAIN, changed("truth/unlabeled/distractor_kind", 2, np.flip), "one right answer, ..."),
     (VAL, distractors_alike, "answers differ, ..."),
     (VAL, changed("truth/cubes", 3, in_pieces), "shapes, ..."),
     (VAL, changed("truth/shape_id", 4, lambda ids: ids[[1, 2, 3, 0]]), "stored ids"),
@@ -193,8 +194,8 @@ def test_a_fair_split_passes_and_all_is_told(split_folder: Path) -> None:
         ("iqtt-train.h5 unlabeled", "from the cubes", 6),
         ("iqtt-val.h5", "stored", 6),
     ]
-    record = json.loads(found.to_json())
-    assert record["format"] == "pix2shape-bench/iqtt-audit"
+    (record,) = json.loads(to_json([found]))["audits"]
+    assert json.loads(to_json([found]))["format"] == "pix2shape-bench/iqtt-audit"
     assert record["passed"] is True
     assert {proof["name"] for proof in record["proofs"]} == PROOFS
     assert all(0 <= p["low"] <= p["accuracy"] <= p["high"] <= 1 for p in record["probes"])
@@ -203,7 +204,7 @@ def test_a_fair_split_passes_and_all_is_told(split_folder: Path) -> None:
         for proof in found.proofs:
             assert proof.detail in text
         assert all(probe.statistic in text for probe in found.probes)
-    assert audit([split_folder]).to_json() == found.to_json()
+    assert to_json([audit([split_folder])]) == to_json([found])
 
 
 def test_files_that_cannot_be_audited(tmp_path: Path) -> None:
@@ -277,7 +278,7 @@ def test_an_audit_of_no_questions_does_not_pass(tmp_path: Path) -> None:
         file["questions"], file["answers"] = plain(0), np.zeros(0, np.uint8)
     found = audit([tmp_path])
     assert not found.passed
-    assert json.loads(found.to_json())["passed"] is False
+    assert json.loads(to_json([found]))["passed"] is False
     assert {proof.status for proof in found.proofs} <= {"ok", "skipped"}
     assert "there are no questions" in table(found)
 

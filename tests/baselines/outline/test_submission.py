@@ -1,0 +1,84 @@
+"""Outlines: the same outline turned is nearest, trees learn, and what is unfair is refused."""
+
+import h5py
+import numpy as np
+import pytest
+
+from baselines.outline.submission import (
+    Outlines,
+    nearest_scores,
+    tree_scores,
+    write_outline,
+    write_outline_trees,
+)
+from iqtt.audit.outlines import DISTANCES, FEATURES, RINGS, outlines
+from scenegen.common.errors import SpecError
+
+
+def boxes(count=80, seed=0):
+    """Questions of rectangles, the right one turned by 90 degrees, and where it is."""
+    rng = np.random.default_rng(seed)
+    masks, right = np.zeros((count, 4, 48, 48), bool), rng.integers(0, 3, count)
+    for row in range(count):
+        sides = rng.permutation(np.arange(4, 40, 6))[:4] + rng.integers(0, 3, 4)
+        for k in range(3):
+            masks[row, 1 + k, 4 : 4 + sides[k], 6:17] = True
+        masks[row, 0] = np.rot90(masks[row, 1 + right[row]])
+    return masks, right
+
+
+def distances_of_another(mask):
+    """Distances from a mask to a square."""
+    square = np.zeros_like(mask)
+    square[10:26, 10:26] = True
+    return outlines(np.stack([mask, square])[None])[1][0, 0, 1]
+
+
+def test_a_turned_or_flipped_outline_is_the_same():
+    mask = np.zeros((48, 48), bool)
+    mask[8:30, 10:16], mask[24:30, 10:30] = True, True
+    four = np.stack([mask, np.rot90(mask), mask[:, ::-1], np.roll(mask, 7, axis=1)])
+    features, distances = outlines(four[None])
+    assert features.shape == (1, 4, len(FEATURES))
+    assert distances.shape == (1, 4, 4, len(DISTANCES))
+    plane = features[0, :, :-RINGS]  # the power spectrum keeps half the waves, so turns change it
+    assert plane == pytest.approx(np.repeat(plane[:1], 4, axis=0), abs=0.02)
+    assert (distances.max(axis=(0, 1, 2)) < 0.3 * distances_of_another(mask)).all()
+    assert outlines(np.zeros((1, 4, 16, 16), bool))[0].any() == False  # noqa: E712
+
+
+def test_nearest_outlines_and_trees_find_turned_boxes():
+    masks, right = boxes()
+    seen = Outlines(*outlines(masks))
+    assert (nearest_scores(seen).argmax(axis=1) == right).mean() > 0.95
+    other, answers = boxes(seed=1)
+    scores = tree_scores(seen, right, Outlines(*outlines(other)))
+    assert (scores.argmax(axis=1) == answers).mean() > 0.8
+    again = tree_scores(seen, right, Outlines(*outlines(other)))
+    assert (scores == again).all()
+
+
+def write(path, masks, right):
+    with h5py.File(path, "w") as file:
+        file["questions"] = np.where(masks[..., None], 40, 255).astype(np.uint8).repeat(3, axis=-1)
+        if right is not None:
+            file["answers"] = right
+    return path
+
+
+def test_submissions_and_what_is_refused(tmp_path):
+    masks, right = boxes(30)
+    data = write(tmp_path / "test.h5", masks, None)
+    train = write(tmp_path / "train.h5", *boxes(30, 2))
+    write_outline(data, tmp_path / "out.h5")
+    with h5py.File(tmp_path / "out.h5") as file:
+        assert (file["scores"][:].argmax(axis=1) == right).mean() > 0.9
+    write_outline_trees(data, tmp_path / "trees.h5", train, 20)
+    for training, labels, where in (
+        (data, None, "train"),
+        (train, 31, "labels"),
+    ):
+        with pytest.raises(SpecError) as error:
+            write_outline_trees(data, tmp_path / "x.h5", training, labels)
+        assert error.value.where == where
+        assert not (tmp_path / "x.h5").exists()
