@@ -1,4 +1,7 @@
-"""Submit predictions for a file of rooms: python examples/submit.py rooms.h5 predictions.h5"""
+"""Submit predictions for a file of rooms: python examples/submit.py rooms.h5 predictions.h5
+
+What it predicts is a dummy, a wall that faces the camera; put your model in its place.
+"""
 
 import argparse
 
@@ -9,7 +12,7 @@ from metrics.prediction_writer import RoomPredictionWriter
 
 
 def predict(image):
-    """Radiance (H, W, 3) to planar depth (H, W) and normals (H, W, 3): put your model here."""
+    """Radiance (H, W, 3) to planar depth (H, W) and normals (H, W, 3): a dummy."""
     depth = np.full(image.shape[:2], 1.6)  # scene units: the room's edge is 1
     return depth, np.broadcast_to([0.0, 0.0, 1.0], image.shape)  # camera frame, facing the viewer
 
@@ -24,7 +27,7 @@ try:
     with (
         scenegen.open_rooms(truth) as rooms,
         RoomPredictionWriter(
-            out, truth, method="constant", run="seed 0", overwrite=arguments.overwrite
+            out, truth, method="dummy wall", run="seed 0", overwrite=arguments.overwrite
         ) as predictions,
     ):
         for room in rooms:

@@ -1,4 +1,7 @@
-"""Submit answers: python examples/submit_iqtt.py iqtt-split/iqtt-test.h5 answers.h5"""
+"""Submit answers: python examples/submit_iqtt.py iqtt-split/iqtt-test.h5 answers.h5
+
+What it answers by is a dummy, the mean brightness of a picture; put your model in its place.
+"""
 
 import argparse
 
@@ -10,7 +13,7 @@ from scenegen import SceneGenError
 
 
 def score(reference, candidates):
-    """Radiance (H, W, 3) and (3, H, W, 3) to scores (3,), best highest: put your model here."""
+    """Radiance (H, W, 3) and (A, H, W, 3) to scores (A,) of A answers, best highest: a dummy."""
     return -np.abs(candidates.mean((1, 2, 3)) - reference.mean())
 
 
@@ -26,7 +29,7 @@ try:
     write_answers(
         out,
         questions,
-        method="mean brightness",  # it mostly measures the area that a shape covers
+        method="dummy brightness",
         scores=scores,
         overwrite=arguments.overwrite,
     )

@@ -201,8 +201,13 @@ def compare(
     " where they differ. The standard deviations over runs cannot be recomputed.",
 )
 @click.option(
-    "--paper/--no-paper", default=True, help="Show the paper's own figures [default: yes]."
+    "--paper",
+    type=click.Choice(["task", "all", "none"]),
+    default="task",
+    show_default=True,
+    help="Which of the paper's own figures to show: those of the score files' tasks, all, or none.",
 )
+@click.option("--no-paper", is_flag=True, help="The same as --paper none.")
 @OVERWRITE
 def leaderboard(
     scores: tuple[str, ...],
@@ -210,12 +215,14 @@ def leaderboard(
     form: str,
     out: str | None,
     recheck: bool,
-    paper: bool,
+    paper: Any,
+    no_paper: bool,
     overwrite: bool,
 ) -> None:
     """Rank score files in one table for each test set.
 
-    What the paper reported on its own data stands beside, without a rank.
+    The headline ranks: relief for rooms, skill for questions. Floors, and what the paper reported
+    on its own data, stand below the methods, without a rank.
     """
     from metrics.leaderboard import text
     from metrics.leaderboard.ranking import leaderboard as rank
@@ -230,7 +237,7 @@ def leaderboard(
         with progress_bar(sum(map(steps, files)), "group") as bar:
             for file in files:
                 recompute(file, bar.update)
-    tables = rank(files, metrics or None, paper=paper)
+    tables = rank(files, metrics or None, paper="none" if no_paper else paper)
     page: str = getattr(text, f"to_{form}")(tables)
     if out is None:
         click.echo(page)

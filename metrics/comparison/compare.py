@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.comparison.pairing import column, common_rows, require_same_test
+from metrics.comparison.pairing import common_rows, pair, require_same_test
 from metrics.comparison.statistics import (
     SIGN_FLIPS,
     holm,
@@ -45,6 +45,7 @@ class Difference:
         p_value: two-sided.
         p_holm: corrected for all comparisons of the family.
         wins, losses, ties: scenes (or questions) in which the method is better, worse, the same.
+            Scenes that have no such score, as no picture shows an object, are not among them.
         smallest: the least difference that this test set would have shown in 80% of cases, given
             how the differences spread; None where it could show none, or all differences are equal.
     """
@@ -128,8 +129,9 @@ def compare(
     pairs = [(name, i) for name in names for i in range(1, len(files))]
 
     def difference(name: str, i: int) -> Difference:
-        a, b = (column(files[k], name, orders[k]) for k in (i, 0))
-        apart = cluster_means(a - b, clusters)
+        a, b, there = pair(files[i], files[0], name, (orders[i], orders[0]))
+        scenes = clusters[there]
+        apart = cluster_means(a - b, scenes)
         ends = bootstrap_interval(apart[:, None], seed, resamples, CONFIDENCE)
         low, high = (None if math.isnan(end) else float(end) for (end,) in ends)
         better = apart if metric(name).higher_is_better else -apart
@@ -138,8 +140,8 @@ def compare(
         return Difference(
             metric=name,
             method=labels[i],
-            value=float(cluster_means(a, clusters).mean()),
-            reference_value=float(cluster_means(b, clusters).mean()),
+            value=float(cluster_means(a, scenes).mean()),
+            reference_value=float(cluster_means(b, scenes).mean()),
             difference=float(apart.mean()),
             low=low,
             high=high,

@@ -6,13 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.checks import LARGEST_MAGNITUDE
-from metrics.scoring.metric_names import HEADLINE, metric
+from metrics.scoring.metric_names import EMPTY_ROOM, HEADLINE, metric
 from metrics.scoring.records import ID_COLUMNS, ScoreFile
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import plain
 
 Array = NDArray[np.float64]
 IDS_SHOWN = 5
+FLOOR_AGREEMENT = 1e-6  # relative: of the empty room, drawn on other machines
+CHANGED = "one of the files was changed"
 
 
 class ComparisonError(SceneGenError):
@@ -85,22 +87,40 @@ def common_rows(files: Sequence[ScoreFile]) -> list[NDArray[np.int64]]:
                 file.place,
                 f"{what} {common[wrong][0]} in another scene",
                 f"that of {first.place}",
-                "one of the files was changed",
+                CHANGED,
             )
+    _require_same_floors(files, orders)
     return orders
 
 
-def column(file: ScoreFile, name: str, order: NDArray[np.int64]) -> Array:
-    """Return a score of the compared rows, (N,).
+def _require_same_floors(files: Sequence[ScoreFile], orders: Sequence[NDArray[np.int64]]) -> None:
+    """Raise ComparisonError where files disagree about the empty room, which is the truth's."""
+    first = files[0].items
+    for file, order in zip(files[1:], orders[1:], strict=True):
+        for name in [name for name in first if name.startswith(EMPTY_ROOM) and name in file.items]:
+            ours, theirs = first[name][orders[0]], file.items[name][order]
+            same = np.isclose(theirs, ours, FLOOR_AGREEMENT, FLOOR_AGREEMENT**2, equal_nan=True)
+            if not same.all():
+                i = int(np.argmin(same))
+                found, expected = (repr(float(values[i])) for values in (theirs, ours))
+                where = f"{file.place}: items.{name}, row {file.ids[order][i]}"
+                told = f"{expected} as in {files[0].place}"
+                raise ComparisonError(where, found, told, CHANGED)
 
-    Raises ComparisonError where the file lacks it, or holds no usable number for one of the rows.
+
+def column(file: ScoreFile, name: str, order: NDArray[np.int64]) -> Array:
+    """Return a score of the compared rows, (N,); NaN where a row has no such score.
+
+    Raises ComparisonError where the file lacks it, or holds no usable number for one of the rows
+    that every file has a score for.
     """
     where = f"{file.place}: items.{name}"
     if name not in file.items:
         held = ", ".join(n for n in file.items if n in file.metrics)
         raise ComparisonError(where, "none", "the scores of all items", f"the file has {held}")
     values: Array = file.items[name][order]
-    bad = ~(np.abs(values) <= LARGEST_MAGNITUDE)
+    lacking = np.isnan(values) if metric(name).lacking else np.zeros(len(values), bool)
+    bad = ~(np.abs(values) <= LARGEST_MAGNITUDE) & ~lacking
     if bad.any():
         rows = file.ids[order][bad]
         raise ComparisonError(
@@ -110,6 +130,31 @@ def column(file: ScoreFile, name: str, order: NDArray[np.int64]) -> Array:
             "finite numbers",
         )
     return values
+
+
+def pair(
+    file: ScoreFile, reference: ScoreFile, name: str, orders: tuple[NDArray[np.int64], ...]
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return a score in both files, (M,) each, and which of the compared rows have it, (N,).
+
+    Which rows those are follows from the truth. Raises ComparisonError where the files differ in
+    that, or no row has it; else as `column`.
+    """
+    ours, theirs = column(file, name, orders[0]), column(reference, name, orders[1])
+    there = ~np.isnan(theirs)
+    differ = np.isnan(ours) == there
+    where = f"{file.place}: items.{name}"
+    if differ.any():
+        rows = file.ids[orders[0]][differ]
+        raise ComparisonError(
+            where,
+            f"other rows without a number, such as {_listed(rows)}",
+            f"those of {reference.place}",
+            CHANGED,
+        )
+    if not there.any():
+        raise ComparisonError(where, "no number at all", "a row that has this score")
+    return ours[there], theirs[there], there
 
 
 def _listed(ids: NDArray[np.int64]) -> str:

@@ -9,6 +9,7 @@ import re
 import unicodedata
 from collections.abc import Iterator, Sequence
 
+from metrics.leaderboard.floors import FLOOR, NOISE
 from metrics.leaderboard.paper_tables import TABLES
 from metrics.leaderboard.table import INCOMPARABLE_MARK, REPORTED_MARK
 from metrics.scoring.records import ScoreFile
@@ -89,6 +90,8 @@ def _own_mark(name: str) -> str:
     """Return which mark of the leaderboard a name has, or one that looks like it; or nothing."""
     if any(_DAGGERS.intersection(unicodedata.name(c, "").split()) for c in name):
         return f"{REPORTED_MARK} or {INCOMPARABLE_MARK}"
+    if skeleton(name).startswith(tuple(map(skeleton, (FLOOR, NOISE)))):
+        return f"{FLOOR.strip()} or {NOISE} before it"
     ending = _endings().search(skeleton(name))
     return "an ending such as [1], #1, (2 runs) or (claims depth when scaled)" if ending else ""
 

@@ -1,29 +1,48 @@
 """Score files side by side: one ranking for each test set, with the paper's figures beside it.
 
 Scores of different test sets never share a ranking. Scores that are not comparable stand below it,
-and so do the paper's figures, which were measured on the authors' data; neither has a rank.
+and so do floors and the paper's figures, which were measured on the authors' data; none has a rank.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
+from metrics.leaderboard.floors import (
+    SKILL_OF,
+    angle_floor_rows,
+    floor_rows,
+    floors_table,
+    kind_floor_rows,
+    require_same_floors,
+    skill_key,
+)
 from metrics.leaderboard.names import check_names
 from metrics.leaderboard.paper_tables import REPORTED, SOURCE, TABLES, Figure, PaperTable
 from metrics.leaderboard.table import (
     INCOMPARABLE_MARK,
     REPORTED_MARK,
+    Column,
     Table,
     build_table,
-    column_head,
     reported_rows,
+    score_column,
+    skill_column,
 )
-from metrics.measures.answers import CHANCE
+from metrics.report.text import SKILL, what_the_floor_is
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import HEADLINE, metric
-from metrics.scoring.records import ID_COLUMNS, ScoreFile
+from metrics.scoring.records import ID_COLUMNS, Score, ScoreFile, Skill
 from scenegen.common.errors import SceneGenError
-from scenegen.common.text_table import by_number, distinct, number, plain
+from scenegen.common.text_table import by_number, distinct, plain
+
+Paper = Literal["all", "task", "none"]
+ABLATIONS = 4  # the table of the paper on parts of its model, which only stands by itself
+ANGLES = "Angle between each view and its scene's first one."
+KINDS = 'Kinds of wrong answers; "-2" ends those of questions with two answers.'
 
 
 class LeaderboardError(SceneGenError):
@@ -31,7 +50,7 @@ class LeaderboardError(SceneGenError):
 
 
 def leaderboard(
-    files: Sequence[ScoreFile], metrics: Sequence[str] | None = None, *, paper: bool = True
+    files: Sequence[ScoreFile], metrics: Sequence[str] | None = None, *, paper: Paper = "task"
 ) -> tuple[Table, ...]:
     """Return tables of these scores, grouped by test set in the order of the files.
 
@@ -40,14 +59,17 @@ def leaderboard(
     Args:
         files: any number, of any test sets.
         metrics: the scores to show; the first one ranks. A task that has none of them, or any task
-            if they are None, shows `metric_names.HEADLINE`.
-        paper: whether to show the paper's figures: those of the shown scores in each ranking, and
-            below all rankings the paper's tables of which some figure found no place.
+            if they are None, shows `metric_names.HEADLINE`, skills before the scores themselves.
+        paper: which of the paper's figures to show: "none"; or those of the shown scores in each
+            ranking, and below all rankings the paper's tables of which some figure found no place,
+            "all" of them or those of the files' tasks.
 
-    Raises LeaderboardError where files that claim to score all of one test set score different
-    rows of it, LookAlikeError for names that could be taken for others, and UnknownMetricError.
+    Raises LeaderboardError where a file is given twice or files that claim to score all of one test
+    set score different rows of it, FloorError where they state different floors of it,
+    LookAlikeError for names that could be taken for others, and UnknownMetricError.
     """
     check_names(files)
+    _require_once(files)
     chosen = {name: metric(name).task for name in metrics or ()}
     groups: dict[tuple[str, str], list[ScoreFile]] = {}
     for file in files:
@@ -56,18 +78,69 @@ def leaderboard(
     shown: set[Figure] = set()
     for (task, digest), members in groups.items():
         _require_same_rows(members)
-        names = [name for name in chosen if chosen[name] == task] or HEADLINE[task]
-        figures = [f for t in TABLES for f in t.figures if paper and f.metric in names]
+        require_same_floors(members)
+        names = [name for name in chosen if chosen[name] == task]
+        columns = _columns(members, names or HEADLINE[task], headline=not names)
+        figures = [
+            figure
+            for table in TABLES
+            for figure in table.figures
+            if paper != "none" and figure.table != ABLATIONS and figure.metric in columns
+        ]
         asked = {file.meta.truth_fingerprint for file in members}
         same_request = {f.meta.truth_digest for f in files if f.meta.truth_fingerprint in asked} - {
             digest
         }
-        for table, used in _tables(members, names, figures, sorted(same_request)):
+        for table, used in _tables(members, columns, figures, sorted(same_request)):
             tables.append(table)
             shown.update(used)
-    if paper:
-        tables += [_paper_table(t) for t in TABLES if not shown.issuperset(t.figures)]
+    floors = floors_table(files)
+    tables += [floors] if floors else []
+    if paper != "none":
+        tasks = {file.task for file in files if paper == "task"} or {"rooms", "iqtt"}
+        kept = (
+            replace(t, figures=tuple(f for f in t.figures if metric(f.metric).task in tasks))
+            for t in TABLES
+        )
+        tables += [_paper_table(t) for t in kept if not shown.issuperset(t.figures)]
     return tuple(tables)
+
+
+def _require_once(files: Sequence[ScoreFile]) -> None:
+    """Raise LeaderboardError where two files hold scores of the same submissions."""
+    for one, other in itertools.combinations(files, 2):
+        hashes = ({run.sha256 for run in file.meta.submissions} for file in (one, other))
+        same = next(hashes) == next(hashes)
+        if same and one.meta.truth_digest == other.meta.truth_digest:
+            found = f"scores of the same submissions as {one.place}"
+            raise LeaderboardError(other.place, found, "each submission once")
+
+
+def _columns(files: Sequence[ScoreFile], names: Sequence[str], headline: bool) -> dict[str, Column]:
+    """Return the columns by key: scores, and skills where any file has them.
+
+    In the headline the skills stand before all scores that they are made of; else after each.
+    """
+    skilled = [name for name in names if any(name in file.skills for file in files)]
+    skills = {skill_key(name): skill_column(name) for name in skilled}
+    if headline:
+        scores = sorted(names, key=lambda name: name in skilled)
+        split = len(names) - len(skilled)
+        first, last = (
+            {name: score_column(name) for name in part} for part in (scores[:split], scores[split:])
+        )
+        return {**first, **skills, **last}
+    found: dict[str, Column] = {}
+    for name in names:
+        found[name] = score_column(name)
+        if name in skilled:
+            found[skill_key(name)] = skills[skill_key(name)]
+    return found
+
+
+def _shown(file: ScoreFile) -> dict[str, Score | Skill]:
+    """Return the scores of a file, and their skills, by the keys of their columns."""
+    return {**file.metrics, **{skill_key(name): one for name, one in file.skills.items()}}
 
 
 def _require_same_rows(files: Sequence[ScoreFile]) -> None:
@@ -85,57 +158,76 @@ def _require_same_rows(files: Sequence[ScoreFile]) -> None:
 
 def _tables(
     files: Sequence[ScoreFile],
-    names: Sequence[str],
+    columns: Mapping[str, Column],
     figures: Sequence[Figure],
     same_request: Sequence[str],
 ) -> Iterator[tuple[Table, list[Figure]]]:
-    """Yield the ranking of a test set, then each score by view angle where any file has that.
+    """Yield the ranking of a test set, then its scores by view angle or by kind of question.
 
     With each table come the figures of the paper that it shows. `same_request` has the digests
     of other test sets, which the same request made.
     """
     labels = distinct([f.method for f in files], [f.path.stem if f.path else "" for f in files])
-    ranked = [(_label(files[i], labels[i]), files[i]) for i in _order(files, names[0])]
-    first = ranked[0][1]
-    what = "Rooms" if first.task == "rooms" else "3D-IQTT"
-    test = known_test(first.meta.truth_digest)
-    title = f"{what}, {plain(test.name) if test else f'truth {first.meta.truth_digest[:12]}'}"
+    order = _order(files, columns)
+    ranked = [(_label(files[i], labels[i]), files[i]) for i in order]
+    first = ranked[0][1]  # comparable, if any is
+    title, names = _title(first), [name for name in columns if not name.startswith(SKILL_OF)]
     used = [f for f in figures if f.view_angle is None]
     table = build_table(
         title,
-        {name: (name, column_head(name)) for name in names},
-        [(label, file.comparable, file.metrics) for label, file in ranked],
+        columns,
+        [(label, file.comparable, _shown(file)) for label, file in ranked],
+        floor_rows(first, names),
         _by_row(used, _figure_label, lambda figure: figure.metric),
-        [*_notes([file for _, file in ranked], names), *map(_same_request_note, same_request)],
+        [*_notes([file for _, file in ranked]), *map(_same_request_note, same_request)],
         ranked=True,
     )
     yield table, used
+    by_angle = first.task == "rooms"
     for name in names:
         entries = []
         for label, file in ranked:
-            found = {a: s[name] for a, s in file.by_view_angle.items() if name in s}
+            groups = file.by_view_angle if by_angle else file.by_distractor
+            found = {key: scores[name] for key, scores in groups.items() if name in scores}
             entries.append((label, file.comparable, found))
-        angles = by_number({angle for _, _, scores in entries for angle in scores})
-        if angles:
-            used = [f for f in figures if f.metric == name and str(f.view_angle) in angles]
-            table = build_table(
-                f"{title}: {column_head(name)} by view angle",
-                {angle: (name, f"{angle}°") for angle in angles},
-                entries,
-                _by_row(used, _figure_label, lambda figure: str(figure.view_angle)),
-                ["Angle between each view and its scene's first one. Rows as in the ranking."],
-                ranked=False,
-            )
-            yield table, used
+        keys = by_number({key for _, _, scores in entries for key in scores})
+        if len(keys) < (1 if by_angle else 2):  # a single kind stands in the title
+            continue
+        used = [f for f in figures if f.metric == name and str(f.view_angle) in keys]
+        column = score_column(name)
+        table = build_table(
+            f"{title}: {column.head} by {'view angle' if by_angle else 'kind of question'}",
+            {key: replace(column, head=f"{key}°" if by_angle else key) for key in keys},
+            entries,
+            angle_floor_rows(first, name) if by_angle else kind_floor_rows(first, keys),
+            _by_row(used, _figure_label, lambda figure: str(figure.view_angle)),
+            [ANGLES if by_angle else KINDS, "Rows as in the ranking."],
+            ranked=False,
+        )
+        yield table, used
 
 
-def _order(files: Sequence[ScoreFile], name: str) -> list[int]:
-    """Indices of the files: comparable ones from best to worst, those without a score, others."""
+def _title(file: ScoreFile) -> str:
+    """Return task and truth, and the kind of the questions if all have one."""
+    what = "Rooms" if file.task == "rooms" else "3D-IQTT"
+    if len(file.by_distractor) == 1:
+        what += f", {plain(*file.by_distractor)} questions"
+    test = known_test(file.meta.truth_digest)
+    return f"{what}, {plain(test.name) if test else f'truth {file.meta.truth_digest[:12]}'}"
 
-    def place(i: int) -> tuple[bool, bool, float]:
-        score = files[i].metrics.get(name)
-        sign = -1.0 if metric(name).higher_is_better else 1.0
-        return not files[i].comparable, score is None, sign * score.value if score else 0.0
+
+def _order(files: Sequence[ScoreFile], columns: Mapping[str, Column]) -> list[int]:
+    """Indices of the files: comparable ones from best to worst, those without a score, others.
+
+    The first column decides; where it is equal, the second one does, and so on.
+    """
+
+    def place(i: int) -> tuple[bool, list[tuple[bool, float]]]:
+        shown, values = _shown(files[i]), []
+        for key, column in columns.items():
+            sign = -1.0 if column.higher_is_better else 1.0
+            values.append((key not in shown, sign * shown[key].value if key in shown else 0.0))
+        return not files[i].comparable, values
 
     return sorted(range(len(files)), key=place)
 
@@ -164,24 +256,30 @@ def _figure_label(figure: Figure) -> str:
     return f"{figure.method}, {figure.data}{labels} (Table {figure.table})"
 
 
-def _notes(files: Sequence[ScoreFile], names: Sequence[str]) -> Iterator[str]:
-    first = files[0]
-    clusters = len(np.unique(first.clusters))
+def _notes(files: Sequence[ScoreFile]) -> Iterator[str]:
+    first, counts = files[0], files[0].meta.counts
     if first.task == "rooms":
-        yield f"{len(first.ids):,} images of {clusters:,} scenes."
+        yield f"{len(first.ids):,} images of {len(np.unique(first.clusters)):,} scenes."
     else:
-        yield f"{clusters:,} questions; chance is {CHANCE:.4f}."
+        chance = f"; chance is {1.0 / counts['answers']:.4f}" if "answers" in counts else ""
+        yield f"{len(first.ids):,} questions{chance}."
+    if any(file.skills for file in files):
+        yield f"{SKILL} {what_the_floor_is(first)}"
     levels = " and ".join(
         f"{level:.4g}%" for level in sorted({100.0 * f.meta.confidence for f in files})
     )
-    yield (
-        f"[low, high]: {levels} interval over {'scenes' if first.task == 'rooms' else 'questions'}."
-        " ±: standard deviation over training runs. Best in bold, which is no test of a difference:"
-        " see bench compare."
+    over = (
+        "scenes" if first.task == "rooms" else "shapes" if "shape" in first.items else "questions"
     )
-    floors = [f.meta.chamfer_floor for f in files if f.meta.chamfer_floor is not None]
-    if floors and "chamfer" in names:
-        yield f"Noise floor of Chamfer at this resolution: {number(max(floors))} scene units."
+    yield (
+        f"[low, high]: {levels} interval over {over}. ±: standard deviation over training runs."
+        " Best in bold, which is no test of a difference: see bench compare."
+    )
+    if first.meta.noise_floors:
+        yield (
+            "Noise floor: the score of the true surface, sampled elsewhere, against itself. Floors"
+            " are as the score files state them; files that disagree are refused."
+        )
 
 
 def _same_request_note(digest: str) -> str:

@@ -8,12 +8,20 @@ from typing import Literal
 from metrics.leaderboard.paper_tables import REPORTED, SOURCE, Figure
 from metrics.report.text import interval_cells
 from metrics.scoring.metric_names import metric
-from metrics.scoring.records import Score
+from metrics.scoring.records import Score, Skill
 from scenegen.common.text_table import number
 
-Kind = Literal["ranked", "incomparable", "reported"]
-Entry = tuple[str, bool, Mapping[str, Score]]
+Kind = Literal["ranked", "incomparable", "floor", "reported"]
+Entry = tuple[str, bool, Mapping[str, Score | Skill]]
 REPORTED_MARK, INCOMPARABLE_MARK = "†", "‡"
+
+
+@dataclass(frozen=True)
+class Column:
+    """The head of a column, and which of its scores are better."""
+
+    head: str
+    higher_is_better: bool
 
 
 @dataclass(frozen=True)
@@ -40,7 +48,8 @@ class Row:
     Attributes:
         rank: its place by the first column, such as "1"; empty where it has none.
         label: the method's name and what has to be known about it, in one line, not escaped.
-        kind: only "ranked" rows have ranks and best cells.
+        kind: only "ranked" rows have ranks and best cells; "floor" rows say what a method without
+            sight, chance or noise gives.
     """
 
     rank: str
@@ -66,24 +75,26 @@ class Table:
 
 def build_table(
     title: str,
-    columns: Mapping[str, tuple[str, str]],
+    columns: Mapping[str, Column],
     entries: Sequence[Entry],
+    floors: Mapping[str, Mapping[str, float]],
     figures: Mapping[str, Mapping[str, Figure]],
     notes: Sequence[str],
     ranked: bool,
 ) -> Table:
-    """Return a table of the scored methods, then of the paper's figures.
+    """Return a table of the scored methods, then of floors, then of the paper's figures.
 
     Args:
-        columns: by key, the name of the score in each column and the column's head.
+        columns: the columns by their keys.
         entries: for each method, best first: its label, whether it is comparable, and its scores
             by the columns' keys.
+        floors: values by the label of their row, then by the columns' keys.
         figures: of the paper, by the label of their row, then by the columns' keys.
         notes: stand below the table, before those on marks that its rows bear.
         ranked: whether the first column ranks the methods.
     """
     first = next(iter(columns))
-    best = {key: _best(entries, key, name) for key, (name, _) in columns.items()}
+    best = {key: _best(entries, key, column) for key, column in columns.items()}
     rows: list[Row] = []
     place, last = 0, ""
     for label, comparable, scores in entries:
@@ -93,6 +104,9 @@ def build_table(
             place = place if cells[0].value == last else len(rows) + 1
             rank, last = str(place), cells[0].value
         rows.append(Row(rank, label, "ranked" if comparable else "incomparable", cells))
+    for label, values in floors.items():
+        texts = (number(values[key]) if key in values else "-" for key in columns)
+        rows.append(Row("", label, "floor", tuple(map(Cell, texts))))
     told = list(notes)
     if not all(comparable for _, comparable, _ in entries):
         told.append(
@@ -101,11 +115,13 @@ def build_table(
             " submission named the truth (score it again with --truth)."
         )
     if figures:
-        shares = {"iqtt_accuracy"}.issuperset(name for name, _ in columns.values())
+        shares = all(
+            figure.labels is not None for row in figures.values() for figure in row.values()
+        )
         unit = "" if shares else "; it states no unit of length"
         told.append(f"{REPORTED_MARK} {SOURCE}, {REPORTED}, so not ranked{unit}.")
     rows += reported_rows(figures, tuple(columns))
-    return Table(title, tuple(head for _, head in columns.values()), tuple(rows), tuple(told))
+    return Table(title, tuple(c.head for c in columns.values()), tuple(rows), tuple(told))
 
 
 def reported_rows(
@@ -119,22 +135,29 @@ def reported_rows(
     return tuple(rows)
 
 
-def column_head(name: str) -> str:
-    """Return the title of a score, an arrow that tells which way is better, and its unit."""
+def score_column(name: str) -> Column:
+    """Return the column of a score: title, an arrow that tells which way is better, and unit."""
     known = metric(name)
-    return f"{known.title} {'↑' if known.higher_is_better else '↓'} ({known.unit})"
+    arrow = "↑" if known.higher_is_better else "↓"
+    return Column(f"{known.title} {arrow} ({known.unit})", known.higher_is_better)
 
 
-def _best(entries: Sequence[Entry], key: str, name: str) -> str:
+def skill_column(name: str) -> Column:
+    """Return the column of the skill of a score."""
+    return Column(f"Skill of {metric(name).title} ↑ (1 is perfect)", True)
+
+
+def _best(entries: Sequence[Entry], key: str, column: Column) -> str:
     """The best of the comparable scores of a column as it is shown; empty where there is none."""
     values = [scores[key].value for _, may, scores in entries if may and key in scores]
-    better = max if metric(name).higher_is_better else min
+    better = max if column.higher_is_better else min
     return number(better(values)) if values else ""
 
 
-def _cell(score: Score | None, best: str | Literal[False]) -> Cell:
+def _cell(score: Score | Skill | None, best: str | Literal[False]) -> Cell:
     if score is None:
         return Cell()
     value, interval = interval_cells(score)
-    spread = "" if score.std is None else f" ± {number(score.std, score.value)}"
+    std = getattr(score, "std", None)
+    spread = "" if std is None else f" ± {number(std, score.value)}"
     return Cell(value, spread + ("" if interval == "-" else f" {interval}"), value == best)

@@ -31,7 +31,7 @@ def require(ok: bool, where: str, found: object, expected: str) -> None:
         raise MeasureError(where, found, expected)
 
 
-def require_some(count: int, where: str) -> None:
+def require_some(count: float, where: str) -> None:
     """Raise EmptyError where there is nothing to score."""
     if count < 1:
         raise EmptyError(where, "none", "at least one")

@@ -1,4 +1,8 @@
-"""Confidence intervals: Wilson's for fractions, the bootstrap over scenes for all other scores."""
+"""Confidence intervals: Wilson's for fractions, the bootstrap over scenes for all other scores.
+
+Both take clusters: views of one scene, or questions about one shape, are alike, so that they tell
+less than as many independent ones.
+"""
 
 import math
 from statistics import NormalDist
@@ -15,8 +19,10 @@ RESAMPLES = 2000
 DRAWS_HELD = 1 << 16
 
 
-def wilson_interval(successes: int, n: int, confidence: float = 0.95) -> tuple[float, float]:
+def wilson_interval(successes: float, n: float, confidence: float = 0.95) -> tuple[float, float]:
     """Return Wilson's score interval, within [0, 1], for a fraction of n independent trials.
+
+    Neither number need be whole: `clustered_wilson_interval` gives effective ones.
 
     (k + z^2/2 -+ z sqrt(k (n - k) / n + z^2/4)) / (n + z^2), with k successes and z the normal
     quantile at (1 + confidence) / 2. Source: Wilson 1927, Probable Inference. The tests compare it
@@ -33,6 +39,77 @@ def wilson_interval(successes: int, n: int, confidence: float = 0.95) -> tuple[f
     return max(0.0, min(share, (middle - half) / total)), min(
         1.0, max(share, (middle + half) / total)
     )
+
+
+def clustered_wilson_interval(
+    right: ArrayLike, clusters: ArrayLike, confidence: float = 0.95
+) -> tuple[float, float]:
+    """Return Wilson's interval for the fraction of right answers, where answers are correlated.
+
+    Wilson's interval of n / deff trials instead of n, deff being the `design_effect` of the
+    clusters: the interval of Korn and Graubard 1998 (Survey Methodology 24, "Confidence intervals
+    for proportions with small expected number of positive counts estimated from survey data"),
+    with Wilson's formula in the place of the exact one. Without clusters, deff is 1, and this is
+    `wilson_interval`.
+
+    Args:
+        right: whether each answer is right, (Q,): 0 or 1.
+        clusters: a label for each, (Q,), such as the shape that the question is about.
+    """
+    values = as_float64(right, "answers")
+    count, share = len(values), float(values.mean())
+    effective = count / design_effect(values, clusters)
+    low, high = wilson_interval(share * effective, effective, confidence)
+    return min(share, low), max(share, high)  # but for rounding, the share lies between anyway
+
+
+def design_effect(values: ArrayLike, clusters: ArrayLike) -> float:
+    """Return by how much clusters raise the variance of the mean of (N,) values: at least 1.
+
+    Kish's design effect (Kish 1965, Survey Sampling, section 8.2): the variance of the mean, from
+    how the sums of S clusters differ from what their sizes let expect,
+    S / (S - 1) sum_i (sum of cluster i - mean * size of cluster i)^2 / N^2, over that of N
+    independent values. One cluster alone shows no such difference; it counts as one value.
+    """
+    table, sums, sizes = _cluster_sums(values, clusters)
+    count, number = len(table), len(sizes)
+    if number == count:
+        return 1.0
+    if number == 1:
+        return float(count)
+    independent = float(np.square(table - table.mean()).sum()) / (count - 1) / count
+    if independent == 0.0:
+        return 1.0
+    residuals = sums - table.mean() * sizes
+    clustered = number / (number - 1) * float(np.square(residuals).sum()) / count**2
+    return min(max(1.0, clustered / independent), float(count))
+
+
+def linearised_means(values: ArrayLike, clusters: ArrayLike) -> Array:
+    """Return a number for each of S clusters, (S, 1), whose mean is that of all N values.
+
+    `bootstrap_interval` of them resamples whole clusters for a mean in which each value counts
+    alike, whatever the size of its cluster: mean + (sum - mean * size) * S / N, the first terms of
+    the mean's Taylor series (Davison and Hinkley 1997, section 2.7). Where each value is a cluster
+    of its own, these are the values.
+    """
+    table, sums, sizes = _cluster_sums(values, clusters)
+    if len(sizes) == len(table):
+        return table[:, None]
+    mean = table.mean()
+    return np.asarray(mean + (sums - mean * sizes) * (len(sizes) / len(table)))[:, None]
+
+
+def _cluster_sums(values: ArrayLike, clusters: ArrayLike) -> tuple[Array, Array, Array]:
+    """Return values (N,), and the sums and the sizes of their clusters, (S,) each."""
+    table, labels = as_float64(values, "values"), np.asarray(clusters)
+    ok = table.ndim == 1 and labels.shape == table.shape
+    require(ok, "cluster labels", f"shape {labels.shape}", f"one for each value of {table.shape}")
+    require_some(len(table), "values")
+    require_finite(table, "values")
+    index = np.unique(labels, return_inverse=True)[1]
+    sums = np.bincount(index, table)
+    return table, sums.astype(np.float64), np.bincount(index).astype(np.float64)
 
 
 def normal_quantile(confidence: float) -> float:
@@ -92,14 +169,14 @@ def bootstrap_interval(
     centre = table.mean(axis=0)
     deviations = table - centre
     deviations[:, (table == table[0]).all(axis=0)] = 0.0
-    resampled = _resampled_means(deviations, seed, resamples)
-    ends = [_bca_ends(d, r, z) for d, r in zip(deviations.T, resampled.T, strict=True)]
+    resampled = resampled_means(deviations, seed, resamples)
+    ends = [bca_ends(d, r, z) for d, r in zip(deviations.T, resampled.T, strict=True)]
     low, high = np.array(ends).T
     # Values that differ in their last digit only may all lie on one side of their rounded mean.
     return centre + np.minimum(low, 0.0), centre + np.maximum(high, 0.0)
 
 
-def _resampled_means(values: Array, seed: int, resamples: int) -> Array:
+def resampled_means(values: Array, seed: int, resamples: int) -> Array:
     """Return means (B, K) of B `resamples`, drawn with replacement from the rows of (S, K)."""
     rng = np.random.default_rng(seed)
     count = len(values)
@@ -114,7 +191,7 @@ def _resampled_means(values: Array, seed: int, resamples: int) -> Array:
     return np.concatenate(means)
 
 
-def _bca_ends(deviations: Array, resampled: Array, z: float) -> tuple[float, float]:
+def bca_ends(deviations: Array, resampled: Array, z: float) -> tuple[float, float]:
     """The two BCa percentiles of the resampled means of deviations from the mean."""
     squares = float(np.square(deviations).sum())
     if squares == 0.0:

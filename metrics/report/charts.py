@@ -52,10 +52,10 @@ def intervals(points: Sequence[tuple[float, float, float, float]], title: str, u
     if not points:
         return Svg()
     table = np.array(points, float)
-    top = float(np.nanmax(table[:, 1:])) or 1.0
+    top, bottom = float(np.nanmax(table[:, 1:])) or 1.0, min(0.0, float(np.nanmin(table[:, 1:])))
     degrees = table[:, 0].tolist()
     x = _scale(min(degrees) - 4, max(degrees) + 4, LEFT, WIDTH - RIGHT)
-    y = _scale(0, top * 1.08, HEIGHT - BOTTOM, TOP)
+    y = _scale(bottom * 1.08, top + 0.08 * abs(top), HEIGHT - BOTTOM, TOP)
     shown = []
     for degree, value, low, high in points:
         if np.isfinite(low) and np.isfinite(high):
@@ -65,6 +65,10 @@ def intervals(points: Sequence[tuple[float, float, float, float]], title: str, u
             f"<title>{degree:g} degrees: {value:.4g} [{low:.4g}, {high:.4g}]</title></circle>"
         )
     axes = _axes(x, degrees, "degrees", y, top, f"{top:.3g}")
+    if bottom < 0:
+        axes += _line("axis", LEFT, y(0), WIDTH - RIGHT, y(0)) + _text(
+            LEFT - 4, y(0) + 4, "0", "end"
+        )
     return _chart(f"{title} ({unit})", "".join(shown) + axes)
 
 

@@ -9,7 +9,16 @@ import numpy as np
 from metrics.report.charts import Svg, histogram, intervals
 from metrics.report.html import render
 from metrics.report.pictures import view_pictures
-from metrics.report.text import GROUP_SCORES, GROUP_TITLES, group_tables, score_rows, source_text
+from metrics.report.text import (
+    GROUP_SCORES,
+    GROUP_TITLES,
+    SKILL,
+    group_tables,
+    headline_rows,
+    score_rows,
+    source_text,
+    what_the_floor_is,
+)
 from metrics.scoring.metric_names import HEADLINE, in_order, metric
 from metrics.scoring.records import Groups, ScoreFile
 from metrics.submissions.reader import RoomPredictions, open_predictions
@@ -31,6 +40,8 @@ def html_report(scores: ScoreFile, truth_path: Path, submissions: Sequence[Path]
         "report.html",
         scores=scores,
         source_text=source_text(scores.meta),
+        headline_rows=headline_rows(scores),
+        skill_text=f"{SKILL} {what_the_floor_is(scores)}" if scores.skills else "",
         score_rows=score_rows(scores),
         groups=[
             (GROUP_TITLES[grouping].capitalize(), rows, list(_over_angle(scores, grouping)))
@@ -47,13 +58,13 @@ def html_report(scores: ScoreFile, truth_path: Path, submissions: Sequence[Path]
 def _over_angle(scores: ScoreFile, grouping: str) -> Iterator[Svg]:
     """Yield a chart of each score over the angle, if that is what the groups are of."""
     groups: Groups = getattr(scores, grouping)
-    names = [name for name in GROUP_SCORES[scores.task] if name in scores.metrics]
-    for name in names if grouping.endswith("_angle") else ():
+    for name in GROUP_SCORES[scores.task] if grouping.endswith("_angle") else ():
         points = []
         for key, found in groups.items():
-            score, degrees = found[name], np.mean([float(part) for part in key.split("-")])
-            low, high = (np.nan if end is None else end for end in (score.low, score.high))
-            points.append((float(degrees), score.value, low, high))
+            if name in found:
+                score, degrees = found[name], np.mean([float(part) for part in key.split("-")])
+                low, high = (np.nan if end is None else end for end in (score.low, score.high))
+                points.append((float(degrees), score.value, low, high))
         yield intervals(points, metric(name).title, metric(name).unit)
 
 
@@ -67,8 +78,14 @@ def _distributions(scores: ScoreFile) -> Iterator[Svg]:
 def _pictures(
     scores: ScoreFile, truth_path: Path, submission: Path
 ) -> Iterator[tuple[str, list[tuple[int, str, list[tuple[str, str]]]]]]:
-    """Yield "Best", "Median" and "Worst", each with its items: row, scores, titles and URLs."""
-    order = np.argsort(np.asarray(scores.items["chamfer"], float), kind="stable")
+    """Yield "Best by Relief IoU", "Median" and "Worst", each with its items.
+
+    Of an item these are its row, scores, titles and URLs. Images without such a score are left out.
+    """
+    first = next(name for name in HEADLINE["rooms"] if name in scores.items)
+    values = np.asarray(scores.items[first], float)
+    order = np.argsort(-values if metric(first).higher_is_better else values, kind="stable")
+    order = order[np.isfinite(values[order])]
     shown = min(SHOWN, len(order))
     middle = (len(order) - shown) // 2
     with RoomsFile(truth_path) as truth, open_predictions(submission) as predictions:
@@ -83,7 +100,9 @@ def _pictures(
                 predictions.depth(place[row]),
             )
             found = [
-                f"{name} {number(float(scores.items[name][entry]))}" for name in HEADLINE["rooms"]
+                f"{name} {number(float(scores.items[name][entry]))}"
+                for name in HEADLINE["rooms"]
+                if name in scores.items
             ]
             return row, ", ".join(found), list(zip(COLUMNS, urls, strict=True))
 
@@ -92,4 +111,4 @@ def _pictures(
             ("Median", order[middle : middle + shown]),
             ("Worst", order[::-1][:shown]),
         ):
-            yield title, [item(entry) for entry in entries.tolist()]
+            yield f"{title} by {metric(first).title}", [item(entry) for entry in entries.tolist()]

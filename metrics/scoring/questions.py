@@ -1,17 +1,26 @@
-"""Scores of submissions that answer mental-rotation questions."""
+"""Scores of submissions that answer mental-rotation questions.
+
+Questions about one shape are alike, so intervals take the shapes as independent, not the questions.
+"""
 
 import hashlib
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.answers import ABSTAINED
-from metrics.measures.statistics import bootstrap_interval, wilson_interval
+from metrics.measures.skill import skill
+from metrics.measures.statistics import (
+    bootstrap_interval,
+    clustered_wilson_interval,
+    linearised_means,
+)
+from metrics.scoring.floors import floor_of_questions
 from metrics.scoring.metric_names import metric
-from metrics.scoring.records import Groups, Score, ScoreFile
+from metrics.scoring.records import Groups, Score, ScoreFile, Skill
 from metrics.scoring.runs import (
     CONFIDENCE,
     Progress,
@@ -19,10 +28,12 @@ from metrics.scoring.runs import (
     known,
     matched_rows,
     meta_of,
+    refuse,
     refuse_copies,
     warnings_of,
 )
 from metrics.scoring.truth_digests import answers_digest
+from metrics.submissions.missing_rows import candidate_problems
 from metrics.submissions.reader import QuestionPredictions
 from metrics.submissions.truths import FoundTruth
 from scenegen.common.errors import FileFormatError
@@ -40,33 +51,39 @@ def score_questions(
 ) -> ScoreFile:
     """Score runs of one method on a file of answers; raises as `evaluate.score`."""
     from iqtt.files.reader import AnswersFile
+    from iqtt.questions.specs import question_kind
 
     with AnswersFile(found.path) as truth:
         names = ("answers", *(LABELS if truth.has_truth else ()))
         columns = {name: np.asarray(truth.read(name, slice(None))) for name in names}
-        fingerprint, kind_names = truth.fingerprint, truth.kind_names
+        fingerprint, candidates = truth.fingerprint, truth.answers
         if truth.has_truth:
             _check_kinds(truth, columns["distractor_kind"], columns["answers"])
         digest = answers_digest(truth, columns)
+        shape = _shapes(truth)
     true = columns["answers"].astype(np.int64)
     rows, whole = matched_rows(files, found.path, fingerprint, len(true), settings.allow_partial)
+    for file in files:
+        refuse(file.path, candidate_problems(file, candidates))
     refuse_copies(files, lambda i, j: _same(files[i], files[j]))
     answers = np.full((len(files), len(true)), ABSTAINED)
     for given, file in zip(answers, files, strict=True):
         given[file.rows] = file.answers
     right = (answers == true)[:, rows]
+    clusters = rows if shape is None else shape[rows]
     progress(len(rows))
 
     def grouped(labels: Array) -> Groups:
         return {
-            str(label): {"iqtt_accuracy": _accuracy(right[:, labels == label], settings)}
+            str(label): {"iqtt_accuracy": _accuracy(right[:, chosen], clusters[chosen], settings)}
             for label in np.unique(labels).tolist()
+            for chosen in [labels == label]
         }
 
     groups: dict[str, Any] = {"by_position": grouped(true[rows])}
     if len(columns) > 1:
         kinds, angles = (columns[name][rows] for name in LABELS)
-        by_kind = np.array([_kinds(row, kind_names) for row in kinds])
+        by_kind = np.array([question_kind(row) for row in kinds.tolist()])
         bins = np.clip(np.digitize(angles, ANGLE_BINS) - 1, 0, len(ANGLE_BINS) - 2)
         spans = np.array([f"{a}-{b}" for a, b in itertools.pairwise(ANGLE_BINS)])
         groups |= {"by_distractor": grouped(by_kind), "by_rotation_angle": grouped(spans[bins])}
@@ -76,36 +93,76 @@ def score_questions(
     counts = {
         "questions": len(rows),
         "questions_in_truth": len(true),
+        "answers": candidates,
         "abstained": int(np.count_nonzero(answers[:, rows] == ABSTAINED)),
         "runs": len(files),
+    }
+    items = {"question": rows, "iqtt_accuracy": right.mean(axis=0)}
+    if shape is not None:
+        counts["shapes"] = len(np.unique(clusters))
+        items["shape"] = clusters
+    accuracy = _accuracy(right, clusters, settings)
+    kinds_asked = {
+        kind: s["iqtt_accuracy"].n for kind, s in groups.get("by_distractor", {}).items()
     }
     return ScoreFile(
         task="iqtt",
         method=files[0].method,
         comparable=not warnings,
         alignment="none",
-        metrics={"iqtt_accuracy": _accuracy(right, settings)},
+        metrics={"iqtt_accuracy": accuracy},
+        skills={"iqtt_accuracy": question_skill(accuracy, kinds_asked, candidates)},
         **groups,
-        items={"question": rows, "iqtt_accuracy": right.mean(axis=0)},
-        meta=meta_of(files, found, fingerprint, digest, settings, counts, warnings, None),
+        items=items,
+        meta=meta_of(files, found, fingerprint, digest, settings, counts, warnings),
     )
 
 
-def _accuracy(right: Array, settings: Settings) -> Score:
-    """Return the accuracy of R runs on Q questions, from (R, Q) bool.
+def question_skill(accuracy: Score, counts: Mapping[str, int], answers: int) -> Skill:
+    """Return (accuracy - floor) / (1 - floor), and its interval by the same line.
+
+    The arguments `counts` and `answers` are those of `floors.floor_of_questions`.
+    """
+    floor, name = floor_of_questions(counts, answers)
+    value = skill(accuracy.value, floor, higher_is_better=True)
+    assert value is not None, "no floor is perfect"
+    low, high = (
+        None if end is None else skill(end, floor, higher_is_better=True)
+        for end in (accuracy.low, accuracy.high)
+    )
+    return Skill(value, low, high, floor, name)
+
+
+def _shapes(truth: "AnswersFile") -> Array | None:
+    """Return a number for the shape of each reference, (Q,), in order of first appearance.
+
+    Shapes that are mirror images of each other have one number. None where the file, as those that
+    were released, does not tell the shapes.
+    """
+    if not truth.has_truth:
+        return None
+    references = np.asarray(truth.read("class_id", slice(None)))[:, 0]
+    _, first, index = np.unique(references, axis=0, return_index=True, return_inverse=True)
+    return np.asarray(np.argsort(np.argsort(first))[index.reshape(-1)])
+
+
+def _accuracy(right: Array, clusters: Array, settings: Settings) -> Score:
+    """Return the accuracy of R runs on Q questions, from (R, Q) bool and their shapes (Q,).
 
     Source: Pix2Shape, section "3D-IQTT" and Table 3: the percentage of questions answered
-    correctly, here as a fraction. Intervals take questions as independent.
+    correctly, here as a fraction.
     """
     runs, questions = right.shape
     unit = metric("iqtt_accuracy").unit
     if runs == 1:
         count = int(np.count_nonzero(right))
-        return Score(count / questions, *wilson_interval(count, questions), unit, questions, None)
-    means = right.mean(axis=0)[:, None]
+        ends = clustered_wilson_interval(right[0].astype(float), clusters, CONFIDENCE)
+        return Score(count / questions, *ends, unit, questions, None)
+    each = right.mean(axis=0)
+    means = linearised_means(each, clusters)
     low, high = bootstrap_interval(means, settings.seed, settings.resamples, CONFIDENCE)
     std = float(right.mean(axis=1).std(ddof=1))
-    return Score(float(means.mean(axis=0)[0]), known(low[0]), known(high[0]), unit, questions, std)
+    return Score(float(each.mean()), known(low[0]), known(high[0]), unit, questions, std)
 
 
 def _same(one: QuestionPredictions, other: QuestionPredictions) -> bool:
@@ -127,9 +184,3 @@ def _check_kinds(truth: "AnswersFile", kinds: Array, answers: Array) -> None:
         where = truth.place("distractor_kind", row)
         expected = f"-1 for the right answer, {answers[row]}, and for no other"
         raise FileFormatError(where, kinds[row].tolist(), expected)
-
-
-def _kinds(row: Array, names: Sequence[str]) -> str:
-    """Return the kind of a question: "mirror" where a wrong answer is a mirror image, else both."""
-    found = {names[kind] for kind in row.tolist() if kind >= 0}
-    return "mirror" if "mirror" in found else "+".join(sorted(found))

@@ -23,7 +23,9 @@ from metrics.submissions.strict_json import (
 )
 
 MOST_BYTES = 32 * 2**20
-_EXPECTED = "0, 1, 2 or -1 for each question"
+SCORES = "pix2shape-bench/scores"
+ADVICE = "`bench leaderboard` and `bench compare` read them"
+_EXPECTED = "a whole number for each question: the answer from 0, or -1"
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,8 @@ def read_answers(path: Path) -> tuple[dict[str, str], Ids, Ids, list[Problem]]:
     nothing = np.zeros(0, np.int64)
     try:
         content = parse_json(read_bytes(path, MOST_BYTES), MOST_ROWS)
+        if isinstance(content, dict) and content.get("format") == SCORES:
+            raise JsonError("", f"the scores of a submission: {ADVICE}", "a submission")
         if not isinstance(content, dict) or "answers" not in content:
             content = {"answers": content}
         found = validated(NamedAnswers, {"method": path.stem, **content})

@@ -13,7 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from metrics.measures.answers import answers_from_scores
+from metrics.measures.answers import CANDIDATES, answers_from_scores
 from metrics.submissions import layout, rules
 from metrics.submissions.problems import Problem
 from scenegen.common.errors import FileFormatError
@@ -205,7 +205,13 @@ def _fits(shape: tuple[int, ...], dataset: layout.Dataset) -> bool:
     sizes = shape[1:]
     if not shape or len(sizes) != len(dataset.shape) or 0 in sizes:
         return False
-    return all(isinstance(e, str) or e == s for e, s in zip(dataset.shape, sizes, strict=True))
+    pairs = zip(dataset.shape, sizes, strict=True)
+    return all(
+        size in CANDIDATES
+        if expected == layout.TWO_OR_THREE
+        else isinstance(expected, str) or size == expected
+        for expected, size in pairs
+    )
 
 
 def _open_with_cache(file: h5py.File, name: str) -> StoredArray:
@@ -260,7 +266,7 @@ def _take_answers(result: Inspection, ids: rules.Ids) -> None:
 
 
 def _answers(result: Inspection, scores: StoredArray, ids: rules.Ids) -> rules.Ids:
-    """Return the answers (M,) of scores (M, 3), up to the first score that is not finite."""
+    """Return the answers (M,) of scores (M, A), up to the first score that is not finite."""
     answers = np.empty(len(ids), np.int64)
     for start in range(0, len(ids), BLOCK_ROWS):
         rows = slice(start, start + BLOCK_ROWS)

@@ -4,12 +4,14 @@ import unicodedata
 from dataclasses import dataclass
 from typing import Any, get_args
 
+from metrics.measures.answers import CANDIDATES
 from metrics.measures.depth import Alignment
 from scenegen.common.hdf5.row_file import Column
 
 FORMAT_NAME = "pix2shape-bench/predictions"
-FORMAT_VERSION = "1.0"
+FORMAT_VERSION = "1.1"
 TASKS = ("rooms", "iqtt")
+TWO_OR_THREE = " or ".join(map(str, CANDIDATES))  # the size of an axis with one entry an answer
 ALIGNMENTS: tuple[str, ...] = get_args(Alignment)
 MOST_ROWS = 10_000_000
 LONGEST_NAME = 200  # characters of method and run, which tables and file names repeat
@@ -36,7 +38,8 @@ class Dataset:
     """A dataset with one entry for each of the M rows.
 
     Attributes:
-        shape: of an entry; H and W are the height and width of the truth's images.
+        shape: of an entry; H and W are the height and width of the truth's images, `TWO_OR_THREE`
+            how many answers its questions offer.
         kinds: NumPy kinds that a reader accepts: "iu" or "f".
         dtype: the type that our writer stores.
     """
@@ -106,10 +109,10 @@ DATASETS = (
             " but 0 wherever the truth has a normal", required=False),
     Dataset("iqtt", "question", (), "iu", "int64", "1", "-", "index in the test file; any order"),
     Dataset("iqtt", "answer", (), "iu", "int8", "1", "-",
-            "which of the three shows the reference: 0, 1 or 2; -1 abstains, which counts as wrong",
+            "which of the answers shows the reference, from 0; -1 abstains, which counts as wrong",
             required=False),
-    Dataset("iqtt", "scores", (3,), "f", "float64", "1", "-",
-            "one for each of the three; the highest wins, a tie for it counts as an abstention; if"
+    Dataset("iqtt", "scores", (TWO_OR_THREE,), "f", "float64", "1", "-",
+            "one for each answer; the highest wins, a tie for it counts as an abstention; if"
             " `answer` is there too, both must say the same", required=False),
 )  # fmt: skip
 ID_NAMES = {"rooms": "row", "iqtt": "question"}

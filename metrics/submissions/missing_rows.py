@@ -1,4 +1,4 @@
-"""Whether a submission answers its truth: the same fingerprint and image size, and every row."""
+"""Whether a submission answers its truth: the same fingerprint, sizes and every row."""
 
 from pathlib import Path
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from metrics.submissions.layout import ID_NAMES
 from metrics.submissions.problems import Problem, first_ids
-from metrics.submissions.reader import Predictions, RoomPredictions
+from metrics.submissions.reader import Predictions, QuestionPredictions, RoomPredictions
+from metrics.submissions.rules import answer_problems
 from scenegen.rooms.reader import RoomsFile
 
 
@@ -45,3 +46,12 @@ def size_problems(predictions: RoomPredictions, truth: RoomsFile) -> list[Proble
         return []
     found = f"images of {predictions.height}x{predictions.width}"
     return [Problem("depth", "shape", f"{expected[0]}x{expected[1]}, as the truth", found)]
+
+
+def candidate_problems(predictions: QuestionPredictions, candidates: int) -> list[Problem]:
+    """Return whether a submission chooses among another number of answers than is offered."""
+    scored = predictions.candidates
+    if scored not in (None, candidates):
+        expected = f"(M, {candidates}), as each question offers {candidates} answers"
+        return [Problem("scores", "shape", expected, f"shape (M, {scored})")]
+    return answer_problems(predictions.answers, predictions.rows, candidates=candidates)

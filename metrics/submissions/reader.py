@@ -141,7 +141,7 @@ class QuestionPredictions(Predictions):
     """Answers to questions.
 
     Attributes, besides those of `Predictions`:
-        answers: (M,) int64: 0, 1, 2, or -1 (abstained); those of the highest scores where only
+        answers: (M,) int64: from 0, or -1 (abstained); those of the highest scores where only
             scores are given (`metrics.measures.answers.answers_from_scores`).
     """
 
@@ -160,9 +160,14 @@ class QuestionPredictions(Predictions):
         super().__init__(path, texts, rows, file)
         self.answers, self._scores = answers, scores
 
+    @property
+    def candidates(self) -> int | None:
+        """How many answers have scores, 2 or 3; None where only answers are given."""
+        return None if self._scores is None else int(self._scores.shape[1])
+
     @cached_property
     def scores(self) -> Array | None:
-        """Scores (M, 3), finite; None where only answers are given. Raises FileFormatError."""
+        """Scores (M, A), finite; None where only answers are given. Raises FileFormatError."""
         if self._scores is None:
             return None
         with reading(f"{self.path}: scores"):

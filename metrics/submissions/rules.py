@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures.answers import ABSTAINED, CANDIDATES
+from metrics.measures.answers import ABSTAINED, MOST_CANDIDATES
 from metrics.measures.checks import LARGEST_MAGNITUDE
 from metrics.submissions.problems import Problem, first_ids
 from scenegen.common.errors import SceneGenError
@@ -72,17 +72,20 @@ def id_problems(ids: Ids, name: str) -> list[Problem]:
     return problems
 
 
-def answer_problems(answers: Array, ids: Ids, name: str = "answer") -> list[Problem]:
-    """Return which answers (M,) are not -1, 0, 1 or 2."""
-    wrong = (answers < ABSTAINED) | (answers >= CANDIDATES)
+def answer_problems(
+    answers: Array, ids: Ids, name: str = "answer", candidates: int = MOST_CANDIDATES
+) -> list[Problem]:
+    """Return which answers (M,) are neither -1 nor one of 0 to `candidates` - 1."""
+    wrong = (answers < ABSTAINED) | (answers >= candidates)
     if not wrong.any():
         return []
-    found = f"{np.count_nonzero(wrong)} outside -1 to 2, such as {answers[wrong][0]}"
-    return [Problem(name, "range", "0, 1, 2, or -1", found, first_ids(ids[wrong]))]
+    found = f"{np.count_nonzero(wrong)} outside -1 to {candidates - 1}, such as {answers[wrong][0]}"
+    expected = f"{', '.join(map(str, range(candidates)))}, or -1"
+    return [Problem(name, "range", expected, found, first_ids(ids[wrong]))]
 
 
 def score_problems(scores: Array, ids: Ids) -> list[Problem]:
-    """Return which scores (M, 3) are not finite numbers."""
+    """Return which scores (M, A) are not finite numbers."""
     wrong = ~_finite(scores, LARGEST_MAGNITUDE).all(axis=1)
     if not wrong.any():
         return []

@@ -10,7 +10,11 @@ import numpy as np
 
 from metrics.submissions.hints.questions import answer_hints
 from metrics.submissions.hints.rooms import room_hints
-from metrics.submissions.missing_rows import match_problems, size_problems
+from metrics.submissions.missing_rows import (
+    candidate_problems,
+    match_problems,
+    size_problems,
+)
 from metrics.submissions.problems import HINT, MOST_IDS, Problem
 from metrics.submissions.reader import (
     QuestionPredictions,
@@ -146,7 +150,9 @@ def _against_questions(predictions: QuestionPredictions, truth_path: Path) -> li
         problems = match_problems(predictions, truth_path, truth.fingerprint, len(truth))
         if any(problem.rule == "match" for problem in problems):
             return problems
-        if not truth.has_answers:
+        wrong = candidate_problems(predictions, truth.answers)
+        problems += wrong
+        if wrong or not truth.has_answers:
             return problems
         return problems + answer_hints(predictions, truth.read("answers", slice(None)))
 

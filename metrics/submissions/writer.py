@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike
 
-from metrics.measures.answers import ABSTAINED, CANDIDATES, answers_from_scores
+from metrics.measures.answers import ABSTAINED, answers_from_scores
 from metrics.measures.depth import Alignment
 from metrics.submissions import layout, rules
 from metrics.submissions.problems import PredictionError, first_error, first_ids
@@ -166,9 +166,9 @@ def write_answers(
     Args:
         questions_file: such as iqtt-test.h5, recorded as given.
         method, run: as for `RoomPredictionWriter`.
-        answer: (Q,) integers: 0, 1 or 2, or -1 to abstain, which counts as wrong.
-        scores: (Q, 3) floats: the highest wins, a tie for it abstains. Either or both; both must
-            say the same.
+        answer: (Q,) integers from 0, or -1 to abstain, which counts as wrong.
+        scores: (Q, A) floats for A answers, 2 or 3 as the file offers: the highest wins, a tie for
+            it abstains. Either or both; both must say the same.
 
     Raises:
         PredictionError: naming the questions, what was found and what was expected.
@@ -178,33 +178,33 @@ def write_answers(
         "iqtt", {"method": method, "run": run, "notes": notes, "truth_path": str(questions_file)}
     )
     _check_elsewhere(path, questions_file)
-    count, fingerprint = _questions(questions_file)
+    count, candidates, fingerprint = _questions(questions_file)
     if count == 0:
         raise PredictionError(questions_file, "no questions", "at least one")
-    values = _checked_answers(answer, scores, count, f"{path}")
+    values = _checked_answers(answer, scores, (count, candidates), f"{path}")
     with new_file(path, overwrite) as file:
         file.attrs.update({**texts, "truth_fingerprint": fingerprint})
         _write_columns(file, "iqtt", {layout.ID_NAMES["iqtt"]: np.arange(count), **values})
 
 
 def _checked_answers(
-    answer: ArrayLike | None, scores: ArrayLike | None, count: int, where: str
+    answer: ArrayLike | None, scores: ArrayLike | None, shape: tuple[int, int], where: str
 ) -> dict[str, rules.Array]:
-    """Return the datasets to write. Raises PredictionError."""
+    """Return the datasets to write, for scores of this shape. Raises PredictionError."""
+    count, candidates = shape
     ids = np.arange(count)
     values: dict[str, rules.Array] = {}
     problems = []
     if scores is not None:
-        shape = (count, CANDIDATES)
         values["scores"] = _checked_floats(scores, shape, f"{where}: scores", np.float64)
         problems += rules.score_problems(values["scores"], ids)
     if answer is not None:
         found = values["answer"] = np.asarray(answer)
         if found.shape != (count,) or found.dtype.kind not in "iu":
-            expected = f"integers of shape ({count},), {ABSTAINED} to {CANDIDATES - 1}"
+            expected = f"integers of shape ({count},), {ABSTAINED} to {candidates - 1}"
             what = f"{found.dtype} of shape {found.shape}"
             raise PredictionError(f"{where}: answer", what, expected)
-        problems += rules.answer_problems(found, ids)
+        problems += rules.answer_problems(found, ids, candidates=candidates)
     if not values:
         raise PredictionError(where, "neither answer nor scores", "either")
     if len(values) == 2 and not problems:
@@ -215,17 +215,17 @@ def _checked_answers(
     return values
 
 
-def _questions(path: str | Path) -> tuple[int, str]:
-    """Return how many questions a file holds, with or without images, and its fingerprint."""
+def _questions(path: str | Path) -> tuple[int, int, str]:
+    """Return how many questions a file holds, how many answers each offers, and its fingerprint."""
     from iqtt.files.reader import AnswersFile, QuestionsFile
     from iqtt.files.tables import NoImagesError
 
     try:
         with QuestionsFile(path) as questions:
-            return len(questions), questions.fingerprint or ""
+            return len(questions), questions.answers, questions.fingerprint or ""
     except NoImagesError:
         with AnswersFile(path) as answers:
-            return len(answers), answers.fingerprint or ""
+            return len(answers), answers.answers, answers.fingerprint or ""
 
 
 def _check_elsewhere(path: str | Path, truth: str | Path) -> None:

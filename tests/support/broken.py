@@ -199,7 +199,7 @@ ANSWERS_OPEN = [
     ("answers are letters", ["answer", "type text"], replaced("answer", lambda v: list("abccba"))),
     ("a score of NaN", ["scores", "NaN", "ids 1)"], put("scores", (1, 2), np.nan)),
     ("an infinite score", ["scores", "infinite", "ids 5)"], put("scores", (5, 0), np.inf)),
-    ("scores for four", ["scores", "shape (6, 4)", "(M, 3)"],
+    ("scores for four", ["scores", "shape (6, 4)", "(M, 2 or 3)"],
      replaced("scores", lambda v: np.zeros((6, 4)))),
     ("scores are an external link", ["scores", "a link"],
      linked("scores", h5py.ExternalLink("other.h5", "/scores"))),
@@ -211,14 +211,18 @@ ANSWERS_OPEN = [
 ANSWERS_MATCH = [
     ("questions missing", ["question", "2 of 6 missing", "ids 4, 5)"], made.answers_kept(4)),
     ("a question unknown", ["question", "does not have", "ids 77)"], put("question", 3, 77)),
+    ("scores for two of three", ["scores", "shape (M, 2)", "(M, 3)"],
+     in_all(gone("answer"), replaced("scores", lambda v: v[:, :2]))),
     ("other questions", ["truth_fingerprint"], attribute("truth_fingerprint", "f" * 64)),
 ]  # fmt: skip
 
 JSON_OPEN = [
     ("JSON: malformed", ["no JSON"], "[0, 1, 2"),
     ("JSON: empty", ["no JSON"], ""),
+    ("JSON: a score file", ["the scores of a submission", "bench leaderboard"],
+     {"format": "pix2shape-bench/scores", "method": "m"}),
     ("JSON: nested deeply", ["nested too deeply"], "[" * 200_000),
-    ("JSON: nested", ["expected 0, 1, 2"], [[0], [1], [2], [0], [1], [2]]),
+    ("JSON: nested", ["expected a whole number for each question"], [[0], [1], [2], [0], [1], [2]]),
     ("JSON: NaN", ["NaN"], "[0, 1, NaN, 0, 1, 2]"),
     ("JSON: infinity", ["inf"], "[0, 1, 1e999, 0, 1, 2]"),
     ("JSON: floats", ["1.0", "ids 1)"], "[0, 1.0, 2, 0, 1, 2]"),

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from metrics.measures.answers import CHANCE
 from metrics.measures.statistics import cluster_means
 from metrics.score_file import Meta, Score, ScoreFile, Submission
 from metrics.scoring.metric_names import metric
@@ -38,6 +37,7 @@ def rooms_scores(method, columns, scenes, runs=1, rows=None, **other):
     items = {"row": rows, "scene_index": scenes, "view_index": views, **columns}
     std = 0.002 if runs > 1 else None
     own = {"comparable": True, "alignment": "none", "by_view_angle": {}, "path": None}
+    own["skills"] = {}
     told = {name: other.pop(name, default) for name, default in own.items()}
     counts = {"rows": count, "rows_in_truth": max(rows) + 1, "scenes": len(set(scenes))}
     counts |= {"runs": runs, "rows_penalised": 0}
@@ -55,19 +55,21 @@ def iqtt_scores(method, right, runs=1, questions=None, **other):
     """Questions with these means (Q,) of right answers over the runs."""
     values = np.asarray(right, np.float64)
     ids = np.arange(len(values)) if questions is None else np.asarray(questions)
-    comparable = other.pop("comparable", True)
-    group = {"mirror": {"iqtt_accuracy": Score(CHANCE, None, None, "fraction", len(values), None)}}
+    own = {"comparable": True, "skills": {}}
+    own = {name: other.pop(name, default) for name, default in own.items()}
+    group = {"mirror": {"iqtt_accuracy": Score(1 / 3, None, None, "fraction", len(values), None)}}
     counts = {"questions": len(ids), "questions_in_truth": int(ids.max()) + 1, "runs": runs}
+    counts["answers"] = 3
     told = {"counts": counts, "resamples": 2000 if runs > 1 else 0}
     return ScoreFile(
         task="iqtt",
         method=method,
-        comparable=comparable,
         alignment="none",
         metrics={"iqtt_accuracy": make_score("iqtt_accuracy", values, ids)},
         items={"question": ids, "iqtt_accuracy": values},
         meta=make_meta(method, runs, **{**told, **other}),
         by_distractor=group,
+        **own,
     )
 
 

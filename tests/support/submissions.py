@@ -41,7 +41,7 @@ def make_truths(folder: Path) -> Truths:
     spec = DatasetSpec(height=32, width=32, min_visible_pixels=3, seed=3)
     make_dataset(folder / "rooms.h5", spec, 8, command="tests")
     split = SplitSpec(
-        seed=5, train=6, labeled=3, val=6, test=6, cubes=(5, 7), height=32, width=32,
+        seed=5, train=6, labeled=3, val=6, test=6, cubes=(8, 9), height=32, width=32,
         min_cube_pixels=2,
     )  # fmt: skip
     make_split(folder / "iqtt", split, command="tests")

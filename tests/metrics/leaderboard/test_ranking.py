@@ -8,13 +8,16 @@ import pytest
 from made_scores import DIGEST, iqtt_scores, rooms_scores
 from refusals import refused
 
+from metrics.leaderboard.floors import FloorError
 from metrics.leaderboard.paper_tables import TABLES
 from metrics.leaderboard.ranking import LeaderboardError, leaderboard
-from metrics.score_file import Score
+from metrics.score_file import Score, Skill
+from metrics.scoring.floors import Floor
 from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import UnknownMetricError
 
 SCENES = [0, 0, 1, 1]
+PAPER = ("task", "all", "none")
 
 
 def rooms(name, chamfer=0.2, mse=0.02, **other):
@@ -28,7 +31,7 @@ def by_label(table):
 
 def test_ranks_and_best_cells():
     files = [rooms("b", 0.3, 0.01), rooms("a", 0.1, 0.02), rooms("c", 0.3, 0.04)]
-    table = leaderboard(files, paper=False)[0]
+    table = leaderboard(files, paper="none")[0]
     assert [(row.rank, row.label) for row in table.rows] == [("1", "a"), ("2", "b"), ("2", "c")]
     assert {row.kind for row in table.rows} == {"ranked"}
     best = [[cell.best for cell in row.cells] for row in table.rows]
@@ -36,43 +39,45 @@ def test_ranks_and_best_cells():
     assert table.columns[0] == "Chamfer ↓ (scene unit)"
     assert by_label(table)["a"].cells[0].rest == " [0.0900, 0.1100]"
     assert table.title == f"Rooms, truth {DIGEST[:12]}"
-    assert len(leaderboard(files, paper=False)) == 1
+    assert len(leaderboard(files, paper="none")) == 1
 
 
 def test_higher_is_better_where_it_is():
     files = [iqtt_scores("low", [1, 0, 0, 0]), iqtt_scores("high", [1, 1, 0, 1])]
-    (table,) = leaderboard(files, paper=False)
-    assert [(row.label, row.cells[0].best) for row in table.rows] == [("high", 1), ("low", 0)]
+    (table,) = leaderboard(files, paper="none")
+    shown = [(row.label, row.cells[0].best) for row in table.rows]
+    assert shown == [("high", 1), ("low", 0), ("floor: chance", 0)]
     assert table.columns == ("IQTT accuracy ↑ (fraction)",)
+    assert table.title == f"3D-IQTT, mirror questions, truth {DIGEST[:12]}"
     assert "4 questions; chance is 0.3333." in table.notes
 
 
 def test_what_is_not_comparable_is_never_ranked_nor_best():
     part = rooms("part", 0.001, 0.001, comparable=False)
     for files in ([part, rooms("a")], [rooms("a"), part]):
-        table = leaderboard(files, paper=False)[0]
+        table = leaderboard(files, paper="none")[0]
         last = table.rows[-1]
         assert (last.rank, last.label, last.kind) == ("", "part ‡", "incomparable")
         assert not any(cell.best for cell in last.cells)
         assert [cell.best for cell in table.rows[0].cells] == [True] * 3
         assert any(note.startswith("‡ not comparable") for note in table.notes)
-    alone = leaderboard([part], paper=False)[0]
+    alone = leaderboard([part], paper="none")[0]
     assert not any(cell.best for cell in alone.rows[0].cells)
 
 
 def test_test_sets_are_never_ranked_together():
     other = "f" * 64
     files = [rooms("a", 0.3), rooms("b", 0.1, truth=other, digest=other), rooms("c", 0.2)]
-    first, second = leaderboard(files, paper=False)
+    first, second = leaderboard(files, paper="none")
     assert not any(note.startswith("Not ranked with") for note in (*first.notes, *second.notes))
     assert [(row.rank, row.label) for row in first.rows] == [("1", "c"), ("2", "a")]
     assert [(row.rank, row.label) for row in second.rows] == [("1", "b")]
     # One fingerprint, two tasks: still two test sets.
-    assert len(leaderboard([rooms("a"), iqtt_scores("b", [1])], paper=False)) == 2
+    assert len(leaderboard([rooms("a"), iqtt_scores("b", [1])], paper="none")) == 2
 
 
 def test_truths_of_one_request_but_other_bits_are_not_ranked_together():
-    first, second = leaderboard([rooms("a"), rooms("b", digest="f" * 64)], paper=False)
+    first, second = leaderboard([rooms("a"), rooms("b", digest="f" * 64)], paper="none")
     assert [len(table.rows) for table in (first, second)] == [1, 1]
     for table, other in ((first, "f" * 12), (second, DIGEST[:12])):
         assert any(note.startswith(f"Not ranked with truth {other}") for note in table.notes)
@@ -81,7 +86,7 @@ def test_truths_of_one_request_but_other_bits_are_not_ranked_together():
 def test_known_test_sets_bear_their_name(monkeypatch):
     known = KnownTest("rooms-test", "rooms", DIGEST, 3, "scenegen render")
     monkeypatch.setattr("metrics.scoring.known_tests.KNOWN_TESTS", (known,))
-    assert leaderboard([rooms("a")], paper=False)[0].title == "Rooms, rooms-test"
+    assert leaderboard([rooms("a")], paper="none")[0].title == "Rooms, rooms-test"
 
 
 def test_files_that_claim_the_whole_test_set_must_agree_on_it():
@@ -97,11 +102,11 @@ def test_files_that_claim_the_whole_test_set_must_agree_on_it():
 def test_scores_that_are_missing_leave_a_hole():
     a, b = rooms("a"), rooms("b")
     less = replace(b, metrics={k: v for k, v in b.metrics.items() if k != "chamfer"})
-    table = leaderboard([less, a], paper=False)[0]
+    table = leaderboard([less, a], paper="none")[0]
     assert [(row.rank, row.label) for row in table.rows] == [("1", "a"), ("", "b")]
     assert table.rows[1].cells[0].value == "-"
     assert table.rows[1].cells[2].best
-    table = leaderboard([less, a], ["mse_depth", "normal_mean_degrees"], paper=False)[0]
+    table = leaderboard([less, a], ["mse_depth", "normal_mean_degrees"], paper="none")[0]
     assert [cell.value for cell in table.rows[0].cells] == ["0.02000", "-"]
     with pytest.raises(UnknownMetricError):
         leaderboard([a], ["cd"])
@@ -109,14 +114,104 @@ def test_scores_that_are_missing_leave_a_hole():
 
 def test_labels_tell_runs_and_claims():
     several = rooms("a", runs=3, alignment="scale_shift")
-    table = leaderboard([several, rooms("b")], paper=False)[0]
+    table = leaderboard([several, rooms("b")], paper="none")[0]
     row = table.rows[0]
     assert row.label == "a (3 runs; claims depth when scaled and shifted)"
     assert row.cells[0].rest.startswith(" ± 0.0020 [")
-    floor = replace(several, meta=replace(several.meta, chamfer_floor=0.0123, confidence=0.9))
-    notes = leaderboard([floor, rooms("b")], paper=False)[0].notes
-    assert "Noise floor of Chamfer at this resolution: 0.01230 scene units." in notes
+    other = replace(several, meta=replace(several.meta, confidence=0.9))
+    notes = leaderboard([other, rooms("b")], paper="none")[0].notes
     assert any(note.startswith("[low, high]: 90% and 95% interval") for note in notes)
+
+
+def skilled(name, chamfer=0.2, **other):
+    """Rooms with relief, a skill over a floor of 0.4, and a noise floor."""
+    columns = {"relief_iou": [0.3] * 4, "chamfer": [chamfer] * 4}
+    skills = {"chamfer": Skill(1 - chamfer / 0.4, -0.5, 0.9, 0.4, "empty-room")}
+    told = {"skills": skills, "noise_floors": {"chamfer": 0.0123}, "path": Path(f"{name}.json")}
+    return rooms_scores(name, columns, SCENES, **{**told, **other})
+
+
+def test_skill_stands_before_the_score_and_floors_below_the_methods():
+    names = ["relief_iou", "chamfer"]
+    table = leaderboard([skilled("worse", 0.3), skilled("better")], names, paper="none")[0]
+    heads = ("Relief IoU ↑ (fraction)", "Chamfer ↓ (scene unit)")
+    assert table.columns == (*heads, "Skill of Chamfer ↑ (1 is perfect)")
+    rows = [(row.rank, row.label, row.kind) for row in table.rows]
+    assert rows == [
+        ("1", "better", "ranked"),  # the first column is tied, the second decides
+        ("1", "worse", "ranked"),
+        ("", "floor: empty-room", "floor"),
+        ("", "noise floor", "floor"),
+    ]
+    cells = [[cell.value for cell in row.cells] for row in table.rows]
+    assert cells[0][2] == "0.5000"
+    assert cells[2:] == [["0", "0.4000", "0"], ["-", "0.01230", "-"]]
+    assert table.rows[0].cells[2].rest == " [-0.5000, 0.9000]"
+    assert not any(cell.best for row in table.rows[2:] for cell in row.cells)
+    right = Skill(0.25, 0.1, 0.4, 0.5, "outline")
+    table = leaderboard([iqtt_scores("q", [1, 0], skills={"iqtt_accuracy": right})])[0]
+    assert table.columns[0] == "Skill of IQTT accuracy ↑ (1 is perfect)"
+    rows = {row.label: [cell.value for cell in row.cells] for row in table.rows}
+    assert rows["floor: outline"] == ["0", "0.5000"]
+    assert rows["floor: chance"] == ["-", "0.3333"]
+
+
+def test_the_floor_by_view_angle_is_the_empty_rooms_at_that_angle():
+    items = {"view_angle_degrees": np.array([0, 35, 0, 35])}
+    items["empty_room_chamfer"] = np.array([0.1, 0.5, 0.3, 0.7])
+    file = rooms("a", by_view_angle=angles(0.2))
+    _, table = leaderboard([replace(file, items={**file.items, **items})], paper="none")
+    floor = by_label(table)["floor: empty-room"]
+    assert [cell.value for cell in floor.cells] == ["0.2000", "-", "0.6000"]  # 0, 5 and 35 degrees
+
+
+def test_a_test_set_has_one_floor():
+    """Which every comparable file of it states; another one is forged, or of another release."""
+    skill = Skill(0.9, 0.8, 1.0, 2.0, "empty-room")
+    with refused(FloorError, "b.json: skills.chamfer.floor", "2.0", "0.4, as in a.json"):
+        leaderboard([skilled("a"), skilled("b", skills={"chamfer": skill})])
+    with refused(FloorError, "b.json: meta.noise_floors.chamfer", "0.1"):
+        leaderboard([skilled("a"), skilled("b", noise_floors={"chamfer": 0.1})])
+    part = skilled("b", skills={"chamfer": skill}, comparable=False)
+    assert leaderboard([part, skilled("a")])[0].rows[2].cells[-1].value != "2.000"
+
+
+def test_a_submission_stands_there_once():
+    a = rooms("a")
+    for other in (a, replace(a, method="b", path=Path("b.json"))):
+        with refused(LeaderboardError, str(other.path), found="a.json", expected="once"):
+            leaderboard([a, other])
+    assert leaderboard([a, replace(a, meta=replace(a.meta, truth_digest="f" * 64))])
+
+
+def by_kind(*rights):
+    kinds = ("matched", "near")
+    return {
+        kind: {"iqtt_accuracy": Score(right, None, None, "fraction", 2, None)}
+        for kind, right in zip(kinds, rights, strict=True)
+    }
+
+
+def test_questions_by_kind_with_the_floors_of_each_kind(monkeypatch):
+    table = (Floor("near", "outline-trees", 1000, 0.6, 0.5, 0.7),)
+    table += (Floor("matched", "outline-trees", 1000, 0.35, 0.3, 0.4),)
+    monkeypatch.setattr("metrics.scoring.floors.FLOORS", (*table, replace(table[0], kind="other")))
+    file = replace(iqtt_scores("a", [1, 0, 1, 0]), by_distractor=by_kind(0.3, 0.7))
+    _, kinds, floors = leaderboard([file], paper="none")
+    assert kinds.columns == ("matched", "near")
+    rows = {row.label: [cell.value for cell in row.cells] for row in kinds.rows}
+    assert rows == {
+        "a": ["0.3000", "0.7000"],
+        "floor: best": ["0.3333", "0.6000"],
+        "floor: chance": ["0.3333", "0.3333"],
+    }
+    assert floors.columns == ("near", "matched")
+    (row,) = floors.rows
+    assert (row.label, row.kind) == ("outline-trees, 1,000 labels", "floor")
+    assert [cell.value + cell.rest for cell in row.cells] == [
+        "0.6000 [0.5000, 0.7000]",
+        "0.3500 [0.3000, 0.4000]",
+    ]
 
 
 def angles(shift):
@@ -128,7 +223,7 @@ def angles(shift):
 
 def test_scores_by_view_angle_keep_the_order_of_the_ranking():
     files = [rooms("b", 0.3, by_view_angle=angles(0.0)), rooms("a", by_view_angle=angles(0.1))]
-    _, table = leaderboard(files, paper=False)
+    _, table = leaderboard(files, paper="none")
     assert table.columns == ("0°", "5°", "35°")
     assert [(row.rank, row.label) for row in table.rows] == [("", "a"), ("", "b")]
     assert [cell.best for cell in table.rows[1].cells] == [True] * 3
@@ -146,7 +241,7 @@ def shown_figures(board):
 @pytest.mark.parametrize("files", [[], ["rooms"], ["iqtt"], ["rooms", "iqtt"]])
 def test_every_figure_of_the_paper_is_shown_marked_and_unranked(files):
     made = {"rooms": rooms("a", 0.11, by_view_angle=angles(0.2)), "iqtt": iqtt_scores("b", [1, 0])}
-    board = leaderboard([made[name] for name in files])
+    board = leaderboard([made[name] for name in files], paper="all")
     shown = shown_figures(board)
     for figure in (figure for table in TABLES for figure in table.figures):
         assert figure.text in shown
@@ -155,9 +250,19 @@ def test_every_figure_of_the_paper_is_shown_marked_and_unranked(files):
     if files:
         ranking = board[0]
         assert ranking.rows[0].kind == "ranked"
-        assert ranking.rows[1].kind == "reported"
+        assert ranking.rows[-1].kind == "reported"
         assert any("as reported, on the authors' data, so not ranked" in n for n in ranking.notes)
         assert any("no unit of length" in n for n in ranking.notes) == (files[0] == "rooms")
+
+
+def test_only_the_tables_of_the_task_are_shown_unless_asked_for():
+    files = [rooms("a", by_view_angle=angles(0.2))]
+    values = {paper: shown_figures(leaderboard(files, paper=paper)) for paper in PAPER}
+    accuracies = {f.text for f in TABLES[2].figures}
+    assert accuracies.isdisjoint(values["task"])
+    assert {f.text for f in TABLES[1].figures} <= set(values["task"])
+    assert accuracies <= set(values["all"])
+    assert values["none"] == []
 
 
 def test_figures_of_other_scores_or_angles_do_not_slip_into_a_ranking():
@@ -167,7 +272,7 @@ def test_figures_of_other_scores_or_angles_do_not_slip_into_a_ranking():
     assert by_label(ranking)["PTN, ShapeNet scenes (Table 1) †"].cells[0].value == "0.181"
     row = by_label(turned)["Pix2Shape, Shape scenes (Table 2) †"]
     assert [cell.value for cell in row.cells] == ["-", "0.098", "0.112"]
-    alone = leaderboard([rooms("a")], paper=False)[0]
+    alone = leaderboard([rooms("a")], paper="none")[0]
     assert [row.kind for row in alone.rows] == ["ranked"]
     people = leaderboard([iqtt_scores("a", [1])])[0]
     cell = by_label(people)["Human Evaluation, 3D-IQTT, 0 labels (Table 3) †"].cells[0]

@@ -104,7 +104,7 @@ def test_latex_has_balanced_braces_and_all_its_cells(board):
         assert {len(re.findall(r"(?<!\\)&", row)) for row in ends} == {len(layout) - 2}
         assert ends
     assert "XeLaTeX or LuaLaTeX" in text.splitlines()[0]
-    simple = to_latex(leaderboard([iqtt_scores("simple", [1, 0])], paper=False))
+    simple = to_latex(leaderboard([iqtt_scores("simple", [1, 0])], paper="none"))
     assert simple.isascii()
     assert simple.startswith("% needs \\usepackage{booktabs,graphicx,textcomp}\n")
 

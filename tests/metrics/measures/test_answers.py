@@ -1,15 +1,21 @@
 """Answers from scores: the highest wins, and ties abstain."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from metrics.measures.answers import ABSTAINED, answers_from_scores
+from metrics.measures.checks import MeasureError
 
 
 def test_the_highest_score_is_the_answer_and_a_tie_is_none():
     scores = [[0.1, 0.7, 0.2], [3, 1, 2], [-5.0, -4.0, -3.0], [1, 1, 0], [0, 2, 2], [1, 1, 1]]
     assert answers_from_scores(scores).tolist() == [1, 0, 2, -1, -1, -1]
+    assert answers_from_scores([[0.2, 0.1], [0.0, 3.0], [1, 1]]).tolist() == [0, 1, -1]
+    for candidates in (1, 4):
+        with pytest.raises(MeasureError):
+            answers_from_scores(np.eye(4)[:, :candidates])
 
 
 @given(st.integers(0, 2**32 - 1))

@@ -14,6 +14,9 @@ from metrics.measures import statistics
 from metrics.measures.statistics import (
     bootstrap_interval,
     cluster_means,
+    clustered_wilson_interval,
+    design_effect,
+    linearised_means,
     wilson_interval,
 )
 
@@ -60,6 +63,55 @@ def test_wilson_agrees_with_scipy(n, share, confidence):
     found = wilson_interval(successes, n, confidence)
     assert found == pytest.approx((expected.low, expected.high), rel=1e-9, abs=1e-12)
     assert 0.0 <= found[0] <= successes / n <= found[1] <= 1.0
+
+
+def correlated(rng, clusters, share):
+    """Answers to 1 to 8 questions about each shape, whose own difficulties differ."""
+    labels = np.repeat(np.arange(clusters), rng.integers(1, 9, clusters))
+    return rng.random(len(labels)) < rng.beta(3 * share, 3 * (1 - share), clusters)[labels], labels
+
+
+def test_intervals_of_fractions_cover_where_answers_are_correlated():
+    rng, hits = np.random.default_rng(3), np.zeros(3)
+    for trial in range(300):
+        right, labels = correlated(rng, 60, 0.4)
+        ends = bootstrap_interval(linearised_means(right.astype(float), labels), trial, 200)
+        for i, (low, high) in enumerate(
+            (
+                clustered_wilson_interval(right.astype(int), labels),
+                (ends[0][0], ends[1][0]),
+                wilson_interval(int(right.sum()), len(right)),
+            )
+        ):
+            hits[i] += low <= 0.4 <= high
+    assert hits[:2] / 300 == pytest.approx(0.95, abs=0.04)
+    assert hits[2] / 300 < 0.87  # as if answers about one shape were independent
+
+
+def test_the_design_effect_is_kishs():
+    """Of clusters of m equal values it is m, but for (S m - 1) / (S m - m); of none it is 1."""
+    each = np.array([1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
+    for size in (1, 4):
+        values, labels = np.repeat(each, size), np.repeat(np.arange(7), size)
+        expected = size * (7 * size - 1) / (7 * size - size)
+        assert design_effect(values, labels) == pytest.approx(expected)
+    assert design_effect([1.0, 0.0, 0.0, 1.0], [0, 0, 1, 1]) == 1.0  # alike, were it not for chance
+    assert design_effect([1.0, 0.0, 1.0], [5, 5, 5]) == 3.0
+    assert design_effect([1.0, 1.0, 1.0], [0, 0, 1]) == 1.0
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 30))
+def test_clusters_never_shorten_an_interval(seed, clusters):
+    right, labels = correlated(np.random.default_rng(seed), clusters, 0.6)
+    low, high = clustered_wilson_interval(right.astype(int), labels)
+    plain = wilson_interval(int(right.sum()), len(right))
+    assert 0.0 <= low <= plain[0] + 1e-12
+    assert plain[1] - 1e-12 <= high <= 1.0
+    alone = clustered_wilson_interval(right.astype(int), np.arange(len(right)))
+    assert alone == pytest.approx(plain, abs=1e-12)
+    values = right + 0.5
+    assert linearised_means(values, labels).mean() == pytest.approx(values.mean())
+    assert linearised_means(values, np.arange(len(values)))[:, 0].tolist() == values.tolist()
 
 
 def test_bca_agrees_with_scipy():

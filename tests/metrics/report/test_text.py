@@ -9,29 +9,57 @@ from made_scores import iqtt_scores, simple_rooms
 
 from metrics.report.page import html_report
 from metrics.report.text import text_report, write_csv
+from metrics.score_file import Skill
+from metrics.scoring.floors import Floor
 from scenegen.common.text_table import number
 
 
-def rooms(name="mine", **meta):
-    scores = simple_rooms(name, counts={"rows": 4, "scenes": 2}, **meta)
+def rooms(name="mine", **other):
+    scores = simple_rooms(name, counts={"rows": 4, "scenes": 2}, **other)
     return replace(scores, by_view_angle=dict.fromkeys(("0", "35", "5"), scores.metrics))
 
 
 def test_the_text_shows_every_score_and_its_reference():
-    scores = rooms(chamfer_floor=0.0123, warnings=("mind the gap",))
-    title, table, *_, notes = text_report(scores).split("\n\n")
+    scores = rooms(noise_floors={"chamfer": 0.0123}, warnings=("mind the gap",))
+    title, _, table, *_, notes = text_report(scores).split("\n\n")
     assert title == "mine: 4 images of 2 scenes of rooms.h5"
     cells = {line.split()[0]: line.split() for line in table.splitlines()}
+    assert cells["score"][1:4] == ["value", "95%", "interval"]
     for name, score in scores.metrics.items():
         assert cells[name][1:3] == [number(score.value), f"[{number(score.low, score.value)},"]
     assert cells["noise"][:3] == ["noise", "floor", "0.0123"]
     assert "warning: mind the gap" in notes.splitlines()
     (told,) = (line for line in notes.splitlines() if line.startswith("truth: "))
     assert all(word in told for word in ("rooms.h5", scores.meta.truth_digest[:12], "given"))
-    questions = iqtt_scores("many", [1, 0], runs=3, counts={"questions": 2})
+    questions = iqtt_scores("many", [1, 0], runs=3, counts={"questions": 2, "answers": 3})
     text = text_report(questions)
     assert text.startswith("many: 2 questions of rooms.h5, mean of 3 runs\n")
     assert "chance 0.3333" in " ".join(text.split())
+
+
+def lines_of(text):
+    """The cells of each line, by the first one."""
+    lines = (re.split(r"\s{2,}", line.strip()) for line in text.splitlines())
+    return {cells[0]: cells[1:] for cells in lines}
+
+
+def test_the_headline_comes_first_with_skills_and_their_floors(monkeypatch):
+    skills = {"chamfer": Skill(-0.25, -0.5, 0.1, 0.16, "empty-room")}
+    text = text_report(rooms(skills=skills, noise_floors={"chamfer": 0.0123}))
+    head, rest = text.split("all scores")
+    assert lines_of(head)["skill of chamfer"] == ["-0.2500", "[-0.5000, 0.1000]", "0: empty-room"]
+    assert lines_of(head)["chamfer"][-1] == "0.1600: empty-room; noise floor 0.0123"
+    assert lines_of(rest.split("by degrees")[0])["chamfer"][3] == "0.1600"
+    assert any("1 is perfect" in line for line in rest.splitlines())
+    floors = (Floor("mirror", "outline", 0, 0.5, 0.4, 0.6),)
+    monkeypatch.setattr("metrics.scoring.floors.FLOORS", floors)
+    accuracy = Skill(0.0, None, None, 0.5, "outline")
+    text = text_report(iqtt_scores("a", [1, 0], skills={"iqtt_accuracy": accuracy}))
+    head, rest = text.split("all scores")
+    assert lines_of(head)["skill of iqtt_accuracy"][-1] == "0: outline"
+    assert lines_of(head)["iqtt_accuracy"][-1] == "0.5000: outline; chance 0.3333"
+    assert lines_of(rest)["chance"][0] == "0.3333"
+    assert lines_of(rest)["mirror"] == ["0.3333 -", "2", "-0.3333 -", "0.5000: outline"]
 
 
 @pytest.mark.parametrize("form", ["text", "markdown", "html"])

@@ -11,7 +11,7 @@ from submissions import edited, good_answers, good_rooms
 
 from iqtt.files.reader import AnswersFile
 from metrics.submissions.layout import ATTRIBUTES, DATASETS
-from metrics.submissions.missing_rows import match_problems, size_problems
+from metrics.submissions.missing_rows import candidate_problems, match_problems, size_problems
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.truths import find_truth
 from metrics.submissions.validation import validate
@@ -81,7 +81,8 @@ def opened_or_refused(case, path, given):
 def problems_with_truth(predictions, truth_path):
     if predictions.task == "iqtt":
         with AnswersFile(truth_path) as truth:
-            return match_problems(predictions, truth_path, truth.fingerprint, len(truth))
+            found = match_problems(predictions, truth_path, truth.fingerprint, len(truth))
+            return found + candidate_problems(predictions, truth.answers)
     with RoomsFile(truth_path) as truth:
         found = size_problems(predictions, truth)
         return found + match_problems(predictions, truth_path, truth.fingerprint, len(truth))

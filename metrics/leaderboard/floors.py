@@ -1,0 +1,117 @@
+"""Floors beside scores: the empty room, noise, chance, and probes that know nothing of 3D."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from metrics.leaderboard.table import Cell, Row, Table
+from metrics.measures.statistics import cluster_means
+from metrics.report.text import RELIEF
+from metrics.scoring import floors
+from metrics.scoring.floors import floor_of_kind
+from metrics.scoring.metric_names import EMPTY_ROOM
+from metrics.scoring.records import FLOOR_NAME, ScoreFile
+from metrics.scoring.schema import SCORE_AGAIN, agree
+from scenegen.common.errors import SceneGenError
+from scenegen.common.text_table import number
+
+FloorRows = dict[str, dict[str, float]]
+SKILL_OF = "skill of "  # how the keys of columns of skills begin
+FLOOR, NOISE, CHANCE = "floor: ", "noise floor", "floor: chance"  # how their labels begin
+
+
+class FloorError(SceneGenError):
+    """Score files of one test set that state different floors."""
+
+
+def skill_key(name: str) -> str:
+    """Return the key of the column that shows the skill of a score."""
+    return SKILL_OF + name
+
+
+def floor_rows(file: ScoreFile, names: Sequence[str]) -> FloorRows:
+    """Return what the floors of a file's test set score: by label, then by key of the column."""
+    rows: FloorRows = {}
+    for name in names:
+        if name in RELIEF:
+            rows.setdefault(FLOOR + FLOOR_NAME, {})[name] = 0.0
+        skill = file.skills.get(name)
+        if skill is not None:
+            rows.setdefault(FLOOR + skill.floor_name, {}).update(
+                {name: skill.floor, skill_key(name): 0.0}
+            )
+    noise = {name: file.meta.noise_floors[name] for name in names if name in file.meta.noise_floors}
+    if noise:
+        rows[NOISE] = noise
+    if "answers" in file.meta.counts and not any(label.startswith(CHANCE) for label in rows):
+        rows[CHANCE] = {"iqtt_accuracy": 1.0 / file.meta.counts["answers"]}
+    return rows
+
+
+def angle_floor_rows(file: ScoreFile, name: str) -> FloorRows:
+    """Return what the empty room scores by view angle: by label, then by whole degrees."""
+    label, angles = FLOOR + FLOOR_NAME, file.items.get("view_angle_degrees")
+    if name in RELIEF:
+        return {label: dict.fromkeys(file.by_view_angle, 0.0)}
+    column = file.items.get(EMPTY_ROOM + name)
+    if angles is None or column is None:
+        return {}
+    found = {}
+    for degrees in file.by_view_angle:
+        chosen = (angles == int(degrees)) & np.isfinite(column)
+        if chosen.any():
+            found[degrees] = float(cluster_means(column[chosen], file.clusters[chosen]).mean())
+    return {label: found}
+
+
+def kind_floor_rows(file: ScoreFile, kinds: Sequence[str]) -> FloorRows:
+    """Return the best floor of each kind of question, and chance, by label, then by kind."""
+    if "answers" not in file.meta.counts:
+        return {}
+    answers = file.meta.counts["answers"]
+    best = {kind: floor_of_kind(kind, answers)[0] for kind in kinds}
+    chance = dict.fromkeys(kinds, 1.0 / answers)
+    return {CHANCE: chance} if best == chance else {f"{FLOOR}best": best, CHANCE: chance}
+
+
+def require_same_floors(files: Sequence[ScoreFile]) -> None:
+    """Raise FloorError where comparable files of one test set state different floors.
+
+    Floors follow from the test set alone, so that one of the files must be wrong.
+    """
+    whole = [file for file in files if file.comparable]
+    for file in whole[1:]:
+        ours, theirs = _stated(whole[0]), _stated(file)
+        for what in ours.keys() & theirs.keys():
+            if not agree(theirs[what], ours[what], 0.0):
+                expected = f"{ours[what]!r}, as in {whole[0].place}"
+                raise FloorError(f"{file.place}: {what}", theirs[what], expected, SCORE_AGAIN)
+
+
+def _stated(file: ScoreFile) -> dict[str, float]:
+    skills = {f"skills.{name}.floor": skill.floor for name, skill in file.skills.items()}
+    noise = {f"meta.noise_floors.{name}": value for name, value in file.meta.noise_floors.items()}
+    return skills | noise
+
+
+def floors_table(files: Sequence[ScoreFile]) -> Table | None:
+    """Return what each probe reached on the kinds of question in these files; None if unknown."""
+    asked = {kind for file in files for kind in file.by_distractor}
+    measured = [floor for floor in floors.FLOORS if floor.kind in asked]
+    kinds = tuple(dict.fromkeys(floor.kind for floor in measured))
+    if not kinds:
+        return None
+    cells: dict[str, dict[str, Cell]] = {}
+    for floor in measured:
+        ends = f" [{number(floor.low, floor.accuracy)}, {number(floor.high, floor.accuracy)}]"
+        cells.setdefault(floor.name, {})[floor.kind] = Cell(number(floor.accuracy), ends)
+    rows = tuple(
+        Row("", name, "floor", tuple(found.get(kind, Cell()) for kind in kinds))
+        for name, found in cells.items()
+    )
+    note = (
+        "Fraction of right answers of methods that know nothing of 3D, with 95% intervals, by kind"
+        " of question and number of labelled questions; measured once, as docs/results.md says. The"
+        " best that lies above chance is the floor of skill."
+    )
+    return Table("3D-IQTT: floors by kind of question", kinds, rows, (note,))

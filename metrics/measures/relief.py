@@ -1,0 +1,51 @@
+"""Relief: how far a surface stands before the empty room, along the viewing axis.
+
+The relief of a pixel is the planar depth of the empty room minus that of the surface, in scene
+units. It is 0 on floor and walls, and above 0 on objects. The scores look at shape and place of
+what stands out, so that lifting or tilting the empty room wins little. But objects stand where they
+often do: one relief for all pictures, the mean of a training set, has a correlation of 0.52 and an
+IoU of 0.37 with those of the preset `shapes`. So relief is compared with another scene's, too.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from metrics.measures.checks import as_float64, require, require_finite, require_some
+
+RELIEF_ABOVE = 0.05  # scene units: pixels with more than this stand out
+# Scene units. A predicted relief that varies less counts as if it varied so much: without this,
+# rounding to half precision, or noise of any size, could be taken for relief.
+LEAST_SPREAD = 1e-3
+
+
+def relief_scores(predicted: ArrayLike, true: ArrayLike) -> dict[str, float]:
+    """Return `relief_correlation` and `relief_iou` of the relief of the scored pixels, (N,) each.
+
+    With p the predicted and t the true relief:
+
+    - relief_correlation: cov(p, t) / (max(std(p), least) std(t)), in [-1, 1], where least is
+      LEAST_SPREAD, or std(t) where that is smaller. This is Pearson's correlation for every
+      prediction with as much relief, and goes to 0 as the relief of a prediction does.
+    - relief_iou: pixels where p and t both exceed RELIEF_ABOVE, divided by those where either does.
+
+    Both are NaN where t exceeds RELIEF_ABOVE nowhere: nothing stands out that could be found.
+    Raises NonFiniteError, EmptyError, and MeasureError on shapes that differ.
+    """
+    p, t = as_float64(predicted, "predicted relief"), as_float64(true, "true relief")
+    ok = p.shape == t.shape and t.ndim == 1
+    require(ok, "relief", f"shapes {p.shape} and {t.shape}", "two arrays (N,)")
+    require_some(len(t), "relief")
+    require_finite(p, "predicted relief")
+    require_finite(t, "true relief")
+    truly, said = t > RELIEF_ABOVE, p > RELIEF_ABOVE
+    if not truly.any():
+        return {"relief_correlation": np.nan, "relief_iou": np.nan}
+    p, t = p - p.mean(), t - t.mean()
+    spread = float(t.std())
+    least = max(float(p.std()), min(LEAST_SPREAD, spread))
+    # A picture that stands out alike all over has no spread.
+    correlation = float((p * t).mean()) / (least * spread) if spread > 0.0 else 0.0
+    return {
+        "relief_correlation": min(max(correlation, -1.0), 1.0),
+        "relief_iou": float((said & truly).sum() / (said | truly).sum()),
+    }
