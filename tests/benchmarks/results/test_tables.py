@@ -120,7 +120,7 @@ def test_rooms(ran, tmp_path):
     assert len(ran) == count
     text = rooms.page(tmp_path)
     assert text.count("###") == 3
-    row = "| `oracle` | 0.500 [0.400, 0.600] | – | -0.250 [-0.500, 0.000] | – | – |"
+    row = f"| `oracle` | 0.500 [0.400, 0.600] | {'– | ' * 3}-0.250 [-0.500, 0.000] | – | – |"
     assert row in text
     assert "| 35 | `mean-depth` | – | 0.5000 [0.4000, 0.6000] | – | – | – | – |" in text
 
