@@ -6,11 +6,11 @@ import numpy as np
 
 from metrics.leaderboard.table import Cell, Row, Table
 from metrics.measures.statistics import cluster_means
-from metrics.report.text import RELIEF
+from metrics.report.text import FLOORS_OF_ROOMS, floor_text
 from metrics.scoring import floors
 from metrics.scoring.floors import floor_of_kind
-from metrics.scoring.metric_names import EMPTY_ROOM
-from metrics.scoring.records import FLOOR_NAME, ScoreFile
+from metrics.scoring.metric_names import EMPTY_ROOM, OTHER_SCENE, SKILLED
+from metrics.scoring.records import ScoreFile
 from metrics.scoring.schema import SCORE_AGAIN, agree
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import number
@@ -30,16 +30,20 @@ def skill_key(name: str) -> str:
 
 
 def floor_rows(file: ScoreFile, names: Sequence[str]) -> FloorRows:
-    """Return what the floors of a file's test set score: by label, then by key of the column."""
+    """Return what the floors of a file's test set score: by label, then by key of the column.
+
+    The floor of a relief is not that of other files: its skill has one, 0, the score itself none.
+    """
     rows: FloorRows = {}
     for name in names:
-        if name in RELIEF:
-            rows.setdefault(FLOOR + FLOOR_NAME, {})[name] = 0.0
         skill = file.skills.get(name)
-        if skill is not None:
-            rows.setdefault(FLOOR + skill.floor_name, {}).update(
-                {name: skill.floor, skill_key(name): 0.0}
-            )
+        if skill is None:
+            continue
+        label = FLOOR + (floor_text(file, name) if is_shared(name) else FLOORS_OF_ROOMS[EMPTY_ROOM])
+        row = rows.setdefault(label, {})
+        row[skill_key(name)] = 0.0
+        if is_shared(name):
+            row[name] = skill.floor
     noise = {name: file.meta.noise_floors[name] for name in names if name in file.meta.noise_floors}
     if noise:
         rows[NOISE] = noise
@@ -48,20 +52,27 @@ def floor_rows(file: ScoreFile, names: Sequence[str]) -> FloorRows:
     return rows
 
 
-def angle_floor_rows(file: ScoreFile, name: str) -> FloorRows:
-    """Return what the empty room scores by view angle: by label, then by whole degrees."""
-    label, angles = FLOOR + FLOOR_NAME, file.items.get("view_angle_degrees")
-    if name in RELIEF:
-        return {label: dict.fromkeys(file.by_view_angle, 0.0)}
-    column = file.items.get(EMPTY_ROOM + name)
-    if angles is None or column is None:
+def own_floors(file: ScoreFile) -> dict[str, float]:
+    """Return the floors that belong to this file's predictions alone, by name of the score."""
+    return {name: one.floor for name, one in file.skills.items() if not is_shared(name)}
+
+
+def angle_floors(file: ScoreFile, name: str) -> dict[str, float]:
+    """Return the mean of a score's floor by view angle, in whole degrees, from the items."""
+    angles, column = map(file.items.get, ("view_angle_degrees", SKILLED.get(name, "") + name))
+    if angles is None or column is None or name not in SKILLED:
         return {}
     found = {}
     for degrees in file.by_view_angle:
         chosen = (angles == int(degrees)) & np.isfinite(column)
         if chosen.any():
             found[degrees] = float(cluster_means(column[chosen], file.clusters[chosen]).mean())
-    return {label: found}
+    return found
+
+
+def is_shared(name: str) -> bool:
+    """Return whether all files of one test set have the same floor of this score."""
+    return SKILLED.get(name) != OTHER_SCENE
 
 
 def kind_floor_rows(file: ScoreFile, kinds: Sequence[str]) -> FloorRows:
@@ -89,7 +100,9 @@ def require_same_floors(files: Sequence[ScoreFile]) -> None:
 
 
 def _stated(file: ScoreFile) -> dict[str, float]:
-    skills = {f"skills.{name}.floor": skill.floor for name, skill in file.skills.items()}
+    skills = {
+        f"skills.{name}.floor": one.floor for name, one in file.skills.items() if is_shared(name)
+    }
     noise = {f"meta.noise_floors.{name}": value for name, value in file.meta.noise_floors.items()}
     return skills | noise
 

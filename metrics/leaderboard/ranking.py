@@ -12,11 +12,15 @@ from typing import Literal
 import numpy as np
 
 from metrics.leaderboard.floors import (
+    FLOOR,
     SKILL_OF,
-    angle_floor_rows,
+    FloorRows,
+    angle_floors,
     floor_rows,
     floors_table,
+    is_shared,
     kind_floor_rows,
+    own_floors,
     require_same_floors,
     skill_key,
 )
@@ -26,20 +30,22 @@ from metrics.leaderboard.table import (
     INCOMPARABLE_MARK,
     REPORTED_MARK,
     Column,
+    Entry,
     Table,
     build_table,
     reported_rows,
     score_column,
     skill_column,
 )
-from metrics.report.text import SKILL, what_the_floor_is
+from metrics.report.text import FLOORS_OF_ROOMS, SKILL, what_the_floor_is
 from metrics.scoring.known_tests import known_test
-from metrics.scoring.metric_names import HEADLINE, metric
+from metrics.scoring.metric_names import EMPTY_ROOM, HEADLINE, metric
 from metrics.scoring.records import ID_COLUMNS, Score, ScoreFile, Skill
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import by_number, distinct, plain
 
 Paper = Literal["all", "task", "none"]
+WIDEST = 6  # columns of scores in one table
 ABLATIONS = 4  # the table of the paper on parts of its model, which only stands by itself
 ANGLES = "Angle between each view and its scene's first one."
 KINDS = 'Kinds of wrong answers; "-2" ends those of questions with two answers.'
@@ -80,7 +86,8 @@ def leaderboard(
         _require_same_rows(members)
         require_same_floors(members)
         names = [name for name in chosen if chosen[name] == task]
-        columns = _columns(members, names or HEADLINE[task], headline=not names)
+        there = [n for n in HEADLINE[task] if any(n in file.metrics for file in members)]
+        columns = _columns(members, names or there or HEADLINE[task][:1], headline=not names)
         figures = [
             figure
             for table in TABLES
@@ -138,6 +145,13 @@ def _columns(files: Sequence[ScoreFile], names: Sequence[str], headline: bool) -
     return found
 
 
+def _parts(columns: Mapping[str, Column]) -> list[dict[str, Column]]:
+    """Return the columns as one table; where it would be too wide, skills and scores apart."""
+    skills = {key: column for key, column in columns.items() if key.startswith(SKILL_OF)}
+    scores = {key: column for key, column in columns.items() if key not in skills}
+    return [skills, scores] if skills and len(columns) > WIDEST else [dict(columns)]
+
+
 def _shown(file: ScoreFile) -> dict[str, Score | Skill]:
     """Return the scores of a file, and their skills, by the keys of their columns."""
     return {**file.metrics, **{skill_key(name): one for name, one in file.skills.items()}}
@@ -172,25 +186,29 @@ def _tables(
     ranked = [(_label(files[i], labels[i]), files[i]) for i in order]
     first = ranked[0][1]  # comparable, if any is
     title, names = _title(first), [name for name in columns if not name.startswith(SKILL_OF)]
-    used = [f for f in figures if f.view_angle is None]
-    table = build_table(
-        title,
-        columns,
-        [(label, file.comparable, _shown(file)) for label, file in ranked],
-        floor_rows(first, names),
-        _by_row(used, _figure_label, lambda figure: figure.metric),
-        [*_notes([file for _, file in ranked]), *map(_same_request_note, same_request)],
-        ranked=True,
-    )
-    yield table, used
+    notes = [*_notes([file for _, file in ranked]), *map(_same_request_note, same_request)]
+    shown = [(label, file.comparable, _shown(file), own_floors(file)) for label, file in ranked]
+    for i, part in enumerate(_parts(columns)):
+        used = [f for f in figures if f.view_angle is None and f.metric in part]
+        table = build_table(
+            f"{title}: scores" if i else title,
+            part,
+            shown,
+            {k: row for k, row in floor_rows(first, names).items() if row.keys() & part.keys()},
+            _by_row(used, _figure_label, lambda figure: figure.metric),
+            ["Rows as in the ranking."] if i else notes,
+            ranked=not i,
+        )
+        yield table, used
     by_angle = first.task == "rooms"
     for name in names:
-        entries = []
+        entries: list[Entry] = []
         for label, file in ranked:
             groups = file.by_view_angle if by_angle else file.by_distractor
             found = {key: scores[name] for key, scores in groups.items() if name in scores}
-            entries.append((label, file.comparable, found))
-        keys = by_number({key for _, _, scores in entries for key in scores})
+            own = {} if is_shared(name) else angle_floors(file, name)
+            entries.append((label, file.comparable, found, own))
+        keys = by_number({key for _, _, scores, _ in entries for key in scores})
         if len(keys) < (1 if by_angle else 2):  # a single kind stands in the title
             continue
         used = [f for f in figures if f.metric == name and str(f.view_angle) in keys]
@@ -199,12 +217,20 @@ def _tables(
             f"{title}: {column.head} by {'view angle' if by_angle else 'kind of question'}",
             {key: replace(column, head=f"{key}°" if by_angle else key) for key in keys},
             entries,
-            angle_floor_rows(first, name) if by_angle else kind_floor_rows(first, keys),
+            _floors_of_groups(first, name, keys),
             _by_row(used, _figure_label, lambda figure: str(figure.view_angle)),
             [ANGLES if by_angle else KINDS, "Rows as in the ranking."],
             ranked=False,
         )
         yield table, used
+
+
+def _floors_of_groups(file: ScoreFile, name: str, keys: Sequence[str]) -> FloorRows:
+    """Return the rows of floors below scores by view angle, or by kind of question."""
+    if file.task == "iqtt":
+        return kind_floor_rows(file, keys)
+    found = angle_floors(file, name) if is_shared(name) else {}
+    return {FLOOR + FLOORS_OF_ROOMS[EMPTY_ROOM]: found} if found else {}
 
 
 def _title(file: ScoreFile) -> str:
@@ -278,7 +304,8 @@ def _notes(files: Sequence[ScoreFile]) -> Iterator[str]:
     if first.meta.noise_floors:
         yield (
             "Noise floor: the score of the true surface, sampled elsewhere, against itself. Floors"
-            " are as the score files state them; files that disagree are refused."
+            " are as the score files state them; files that disagree are refused. A relief has a"
+            " floor of its own beside it."
         )
 
 

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 from metrics.leaderboard.paper_tables import REPORTED, SOURCE, Figure
-from metrics.report.text import interval_cells
+from metrics.report.text import as_shown, interval_cells
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import Score, Skill
 from scenegen.common.text_table import number
 
 Kind = Literal["ranked", "incomparable", "floor", "reported"]
-Entry = tuple[str, bool, Mapping[str, Score | Skill]]
+Scores = Mapping[str, Score | Skill]
+Entry = tuple[str, bool, Scores, Mapping[str, float]]
 REPORTED_MARK, INCOMPARABLE_MARK = "†", "‡"
 
 
@@ -31,8 +32,9 @@ class Cell:
     Attributes:
         value: the score with 4 significant digits, or a figure of the paper as printed; "-" where
             there is none.
-        rest: what follows the value, such as " ± 0.01 [0.1, 0.2]": the standard deviation over runs
-            (or what the paper prints after "±"), and the interval; or empty.
+        rest: what follows the value, such as " ± 0.01 [0.1, 0.2]": standard deviation over runs
+            (or what the paper prints after "±"), the interval, and a floor that other methods do
+            not share; or empty.
         best: whether no ranked score of the column is better, as far as the shown digits tell.
     """
 
@@ -86,8 +88,8 @@ def build_table(
 
     Args:
         columns: the columns by their keys.
-        entries: for each method, best first: its label, whether it is comparable, and its scores
-            by the columns' keys.
+        entries: for each method, best first: its label, whether it is comparable, its scores by
+            the columns' keys, and so those of their floors that other methods do not share.
         floors: values by the label of their row, then by the columns' keys.
         figures: of the paper, by the label of their row, then by the columns' keys.
         notes: stand below the table, before those on marks that its rows bear.
@@ -97,8 +99,10 @@ def build_table(
     best = {key: _best(entries, key, column) for key, column in columns.items()}
     rows: list[Row] = []
     place, last = 0, ""
-    for label, comparable, scores in entries:
-        cells = tuple(_cell(scores.get(key), comparable and best[key]) for key in columns)
+    for label, comparable, scores, own in entries:
+        cells = tuple(
+            _cell(scores.get(key), comparable and best[key], own.get(key)) for key in columns
+        )
         rank = ""
         if ranked and comparable and first in scores:
             place = place if cells[0].value == last else len(rows) + 1
@@ -108,7 +112,7 @@ def build_table(
         texts = (number(values[key]) if key in values else "-" for key in columns)
         rows.append(Row("", label, "floor", tuple(map(Cell, texts))))
     told = list(notes)
-    if not all(comparable for _, comparable, _ in entries):
+    if not all(comparable for _, comparable, *_ in entries):
         told.append(
             f"{INCOMPARABLE_MARK} not comparable, so not ranked: not all of the test set was"
             " scored, or values that are not finite were given the worst score, or only the"
@@ -144,20 +148,22 @@ def score_column(name: str) -> Column:
 
 def skill_column(name: str) -> Column:
     """Return the column of the skill of a score."""
-    return Column(f"Skill of {metric(name).title} ↑ (1 is perfect)", True)
+    return Column(f"{metric(name).title}: skill ↑", True)
 
 
 def _best(entries: Sequence[Entry], key: str, column: Column) -> str:
     """The best of the comparable scores of a column as it is shown; empty where there is none."""
-    values = [scores[key].value for _, may, scores in entries if may and key in scores]
+    found = [scores[key] for _, may, scores, _ in entries if may and key in scores]
     better = max if column.higher_is_better else min
-    return number(better(values)) if values else ""
+    return interval_cells(better(found, key=lambda one: one.value))[0] if found else ""
 
 
-def _cell(score: Score | Skill | None, best: str | Literal[False]) -> Cell:
+def _cell(score: Score | Skill | None, best: str | Literal[False], floor: float | None) -> Cell:
     if score is None:
         return Cell()
     value, interval = interval_cells(score)
     std = getattr(score, "std", None)
     spread = "" if std is None else f" ± {number(std, score.value)}"
-    return Cell(value, spread + ("" if interval == "-" else f" {interval}"), value == best)
+    ends = "" if interval == "-" else f" {interval}"
+    own = "" if floor is None else f" floor {number(floor, as_shown(score))}"
+    return Cell(value, spread + ends + own, value == best)

@@ -7,14 +7,21 @@ from pathlib import Path
 import numpy as np
 
 from metrics.scoring.known_tests import known_test
-from metrics.scoring.metric_names import HEADLINE, in_order, metric
+from metrics.scoring.metric_names import (
+    EMPTY_ROOM,
+    HEADLINE,
+    OTHER_SCENE,
+    SKILLED,
+    in_order,
+    metric,
+)
 from metrics.scoring.questions import question_skill
-from metrics.scoring.records import FLOOR_NAME, GROUPINGS, Meta, Score, ScoreFile, Skill
+from metrics.scoring.records import GROUPINGS, Meta, Score, ScoreFile, Skill
 from scenegen.common.new_file import written_beside
 from scenegen.common.text_table import by_number, laid_out, markdown, number, plain, printable
 
 SKILL = "Skill: 1 is perfect, 0 is as good as the floor, below 0 is worse than the floor."
-RELIEF = ("relief_iou", "relief_correlation")  # both 0 in the empty room, which has no relief
+FLOORS_OF_ROOMS = {EMPTY_ROOM: "empty room", OTHER_SCENE: "against another scene"}
 HEADLINE_HEAD = ("headline", "value", "{} interval", "floor")
 HEAD = ("score", "value", "{} interval", "std of runs", "floor", "unit", "better")
 GROUP_TITLES = {
@@ -54,33 +61,37 @@ def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> N
 
 
 def headline_rows(scores: ScoreFile, escape: Callable[[str], str] = str) -> list[Sequence[str]]:
-    """Return a head, then a row for each headline score without a floor above 0, for the skills of
-    the others, and for these themselves; each says what its floor is.
+    """Return a head, then a row for each skill of a headline score, then for each such score.
+
+    Each row says what its floor is.
     """
     names = [name for name in HEADLINE[scores.task] if name in scores.metrics]
     skilled = [name for name in names if name in scores.skills]
     shown: list[tuple[str, Score | Skill, str]] = [
-        (name, scores.metrics[name], f"0: {FLOOR_NAME}" if name in RELIEF else "-")
-        for name in names
-        if name not in skilled
-    ]
-    shown += [
-        (f"skill of {name}", scores.skills[name], f"0: {scores.skills[name].floor_name}")
+        (f"skill of {name}", scores.skills[name], f"0: {floor_text(scores, name)}")
         for name in skilled
     ]
-    shown += [(name, scores.metrics[name], _floor_text(scores, name)) for name in skilled]
+    shown += [(name, scores.metrics[name], _floors_beside(scores, name)) for name in names]
     rows = [(escape(name), *interval_cells(one), escape(floor)) for name, one, floor in shown]
     return [_head(HEADLINE_HEAD, scores), *rows]
 
 
-def _floor_text(scores: ScoreFile, name: str) -> str:
-    """Return the floor of a score that has a skill, and what chance or noise gives."""
-    skill, score = scores.skills[name], scores.metrics[name]
-    text = f"{number(skill.floor, score.value)}: {skill.floor_name}"
+def floor_text(scores: ScoreFile, name: str) -> str:
+    """Return in words what the floor of a score that has a skill is."""
+    if scores.task == "rooms":
+        return FLOORS_OF_ROOMS[SKILLED[name]]
+    return scores.skills[name].floor_name
+
+
+def _floors_beside(scores: ScoreFile, name: str) -> str:
+    """Return the floor of a score, and what chance or noise gives, each with its name."""
+    like, told = as_shown(scores.metrics[name]), []
+    if name in scores.skills:
+        told.append(f"{number(scores.skills[name].floor, like)}: {floor_text(scores, name)}")
     label, value = references(scores).get(name, ("", 0.0))
-    if label and not skill.floor_name.startswith(label):
-        text += f"; {label} {number(value, score.value)}"
-    return text
+    if label and not any(f": {label}" in text for text in told):
+        told.append(f"{label} {number(value, like)}")
+    return "; ".join(told) or "-"
 
 
 def references(scores: ScoreFile) -> dict[str, tuple[str, float]]:
@@ -99,9 +110,8 @@ def score_rows(scores: ScoreFile, escape: Callable[[str], str] = str) -> list[Se
         score, known = scores.metrics[name], metric(name)
         better = "higher" if known.higher_is_better else "lower"
         std = "-" if score.std is None else number(score.std, score.value)
-        floor = "0" if name in RELIEF else "-"
-        if name in scores.skills:
-            floor = number(scores.skills[name].floor, score.value)
+        skill = scores.skills.get(name)
+        floor = "-" if skill is None else number(skill.floor, as_shown(score))
         rows.append((escape(name), *interval_cells(score), std, floor, escape(score.unit), better))
         if name in beside:
             label, value = beside[name]
@@ -146,10 +156,16 @@ def _add_floors(rows: list[Sequence[str]], scores: ScoreFile, escape: Callable[[
 
 def interval_cells(score: Score | Skill) -> tuple[str, str]:
     """Return a value and its interval as text; "-" stands for no interval."""
+    like = as_shown(score)
     if score.low is None or score.high is None:
-        return number(score.value), "-"
-    ends = f"[{number(score.low, score.value)}, {number(score.high, score.value)}]"
-    return number(score.value), ends
+        return number(score.value, like), "-"
+    return number(score.value, like), f"[{number(score.low, like)}, {number(score.high, like)}]"
+
+
+def as_shown(score: Score | Skill) -> float:
+    """Return a number with as many decimals as a score is shown with: four where 0 is a middle."""
+    signed = isinstance(score, Skill) or score.unit == "correlation"
+    return 0.1 if signed else score.value
 
 
 def _title(scores: ScoreFile, escape: Callable[[str], str]) -> str:
@@ -193,7 +209,10 @@ def _notes(scores: ScoreFile) -> Iterator[str]:
 def what_the_floor_is(scores: ScoreFile) -> str:
     """Return in a sentence what the floor of the skills is."""
     if scores.task == "rooms":
-        return "The floor is the empty room: walls and floor from the true camera, no objects."
+        return (
+            "The floor is the empty room: walls and floor from the true camera, no objects; of"
+            " relief it is the same prediction, held against the relief of another scene."
+        )
     return "The floor is the best method without 3D, by kind of question: docs/results.md."
 
 

@@ -124,33 +124,33 @@ def test_labels_tell_runs_and_claims():
 
 
 def skilled(name, chamfer=0.2, **other):
-    """Rooms with relief, a skill over a floor of 0.4, and a noise floor."""
-    columns = {"relief_iou": [0.3] * 4, "chamfer": [chamfer] * 4}
-    skills = {"chamfer": Skill(1 - chamfer / 0.4, -0.5, 0.9, 0.4, "empty-room")}
+    """Rooms with a skill over a floor of 0.4, and a noise floor."""
+    columns = {"hausdorff": [0.3] * 4, "chamfer": [chamfer] * 4}
+    skills = {"chamfer": Skill(1 - chamfer / 0.4, -0.5, 0.9, 0.4, "empty_room_chamfer")}
     told = {"skills": skills, "noise_floors": {"chamfer": 0.0123}, "path": Path(f"{name}.json")}
     return rooms_scores(name, columns, SCENES, **{**told, **other})
 
 
 def test_skill_stands_before_the_score_and_floors_below_the_methods():
-    names = ["relief_iou", "chamfer"]
+    names = ["hausdorff", "chamfer"]
     table = leaderboard([skilled("worse", 0.3), skilled("better")], names, paper="none")[0]
-    heads = ("Relief IoU ↑ (fraction)", "Chamfer ↓ (scene unit)")
-    assert table.columns == (*heads, "Skill of Chamfer ↑ (1 is perfect)")
+    heads = ("Hausdorff ↓ (scene unit)", "Chamfer ↓ (scene unit)")
+    assert table.columns == (*heads, "Chamfer: skill ↑")
     rows = [(row.rank, row.label, row.kind) for row in table.rows]
     assert rows == [
         ("1", "better", "ranked"),  # the first column is tied, the second decides
         ("1", "worse", "ranked"),
-        ("", "floor: empty-room", "floor"),
+        ("", "floor: empty room", "floor"),
         ("", "noise floor", "floor"),
     ]
     cells = [[cell.value for cell in row.cells] for row in table.rows]
     assert cells[0][2] == "0.5000"
-    assert cells[2:] == [["0", "0.4000", "0"], ["-", "0.01230", "-"]]
+    assert cells[2:] == [["-", "0.4000", "0"], ["-", "0.01230", "-"]]
     assert table.rows[0].cells[2].rest == " [-0.5000, 0.9000]"
     assert not any(cell.best for row in table.rows[2:] for cell in row.cells)
     right = Skill(0.25, 0.1, 0.4, 0.5, "outline")
     table = leaderboard([iqtt_scores("q", [1, 0], skills={"iqtt_accuracy": right})])[0]
-    assert table.columns[0] == "Skill of IQTT accuracy ↑ (1 is perfect)"
+    assert table.columns[0] == "IQTT accuracy: skill ↑"
     rows = {row.label: [cell.value for cell in row.cells] for row in table.rows}
     assert rows["floor: outline"] == ["0", "0.5000"]
     assert rows["floor: chance"] == ["-", "0.3333"]
@@ -161,13 +161,39 @@ def test_the_floor_by_view_angle_is_the_empty_rooms_at_that_angle():
     items["empty_room_chamfer"] = np.array([0.1, 0.5, 0.3, 0.7])
     file = rooms("a", by_view_angle=angles(0.2))
     _, table = leaderboard([replace(file, items={**file.items, **items})], paper="none")
-    floor = by_label(table)["floor: empty-room"]
+    floor = by_label(table)["floor: empty room"]
     assert [cell.value for cell in floor.cells] == ["0.2000", "-", "0.6000"]  # 0, 5 and 35 degrees
+
+
+def relief(name, iou, floor):
+    """Rooms whose relief has a floor of its own, as it is the same prediction for another scene."""
+    value = (iou - floor) / (1 - floor)
+    skills = {"relief_iou": Skill(value, None, None, floor, "other_scene_relief_iou")}
+    return rooms_scores(name, {"relief_iou": [iou] * 4}, SCENES, skills=skills)
+
+
+def test_the_skill_of_relief_ranks_and_its_floor_stands_beside_each_score():
+    guess, seen = relief("guess", 0.37, 0.36), relief("seen", 0.35, 0.2)
+    table = leaderboard([guess, seen], paper="none")[0]
+    assert table.columns == ("Relief IoU: skill ↑", "Relief IoU ↑ (fraction)")
+    assert [row.label for row in table.rows] == ["seen", "guess", "floor: empty room"]
+    assert [row.cells[1].rest.split("floor ")[-1] for row in table.rows[:2]] == ["0.2000", "0.3600"]
+    assert [cell.value for cell in table.rows[2].cells] == ["0", "-"]
+
+
+def test_what_is_too_wide_becomes_two_tables():
+    names = ("chamfer", "hausdorff", "mse_depth", "relief_iou")
+    columns = {name: [0.2] * 4 for name in names}
+    skills = {name: Skill(0.5, None, None, 0.4, f"empty_room_{name}") for name in names[:3]}
+    ranking, scores = leaderboard([rooms_scores("a", columns, SCENES, skills=skills)], paper="none")
+    assert ranking.columns == tuple(f"{n}: skill ↑" for n in ("Chamfer", "Hausdorff", "MSE-depth"))
+    assert scores.columns[0] == "Relief IoU ↑ (fraction)"
+    assert [table.rows[0].rank for table in (ranking, scores)] == ["1", ""]
 
 
 def test_a_test_set_has_one_floor():
     """Which every comparable file of it states; another one is forged, or of another release."""
-    skill = Skill(0.9, 0.8, 1.0, 2.0, "empty-room")
+    skill = Skill(0.9, 0.8, 1.0, 2.0, "empty_room_chamfer")
     with refused(FloorError, "b.json: skills.chamfer.floor", "2.0", "0.4, as in a.json"):
         leaderboard([skilled("a"), skilled("b", skills={"chamfer": skill})])
     with refused(FloorError, "b.json: meta.noise_floors.chamfer", "0.1"):

@@ -44,11 +44,11 @@ def lines_of(text):
 
 
 def test_the_headline_comes_first_with_skills_and_their_floors(monkeypatch):
-    skills = {"chamfer": Skill(-0.25, -0.5, 0.1, 0.16, "empty-room")}
+    skills = {"chamfer": Skill(-0.25, -0.5, 0.1, 0.16, "empty_room_chamfer")}
     text = text_report(rooms(skills=skills, noise_floors={"chamfer": 0.0123}))
     head, rest = text.split("all scores")
-    assert lines_of(head)["skill of chamfer"] == ["-0.2500", "[-0.5000, 0.1000]", "0: empty-room"]
-    assert lines_of(head)["chamfer"][-1] == "0.1600: empty-room; noise floor 0.0123"
+    assert lines_of(head)["skill of chamfer"] == ["-0.2500", "[-0.5000, 0.1000]", "0: empty room"]
+    assert lines_of(head)["chamfer"][-1] == "0.1600: empty room; noise floor 0.0123"
     assert lines_of(rest.split("by degrees")[0])["chamfer"][3] == "0.1600"
     assert any("1 is perfect" in line for line in rest.splitlines())
     floors = (Floor("mirror", "outline", 0, 0.5, 0.4, 0.6),)
