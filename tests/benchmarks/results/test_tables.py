@@ -34,7 +34,8 @@ def ran(monkeypatch):
         path.parent.mkdir(parents=True, exist_ok=True)
         score = {"value": 0.5, "low": 0.4, "high": 0.6, "std": None, "n": 9}
         scores = {"metrics": {"iqtt_accuracy": score, "chamfer": score, "relief_iou": score}}
-        scores |= {"skills": {"chamfer": {"value": -0.25, "low": -0.5, "high": 0.0}}}
+        skill = {"value": -0.25, "low": -0.5, "high": 0.0}
+        scores |= {"skills": {"chamfer": skill, "iqtt_accuracy": skill}}
         scores |= {"by_view_angle": {"35": {"chamfer": score}}}
         path.write_text(json.dumps(scores) if "--json" in words else command)
 
@@ -101,7 +102,8 @@ def test_table_3(ran, tmp_path):
     assert cells[2] == ["`siamese`", "200", *[score] * 6, "0.3610"]
     assert cells[3] == ["`siamese`", "1,000", *[score] * 6, "0.3701"]
     assert cells[4] == ["people", "–", *["–"] * 6, "0.7329 ± 0.148"]
-    assert len(cells) == 5
+    assert cells[10] == ["`siamese`", "200", *["-0.250 [-0.500, 0.000]"] * 6], "skills"
+    assert len(cells) == 12
 
 
 def test_rooms(ran, tmp_path):
