@@ -294,7 +294,8 @@ def draw_lights(
 
     They are far away, on the camera's side, in uniform directions within bounds: the first at an
     angle of 26 to 46 degrees to the camera, so that most of what it sees is lit and the faces of a
-    cube differ; the others at 37 to 90 degrees. Unused slots are zero.
+    cube differ; the others at 37 to 90 degrees, on the other side of the camera. Unused slots
+    are zero.
     """
     most, distance = spec.lights[1], LIGHT_DISTANCE * camera_distance
     count = rng.integers(spec.lights[0], most, images, endpoint=True)
@@ -302,6 +303,7 @@ def draw_lights(
     z = rng.uniform(*OTHER_LIGHTS, (images, most))
     z[:, 0] = rng.uniform(*FIRST_LIGHT, images)
     around = rng.uniform(0.0, 2 * math.pi, (images, most))
+    around[:, 1:] = around[:, :1] + math.pi / 2 + around[:, 1:] / 2
     r = np.sqrt(1 - z * z)
     direction = np.stack([r * np.cos(around), r * np.sin(around), z], axis=2)
     color = rng.uniform(0.3, 1.0, (images, most, 3))
