@@ -35,9 +35,9 @@ from metrics.submissions.strict_json import parse_json, read_bytes
 from scenegen.common.new_file import written_beside
 from scenegen.common.text_table import by_number
 
-MOST_BYTES = 256 * 2**20  # about 250,000 images
+MOST_BYTES = 256 * 2**20  # more images than may be parsed, see `strict_json.MOST_MEMORY`
 MOST_KEYS = 10_000  # of one object
-WITHOUT_JSON = "about 250,000 images fit; --csv writes the scores of any number of them"
+WITHOUT_JSON = "about 140,000 images fit; --csv writes the scores of any number of them"
 
 __all__ = [
     "FORMAT_NAME",

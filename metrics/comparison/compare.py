@@ -22,7 +22,12 @@ from metrics.comparison.statistics import (
     smallest_detectable_difference,
     smallest_significant_fraction,
 )
-from metrics.measures.statistics import RESAMPLES, bootstrap_interval, cluster_means
+from metrics.measures.statistics import (
+    RESAMPLES,
+    bootstrap_interval,
+    cluster_means,
+    linearised_means,
+)
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import ScoreFile
 from scenegen.common.text_table import distinct, plain
@@ -125,6 +130,7 @@ def compare(
     names = require_same_test(files, metrics, allow_incomparable)
     orders = common_rows(files)
     clusters = files[0].clusters[orders[0]]
+    shapes = files[0].items.get("shape", files[0].ids)[orders[0]]  # of questions
     labels = distinct([f.method for f in files], [f.path.stem if f.path else "" for f in files])
     pairs = [(name, i) for name in names for i in range(1, len(files))]
 
@@ -132,11 +138,17 @@ def compare(
         a, b, there = pair(files[i], files[0], name, (orders[i], orders[0]))
         scenes = clusters[there]
         apart = cluster_means(a - b, scenes)
-        ends = bootstrap_interval(apart[:, None], seed, resamples, CONFIDENCE)
+        # What is independent, for intervals and for tests: scenes, and shapes that are asked about.
+        means = sums = apart
+        if files[0].task == "iqtt":
+            means = linearised_means(apart, shapes[there])[:, 0]
+            sums = np.bincount(np.unique(shapes[there], return_inverse=True)[1], apart)
+        ends = bootstrap_interval(means[:, None], seed, resamples, CONFIDENCE)
         low, high = (None if math.isnan(end) else float(end) for (end,) in ends)
         better = apart if metric(name).higher_is_better else -apart
         exact = files[0].task == "iqtt" and files[i].runs == files[0].runs == 1
-        p_value = mcnemar_exact(a == 1.0, b == 1.0) if exact else sign_flip_test(apart, seed)
+        exact = exact and len(means) == len(apart)
+        p_value = mcnemar_exact(a == 1.0, b == 1.0) if exact else sign_flip_test(sums, seed)
         return Difference(
             metric=name,
             method=labels[i],
@@ -151,7 +163,7 @@ def compare(
             wins=int(np.count_nonzero(better > 0.0)),
             losses=int(np.count_nonzero(better < 0.0)),
             ties=int(np.count_nonzero(better == 0.0)),
-            smallest=_smallest(apart, exact, ALPHA / len(pairs)),
+            smallest=_smallest(means, exact, ALPHA / len(pairs)),
         )
 
     found = [difference(name, i) for name, i in pairs]

@@ -102,10 +102,9 @@ def _require_same_floors(files: Sequence[ScoreFile], orders: Sequence[NDArray[np
             same = np.isclose(theirs, ours, FLOOR_AGREEMENT, FLOOR_AGREEMENT**2, equal_nan=True)
             if not same.all():
                 i = int(np.argmin(same))
-                found, expected = (repr(float(values[i])) for values in (theirs, ours))
-                where = f"{file.place}: items.{name}, row {file.ids[order][i]}"
-                told = f"{expected} as in {files[0].place}"
-                raise ComparisonError(where, found, told, CHANGED)
+                found = f"{float(theirs[i])!r} in row {file.ids[order][i]}"
+                told = f"{float(ours[i])!r} as in {files[0].place}"
+                raise ComparisonError(f"{file.place}: items.{name}", found, told, CHANGED)
 
 
 def column(file: ScoreFile, name: str, order: NDArray[np.int64]) -> Array:

@@ -101,9 +101,10 @@ def _probability(p: float) -> str:
 
 def _legend(comparison: Comparison) -> list[str]:
     first = comparison.differences[0]
-    clusters = "scenes" if comparison.task == "rooms" else "questions"
+    rooms = comparison.task == "rooms"
+    clusters, apart = ("scenes",) * 2 if rooms else ("questions", "shapes")
     if first.test == SIGN_FLIP:
-        test = f"sign flips of the mean difference of each {clusters[:-1]}"
+        test = f"sign flips of the differences of each {apart[:-1]}"
     else:
         test = "exact McNemar test"
     if len({d.test for d in comparison.differences}) > 1:
@@ -112,7 +113,7 @@ def _legend(comparison: Comparison) -> list[str]:
     many = f"{family} comparisons" if family > 1 else "1 comparison"
     return [
         f"difference: method - reference, paired, with its {CONFIDENCE:.0%} bootstrap interval over"
-        f" {clusters} (not corrected).",
+        f" {apart} (not corrected).",
         f"better/worse/same: {clusters}. p: {test}, two-sided; Holm: corrected for {many}.",
         f"least shown: what this test set would show in {POWER:.0%} of cases after the correction,"
         " as the differences spread here; none: no difference, or none can be told.",

@@ -13,7 +13,7 @@ from metrics.scoring.metric_names import EMPTY_ROOM, OTHER_SCENE, SKILLED
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.schema import SCORE_AGAIN, agree
 from scenegen.common.errors import SceneGenError
-from scenegen.common.text_table import number
+from scenegen.common.text_table import number, printable
 
 FloorRows = dict[str, dict[str, float]]
 SKILL_OF = "skill of "  # how the keys of columns of skills begin
@@ -39,7 +39,8 @@ def floor_rows(file: ScoreFile, names: Sequence[str]) -> FloorRows:
         skill = file.skills.get(name)
         if skill is None:
             continue
-        label = FLOOR + (floor_text(file, name) if is_shared(name) else FLOORS_OF_ROOMS[EMPTY_ROOM])
+        told = floor_text(file, name) if is_shared(name) else FLOORS_OF_ROOMS[EMPTY_ROOM]
+        label = FLOOR + printable(" ".join(told.split()))
         row = rows.setdefault(label, {})
         row[skill_key(name)] = 0.0
         if is_shared(name):

@@ -215,7 +215,7 @@ def _tables(
         column = score_column(name)
         table = build_table(
             f"{title}: {column.head} by {'view angle' if by_angle else 'kind of question'}",
-            {key: replace(column, head=f"{key}°" if by_angle else key) for key in keys},
+            {key: replace(column, head=f"{key}°" if by_angle else plain(key)) for key in keys},
             entries,
             _floors_of_groups(first, name, keys),
             _by_row(used, _figure_label, lambda figure: str(figure.view_angle)),

@@ -10,10 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures.statistics import bootstrap_interval, cluster_means, wilson_interval
+from metrics.measures.answers import CANDIDATES
+from metrics.measures.statistics import (
+    bootstrap_interval,
+    cluster_means,
+    clustered_wilson_interval,
+    linearised_means,
+    wilson_interval,
+)
 from metrics.scoring.estimates import by_presence, object_labels, skills
 from metrics.scoring.metric_names import OBJECT_SCORES, metric
-from metrics.scoring.records import GROUPINGS, Score, ScoreFile
+from metrics.scoring.questions import question_skill
+from metrics.scoring.records import GROUPINGS, Score, ScoreFile, Skill
 from metrics.scoring.schema import AGREEMENT, SCORE_AGAIN, agree
 from scenegen.common.errors import SceneGenError
 
@@ -32,7 +40,8 @@ def recheck(file: ScoreFile, progress: Callable[[int], Any] = lambda done: None)
     All scores over images or questions, those by view angle and those of single objects by shape
     and size are recomputed with their intervals, and so are skills.
     Of questions by group, whole numbers of right answers have to add up, and the intervals of one
-    run have to be Wilson's. Numbers agree within `schema.AGREEMENT`.
+    run have to be Wilson's, or wider where items tell the shapes. Numbers agree within
+    `schema.AGREEMENT`.
 
     Args:
         file: what to recompute.
@@ -94,11 +103,14 @@ def _compare(
 
 
 def _compare_skills(file: ScoreFile) -> None:
-    """Recompute the skills of rooms, with their paired intervals."""
-    if file.task != "rooms" or not file.skills:
+    """Recompute the skills, with their intervals, which are paired for rooms."""
+    if not file.skills:
         return
     meta = file.meta
-    expected = skills(file.items, file.clusters, meta.seed, meta.resamples, meta.confidence)
+    if file.task == "iqtt":
+        expected = _question_skills(file)
+    else:
+        expected = skills(file.items, file.clusters, meta.seed, meta.resamples, meta.confidence)
     for name, skill in file.skills.items():
         place = f"skills.{name}"
         if name not in expected:
@@ -110,6 +122,19 @@ def _compare_skills(file: ScoreFile) -> None:
             _require_part(
                 file, f"{place}.{part}", getattr(skill, part), getattr(other, part), scale
             )
+        if skill.floor_name != other.floor_name:
+            where = f"{file.place}: {place}.floor_name"
+            raise RecheckError(where, repr(skill.floor_name), repr(other.floor_name), SCORE_AGAIN)
+
+
+def _question_skills(file: ScoreFile) -> dict[str, Skill]:
+    """Return the skill of the accuracy over the floors that this release knows."""
+    answers = file.meta.counts.get("answers", 0)
+    if answers not in CANDIDATES:
+        where = f"{file.place}: meta.counts.answers"
+        raise RecheckError(where, str(answers), " or ".join(map(str, CANDIDATES)), SCORE_AGAIN)
+    asked = {kind: s[ACCURACY].n for kind, s in file.by_distractor.items() if ACCURACY in s}
+    return {ACCURACY: question_skill(file.metrics[ACCURACY], asked, answers)}
 
 
 def _compare_objects(file: ScoreFile) -> None:
@@ -139,10 +164,12 @@ def _intervals(
     file: ScoreFile, means: NDArray[np.float64]
 ) -> tuple[Sequence[float], Sequence[float]]:
     """Return the ends of the intervals of these means of clusters (S, K), (K,) each."""
-    if file.task == "iqtt" and file.runs == 1:
-        right = int(np.count_nonzero(means == 1.0))
-        low, high = wilson_interval(right, len(means), file.meta.confidence)
-        return [low], [high]
+    if file.task == "iqtt":
+        shapes = file.items.get("shape", file.ids)[np.argsort(file.ids)]
+        if file.runs == 1:
+            low, high = clustered_wilson_interval(means[:, 0], shapes, file.meta.confidence)
+            return [low], [high]
+        means = linearised_means(means[:, 0], shapes)
     lows, highs = bootstrap_interval(
         means, file.meta.seed, file.meta.resamples, file.meta.confidence
     )
@@ -196,7 +223,7 @@ def _compare_questions(
         whole = round(score.value * answers)
         low, high = score.low, score.high
         if file.runs == 1:
-            low, high = wilson_interval(whole, score.n, file.meta.confidence)
+            low, high = _possible_ends(file, score, whole)
         _require(file, place, score, whole / answers, low, high, score.n)
         asked, right = asked + score.n, right + whole
     total = round(float(file.items[ACCURACY].sum()) * file.runs)
@@ -207,6 +234,20 @@ def _compare_questions(
         if found != expected:
             told = f"{expected} {what}, as in items"
             raise RecheckError(f"{file.place}: {grouping}", f"{found} {what}", told, SCORE_AGAIN)
+
+
+def _possible_ends(file: ScoreFile, score: Score, right: int) -> tuple[float, float]:
+    """Return the ends that the interval of a group may have, those of the score where it may.
+
+    The questions of the group are between one and all of them independent ones: its shapes are not
+    known, so that neither is the design effect. Where questions have no shapes, all are.
+    """
+    narrow = wilson_interval(right, score.n, file.meta.confidence)
+    if "shape" not in file.items or score.low is None or score.high is None:
+        return narrow
+    wide = wilson_interval(right / score.n, 1.0, file.meta.confidence)
+    low, high = min(max(score.low, wide[0]), narrow[0]), max(min(score.high, wide[1]), narrow[1])
+    return low, high
 
 
 def _require(

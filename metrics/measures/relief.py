@@ -3,9 +3,11 @@
 The relief of a pixel is the planar depth of the empty room minus that of the surface, in scene
 units. It is 0 on floor and walls, and above 0 on objects. The scores look at shape and place of
 what stands out, so that lifting or tilting the empty room wins little. But objects stand where they
-often do: one relief for all pictures, the mean of a training set, has a correlation of 0.52 and an
+often do: one relief for all pictures, the mean of a training set, has a correlation of 0.53 and an
 IoU of 0.37 with those of the preset `shapes`. So relief is compared with another scene's, too.
 """
+
+import math
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,10 +43,10 @@ def relief_scores(predicted: ArrayLike, true: ArrayLike) -> dict[str, float]:
     if not truly.any():
         return {"relief_correlation": np.nan, "relief_iou": np.nan}
     p, t = p - p.mean(), t - t.mean()
-    spread = float(t.std())
-    least = max(float(p.std()), min(LEAST_SPREAD, spread))
-    # A picture that stands out alike all over has no spread.
-    correlation = float((p * t).mean()) / (least * spread) if spread > 0.0 else 0.0
+    variance = float((t * t).mean())
+    least = max(float((p * p).mean()), min(LEAST_SPREAD**2, variance))
+    # A picture that stands out alike all over has no spread. Of equal reliefs, this is 1 exactly.
+    correlation = float((p * t).mean()) / math.sqrt(least * variance) if variance > 0.0 else 0.0
     return {
         "relief_correlation": min(max(correlation, -1.0), 1.0),
         "relief_iou": float((said & truly).sum() / (said | truly).sum()),

@@ -45,9 +45,11 @@ def skill_interval(
         scores, floors: means of the clusters, (S,) each, at least 0, lower is better.
         seed, resamples, confidence: as in `statistics.bootstrap_interval`.
     """
-    table = np.stack([as_float64(scores, "scores"), as_float64(floors, "floors")], axis=-1)
-    require(table.ndim == 2, "scores", f"shape {table.shape[:-1]}", "(S,)")
-    require_some(len(table), "scores")
+    errors, lines = as_float64(scores, "scores"), as_float64(floors, "floors")
+    ok = errors.ndim == 1 and errors.shape == lines.shape
+    require(ok, "scores", f"shapes {errors.shape} and {lines.shape}", "(S,) each")
+    require_some(len(errors), "scores")
+    table = np.stack([errors, lines], axis=-1)
     require_finite(table, "scores and floors")
     score, floor = table.mean(axis=0)
     require(floor > 0.0, "mean of the floors", floor, "above 0")

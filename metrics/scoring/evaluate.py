@@ -26,7 +26,7 @@ def score(
 
     Views are averaged within a scene, then scenes; several runs are averaged within each item, and
     `std` is the standard deviation over runs (with n - 1). Intervals resample whole scenes; those
-    of IQTT accuracy are Wilson's for a single run, and resample questions for several.
+    of IQTT accuracy are Wilson's for a single run, and resample for several, both over shapes.
 
     Args:
         paths: submissions of one method, task and alignment.

@@ -18,7 +18,7 @@ from metrics.submissions.problems import JsonError
 from scenegen.common.text_table import printable
 
 LONGEST_SHOWN = 200  # characters of each part of an error: a file's keys and texts may be huge
-MOST_MEMORY = 5 * 2**28  # bytes that a parsed text may take; 160,000 scored images: 0.8 GB
+MOST_MEMORY = 5 * 2**28  # bytes that a parsed text may take; 140,000 scored images: 0.8 GB
 LARGEST_WHOLE = 2**53  # beyond it, JSON readers that know only doubles change whole numbers
 _FOUND = {"missing": "no such key", "unexpected_keyword_argument": "an unknown key"}
 _EXPECTED = {

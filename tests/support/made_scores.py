@@ -1,9 +1,11 @@
 """Score files for tests, made in memory."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from metrics.measures.statistics import cluster_means
-from metrics.score_file import Meta, Score, ScoreFile, Submission
+from metrics.score_file import Meta, Score, ScoreFile, Skill, Submission
 from metrics.scoring.metric_names import metric
 
 TRUTH = "0123456789abcdef" * 4
@@ -48,6 +50,39 @@ def rooms_scores(method, columns, scenes, runs=1, rows=None, **other):
         items={name: np.asarray(column) for name, column in items.items()},
         meta=make_meta(method, runs, **{"counts": counts, **other}),
         **told,
+    )
+
+
+def rooms_with_objects(method="mine", **other):
+    """Four rows of two scenes, of which the last shows no object, with skills."""
+    nan = float("nan")
+    columns = {"chamfer": [0.1, 0.3, 0.2, 0.2], "empty_room_chamfer": [0.5, 0.3, 0.2, 0.2]}
+    objects = {"row": [0, 0, 1, 2], "object": [1, 2, 1, 3], "pixels": [20, 60, 16, 30]}
+    objects |= {"object_depth_error": [0.2, 0.4, 0.1, 0.3]}
+    objects |= {"object_completeness": [0.01, 0.03, 0.06, 0.2]}
+    objects |= {"object_recall_0.02": [1.0, 0, 0, 0], "object_recall_0.05": [1.0, 1, 0, 0]}
+    columns |= {"object_depth_error": [0.35, 0.1, 0.3, nan]}
+    columns |= {"object_completeness": [0.025, 0.06, 0.2, nan]}
+    columns |= {"object_recall_0.02": [0.5, 0.0, 0.0, nan]}
+    columns |= {"relief_correlation": [-0.5, 0.5, -0.25, nan], "relief_iou": [0.1, 0.2, 0.3, nan]}
+    file = rooms_scores(method, {"chamfer": columns["chamfer"]}, [0, 0, 1, 1], **other)
+    kept = {n: [v for v in c if v == v] for n, c in columns.items() if not n.startswith("empty")}
+    counts = {**file.meta.counts, "objects": 4, "rows_without_objects": 1, "pixels": 4096}
+    scores = {n: make_score(n, c, [0, 0, 1, 1][: len(c)]) for n, c in kept.items()}
+    middle = scores["relief_correlation"].value
+    scores["relief_correlation"] = replace(scores["relief_correlation"], low=-1.0, high=1.0)
+    assert middle == -0.125
+    skill = Skill(1 - 0.2 / 0.3, 0.0, 0.5, 0.3, "empty_room_chamfer")
+    shapes = np.array(["box", "cone", "box", "torus"], object)
+    return replace(
+        file,
+        metrics=scores,
+        skills={"chamfer": skill},
+        items={**file.items, **{n: np.array(c) for n, c in columns.items()}},
+        objects={"shape": shapes, **{n: np.array(c) for n, c in objects.items()}},
+        by_object_shape={"torus": {n: make_score(n, [0.2], [1]) for n in ["object_completeness"]}},
+        by_object_size={"0-1": {n: make_score(n, [0.2], [1]) for n in ["object_completeness"]}},
+        meta=replace(file.meta, counts=counts),
     )
 
 

@@ -123,6 +123,22 @@ def test_answers_averaged_over_runs_go_by_sign_flips():
     assert compare([files[0], agreeing]).differences[0].test == "sign flips"
 
 
+def test_questions_about_one_shape_are_not_independent():
+    """Eight questions about each of 6 shapes, answered alike: as if there were 6 questions."""
+    shapes = np.repeat(np.arange(6), 8)
+    right = np.repeat([[1, 0], [1, 0], [1, 0], [1, 0], [1, 0], [1, 1]], 8, axis=0)
+    plain = [iqtt_scores(name, right[:, k]) for k, name in ((1, "b"), (0, "a"))]
+    files = [replace(file, items={**file.items, "shape": shapes}) for file in plain]
+    (each,), (alike,) = (compare(some).differences for some in (plain, files))
+    assert each.difference == alike.difference == pytest.approx(5 / 6)
+    assert (each.test, alike.test) == ("exact McNemar", "sign flips")
+    assert each.p_value < 1e-10
+    assert alike.p_value == 2 / 2**5
+    assert alike.high - alike.low > 2 * (each.high - each.low)
+    single = [replace(file, items={**file.items, "shape": np.arange(48)}) for file in plain]
+    assert compare(single).differences == compare(plain).differences
+
+
 def test_rows_in_another_order_are_paired_by_number():
     rng = np.random.default_rng(1)
     columns = {"chamfer": rng.random(16)}
@@ -162,3 +178,21 @@ def test_the_same_numbers_every_time_and_others_with_another_seed():
     files = three_methods(scenes=30)
     assert compare(files, ["chamfer"]) == compare(files, ["chamfer"])
     assert compare(files, ["chamfer"], seed=1) != compare(files, ["chamfer"])
+
+
+def test_rows_without_the_score_are_left_out():
+    """A whole scene, and a view of another; values below 0 are as good as any."""
+    nan = float("nan")
+    ours = np.array([-0.5, nan, 0.25, 0.5, nan, nan, 0.75, 0.125])
+    theirs = ours - np.array([0.25, 0.0, 0.5, -0.5, 0.0, 0.0, 0.125, 0.125])
+    scenes = [0, 0, 1, 1, 2, 2, 3, 3]
+    files = [rooms_scores(name, {"chamfer": np.zeros(8)}, scenes) for name in ("theirs", "ours")]
+    files = [
+        replace(file, items={**file.items, "relief_correlation": column})
+        for file, column in zip(files, (theirs, ours), strict=True)
+    ]
+    (found,) = compare(files, ["relief_correlation"]).differences
+    assert (found.wins, found.losses, found.ties) == (2, 0, 1)
+    assert found.difference == pytest.approx(np.mean([0.25, 0.0, 0.125]))
+    assert found.value == pytest.approx(np.mean([-0.5, 0.375, 0.4375]))
+    assert found.low <= found.difference <= found.high

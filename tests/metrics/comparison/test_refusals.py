@@ -91,3 +91,26 @@ def test_scores_of_other_tasks_and_unknown_ones():
         compare([A, A], ["iqtt_accuracy"])
     with pytest.raises(UnknownMetricError):
         compare([A, A], ["cd"])
+
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "found"),
+    [
+        ("relief_iou", [0.1, 0.2, NAN, NAN, NAN, 0.3], "other rows without a number, such as 4"),
+        ("relief_iou", [0.1, 0.2, NAN, 0.3, 0.1, 0.3], "other rows without a number, such as 3"),
+        ("empty_room_chamfer", [0.1, 0.2, 0.3, 0.2, 0.1, 0.3001], "0.3001"),
+    ],
+)
+def test_files_that_disagree_about_the_truth(name, column, found):
+    """Which rows show objects, and how well an empty room does, is the same for every method."""
+    relief = [0.1, 0.2, NAN, NAN, 0.1, 0.3]
+    held = {"relief_iou": relief, "empty_room_chamfer": [0.1, 0.2, 0.3, 0.2, 0.1, 0.3]}
+    first, second = with_items(A, **held), with_items(B, **{**held, name: column})
+    with refused(ComparisonError, f"b.json: items.{name}", found, hint="one of the files"):
+        compare([first, second], ["relief_iou"])
+    none = [with_items(one, relief_iou=[NAN] * 6) for one in (A, B)]
+    with refused(ComparisonError, "b.json: items.relief_iou", "no number at all"):
+        compare(none, ["relief_iou"])

@@ -53,7 +53,18 @@ def test_other_names_are_shown():
     check_names(
         named("oracle", "oracle", "Oracle", "oracles", "oracl\u00e9", "PTN", "ptn", "pix2shape")
     )
-    check_names(named("a (big)", "run #2 of a", "[x] a", "C#", "cross-entropy", "\u6df1\u5ea6", ""))
+    check_names(
+        named(
+            "a (big)",
+            "floor plans",
+            "run #2 of a",
+            "[x] a",
+            "C#",
+            "cross-entropy",
+            "\u6df1\u5ea6",
+            "",
+        )
+    )
 
 
 MARKED = [
@@ -66,6 +77,7 @@ MARKED = [
     "a (cIaims depth when x)",
 ]
 MARKED += ["a #2", "a \uff032", "a #\u0661", "a [b]", "a \uff3bb\uff3d"]
+MARKED += ["floor: empty room", "noise floor", "fl\u043eor: x"]
 
 
 @pytest.mark.parametrize("name", MARKED, ids=ascii)

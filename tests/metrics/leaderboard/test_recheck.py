@@ -13,10 +13,19 @@ from refusals import refused
 import cli
 from baselines.trivial import write_chance, write_room_baseline
 from metrics.leaderboard.recheck import RecheckError, recheck, steps
-from metrics.measures.statistics import bootstrap_interval, cluster_means, wilson_interval
+from metrics.measures.statistics import (
+    bootstrap_interval,
+    cluster_means,
+    clustered_wilson_interval,
+    linearised_means,
+    wilson_interval,
+)
+from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import Score, read_scores, write_scores
 from metrics.scoring.evaluate import score
-from metrics.scoring.metric_names import metric
+from metrics.scoring.metric_names import OBJECT_SCORES, metric
+from metrics.scoring.questions import question_skill
+from scenegen.rooms.reader import RoomsFile
 
 SCENES = np.repeat(np.arange(9), 2)
 ANGLES = np.tile([0, 35], 9)
@@ -139,6 +148,67 @@ def test_scores_of_one_image_agree_with_each_other(truths, tmp_path, name):
         recheck(forged)
 
 
+@pytest.fixture(scope="module")
+def scored_rooms(truths, tmp_path_factory):
+    """What the program says of objects moved back and walls moved forth; few scores are 0 or 1."""
+    path = tmp_path_factory.mktemp("recheck") / "p.h5"
+    with (
+        RoomsFile(truths.rooms) as rooms,
+        RoomPredictionWriter(path, truths.rooms, method="m") as p,
+    ):
+        for row, room in enumerate(rooms):
+            p.add(row, np.where(room.object_id > 0, 1.04, 0.98) * np.nan_to_num(room.depth, nan=3))
+    return replace(score([path], truths.rooms), path=Path("m.json"))
+
+
+@pytest.mark.parametrize("part", ["value", "low", "high", "floor"])
+@pytest.mark.parametrize("name", ["chamfer", "object_completeness", "relief_iou"])
+def test_skills_follow_from_the_items(scored_rooms, name, part):
+    recheck(scored_rooms)
+    found = scored_rooms.skills[name]
+    other = replace(found, **{part: getattr(found, part) + 1e-6})
+    with refused(RecheckError, f"m.json: skills.{name}.{part}"):
+        recheck(replace(scored_rooms, skills={**scored_rooms.skills, name: other}))
+
+
+@pytest.mark.parametrize("grouping", ["by_object_shape", "by_object_size"])
+def test_groups_of_objects_follow_from_the_objects(scored_rooms, grouping):
+    groups = getattr(scored_rooms, grouping)
+    key = next(iter(groups))
+    for part in ("value", "low", "n"):
+        score = groups[key]["object_completeness"]
+        changed = (getattr(score, part) or 0) + (1 if part == "n" else 1e-6)
+        scores = {**groups[key], "object_completeness": replace(score, **{part: changed})}
+        with refused(RecheckError, f"{grouping}.{key}.object_completeness.{part}"):
+            recheck(replace(scored_rooms, **{grouping: {**groups, key: scores}}))
+    unknown = {**groups, "99-100": groups[key]}
+    with refused(RecheckError, f"{grouping}.99-100", expected="objects of this group"):
+        recheck(replace(scored_rooms, **{grouping: unknown}))
+
+
+@pytest.mark.parametrize("name", OBJECT_SCORES)
+def test_scores_of_images_follow_from_their_objects(scored_rooms, name):
+    """A table of objects that says better than the column does."""
+    better = 0.5 * scored_rooms.objects[name] + 0.25 * ("recall" in name)
+    objects = {**scored_rooms.objects, name: better}
+    with refused(RecheckError, f"items.{name}[0]", expected="as objects say"):
+        recheck(replace(scored_rooms, objects=objects))
+
+
+def test_without_objects_no_skill_follows(scored_rooms):
+    gone = np.full(len(scored_rooms.ids), np.nan)
+    names = {name for name in scored_rooms.items if "object_" in name}
+    items = {**scored_rooms.items, **dict.fromkeys(names, gone)}
+    less = {name: s for name, s in scored_rooms.metrics.items() if name not in names}
+    bare = replace(
+        scored_rooms, items=items, metrics=less, objects={}, by_view_angle={},
+        by_object_shape={}, by_object_size={},
+    )  # fmt: skip
+    with refused(RecheckError, "skills.chamfer", "a skill", "none"):
+        recheck(replace(bare, skills={"chamfer": scored_rooms.skills["chamfer"]}))
+    recheck(replace(bare, skills={}))
+
+
 def test_intervals_cannot_be_left_out():
     with refused(RecheckError, "metrics.chamfer.low", "null", "0."):
         recheck(forged(made_rooms(), "metrics/chamfer", low=None, high=None))
@@ -180,6 +250,51 @@ def test_groups_of_questions_add_up(groups, found, expected):
         recheck(replace(made_questions(), by_position=groups))
     with refused(RecheckError, "by_position.0.iqtt_accuracy", "no such key"):
         recheck(replace(made_questions(), by_position={"0": {}}))
+
+
+def shaped(runs=1):
+    """Six questions about three shapes, with the skill over chance."""
+    file = made_questions(runs)
+    shapes, right = np.array([0, 0, 1, 1, 2, 2]), file.items["iqtt_accuracy"]
+    if runs == 1:
+        low, high = clustered_wilson_interval(right, shapes)
+    else:
+        low, high = (end[0] for end in bootstrap_interval(linearised_means(right, shapes), 0))
+    accuracy = replace(file.metrics["iqtt_accuracy"], low=float(low), high=float(high))
+    known = {"iqtt_accuracy": question_skill(accuracy, {}, 3)}
+    items = {**file.items, "shape": shapes}
+    return replace(file, items=items, metrics={"iqtt_accuracy": accuracy}, skills=known)
+
+
+@pytest.mark.parametrize("runs", [1, 2])
+def test_intervals_of_questions_rest_on_their_shapes(runs, tmp_path):
+    file = shaped(runs)
+    write_scores(replace(file, items={n: c[::-1] for n, c in file.items.items()}), tmp_path / "s")
+    recheck(read_scores(tmp_path / "s"))
+    others = {**file.items, "shape": np.array([0, 1, 0, 0, 0, 0])}
+    with refused(RecheckError, "metrics.iqtt_accuracy.low"):
+        recheck(replace(file, items=others))
+
+
+def test_skills_of_questions_are_recomputed():
+    file = shaped()
+    for part, value in (("value", 0.9), ("low", 0.0), ("floor", 0.2), ("floor_name", "best")):
+        forged = {"iqtt_accuracy": replace(file.skills["iqtt_accuracy"], **{part: value})}
+        with refused(RecheckError, f"q.json: skills.iqtt_accuracy.{part}"):
+            recheck(replace(file, skills=forged))
+    counts = {name: number for name, number in file.meta.counts.items() if name != "answers"}
+    with refused(RecheckError, "meta.counts.answers"):
+        recheck(replace(file, meta=replace(file.meta, counts=counts)))
+
+
+def test_intervals_of_groups_are_those_of_one_to_all_questions():
+    file = shaped()
+    low, high = wilson_interval(3, 4)
+    wider = {"low": low - 0.05, "high": high + 0.005}
+    recheck(forged(file, "by_position/2", **wider))
+    for part, value in (("low", low + 0.01), ("high", high - 0.01), ("low", 0.0)):
+        with refused(RecheckError, f"by_position.2.iqtt_accuracy.{part}"):
+            recheck(forged(file, "by_position/2", **{part: value}))
 
 
 def test_the_leaderboard_refuses_what_does_not_follow(tmp_path, check_refusal):

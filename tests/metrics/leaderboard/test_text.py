@@ -1,6 +1,7 @@
 """Leaderboards in Markdown, HTML and LaTeX, with names that would like to break them."""
 
 import re
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -11,6 +12,7 @@ from pages import Page
 
 from metrics.leaderboard.ranking import leaderboard
 from metrics.leaderboard.text import latex, to_html, to_latex, to_markdown
+from metrics.score_file import Skill
 from scenegen.common.text_table import markdown, plain
 
 HOSTILE = [
@@ -41,7 +43,11 @@ def board():
         )
         for i, name in enumerate(HOSTILE)
     ]
-    return leaderboard([*files, iqtt_scores("simple", [1, 0, 1])])
+    questions = iqtt_scores("simple", [1, 0, 1])
+    (group,) = questions.by_distractor.values()
+    skills = {"iqtt_accuracy": Skill(0.5, 0.4, 0.6, 1 / 3, HOSTILE[4] + HOSTILE[2] + "\x1b")}
+    kinds = dict.fromkeys(("near | far", "\x1b[2J", "<img src=x>"), group)
+    return leaderboard([*files, replace(questions, skills=skills, by_distractor=kinds)])
 
 
 TAGS = {"html", "head", "meta", "title", "style", "body", "h1", "h2", "div", "bdi", "small"}
@@ -62,6 +68,9 @@ def test_html_holds_nothing_but_its_own_tags(board):
     widths = [len(row) for row in page.rows[: len(HOSTILE) + 1]]
     assert set(widths) == {5}
     assert text.encode().decode() == text
+    for shown in (text, to_markdown(board), to_latex(board)):
+        assert "\x1b" not in shown
+        assert "floor: two lines" in shown
 
 
 def test_the_best_are_marked_in_each_format(board):

@@ -10,9 +10,12 @@ from scipy.spatial import cKDTree
 from metrics.measures.chamfer_hausdorff import NearestDistances, point_scores
 from metrics.measures.depth import compare_depth, depth_scores
 from metrics.measures.normals import normal_scores
+from metrics.measures.objects import object_means, single_objects
+from metrics.measures.relief import relief_scores
 from metrics.scoring.metric_names import (
     ALL,
     HEADLINE,
+    SKILLED,
     UnknownMetricError,
     in_order,
     markdown_table,
@@ -35,6 +38,11 @@ def all_scores(noise):
     for alignment in ALIGNMENTS:
         found |= depth_scores(compare_depth(wrong, true), alignment)
     normals = normal_scores(50.0 * noise * rng.random(200))
+    ids, relief = rng.integers(0, 3, 200), rng.random(200)
+    objects = object_means(single_objects(ids, noise * relief, noise * relief))
+    angle = normals["normal_mean_degrees"]
+    objects |= {f"{way}object_normal_mean_degrees": angle for way in ("", "derived_")}
+    found |= relief_scores(relief + 9.0 * noise * rng.standard_normal(200), relief) | objects
     return found | normals | {f"derived_{name}": value for name, value in normals.items()}
 
 
@@ -42,7 +50,9 @@ def test_every_score_that_is_made_is_in_the_table_and_none_beside():
     made = set(all_scores(0.2))
     thresholds = {name for name in made if name.startswith("f_score_")}
     assert len(thresholds) == 3
-    assert (made - thresholds) | {"f_score_<threshold>", "iqtt_accuracy"} == set(ALL)
+    floors = {ending + name for name, ending in SKILLED.items()}
+    others = {"f_score_<threshold>", "iqtt_accuracy"}
+    assert (made - thresholds) | floors | others == set(ALL)
 
 
 def test_directions_and_limits_hold_for_scores_that_are_made():
@@ -51,8 +61,9 @@ def test_directions_and_limits_hold_for_scores_that_are_made():
         known = metric(name)
         assert known.task == "rooms"
         if known.higher_is_better:
-            assert value == known.largest == 1.0 > bad[name] >= 0.0
-            assert known.unit == "fraction"
+            assert value == pytest.approx(known.largest, abs=1e-12)
+            assert known.largest == 1.0 > bad[name] >= known.smallest
+            assert known.unit == ("fraction" if known.smallest == 0.0 else "correlation")
         else:
             assert 0.0 <= value < 1e-12 < bad[name] <= known.largest
 

@@ -1,0 +1,52 @@
+"""Skill, and its paired interval against resampling by plain loops."""
+
+import numpy as np
+import pytest
+
+from metrics.measures.checks import MeasureError
+from metrics.measures.skill import skill, skill_interval
+
+RNG = np.random.default_rng(8)
+FLOORS = RNG.gamma(2.0, 0.1, 60)
+
+
+def test_perfect_is_1_and_the_floor_is_0():
+    for floor in (1e-9, 0.3, 5.0):
+        assert (skill(0.0, floor, False), skill(floor, floor, False)) == (1.0, 0.0)
+        assert skill(2 * floor, floor, False) == -1.0
+    for floor in (-0.2, 0.0, 0.7):
+        assert (skill(1.0, floor, True), skill(floor, floor, True)) == (1.0, 0.0)
+    assert skill(0.4, 0.6, True) == pytest.approx(-0.5)
+    assert skill(0.0, 0.0, False) is skill(1.0, 1.0, True) is None
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.1, 1.0, 3.7])
+def test_a_multiple_of_the_floor_has_an_interval_of_no_width(factor):
+    low, high = skill_interval(factor * FLOORS, FLOORS, 0)
+    assert (low, high) == (pytest.approx(1.0 - factor, abs=1e-12),) * 2
+    if factor in (0.0, 1.0):
+        assert low == high == 1.0 - factor
+
+
+def test_the_interval_is_about_that_of_plain_percentiles():
+    scores = FLOORS * RNG.uniform(0.3, 0.9, 60)
+    drawn = np.random.default_rng(1).integers(0, 60, (4000, 60))
+    plain = np.quantile([1.0 - scores[d].sum() / FLOORS[d].sum() for d in drawn], [0.025, 0.975])
+    low, high = skill_interval(scores, FLOORS, 0)
+    assert (low, high) == (pytest.approx(plain[0], abs=0.02), pytest.approx(plain[1], abs=0.02))
+    assert low < 1.0 - scores.mean() / FLOORS.mean() < high
+    unpaired = 1.0 - np.mean(scores) / np.quantile(
+        [FLOORS[d].mean() for d in drawn], [0.025, 0.975]
+    )
+    assert high - low < 0.5 * np.ptp(unpaired)  # what pairing is for
+    assert skill_interval(scores, FLOORS, 0) == (low, high)
+    assert skill_interval(scores, FLOORS, 1) != (low, high)
+
+
+def test_where_there_is_no_interval():
+    assert np.isnan(skill_interval([0.1], [0.2], 0)).all()
+    # Among three scenes of which one has objects, some resamples have none.
+    assert np.isnan(skill_interval([0.1, 0.0, 0.0], [0.2, 0.0, 0.0], 0)).all()
+    for scores, floors in (([0.1, 0.2], [0.0, 0.0]), ([0.1], [0.1, 0.2]), ([], [])):
+        with pytest.raises(MeasureError):
+            skill_interval(scores, floors, 0)

@@ -1,0 +1,215 @@
+"""Objects, relief and skill: independent computations, guesses that must not win, empty rooms."""
+
+import h5py
+import numpy as np
+import pytest
+from h5_edits import replaced
+from scipy.spatial import cKDTree
+
+from baselines.trivial import write_room_baseline
+from metrics.leaderboard.recheck import recheck
+from metrics.measures.empty_room import empty_room
+from metrics.measures.objects import LEAST_PIXELS
+from metrics.prediction_writer import RoomPredictionWriter
+from metrics.score_file import read_scores, write_scores
+from metrics.scoring.evaluate import score
+from metrics.scoring.image_scores import true_relief
+from metrics.scoring.metric_names import metric
+from metrics.scoring.rows import other_scenes
+from metrics.scoring.runs import Settings
+from scenegen.camera import back_project
+from scenegen.common.errors import FileFormatError
+from scenegen.rooms.reader import RoomsFile
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, rooms_path):
+    """Rooms (8 of them), and submissions for them."""
+    made = tmp_path_factory.mktemp("images")
+    rng = np.random.default_rng(0)
+    (made / "rooms.h5").symlink_to(rooms_path)
+    write_room_baseline("empty-room", rooms_path, made / "empty-room.h5")
+    with (
+        RoomsFile(rooms_path) as rooms,
+        RoomPredictionWriter(made / "noisy-0.h5", rooms_path, method="noisy") as out,
+    ):
+        for row in rng.permutation(len(rooms)).tolist():
+            out.add(row, rooms[row].depth * rng.uniform(0.9, 1.1, rooms[row].depth.shape))
+    return made
+
+
+def test_the_empty_room_has_no_relief_and_no_skill(folder):
+    """Nor one that was rounded to half precision, or moved away."""
+    found = score([folder / "empty-room.h5"], folder / "rooms.h5")
+    assert found.metrics["relief_iou"].value == 0.0
+    assert abs(found.metrics["relief_correlation"].value) < 1e-5
+    for name, skill in found.skills.items():
+        assert (skill.value, skill.low, skill.high) == (pytest.approx(0.0, abs=1e-5),) * 3, name
+
+
+def guess(path, truth, depth_of):
+    """A submission whose depth is made of that of the empty room; nobody looked at any image."""
+    with RoomsFile(truth) as rooms, RoomPredictionWriter(path, truth, method="guess") as out:
+        size = rooms.spec.height, rooms.spec.width
+        for row, room in enumerate(rooms):
+            depth, _ = empty_room(room.world_from_camera, room.fov_y_degrees, *size)
+            out.add(row, depth_of(depth))
+    return score([path], truth)
+
+
+@pytest.mark.parametrize(
+    "depth_of",
+    [
+        lambda depth: depth.astype(np.float16).astype(np.float64),
+        lambda depth: depth + np.random.default_rng(0).normal(0.0, 1e-6, depth.shape),
+        lambda depth: depth - 0.1,
+        lambda depth: 0.9 * depth,
+        lambda depth: depth - np.linspace(0.0, 0.3, len(depth))[:, None],
+        lambda depth: np.full_like(depth, depth.mean()),
+    ],
+    ids=["rounded", "noise", "lifted", "nearer", "ramp", "constant"],
+)
+def test_guesses_without_a_look_at_the_picture_do_not_win(folder, tmp_path, depth_of):
+    found = guess(tmp_path / "g.h5", folder / "rooms.h5", depth_of)
+    for name in ("relief_correlation", "relief_iou"):
+        assert found.metrics[name].value < 0.45
+        assert found.skills[name].value < 0.1
+
+
+def test_one_relief_for_all_pictures_has_no_skill_at_all(folder, tmp_path):
+    """The mean relief of this very test set, which wins error of depth and raw scores of relief."""
+    with RoomsFile(folder / "rooms.h5") as rooms:
+        reliefs = [true_relief(r.depth, r.world_from_camera, r.fov_y_degrees) for r in rooms]
+    mean = np.nan_to_num(reliefs).mean(axis=0)
+    found = guess(tmp_path / "g.h5", folder / "rooms.h5", lambda depth: depth - mean)
+    assert found.skills["mse_depth"].value > 0.05
+    assert found.metrics["relief_correlation"].value > 0.3
+    for name in ("relief_correlation", "relief_iou"):
+        assert found.skills[name].value == pytest.approx(0.0, abs=0.02)
+
+
+def test_scores_of_objects_and_relief_are_those_of_scipy_and_numpy(folder):
+    found = score([folder / "noisy-0.h5"], folder / "rooms.h5")
+    with RoomsFile(folder / "rooms.h5") as rooms, h5py.File(folder / "noisy-0.h5") as file:
+        place = {int(row): i for i, row in enumerate(file["row"])}
+        for row, room in enumerate(rooms):
+            depth, mask = file["depth"][place[row]].astype(float), np.isfinite(room.depth)
+            points, true = (back_project(d, room.fov_y_degrees) for d in (depth, room.depth))
+            tree, each = cKDTree(points[mask]), {}
+            for one in np.unique(room.object_id[room.object_id > 0]).tolist():
+                pixels = room.object_id == one
+                if pixels.sum() >= LEAST_PIXELS:
+                    error = np.abs(depth - room.depth)[pixels]
+                    each[one] = tree.query(true[pixels])[0], error, error.size
+            entries = np.flatnonzero(found.objects["row"] == row)
+            assert found.objects["object"][entries].tolist() == list(each)
+            assert found.objects["pixels"][entries].tolist() == [n for *_, n in each.values()]
+            names = [s.shape for s in room.scene.objects]
+            assert [names[k - 1] for k in each] == found.objects["shape"][entries].tolist()
+            near, errors, _ = (
+                np.array([v[i].mean() if i < 2 else v[i] for v in each.values()]) for i in range(3)
+            )
+            assert found.objects["object_completeness"][entries] == pytest.approx(near)
+            assert found.objects["object_depth_error"][entries] == pytest.approx(errors)
+            pooled = np.concatenate([v[0] for v in each.values()]).mean()
+            assert found.items["object_completeness"][row] == pytest.approx(pooled)
+            assert found.items["object_recall_0.05"][row] == np.mean(near < 0.05)
+            corner = room.world_from_camera
+            world = true[mask] @ corner[:3, :3].T
+            rays = world / room.depth[mask][:, None]
+            wall = np.min(-corner[:3, 3] / np.where(rays < 0, rays, -1e-9), axis=-1)
+            said, relief = wall - depth[mask], wall - room.depth[mask]
+            expected = np.corrcoef(said, relief)[0, 1]
+            assert found.items["relief_correlation"][row] == pytest.approx(expected, abs=1e-6)
+            both, any_ = ((said > 0.05) & (relief > 0.05)), ((said > 0.05) | (relief > 0.05))
+            assert found.items["relief_iou"][row] == pytest.approx(
+                both.sum() / any_.sum(), abs=2e-3
+            )
+
+
+def test_rooms_without_objects_have_no_such_scores(make_rooms, tmp_path):
+    truth = make_rooms(tmp_path / "bare.h5", 3, objects=(0, 0))
+    write_room_baseline("empty-room", truth, tmp_path / "p.h5")
+    write_scores(score([tmp_path / "p.h5"], truth), tmp_path / "s.json")
+    found = read_scores(tmp_path / "s.json")
+    recheck(found)
+    assert not [name for name in found.metrics if metric(name).lacking]
+    assert found.metrics["chamfer"].value < 1e-5
+    assert (dict(found.skills), dict(found.by_object_shape)) == ({}, {})
+    assert found.meta.counts["rows_without_objects"] == 3
+    assert np.isnan(found.items["relief_iou"]).all()
+
+
+def test_rows_without_objects_are_left_out_and_counted(folder, make_rooms, tmp_path):
+    truth = make_rooms(tmp_path / "some.h5", 8, objects=(0, 1), seed=5)
+    write_room_baseline("oracle", truth, tmp_path / "p.h5")
+    write_scores(score([tmp_path / "p.h5"], truth), tmp_path / "s.json")
+    found = read_scores(tmp_path / "s.json")
+    recheck(found)
+    bare = found.meta.counts["rows_without_objects"]
+    assert 0 < bare < 8
+    assert np.isnan(found.items["object_recall_0.02"]).sum() == bare
+    for name in ("object_recall_0.02", "relief_iou", "relief_correlation"):
+        assert (found.metrics[name].value, found.metrics[name].n) == (1.0, 8 - bare)
+    assert found.metrics["chamfer"].n == 8
+
+
+def test_a_depth_that_is_not_finite_is_no_relief(folder, tmp_path):
+    """Where objects are, it would lie at the camera, and so far before the empty room."""
+    path = tmp_path / "holes.h5"
+    with RoomsFile(folder / "rooms.h5") as rooms, h5py.File(folder / "empty-room.h5") as file:
+        ids = np.stack([room.object_id for room in rooms])[file["row"][:]]
+        path.write_bytes((folder / "empty-room.h5").read_bytes())
+    with h5py.File(path, "r+") as file:
+        replaced("depth", lambda depth: np.where(ids > 0, np.nan, depth))(file)
+    found = score([path], folder / "rooms.h5", Settings(non_finite="penalise"))
+    assert found.metrics["relief_iou"].value == 0.0
+    assert found.metrics["relief_correlation"].value == -1.0
+    assert found.skills["object_depth_error"].value < 0.0
+    assert not found.comparable
+
+
+def test_alignment_changes_no_relief(folder, tmp_path):
+    truth, found = folder / "rooms.h5", []
+    for alignment in ("none", "scale"):
+        path = tmp_path / f"{alignment}.h5"
+        with (
+            RoomsFile(truth) as rooms,
+            RoomPredictionWriter(path, truth, method="m", alignment=alignment) as out,
+        ):
+            for row, room in enumerate(rooms):
+                out.add(row, 2.0 * room.depth)
+        found.append(score([path], truth).metrics["relief_iou"].value)
+    assert found == [0.0, 0.0]
+
+
+def test_every_row_serves_once_as_that_of_another_scene():
+    scene = np.array([4, 4, 4, 9, 9, 9, 2, 2, 2])
+    view = np.array([0, 1, 2] * 3)
+    found = other_scenes(scene, view)
+    assert sorted(found) == list(range(9))
+    assert (scene[found] != scene).all()
+    assert np.count_nonzero(view[found] == view) == 6  # all but the last of each view
+    assert other_scenes(np.zeros(3, int), np.arange(3)).tolist() == [0, 1, 2]
+
+
+def test_the_scores_of_one_scene_have_no_skill_of_relief(make_rooms, tmp_path):
+    truth = make_rooms(tmp_path / "one.h5", 1, views=(0.0, 35.0))
+    write_room_baseline("empty-room", truth, tmp_path / "p.h5")
+    write_scores(score([tmp_path / "p.h5"], truth), tmp_path / "s.json")
+    found = read_scores(tmp_path / "s.json")
+    recheck(found)
+    assert "relief_iou" not in found.skills
+    assert found.skills["chamfer"].low is None
+
+
+@pytest.mark.parametrize(("value", "told"), [(-1, "no shape"), (99, "no shape")])
+def test_a_truth_whose_objects_have_no_shape_is_refused(folder, tmp_path, value, told):
+    truth = tmp_path / "rooms.h5"
+    truth.write_bytes((folder / "rooms.h5").read_bytes())
+    with h5py.File(truth, "r+") as file:
+        file["object/shape"][3] = value
+    with pytest.raises(FileFormatError) as caught:
+        score([folder / "noisy-0.h5"], truth)
+    assert caught.value.where == f"{truth}: object/shape, row 3"
+    assert told in caught.value.found
