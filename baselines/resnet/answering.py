@@ -47,7 +47,7 @@ def write_submission(
     if len(parts(data)) > 1:
         raise SpecError(data, "training questions", "questions to answer, such as iqtt-test.h5")
     with open_questions(data) as questions:
-        count = number_of_answers(questions)
+        count = questions.answers
         if count != card.answers and not method.any_number:
             raise SpecError(
                 data,
@@ -70,11 +70,6 @@ def _bundled(method: Method) -> Path:
     return found[-1]
 
 
-def number_of_answers(questions: QuestionsFile) -> int:
-    """Return K, the number of answers that each question of a file offers; 2 without questions."""
-    return len(questions.read("questions", 0)) - 1 if len(questions) else 2
-
-
 @torch.inference_mode()
 def answer_scores(
     network: nn.Module,
@@ -94,7 +89,7 @@ def answer_scores(
         images = torch.stack([images_of(questions.read("questions", row), size) for row in rows])
         scores.append(network(images.to(device)).cpu().double().numpy())
         progress(len(rows), total)
-    return np.concatenate(scores) if scores else np.empty((0, 2))
+    return np.concatenate(scores) if scores else np.empty((0, questions.answers))
 
 
 def images_of(stored: Array, size: int) -> Tensor:
@@ -109,9 +104,7 @@ def accuracy(network: nn.Module, path: str | Path, size: int, answers: int) -> f
     None where the file has no questions of so many answers, or tells no answers.
     """
     with open_questions(path) as questions:
-        if not len(questions) or not questions.has_answers:
-            return None
-        if number_of_answers(questions) != answers:
+        if not len(questions) or not questions.has_answers or questions.answers != answers:
             return None
         found = answer_scores(network, questions, size).argmax(axis=1)
         return float((found == questions.read("answers", slice(None))).mean())

@@ -47,10 +47,10 @@ class Card:
     labels: int
     seed: int = 0
     depth: int = 18
-    width: int = 32
+    width: int = 16
     size: int = 64
     batch: int = 16
-    iterations: int = 800
+    iterations: int = 400
     learning_rate: float = 0.001
     fingerprint: str = ""
     iteration: int = 0

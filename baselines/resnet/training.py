@@ -17,7 +17,7 @@ from torch.utils.data import DataLoader, Dataset
 
 from baselines.pix2shape.data.rooms import Draws, check_reducible
 from baselines.pix2shape.use.predict import chosen_device
-from baselines.resnet.answering import accuracy, images_of, number_of_answers
+from baselines.resnet.answering import accuracy, images_of
 from baselines.resnet.methods import (
     CHECKPOINT,
     WEIGHTS,
@@ -63,7 +63,7 @@ class LabelledQuestions(Dataset[tuple[Tensor, int]]):
             labels = len(questions) if labels is None else labels
             check(1 <= labels <= len(questions), "labels", labels, f"1 to {len(questions)}")
             check_reducible(path, questions.height, questions.width, size)
-            self.answers = number_of_answers(questions)
+            self.answers = questions.answers
         self._rows = QuestionsDataset(path, LABELED, ("questions", "answers"))
         self.fingerprint = str(self._rows.fingerprint or "")
         self._size, self._labels = size, labels
@@ -84,9 +84,9 @@ def train(
     *,
     labels: int | None = None,
     seed: int = 0,
-    iterations: int = 800,
+    iterations: int = 400,
     depth: int = 18,
-    width: int = 32,
+    width: int = 16,
     size: int = 64,
     batch: int = 16,
     learning_rate: float = 0.001,

@@ -163,7 +163,7 @@ def _place(folder: Path, method: str, labels: int, kind: str) -> Path:
 
 
 def page(folder: Path) -> str:
-    """Return Table 3 as far as it is scored."""
+    """Return Table 3 as far as it is scored, and the skills of the same rows."""
     figures = {(f.method, f.labels): f for f in TABLES[2].figures}
 
     def printed(method: str, labels: int) -> str:
@@ -172,20 +172,25 @@ def page(folder: Path) -> str:
             return NOTHING
         return figure.text + (f" ± {figure.spread}" if figure.spread else "")
 
-    rows = []
+    kinds = [f"`{kind}`" for kind in KINDS]
+    rows = [
+        [*row, printed(method.paper, labels)] for method, labels, row in _rows(folder, "metrics")
+    ]
+    rows.append(["people", NOTHING, *[NOTHING] * len(KINDS), printed(PEOPLE, 0)])
+    accuracy = table(["method", "labels", *kinds, "paper, Table 3"], rows)
+    skills = [row for *_, row in _rows(folder, "skills")]
+    if not skills:
+        return accuracy
+    told = "Skill, (accuracy - floor) / (1 - floor), where the floor is that of the kind:"
+    return f"{accuracy}\n\n{told}\n\n{table(['method', 'labels', *kinds], skills)}"
+
+
+def _rows(folder: Path, what: str) -> Iterator[tuple[Method, int, list[str]]]:
+    """Yield the rows that have a figure: method, labels, and the cells."""
     for method in METHODS:
         for labels in method.labels:
-            cells = list(_cells(folder, method, labels))
+            paths = [_place(folder, method.name, labels, kind) for kind in KINDS]
+            found = [json.loads(p.read_text())["scores"][what] if p.exists() else {} for p in paths]
+            cells = [shown(scores.get("iqtt_accuracy")) for scores in found]
             if any(cell != NOTHING for cell in cells):
-                own = printed(method.paper, labels)
-                rows.append([f"`{method.name}`", f"{labels:,}", *cells, own])
-    rows.append(["people", NOTHING, *[NOTHING] * len(KINDS), printed(PEOPLE, 0)])
-    head = ["method", "labels", *(f"`{kind}`" for kind in KINDS), "paper, Table 3"]
-    return table(head, rows)
-
-
-def _cells(folder: Path, method: Method, labels: int) -> Iterator[str]:
-    for kind in KINDS:
-        path = _place(folder, method.name, labels, kind)
-        scores = json.loads(path.read_text())["scores"]["metrics"] if path.exists() else {}
-        yield shown(scores.get("iqtt_accuracy"))
+                yield method, labels, [f"`{method.name}`", f"{labels:,}", *cells]

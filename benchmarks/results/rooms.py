@@ -22,6 +22,8 @@ PRESETS = {
 VIEWS = ("0", "5", "35", "55", "80")
 HEADLINE = {"relief_iou": "relief IoU", "relief_correlation": "relief correlation"}
 SKILLS = {
+    "relief_iou": "skill in relief IoU",
+    "relief_correlation": "skill in relief correlation",
     "chamfer": "skill in CD",
     "hausdorff": "skill in HD",
     "mse_depth": "skill in MSE",

@@ -92,9 +92,9 @@ def run_command(folder: Path, command: str) -> None:
     code = f"import sys, cli; sys.argv[0] = {program!r}; cli.{program}()"
     path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
     environment = {**os.environ, "PYTHONPATH": path}
-    done = subprocess.run(
-        [sys.executable, "-c", code, *words], cwd=folder, env=environment, check=False
-    )
+    shown = subprocess.DEVNULL if words[0] == "score" else None  # pages of tables; JSON has them
+    python = [sys.executable, "-c", code, *words]
+    done = subprocess.run(python, cwd=folder, env=environment, stdout=shown, check=False)
     if done.returncode:
         raise StepError(f"{command}: exit code {done.returncode}")
 

@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 from pix2shape_models import edited, released
 
+from iqtt.files.make import make_split
+from iqtt.questions.specs import SplitSpec
 from metrics.scoring.evaluate import score
 from scenegen.common.errors import SceneGenError, SpecError
 
@@ -74,36 +76,24 @@ def test_other_weights_checkpoints_and_data_are_refused(run_folders, truths, que
         cnn.write_submission(truths.iqtt, out, tmp_path / "none.safetensors")
 
 
-def test_questions_of_another_number_of_answers(run_folders, tmp_path, monkeypatch):
-    """The softmax has three outputs; distances are measured for any number of answers."""
-    from baselines.resnet import answering
-
-    written = {}
-    monkeypatch.setattr(answering, "write_answers", lambda out, data, **what: written.update(what))
-    monkeypatch.setattr(answering, "parts", lambda path: ("",))
-    images = np.random.default_rng(0).integers(0, 256, (5, 3, 32, 32, 3), np.uint8)
-
-    class Two:
-        path, height, width = "two.h5", 32, 32
-
-        def __len__(self):
-            return 5
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *error):
-            pass
-
-        def read(self, name, row):
-            return images[row]
-
-    monkeypatch.setattr(answering, "open_questions", lambda path: Two())
-    siamese.write_submission("two.h5", tmp_path / "x.h5", run_folders["siamese"] / WEIGHTS)
-    assert written["scores"].shape == (5, 2)
+def test_questions_of_two_answers(run_folders, small, tmp_path):
+    """A softmax has as many outputs as in training; distances are measured to any answer."""
+    spec = SplitSpec(
+        train=4, labeled=4, val=2, test=5, cubes=(8, 8), distractors="mirror-pair", answers=2,
+        height=32, width=32, min_cube_pixels=0,
+    )  # fmt: skip
+    make_split(tmp_path / "two", spec)
+    test, out = tmp_path / "two" / "iqtt-test.h5", tmp_path / "x.h5"
+    siamese.write_submission(test, out, run_folders["siamese"] / WEIGHTS)
+    with h5py.File(out) as file:
+        assert file["scores"].shape == (5, 2)
     with pytest.raises(SpecError) as error:
-        cnn.write_submission("two.h5", tmp_path / "x.h5", run_folders["cnn"] / WEIGHTS)
+        cnn.write_submission(test, out, run_folders["cnn"] / WEIGHTS, overwrite=True)
     assert error.value.found == "questions of 2 answers"
+    own = cnn.train(tmp_path / "two/iqtt-train.h5", tmp_path / "run", iterations=2, **small)
+    cnn.write_submission(test, out, own, overwrite=True)
+    with h5py.File(out) as file:
+        assert file["scores"].shape == (5, 2)
 
 
 def test_no_answers_no_accuracy(run_folders, truths, tmp_path):

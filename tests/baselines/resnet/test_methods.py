@@ -105,7 +105,7 @@ def test_a_cut_file_and_no_file_are_told(run_folders, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("depth", 34), ("width", 2), ("answers", 1), ("iteration", 801), ("learning_rate", 0.0)],
+    [("depth", 34), ("width", 2), ("answers", 1), ("iteration", 401), ("learning_rate", 0.0)],
 )
 def test_settings_out_of_range(name, value):
     with pytest.raises(SpecError) as error:
