@@ -60,7 +60,7 @@ def _describe(masks: NDArray[np.bool_]) -> tuple[Array, Array]:
     reaches, where its boundary is, and how much of it lies at each of RADII distances.
     """
     short = min(masks.shape[1:])
-    empty = ~masks.any(axis=(1, 2))
+    empty = ~np.asarray(masks.any(axis=(1, 2)))
     left, right, rows = _row_ends(masks)
     middle, invariants = _moments(masks)
     points = np.stack([np.concatenate([left, right], 1), np.concatenate([rows, rows], 1)], 2)
@@ -207,12 +207,12 @@ def _polar(masks: NDArray[np.bool_], middle: Array, short: int) -> tuple[Array, 
     np.maximum.at(farthest, which * DIRECTIONS + sector, distance)
     radius = np.minimum((distance * 2 * RADII).astype(np.int64), RADII - 1)
     cell = (which * RADII + radius) * DIRECTIONS + sector
-    area = np.bincount(cell, minlength=len(masks) * RADII * DIRECTIONS) / short**2
+    area: Array = np.bincount(cell, minlength=len(masks) * RADII * DIRECTIONS) / short**2
     levels = 256
     bins = np.minimum((distance * levels).astype(np.int64), levels - 1)
     counts = np.bincount(which * levels + bins, minlength=len(masks) * levels)
-    share = np.cumsum(counts.reshape(-1, levels), axis=1)
-    share = share / np.maximum(share[:, -1:], 1)
+    within = np.cumsum(counts.reshape(-1, levels), axis=1)
+    share = within / np.maximum(within[:, -1:], 1)
     quantiles = np.stack([(share < q).sum(axis=1) for q in QUANTILES], axis=1) / levels
     grid = area.reshape(-1, RADII, DIRECTIONS)
     return farthest.reshape(-1, DIRECTIONS), grid, quantiles
@@ -225,9 +225,9 @@ def _spectrum(masks: NDArray[np.bool_]) -> Array:
     rows, columns = height // step * step, width // step * step
     small = masks[:, :rows, :columns].astype(np.float32)
     small = small.reshape(len(masks), rows // step, step, columns // step, step).mean(axis=(2, 4))
-    power = np.abs(np.fft.rfft2(small)) ** 2
+    power = np.abs(np.fft.fft2(small)) ** 2
     frequency = np.hypot(
-        np.fft.fftfreq(small.shape[1])[:, None], np.fft.rfftfreq(small.shape[2])[None]
+        np.fft.fftfreq(small.shape[1])[:, None], np.fft.fftfreq(small.shape[2])[None]
     )
     # Rings of equal width; the first holds the slowest waves that fit the image.
     ring = np.minimum((frequency * 4 * RINGS).astype(np.int64), RINGS)

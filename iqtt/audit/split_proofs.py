@@ -97,7 +97,7 @@ def _canonical_keys(cubes: Array) -> Array:
     Of all turns and mirror images whose box has sides x >= y >= z it is the least list.
     """
     turns = [turn * sign for turn in cube_rotations() for sign in ([1, 1, 1], MIRROR_X)]
-    results = [np.zeros((0, cubes.shape[1]), np.int64)]
+    results: list[Array] = [np.zeros((0, cubes.shape[1]), np.int64)]
     for start in range(0, len(cubes), _CHUNK):
         part = cubes[start : start + _CHUNK].astype(np.int64)
         best = np.full(part.shape[:2], 1 << 12)
@@ -109,7 +109,7 @@ def _canonical_keys(cubes: Array) -> Array:
             falls = (side[:, 0] >= side[:, 1]) & (side[:, 1] >= side[:, 2])
             at = (keys != best).argmax(axis=1)[:, None]
             less = np.take_along_axis(keys < best, at, axis=1)[:, 0]
-            best = np.where((falls & less)[:, None], keys, best)
+            best = np.asarray(np.where((falls & less)[:, None], keys, best))
         results.append(best)
     return np.concatenate(results)
 
