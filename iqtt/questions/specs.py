@@ -146,9 +146,11 @@ class SplitSpec:
 
     def framing_distance(self, radius: float) -> float:
         """Return the distance from camera to origin at which a sphere about the origin fits the
-        image with 2% to spare; cube edges.
+        image, with 2% and at least the pixels of the border to spare; cube edges.
         """
-        return 1.02 * radius / math.sin(math.radians(self.fov_degrees) / 2)
+        side = min(self.height, self.width)
+        spare = max(1.02, side / (side - 2))
+        return spare * radius / math.sin(math.radians(self.fov_degrees) / 2)
 
     @property
     def pixels_per_edge(self) -> float:

@@ -220,7 +220,7 @@ def test_audit_passes_and_writes_json(run, split, tmp_path, check_refusal):
     assert "one right answer" in result.stdout
     found = json.loads((tmp_path / "audit.json").read_text())
     assert found["passed"] is True
-    assert {proof["status"] for proof in found["proofs"]} == {"ok"}
+    assert {proof["status"] for proof in found["audits"][0]["proofs"]} == {"ok"}
     again = run("audit", split, "--json", "audit.json")
     check_refusal(again.exit_code, again.stdout, again.stderr, ("audit.json", "--overwrite"))
     told = run("audit", split, "--markdown")

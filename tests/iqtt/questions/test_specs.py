@@ -74,7 +74,7 @@ def test_a_setting_out_of_range_is_refused(setting):
         assert error.value.expected
     with pytest.raises(SpecError) as error:
         SplitSpec(height=64, min_cube_pixels=16)
-    assert error.value.expected.startswith("from 0 to 15 pixels"), "it depends on the image's size"
+    assert error.value.expected.startswith("from 0 to 14 pixels"), "it depends on the image's size"
 
 
 @pytest.mark.parametrize("changed", EDGES)
@@ -175,8 +175,8 @@ SIDES = st.integers(16, 600)
 
 @given(SIDES, SIDES, st.floats(5, 90), st.floats(1.5, 10), st.integers(0, 2**32 - 1))
 @settings(max_examples=60)
-def test_no_point_of_the_bounding_sphere_leaves_the_image(height, width, fov, radius, seed):
-    """And its outline comes within 3% of the nearer borders."""
+def test_no_pixel_of_the_border_shows_the_bounding_sphere(height, width, fov, radius, seed):
+    """And its outline comes near the nearer borders: within 7%, in small images a few pixels."""
     spec = SplitSpec(
         height=height, width=width, fov_degrees=fov, max_radius=radius, min_cube_pixels=0
     )
@@ -195,7 +195,8 @@ def test_no_point_of_the_bounding_sphere_leaves_the_image(height, width, fov, ra
     image = (seen * (1, -1, -1)) @ intrinsics(height, width, camera.fov_y_degrees).T
     pixels = image[:, :2] / image[:, 2:]
     off_centre = abs(pixels - (width / 2, height / 2)) / (min(height, width) / 2)
-    assert 0.93 < off_centre.max() < 1
+    side = min(height, width)
+    assert 0.93 - 3 / side < off_centre.max() < 1 - 1 / side
 
 
 def test_an_edge_has_the_length_in_pixels_that_is_said():

@@ -71,8 +71,8 @@ def radius(cubes: np.ndarray) -> float:
 
 
 def spec_distance(radius: float) -> float:
-    """Where a sphere's outline is the image's inscribed circle, and 2% more."""
-    return 1.02 * radius / math.sin(math.radians(SPEC.fov_degrees / 2))
+    """Where a sphere's outline is the image's inscribed circle, and a pixel of 64 on each side."""
+    return 64 / 62 * radius / math.sin(math.radians(SPEC.fov_degrees / 2))
 
 
 @pytest.mark.parametrize("least", [0, 30, 90])
