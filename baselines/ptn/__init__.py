@@ -4,11 +4,16 @@
     network.py      settings, encoder and volume decoder
     batches.py      what an iteration sees
     silhouettes.py  silhouettes of a room's objects, from the image or from ids
-    rooms.py        rooms of several views, questions.py  polycubes, as batches
+    rooms.py        batches of rooms of several views
+    questions.py    batches of polycubes
     storage.py      weights, checkpoints and their card
-    training.py     `train`
     matching.py     which of the answers shows the reference's volume
     submission.py   `write_submission`
+    training.py     `train`
 
 docs/baselines.md says what it is told that other baselines are not, and what it reaches.
 """
+
+from scenegen.common.lazy_names import lazy_names
+
+__getattr__ = lazy_names(__name__, {"training": "train", "submission": "write_submission"})

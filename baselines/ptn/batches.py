@@ -1,4 +1,4 @@
-"""What one iteration of training sees: images, and some rays of the silhouettes of several views."""
+"""What an iteration of training sees: images, and rays of the silhouettes of several views."""
 
 from dataclasses import dataclass
 

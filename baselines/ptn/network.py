@@ -6,6 +6,7 @@ to 6^3 x 256, 15^3 x 96 and 32^3. All numbers of channels are multiples of `widt
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import torch
 from torch import Tensor, nn
@@ -39,12 +40,12 @@ class PtnConfig:
     silhouettes: str = "image"
     size: int = 64
     width: int = 16
-    iterations: int = 4000
+    iterations: int = 3200
     batch: int = 16
     views: int = 3
     rays: int = 256
     samples: int = 40
-    learning_rate: float = 5e-4
+    learning_rate: float = 1e-3
     weight_decay: float = 0.0
     seed: int = 0
 
@@ -52,7 +53,9 @@ class PtnConfig:
         normalise(self)
         check(self.task in ("rooms", "questions"), "task", self.task, "rooms or questions")
         check(self.silhouettes in ("image", "ids"), "silhouettes", self.silhouettes, "image or ids")
-        check(all(a < b for a, b in zip(self.low, self.high, strict=True)), "low", self.low, "< high")
+        check(
+            all(a < b for a, b in zip(self.low, self.high, strict=True)), "low", self.low, "< high"
+        )
         check(self.size % 8 == 0 and 8 <= self.size <= 512, "size", self.size, "8 to 512, by 8")
         check(self.width % 2 == 0 and 2 <= self.width <= 256, "width", self.width, "even, 2 to 256")
         for name in ("iterations", "batch", "views", "rays"):
@@ -72,7 +75,7 @@ class Ptn(nn.Module):
         width, told = config.width, 3 * (config.task == "rooms")
         channels = (3, width, 2 * width, 4 * width)
         layers: list[nn.Module] = []
-        for a, b in zip(channels, channels[1:], strict=False):
+        for a, b in pairwise(channels):
             layers += [nn.Conv2d(a, b, 5, stride=2, padding=2), nn.ReLU()]
         self.pixels = nn.Sequential(*layers, nn.Flatten())
         last, wide = 4 * width * (config.size // 8) ** 2, 16 * width

@@ -101,7 +101,10 @@ class TrainingShapes:
     def _item(self, rng: np.random.Generator) -> tuple[Array, Array, Array]:
         config, questions = self._config, self._questions
         row = int(rng.integers(len(questions)))
-        images, rotations = questions.read("questions", row), questions.read("world_from_shape", row)
+        images, rotations = (
+            questions.read("questions", row),
+            questions.read("world_from_shape", row),
+        )
         which = int(rng.integers(len(images)))
         count = int(questions.read("cube_count", row))
         cubes, rotation = questions.read("cubes", row)[which, :count], rotations[which]

@@ -85,14 +85,14 @@ class RoomImages:
 
 
 class TrainingRooms:
-    """Scenes of several views, with silhouettes of all of them, which are made once.
+    """Scenes of several views, with silhouettes of all of them, made when first used.
 
     Attributes:
         fingerprint, data: fingerprint and request of the file.
     """
 
     def __init__(self, path: str | Path, config: PtnConfig) -> None:
-        """Make the silhouettes. Raises SpecError where a scene has one view; as `RoomsFile`."""
+        """Check the file. Raises SpecError where a scene has one view; as `RoomsFile`."""
         self._rooms = rooms = RoomsFile(path)
         try:
             self._prepare(rooms, config)
@@ -117,8 +117,7 @@ class TrainingRooms:
         self.fingerprint, self.data = rooms.fingerprint, rooms.spec.to_json()
         pixels = rooms.spec.height * rooms.spec.width
         self._packed = np.empty((len(rooms), -(-pixels // 8)), np.uint8)
-        for row in range(len(rooms)):
-            self._packed[row] = np.packbits(silhouette(rooms, row, config.silhouettes))
+        self._made = np.zeros(len(rooms), bool)
 
     def batch(self, rng: np.random.Generator) -> Batch:
         """Draw a batch: any view of a scene is the input, and the volume is seen from `views`."""
@@ -133,7 +132,7 @@ class TrainingRooms:
             for other in rng.choice(rows, size=min(config.views, len(rows)), replace=False):
                 pixels = rng.integers(spec.height * spec.width, size=config.rays)
                 rays.append(images.rays(int(other), pixels, mirrored))
-                found.append(self._packed[other, pixels >> 3] >> (7 - (pixels & 7)) & 1)
+                found.append(self._shown(int(other), pixels))
             joined = np.concatenate(rays, axis=1)
             made.append((images.image(row), images.camera(row), joined, np.concatenate(found)))
         image, camera, rays_, shown = (
@@ -141,3 +140,10 @@ class TrainingRooms:
         )
         return Batch(image, camera, rays_[:, 0], rays_[:, 1], shown)
 
+    def _shown(self, row: int, pixels: Array) -> Array:
+        """Return whether pixels show an object, 0 or 1; a row's silhouette is made once."""
+        if not self._made[row]:
+            source = self._config.silhouettes
+            self._packed[row] = np.packbits(silhouette(self._images.rooms, row, source))
+            self._made[row] = True
+        return np.asarray(self._packed[row, pixels >> 3] >> (7 - (pixels & 7)) & 1)

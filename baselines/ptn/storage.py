@@ -1,4 +1,4 @@
-"""Weights and checkpoints: safetensors files that hold their own card, read without running code."""
+"""Weights and checkpoints as safetensors files, each with its card inside."""
 
 import errno
 from collections.abc import Mapping
@@ -46,7 +46,9 @@ class Card:
         normalise(self)
         version = self.format_version
         check(version == FORMAT_VERSION, "format version", version, str(FORMAT_VERSION))
-        check(0 <= self.iteration <= self.config.iterations, "iteration", self.iteration, "in reach")
+        check(
+            0 <= self.iteration <= self.config.iterations, "iteration", self.iteration, "in reach"
+        )
 
 
 def new_model(config: PtnConfig) -> tuple[Ptn, Adam]:
@@ -126,4 +128,3 @@ def _model(path: str | Path, config: PtnConfig, tensors: Mapping[str, Tensor]) -
     model = Ptn(config)
     model.load_state_dict({name: tensors[name].to(torch.float32) for name in wanted})
     return model
-
