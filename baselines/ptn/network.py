@@ -40,11 +40,11 @@ class PtnConfig:
     silhouettes: str = "image"
     size: int = 64
     width: int = 16
-    iterations: int = 3200
-    batch: int = 16
+    iterations: int = 3000
+    batch: int = 12
     views: int = 3
-    rays: int = 256
-    samples: int = 40
+    rays: int = 160
+    samples: int = 32
     learning_rate: float = 1e-3
     weight_decay: float = 0.0
     seed: int = 0

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from baselines.pix2shape.data.rooms import channels_first, check_reducible
 from baselines.ptn.batches import Batch
 from baselines.ptn.network import PtnConfig
-from baselines.ptn.silhouettes import check_shading, silhouette
+from baselines.ptn.silhouettes import Silhouettes
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.rendering.ground_truth import decode_image
@@ -48,6 +48,7 @@ class RoomImages:
         check_reducible(rooms.path, rooms.spec.height, rooms.spec.width, size)
         self.rooms, self._size = rooms, size
         self.poses: Array = rooms.read("camera/world_from_camera", slice(None))
+        self._fov: Array = rooms.read("camera/fov_y_degrees", slice(None))
         unknown = np.flatnonzero(~np.isfinite(self.poses).all(axis=(1, 2)))
         if len(unknown):
             where = f"{rooms.path}: camera/world_from_camera, row {unknown[0]}"
@@ -68,24 +69,22 @@ class RoomImages:
         place = self.poses[row, :3, 3]
         return place[[*SWAPPED]] if self.mirrored[row] else place
 
-    def rays(self, row: int, pixels: Array | None = None, mirrored: bool = False) -> Array:
-        """Return origins and directions of a row's rays, (2, R, 3), world or mirrored frame.
+    def rays(self, row: int, pixels: Array | None = None) -> Array:
+        """Return origins and directions of a row's rays, (2, R, 3), world; planar depth is 1.
 
         Args:
             pixels: numbers of pixels, counted row by row; by default all.
-            mirrored: whether to swap x and z, for the volume of a mirrored image.
         """
         spec, pose = self.rooms.spec, self.poses[row]
-        fov = float(self.rooms.read("camera/fov_y_degrees", row))
+        fov = float(self._fov[row])
         rays = pixel_directions(spec.height, spec.width, fov).reshape(-1, 3)
         rays = rays if pixels is None else rays[pixels]
         directions = rays @ pose[:3, :3].T
-        found = np.stack([np.broadcast_to(pose[:3, 3], directions.shape), directions])
-        return found[..., [*SWAPPED]] if mirrored else found
+        return np.stack([np.broadcast_to(pose[:3, 3], directions.shape), directions])
 
 
 class TrainingRooms:
-    """Scenes of several views, with silhouettes of all of them, made when first used.
+    """Scenes of several views, with silhouettes of all of them.
 
     Attributes:
         fingerprint, data: fingerprint and request of the file.
@@ -112,12 +111,8 @@ class TrainingRooms:
             expected = "two or more of every scene, as silhouettes of one view tell no shape"
             hint = "render the file with --views 0,35,80"
             raise SpecError(f"{rooms.path}: scene {scene}", "one view", expected, hint)
-        if config.silhouettes == "image":
-            check_shading(rooms)
         self.fingerprint, self.data = rooms.fingerprint, rooms.spec.to_json()
-        pixels = rooms.spec.height * rooms.spec.width
-        self._packed = np.empty((len(rooms), -(-pixels // 8)), np.uint8)
-        self._made = np.zeros(len(rooms), bool)
+        self._silhouettes = Silhouettes(rooms, config.silhouettes)
 
     def batch(self, rng: np.random.Generator) -> Batch:
         """Draw a batch: any view of a scene is the input, and the volume is seen from `views`."""
@@ -129,21 +124,15 @@ class TrainingRooms:
             row = int(rng.choice(rows))
             mirrored = bool(images.mirrored[row])
             rays, found = [], []
-            for other in rng.choice(rows, size=min(config.views, len(rows)), replace=False):
+            again = len(rows) < config.views
+            for other in rng.choice(rows, size=config.views, replace=again):
                 pixels = rng.integers(spec.height * spec.width, size=config.rays)
-                rays.append(images.rays(int(other), pixels, mirrored))
-                found.append(self._shown(int(other), pixels))
+                world = images.rays(int(other), pixels)
+                found.append(self._silhouettes.at(int(other), pixels, *world))
+                rays.append(world[..., [*SWAPPED]] if mirrored else world)
             joined = np.concatenate(rays, axis=1)
             made.append((images.image(row), images.camera(row), joined, np.concatenate(found)))
         image, camera, rays_, shown = (
             torch.from_numpy(np.stack(part).astype(np.float32)) for part in zip(*made, strict=True)
         )
         return Batch(image, camera, rays_[:, 0], rays_[:, 1], shown)
-
-    def _shown(self, row: int, pixels: Array) -> Array:
-        """Return whether pixels show an object, 0 or 1; a row's silhouette is made once."""
-        if not self._made[row]:
-            source = self._config.silhouettes
-            self._packed[row] = np.packbits(silhouette(self._images.rooms, row, source))
-            self._made[row] = True
-        return np.asarray(self._packed[row, pixels >> 3] >> (7 - (pixels & 7)) & 1)

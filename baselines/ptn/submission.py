@@ -137,7 +137,8 @@ def seen(
         mirrored: whether it is that of a mirrored image.
     """
     depth, normal = empty_room(images.rooms, row)
-    rays = torch.from_numpy(images.rays(row, mirrored=mirrored).astype(np.float32))
+    world = images.rays(row)
+    rays = torch.from_numpy((world[..., [*SWAPPED]] if mirrored else world).astype(np.float32))
     origin, direction = rays[:, None]
     hit = first_hit(volume, model.box, origin, direction, SAMPLES)
     points = torch.nan_to_num(origin + hit[..., None] * direction)

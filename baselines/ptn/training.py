@@ -113,7 +113,6 @@ def train(
         model, optimiser = new_model(card.config)
     card = replace(card, labels=card.labels if resume else labels)
     found = labelled(data, card.config, card.labels)  # before hours of training
-    folder.mkdir(parents=True, exist_ok=True)
     if networks is None or resume:
         card = _iterate(data, folder, model, optimiser, card, progress)
     if found is not None:
@@ -121,6 +120,7 @@ def train(
             right = torch.from_numpy(found.read("answers", slice(0, card.labels)).astype(np.int64))
             told = torch.cat(list(feature_batches(model.eval(), found, card.labels)))
         card = replace(card, head=fitted_head(told, right))
+    folder.mkdir(parents=True, exist_ok=True)
     save_weights(folder / WEIGHTS, model, card)
     return folder / WEIGHTS
 
@@ -134,6 +134,7 @@ def _iterate(
             expected = f"{card.fingerprint[:12]}, on which the run was trained"
             raise SpecError(data, f"fingerprint {source.fingerprint[:12]}", expected)
         card = replace(card, fingerprint=source.fingerprint, data=source.data)
+        folder.mkdir(parents=True, exist_ok=True)
         began, last = time.monotonic() - card.seconds, card.config.iterations
         for iteration in range(card.iteration, last):
             batch = source.batch(item_rng(card.config.seed, iteration, Purpose.TRAINING))
