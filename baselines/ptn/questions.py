@@ -5,8 +5,10 @@ have: two images of a question may show one shape, but which two is the answer. 
 unlabelled training questions is an object of its own, and is joined by silhouettes of its shape
 from other sides, drawn here from the cubes and the rotation that training files tell. Training is
 thus told more than other baselines: what a turntable would show of the training shapes. It is told
-neither answers nor volumes. A volume has the frame of its image: the camera's axes, the shape's
-centre, cube edges.
+neither answers nor volumes.
+
+A volume has the frame of its image: the camera's axes about the shape's centre. Its unit is the
+radius of the ball that the question's camera frames, so the camera is at the same place in all.
 """
 
 from pathlib import Path
@@ -27,21 +29,20 @@ from scenegen.rendering.ground_truth import decode_image
 
 Array = NDArray[Any]
 PART = "unlabeled"
+BOX = {"low": (-1.0, -1.0, -1.0), "high": (1.0, 1.0, 1.0)}  # every shape fits, however turned
 EXPECTED = "a training file such as iqtt-train.h5, with the group `truth`"
 
 
-def question_box(path: str | Path) -> dict[str, tuple[float, float, float]]:
-    """Return the corners of a cube that holds every shape of a training file, however turned.
+def check_questions(path: str | Path) -> None:
+    """Raise SpecError for a file that is not ours or not for training.
 
-    Raises as `QuestionsFile`, and SpecError for a file that is not ours or not for training.
+    Raises as `QuestionsFile`.
     """
     if PART not in parts(path):
         raise SpecError(path, "no training questions", EXPECTED)
     with open_questions(path, PART) as questions:
         if questions.spec is None or not questions.has_truth or not len(questions):
             raise SpecError(path, "questions that tell no shapes, or none", EXPECTED)
-        side = float(questions.spec.max_radius)
-    return {"low": (-side, -side, -side), "high": (side, side, side)}
 
 
 def uniform_rotation(rng: np.random.Generator) -> Array:
@@ -68,8 +69,8 @@ class TrainingShapes:
     """The images of a training file's unlabelled questions, and silhouettes of their shapes."""
 
     def __init__(self, path: str | Path, config: PtnConfig) -> None:
-        """Check the file. Raises as `question_box`."""
-        question_box(path)
+        """Check the file. Raises as `check_questions`."""
+        check_questions(path)
         self._config = config
         self._questions = open_questions(path, PART)
         try:
@@ -79,10 +80,11 @@ class TrainingShapes:
             self.close()
             raise
         spec = self._questions.spec
-        assert spec is not None  # as `question_box` asks
-        pose = spec.camera.world_from_camera
+        assert spec is not None  # as `check_questions` asks
+        self._radius = 1 / spec.framing_distance(1.0)  # of the framed ball, at camera distance 1
+        pose = spec.camera(1 / self._radius).world_from_camera
         self._origin = pose[:3, 3]
-        rays = pixel_directions(height, width, spec.camera.fov_y_degrees)
+        rays = pixel_directions(height, width, spec.fov_y_degrees)
         self._directions = rays.reshape(-1, 3) @ pose[:3, :3].T
         self.fingerprint, self.data = str(self._questions.fingerprint), spec.to_json()
 
@@ -108,6 +110,7 @@ class TrainingShapes:
         which = int(rng.integers(len(images)))
         count = int(questions.read("cube_count", row))
         cubes, rotation = questions.read("cubes", row)[which, :count], rotations[which]
+        radius = self._radius * float(questions.read("camera_distance", row))  # cube edges
         rays, shown = [], []
         for view in range(config.views):
             turn = uniform_rotation(rng) if view else np.eye(3)
@@ -115,6 +118,6 @@ class TrainingShapes:
             direction = self._directions[pixels] @ turn  # turning the shape, from the volume's side
             origin = np.broadcast_to(self._origin @ turn, direction.shape)
             rays.append(np.stack([origin, direction]))
-            shown.append(meets_cubes(cubes, origin @ rotation, direction @ rotation))
+            shown.append(meets_cubes(cubes, radius * origin @ rotation, direction @ rotation))
         image = channels_first(decode_image(images[which]), config.size)
         return image, np.concatenate(rays, axis=1), np.concatenate(shown)

@@ -22,7 +22,7 @@ from baselines.ptn import projection
 from baselines.ptn.batches import Batch
 from baselines.ptn.matching import fitted_head
 from baselines.ptn.network import Ptn, PtnConfig
-from baselines.ptn.questions import TrainingShapes, question_box
+from baselines.ptn.questions import BOX, TrainingShapes, check_questions
 from baselines.ptn.rooms import TrainingRooms, room_box
 from baselines.ptn.storage import (
     CHECKPOINT,
@@ -189,7 +189,8 @@ def projection_loss(model: Ptn, batch: Batch) -> Tensor:
 def _config(data: str | Path, settings: dict[str, Any]) -> PtnConfig:
     """Return the configuration that suits a file."""
     if is_question_file(data):
-        return PtnConfig(task="questions", **question_box(data), **settings)
+        check_questions(data)
+        return PtnConfig(task="questions", **BOX, **settings)
     return PtnConfig(task="rooms", **room_box(data), **settings)
 
 

@@ -14,7 +14,7 @@ TINY: dict[str, Any] = {"width": 2, "size": 16, "batch": 2, "rays": 40, "samples
 
 def tiny(task: str = "rooms", **settings: Any) -> Ptn:
     """Return an untrained model of the unit box, or of a cube around 0."""
-    low, high = ((0, 0, 0), (1, 0.5, 1)) if task == "rooms" else ((-3.5,) * 3, (3.5,) * 3)
+    low, high = ((0, 0, 0), (1, 0.5, 1)) if task == "rooms" else ((-1,) * 3, (1,) * 3)
     return new_model(PtnConfig(task, low, high, **{**TINY, **settings}))[0].eval()
 
 
@@ -31,9 +31,9 @@ def volume_of(distance: Any, edge: float) -> torch.Tensor:
     return torch.from_numpy(np.clip(0.5 - distance / edge, 0, 1).astype(np.float32))[None]
 
 
-def cubes_volume(model: Ptn, cubes: Any, rotation: Any) -> torch.Tensor:
-    """Return the volume of a polycube turned about the centre of its box."""
-    places = voxel_centres(model) @ rotation  # in the shape's frame
+def cubes_volume(model: Ptn, cubes: Any, rotation: Any, radius: float = 3.0) -> torch.Tensor:
+    """Return the volume of a polycube, turned about its box's centre; a unit is `radius` edges."""
+    places = radius * voxel_centres(model) @ rotation  # in the shape's frame
     middle = (cubes.min(axis=0) + cubes.max(axis=0) + 1) / 2
     inside = [np.abs(places - (c + 0.5 - middle)).max(axis=-1) - 0.5 for c in cubes]
     return volume_of(np.min(inside, axis=0), 0.2)

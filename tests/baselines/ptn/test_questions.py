@@ -11,7 +11,7 @@ torch = pytest.importorskip("torch")
 from ptn_models import cubes_volume, tiny  # noqa: E402
 
 from baselines.ptn.projection import silhouettes  # noqa: E402
-from baselines.ptn.questions import TrainingShapes, meets_cubes, question_box  # noqa: E402
+from baselines.ptn.questions import TrainingShapes, check_questions, meets_cubes  # noqa: E402
 from iqtt.files.make import make_split  # noqa: E402
 from iqtt.files.reader import open_questions  # noqa: E402
 from iqtt.questions.specs import SplitSpec  # noqa: E402
@@ -30,9 +30,9 @@ def split(tmp_path_factory) -> Path:
 def test_silhouettes_of_cubes_are_where_images_are_not_background(split):
     with open_questions(split / "iqtt-train.h5", "unlabeled") as questions:
         spec = questions.spec
-        pose = spec.camera.world_from_camera
-        rays = pixel_directions(48, 48, spec.camera.fov_y_degrees).reshape(-1, 3) @ pose[:3, :3].T
         question = questions[0]
+        pose = question.truth.camera.world_from_camera
+        rays = pixel_directions(48, 48, spec.fov_y_degrees).reshape(-1, 3) @ pose[:3, :3].T
         for image, cubes, turn in zip(
             question.radiance, question.truth.cubes, question.truth.world_from_shape, strict=True
         ):
@@ -52,17 +52,19 @@ def test_volumes_of_the_truth_have_the_batchs_silhouettes(split):
     assert batch.camera.shape == (3, 0)
     with open_questions(path, "unlabeled") as questions:
         (question,) = questions
+        distance = question.truth.camera.position[2]
+        radius = distance / questions.spec.framing_distance(1.0)
     for item in range(3):
         same = [np.moveaxis(one, -1, 0) == batch.image[item].numpy() for one in question.radiance]
         which = int(np.argmax([one.mean() for one in same]))
         cubes, turn = question.truth.cubes[which], question.truth.world_from_shape[which]
         rays = batch.origin[item][None], batch.direction[item][None]
-        found = silhouettes(cubes_volume(model, cubes, turn), model.box, *rays, 96)[0] > 0.5
+        found = silhouettes(cubes_volume(model, cubes, turn, radius), model.box, *rays, 96)[0] > 0.5
         assert (found != (batch.silhouette[item] > 0)).float().mean() < 0.03
 
 
-def test_files_that_tell_no_shapes_are_refused(split, truths):
-    assert question_box(split / "iqtt-train.h5")["high"] == (3.5, 3.5, 3.5)
+def test_files_that_tell_no_shapes_are_refused(split):
+    check_questions(split / "iqtt-train.h5")
     for path in (split / "iqtt-test.h5", split / "iqtt-val.h5"):
         with pytest.raises(SpecError):
-            question_box(path)
+            check_questions(path)

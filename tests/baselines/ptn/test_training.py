@@ -70,7 +70,7 @@ def test_a_run_that_is_resumed_gives_the_same_weights(rooms, tmp_path, monkeypat
     assert any((one[name] != different[name]).any() for name in one)
 
 
-def test_what_does_not_fit_is_refused_before_training(rooms, truths, make_rooms, tmp_path):
+def test_what_does_not_fit_is_refused_before_training(rooms, truths, tmp_path):
     run = tmp_path / "run"
     for settings in ({"labels": 5}, {"silhouettes": "guess"}, {"width": 3}, {"size": 24}):
         with pytest.raises(SpecError):
@@ -82,9 +82,9 @@ def test_what_does_not_fit_is_refused_before_training(rooms, truths, make_rooms,
     assert not run.exists()
     train(rooms, run, **TINY, iterations=1)
     with pytest.raises(SpecError):
-        train(
-            make_rooms(tmp_path / "x.h5", 2, **VIEWS, lights=(1, 1)), tmp_path / "y", networks=run
-        )
+        train(truths.iqtt, tmp_path / "other", networks=run / "weights.safetensors")
+    with pytest.raises(SpecError):
+        train(rooms, tmp_path / "other", networks=run / "weights.safetensors", width=2)
 
 
 def test_another_file_or_a_broken_checkpoint_ends_a_run(rooms, make_rooms, tmp_path):
