@@ -92,8 +92,9 @@ def baseline(
                 bar.total = total
                 bar.update(done)
 
-            how = {"overwrite": overwrite, "progress": show}
-            _package(name).write_submission(data, out, weights, **how)
+            write = _package(name).write_submission
+            given = {} if weights is None else {"weights": weights}
+            write(data, out, **given, overwrite=overwrite, progress=show)
     elif name == "chance":
         from baselines.trivial import write_chance
 
@@ -152,15 +153,18 @@ def train_baseline(
         raise click.UsageError(f"--resume goes on with the run's own {own}; leave them out")
     train = _package(name).train
     parameters = inspect.signature(train).parameters.values()
-    reserved = {*options, "resume", "progress"}
-    known = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
+    known = {p.name: p.default for p in parameters if p.kind is p.KEYWORD_ONLY}
     for key in given:
         if key not in known:
             raise click.UsageError(f"--{key}: {name} has no such setting")
+    others = {key: known[key] for key in sorted(known.keys() - {*options, "resume", "progress"})}
     for key, value in settings:
-        if key not in known or key in reserved:
-            listed = ", ".join(sorted(set(known) - reserved))
-            raise click.UsageError(f"--set: found {key!r:.40}, expected one of {listed}")
+        if key not in others:
+            raise click.UsageError(f"--set: found {key!r:.40}, expected one of {', '.join(others)}")
+        like = type(others[key])
+        if like not in (type(value), type(None)) and (like, type(value)) != (float, int):
+            text = f"--set: {key}: found {value!r:.40}, expected one like {others[key]!r}"
+            raise click.UsageError(text)
         given[key] = value
     bar, told = progress_bar(None, "it"), ""
 

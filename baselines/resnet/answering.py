@@ -57,7 +57,8 @@ def write_submission(
             )
         network.to(chosen_device(device))
         found = answer_scores(network, questions, card.size, progress)
-    write_answers(out, data, method=method.name, scores=found, overwrite=overwrite)
+    run = f"{card.labels} labels, seed {card.seed}"
+    write_answers(out, data, method=method.name, scores=found, run=run, overwrite=overwrite)
 
 
 def _bundled(method: Method) -> Path:

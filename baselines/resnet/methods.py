@@ -38,7 +38,7 @@ class Card:
         iterations: number of steps of Adam.
         learning_rate: of the first step; it falls linearly to 0.
         fingerprint: of the labelled part of the training file.
-        iteration, seconds: how many steps are done, and how long they took.
+        iteration: how many steps are done.
         validation: accuracy on iqtt-val.h5 beside the training file; None where there is none.
     """
 
@@ -54,7 +54,6 @@ class Card:
     learning_rate: float = 0.001
     fingerprint: str = ""
     iteration: int = 0
-    seconds: float = 0.0
     validation: float | None = None
 
     def __post_init__(self) -> None:

@@ -5,8 +5,7 @@ goes on after a kill as if it had never stopped.
 """
 
 import errno
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -134,8 +133,9 @@ def train(
             learning_rate=learning_rate,
         )
         source = LabelledQuestions(data, size, labels)
-        told = {"answers": source.answers, "labels": len(source)}
-        state = new_state(method, replace(given, **told, fingerprint=source.fingerprint))
+        mark = source.fingerprint
+        card = replace(given, answers=source.answers, labels=len(source), fingerprint=mark)
+        state = new_state(method, card)
     _to_device(state, chosen_device(device))
     folder.mkdir(parents=True, exist_ok=True)
     last = state.card.iterations
@@ -159,16 +159,16 @@ def _to_device(state: State, device: torch.device) -> None:
     state.optimiser.load_state_dict(state.optimiser.state_dict())  # moves its moments, too
 
 
-def _steps(method: Method, state: State, source: LabelledQuestions) -> Any:
+def _steps(method: Method, state: State, source: LabelledQuestions) -> Iterator[float]:
     """Take the steps that are left; yield the loss of each."""
     card = state.card
     draws = Draws(len(source), card.batch, card.seed, card.iteration)
     batches = iter(DataLoader(source, batch_sampler=draws))
-    began = time.monotonic() - card.seconds
     device = next(state.network.parameters()).device
     state.network.train()
     for number in range(card.iteration, card.iterations):
-        images, right = permuted(*next(batches), card.seed, number)
+        images, right = next(batches)
+        images, right = permuted(images, right, card.seed, number)
         for group in state.optimiser.param_groups:
             group["lr"] = card.learning_rate * (1 - number / card.iterations)
         loss = method.loss(state.network(images.to(device)), right.to(device))
@@ -176,10 +176,9 @@ def _steps(method: Method, state: State, source: LabelledQuestions) -> Any:
             hint = "begin again with a smaller learning rate"
             raise SceneGenError(f"iteration {number}", "a loss that is not finite", hint=hint)
         state.optimiser.zero_grad()
-        loss.backward()
+        loss.backward()  # type: ignore[no-untyped-call]
         state.optimiser.step()
-        seconds = round(time.monotonic() - began, 3)
-        state.card = replace(state.card, iteration=number + 1, seconds=seconds)
+        state.card = replace(state.card, iteration=number + 1)
         yield float(loss.detach())
 
 

@@ -33,7 +33,7 @@ class NearestAnswer(nn.Module):
     def forward(self, images: Tensor) -> Tensor:
         """Return minus the distances, (Q, K), of images, (Q, 1 + K, 3, S, S)."""
         features = self.last(self.resnet(images.flatten(0, 1))).view(*images.shape[:2], FEATURES)
-        squares = (features[:, 1:] - features[:, :1]).square().sum(dim=2)
+        squares: Tensor = (features[:, 1:] - features[:, :1]).square().sum(dim=2)
         return -(squares + 1e-12).sqrt()  # at a distance of 0 the root has no derivative
 
 

@@ -1,0 +1,191 @@
+"""Table 3 of the paper: the accuracy of every method on every kind of question.
+
+All methods learn from one training split of mixed questions, of which a method may use so many
+answers as the column says, and are tested on the kinds of the suite.
+"""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from benchmarks.results.markdown import NOTHING, shown, table
+from benchmarks.results.steps import Step, bundled_mark, each, made, mark, record
+from metrics.leaderboard.paper_tables import TABLES
+
+KINDS = ("matched", "mirror-pair", "mirror-pair-2", "other", "near", "mirror")
+TRAINING = Step(
+    "iqtt make-split --distractors mixed --train 20000 --labeled 1000 --val 1000 --test 1 --seed 7"
+    " --out mixed",
+    "mixed",
+)
+SUITE = Step("iqtt make-split --preset suite --out suite", "suite")
+TRAIN = "mixed/iqtt-train.h5"
+LABELS = (0, 200, 1000)
+
+
+@dataclass(frozen=True)
+class Method:
+    """A row of the table for each number of labels.
+
+    Attributes:
+        name: as in `bench baseline NAME`.
+        labels: numbers of labelled questions.
+        answer: the command that writes a submission for {test}, to {out}.
+        train: the command that trains in folder {run}; empty where nothing is trained.
+        start: what is added to it where labels are used, if all but a last layer is that of the run
+            without labels, whose weights are {start}; or empty.
+        runs: how many seeds at most; one where the seed changes nothing.
+        paper: its name in the paper's Table 3.
+        answers: numbers of answers that it can choose from.
+    """
+
+    name: str
+    labels: tuple[int, ...]
+    answer: str
+    train: str = ""
+    start: str = ""
+    runs: int = 10
+    paper: str = ""
+    answers: tuple[int, ...] = (2, 3)
+
+
+def _trained(name: str, labels: tuple[int, ...], **more: Any) -> Method:
+    """Return a method of `bench train` and `bench baseline`."""
+    answer = "--data {test} --weights {run}/weights.safetensors --out {out}"
+    train = "--data {train} --labels {labels} --seed {seed} --out {run}"
+    return Method(
+        name, labels, f"bench baseline {name} {answer}", f"bench train {name} {train}", **more
+    )
+
+
+METHODS = (
+    Method("chance", (0,), "bench baseline chance --data {test} --seed {seed} --out {out}", runs=3),
+    Method("outline", (0,), "bench baseline outline --data {test} --out {out}", runs=1),
+    Method(
+        "outline-trees",
+        (200, 1000),
+        "bench baseline outline-trees --train {train} --labels {labels} --data {test} --out {out}",
+        runs=1,
+    ),
+    _trained("cnn", (200, 1000), paper="CNN", answers=(3,)),
+    _trained("siamese", (200, 1000), paper="Siamese CNN"),
+    _trained("ptn", LABELS, paper="Persp. Transf. Nets", start="""--set 'networks="{start}"'"""),
+    _trained("rezende", LABELS, paper="Rezende et al.", start="""--set 'start="{start}"'"""),
+    Method(
+        "pix2shape",
+        LABELS,
+        "bench baseline pix2shape --data {test} --weights {run}/weights.safetensors --out {out}",
+        "pix2shape train --data {train} --labels {labels} --seed {seed} --set iterations=1500"
+        " --out {run}",
+        paper="Pix2Shape",
+    ),
+)
+PEOPLE = "Human Evaluation"  # of the paper
+
+
+def run(folder: Path, methods: Sequence[str], seeds: int) -> list[str]:
+    """Score all methods that are not scored yet; return what failed."""
+    failed = each((step.makes, partial(made, folder, step)) for step in (TRAINING, SUITE))
+    if failed:
+        return failed
+    return each(
+        (
+            f"{method.name}, {labels} labels, {kind}",
+            partial(_cell, folder, method, labels, kind, seeds),
+        )
+        for method in METHODS
+        if not methods or method.name in methods
+        for labels in method.labels
+        for kind in KINDS
+        if _answers(kind) in method.answers
+    )
+
+
+def _answers(kind: str) -> int:
+    return 2 if kind.endswith("-2") else 3
+
+
+def _cell(folder: Path, method: Method, labels: int, kind: str, seeds: int) -> dict[str, Any]:
+    """Return the scores of a method on a kind of questions, as means over its runs."""
+    test = f"suite/{kind}/iqtt-test.h5"
+    numbers = range(min(seeds, method.runs))
+    settings = {
+        "method": method.name,
+        "labels": labels,
+        "kind": kind,
+        "seeds": len(numbers),
+        "train": method.train + (f" {method.start}" if labels else ""),
+        "answer": method.answer,
+        "files": {path: mark(folder / path) for path in (TRAIN, test)},
+        "bundled": "" if method.train else bundled_mark(method.name),
+    }
+
+    def score() -> dict[str, Any]:
+        outs = []
+        for seed in numbers:
+            run, out = _run(method, labels, seed), f"{_run(method, labels, seed)}/answers-{kind}.h5"
+            reads = [test, *([_weights(folder, method, labels, seed)] if method.train else [])]
+            words = {"train": TRAIN, "labels": labels, "seed": seed, "run": run, "test": test}
+            made(folder, Step(method.answer.format(**words, out=out), out, tuple(reads)))
+            outs.append(out)
+        truth = test.replace(".h5", "-answers.h5")
+        result = f"{method.name}-{labels}/{kind}-scores.json"
+        command = f"bench score {' '.join(outs)} --truth {truth} --json {result}"
+        made(folder, Step(command, result, (*outs, truth)))
+        scores = json.loads((folder / result).read_text())
+        return {name: scores.get(name, {}) for name in ("metrics", "skills")}
+
+    return record(_place(folder, method.name, labels, kind), settings, score)
+
+
+def _run(method: Method, labels: int, seed: int) -> str:
+    return f"{method.name}-{labels}-{seed}"
+
+
+def _weights(folder: Path, method: Method, labels: int, seed: int) -> str:
+    """Train a method, unless it is trained; return the path of its weights."""
+    run, command, reads = _run(method, labels, seed), method.train, [TRAIN]
+    words = {"train": TRAIN, "labels": labels, "seed": seed, "run": run}
+    if labels and method.start:
+        start = _weights(folder, method, 0, seed)
+        command, words["start"] = f"{command} {method.start}", start
+        reads.append(start)
+    weights = f"{run}/weights.safetensors"
+    made(folder, Step(command.format(**words), weights, tuple(reads), run=run))
+    return weights
+
+
+def _place(folder: Path, method: str, labels: int, kind: str) -> Path:
+    return folder / "scores" / f"questions-{method}-{labels}-{kind}.json"
+
+
+def page(folder: Path) -> str:
+    """Return Table 3 as far as it is scored."""
+    figures = {(f.method, f.labels): f for f in TABLES[2].figures}
+
+    def printed(method: str, labels: int) -> str:
+        figure = figures.get((method, labels))
+        if figure is None:
+            return NOTHING
+        return figure.text + (f" ± {figure.spread}" if figure.spread else "")
+
+    rows = []
+    for method in METHODS:
+        for labels in method.labels:
+            cells = list(_cells(folder, method, labels))
+            if any(cell != NOTHING for cell in cells):
+                own = printed(method.paper, labels)
+                rows.append([f"`{method.name}`", f"{labels:,}", *cells, own])
+    rows.append(["people", NOTHING, *[NOTHING] * len(KINDS), printed(PEOPLE, 0)])
+    head = ["method", "labels", *(f"`{kind}`" for kind in KINDS), "paper, Table 3"]
+    return table(head, rows)
+
+
+def _cells(folder: Path, method: Method, labels: int) -> Iterator[str]:
+    for kind in KINDS:
+        path = _place(folder, method.name, labels, kind)
+        scores = json.loads(path.read_text())["scores"]["metrics"] if path.exists() else {}
+        yield shown(scores.get("iqtt_accuracy"))

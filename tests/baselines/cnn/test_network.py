@@ -1,0 +1,27 @@
+"""The classifier: layers as in the paper, and one output for each answer."""
+
+import pytest
+
+torch = pytest.importorskip("torch")
+from baselines.cnn.network import METHOD, AnswerClassifier  # noqa: E402
+from baselines.resnet.methods import Card  # noqa: E402
+
+
+@pytest.mark.parametrize("answers", [2, 3])
+def test_layers_and_probabilities(answers):
+    network = AnswerClassifier(Card("cnn", answers, 1, width=4, size=16)).eval()
+    widths = [layer.out_features for layer in network.head if isinstance(layer, torch.nn.Linear)]
+    assert widths == [2048, 512, 256, answers]
+    images = torch.rand(2, 1 + answers, 3, 16, 16)
+    scores = network(images)
+    assert scores.shape == (2, answers)
+    assert scores.exp().sum(dim=1) == pytest.approx(1.0)
+    # The first layer sees the features of every image, in the order of the images.
+    alone = torch.cat([network.resnet(images[:, k]) for k in range(1 + answers)], dim=1)
+    assert torch.allclose(network.head(alone).log_softmax(1), scores, atol=1e-5)
+
+
+def test_the_loss_is_the_cross_entropy():
+    scores = torch.tensor([[0.7, 0.2, 0.1], [0.5, 0.25, 0.25]]).log()
+    expected = -(torch.tensor(0.7).log() + torch.tensor(0.25).log()) / 2
+    assert METHOD.loss(scores, torch.tensor([0, 2])) == pytest.approx(expected.item())

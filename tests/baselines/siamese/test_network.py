@@ -1,0 +1,47 @@
+"""Distances of features, and the contrastive loss of the paper's appendix."""
+
+import pytest
+
+torch = pytest.importorskip("torch")
+from baselines.resnet.methods import Card  # noqa: E402
+from baselines.siamese.network import NearestAnswer, contrastive_loss  # noqa: E402
+
+
+@pytest.mark.parametrize("answers", [2, 3])
+def test_scores_are_minus_the_distance_from_the_reference(answers):
+    network = NearestAnswer(Card("siamese", 3, 1, width=4, size=16)).eval()
+    images = torch.rand(2, 1 + answers, 3, 16, 16)
+    images[0, 2] = images[0, 0]
+    scores = network(images)
+    assert scores.shape == (2, answers)
+    assert scores[0, 1] == pytest.approx(0, abs=1e-4)
+    features = network.last(network.resnet(images[1]))
+    assert features.shape == (1 + answers, 2048)
+    assert scores[1, 0] == pytest.approx(-torch.dist(features[1], features[0]).item(), rel=1e-4)
+
+
+def test_resnet_50_has_the_features_itself():
+    with torch.device("meta"):
+        network = NearestAnswer(Card("siamese", 3, 1, depth=50, width=64))
+    assert isinstance(network.last, torch.nn.Identity)
+
+
+def paper(distance, different):
+    """The appendix's equation for one pair of images, with margin 2."""
+    return (1 - different) * distance**2 / 2 + different * max(0.0, 2.0 - distance) ** 2 / 2
+
+
+def test_the_loss_is_the_papers():
+    distances = [[0.5, 1.5, 3.0], [2.5, 0.0, 1.0]]
+    right = [0, 2]
+    expected = [paper(distances[q][k], float(k != right[q])) for q in range(2) for k in range(3)]
+    found = contrastive_loss(-torch.tensor(distances), torch.tensor(right))
+    assert found == pytest.approx(sum(expected) / 6)
+
+
+def test_the_loss_has_a_gradient_where_two_images_are_equal():
+    network = NearestAnswer(Card("siamese", 3, 1, width=4, size=16))
+    images = torch.rand(2, 4, 3, 16, 16)
+    images[:, 1] = images[:, 0]
+    contrastive_loss(network(images), torch.tensor([0, 0])).backward()
+    assert all(torch.isfinite(p.grad).all() for p in network.parameters())

@@ -1,0 +1,156 @@
+"""`bench train` and `bench baseline` with trained baselines, as a user types them, and mistakes."""
+
+import importlib.util
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import h5py
+import pytest
+from pix2shape_commands import bench, files_in, linked
+
+from baselines import commands
+
+SMALL = tuple(f"--set={one}" for one in ("width=4", "size=16", "batch=2"))
+DATA = "--data iqtt-train.h5"
+
+
+@pytest.fixture
+def folder(pix2shape_files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in a folder that holds links to rooms and questions."""
+    monkeypatch.chdir(tmp_path)
+    return linked(pix2shape_files, tmp_path)
+
+
+@pytest.fixture
+def fake(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Put a baseline in the place of `cnn` that keeps what it is asked for."""
+    asked: dict[str, Any] = {}
+
+    def train(data, run_folder, *, labels=5, seed=0, depth=18, resume=False, progress=None):
+        asked.update(data=data, labels=labels, seed=seed, depth=depth, resume=resume)
+        progress(1, 1, {"loss": 0.25})
+        return Path(run_folder) / "w.safetensors"
+
+    package = SimpleNamespace(train=train)
+    monkeypatch.setattr(commands, "import_module", lambda name: package)
+    return asked
+
+
+@pytest.mark.parametrize("name", ["cnn", "siamese"])
+def test_train_answer_score(name, folder):
+    pytest.importorskip("torch")
+    made = bench(
+        *f"train {name} {DATA} --out run --labels 2 --iterations 2 --seed 3".split(), *SMALL
+    )
+    assert made.exit_code == 0, made.output
+    with_it = ("--weights", "run/weights.safetensors")
+    done = bench("baseline", name, "--data", "iqtt-test.h5", *with_it, "--out", "a.h5")
+    assert done.exit_code == 0, done.output
+    assert bench("validate", "a.h5", "--truth", "iqtt-test.h5").stdout == "a.h5: valid\n"
+    with h5py.File("a.h5") as file:
+        assert (file.attrs["method"], file.attrs["run"]) == (name, "2 labels, seed 3")
+    assert bench("train", name, *DATA.split(), "--out", "run", "--resume").exit_code == 0
+
+
+def test_settings_reach_the_baseline(fake, folder):
+    line = f"train cnn {DATA} --out run --set depth=50 --seed 7"
+    done = bench(*line.split())
+    assert done.exit_code == 0, done.output
+    assert fake == {
+        "data": "iqtt-train.h5", "labels": 5, "seed": 7, "depth": 50, "resume": False
+    }  # fmt: skip
+    assert "loss 0.25" in done.stdout
+    assert "run/w.safetensors" in done.stdout
+    assert bench(*f"train cnn {DATA} --out run --resume".split()).exit_code == 0
+    assert fake["resume"] is True
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("--iterations 5", ("--iterations", "cnn")),
+        ("--set colour=1", ("--set", "'colour'", "depth")),
+        ('--set depth="deep"', ("--set", "depth", "'deep'", "18")),
+        ("--set depth=true", ("--set", "depth", "True")),
+        ("--set resume=true", ("--set", "'resume'")),
+        ("--set progress=1", ("--set", "'progress'")),
+        ("--resume --seed 2", ("--resume",)),
+        ("--resume --set depth=50", ("--resume",)),
+    ],
+)
+def test_what_a_baseline_has_not_is_refused(fake, folder, line, words, check_refusal):
+    result = bench(*f"train cnn {DATA} --out run {line}".split())
+    check_refusal(result.exit_code, result.stdout, result.stderr, words)
+    assert fake == {}
+
+
+MISTAKES = [
+    (f"train cnn {DATA} --out run --labels 4", ("--labels", "found 4", "1 to 3")),
+    ("train cnn --data rooms.h5 --out run", ("rooms.h5", "'pix2shape-bench/iqtt'")),
+    ("train cnn --data iqtt-test.h5 --out run", ("iqtt-test.h5", "no training questions")),
+    ("train cnn --data nothing.h5 --out run", ("nothing.h5",)),
+    (f"train cnn {DATA} --out run --set depth=34", ("depth", "18 or 50")),
+    (f"train cnn {DATA} --out run --set width=wide", ("--set", "'width=wide'")),
+    (f"train cnn {DATA} --out run", ("iqtt-train.h5", "32x32", "64")),
+    (f"train cnn {DATA} --out run --resume", ("run: ", "checkpoint")),
+    (f"train ptm {DATA} --out run", ("ptm",)),
+    ("baseline cnn --data iqtt-test.h5 --train rooms.h5", ("--train", "bench train cnn")),
+    ("baseline cnn --data iqtt-test.h5 --weights text.safetensors", ("text.safetensors",)),
+    ("baseline cnn --data iqtt-test.h5 --weights rooms.safetensors", ("rooms.safetensors",)),
+    ("baseline chance --data iqtt-test.h5 --weights rooms.safetensors", ("--weights", "chance")),
+]
+
+
+@pytest.mark.parametrize(("line", "words"), MISTAKES)
+def test_a_mistake_is_one_line_and_leaves_nothing(line, words, folder, check_refusal):
+    pytest.importorskip("torch")
+    before = files_in(folder)
+    result = bench(*line.split())
+    check_refusal(result.exit_code, result.stdout, result.stderr, words)
+    assert files_in(folder) == before
+
+
+def test_without_bundled_weights(folder, monkeypatch, check_refusal):
+    pytest.importorskip("torch")
+    from dataclasses import replace
+
+    from baselines.resnet import answering
+
+    bundled = answering._bundled
+    monkeypatch.setattr(
+        answering, "_bundled", lambda method: bundled(replace(method, files=folder / "none"))
+    )
+    result = bench("baseline", "siamese", "--data", "iqtt-test.h5")
+    check_refusal(
+        result.exit_code, result.stdout, result.stderr, ("--weights", "bench train siamese")
+    )
+
+
+def test_who_interrupts_is_told_how_to_go_on(folder, fake, monkeypatch):
+    def train(data, run_folder, *, resume, progress):
+        raise KeyboardInterrupt
+
+    package = SimpleNamespace(train=train)
+    monkeypatch.setattr(commands, "import_module", lambda name: package)
+    result = bench(*f"train cnn {DATA} --out run".split())
+    assert (result.exit_code, "--resume" in result.stdout) == (1, True)
+
+
+@pytest.mark.parametrize("line", ["train cnn --data x.h5 --out y", "baseline siamese --data x.h5"])
+@pytest.mark.parametrize("gone", ["torch", "safetensors"])
+def test_without_the_optional_packages(line, gone, tmp_path, monkeypatch, check_refusal):
+    find, util = importlib.util.find_spec, importlib.util
+    monkeypatch.setattr(util, "find_spec", lambda name: None if name == gone else find(name))
+    monkeypatch.chdir(tmp_path)
+    result = bench(*line.split())
+    words = (line.split()[1], gone, "pip install '.[model]'")
+    check_refusal(result.exit_code, result.stdout, result.stderr, words)
+
+
+@pytest.mark.parametrize("name", commands.TRAINED)
+def test_every_trained_baseline_has_both_functions(name):
+    pytest.importorskip("torch")
+    package = commands._package(name)
+    assert callable(package.train)
+    assert callable(package.write_submission)
