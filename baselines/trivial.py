@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.files.reader import open_questions
+from metrics.measures.empty_room import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
-from scenegen.camera import pixel_directions
 from scenegen.common.errors import SpecError
 from scenegen.common.seeding import Purpose, item_rng
 from scenegen.rooms.reader import RoomsFile
@@ -60,7 +60,10 @@ def write_room_baseline(
                 elif name == "oracle":
                     submission.add(row, rooms.read("depth", row), rooms.read("normal", row))
                 else:
-                    submission.add(row, *empty_room(rooms, row))
+                    matrix = rooms.read("camera/world_from_camera", row)
+                    fov = float(rooms.read("camera/fov_y_degrees", row))
+                    size = rooms.spec.height, rooms.spec.width
+                    submission.add(row, *empty_room(matrix, fov, *size))
                 progress(1)
 
 
@@ -70,23 +73,6 @@ def write_chance(data: str | Path, out: str | Path, seed: int = 0, overwrite: bo
         count = len(questions)
     answers = item_rng(seed, 0, Purpose.ANSWERS).integers(3, size=count)
     write_answers(out, data, method="chance", answer=answers, overwrite=overwrite)
-
-
-def empty_room(rooms: RoomsFile, row: int) -> tuple[Array, Array]:
-    """Return planar depth, (H, W), and normals, (H, W, 3), of the room's three planes.
-
-    Depth is in scene units and normals are in the camera frame. The planes are continued beyond
-    the room's edges, so that every pixel has a depth.
-    """
-    world_from_camera = rooms.read("camera/world_from_camera", row)
-    size = rooms.spec.height, rooms.spec.width
-    rays = pixel_directions(*size, float(rooms.read("camera/fov_y_degrees", row)))
-    directions, origin = rays @ world_from_camera[:3, :3].T, world_from_camera[:3, 3]
-    with np.errstate(divide="ignore"):
-        reach = np.where(directions < 0, -origin / directions, np.inf)
-    depth = reach.min(axis=-1)
-    depth = np.where(np.isfinite(depth), depth, depth[np.isfinite(depth)].max(initial=1.0))
-    return depth, np.eye(3)[reach.argmin(axis=-1)] @ world_from_camera[:3, :3]
 
 
 def _mean_depth(rooms: RoomsFile, train: str | Path) -> Array:

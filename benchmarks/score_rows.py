@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from metrics.prediction_writer import RoomPredictionWriter
-from metrics.scoring.rooms import score_rows
+from metrics.scoring.rows import score_rows
 from metrics.submissions.reader import open_predictions
 from scenegen.common.hdf5.row_file import Table, new_file
 from scenegen.description.specs import DatasetSpec

@@ -5,7 +5,7 @@ docs/scores.md describes the format. Numbers that are written here read back to 
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -19,11 +19,14 @@ from metrics.scoring.records import (
     FORMAT_VERSION,
     GROUPINGS,
     ID_COLUMNS,
+    OBJECT_COLUMNS,
     OPTIONAL_COLUMNS,
+    SHAPE_COLUMN,
     Groups,
     Meta,
     Score,
     ScoreFile,
+    Skill,
     Submission,
 )
 from metrics.scoring.schema import parse_scores
@@ -43,6 +46,7 @@ __all__ = [
     "Meta",
     "Score",
     "ScoreFile",
+    "Skill",
     "Submission",
     "read_scores",
     "to_json",
@@ -93,10 +97,10 @@ def _parsed(data: bytes) -> ScoreFile:
 def to_json(scores: ScoreFile) -> str:
     """Return the text of a score file: keys in a fixed order, a line for each column of items."""
     meta = asdict(scores.meta)
-    for name in ("versions", "counts"):
+    for name in ("versions", "counts", "noise_floors"):
         meta[name] = dict(sorted(meta[name].items()))
-    if scores.meta.chamfer_floor is None:
-        del meta["chamfer_floor"]
+    if not scores.meta.noise_floors:
+        del meta["noise_floors"]
     head = {
         "format": FORMAT_NAME,
         "format_version": FORMAT_VERSION,
@@ -105,19 +109,27 @@ def to_json(scores: ScoreFile) -> str:
         "comparable": scores.comparable,
         "alignment": scores.alignment,
         "metrics": _metrics(scores.metrics),
+        "skills": _metrics(scores.skills),
         **{name: _groups(getattr(scores, name)) for name in GROUPINGS.get(scores.task, ())},
         "meta": meta,
     }
     # Only ASCII, as one wide character makes the whole text take 4 bytes a character when read.
     text = json.dumps(_plain(head), indent=2, allow_nan=False)
     first = (*ID_COLUMNS.get(scores.task, ()), *OPTIONAL_COLUMNS.get(scores.task, ()))
-    names = [name for name in first if name in scores.items]
-    names += in_order(name for name in scores.items if name not in first)
-    lines = [f"    {json.dumps(name)}: {json.dumps(_column(scores.items[name]))}" for name in names]
-    return f'{text[:-2]},\n  "items": {{\n' + ",\n".join(lines) + "\n  }\n}\n"
+    tables = _table("items", scores.items, first)
+    if scores.objects:
+        tables += ",\n" + _table("objects", scores.objects, (*OBJECT_COLUMNS, SHAPE_COLUMN))
+    return f"{text[:-2]},\n{tables}\n}}\n"
 
 
-def _metrics(found: Mapping[str, Score]) -> dict[str, Any]:
+def _table(key: str, columns: Mapping[str, Any], first: Sequence[str]) -> str:
+    names = [name for name in first if name in columns]
+    names += in_order(name for name in columns if name not in first)
+    lines = [f"    {json.dumps(name)}: {json.dumps(_column(columns[name]))}" for name in names]
+    return f'  "{key}": {{\n' + ",\n".join(lines) + "\n  }"
+
+
+def _metrics(found: Mapping[str, Score | Skill]) -> dict[str, Any]:
     return {name: vars(found[name]) for name in in_order(found)}
 
 

@@ -179,7 +179,7 @@ def _notes(files: Sequence[ScoreFile], names: Sequence[str]) -> Iterator[str]:
         " ±: standard deviation over training runs. Best in bold, which is no test of a difference:"
         " see bench compare."
     )
-    floors = [f.meta.chamfer_floor for f in files if f.meta.chamfer_floor is not None]
+    floors = [f.meta.noise_floors["chamfer"] for f in files if "chamfer" in f.meta.noise_floors]
     if floors and "chamfer" in names:
         yield f"Noise floor of Chamfer at this resolution: {number(max(floors))} scene units."
 

@@ -11,10 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.statistics import bootstrap_interval, cluster_means, wilson_interval
+from metrics.scoring.estimates import by_presence, object_labels, skills
+from metrics.scoring.metric_names import OBJECT_SCORES, metric
 from metrics.scoring.records import GROUPINGS, Score, ScoreFile
 from metrics.scoring.schema import AGREEMENT, SCORE_AGAIN, agree
 from scenegen.common.errors import SceneGenError
 
+Column = NDArray[Any]
 Found = tuple[str, float | None, float | None]
 ACCURACY = "iqtt_accuracy"
 
@@ -26,7 +29,8 @@ class RecheckError(SceneGenError):
 def recheck(file: ScoreFile, progress: Callable[[int], Any] = lambda done: None) -> None:
     """Recompute a score file, as `read_scores` returns it, from its items.
 
-    All scores over images or questions and those by view angle are recomputed with their intervals.
+    All scores over images or questions, those by view angle and those of single objects by shape
+    and size are recomputed with their intervals, and so are skills.
     Of questions by group, whole numbers of right answers have to add up, and the intervals of one
     run have to be Wilson's. Numbers agree within `schema.AGREEMENT`.
 
@@ -38,8 +42,9 @@ def recheck(file: ScoreFile, progress: Callable[[int], Any] = lambda done: None)
     """
     everything = np.ones(len(file.ids), bool)
     with np.errstate(all="ignore"):
-        _compare(file, "metrics", file.metrics, everything)
+        _compare(file, "metrics", file.metrics, file.items, file.clusters)
         _compare_columns(file)
+        _compare_skills(file)
         progress(1)
         for degrees, scores in file.by_view_angle.items():
             place = f"by_view_angle.{degrees}"
@@ -48,8 +53,11 @@ def recheck(file: ScoreFile, progress: Callable[[int], Any] = lambda done: None)
             if not chosen.any():
                 found, expected = "scores", f"an image whose view angle is {int(degrees)} degrees"
                 raise RecheckError(f"{file.place}: {place}", found, expected, SCORE_AGAIN)
-            _compare(file, place, scores, chosen)
+            some = {name: column[chosen] for name, column in file.items.items()}
+            _compare(file, place, scores, some, file.clusters[chosen])
             progress(1)
+        if file.objects:
+            _compare_objects(file)
     for grouping in GROUPINGS["iqtt"]:
         if getattr(file, grouping):
             _compare_questions(file, grouping, getattr(file, grouping))
@@ -61,25 +69,70 @@ def steps(file: ScoreFile) -> int:
 
 
 def _compare(
-    file: ScoreFile, place: str, scores: Mapping[str, Score], chosen: NDArray[np.bool_]
+    file: ScoreFile,
+    place: str,
+    scores: Mapping[str, Score],
+    columns: Mapping[str, Column],
+    clusters: Column,
 ) -> None:
-    """Recompute scores from these items."""
-    names = list(scores)
-    for name in names:
-        if name not in file.items or np.isnan(file.items[name][chosen]).any():
+    """Recompute scores from columns (N,) of items or of single objects, and their scenes (N,)."""
+    for name in scores:
+        there = ~np.isnan(columns.get(name, np.array([np.nan])))
+        if not (there.any() if metric(name).lacking else there.all()):
             where = f"{file.place}: {place}.{name}"
             raise RecheckError(where, "a score", f"numbers in items.{name}", SCORE_AGAIN)
-    if not names:
+    for names, there in by_presence({name: columns[name] for name in scores}):
+        table = np.stack([columns[name][there] for name in names], axis=-1)
+        try:
+            means = cluster_means(table, clusters[there])
+            low, high = _intervals(file, means)
+        except SceneGenError as error:
+            raise RecheckError(f"{file.place}: {place}", error, "scores of finite items") from error
+        for k, name in enumerate(names):
+            mean = float(means[:, k].mean())
+            _require(file, f"{place}.{name}", scores[name], mean, low[k], high[k], len(means))
+
+
+def _compare_skills(file: ScoreFile) -> None:
+    """Recompute the skills of rooms, with their paired intervals."""
+    if file.task != "rooms" or not file.skills:
         return
-    columns = np.stack([file.items[name][chosen] for name in names], axis=-1)
-    try:
-        means = cluster_means(columns, file.clusters[chosen])
-        low, high = _intervals(file, means)
-    except SceneGenError as error:
-        raise RecheckError(f"{file.place}: {place}", error, "scores of finite items") from error
-    for k, name in enumerate(names):
-        mean = float(means[:, k].mean())
-        _require(file, f"{place}.{name}", scores[name], mean, low[k], high[k], len(means))
+    meta = file.meta
+    expected = skills(file.items, file.clusters, meta.seed, meta.resamples, meta.confidence)
+    for name, skill in file.skills.items():
+        place = f"skills.{name}"
+        if name not in expected:
+            told = "none, as items hold no object"
+            raise RecheckError(f"{file.place}: {place}", "a skill", told, SCORE_AGAIN)
+        other = expected[name]
+        for part in ("value", "low", "high", "floor"):
+            scale = other.floor if part == "floor" else max(1.0, abs(other.value))
+            _require_part(
+                file, f"{place}.{part}", getattr(skill, part), getattr(other, part), scale
+            )
+
+
+def _compare_objects(file: ScoreFile) -> None:
+    """Recompute the groups of single objects, and the scores of images that follow from them."""
+    objects = file.objects
+    order = np.argsort(file.ids)
+    entry = order[np.searchsorted(file.ids, objects["row"], sorter=order)]
+    counts = np.bincount(entry, minlength=len(file.ids))
+    for name in OBJECT_SCORES if len(entry) else ():
+        weights = np.ones(len(entry)) if "recall" in name else objects["pixels"].astype(np.float64)
+        sums = np.bincount(entry, weights * objects[name], len(file.ids))
+        expected = sums / np.bincount(entry, weights, len(file.ids))
+        if name in file.items:
+            _require_column(file, name, expected, counts > 0, "objects say")
+    for grouping, labels in object_labels(objects, file.meta.counts.get("pixels", 1)).items():
+        for key, scores in getattr(file, grouping).items():
+            chosen = labels == key
+            place = f"{grouping}.{key}"
+            if not chosen.any():
+                found, told = "scores", "objects of this group"
+                raise RecheckError(f"{file.place}: {place}", found, told, SCORE_AGAIN)
+            some = {name: objects[name][chosen] for name in OBJECT_SCORES}
+            _compare(file, place, scores, some, file.clusters[entry[chosen]])
 
 
 def _intervals(
@@ -111,13 +164,22 @@ def _compare_columns(file: ScoreFile) -> None:
         if not {name, *parts} <= set(columns):
             continue
         expected = function(*(columns[part] for part in parts))
-        scale = np.maximum(np.abs(expected), np.abs(columns[name]))
-        wrong = ~(np.abs(columns[name] - expected) <= AGREEMENT * scale + AGREEMENT**2)
-        if wrong.any():
-            i = int(np.argmax(wrong))
-            where = f"{file.place}: items.{name}[{i}]"
-            told = f"{float(expected[i])!r}, as {' and '.join(parts)} say"
-            raise RecheckError(where, repr(float(columns[name][i])), told, SCORE_AGAIN)
+        everywhere = np.ones(len(expected), bool)
+        _require_column(file, name, expected, everywhere, f"{' and '.join(parts)} say")
+
+
+def _require_column(
+    file: ScoreFile, name: str, expected: Column, there: NDArray[np.bool_], why: str
+) -> None:
+    """Raise RecheckError unless a column of items is this one, where it is there."""
+    found = file.items[name]
+    scale = np.maximum(np.abs(expected), np.abs(found))
+    wrong = there & ~(np.abs(found - expected) <= AGREEMENT * scale + AGREEMENT**2)
+    if wrong.any():
+        i = int(np.argmax(wrong))
+        where = f"{file.place}: items.{name}[{i}]"
+        told = f"{float(expected[i])!r}, as {why}"
+        raise RecheckError(where, repr(float(found[i])), told, SCORE_AGAIN)
 
 
 def _compare_questions(
@@ -158,11 +220,18 @@ def _require(
 ) -> None:
     """Raise RecheckError unless a score is this one."""
     for part, found, expected in _parts(score, value, low, high, n):
-        if not agree(found, expected, value):
-            where = f"{file.place}: {place}.{part}"
-            told = "null" if found is None else repr(found)
-            recomputed = "null" if expected is None else repr(expected)
-            raise RecheckError(where, told, f"{recomputed}, computed from items", SCORE_AGAIN)
+        _require_part(file, f"{place}.{part}", found, expected, value)
+
+
+def _require_part(
+    file: ScoreFile, place: str, found: float | None, expected: float | None, scale: float
+) -> None:
+    """Raise RecheckError unless two numbers agree, rounding of sums of this scale left aside."""
+    if not agree(found, expected, scale):
+        told = "null" if found is None else repr(found)
+        recomputed = "null" if expected is None else repr(expected)
+        told_instead = f"{recomputed}, computed from items"
+        raise RecheckError(f"{file.place}: {place}", told, told_instead, SCORE_AGAIN)
 
 
 def _parts(

@@ -92,14 +92,14 @@ def bootstrap_interval(
     centre = table.mean(axis=0)
     deviations = table - centre
     deviations[:, (table == table[0]).all(axis=0)] = 0.0
-    resampled = _resampled_means(deviations, seed, resamples)
-    ends = [_bca_ends(d, r, z) for d, r in zip(deviations.T, resampled.T, strict=True)]
+    resampled = resampled_means(deviations, seed, resamples)
+    ends = [bca_ends(d, r, z) for d, r in zip(deviations.T, resampled.T, strict=True)]
     low, high = np.array(ends).T
     # Values that differ in their last digit only may all lie on one side of their rounded mean.
     return centre + np.minimum(low, 0.0), centre + np.maximum(high, 0.0)
 
 
-def _resampled_means(values: Array, seed: int, resamples: int) -> Array:
+def resampled_means(values: Array, seed: int, resamples: int) -> Array:
     """Return means (B, K) of B `resamples`, drawn with replacement from the rows of (S, K)."""
     rng = np.random.default_rng(seed)
     count = len(values)
@@ -114,7 +114,7 @@ def _resampled_means(values: Array, seed: int, resamples: int) -> Array:
     return np.concatenate(means)
 
 
-def _bca_ends(deviations: Array, resampled: Array, z: float) -> tuple[float, float]:
+def bca_ends(deviations: Array, resampled: Array, z: float) -> tuple[float, float]:
     """The two BCa percentiles of the resampled means of deviations from the mean."""
     squares = float(np.square(deviations).sum())
     if squares == 0.0:

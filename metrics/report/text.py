@@ -16,6 +16,8 @@ from scenegen.common.text_table import by_number, laid_out, markdown, number, pl
 HEAD = ("score", "value", "95% interval", "std of runs", "unit", "better")
 GROUP_TITLES = {
     "by_view_angle": "by degrees between the view and the scene's first one",
+    "by_object_shape": "of single objects, by shape",
+    "by_object_size": "of single objects, by share of the picture in percent",
     "by_distractor": "by kind of wrong answers",
     "by_rotation_angle": "by rotation between reference and right answer, degrees",
     "by_position": "by place of the right answer",
@@ -50,10 +52,8 @@ def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> N
 
 def score_rows(scores: ScoreFile, escape: Callable[[str], str] = str) -> list[Sequence[str]]:
     """Return a head, and a row for each score; what chance or noise gives follows its score."""
-    floor = scores.meta.chamfer_floor
     references = {"iqtt_accuracy": ("  chance", CHANCE)}
-    if floor is not None:
-        references["chamfer"] = ("  noise floor", floor)
+    references |= {n: ("  noise floor", floor) for n, floor in scores.meta.noise_floors.items()}
     rows: list[Sequence[str]] = [HEAD]
     for name in in_order(scores.metrics):
         score, known = scores.metrics[name], metric(name)
@@ -70,13 +70,15 @@ def group_tables(
     scores: ScoreFile, escape: Callable[[str], str] = str
 ) -> Iterator[tuple[str, list[Sequence[str]]]]:
     """Yield each grouping that the scores have, and its table: a row for each group."""
-    names = [name for name in GROUP_SCORES[scores.task] if name in scores.metrics]
     for grouping in GROUPINGS[scores.task]:
         groups = getattr(scores, grouping)
+        held = {name for found in groups.values() for name in found}
+        names = [name for name in GROUP_SCORES[scores.task] if name in held] or in_order(held)
         rows: list[Sequence[str]] = [("", *map(escape, names), "n")]
         for key in by_number(groups):
-            cells = [" ".join(interval_cells(groups[key][name])) for name in names]
-            rows.append((escape(key), *cells, str(groups[key][names[0]].n)))
+            found = groups[key]
+            cells = [" ".join(interval_cells(found[n])) if n in found else "-" for n in names]
+            rows.append((escape(key), *cells, str(max(score.n for score in found.values()))))
         if groups:
             yield grouping, rows
 
@@ -107,8 +109,8 @@ def _notes(scores: ScoreFile) -> Iterator[str]:
             f"intervals: bootstrap over scenes, {meta.resamples} resamples, seed {meta.seed};"
             f" alignment claimed: {scores.alignment} (points are never aligned)"
         )
-        if meta.chamfer_floor is not None:
-            yield "noise floor: Chamfer distance of the true surface to itself, sampled elsewhere"
+        if meta.noise_floors:
+            yield "noise floor: the score of the true surface, sampled elsewhere, against itself"
     elif scores.runs == 1:
         yield "intervals: Wilson's; abstentions and ties count as wrong"
     else:

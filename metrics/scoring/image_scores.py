@@ -1,15 +1,26 @@
 """All scores of one image: predicted depth and normals against the true ones."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures.chamfer_hausdorff import chamfer, nearest_distances, point_scores
-from metrics.measures.depth import Alignment, compare_depth, depth_scores
+from metrics.measures.chamfer_hausdorff import (
+    NearestDistances,
+    chamfer,
+    hausdorff,
+    nearest_distances,
+    point_scores,
+)
+from metrics.measures.depth import Alignment, compare_depth, depth_scores, mse_depth
+from metrics.measures.empty_room import empty_room
 from metrics.measures.image_search import nearest_distances_on_image
 from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_depth
+from metrics.measures.objects import counted_objects, object_means, single_objects
+from metrics.measures.relief import relief_scores
+from metrics.scoring.metric_names import SKILLED
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.rules import depth_faults, normal_faults, refuse_faults
 from metrics.submissions.truths import TrueView
@@ -21,15 +32,53 @@ F_SCORE_THRESHOLDS = (0.01, 0.02, 0.05)  # scene units: edges of the room
 ALIGNMENTS: tuple[Alignment, ...] = ("none", "scale", "scale_shift")
 
 
+@dataclass(frozen=True)
+class ImageScores:
+    """Scores of one image.
+
+    Attributes:
+        scores: by name; NaN where the image has no such score, see `metric_names.Metric.lacking`.
+        objects: of each object that counts, as `measures.objects.single_objects` gives them.
+    """
+
+    scores: dict[str, float]
+    objects: dict[str, Array]
+
+
+@dataclass(frozen=True)
+class EmptyRoom:
+    """The empty room that the camera of a true view sees.
+
+    Attributes:
+        depth: planar, (H, W), scene units.
+        scores: those of `metric_names.SKILLED`, by name.
+    """
+
+    depth: Array
+    scores: dict[str, float]
+
+
+def score_empty_room(truth: TrueView) -> EmptyRoom:
+    """Draw and score the empty room of a true view, the floor of all skills."""
+    height, width = truth.depth.shape
+    depth, _ = empty_room(truth.world_from_camera, truth.fov_y_degrees, height, width)
+    nearest = nearest_distances_on_image(depth, truth.depth, truth.fov_y_degrees, truth.mask)
+    scores = {"chamfer": chamfer(nearest), "hausdorff": hausdorff(nearest)}
+    scores["mse_depth"] = mse_depth(compare_depth(depth, truth.depth, truth.mask))
+    scores |= object_means(_single_objects(depth, truth, nearest))
+    return EmptyRoom(depth, {name: scores[name] for name in SKILLED})
+
+
 def score_view(
     depth: Array,
     normal: Array | None,
     truth: TrueView,
+    empty: Array,
     *,
     alignments: Sequence[Alignment] = ALIGNMENTS,
     non_finite: NonFinite = "error",
-) -> dict[str, float]:
-    """Return every score of one image by name.
+) -> ImageScores:
+    """Return every score of one image.
 
     Surfels are back-projected from depth, in the camera frame, as Pix2Shape does (section "Scene
     Reconstruction"). Names and units are those of `metric_names`.
@@ -38,9 +87,12 @@ def score_view(
         depth: predicted planar depth, (H, W), scene units.
         normal: predicted normals, (H, W, 3), camera frame; None where the method gives none.
         truth: what it is compared with.
-        alignments: the alignments after which depth is scored; points are never aligned.
+        empty: planar depth of the empty room, (H, W), scene units.
+        alignments: the alignments after which depth is scored; points and relief are never
+            aligned.
         non_finite: what to do with scored pixels that break `submissions.rules`. "penalise" scores
-            them at the worst: depth as 0 (at the camera), a normal as opposite to the true one.
+            them at the worst: depth as 0 (at the camera), a normal as opposite to the true one. An
+            image with such a depth gets the worst scores of relief, -1 and 0.
 
     Raises PredictionError with the count and the first pixel, unless they are penalised, and
     ValueError on other shapes than the truth's.
@@ -49,7 +101,8 @@ def score_view(
     faults = depth_faults(depth, mask)
     if non_finite == "error":
         refuse_faults(faults, PredictionError, "predicted depth")
-    depth = np.where(_any(faults, mask), 0.0, depth)
+    broken = _any(faults, mask)
+    depth = np.where(broken, 0.0, depth)
     if normal is not None:
         faults = normal_faults(normal, mask)
         if non_finite == "error":
@@ -60,36 +113,64 @@ def score_view(
     pair = compare_depth(depth, truth.depth, mask)
     for alignment in alignments:
         scores |= depth_scores(pair, alignment)
+    relief = relief_scores(depth, truth.depth, empty, mask)
+    if broken.any():  # else they would count as relief, at the camera
+        worst = {"relief_correlation": -1.0, "relief_iou": 0.0}
+        relief = {name: value if np.isnan(value) else worst[name] for name, value in relief.items()}
+    objects = _single_objects(depth, truth, nearest)
+    scores |= relief | object_means(objects)
+    counted = counted_objects(truth.object_id)
     if normal is not None:
-        scores |= normal_scores(angular_errors_degrees(normal, truth.normal, mask))
+        angles = angular_errors_degrees(normal, truth.normal, mask)
+        scores |= normal_scores(angles)
+        scores["object_normal_mean_degrees"] = _mean(angles[counted[mask]])
     # Both derived alike, so that a perfect depth is perfect at creases, too, where planes blend.
     derived, _ = normals_from_depth(depth, truth.fov_y_degrees, mask)
     true_derived, on_surface = normals_from_depth(truth.depth, truth.fov_y_degrees, mask)
     angles = angular_errors_degrees(derived, true_derived, on_surface)
-    return scores | {f"derived_{name}": value for name, value in normal_scores(angles).items()}
+    scores |= {f"derived_{name}": value for name, value in normal_scores(angles).items()}
+    # Of objects so thin that no pixel has such a plane, all pixels count.
+    smooth = counted & on_surface if (counted & on_surface).any() else counted
+    angles = angular_errors_degrees(derived, true_derived, smooth) if smooth.any() else angles[:0]
+    return ImageScores(scores | {"derived_object_normal_mean_degrees": _mean(angles)}, objects)
 
 
-def chamfer_floor(truth: TrueView) -> float:
-    """Return the Chamfer distance between two samples of the true surface, in scene units.
+def noise_floors(truth: TrueView) -> dict[str, float]:
+    """Return what two samples of the true surface score against each other, by name of the score.
 
-    One sample is at the pixels' centres, the other at the corners between them. A method whose
-    surfels lie on the true surface, but not on the truth's rays, scores about this. A corner counts
-    where its four pixels show one object; its depth is that of the plane through them, for which
-    1 / depth is linear across the image. NaN where no corner counts.
+    One sample is at the pixels' centres, the other, in the place of a prediction, at the corners
+    between them. A method whose surfels lie on the true surface, but not on the truth's rays,
+    scores about this. A corner counts where its four pixels show one object; its depth is that of
+    the plane through them, for which 1 / depth is linear across the image. No score where no corner
+    counts. Scores that compare depth along the truth's rays have no such floor: it is 0.
     """
     ids, mask = truth.object_id, truth.mask
     height, width = ids.shape
     quads = [(slice(i, height - 1 + i), slice(j, width - 1 + j)) for i, j in np.ndindex(2, 2)]
     whole = np.logical_and.reduce([mask[q] & (ids[q] == ids[quads[0]]) for q in quads])
     if not whole.any():
-        return float("nan")
+        return {}
     depth = np.where(mask, truth.depth, 1.0).astype(np.float64)
     corner_depth = 4.0 / np.sum([1.0 / depth[q] for q in quads], axis=0)
     rays = pixel_directions(height, width, truth.fov_y_degrees)
     between = np.sum([rays[q] for q in quads], axis=0) / 4.0
     corners = (corner_depth[..., None] * between)[whole]
     centres = back_project(truth.depth, truth.fov_y_degrees)[mask]
-    return chamfer(nearest_distances(corners, centres))
+    nearest = nearest_distances(corners, centres)
+    objects = object_means(_single_objects(truth.depth, truth, nearest))
+    scores = {"chamfer": chamfer(nearest), "hausdorff": hausdorff(nearest), **objects}
+    names = ("chamfer", "hausdorff", "object_completeness")
+    return {name: scores[name] for name in names if np.isfinite(scores[name])}
+
+
+def _single_objects(depth: Array, truth: TrueView, nearest: NearestDistances) -> dict[str, Array]:
+    mask = truth.mask
+    error = np.abs(depth[mask] - truth.depth[mask].astype(np.float64))
+    return single_objects(truth.object_id[mask], error, nearest.reverse)
+
+
+def _mean(angles: Array) -> float:
+    return float(angles.mean()) if len(angles) else np.nan
 
 
 def _any(faults: Mapping[str, Array], mask: Array) -> Array:

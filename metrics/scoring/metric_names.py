@@ -8,10 +8,23 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from scenegen.common.errors import SceneGenError
 
-HEADLINE = {"rooms": ("chamfer", "hausdorff", "mse_depth"), "iqtt": ("iqtt_accuracy",)}
+HEADLINE = {
+    "rooms": ("relief_iou", "relief_correlation", "chamfer", "hausdorff", "mse_depth"),
+    "iqtt": ("iqtt_accuracy",),
+}
+RECALL_WITHIN = ("0.02", "0.05")  # scene units
+OBJECT_SCORES = (
+    "object_depth_error",
+    "object_completeness",
+    *(f"object_recall_{limit}" for limit in RECALL_WITHIN),
+)  # of single objects, too
+EMPTY_ROOM = "empty_room_"  # begins the names of the empty room's own scores
+# Scores that have a skill, the floor being the empty room. It has a relief of 0 by definition.
+SKILLED = ("chamfer", "hausdorff", "mse_depth", "object_depth_error", "object_completeness")
 F_SCORE = "f_score_<threshold>"
 DERIVED = "derived_"
 _NEAREST = "the predicted depth of an image nearest to the true depth in least squares."
@@ -41,7 +54,9 @@ class Metric:
         title: for the head of a table.
         unit: "fraction" runs from 0 to 1.
         definition: one sentence that defines the score of one image or question.
-        largest: the upper limit of its values; the lower one is 0.
+        largest, smallest: the limits of its values.
+        lacking: pictures that have no such score: "objects", those without any object that counts;
+            "relief", those whose true relief nowhere exceeds `relief.RELIEF_ABOVE`; else "".
     """
 
     name: str
@@ -51,6 +66,8 @@ class Metric:
     higher_is_better: bool
     definition: str
     largest: float = math.inf
+    smallest: float = 0.0
+    lacking: Literal["", "objects", "relief"] = ""
 
     @property
     def direction(self) -> str:
@@ -114,6 +131,35 @@ _NORMALS = (
              f"fraction of these angles below {limit} degrees.")
       for limit in ("11.25", "22.5", "30")),
 )  # fmt: skip
+_OBJECTS = tuple(
+    replace(metric, lacking="objects")
+    for metric in (
+        _distance("object_depth_error", "Objects' depth error",
+                  "mean absolute difference of predicted and true planar depth, over the pixels of"
+                  " objects."),
+        _distance("object_completeness", "Objects' completeness",
+                  "mean distance from the true points of objects to the nearest of all predicted"
+                  " points."),
+        *(_share(f"object_recall_{limit}", f"Objects found within {limit}",
+                 "fraction of the objects whose own `object_completeness` is below"
+                 f" {limit} scene units.")
+          for limit in RECALL_WITHIN),
+        _angle("object_normal_mean_degrees", "Objects' normals, mean",
+               "mean angle between predicted and true normals, over the pixels of objects."),
+        _angle("derived_object_normal_mean_degrees", "Objects' normals, mean, from depth",
+               "the same of normals derived from the predicted and from the true depth."),
+    )
+)  # fmt: skip
+_RELIEF = (
+    Metric("relief_correlation", "Relief correlation", "rooms", "correlation", True,
+           "correlation, over the scored pixels, of predicted with true relief: planar depth of the"
+           " empty room minus that of the surface.", 1.0, -1.0, "relief"),
+    replace(
+        _share("relief_iou", "Relief IoU",
+               "pixels where predicted and true relief both exceed 0.05 scene units, divided by"
+               " those where either does."),
+        lacking="relief"),
+)  # fmt: skip
 _ACCURACY = _share(
     "iqtt_accuracy",
     "IQTT accuracy",
@@ -150,8 +196,19 @@ ALL: dict[str, Metric] = {
         *(_aligned(metric, ending) for ending in _ALIGNED for metric in _DEPTH),
         *_NORMALS,
         *(_derived(metric) for metric in _NORMALS),
+        *_OBJECTS,
+        *_RELIEF,
         _ACCURACY,
     )
+}
+ALL |= {
+    EMPTY_ROOM + name: replace(
+        ALL[name],
+        name=EMPTY_ROOM + name,
+        title=f"{ALL[name].title}, empty room",
+        definition=f"`{name}` of the empty room, drawn from the true camera.",
+    )
+    for name in SKILLED
 }
 _PLACES = {name: place for place, name in enumerate(ALL)}
 
@@ -200,12 +257,15 @@ def markdown_table() -> str:
         (f"<depth score>{ending}", "the same", "the same", definition)
         for ending, (_, definition) in _ALIGNED.items()
     ]
+    floor = f"the score of the empty room; in `items` alone, for {', '.join(SKILLED)}."
     derived = "the same of normals derived from the predicted and from the true depth."
     rows = [
         *map(_cells, (*_POINTS, *_DEPTH)),
         *forms,
         *map(_cells, _NORMALS),
         (f"{DERIVED}<normal score>", "the same", "the same", derived),
+        *map(_cells, (*_OBJECTS, *_RELIEF)),
+        (f"{EMPTY_ROOM}<score>", "the same", "the same", floor),
         _cells(_ACCURACY),
     ]
     lines = [f"| `{name}` | {' | '.join(cells)} |" for name, *cells in rows]

@@ -87,7 +87,7 @@ def score_questions(
         metrics={"iqtt_accuracy": _accuracy(right, settings)},
         **groups,
         items={"question": rows, "iqtt_accuracy": right.mean(axis=0)},
-        meta=meta_of(files, found, fingerprint, digest, settings, counts, warnings, None),
+        meta=meta_of(files, found, fingerprint, digest, settings, counts, warnings),
     )
 
 

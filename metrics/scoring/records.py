@@ -16,7 +16,7 @@ from metrics.measures.depth import Alignment
 from metrics.submissions.strict_json import LARGEST_WHOLE
 
 FORMAT_NAME = "pix2shape-bench/scores"
-FORMAT_VERSION = "2.0"
+FORMAT_VERSION = "3.0"
 LONGEST_NAME = 200  # characters of method, run and fingerprint
 LONGEST_TEXT = 10_000
 Task = Literal["rooms", "iqtt"]
@@ -34,8 +34,12 @@ ByKey = Annotated[Mapping[Key, Value], FailFast()]
 # Columns of `ScoreFile.items` that identify each entry; no two entries share the first one.
 ID_COLUMNS = {"rooms": ("row", "scene_index", "view_index"), "iqtt": ("question",)}
 OPTIONAL_COLUMNS = {"rooms": ("view_angle_degrees",), "iqtt": ()}
+# Columns of `ScoreFile.objects`, beside its scores: whole numbers, and a text.
+OBJECT_COLUMNS = ("row", "object", "pixels")
+SHAPE_COLUMN = "shape"
+FLOOR_NAME = "empty-room"  # of the skills of rooms
 GROUPINGS = {
-    "rooms": ("by_view_angle",),
+    "rooms": ("by_view_angle", "by_object_shape", "by_object_size"),
     "iqtt": ("by_distractor", "by_rotation_angle", "by_position"),
 }
 
@@ -49,19 +53,40 @@ class Score:
     """A score with its interval.
 
     Attributes:
-        value: mean over views within a scene, then over scenes; or over questions.
+        value: mean over views within a scene, then over scenes; or over questions. Rows that have
+            no such score, as they show no object, are left out.
         low, high: ends of the interval at `Meta.confidence`; None where there is none.
         n: scenes, or questions, that it rests on.
         std: standard deviation over training runs (n - 1 in the denominator); None for one run.
     """
 
     __pydantic_config__ = _CONFIG
-    value: NotNegative
+    value: Number
     low: Number | None
     high: Number | None
     unit: Text
     n: Annotated[int, Field(strict=True, ge=1)]
     std: NotNegative | None
+
+
+@dataclass(frozen=True)
+class Skill:
+    """A score between that of a method that sees nothing, the floor, and a perfect one.
+
+    Attributes:
+        value: 1 is perfect, 0 is the floor, below 0 is worse than it; see `measures.skill`.
+        low, high: ends of the interval at `Meta.confidence`; None where there is none. That of
+            rooms is paired: it resamples the scenes of score and floor together.
+        floor: the floor's score on the same items, in the unit of the score.
+        floor_name: what has that score, such as "empty-room".
+    """
+
+    __pydantic_config__ = _CONFIG
+    value: Annotated[Number, Field(le=1.0)]
+    low: Number | None
+    high: Number | None
+    floor: NotNegative
+    floor_name: Annotated[Name, Field(pattern=r"\S")]
 
 
 @dataclass(frozen=True)
@@ -93,8 +118,8 @@ class Meta:
         confidence: of all intervals.
         counts: such as the number of rows, scenes, runs.
         warnings: for a person, such as why the scores are not comparable.
-        chamfer_floor: Chamfer distance between two samples of the true surface at this
-            resolution, scene units; None where it was not measured, and for questions.
+        noise_floors: by name of the score, what two samples of the true surface score against each
+            other at this resolution; none for scores whose floor is 0, and for questions.
     """
 
     __pydantic_config__ = _CONFIG
@@ -110,7 +135,7 @@ class Meta:
     confidence: Annotated[Number, Field(ge=0.5, le=0.999)]
     counts: ByKey[str, Whole]
     warnings: TupleOf[Text]
-    chamfer_floor: NotNegative | None = None
+    noise_floors: ByKey[str, NotNegative] = field(default_factory=dict)
 
 
 Scores = ByKey[str, Score]
@@ -119,6 +144,8 @@ Degrees = Annotated[str, Field(pattern="^[0-9]{1,3}$")]
 DegreeRange = Annotated[str, Field(pattern="^[0-9]{1,3}-[0-9]{1,3}$")]
 KindOfAnswers = Annotated[str, Field(pattern=r"^[^\s].{0,59}$")]
 Position = Annotated[str, Field(pattern="^[0-2]$")]
+Shape = Annotated[str, Field(pattern=r"^[^\s].{0,59}$")]
+PercentRange = Annotated[str, Field(pattern="^[0-9]{1,3}-[0-9]{1,3}$")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +160,13 @@ class ScoreFile:
         metrics: by name, see `metric_names`.
         items: columns of equal length with an entry for each image or question: the integers of
             `ID_COLUMNS`, maybe those of `OPTIONAL_COLUMNS` (-1 where not known), and float64 by
-            name of the metric, means over the runs.
+            name of the metric, means over the runs; NaN where a row has no such score.
+        skills: by name of the score, for some of `metrics`.
+        objects: rooms only: columns of equal length with an entry for each object that is scored
+            by itself: the integers of `OBJECT_COLUMNS` (row of the truth, id in the image, pixels
+            that show it), the text `SHAPE_COLUMN`, and float64 by name of the metric.
+        by_object_shape: scores of `objects` by shape or class, such as "sphere"; rooms only.
+        by_object_size: the same by range of the share of the picture in percent, such as "1-2".
         by_view_angle: scores by whole degrees between a view and its scene's first one, such as
             "35"; rooms only.
         by_distractor: by kind of wrong answers; questions only, as are the next two.
@@ -150,7 +183,11 @@ class ScoreFile:
     metrics: Annotated[Scores, Field(min_length=1)]
     items: Mapping[str, Annotated[NDArray[Any], SkipValidation]]
     meta: Meta
+    skills: ByKey[str, Skill] = field(default_factory=dict)
+    objects: Mapping[str, Annotated[NDArray[Any], SkipValidation]] = field(default_factory=dict)
     by_view_angle: ByKey[Degrees, Scores] = field(default_factory=dict)
+    by_object_shape: ByKey[Shape, Scores] = field(default_factory=dict)
+    by_object_size: ByKey[PercentRange, Scores] = field(default_factory=dict)
     by_distractor: ByKey[KindOfAnswers, Scores] = field(default_factory=dict)
     by_rotation_angle: ByKey[DegreeRange, Scores] = field(default_factory=dict)
     by_position: ByKey[Position, Scores] = field(default_factory=dict)

@@ -2,7 +2,7 @@
 
 import importlib.metadata
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -127,7 +127,7 @@ def meta_of(
     settings: Settings,
     counts: dict[str, int],
     warnings: list[str],
-    floor: float | None,
+    noise_floors: Mapping[str, float] | None = None,
 ) -> Meta:
     """Return what a score file records beside its numbers."""
     resampled = files[0].task == "rooms" or len(files) > 1
@@ -144,5 +144,5 @@ def meta_of(
         confidence=CONFIDENCE,
         counts=counts,
         warnings=tuple(warnings),
-        chamfer_floor=floor,
+        noise_floors=noise_floors or {},
     )

@@ -5,20 +5,33 @@ This module imports pydantic, so the commands import it only when they run.
 """
 
 import math
-import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from metrics.measures.skill import skill
 from metrics.scoring.known_tests import known_test
-from metrics.scoring.metric_names import Metric, UnknownMetricError, metric
-from metrics.scoring.records import GROUPINGS, ID_COLUMNS, OPTIONAL_COLUMNS, Score, ScoreFile, Task
+from metrics.scoring.metric_names import EMPTY_ROOM, SKILLED, metric
+from metrics.scoring.records import (
+    FLOOR_NAME,
+    GROUPINGS,
+    Score,
+    ScoreFile,
+    Skill,
+    Task,
+)
+from metrics.scoring.tables import (
+    check_presence,
+    item_columns,
+    known_metric,
+    object_columns,
+    within,
+)
 from metrics.submissions.problems import JsonError
-from metrics.submissions.strict_json import LARGEST_WHOLE, refusal, shown, validated
+from metrics.submissions.strict_json import refusal, shown, validated
 
 AGREEMENT = 1e-9  # of numbers that are computed again, relative: other libraries add differently
 RESAMPLES = range(100, 100_001)  # as many as `bench score` takes
@@ -32,7 +45,7 @@ class Head:
     """The keys that say how to read the others."""
 
     format: Literal["pix2shape-bench/scores"]
-    format_version: Annotated[str, Field(pattern=r"^2\.[0-9]{1,4}$")]
+    format_version: Annotated[str, Field(pattern=r"^3\.[0-9]{1,4}$")]
     task: Task
 
 
@@ -49,22 +62,26 @@ def parse_scores(content: Any) -> ScoreFile:
     try:
         task = validated(Head, content).task
     except JsonError as error:
-        if error.where == "format_version" and error.found.startswith("'1."):
+        if error.where == "format_version" and error.found.startswith(("'1.", "'2.")):
             raise JsonError(error.where, error.found, error.expected, SCORE_AGAIN) from error
         raise
     body = {key: value for key, value in content.items() if key not in ("format", "format_version")}
     foreign = {"path"}.union(*GROUPINGS.values()).difference(GROUPINGS[task])
+    foreign |= {"objects"} if task == "iqtt" else set()
     for name in foreign.intersection(body):
         raise refusal(name, "an unknown key", "no key of this name")
     found = validated(ScoreFile, body)
-    if task == "iqtt":
-        if found.alignment != "none":
-            raise refusal("alignment", repr(found.alignment), "'none'")
-        if "chamfer_floor" in body["meta"]:
-            raise refusal("meta.chamfer_floor", "an unknown key", "no key of this name")
+    if task == "iqtt" and found.alignment != "none":
+        raise refusal("alignment", repr(found.alignment), "'none'")
+    if task == "iqtt" and "noise_floors" in body["meta"]:
+        raise refusal("meta.noise_floors", "an unknown key", "no key of this name")
     if len({submission.sha256 for submission in found.meta.submissions}) < found.runs:
         raise refusal("meta.submissions", "the same sha256 twice", "each submission once")
-    found = replace(found, items=_items(found.items, task, found.runs))
+    found = replace(found, items=item_columns(found.items, task, found.runs))
+    found = replace(found, objects=object_columns(found))
+    check_presence(found)
+    for name in found.meta.noise_floors:
+        known_metric(f"meta.noise_floors.{name:.60}", name, task)
     _check_counts(found)
     _check_comparable(found)
     most = len(np.unique(found.clusters))
@@ -72,7 +89,9 @@ def parse_scores(content: Any) -> ScoreFile:
         for name, score in scores.items():
             _check_score(f"{place}.{name}", name, score, found, most)
     for name, score in found.metrics.items():
-        _check_mean(found, name, score, most)
+        _check_mean(found, name, score)
+    for name, known in found.skills.items():
+        _check_skill(found, name, known)
     return found
 
 
@@ -91,6 +110,10 @@ def _check_counts(file: ScoreFile) -> None:
     expected = {scored: len(ids), "runs": file.runs}
     if file.task == "rooms":
         expected["scenes"] = len(np.unique(file.clusters))
+    if file.objects:
+        rows = file.objects["row"]
+        expected["objects"] = len(rows)
+        expected["rows_without_objects"] = len(ids) - len(np.unique(rows))
     for name, number in expected.items():
         if counts.get(name) != number:
             raise _wrong_count(counts, name, f"{number}, as in items and meta.submissions")
@@ -98,6 +121,10 @@ def _check_counts(file: ScoreFile) -> None:
         raise _wrong_count(counts, all_there, f"more than {ids.max()}, the largest number in items")
     if file.task == "rooms" and counts.get("rows_penalised", len(ids) + 1) > len(ids):
         raise _wrong_count(counts, "rows_penalised", f"at most {len(ids)}")
+    if file.objects and len(file.objects["row"]):
+        shown_by = np.bincount(np.unique(rows, return_inverse=True)[1], file.objects["pixels"])
+        if counts.get("pixels", 0) < shown_by.max():
+            raise _wrong_count(counts, "pixels", f"at least {shown_by.max():.0f}, as in objects")
     formula = file.task == "iqtt" and file.runs == 1
     if file.meta.resamples not in ((0,) if formula else RESAMPLES):
         expected_number = "0, as the interval is Wilson's" if formula else "100 to 100000"
@@ -132,106 +159,72 @@ def _check_comparable(file: ScoreFile) -> None:
 
 def _check_score(place: str, name: str, score: Score, file: ScoreFile, most: int) -> None:
     """Raise JsonError unless a score suits its name, its interval, and the number of clusters."""
-    known = _metric(place, name, file.task)
+    known = known_metric(place, name, file.task)
     if score.unit != known.unit:
         raise refusal(f"{place}.unit", repr(score.unit), repr(known.unit))
-    if score.value > known.largest:
-        raise refusal(f"{place}.value", shown(score.value), f"at most {known.largest:g}")
+    if not known.smallest <= score.value <= known.largest:
+        expected = f"a number {within(known.smallest, known.largest)}"
+        raise refusal(f"{place}.value", shown(score.value), expected)
     if score.n > most:
         what = "scenes" if file.task == "rooms" else "questions"
         raise refusal(f"{place}.n", shown(score.n), f"at most {most}, the number of {what}")
-    if (score.low is None) != (score.high is None):
-        raise refusal(place, "one end of an interval", "both, or null for both")
-    if score.low is not None and score.high is not None:
-        slack = AGREEMENT * score.value
-        if not score.low - slack <= score.value <= score.high + slack:
-            found = f"{score.value!r} outside of {score.low!r} to {score.high!r}"
-            raise refusal(f"{place}.value", found, "a value within its interval")
+    _check_interval(place, score)
     if score.std is not None and file.runs == 1:
         raise refusal(f"{place}.std", shown(score.std), "null, as there is one run")
 
 
-def _items(stored: Mapping[str, Any], task: str, runs: int) -> dict[str, NDArray[Any]]:
-    """Return the columns as arrays, (N,) each."""
-    required, optional = ID_COLUMNS[task], OPTIONAL_COLUMNS[task]
-    for name in required:
-        if name not in stored:
-            raise refusal(f"items.{name}", "no such key", "it to be there")
-    columns: dict[str, NDArray[Any]] = {}
-    for name, values in stored.items():
-        place = f"items.{name:.60}"
-        if name in required or name in optional:
-            least = 0 if name in required else -1
-            columns[name] = _column(place, values, np.int64, least, LARGEST_WHOLE)
-        else:
-            most = _metric(place, name, task).largest
-            columns[name] = _column(place, values, np.float64, 0, most)
-    ids = columns[required[0]]
-    for name, column in columns.items():
-        if len(column) != len(ids):
-            expected = f"{len(ids)}, as in {required[0]}"
-            raise refusal(f"items.{name}", f"{len(column)} entries", expected)
-    if not len(ids):
-        raise refusal("items", "no entries", "at least one in each column")
-    names, times = np.unique(ids, return_counts=True)
-    if len(names) < len(ids):
-        twice = names[int(np.argmax(times > 1))]
-        raise refusal(f"items.{required[0]}", f"{twice} twice", "each once")
-    answers = columns.get("iqtt_accuracy")
-    if answers is not None and runs == 1:
-        wrong = ~np.isin(answers, (0.0, 1.0))
-        if wrong.any():
-            found = repr(float(answers[wrong][0]))
-            raise refusal("items.iqtt_accuracy", found, "0 or 1 for one run")
-    return columns
+def _check_interval(place: str, score: Score | Skill) -> None:
+    """Raise JsonError unless an interval has both ends or none, and the value between them."""
+    if (score.low is None) != (score.high is None):
+        raise refusal(place, "one end of an interval", "both, or null for both")
+    if score.low is not None and score.high is not None:
+        slack = AGREEMENT * abs(score.value)
+        if not score.low - slack <= score.value <= score.high + slack:
+            found = f"{score.value!r} outside of {score.low!r} to {score.high!r}"
+            raise refusal(f"{place}.value", found, "a value within its interval")
 
 
-def _column(place: str, values: Any, dtype: type[Any], least: float, most: float) -> NDArray[Any]:
-    """Return a list of numbers within limits as an array; null becomes NaN where NaN can be."""
-    if not isinstance(values, list):
-        raise refusal(place, shown(values), "a list of numbers")
-    floats = dtype is np.float64
-    kinds = {int, float, type(None)} if floats else {int}
-    try:
-        column = np.array(values, dtype) if set(map(type, values)) <= kinds else None
-    except OverflowError:
-        column = None
-    if column is not None:
-        outside = np.isinf(column) | (column < least) | (column > most)
-        if not outside.any():
-            return column
-    for i, value in enumerate(values):
-        number = type(value) in kinds - {type(None)} and abs(value) <= sys.float_info.max
-        if not (floats and value is None) and not (number and least <= value <= most):
-            limits = f"from {least} to {most:g}" if np.isfinite(most) else f"from {least}"
-            expected = f"a {'finite' if floats else 'whole'} number {limits}"
-            raise refusal(f"{place}[{i}]", shown(value), expected)
-    raise AssertionError("an array of numbers within limits can be made")
-
-
-def _metric(place: str, name: str, task: str) -> Metric:
-    """Return what a score is. Raises JsonError for a name that is no score of the task."""
-    try:
-        known = metric(name)
-    except UnknownMetricError:
-        known = None
-    if known is None or known.task != task:
-        raise refusal(place, f"no score of task {task!r}", "a name listed in docs/scores.md")
-    return known
-
-
-def _check_mean(file: ScoreFile, name: str, score: Score, clusters: int) -> None:
-    """Raise JsonError unless a score is the mean of its column, over views and then scenes."""
-    if score.n != clusters:
-        raise refusal(f"metrics.{name}.n", shown(score.n), f"{clusters}, as in items")
+def _mean(file: ScoreFile, name: str, why: str) -> tuple[float, int]:
+    """Return the mean of a column, over views and then scenes, and the number of scenes."""
     column = file.items.get(name)
     if column is None:
-        raise refusal(f"items.{name}", "no such key", f"the column of metrics.{name}")
-    if np.isnan(column).any():
-        raise refusal(f"items.{name}", "null", f"numbers, as metrics.{name} is their mean")
-    index = np.unique(file.clusters, return_inverse=True)[1]
+        raise refusal(f"items.{name}", "no such key", f"the column of {why}")
+    there = ~np.isnan(column)
+    if not there.any() or not (there.all() or metric(name).lacking):
+        raise refusal(f"items.{name}", "null", f"numbers, as {why} is their mean")
+    index = np.unique(file.clusters[there], return_inverse=True)[1]
     with np.errstate(over="ignore"):  # `cluster_means` refuses columns whose sum overflows
-        mean = float((np.bincount(index, column) / np.bincount(index)).mean())
+        means = np.bincount(index, column[there]) / np.bincount(index)
+        return float(means.mean()), len(means)
+
+
+def _check_mean(file: ScoreFile, name: str, score: Score) -> None:
+    """Raise JsonError unless a score is the mean of its column, over views and then scenes."""
+    mean, clusters = _mean(file, name, f"metrics.{name}")
+    if score.n != clusters:
+        raise refusal(f"metrics.{name}.n", shown(score.n), f"{clusters}, as in items")
     if not agree(score.value, mean, 0.0):
         expected = f"{mean!r}, the mean of items.{name} over scenes"
         raise refusal(f"metrics.{name}.value", repr(score.value), expected)
+
+
+def _check_skill(file: ScoreFile, name: str, found: Skill) -> None:
+    """Raise JsonError unless a skill follows from a score of the file and from its floor."""
+    place = f"skills.{name}"
+    known = known_metric(f"skills.{name:.60}", name, file.task)
+    if name not in file.metrics:
+        raise refusal(place, "the skill of no score", f"metrics.{name}")
+    if file.task == "rooms":
+        if name not in SKILLED:
+            raise refusal(place, "a score without skill", f"one of {', '.join(SKILLED)}")
+        if found.floor_name != FLOOR_NAME:
+            raise refusal(f"{place}.floor_name", repr(found.floor_name), repr(FLOOR_NAME))
+        floor, _ = _mean(file, EMPTY_ROOM + name, f"{place}.floor")
+        if not agree(found.floor, floor, 0.0):
+            expected = f"{floor!r}, the mean of items.{EMPTY_ROOM}{name} over scenes"
+            raise refusal(f"{place}.floor", repr(found.floor), expected)
+    expected_value = skill(file.metrics[name].value, found.floor, known.higher_is_better)
+    if expected_value is None or not agree(found.value, expected_value, 1.0):
+        told = "no skill" if expected_value is None else repr(expected_value)
+        raise refusal(f"{place}.value", repr(found.value), f"{told}, as score and floor say")
+    _check_interval(place, found)

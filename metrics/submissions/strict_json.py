@@ -33,7 +33,7 @@ _EXPECTED = {
 
 
 _PATTERNS = {
-    r"^2\.[0-9]{1,4}$": "a version 2.x",
+    r"^3\.[0-9]{1,4}$": "a version 3.x",
     "^[0-9a-f]{64}$": "64 hexadecimal digits",
     r"\S": "a text that is not blank",
 }

@@ -39,12 +39,14 @@ class TrueView:
         normal: (H, W, 3), camera frame, unit, facing the viewer.
         object_id: (H, W).
         fov_y_degrees: vertical field of view.
+        world_from_camera: (4, 4), rigid.
     """
 
     depth: Array
     normal: Array
     object_id: Array
     fov_y_degrees: float
+    world_from_camera: Array
 
     @property
     def mask(self) -> Array:
@@ -95,6 +97,7 @@ def read_true_view(truth: RoomsFile, row: int) -> TrueView:
         truth.read("normal", row),
         truth.read("object_id", row),
         float(truth.read("camera/fov_y_degrees", row)),
+        truth.read("camera/world_from_camera", row),
     )
     depth, surface = view.depth, view.object_id >= 0
     normal = as_doubles(view.normal)
@@ -112,16 +115,15 @@ def read_true_view(truth: RoomsFile, row: int) -> TrueView:
             raise FileFormatError(_place(truth, name, row), found, expected)
     if not surface.any():
         raise FileFormatError(_place(truth, "object_id", row), "no surface", "a pixel to be scored")
-    _check_camera(truth, row, view.fov_y_degrees)
+    _check_camera(truth, row, view)
     return view
 
 
-def _check_camera(truth: RoomsFile, row: int, fov_y_degrees: float) -> None:
-    if not 0.0 < fov_y_degrees < 180.0:
+def _check_camera(truth: RoomsFile, row: int, view: TrueView) -> None:
+    if not 0.0 < view.fov_y_degrees < 180.0:
         where = _place(truth, "camera/fov_y_degrees", row)
-        raise FileFormatError(where, fov_y_degrees, "between 0 and 180")
-    name = "camera/world_from_camera"
-    matrix = truth.read(name, row)
+        raise FileFormatError(where, view.fov_y_degrees, "between 0 and 180")
+    matrix = view.world_from_camera
     rotation = np.clip(matrix[:3, :3], -2.0, 2.0)  # beyond which it is none, and squares overflow
     rigid = (
         np.isfinite(matrix).all()
@@ -131,7 +133,8 @@ def _check_camera(truth: RoomsFile, row: int, fov_y_degrees: float) -> None:
     )
     if not rigid:
         found = "a matrix that is no rotation and shift"
-        raise FileFormatError(_place(truth, name, row), found, "a rigid transform")
+        where = _place(truth, "camera/world_from_camera", row)
+        raise FileFormatError(where, found, "a rigid transform")
 
 
 def _place(truth: RoomsFile, name: str, row: int) -> str:

@@ -4,24 +4,12 @@ import h5py
 import numpy as np
 import pytest
 
-from baselines.trivial import empty_room, write_chance, write_room_baseline
+from baselines.trivial import write_chance, write_room_baseline
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.scoring.evaluate import score
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
-
-
-def test_an_empty_room_is_the_truth_wherever_no_object_is(rooms_path):
-    with RoomsFile(rooms_path) as rooms:
-        for row in range(len(rooms)):
-            depth, normal = empty_room(rooms, row)
-            room = rooms[row]
-            wall = room.object_id == 0
-            assert np.isfinite(depth).all()
-            assert depth[wall] == pytest.approx(room.depth[wall], rel=1e-5)
-            assert normal[wall] == pytest.approx(room.normal[wall], abs=1e-5)
-            assert (depth[room.object_id > 0] > room.depth[room.object_id > 0] - 1e-4).all()
 
 
 def test_means_come_from_the_training_file_and_baselines_rank(make_rooms, rooms_path, tmp_path):

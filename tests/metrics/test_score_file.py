@@ -16,7 +16,9 @@ from metrics.score_file import JsonError, Score, read_scores, to_json, write_sco
 
 
 def test_what_is_written_reads_back_to_the_same_bits(tmp_path):
-    scores = made_scores.simple_rooms(runs=3, chamfer_floor=0.1 + 0.2, warnings=("a", "b"))
+    scores = made_scores.simple_rooms(
+        runs=3, noise_floors={"chamfer": 0.1 + 0.2}, warnings=("a", "b")
+    )
     path = tmp_path / "scores.json"
     write_scores(scores, path)
     found = read_scores(path)

@@ -11,7 +11,7 @@ from metrics.score_file import JsonError, read_scores, to_json, write_scores
 from metrics.scoring.known_tests import KNOWN_TESTS
 from metrics.submissions.strict_json import LONGEST_SHOWN, refusal
 
-ROOMS = json.loads(to_json(made_scores.simple_rooms(runs=2, chamfer_floor=0.01)))
+ROOMS = json.loads(to_json(made_scores.simple_rooms(runs=2, noise_floors={"chamfer": 0.01})))
 IQTT = json.loads(to_json(made_scores.iqtt_scores("m", [1, 0, 1, 1])))
 GONE = object()
 
@@ -77,8 +77,8 @@ LOW, HIGH = (ROOMS["metrics"]["chamfer"][end] for end in ("low", "high"))
 WRONG = [
     ("format", GONE, "", "no such key", "to be there"),
     ("format", "pix2shape-bench/rooms", "", "'pix2shape-bench/rooms'", "'pix2shape-bench/scores'"),
-    ("format_version", "1.0", "", "'1.0'", "2.x"),
-    ("format_version", "3.0", "", "'3.0'", "2.x"),
+    ("format_version", "1.0", "", "'1.0'", "3.x"),
+    ("format_version", "4.0", "", "'4.0'", "3.x"),
     ("task", "room", "", "'room'", "'rooms' or 'iqtt'"),
     ("task", ["rooms"], "", "a list of 1", "'rooms' or 'iqtt'"),
     ("method", 3, "", "3", "text"),
@@ -92,11 +92,11 @@ WRONG = [
     ("metrics/cd", ROOMS["metrics"]["chamfer"], "", "no score of task 'rooms'", "docs/scores.md"),
     ("metrics/iqtt_accuracy", ROOMS["metrics"]["chamfer"], "", "no score of task 'rooms'", "docs"),
     ("metrics/chamfer/value", None, "", "null", "number"),
-    ("metrics/chamfer/value", -0.1, "", "-0.1", "equal to 0"),
+    ("metrics/chamfer/value", -0.1, "", "-0.1", "a number from 0"),
     ("metrics/chamfer/value", 0.3, "", f"0.3 outside of {LOW} to {HIGH}", "within its interval"),
     ("metrics/chamfer/value", 0.21, "", "0.21", "0.2, the mean of items.chamfer"),
     ("metrics/chamfer/value", 10**400, "", "a huge whole number", "number"),
-    ("metrics/f_score_0.05/value", 1.5, "", "1.5", "at most 1"),
+    ("metrics/f_score_0.05/value", 1.5, "", "1.5", "from 0 to 1"),
     ("metrics/chamfer/unit", "m", "", "'m'", "'scene unit'"),
     ("metrics/chamfer/low", None, "metrics.chamfer", "one end of an interval", "both"),
     (
@@ -188,7 +188,7 @@ WRONG_QUESTIONS = [
     ("items/iqtt_accuracy", [1, 0, 1, 0.5], "", "0.5", "0 or 1"),
     ("alignment", "scale", "", "'scale'", "'none'"),
     ("by_view_angle", {}, "", "an unknown key", "no key of this name"),
-    ("meta/chamfer_floor", None, "", "an unknown key", "no key of this name"),
+    ("meta/noise_floors", {}, "", "an unknown key", "no key of this name"),
 ]
 
 
@@ -234,9 +234,10 @@ def test_text_that_is_no_score_file(text, where, found, tmp_path):
     assert error[1].startswith(found)
 
 
-def test_files_of_format_1_are_scored_again(tmp_path):
+@pytest.mark.parametrize("version", ["1.0", "2.0"])
+def test_files_of_older_formats_are_scored_again(version, tmp_path):
     path = tmp_path / "s.json"
-    path.write_text(json.dumps(changed(ROOMS, "format_version", "1.0")))
+    path.write_text(json.dumps(changed(ROOMS, "format_version", version)))
     with refused(JsonError, "format_version", hint="score the submission again"):
         read_scores(path)
 

@@ -113,7 +113,9 @@ def test_labels_tell_runs_and_claims():
     row = table.rows[0]
     assert row.label == "a (3 runs; claims depth when scaled and shifted)"
     assert row.cells[0].rest.startswith(" ± 0.0020 [")
-    floor = replace(several, meta=replace(several.meta, chamfer_floor=0.0123, confidence=0.9))
+    floor = replace(
+        several, meta=replace(several.meta, noise_floors={"chamfer": 0.0123}, confidence=0.9)
+    )
     notes = leaderboard([floor, rooms("b")], paper=False)[0].notes
     assert "Noise floor of Chamfer at this resolution: 0.01230 scene units." in notes
     assert any(note.startswith("[low, high]: 90% and 95% interval") for note in notes)

@@ -18,7 +18,7 @@ def rooms(name="mine", **meta):
 
 
 def test_the_text_shows_every_score_and_its_reference():
-    scores = rooms(chamfer_floor=0.0123, warnings=("mind the gap",))
+    scores = rooms(noise_floors={"chamfer": 0.0123}, warnings=("mind the gap",))
     title, table, *_, notes = text_report(scores).split("\n\n")
     assert title == "mine: 4 images of 2 scenes of rooms.h5"
     cells = {line.split()[0]: line.split() for line in table.splitlines()}

@@ -65,7 +65,7 @@ def test_the_truth_is_perfect(folder):
         best = 1.0 if metric(name).higher_is_better else 0.0
         assert value.value == pytest.approx(best, abs=1e-10), name
     assert {"normal_mean_degrees", "derived_normal_mean_degrees"} <= set(found.metrics)
-    assert 0 < found.meta.chamfer_floor < 0.1
+    assert 0 < found.meta.noise_floors["chamfer"] < 0.1
 
 
 def test_points_are_those_of_scipy_and_means_those_of_numpy(folder):
@@ -114,7 +114,7 @@ def test_files_are_opened_once_however_many_rows_they_have(folder, monkeypatch):
     counts = []
     for chunk in (8, 1):
         opened.clear()
-        monkeypatch.setattr("metrics.scoring.rooms.CHUNK", chunk)
+        monkeypatch.setattr("metrics.scoring.rows.CHUNK", chunk)
         score([folder / "empty-room.h5"], settings=Settings(processes=1))
         counts.append(len(opened))
     assert counts[0] == counts[1]

@@ -9,7 +9,7 @@ import pytest
 from refusals import refused
 
 from baselines.trivial import write_room_baseline
-from metrics.scoring import rooms as module
+from metrics.scoring import rows as module
 from metrics.scoring.runs import ScoringError
 from metrics.submissions.reader import open_predictions
 
