@@ -83,7 +83,7 @@ def best_fits(reference: Tensor, answers: Tensor) -> Tensor:
 def _turned(volume: Tensor, box: Tensor, points: Tensor, rotations: Tensor) -> Tensor:
     """Return a volume's values at points when it is turned, centred: (1, D, D, D) -> (R, P)."""
     parts = []
-    for some in rotations.split(CHUNK):
+    for some in torch.split(rotations, CHUNK):
         places = (points @ some).reshape(1, -1, 3)  # the inverse of each rotation, on the left
         parts.append(sampled(volume, box, places).view(len(some), len(points)))
     return _centred(torch.cat(parts))
@@ -103,8 +103,8 @@ def features(model: Ptn, images: Tensor) -> Tensor:
     questions, pictures = images.shape[:2]
     none = images.new_empty(questions * pictures, 0)
     code = model.encode(images.flatten(0, 1), none)
-    volumes = model.decode(code, none).unflatten(0, (questions, pictures))
-    code = code.unflatten(0, (questions, pictures))
+    volumes = model.decode(code, none).view(questions, pictures, *[VOXELS] * 3)
+    code = code.view(questions, pictures, -1)
     nearness = -(code[:, 1:] - code[:, :1]).norm(dim=-1)
     fits = torch.stack([best_fits(volume[0], volume[1:]) for volume in volumes])
     return torch.stack([fits, nearness], dim=-1)

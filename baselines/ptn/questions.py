@@ -29,7 +29,7 @@ from scenegen.rendering.ground_truth import decode_image
 
 Array = NDArray[Any]
 PART = "unlabeled"
-BOX = {"low": (-1.0, -1.0, -1.0), "high": (1.0, 1.0, 1.0)}  # every shape fits, however turned
+BOX = (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0)  # every shape fits, however turned
 EXPECTED = "a training file such as iqtt-train.h5, with the group `truth`"
 
 

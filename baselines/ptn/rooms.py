@@ -22,23 +22,26 @@ from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
+Corner = tuple[float, float, float]
 SWAPPED = (2, 1, 0)  # x, y, z of the mirrored room
 
 
-def room_box(path: str | Path) -> dict[str, tuple[float, float, float]]:
+def room_box(path: str | Path) -> tuple[Corner, Corner]:
     """Return the corners of the part of the unit box that a file's objects can reach.
 
     Raises as `RoomsFile`.
     """
     with RoomsFile(path) as rooms:
         spec = rooms.spec
-    return {"low": (0.0, 0.0, 0.0), "high": (1.0, min(1.0, 2 * spec.object_radius[1]), 1.0)}
+    return (0.0, 0.0, 0.0), (1.0, min(1.0, 2 * spec.object_radius[1]), 1.0)
 
 
 class RoomImages:
     """The images and cameras of a rooms file, mirrored where the network wants them so.
 
     Attributes:
+        shape: height and width of the images, pixels.
+        poses, fov_y_degrees: `world_from_camera` and field of view of each row's camera.
         mirrored: for each row, whether its image is mirrored for the encoder, (N,).
         rows_of: the rows of each scene, by view, so the first is the scene's input image.
     """
@@ -47,8 +50,9 @@ class RoomImages:
         """Read the cameras. Raises SpecError, FileFormatError."""
         check_reducible(rooms.path, rooms.spec.height, rooms.spec.width, size)
         self.rooms, self._size = rooms, size
+        self.shape = rooms.spec.height, rooms.spec.width
         self.poses: Array = rooms.read("camera/world_from_camera", slice(None))
-        self._fov: Array = rooms.read("camera/fov_y_degrees", slice(None))
+        self.fov_y_degrees: Array = rooms.read("camera/fov_y_degrees", slice(None))
         unknown = np.flatnonzero(~np.isfinite(self.poses).all(axis=(1, 2)))
         if len(unknown):
             where = f"{rooms.path}: camera/world_from_camera, row {unknown[0]}"
@@ -75,9 +79,8 @@ class RoomImages:
         Args:
             pixels: numbers of pixels, counted row by row; by default all.
         """
-        spec, pose = self.rooms.spec, self.poses[row]
-        fov = float(self._fov[row])
-        rays = pixel_directions(spec.height, spec.width, fov).reshape(-1, 3)
+        pose = self.poses[row]
+        rays = pixel_directions(*self.shape, float(self.fov_y_degrees[row])).reshape(-1, 3)
         rays = rays if pixels is None else rays[pixels]
         directions = rays @ pose[:3, :3].T
         return np.stack([np.broadcast_to(pose[:3, 3], directions.shape), directions])
@@ -117,7 +120,7 @@ class TrainingRooms:
     def batch(self, rng: np.random.Generator) -> Batch:
         """Draw a batch: any view of a scene is the input, and the volume is seen from `views`."""
         config, images = self._config, self._images
-        spec = images.rooms.spec
+        count = images.shape[0] * images.shape[1]
         made: list[tuple[Array, Array, Array, Array]] = []
         for scene in rng.integers(len(images.rows_of), size=config.batch):
             rows = images.rows_of[scene]
@@ -126,7 +129,7 @@ class TrainingRooms:
             rays, found = [], []
             again = len(rows) < config.views
             for other in rng.choice(rows, size=config.views, replace=again):
-                pixels = rng.integers(spec.height * spec.width, size=config.rays)
+                pixels = rng.integers(count, size=config.rays)
                 world = images.rays(int(other), pixels)
                 found.append(self._silhouettes.at(int(other), pixels, *world))
                 rays.append(world[..., [*SWAPPED]] if mirrored else world)

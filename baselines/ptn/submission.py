@@ -20,8 +20,8 @@ from baselines.ptn.network import Ptn
 from baselines.ptn.projection import first_hit, outward
 from baselines.ptn.rooms import SWAPPED, RoomImages
 from baselines.ptn.storage import Card, load_weights
-from baselines.trivial import empty_room
 from iqtt.files.reader import QuestionsFile, open_questions, parts
+from metrics.measures.empty_room import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from scenegen.common.errors import SpecError
 from scenegen.common.new_file import check_writable
@@ -136,7 +136,7 @@ def seen(
         volume: (1, D, D, D).
         mirrored: whether it is that of a mirrored image.
     """
-    depth, normal = empty_room(images.rooms, row)
+    depth, normal = empty_room(images.poses[row], images.fov_y_degrees[row], *images.shape)
     world = images.rays(row)
     rays = torch.from_numpy((world[..., [*SWAPPED]] if mirrored else world).astype(np.float32))
     origin, direction = rays[:, None]

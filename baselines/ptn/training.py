@@ -190,8 +190,8 @@ def _config(data: str | Path, settings: dict[str, Any]) -> PtnConfig:
     """Return the configuration that suits a file."""
     if is_question_file(data):
         check_questions(data)
-        return PtnConfig(task="questions", **BOX, **settings)
-    return PtnConfig(task="rooms", **room_box(data), **settings)
+        return PtnConfig("questions", *BOX, **settings)
+    return PtnConfig("rooms", *room_box(data), **settings)
 
 
 def _source(data: str | Path, config: PtnConfig) -> Source:

@@ -62,7 +62,7 @@ def test_an_image_is_mirrored_where_its_camera_stands_nearer_z(make_rooms, tmp_p
 
 def test_the_box_holds_every_object(make_rooms, tmp_path):
     path = make_rooms(tmp_path / "rooms.h5", 4, pose="any")
-    top = room_box(path)["high"][1]
+    top = room_box(path)[1][1]
     with RoomsFile(path) as rooms:
         assert top == 2 * rooms.spec.object_radius[1]
         scale = rooms.read("object/scale", slice(None))
