@@ -304,7 +304,7 @@ def draw_lights(
     around = rng.uniform(0.0, 2 * math.pi, (images, most))
     r = np.sqrt(1 - z * z)
     direction = np.stack([r * np.cos(around), r * np.sin(around), z], axis=2)
-    color = rng.uniform(0.5, 1.0, (images, most, 3))
+    color = rng.uniform(0.3, 1.0, (images, most, 3))
     level = spec.light_level * distance**2 / count
     color *= level[:, None, None] / color.max(axis=2, keepdims=True)
     used = (np.arange(most) < count[:, None])[..., None]
