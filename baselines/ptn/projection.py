@@ -1,9 +1,8 @@
 """The perspective transformer: voxels are sampled along the rays of a camera.
 
-Yan et al., "Perspective Transformer Nets" (NeurIPS 2016), section 3.2: the places of samples are
-transformed from the camera to the volume, the volume is interpolated there trilinearly (equation
-2), and the silhouette is the largest value along each ray (equation 3). Here the samples of a ray
-are spread evenly between the places where it enters and leaves the volume's box, instead of over
+Yan et al., "Perspective Transformer Nets" (NeurIPS 2016): the places of samples are transformed
+from the camera to the volume, the volume is interpolated there trilinearly, and the silhouette is
+the largest value along each ray. Here the samples of a ray are spread evenly between the places where it enters and leaves the volume's box, instead of over
 planes of depth that are the same for all rays, so that none is wasted outside. Functions of
 tensors; all lengths are in scene units and all places in the volume's frame.
 """

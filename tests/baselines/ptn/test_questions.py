@@ -59,6 +59,10 @@ def test_volumes_of_the_truth_have_the_batchs_silhouettes(split):
         which = int(np.argmax([one.mean() for one in same]))
         cubes, turn = question.truth.cubes[which], question.truth.world_from_shape[which]
         rays = batch.origin[item][None], batch.direction[item][None]
+        toward = torch.nn.functional.normalize(batch.direction[item], dim=1)
+        miss = torch.linalg.cross(batch.origin[item], toward).norm(dim=1)
+        assert miss.max() < 1.02 * 2**0.5  # rays of a camera that frames the ball of radius 1
+        assert len(batch.origin[item].unique(dim=0)) == 3  # cameras
         found = silhouettes(cubes_volume(model, cubes, turn, radius), model.box, *rays, 96)[0] > 0.5
         assert (found != (batch.silhouette[item] > 0)).float().mean() < 0.03
 
