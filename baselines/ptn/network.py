@@ -1,8 +1,9 @@
 """The networks: an image becomes a code, and the code a volume of 32^3 occupancies.
 
-Layers as Yan et al. list them on the page of their code: convolutions of 5x5 with 64, 128 and 256 channels,
-fully connected layers of 1024, 1024 and 512, then one of 3^3 x 512 and transposed 3D convolutions
-to 6^3 x 256, 15^3 x 96 and 32^3. All numbers of channels are multiples of `width`, 64 in the paper.
+Layers as Yan et al. list them on the page of their code: convolutions of 5x5 with 64, 128 and 256
+channels, fully connected layers of 1024, 1024 and 512, then one of 3^3 x 512 and transposed 3D
+convolutions to 6^3 x 256, 15^3 x 96 and 32^3. All numbers of channels are multiples of `width`, 64
+in the paper.
 """
 
 from dataclasses import dataclass

@@ -2,9 +2,9 @@
 
 Yan et al., "Perspective Transformer Nets" (NeurIPS 2016): the places of samples are transformed
 from the camera to the volume, the volume is interpolated there trilinearly, and the silhouette is
-the largest value along each ray. Here the samples of a ray are spread evenly between the places where it enters and leaves the volume's box, instead of over
-planes of depth that are the same for all rays, so that none is wasted outside. Functions of
-tensors; all lengths are in scene units and all places in the volume's frame.
+the largest value along each ray. Here the samples of a ray are spread evenly between the places
+where it enters and leaves the volume's box, instead of over planes of depth that are the same for
+all rays, so that none is wasted outside. Functions of tensors; places are in the volume's frame.
 """
 
 import torch

@@ -1,7 +1,7 @@
 """`train`: the projection loss, its iterations, and a run's folder with checkpoint and weights.
 
-The loss is the projection loss of Yan et al. (NeurIPS 2016): the mean squared difference of the volume's silhouettes
-from the true ones, over the views of each image. There is no loss on volumes.
+The loss is the projection loss of Yan et al. (NeurIPS 2016): the mean squared difference of the
+volume's silhouettes from the true ones, over the views of each image. There is no loss on volumes.
 """
 
 import errno
