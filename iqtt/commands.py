@@ -84,6 +84,13 @@ option = partial(click.option, show_default=True)
     " one shape, in degrees.",
 )
 @option(
+    "--min-sight-angle",
+    "min_sight_angle_degrees",
+    type=float,
+    help="Smallest angle between the lines of sight of these views, in degrees: nearer views, and"
+    " views from behind, have outlines that are alike [default: 40; 0 with v2 and paper].",
+)
+@option(
     "--min-cube-pixels",
     type=int,
     help="Smallest number of pixels that show a cube [default: 30 at 128x128 and radius 3.5].",

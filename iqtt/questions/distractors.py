@@ -44,7 +44,7 @@ LOOKS_AND_SIZES = (  # settings that make no question another one
     *("train", "labeled", "val", "test", "image_dtype", "with_depth"),
     *("background", "ambient", "reflectance", "light_level"),
 )
-LEAST_MATCHED = 20  # shapes with matched ones that a split has at least, so that questions vary
+LEAST_MATCHED = 60  # shapes with matched ones that a split has at least, so that questions vary
 
 
 @dataclass(frozen=True, eq=False)

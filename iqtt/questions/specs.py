@@ -23,8 +23,9 @@ PRESETS: dict[str, dict[str, Any]] = {
     # training questions in all, labelled ones among them, validation, test
     "small": {"train": 1_000, "labeled": 100, "val": 200, "test": 200},
     "v2": {"train": 100_000, "labeled": 10_000, "val": 10_000, "test": 10_000}
-    | {"image_dtype": "float32"},
-    "paper": {"train": 100_000, "labeled": 1_000, "val": 100_000, "test": 100_000},
+    | {"image_dtype": "float32", "min_sight_angle_degrees": 0.0},
+    "paper": {"train": 100_000, "labeled": 1_000, "val": 100_000, "test": 100_000}
+    | {"min_sight_angle_degrees": 0.0},
     "suite": {"train": 5_000, "labeled": 1_000, "val": 500, "test": 2_000},
 }
 SUITE = {  # the splits of the suite: the kind and the number of answers of each
@@ -55,6 +56,9 @@ class SplitSpec:
         image_dtype: "uint8", "float16" or "float32"; radiance lies within 0..1.
         min_angle_degrees: smallest rotation allowed between the reference's view and an answer's,
             and between the views of two answers that show the same shape.
+        min_sight_angle_degrees: smallest angle allowed between the lines of sight of these views,
+            seen as axes, in the frame of the shape; for a mirror image, mirrored. Nearer views have
+            outlines that are much alike.
         min_cube_pixels: number of pixels that every cube shows at least, in every image.
         max_radius: largest bounding sphere of a shape, cube edges.
         lights: fewest and most point lights.
@@ -78,6 +82,7 @@ class SplitSpec:
     width: int = 128
     image_dtype: str = "uint8"
     min_angle_degrees: float = 30.0
+    min_sight_angle_degrees: float = 40.0
     min_cube_pixels: int = 30
     max_radius: float = 3.5
     lights: tuple[int, int] = (2, 2)
@@ -111,6 +116,7 @@ class SplitSpec:
         small, large = min(self.height, self.width), max(self.height, self.width)
         check(small >= 16 and large <= 4096, "size", sides, "from 16 to 4096 pixels a side")
         _check_within("min angle", self.min_angle_degrees, 0, 90, " degrees")
+        _check_within("min sight angle", self.min_sight_angle_degrees, 0, 60, " degrees")
         _check_within("max radius", self.max_radius, 1.5, 10, " cube edges")
         _check_within("fov", self.fov_degrees, 5, 90, " degrees")
         _check_within("light level", self.light_level, 0, 100)

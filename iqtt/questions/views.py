@@ -1,5 +1,6 @@
 """The views of a question: rotations under which every cube shows, and the lights of each image."""
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from iqtt.questions.distractors import Pools, Shapes, arrange, draw_shapes, question_key
 from iqtt.questions.packing import Question, cube_centres, pack_views
 from iqtt.questions.specs import SplitSpec
-from iqtt.shapes.polycube import ROTATIONS, bounding_radius, symmetries
+from iqtt.shapes.polycube import MAX_CUBES, ROTATIONS, bounding_radius, mirror, symmetries
 from scenegen.common.errors import PlacementError
 from scenegen.common.rotations import rotation_matrix
 from scenegen.common.seeding import Purpose, item_rng
@@ -21,7 +22,7 @@ from scenegen.rendering.renderer import launch_fields
 Array = NDArray[Any]
 SHRINK = 2  # how many times smaller the images are by which visibility is first judged
 MARGIN = 1.5  # in them a cube needs so many times the pixels, so that full images seldom fall short
-VIEWS = 60  # rotations proposed for one image before the question gets other shapes
+VIEWS = 100  # rotations proposed for one image before the question gets other shapes
 PROPOSED = 2  # least number of views of one image that are judged at once
 PROPOSALS_AT_ONCE = 256  # views of all images that are judged at once, roughly
 QUESTION_ATTEMPTS = 50  # choices of shapes for one question
@@ -144,12 +145,13 @@ def find_views(
 ) -> Array:
     """Return rotations under which every cube shows, (Q, 1 + K, 3, 3); NaN where none was found.
 
-    Rotations of answers that are too near to the reference's view are not proposed, nor those of an
-    answer that are too near to an answer before it of the same shape. The right answer's shape is
-    seen twice and most wrong ones once, and a crowded shape often hides a cube; for that alone, the
-    less crowded answers would be right more often. So from CROWDED cubes on, the shape of each
-    answer needs a view as the reference too, and the answers keep away from all such views.
-    The view of the right answer's shape is the one that is used.
+    Rotations of answers that are too near to the reference's view are not proposed (`far_enough`),
+    nor those that are too near to the view of an answer before it that shows the same shape or its
+    mirror image. The right answer's shape is seen twice and most wrong ones once, and a crowded
+    shape often hides a cube; for that alone, the less crowded answers would be right more often. So
+    from CROWDED cubes on, the shape of each answer needs a view as the reference too, and the
+    answers keep away from all such views. The view of the right answer's shape is the one that is
+    used.
     """
     questions, slots, answers = len(shapes), spec.cubes[1], spec.answers
     # The answers as references, then as answers.
@@ -184,40 +186,80 @@ def find_views(
     choose(as_references, np.repeat(needed[..., None], VIEWS, axis=2))
     seen = np.isfinite(found[:, as_references]).all(axis=(2, 3))
     allowed = np.repeat((seen | ~needed).all(axis=1)[:, None], answers, axis=1)[..., None]
+    mirrored, related = relations(shapes)
     for reference in range(answers):
-        far = far_enough(spec, found[:, reference], turns[:, as_answers], symmetric[:, 1:])
+        far = far_enough(
+            spec,
+            found[:, reference],
+            turns[:, as_answers],
+            symmetric[:, 1:],
+            mirrored[:, reference],
+        )
         allowed = allowed & (far | ~seen[:, reference, None, None])
-    # The answer before each one that shows the same shape, as in `mirror-pair`; -1 for none.
-    twin = np.array([_twins(one) for one in shapes]).reshape(questions, answers)
-    choose(as_answers, allowed & (twin < 0)[..., None])
-    if (twin >= 0).any():
-        first = found[np.arange(questions), answers + twin.max(axis=1)]
-        far = far_enough(spec, first, turns[:, as_answers], symmetric[:, 1:])
-        choose(as_answers, allowed & far & (twin >= 0)[..., None])
+    # Answers that show one shape, or its mirror image, are found one after the other.
+    before = np.tril(related, -1)
+    step = before.sum(axis=2)
+    for now in range(answers):
+        choose(as_answers, allowed & (step == now)[..., None])
+        first = found[:, answers + now]
+        far = far_enough(spec, first, turns[:, as_answers], symmetric[:, 1:], mirrored[:, now])
+        allowed = allowed & (far | ~before[:, :, now, None])
     rows = np.arange(questions)
     return np.concatenate([found[rows, right][:, None], found[:, as_answers]], axis=1)
 
 
-def _twins(shapes: Shapes) -> list[int]:
-    """Return for each answer the answer before it that has the same cubes, else -1."""
-    names = [cubes.tobytes() for cubes in shapes.cubes[1:]]
-    return [names.index(name) if names.index(name) < i else -1 for i, name in enumerate(names)]
+def relations(shapes: Sequence[Shapes]) -> tuple[Array, Array]:
+    """Return how the answers of each question are related, (Q, K, K) bool each.
+
+    The first tells whether one is compared with the other's mirror image, as it has more cubes in
+    common with that; the second whether they show one shape, or a shape and its mirror image.
+    """
+    answers = len(shapes[0].cubes) - 1 if shapes else 0
+    mirrored, related = np.zeros((2, len(shapes), answers, answers), bool)
+    for row, one in enumerate(shapes):
+        cubes, images = one.cubes[1:].astype(np.int64), mirror(one.cubes[1:]).astype(np.int64)
+        for i, j in itertools.permutations(range(answers), 2):
+            plain, turned = _in_common(cubes[i], cubes[j]), _in_common(images[i], cubes[j])
+            mirrored[row, i, j] = turned > plain
+            related[row, i, j] = max(plain, turned) == len(cubes[i])
+    return mirrored, related
 
 
-def far_enough(spec: SplitSpec, reference: Array, turns: Array, symmetric: Array) -> Array:
+def _in_common(a: Array, b: Array) -> int:
+    """Return how many cubes two shapes have in common, one of them moved as fits best."""
+    apart = (a[:, None] - b + 2 * MAX_CUBES) @ (1, 256, 65536)
+    return int(np.unique(apart, return_counts=True)[1].max())
+
+
+def far_enough(
+    spec: SplitSpec, reference: Array, turns: Array, symmetric: Array, mirrored: Array
+) -> Array:
     """Return whether each rotation is far enough from the reference's, (Q, K, VIEWS) bool.
+
+    Both the rotation between the views and the angle between their lines of sight count. A rotation
+    about the line of sight turns the picture and shows nothing new, and the view from behind has
+    the same outline, flipped; so the angle between the lines of sight is that of two axes, 0 to 90
+    degrees.
 
     Args:
         reference: rotations of the references, (Q, 3, 3).
         turns: rotations of the K answers, (Q, K, VIEWS, 3, 3).
         symmetric: symmetries of the answers, (Q, K, 24), as in `rotation_angle_degrees`.
+        mirrored: answers that are compared with the reference's mirror image, (Q, K): it shows the
+            reference's outline, flipped, from the mirrored line of sight.
     """
     relative = np.swapaxes(reference, 1, 2)[:, None, None] @ turns
-    nearest = np.full(turns.shape[:3], -np.inf)
+    hand = np.where(mirrored[..., None], (-1.0, 1.0, 1.0), 1.0)  # (Q, K, 3), as `mirror` does
+    sight = reference[:, None, 2] * hand
+    nearest, alike = np.full((2, *turns.shape[:3]), -np.inf)
     for rotation, has in zip(ROTATIONS, np.moveaxis(symmetric, 2, 0), strict=True):
         trace = (relative[has] * rotation).sum(axis=(-2, -1))
         nearest[has] = np.maximum(nearest[has], trace)
-    return np.asarray((nearest - 1) / 2 <= math.cos(math.radians(spec.min_angle_degrees)))
+        cosine = np.abs(turns[has][:, :, 2] @ (sight[has] @ rotation)[..., None])[..., 0]
+        alike[has] = np.maximum(alike[has], cosine)
+    turned = (nearest - 1) / 2 <= math.cos(math.radians(spec.min_angle_degrees))
+    seen_anew = alike <= math.cos(math.radians(spec.min_sight_angle_degrees))
+    return np.asarray(turned & seen_anew)
 
 
 def _first_good(
@@ -294,7 +336,8 @@ def draw_lights(
 
     They are far away, on the camera's side, in uniform directions within bounds: the first at an
     angle of 26 to 46 degrees to the camera, so that most of what it sees is lit and the faces of a
-    cube differ; the others at 37 to 90 degrees. Unused slots are zero.
+    cube differ; the others at 37 to 90 degrees, on the other side of the camera. Unused slots
+    are zero.
     """
     most, distance = spec.lights[1], LIGHT_DISTANCE * camera_distance
     count = rng.integers(spec.lights[0], most, images, endpoint=True)
@@ -302,6 +345,7 @@ def draw_lights(
     z = rng.uniform(*OTHER_LIGHTS, (images, most))
     z[:, 0] = rng.uniform(*FIRST_LIGHT, images)
     around = rng.uniform(0.0, 2 * math.pi, (images, most))
+    around[:, 1:] = around[:, :1] + math.pi / 2 + around[:, 1:] / 2
     r = np.sqrt(1 - z * z)
     direction = np.stack([r * np.cos(around), r * np.sin(around), z], axis=2)
     color = rng.uniform(0.3, 1.0, (images, most, 3))

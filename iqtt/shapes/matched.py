@@ -1,9 +1,10 @@
-"""Shapes that outlines hardly tell apart: alike in bounding box, inertia and surface.
+"""Shapes that outlines hardly tell apart: alike in bounding box, surface and moments.
 
 An outline shows how long a shape is in each direction, how its cubes are spread about the middle,
 and how much surface it has. So shapes are matched in just that: in the sorted edges of the
-bounding box and the number of faces where two cubes touch (6 n - 2 contacts are the surface),
-which must be equal, and in the principal radii of gyration, which may differ by `TOLERANCE`.
+bounding box and the number of faces where two cubes touch (n cubes with c contacts have a surface
+of 6 n - 2 c), which must be equal, and in moments of inertia and of higher order. Inertia alone is
+not enough: outlines show lopsided shapes (third order) and stretched ones (fourth order).
 What is left is how the cubes follow one another, which takes more than an outline.
 """
 
@@ -13,20 +14,36 @@ from scipy.spatial import cKDTree
 
 from iqtt.shapes.polycube import Cubes
 
-TOLERANCE = 0.05  # cube edges, between the principal radii of gyration of two matched shapes
-PARTNERS = 6  # most partners of a shape
-_APART = 100.0  # cube edges between groups that must not be matched: larger than any radius
+TOLERANCE = 0.05  # cube edges, between the `moments` of two matched shapes
+PARTNERS = 4  # most partners of a shape
+_APART = 100.0  # cube edges between groups that must not be matched: larger than any moment
 
 
-def gyration_radii(cubes: Cubes) -> NDArray[np.float64]:
-    """Return the principal radii of gyration of each shape, (S, 3), rising, cube edges.
+def moments(cubes: Cubes) -> NDArray[np.float64]:
+    """Return lengths that no rotation or mirror changes, (S, 7), cube edges.
 
-    They are the roots of the eigenvalues of the covariance of the points in its solid cubes. They
-    are rounded to 1e-6, so that every machine finds the same matches.
+    They are the three principal radii of gyration of the solid cubes, rising; half the cube roots
+    of the norm of the third moments of their centres and of its trace, which tell how lopsided a
+    shape is; and the fourth roots of the mean fourth power of the distance from the centroid and of
+    the norm of the fourth moments. They are rounded to 1e-6, so that every machine finds the same
+    matches.
     """
-    offset = cubes - cubes.mean(axis=1, keepdims=True)
-    covariance = np.swapaxes(offset, 1, 2) @ offset / cubes.shape[1] + np.eye(3) / 12
-    return np.asarray(np.sqrt(np.linalg.eigvalsh(covariance)).round(6))
+    x = cubes - cubes.mean(axis=1, keepdims=True)
+    count = cubes.shape[1]
+    pairs = x[..., :, None] * x[..., None, :]
+    second = pairs.sum(axis=1) / count + np.eye(3) / 12
+    pairs = pairs.reshape(len(cubes), count, 9)
+    third = np.swapaxes(pairs, 1, 2) @ x / count
+    fourth = np.swapaxes(pairs, 1, 2) @ pairs / count
+    trace = third.reshape(-1, 3, 3, 3).trace(axis1=1, axis2=2)
+    lengths = (
+        np.sqrt(np.linalg.eigvalsh(second)),
+        np.cbrt(np.linalg.norm(third, axis=(1, 2)))[:, None] / 2,
+        np.cbrt(np.linalg.norm(trace, axis=1))[:, None] / 2,
+        ((x**2).sum(axis=2) ** 2).mean(axis=1)[:, None] ** (1 / 4),
+        np.linalg.norm(fourth, axis=(1, 2))[:, None] ** (1 / 4),
+    )
+    return np.concatenate(lengths, axis=1).round(6)
 
 
 def contacts(cubes: Cubes) -> NDArray[np.intp]:
@@ -46,14 +63,15 @@ def matched_rows(cubes: Cubes) -> NDArray[np.intp]:
     Args:
         cubes: (S, n, 3), one shape of each class.
     """
+    if len(cubes) < 3:
+        return np.zeros((0, 1 + PARTNERS), np.intp)
     edges = np.sort(cubes.max(axis=1) - cubes.min(axis=1), axis=1)
     exact = np.column_stack([edges, contacts(cubes)])
     _, group = np.unique(exact, axis=0, return_inverse=True)
-    places = np.column_stack([gyration_radii(cubes), _APART * group.reshape(-1)])
-    if len(cubes) < 3:
-        return np.zeros((0, 1 + PARTNERS), np.intp)
-    far, rows = cKDTree(places).query(places, 1 + PARTNERS, distance_upper_bound=TOLERANCE)
-    # A shape with a twin of equal radii may come second in its own row: it is put first.
+    places = np.column_stack([moments(cubes), _APART * group.reshape(-1)])
+    found = cKDTree(places).query(places, 1 + PARTNERS, distance_upper_bound=TOLERANCE)
+    far, rows = map(np.asarray, found)
+    # A shape with a twin of equal moments may come second in its own row: it is put first.
     far[rows == np.arange(len(cubes))[:, None]] = -1
     order = np.lexsort((rows, far.round(6)), axis=1)
     rows = np.take_along_axis(np.where(np.isinf(far), -1, rows), order, axis=1)

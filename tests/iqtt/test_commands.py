@@ -135,7 +135,7 @@ def test_a_secret_that_is_none(run, tmp_path, options, words, check_refusal):
         ("", {"train": 1000, "labeled": 100, "val": 200, "test": 200}),
         ("--preset v2", {"train": 100_000, "labeled": 10_000, "val": 10_000, "test": 10_000}),
         ("--preset paper", {"train": 100_000, "labeled": 1_000, "val": 100_000, "test": 100_000}),
-        ("--size 64 --train 50", {"min_cube_pixels": 3, "train": 50, "labeled": 5}),
+        ("--size 64 --train 50", {"min_cube_pixels": 8, "train": 50, "labeled": 5}),
     ],
 )
 def test_presets_and_what_follows_from_them(run, monkeypatch, options, expected, tmp_path):
@@ -211,7 +211,7 @@ def test_info_describes_every_file(run, split):
     for name in FILES:
         result = run("info", split / name)
         assert result.exit_code == 0, result.output
-        assert "pix2shape-bench/iqtt 1.2" in result.stdout
+        assert "pix2shape-bench/iqtt 2.0" in result.stdout
 
 
 def test_audit_passes_and_writes_json(run, split, tmp_path, check_refusal):

@@ -105,9 +105,10 @@ def test_truth_has_no_padding_and_agrees_with_the_images(split_folder):
         assert list(truth.shape_id) == ids
         same = [k for k in range(3) if truth.shape_id[k + 1] == truth.shape_id[0]]
         assert same == [record.answer] == [k for k, v in enumerate(truth.distractor_kind) if not v]
-        assert set(truth.distractor_kind) <= {None, "other", "near", "mirror"}
+        assert set(truth.distractor_kind) <= {None, "other", "near", "mirror", "matched"}
         for k, kind in enumerate(truth.distractor_kind):
-            assert (kind == "mirror") <= (truth.class_id[k + 1] == truth.class_id[0])
+            assert (kind == "mirror") <= (truth.class_id.count(truth.class_id[k + 1]) > 1)
+        assert truth.camera == questions.spec.camera(truth.camera.position[2])
         turned = truth.world_from_shape @ truth.world_from_shape.transpose(0, 2, 1)
         np.testing.assert_allclose(turned, np.tile(np.eye(3), (4, 1, 1)), atol=1e-12)
         assert questions.spec.min_angle_degrees <= truth.angle_degrees <= 180

@@ -36,6 +36,7 @@ REFUSED = {
     "width": ("size", (15, 4097)),
     "image_dtype": ("image dtype", ("int8",)),
     "min_angle_degrees": ("min angle", (-0.5, 90.5, NAN)),
+    "min_sight_angle_degrees": ("min sight angle", (-0.5, 60.5, NAN)),
     "min_cube_pixels": ("min cube pixels", (-1, 61)),
     "max_radius": ("max radius", (0.0, -3.5, 1.49, 10.5, NAN, INF)),
     "lights": ("lights", ((0, 2), (3, 2), (1, 17))),
@@ -121,13 +122,15 @@ def test_settings_that_are_not_given_follow_others():
     assert preset_spec("small") == SplitSpec()
     assert preset_spec("paper", train=5_000).labeled == 50
     assert preset_spec("v2", train=5_000).labeled == 500
+    assert preset_spec("v2").min_sight_angle_degrees == 0
+    assert preset_spec("v2", min_sight_angle_degrees=20).min_sight_angle_degrees == 20
     assert preset_spec("small", train=0).labeled == 0
     assert preset_spec("small", train=50, labeled=50).labeled == 50
     pixels = {
         side: preset_spec("small", height=side).min_cube_pixels for side in (16, 64, 128, 256)
     }
-    assert pixels == {16: 1, 64: 3, 128: 12, 256: 12}
-    assert preset_spec("small", height=256, width=512).min_cube_pixels == 48
+    assert pixels == {16: 1, 64: 8, 128: 30, 256: 30}
+    assert preset_spec("small", height=256, width=512).min_cube_pixels == 120
     assert preset_spec("small", height=64, min_cube_pixels=0).min_cube_pixels == 0
     for request, where in (
         ({"preset": "large"}, "preset"),

@@ -10,7 +10,7 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from iqtt.questions import views as module
-from iqtt.questions.distractors import Pools, Shapes, draw_shapes, make_pools, question_key
+from iqtt.questions.distractors import Pools, Shapes, arrange, draw_shapes, make_pools, question_key
 from iqtt.questions.packing import Question
 from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import (
@@ -21,11 +21,12 @@ from iqtt.questions.views import (
     far_enough,
     find_views,
     random_frames,
+    relations,
     rotation_angle_degrees,
     sample_questions,
     shape_symmetries,
 )
-from iqtt.shapes.polycube import symmetries
+from iqtt.shapes.polycube import mirror, symmetries
 from scenegen.common.errors import PlacementError
 from scenegen.common.seeding import Purpose, item_rng
 
@@ -137,19 +138,48 @@ def test_stored_rotations_tell_nothing_about_the_answer(kind):
         assert stats.binomtest(right, len(wins), 1 / 3).pvalue > 1e-3
 
 
-@pytest.mark.parametrize("least", [30, 90])
-def test_far_enough_is_just_so_many_degrees(least):
+@pytest.mark.parametrize(("least", "sight"), [(30, 0), (90, 0), (0, 25), (30, 60)])
+def test_far_enough_is_just_so_many_degrees(least, sight):
+    """Lines of sight are compared by brute force, over the shape's symmetries, from SciPy."""
     shapes = ([[0, 0, 0], [1, 0, 0]], [[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0]])
     symmetric = np.stack([symmetries(np.array([shape]))[0] for shape in shapes])
     turns = draw_rotations(np.random.default_rng(0), (4, 500))
-    far = far_enough(
-        replace(SPEC, min_angle_degrees=least), turns[:1, 0], turns[None, 1:], symmetric[None]
-    )
-    angles = [
-        [rotation_angle_degrees(turns[0, 0], turn, own) for turn in some]
-        for some, own in zip(turns[1:], symmetric, strict=True)
-    ]
-    assert (far[0] == (np.array(angles) >= least)).all()
+    spec = replace(SPEC, min_angle_degrees=least, min_sight_angle_degrees=sight)
+    mirrored = np.array([[False, True, True]])
+    far = far_enough(spec, turns[:1, 0], turns[None, 1:], symmetric[None], mirrored)
+    reference = turns[0, 0]
+    for k, shape in enumerate(shapes):
+        own = turns_between(np.array(shape), np.array(shape))
+        seen = reference[2] * (-1, 1, 1) if mirrored[0, k] else reference[2]
+        axes = np.array([turn.apply(seen) for turn in own])
+        between = np.degrees(np.arccos(np.abs(turns[1 + k, :, 2] @ axes.T).max(axis=1)))
+        angles = [rotation_angle_degrees(reference, turn, symmetric[k]) for turn in turns[1 + k]]
+        assert (far[0, k] == ((np.array(angles) >= least) & (between >= sight))).all()
+    assert far[0, :2].any()
+    assert not far.all()
+
+
+def test_answers_of_one_shape_or_its_mirror_image_are_related():
+    spec = replace(SPEC, distractors="mirror-pair", cubes=(6, 6))
+    drawn = draw_shapes(spec, make_pools(spec), "val", [(0, 0)])[0]
+    mirrored, related = relations([arrange(drawn, 1, RNG(0))])
+    assert mirrored[0].tolist() == [[False, True, False], [True, False, True], [False, True, False]]
+    assert (related[0] == ~np.eye(3, dtype=bool)).all()
+
+
+def test_no_outline_is_shown_twice_in_a_question():
+    """The three answers of a mirror pair, and the reference, are seen along four axes."""
+    spec = replace(SPEC, distractors="mirror-pair", min_sight_angle_degrees=40)
+    for question in sample_questions(spec, make_pools(spec), "train", REQUESTS, Tally()):
+        cubes, turns = question.shapes.cubes, question.world_from_shape
+        for i, j in itertools.combinations(range(4), 2):
+            hand = np.array([1, 1, 1])
+            same = turns_between(cubes[i], cubes[j])
+            if not same:
+                hand = np.array([-1, 1, 1])
+                same = turns_between(mirror(cubes[i]), cubes[j])
+            axes = np.array([turn.apply(turns[i][2] * hand) for turn in same])
+            assert np.abs(axes @ turns[j][2]).max() <= math.cos(math.radians(40)) + 1e-9
 
 
 def test_questions_are_what_was_asked_for(sampled):
@@ -207,7 +237,7 @@ def test_views_are_the_first_good_ones_of_those_drawn(pools, sampled):
         refused += int(same.argmax(axis=1).sum())
     assert tally.proposed == tally.refused + 4 * len(questions)
     assert tally.refused <= refused, "those too near to the reference's view do not count"
-    free, every = replace(SPEC, min_angle_degrees=0), Tally()
+    free, every = replace(SPEC, min_angle_degrees=0, min_sight_angle_degrees=0), Tally()
     for question in sample_questions(free, pools, "val", REQUESTS, every):
         every.refused -= int(is_proposed(question).argmax(axis=1).sum())
     assert every.refused == 0
@@ -262,7 +292,7 @@ def test_whether_crowded_shapes_are_asked_for_does_not_tell_which_is_right(monke
 def test_the_last_proposal_counts_as_well(pools, monkeypatch):
     monkeypatch.setattr(module, "VIEWS", 1)
     tally = Tally()
-    easy = replace(SPEC, min_cube_pixels=0, min_angle_degrees=0)
+    easy = replace(SPEC, min_cube_pixels=0, min_angle_degrees=0, min_sight_angle_degrees=0)
     assert {q.attempt for q in sample_questions(easy, pools, "test", REQUESTS, tally)} == {0}
     assert tally == Tally(4 * len(REQUESTS), 0)
 

@@ -49,13 +49,20 @@ def batch_of(source: QuestionImages) -> Any:
     return source.as_batch(default_collate([source[row] for row in range(len(source))]))
 
 
+def scales(file: h5py.File) -> np.ndarray:
+    """How many times larger each question is shown than it is stored, (Q,)."""
+    distance = 1.02 * SPEC.max_radius / math.sin(math.radians(SPEC.fov_degrees) / 2)
+    return distance / file["truth/unlabeled/camera_distance"][:]
+
+
 def test_items_are_the_four_images_and_batches_four_after_four(train_path):
     source = QuestionImages(train_path, "unlabeled", TINY)
     assert len(source) == 3
     batch = batch_of(source)
     with h5py.File(train_path) as file:
         questions = file["unlabeled/questions"][:]
-        colors = file["truth/unlabeled/light_color"][:]
+        scale = scales(file)
+        colors = file["truth/unlabeled/light_color"][:] * scale[:, None, None, None] ** 2
     parts = [questions[:, :, i::2, j::2] for i in (0, 1) for j in (0, 1)]
     means = np.moveaxis(sum(parts) / 4, -1, 2)
     assert source[0]["image"].shape == (4, 3, 32, 32)
@@ -75,7 +82,8 @@ def test_the_truth_shaded_with_what_is_told_is_the_image(train_path):
     source = QuestionImages(train_path, "unlabeled", TINY)
     batch = batch_of(source)
     with h5py.File(train_path) as file:
-        depth = file["truth/unlabeled/depth"][:].reshape(12, 64, 64).astype(np.float64)
+        depth = file["truth/unlabeled/depth"][:].astype(np.float64)
+        depth = (depth * scales(file)[:, None, None, None]).reshape(12, 64, 64)
         expected = file["unlabeled/questions"][:].reshape(12, 64, 64, 3)
     behind = np.isnan(depth)
     colors = np.broadcast_to(batch.views.background[:, None, None].numpy(), expected.shape)
@@ -109,7 +117,12 @@ def test_shapes_and_rotations_are_never_read(train_path, tmp_path):
     shutil.copy(train_path, tmp_path / "blank.h5")
     with h5py.File(tmp_path / "blank.h5", "r+") as file:
         truth = file["truth/labeled"]
-        assert set(truth) - TRUTH == {"light_count", "light_position", "light_color"}
+        assert set(truth) - TRUTH == {
+            "light_count",
+            "light_position",
+            "light_color",
+            "camera_distance",
+        }
         for name in TRUTH | {"light_count"}:
             truth[name][...] = 0
     blank = QuestionImages(tmp_path / "blank.h5", "labeled", TINY)
@@ -166,7 +179,8 @@ def test_the_configuration_for_questions(train_path):
     assert config.depth_middle == pytest.approx(distance)
     assert config.depth_reach == pytest.approx(SPEC.max_radius / config.depth_middle)
     with h5py.File(train_path) as file:
-        depth = file["truth/unlabeled/depth"][:] / config.depth_middle
+        depth = file["truth/unlabeled/depth"][:] * scales(file)[:, None, None, None]
+        depth /= config.depth_middle
     assert 1 - config.depth_reach < np.nanmin(depth) < np.nanmax(depth) < 1 + config.depth_reach
     with pytest.raises(SpecError, match="z scene"):
         for_questions(tiny(z_scene=10), train_path, "labeled")
