@@ -41,7 +41,7 @@ class PtnConfig:
     silhouettes: str = "image"
     size: int = 64
     width: int = 16
-    iterations: int = 3000
+    iterations: int = 1700
     batch: int = 12
     views: int = 3
     rays: int = 160
