@@ -34,6 +34,7 @@ UNTRAINED = {
 # a baseline that is trained with `bench train NAME`. A new one is a line here.
 TRAINED = {
     "cnn": "answers to questions: ResNets and a softmax over the answers",
+    "ptn": "voxels by Perspective Transformer Nets: rooms, and answers to questions",
     "siamese": "answers to questions: the one whose features are nearest to the reference's",
 }
 ALL = {**UNTRAINED, **TRAINED}

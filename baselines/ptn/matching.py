@@ -1,0 +1,131 @@
+"""Which answer shows the reference's shape: by volumes turned until they fit, and by codes.
+
+Two images of one shape give volumes that differ by a rotation about the shape's centre. Rotations
+are searched from a grid over SO(3) to finer and finer turns of the best ones; the fit is the
+correlation of occupancies within the ball that all rotations keep.
+"""
+
+import math
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from baselines.ptn.network import VOXELS, Ptn
+from baselines.ptn.projection import sampled
+from scenegen.common.rotations import rotation_matrix
+
+COARSE = 16  # voxels a side of the volumes that are compared
+GRID = 1200  # rotations that are tried first, some 20 degrees apart
+KEPT, TURNS = 4, 32  # how many of the best are turned further, and in how many ways each
+FINER = (0.2, 0.1)  # radians of these turns, in each round
+CHUNK = 256  # rotations at a time
+PSI = 1.533751168755204288118041  # positive root of psi^4 = psi + 4
+FEATURES = ("fit of volumes", "nearness of codes")
+RIDGE = 1e-3  # keeps the head's weights finite where labels are few
+
+
+def rotation_grid(count: int) -> Tensor:
+    """Return rotations spread evenly over SO(3), (count, 3, 3).
+
+    Super-Fibonacci spirals: Alexa, "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling of
+    SO(3)" (CVPR 2022).
+    """
+    s = np.arange(count) + 0.5
+    r, rest = np.sqrt(s / count), np.sqrt(1 - s / count)
+    a, b = 2 * math.pi * s / math.sqrt(2), 2 * math.pi * s / PSI
+    quaternion = np.stack([r * np.sin(a), r * np.cos(a), rest * np.sin(b), rest * np.cos(b)])
+    return torch.from_numpy(rotation_matrix(quaternion)).float()
+
+
+def small_turns(count: int, angle: float) -> Tensor:
+    """Return turns by an angle about axes spread evenly over the sphere, (count, 3, 3)."""
+    i = np.arange(count) + 0.5
+    z, turn = 1 - 2 * i / count, i * math.pi * (3 - math.sqrt(5))
+    flat = np.sqrt(1 - z * z)
+    axis = np.stack([flat * np.cos(turn), flat * np.sin(turn), z])
+    quaternion = np.concatenate(
+        [np.full((1, count), math.cos(angle / 2)), math.sin(angle / 2) * axis]
+    )
+    return torch.from_numpy(rotation_matrix(quaternion)).float()
+
+
+@torch.inference_mode()
+def best_fits(reference: Tensor, answers: Tensor) -> Tensor:
+    """Return how well a volume fits each of K others when it is turned, (K,), 1 at best.
+
+    Args:
+        reference: occupancies, (D, D, D) by z, y, x, D a multiple of 16; the turn is about the
+            middle.
+        answers: (K, D, D, D).
+    """
+    small = functional.avg_pool3d(torch.cat([reference[None], answers])[:, None], VOXELS // COARSE)
+    side = (torch.arange(COARSE) + 0.5) * 2 / COARSE - 1
+    points = torch.stack(torch.meshgrid(side, side, side, indexing="ij")[::-1], dim=-1)
+    inside = points.norm(dim=-1) <= 1
+    points, box = points[inside], torch.tensor([[-1.0] * 3, [1.0] * 3])
+    wanted = _centred(small[1:, 0][:, inside])
+    start = rotation_grid(GRID)
+    found = _turned(small[0], box, points, start) @ wanted.T
+    best = []
+    for k in range(len(answers)):
+        turns, fits = start, found[:, k]
+        for angle in FINER:
+            top = turns[fits.topk(KEPT).indices]
+            finer = (small_turns(TURNS, angle)[None] @ top[:, None]).flatten(0, 1)
+            turns = torch.cat([top, finer])
+            fits = _turned(small[0], box, points, turns) @ wanted[k]
+        best.append(fits.amax())
+    return torch.stack(best)
+
+
+def _turned(volume: Tensor, box: Tensor, points: Tensor, rotations: Tensor) -> Tensor:
+    """Return a volume's values at points when it is turned, centred: (1, D, D, D) -> (R, P)."""
+    parts = []
+    for some in torch.split(rotations, CHUNK):
+        places = (points @ some).reshape(1, -1, 3)  # the inverse of each rotation, on the left
+        parts.append(sampled(volume, box, places).view(len(some), len(points)))
+    return _centred(torch.cat(parts))
+
+
+def _centred(values: Tensor) -> Tensor:
+    return functional.normalize(values - values.mean(dim=-1, keepdim=True), dim=-1)
+
+
+@torch.inference_mode()
+def features(model: Ptn, images: Tensor) -> Tensor:
+    """Return what tells answers apart, (Q, K, 2): `FEATURES`, more is nearer.
+
+    Args:
+        images: of questions, (Q, 1 + K, 3, S, S), the reference first.
+    """
+    questions, pictures = images.shape[:2]
+    none = images.new_empty(questions * pictures, 0)
+    code = model.encode(images.flatten(0, 1), none)
+    volumes = model.decode(code, none).view(questions, pictures, *[VOXELS] * 3)
+    code = code.view(questions, pictures, -1)
+    nearness = -(code[:, 1:] - code[:, :1]).norm(dim=-1)
+    fits = torch.stack([best_fits(volume[0], volume[1:]) for volume in volumes])
+    return torch.stack([fits, nearness], dim=-1)
+
+
+def fitted_head(found: Tensor, right: Tensor) -> tuple[float, ...]:
+    """Return weights of features that make right answers most likely, by a softmax over answers.
+
+    Args:
+        found: as `features` gives them, (Q, K, F); right: (Q,).
+    """
+    spread = found.std(dim=(0, 1)).clamp(min=1e-9).double()
+    scaled = found.double() / spread
+    weights = torch.zeros(found.shape[-1], dtype=torch.double, requires_grad=True)
+    optimiser = torch.optim.LBFGS([weights], max_iter=100, line_search_fn="strong_wolfe")
+
+    def loss() -> Tensor:
+        optimiser.zero_grad()
+        value = functional.cross_entropy(scaled @ weights, right) + RIDGE * weights.square().sum()
+        value.backward()  # type: ignore[no-untyped-call]
+        return value
+
+    optimiser.step(loss)  # type: ignore[no-untyped-call]
+    return tuple((weights.detach() / spread).tolist())

@@ -1,0 +1,120 @@
+"""The networks: an image becomes a code, and the code a volume of 32^3 occupancies.
+
+Layers as Yan et al. list them on the page of their code: convolutions of 5x5 with 64, 128 and 256
+channels, fully connected layers of 1024, 1024 and 512, then one of 3^3 x 512 and transposed 3D
+convolutions to 6^3 x 256, 15^3 x 96 and 32^3. All numbers of channels are multiples of `width`, 64
+in the paper.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import torch
+from torch import Tensor, nn
+
+from scenegen.common.records import check, normalise
+
+VOXELS = 32  # along each side of the volume; the decoder's layers give no other number
+FIRST_BIAS = -2.0  # of the occupancies' logits: most of a volume is empty
+PAPER_WIDTH = 64
+
+
+@dataclass(frozen=True)
+class PtnConfig:
+    """The settings of networks and training; defaults suit one core, `width` 64 is the paper's.
+
+    Attributes:
+        task: "rooms", whose networks are told the image's camera, or "questions".
+        low, high: corners of the volume's box, in the frame of the volume, scene units.
+        silhouettes: where those of rooms come from, "image" or "ids".
+        size: side of the images that the encoder takes, pixels; a multiple of 8.
+        batch: images of an iteration.
+        views: silhouettes that each image's volume is compared with.
+        rays: pixels of each silhouette that an iteration looks at.
+        samples: places along each ray.
+        learning_rate: of Adam; it falls to zero over the second half of the iterations.
+    """
+
+    task: str
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+    silhouettes: str = "image"
+    size: int = 64
+    width: int = 16
+    iterations: int = 1700
+    batch: int = 12
+    views: int = 3
+    rays: int = 160
+    samples: int = 32
+    learning_rate: float = 1e-3
+    weight_decay: float = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        normalise(self)
+        check(self.task in ("rooms", "questions"), "task", self.task, "rooms or questions")
+        check(self.silhouettes in ("image", "ids"), "silhouettes", self.silhouettes, "image or ids")
+        check(
+            all(a < b for a, b in zip(self.low, self.high, strict=True)), "low", self.low, "< high"
+        )
+        check(self.size % 8 == 0 and 8 <= self.size <= 512, "size", self.size, "8 to 512, by 8")
+        check(self.width % 2 == 0 and 2 <= self.width <= 256, "width", self.width, "even, 2 to 256")
+        for name in ("iterations", "batch", "views", "rays"):
+            check(1 <= getattr(self, name) <= 10**7, name, getattr(self, name), "1 to 10**7")
+        check(2 <= self.samples <= 1024, "samples", self.samples, "2 to 1024")
+        check(0 < self.learning_rate <= 1, "learning rate", self.learning_rate, "0 to 1")
+        check(0 <= self.weight_decay <= 1, "weight decay", self.weight_decay, "0 to 1")
+
+
+class Ptn(nn.Module):
+    """Encoder and volume decoder."""
+
+    def __init__(self, config: PtnConfig) -> None:
+        """Make the layers."""
+        super().__init__()
+        self.config = config
+        width, told = config.width, 3 * (config.task == "rooms")
+        channels = (3, width, 2 * width, 4 * width)
+        layers: list[nn.Module] = []
+        for a, b in pairwise(channels):
+            layers += [nn.Conv2d(a, b, 5, stride=2, padding=2), nn.ReLU()]
+        self.pixels = nn.Sequential(*layers, nn.Flatten())
+        last, wide = 4 * width * (config.size // 8) ** 2, 16 * width
+        self.code = nn.Sequential(
+            *(nn.Linear(last + told, wide), nn.ReLU()),
+            *(nn.Linear(wide, wide), nn.ReLU()),
+            *(nn.Linear(wide, 8 * width), nn.ReLU()),
+        )
+        first, middle, thin = 8 * width, 4 * width, 3 * width // 2
+        self.volume = nn.Sequential(
+            nn.Linear(8 * width + told, 27 * first),
+            nn.ReLU(),
+            nn.Unflatten(1, (first, 3, 3, 3)),
+            nn.ConvTranspose3d(first, middle, 4),  # 3 -> 6
+            nn.ReLU(),
+            nn.ConvTranspose3d(middle, thin, 5, stride=2),  # 6 -> 15
+            nn.ReLU(),
+            nn.ConvTranspose3d(thin, 1, 6, stride=2, padding=1),  # 15 -> 32
+        )
+        output = self.volume[-1]
+        assert isinstance(output, nn.ConvTranspose3d)
+        assert output.bias is not None
+        nn.init.constant_(output.bias, FIRST_BIAS)
+
+    @property
+    def box(self) -> Tensor:
+        """Corners of the volume, (2, 3)."""
+        return torch.tensor((self.config.low, self.config.high))
+
+    def encode(self, image: Tensor, camera: Tensor) -> Tensor:
+        """Return codes, (B, 8 width), of images, (B, 3, S, S), and cameras, (B, 3 or 0)."""
+        found: Tensor = self.code(torch.cat([self.pixels(image - 0.5), camera], dim=1))
+        return found
+
+    def decode(self, code: Tensor, camera: Tensor) -> Tensor:
+        """Return occupancies from 0 to 1, (B, 32, 32, 32) by z, y and x."""
+        return torch.sigmoid(self.volume(torch.cat([code, camera], dim=1))[:, 0])
+
+    def forward(self, image: Tensor, camera: Tensor) -> Tensor:
+        """Return the volumes of images: `decode` of `encode`."""
+        return self.decode(self.encode(image, camera), camera)

@@ -1,0 +1,141 @@
+"""Rooms for the networks: images of scenes, and silhouettes of the same scenes from other views.
+
+The volume is the part of the room's unit box that objects can reach. The room looks the same in a
+mirror that swaps x and z, so an image whose camera stands nearer the z axis is mirrored, and the
+network only ever sees rooms from one side.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from baselines.pix2shape.data.rooms import channels_first, check_reducible
+from baselines.ptn.batches import Batch
+from baselines.ptn.network import PtnConfig
+from baselines.ptn.silhouettes import Silhouettes
+from scenegen.camera import pixel_directions
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.rendering.ground_truth import decode_image
+from scenegen.rooms.reader import RoomsFile
+
+Array = NDArray[Any]
+Corner = tuple[float, float, float]
+SWAPPED = (2, 1, 0)  # x, y, z of the mirrored room
+
+
+def room_box(path: str | Path) -> tuple[Corner, Corner]:
+    """Return the corners of the part of the unit box that a file's objects can reach.
+
+    Raises as `RoomsFile`.
+    """
+    with RoomsFile(path) as rooms:
+        spec = rooms.spec
+    return (0.0, 0.0, 0.0), (1.0, min(1.0, 2 * spec.object_radius[1]), 1.0)
+
+
+class RoomImages:
+    """The images and cameras of a rooms file, mirrored where the network wants them so.
+
+    Attributes:
+        shape: height and width of the images, pixels.
+        poses, fov_y_degrees: `world_from_camera` and field of view of each row's camera.
+        mirrored: for each row, whether its image is mirrored for the encoder, (N,).
+        rows_of: the rows of each scene, by view, so the first is the scene's input image.
+    """
+
+    def __init__(self, rooms: RoomsFile, size: int) -> None:
+        """Read the cameras. Raises SpecError, FileFormatError."""
+        check_reducible(rooms.path, rooms.spec.height, rooms.spec.width, size)
+        self.rooms, self._size = rooms, size
+        self.shape = rooms.spec.height, rooms.spec.width
+        self.poses: Array = rooms.read("camera/world_from_camera", slice(None))
+        self.fov_y_degrees: Array = rooms.read("camera/fov_y_degrees", slice(None))
+        unknown = np.flatnonzero(~np.isfinite(self.poses).all(axis=(1, 2)))
+        if len(unknown):
+            where = f"{rooms.path}: camera/world_from_camera, row {unknown[0]}"
+            raise FileFormatError(where, "numbers that are not finite", "the camera's pose")
+        self.mirrored = self.poses[:, 2, 3] > self.poses[:, 0, 3]
+        scene, view = (rooms.read(name, slice(None)) for name in ("scene_index", "view_index"))
+        order = np.lexsort((view, scene))
+        starts = np.flatnonzero(np.diff(scene[order])) + 1
+        self.rows_of = np.split(order, starts)
+
+    def image(self, row: int) -> Array:
+        """Return an image as the encoder takes it, (3, S, S), mirrored if its row is."""
+        small = channels_first(decode_image(self.rooms.read("image", row)), self._size)
+        return small[..., ::-1].copy() if self.mirrored[row] else small
+
+    def camera(self, row: int) -> Array:
+        """Return the position of a row's camera in the frame of that row's volume, (3,)."""
+        place = self.poses[row, :3, 3]
+        return place[[*SWAPPED]] if self.mirrored[row] else place
+
+    def rays(self, row: int, pixels: Array | None = None) -> Array:
+        """Return origins and directions of a row's rays, (2, R, 3), world; planar depth is 1.
+
+        Args:
+            pixels: numbers of pixels, counted row by row; by default all.
+        """
+        pose = self.poses[row]
+        rays = pixel_directions(*self.shape, float(self.fov_y_degrees[row])).reshape(-1, 3)
+        rays = rays if pixels is None else rays[pixels]
+        directions = rays @ pose[:3, :3].T
+        return np.stack([np.broadcast_to(pose[:3, 3], directions.shape), directions])
+
+
+class TrainingRooms:
+    """Scenes of several views, with silhouettes of all of them.
+
+    Attributes:
+        fingerprint, data: fingerprint and request of the file.
+    """
+
+    def __init__(self, path: str | Path, config: PtnConfig) -> None:
+        """Check the file. Raises SpecError where a scene has one view; as `RoomsFile`."""
+        self._rooms = rooms = RoomsFile(path)
+        try:
+            self._prepare(rooms, config)
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Close the file."""
+        self._rooms.close()
+
+    def _prepare(self, rooms: RoomsFile, config: PtnConfig) -> None:
+        self._images, self._config = RoomImages(rooms, config.size), config
+        single = [rows[0] for rows in self._images.rows_of if len(rows) < 2]
+        if single:
+            scene = int(rooms.read("scene_index", int(single[0])))
+            expected = "two or more of every scene, as silhouettes of one view tell no shape"
+            hint = "render the file with --views 0,35,80"
+            raise SpecError(f"{rooms.path}: scene {scene}", "one view", expected, hint)
+        self.fingerprint, self.data = rooms.fingerprint, rooms.spec.to_json()
+        self._silhouettes = Silhouettes(rooms, config.silhouettes)
+
+    def batch(self, rng: np.random.Generator) -> Batch:
+        """Draw a batch: any view of a scene is the input, and the volume is seen from `views`."""
+        config, images = self._config, self._images
+        count = images.shape[0] * images.shape[1]
+        made: list[tuple[Array, Array, Array, Array]] = []
+        for scene in rng.integers(len(images.rows_of), size=config.batch):
+            rows = images.rows_of[scene]
+            row = int(rng.choice(rows))
+            mirrored = bool(images.mirrored[row])
+            rays, found = [], []
+            again = len(rows) < config.views
+            for other in rng.choice(rows, size=config.views, replace=again):
+                pixels = rng.integers(count, size=config.rays)
+                world = images.rays(int(other), pixels)
+                found.append(self._silhouettes.at(int(other), pixels, *world))
+                rays.append(world[..., [*SWAPPED]] if mirrored else world)
+            joined = np.concatenate(rays, axis=1)
+            made.append((images.image(row), images.camera(row), joined, np.concatenate(found)))
+        image, camera, rays_, shown = (
+            torch.from_numpy(np.stack(part).astype(np.float32)) for part in zip(*made, strict=True)
+        )
+        return Batch(image, camera, rays_[:, 0], rays_[:, 1], shown)

@@ -1,0 +1,87 @@
+"""Batches of rooms: rays and silhouettes agree with a known ball, mirrored or not."""
+
+import h5py
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from ptn_models import tiny, volume_of, voxel_centres  # noqa: E402
+
+from baselines.ptn.projection import silhouettes  # noqa: E402
+from baselines.ptn.rooms import RoomImages, TrainingRooms, room_box  # noqa: E402
+from scenegen.common.errors import FileFormatError, SpecError  # noqa: E402
+from scenegen.rooms.reader import RoomsFile  # noqa: E402
+
+BALL = {"shapes": ("sphere",), "objects": (1, 1), "views": (0.0, 35.0, 80.0), "seed": 4}
+BIG = {"height": 64, "width": 64, "object_radius": (0.12, 0.16)}
+
+
+def ball(path, model, mirrored):
+    """Return the volume of the one ball of a file's scene."""
+    with RoomsFile(path) as rooms:
+        place = rooms.read("object/world_from_object", 0)[0, :3, 3]
+        radius = float(rooms.read("object/scale", 0)[0])
+    place = place[::-1] if mirrored else place
+    return volume_of(np.linalg.norm(voxel_centres(model) - place, axis=-1) - radius, 0.04)
+
+
+def test_a_ball_is_where_all_views_of_a_batch_see_it(make_rooms, tmp_path):
+    path = make_rooms(tmp_path / "ball.h5", 1, **BALL, **BIG)
+    model = tiny(batch=6, rays=300, size=32)
+    with RoomsFile(path) as rooms:
+        places = rooms.read("camera/world_from_camera", slice(None))[:, :3, 3]
+    source, seen = TrainingRooms(path, model.config), set()
+    batch = source.batch(np.random.default_rng(0))
+    source.close()
+    assert batch.image.shape == (6, 3, 32, 32)
+    assert 0.02 < batch.silhouette.mean() < 0.5
+    for item in range(6):
+        camera = batch.camera[item].numpy()
+        assert camera[0] >= camera[2]
+        mirrored = np.abs(places - camera).sum(axis=1).min() > 1e-3
+        seen.add(bool(mirrored))
+        rays = batch.origin[item][None], batch.direction[item][None]
+        found = silhouettes(ball(path, model, mirrored), model.box, *rays, 64)[0] > 0.5
+        assert (found != (batch.silhouette[item] > 0)).float().mean() < 0.03
+    assert seen == {False, True}
+
+
+def test_an_image_is_mirrored_where_its_camera_stands_nearer_z(make_rooms, tmp_path):
+    path = make_rooms(tmp_path / "ball.h5", 1, **BALL)
+    with RoomsFile(path) as rooms:
+        images = RoomImages(rooms, 32)
+        assert [rows.tolist() for rows in images.rows_of] == [[0, 1, 2]]
+        for row, pose in enumerate(images.poses):
+            plain = np.moveaxis(rooms[row].radiance, -1, 0)
+            wanted = plain[:, :, ::-1] if pose[2, 3] > pose[0, 3] else plain
+            assert (images.image(row) == wanted).all()
+        assert images.mirrored.any()
+        assert not images.mirrored.all()
+
+
+def test_the_box_holds_every_object(make_rooms, tmp_path):
+    path = make_rooms(tmp_path / "rooms.h5", 4, pose="any")
+    top = room_box(path)[1][1]
+    with RoomsFile(path) as rooms:
+        assert top == 2 * rooms.spec.object_radius[1]
+        scale = rooms.read("object/scale", slice(None))
+        height = rooms.read("object/world_from_object", slice(None))[:, :, 1, 3]
+        assert (height <= top - 0.5 * scale).all()
+
+
+def test_files_that_tell_too_little_are_refused(make_rooms, tmp_path):
+    config = tiny().config
+    one = make_rooms(tmp_path / "one.h5", 2)
+    with pytest.raises(SpecError) as error:
+        TrainingRooms(one, config)
+    assert "--views" in error.value.hint
+    odd = make_rooms(tmp_path / "odd.h5", 1, height=36, width=32, **BALL)
+    with pytest.raises(SpecError):
+        TrainingRooms(odd, config)
+    blind = make_rooms(tmp_path / "blind.h5", 1, **BALL)
+    with h5py.File(blind, "r+") as file:
+        file["camera/world_from_camera"][1] = np.nan
+    with pytest.raises(FileFormatError) as error:
+        TrainingRooms(blind, config)
+    assert "row 1" in error.value.where

@@ -1,0 +1,126 @@
+"""Submissions: what a volume looks like, files that can be scored, and refusals."""
+
+import h5py
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from ptn_models import TINY, tiny, volume_of, voxel_centres  # noqa: E402
+
+from baselines.ptn.rooms import RoomImages  # noqa: E402
+from baselines.ptn.storage import Card, save_weights  # noqa: E402
+from baselines.ptn.submission import FILES, seen, write_submission  # noqa: E402
+from baselines.ptn.training import train  # noqa: E402
+from iqtt.files.make import make_split  # noqa: E402
+from iqtt.questions.specs import SplitSpec  # noqa: E402
+from metrics.measures.empty_room import empty_room  # noqa: E402
+from metrics.scoring.evaluate import score  # noqa: E402
+from scenegen.common.errors import FileFormatError, SpecError  # noqa: E402
+from scenegen.rooms.reader import RoomsFile  # noqa: E402
+
+VIEWS = {"views": (0.0, 80.0), "objects": (1, 1), "shapes": ("sphere",)}
+
+
+def stored(folder, task="rooms", **settings):
+    model = tiny(task, **settings)
+    path = folder / f"{task}.safetensors"
+    save_weights(path, model, Card(model.config))
+    return path
+
+
+def test_a_true_volume_gives_the_truths_depth_and_normals_in_every_view(make_rooms, tmp_path):
+    size = {"height": 64, "width": 64, "object_radius": (0.12, 0.16)}
+    path = make_rooms(tmp_path / "ball.h5", 2, **VIEWS, **size)
+    model = tiny()
+    with RoomsFile(path) as rooms:
+        images = RoomImages(rooms, 16)
+        for row in range(len(rooms)):
+            room = rooms[row]
+            place = rooms.read("object/world_from_object", row)[0, :3, 3]
+            radius = float(rooms.read("object/scale", row)[0])
+            for mirrored in (False, True):
+                middle = place[::-1] if mirrored else place
+                away = np.linalg.norm(voxel_centres(model) - middle, axis=-1) - radius
+                depth, normal = seen(model, volume_of(away, 0.06), images, row, mirrored)
+                inside = room.object_id > 0
+                both = inside & (
+                    depth < empty_room(images.poses[row], room.fov_y_degrees, 64, 64)[0]
+                )
+                assert both.sum() > 0.93 * inside.sum()
+                assert np.abs(depth - room.depth)[both].mean() < 0.01
+                cosine = (normal * room.normal).sum(axis=-1)[both]
+                assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean() < 8
+                assert depth[~inside] == pytest.approx(room.depth[~inside], abs=0.2)
+
+
+def test_submissions_for_rooms_can_be_scored(make_rooms, tmp_path):
+    path = make_rooms(tmp_path / "rooms.h5", 2, **VIEWS)
+    out, done = tmp_path / "out.h5", []
+    write_submission(path, out, stored(tmp_path), progress=lambda *told: done.append(told))
+    assert done == [(1, 4)] * 4
+    found = score([out]).metrics
+    assert np.isfinite(found["chamfer"].value)
+    with pytest.raises(FileExistsError):
+        write_submission(path, out, stored(tmp_path))
+    weights = stored(tmp_path, silhouettes="ids")
+    write_submission(path, out, weights, overwrite=True)
+    with h5py.File(out) as file:
+        assert "ids" in file.attrs["method"]
+
+
+@pytest.fixture(scope="module")
+def questions(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ptn") / "split"
+    spec = SplitSpec(train=6, labeled=4, val=0, test=3, height=32, width=32, min_cube_pixels=0)
+    make_split(folder, spec)
+    return folder
+
+
+def test_answers_follow_labels_and_names(questions, tmp_path):
+    train_file, test_file = (questions / f"iqtt-{name}.h5" for name in ("train", "test"))
+    weights = train(train_file, tmp_path / "none", **TINY, iterations=2)
+    told = train(train_file, tmp_path / "told", networks=weights, labels=4)
+    scores = {}
+    for name, how in (
+        ("volumes", {"weights": weights}),
+        ("told", {"weights": told}),
+        ("codes", {"weights": told, "compare": "codes"}),
+    ):
+        write_submission(test_file, tmp_path / f"{name}.h5", **how)
+        with h5py.File(tmp_path / f"{name}.h5") as file:
+            scores[name] = file["scores"][:]
+    assert scores["codes"].max() <= 0
+    assert not np.allclose(scores["volumes"], scores["told"])
+    with pytest.raises(SpecError):
+        train(train_file, tmp_path / "many", **TINY, labels=5)
+
+
+def test_weights_and_files_of_different_tasks_are_refused(questions, make_rooms, tmp_path):
+    rooms = make_rooms(tmp_path / "rooms.h5", 1)
+    test_file, out = questions / "iqtt-test.h5", tmp_path / "out.h5"
+    for data, weights, how in (
+        (rooms, stored(tmp_path, "questions"), {}),
+        (test_file, stored(tmp_path), {}),
+        (questions / "iqtt-train.h5", stored(tmp_path, "questions"), {}),
+        (rooms, stored(tmp_path), {"compare": "codes"}),
+        (test_file, stored(tmp_path, "questions"), {"compare": "smell"}),
+    ):
+        with pytest.raises(SpecError):
+            write_submission(data, out, weights, **how)
+    other = tmp_path / "other.safetensors"
+    from baselines.tensor_files import save_tensors
+
+    save_tensors(other, {"x": torch.zeros(1)}, {})
+    with pytest.raises(FileFormatError):
+        write_submission(rooms, out, other)
+    assert not out.exists()
+
+
+def test_bundled_weights_see_objects_in_rooms_they_were_not_trained_on(make_rooms, tmp_path):
+    size = {"height": 64, "width": 64, "min_visible_pixels": 12, "object_radius": (0.08, 0.165)}
+    path = make_rooms(tmp_path / "rooms.h5", 8, **size, views=(0.0, 35.0, 80.0), seed=12345)
+    write_submission(path, tmp_path / "out.h5")
+    found = score([tmp_path / "out.h5"]).metrics
+    assert found["relief_iou"].value > 0.3  # the empty room has 0, a ramp of the mean objects 0.12
+    assert (FILES / "rooms.safetensors").stat().st_size < 15e6
