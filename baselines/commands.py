@@ -1,33 +1,53 @@
-"""`bench baseline`: reads the options and makes one library call. Heavy imports happen inside."""
+"""`bench baseline` and `bench train`: each reads its options and makes one library call.
+
+Heavy imports happen inside the commands, so that `--help` is quick and works without torch.
+"""
+
+import inspect
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any
 
 import click
 
-from baselines.pix2shape.commands import SUBMISSION, WEIGHTS_PATH, predict_to
+from baselines.pix2shape.commands import (
+    SUBMISSION,
+    WEIGHTS_PATH,
+    Setting,
+    needs_torch,
+    predict_to,
+)
 from scenegen.common.command_line import EXAMPLE, LARGEST, OVERWRITE, print_line, progress_bar
-from scenegen.common.paths import InputPath
+from scenegen.common.paths import InputPath, OutputFolder
 
-BASELINES = """\b
-Baselines:
-  constant    one depth everywhere, the mean of the training rooms
-  mean-depth  the mean depth of the training rooms at each pixel
-  empty-room  the room's walls and floor, which it is told, without objects
-  chance      random answers to questions
-  oracle      the truth itself, which must score perfectly
-  pix2shape   the reference model, with trained weights
+UNTRAINED = {
+    "constant": "one depth everywhere, the mean of the training rooms",
+    "mean-depth": "the mean depth of the training rooms at each pixel",
+    "empty-room": "the room's walls and floor, which it is told, without objects",
+    "oracle": "the truth itself, which must score perfectly",
+    "chance": "random answers to questions",
+    "pix2shape": "the reference model, which `pix2shape train` trains",
+}
+# Packages `baselines.<name>`, - written as _, whose functions `train` and `write_submission` make
+# a baseline that is trained with `bench train NAME`. A new one is a line here.
+TRAINED = {
+    "cnn": "answers to questions: ResNets and a softmax over the answers",
+    "siamese": "answers to questions: the one whose features are nearest to the reference's",
+}
+ALL = {**UNTRAINED, **TRAINED}
 
-"""
+
+def _listed(baselines: Mapping[str, str]) -> str:
+    wide = max(map(len, baselines))
+    lines = (f"  {name:{wide}}  {text}" for name, text in baselines.items())
+    return "\n".join(("\b", "Baselines:", *lines, "", ""))
 
 
 @click.command(
-    epilog=f"{BASELINES}{EXAMPLE}bench baseline empty-room --data rooms.h5 --out empty-room.h5"
+    epilog=f"{_listed(ALL)}{EXAMPLE}bench baseline empty-room --data rooms.h5 --out empty-room.h5"
 )
-@click.argument(
-    "name",
-    type=click.Choice(["constant", "mean-depth", "empty-room", "chance", "oracle", "pix2shape"]),
-)
-@click.option(
-    "--data", type=InputPath(), required=True, help="Rooms; or questions, for chance and pix2shape."
-)
+@click.argument("name", type=click.Choice(list(ALL)))
+@click.option("--data", type=InputPath(), required=True, help="Rooms or questions to predict.")
 @click.option(
     "--train", type=InputPath(), help="Rooms that constant and mean-depth take their means from."
 )
@@ -42,7 +62,7 @@ Baselines:
 @click.option(
     "--weights",
     type=WEIGHTS_PATH,
-    help="Weights of pix2shape: a .safetensors file or a bundled name"
+    help="Weights of a trained baseline: a .safetensors file; of pix2shape also a bundled name"
     "  [the bundled ones that suit the data].",
 )
 @OVERWRITE
@@ -56,13 +76,23 @@ def baseline(
     overwrite: bool,
 ) -> None:
     """Write the submission of a baseline for rooms or questions."""
-    if weights is not None and name != "pix2shape":
-        raise click.UsageError(f"--weights: {name} has none; they are pix2shape's")
-    if train is not None and name == "pix2shape":
-        raise click.UsageError("--train: pix2shape is trained already; see pix2shape train")
+    if weights is not None and name not in ("pix2shape", *TRAINED):
+        raise click.UsageError(f"--weights: {name} has none")
+    if train is not None and name in ("pix2shape", *TRAINED):
+        command = "pix2shape train" if name == "pix2shape" else f"bench train {name}"
+        raise click.UsageError(f"--train: {name} is trained already; see {command}")
     method = name
     if name == "pix2shape":
         method += f", weights {predict_to(out, weights, data, overwrite=overwrite)},"
+    elif name in TRAINED:
+        with progress_bar(None, "row") as bar:
+
+            def show(done: int, total: int) -> None:
+                bar.total = total
+                bar.update(done)
+
+            how = {"overwrite": overwrite, "progress": show}
+            _package(name).write_submission(data, out, weights, **how)
     elif name == "chance":
         from baselines.trivial import write_chance
 
@@ -77,4 +107,91 @@ def baseline(
     print_line(f"{out}: {method} on {data}; score it with `bench score {out} --truth {data}`")
 
 
-COMMANDS = (baseline,)
+@click.command(
+    name="train",
+    epilog=f"{_listed(TRAINED)}{EXAMPLE}bench train cnn --data iqtt/iqtt-train.h5 --out run",
+)
+@click.argument("name", type=click.Choice(list(TRAINED)))
+@click.option("--data", type=InputPath(), required=True, help="Rooms or questions to train on.")
+@click.option("--out", type=OutputFolder(), required=True, help="Folder of the run.")
+@click.option(
+    "--labels",
+    type=click.IntRange(0, LARGEST),
+    help="Labelled questions whose answers may be used  [the baseline's own].",
+)
+@click.option(
+    "--seed", type=click.IntRange(0, LARGEST), help="Seed of every random choice  [the run's; 0]."
+)
+@click.option(
+    "--iterations", type=click.IntRange(1, LARGEST), help="Steps of training  [the baseline's own]."
+)
+@click.option(
+    "--set",
+    "settings",
+    type=Setting(),
+    multiple=True,
+    help="Change another setting of the baseline, such as depth=50; docs/baselines.md lists them.",
+)
+@click.option("--resume", is_flag=True, help="Go on from the checkpoint of --out.")
+def train_baseline(
+    name: str,
+    data: str,
+    out: str,
+    labels: int | None,
+    seed: int | None,
+    iterations: int | None,
+    settings: tuple[tuple[str, Any], ...],
+    resume: bool,
+) -> None:
+    """Train a baseline; weights and checkpoint are written to a folder."""
+    options = {"labels": labels, "seed": seed, "iterations": iterations}
+    given = {key: value for key, value in options.items() if value is not None}
+    if resume and (given or settings):
+        own = "--labels, --seed, --iterations and --set"
+        raise click.UsageError(f"--resume goes on with the run's own {own}; leave them out")
+    train = _package(name).train
+    parameters = inspect.signature(train).parameters.values()
+    reserved = {*options, "resume", "progress"}
+    known = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
+    for key in given:
+        if key not in known:
+            raise click.UsageError(f"--{key}: {name} has no such setting")
+    for key, value in settings:
+        if key not in known or key in reserved:
+            listed = ", ".join(sorted(set(known) - reserved))
+            raise click.UsageError(f"--set: found {key!r:.40}, expected one of {listed}")
+        given[key] = value
+    bar, told = progress_bar(None, "it"), ""
+
+    def show(done: int, total: int, numbers: Mapping[str, float]) -> None:
+        nonlocal told
+        told = ", ".join(f"{key} {value:.3g}" for key, value in numbers.items())
+        if bar.total is None:  # the first iteration, of a resumed run too
+            bar.total, bar.initial, bar.n = total, done - 1, done - 1
+        bar.set_postfix_str(told, refresh=False)
+        bar.update(done - bar.n)
+        if bar.disable and (done % 100 == 0 or done == total):  # no terminal, but perhaps a log
+            print_line(f"{done} of {total}: {told}")
+
+    try:
+        weights = train(data, out, **given, resume=resume, progress=show)
+    except KeyboardInterrupt:
+        click.echo()
+        print_line(f"Stopped; `--resume` goes on from {out}'s last checkpoint, if it got one.")
+        raise
+    finally:
+        bar.close()
+    more = f" ({told})" if told else ""
+    print_line(
+        f"{weights}: {name} trained on {data}{more}; now `bench baseline {name} --weights {weights}"
+        " --data ...`"
+    )
+
+
+def _package(name: str) -> Any:
+    """Return the package of a trained baseline. Raises UserError where torch is missing."""
+    needs_torch(name, ("torch", "safetensors"))
+    return import_module(f"baselines.{name.replace('-', '_')}")
+
+
+COMMANDS = (baseline, train_baseline)

@@ -39,7 +39,9 @@ def heavy_after(code, cwd):
     return done.stdout.split()
 
 
-@pytest.mark.parametrize("package", ["scenegen", "iqtt", "metrics", "baselines.pix2shape", "cli"])
+@pytest.mark.parametrize(
+    "package", ["scenegen", "iqtt", "metrics", "baselines.pix2shape", "baselines.cnn", "cli"]
+)
 def test_importing_a_package_loads_nothing_heavy(package, tmp_path):
     assert heavy_after(f"import {package}", tmp_path) == []
 
@@ -55,6 +57,7 @@ def test_importing_a_package_loads_nothing_heavy(package, tmp_path):
         ("iqtt", ["--help"]),
         ("bench", ["--help"]),
         ("bench", ["baseline", "--help"]),
+        ("bench", ["train", "--help"]),
         ("pix2shape", ["--help"]),
         ("pix2shape", ["--version"]),
         *(("pix2shape", [name, "--help"]) for name in PIX2SHAPE),

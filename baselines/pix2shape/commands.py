@@ -308,11 +308,11 @@ def _model_and_rooms(
     return model, rooms, pick_rows(len(rooms), items)
 
 
-def needs_torch() -> None:
+def needs_torch(who: str = "pix2shape", packages: tuple[str, ...] = PACKAGES) -> None:
     """Raise UserError where an optional package is missing."""
-    missing = ", ".join(name for name in PACKAGES if importlib.util.find_spec(name) is None)
+    missing = ", ".join(name for name in packages if importlib.util.find_spec(name) is None)
     if missing:
-        raise UserError(f"pix2shape needs {missing}: pip install '.[model]'")
+        raise UserError(f"{who} needs {missing}: pip install '.[model]'")
 
 
 COMMANDS = (train, predict, sample, interpolate, rotate)

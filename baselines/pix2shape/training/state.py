@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-from torch import Tensor, nn
+from torch import nn
 from torch.optim import Adam
 
+from baselines.optimiser_moments import load_moments, moments_of
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.weights import storage
@@ -18,7 +19,6 @@ from scenegen.common.seeding import Purpose, item_seed
 
 CHECKPOINT = "checkpoint.safetensors"
 KINDS = ("generator", "critic")  # the optimisers of a state
-MOMENTS = ("exp_avg", "exp_avg_sq", "step")  # Adam's
 
 
 @dataclass(eq=False)
@@ -54,10 +54,8 @@ def save_state(folder: Path, state: State, card: Card) -> None:
     tensors = {f"model.{name}": value for name, value in state.model.state_dict().items()}
     notes = {"iteration": str(state.iteration), "seconds": f"{state.seconds:.3f}"}
     for kind in KINDS:
-        moments = getattr(state, kind).state_dict()["state"]
-        notes[kind] = str(len(moments))  # not every loss trains every parameter
-        for index, values in moments.items():
-            tensors |= {f"{kind}.{index}.{name}": value for name, value in values.items()}
+        moments, notes[kind] = moments_of(getattr(state, kind))
+        tensors |= {f"{kind}.{name}": value for name, value in moments.items()}
     storage.save_card(folder / CHECKPOINT, card)
     save_tensors(folder / CHECKPOINT, tensors, notes)
 
@@ -76,34 +74,12 @@ def load_state(folder: Path) -> tuple[State, Card]:
         _check(0 <= state.iteration <= card.config.iterations, f"iteration {state.iteration}")
         for kind in KINDS:
             own = {k.removeprefix(f"{kind}."): v for k, v in tensors.items() if k.startswith(kind)}
-            _load_moments(getattr(state, kind), own, int(notes[kind]))
+            load_moments(getattr(state, kind), own, int(notes[kind]))
         strange = [name for name in tensors if name.split(".")[0] not in ("model", *KINDS)]
         _check(not strange, f"{', '.join(strange)} not expected")
     except (KeyError, ValueError) as error:
         raise FileFormatError(path, f"{error}", "a checkpoint of this release") from error
     return state, card
-
-
-def _load_moments(optimiser: Adam, tensors: dict[str, Tensor], count: int) -> None:
-    """Set the moments of an optimiser's first `count` trained parameters.
-
-    Raises KeyError, ValueError where moments are missing, unknown, of another shape, not finite.
-    """
-    parameters = optimiser.param_groups[0]["params"]
-    moments: dict[int, dict[str, Tensor]] = {}
-    for index in sorted({int(name.partition(".")[0]) for name in tensors}):
-        _check(index < len(parameters), f"moments of parameter {index}, not expected")
-        moments[index] = {}
-        for field in MOMENTS:
-            value = moments[index][field] = tensors[f"{index}.{field}"]
-            shape = () if field == "step" else tuple(parameters[index].shape)
-            found = f"{index}.{field}: {value.dtype}, shape {tuple(value.shape)}"
-            ok = tuple(value.shape) == shape and value.dtype.is_floating_point
-            _check(ok and bool(torch.isfinite(value).all()), f"{found}, not as its weights are")
-    _check(len(moments) == count, f"moments of {len(moments)} parameters, expected {count}")
-    _check(len(tensors) == count * len(MOMENTS), f"{len(tensors)} moments, not expected")
-    groups = optimiser.state_dict()["param_groups"]
-    optimiser.load_state_dict({"state": moments, "param_groups": groups})
 
 
 def _check(ok: bool, found: str) -> None:
