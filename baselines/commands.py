@@ -32,6 +32,7 @@ UNTRAINED = {
 # a baseline that is trained with `bench train NAME`. A new one is a line here.
 TRAINED = {
     "cnn": "answers to questions: ResNets and a softmax over the answers",
+    "rezende": "answers to questions: meshes from images, through a renderer without gradients",
     "siamese": "answers to questions: the one whose features are nearest to the reference's",
 }
 ALL = {**UNTRAINED, **TRAINED}

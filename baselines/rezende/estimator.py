@@ -24,21 +24,23 @@ def sampled_gradient(
         gradient = 1 / pairs * sum_k eps_k (loss(mean + width eps_k) - loss(mean - width eps_k)) / (2 width)
 
     It is exact in expectation for the smoothed loss, and for a quadratic loss equals the gradient
-    of the loss itself.
+    of the loss itself. Where an element of x can only change a part of the loss, the rest of the
+    loss is noise to it; then `loss` may return to each element its own part.
 
     Args:
-        loss: (M, B, ...) -> (M, B), called once; no gradient is asked of it.
+        loss: (M, B, ...) -> (M, B), or (M, B, V) with a part for each of the elements that follow
+            B; called once, and no gradient is asked of it.
         mean: (B, ...); gradients of it are not followed.
         pairs: number of antithetic pairs for each of the B.
 
-    Returns the estimate, like `mean`, and the mean loss of all samples, (B,).
+    Returns the estimate, like `mean`, and the losses' means over samples, (B,) or (B, V).
     """
     with torch.no_grad():
         noise = torch.randn((pairs, *mean.shape), generator=generator)
         steps = width * torch.cat([noise, -noise])
         losses = loss(mean.detach() + steps)
         difference = (losses[:pairs] - losses[pairs:]) / (2 * width)
-        weights = difference.view(pairs, len(mean), *(1,) * (mean.dim() - 1))
+        weights = difference.view(*difference.shape, *(1,) * (noise.dim() - difference.dim()))
         return (weights * noise).mean(dim=0), losses.mean(dim=0)
 
 

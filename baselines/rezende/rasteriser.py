@@ -66,6 +66,19 @@ def rasterise(vertices: Array, faces: Array, views: Views) -> tuple[Array, Array
     return radiance.reshape(count, size, size, 3), depth.reshape(count, size, size)
 
 
+def project(vertices: Array, views: Views) -> tuple[Array, Array, Array]:
+    """Return where vertices, (..., 3), lie on the picture: x, y and inverse depth, (...) each.
+
+    x and y are in pixels, where whole numbers are the centres of pixels and row 0 is on top.
+    Inverse depth is 0 for vertices nearer than NEAR, and x and y mean nothing then.
+    """
+    depth = views.distance - vertices[..., 2]
+    inverse = np.where(depth > NEAR * views.distance, 1 / np.where(depth == 0, 1, depth), 0)
+    scale = inverse / pixel_size(views.size, views.fov_y_degrees)
+    middle = (views.size - 1) / 2
+    return middle + vertices[..., 0] * scale, middle - vertices[..., 1] * scale, inverse
+
+
 def shade_triangles(vertices: Array, faces: Array, views: Views, chosen: Array) -> Array:
     """Return the radiance of some triangles at their centroids, (T, 3).
 
@@ -106,13 +119,8 @@ def _visible(vertices: Array, faces: Array, views: Views) -> tuple[Array, Array,
     those of all pictures row by row, and inverse depth, (P,) each.
     """
     size = views.size
-    depth = views.distance - vertices[..., 2]
-    ahead = depth > NEAR * views.distance
-    inverse = 1 / np.where(ahead, depth, 1)
-    scale = 1 / pixel_size(size, views.fov_y_degrees)
-    # Pixel coordinates, where whole numbers are the centres of pixels; row 0 is on top.
-    x = vertices[..., 0] * inverse * scale + (size - 1) / 2
-    y = (size - 1) / 2 - vertices[..., 1] * inverse * scale
+    x, y, inverse = project(vertices, views)
+    ahead = inverse > 0
     cx, cy, cz = ([value[:, corner].ravel() for corner in faces.T] for value in (x, y, inverse))
     # Twice the area on the picture; as rows go down, it is negative for anticlockwise corners.
     area = (cx[1] - cx[0]) * (cy[2] - cy[0]) - (cx[2] - cx[0]) * (cy[1] - cy[0])

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
-SMOOTHING = 2.0  # weight of the Laplacian; offsets that change from vertex to vertex are damped
+SMOOTHING = 6.0  # weight of the Laplacian; offsets that change from vertex to vertex are damped
 
 
 @cache
