@@ -37,10 +37,11 @@ option = partial(click.option, show_default=True)
 @option("--out", type=OutputFolder(), default="iqtt-split", help="Folder for the four files.")
 @option(
     "--preset",
-    type=click.Choice(["small", "v2", "paper"]),
+    type=click.Choice(["small", "v2", "paper", "suite"]),
     default="small",
     help="Numbers of questions. small: 1,000 for training (100 with answers), 200 for validation,"
-    " 200 for testing; v2: as in the released data; paper: as in the paper.",
+    " 200 for testing; v2: as in the released data, in float32; paper: as in the paper; suite: a"
+    " folder for each kind of questions, 5,000 (1,000), 500 and 2,000 in each.",
 )
 @option("--train", type=int, help="Number of training questions, with and without answers.")
 @option(
@@ -58,7 +59,7 @@ option = partial(click.option, show_default=True)
     help="File whose content is the seed, for a private test set. No file that is written holds the"
     " seed.",
 )
-@option("--cubes", type=Range(int), default="5-11", help="Number of cubes of a shape.")
+@option("--cubes", type=Range(int), default="8-11", help="Number of cubes of a shape.")
 @option(
     "--shapes",
     type=click.Choice(["chain", "tree"]),
@@ -67,17 +68,20 @@ option = partial(click.option, show_default=True)
 )
 @option(
     "--distractors",
-    type=click.Choice(["other", "near", "mirror", "mixed"]),
+    type=click.Choice(["other", "near", "mirror", "matched", "mirror-pair", "mixed"]),
     default="mixed",
     help="Wrong answers. other: different shapes; near: one cube moved; mirror: a mirror image and"
-    " a near shape; mixed: each question one of the three.",
+    " a near shape; matched: different shapes with like outlines; mirror-pair: two views of the"
+    " mirror image; mixed: each question one of these.",
 )
+@option("--answers", type=int, default=3, help="Number of answers, 3 or 2; one of them is right.")
 @option(
     "--min-angle",
     "min_angle_degrees",
     type=float,
     default=30,
-    help="Smallest rotation between the reference's view and an answer's, in degrees.",
+    help="Smallest rotation between the reference's view and an answer's, and between two views of"
+    " one shape, in degrees.",
 )
 @option(
     "--min-cube-pixels",
@@ -88,7 +92,11 @@ option = partial(click.option, show_default=True)
 @command_line.SIZE
 @option("--background", type=Color(), default="white", help="Background colour.")
 @option("--lights", type=Range(int), default="2", help="Number of lights.")
-@command_line.IMAGE_DTYPE
+@option(
+    "--image-dtype",
+    type=click.Choice(["uint8", "float16", "float32"]),
+    help="Type of stored radiance [default: uint8; float32 with --preset v2].",
+)
 @option("--with-depth", is_flag=True, help="Store planar depth as well.")
 @command_line.COMPRESSION
 @option("--batch", type=click.IntRange(1, 4096), default=64, help="Questions rendered at once.")
@@ -107,25 +115,32 @@ def make_split(
 ) -> None:
     """Make a split of mental-rotation questions for training, validation and testing.
 
-    A question has four images: a reference, and three answers of which one shows the same shape.
-    No shape, nor its mirror image, is in two of training, validation and test.
+    A question has a reference and answers, one of which shows the same shape. Every cube of a shape
+    shows in every picture. No shape, nor its mirror image, is in two of training, validation and
+    test, whatever the settings.
     """
     from iqtt.files import make
     from iqtt.questions import specs
     from scenegen.common.errors import SpecError
 
+    suite, context = preset == "suite", click.get_current_context()
+    given = click.core.ParameterSource.DEFAULT
     if secret_seed is not None:
-        source = click.get_current_context().get_parameter_source("seed")
-        if source is not click.core.ParameterSource.DEFAULT:
+        if context.get_parameter_source("seed") is not given:
             raise SpecError("--secret-seed", "--seed as well", "only one of the two")
-        refuse_command_inputs(Path(out) / name for name in make.FILES)
+        folders = [Path(out) / name for name in specs.SUITE] if suite else [Path(out)]
+        refuse_command_inputs(folder / name for folder in folders for name in make.FILES)
         settings["seed"] = specs.secret_seed(secret_seed)
+    for name in ("distractors", "answers") if suite else ():
+        if context.get_parameter_source(name) is not given:
+            raise SpecError(f"--{name}", "--preset suite as well", "only one of the two")
     chosen = {name: value for name, value in settings.items() if value is not None}
     spec = specs.preset_spec(preset, height=size[0], width=size[1], **chosen)
-    count = spec.train + spec.val + spec.test
+    splits = len(specs.SUITE) if suite else 1
+    count = splits * (spec.train + spec.val + spec.test)
     started = time.perf_counter()
     with progress_bar(count, "question") as bar:
-        tally = make.make_split(
+        tally = (make.make_suite if suite else make.make_split)(
             out,
             spec,
             batch=batch,
@@ -137,10 +152,11 @@ def make_split(
             progress=bar.update,
         )
     seconds = time.perf_counter() - started
-    megabytes = sum(path.stat().st_size for path in Path(out).iterdir()) / 1e6
+    megabytes = sum(path.stat().st_size for path in Path(out).rglob("*.h5")) / 1e6
     print_line(
-        f"{out}: {spec.train} + {spec.val} + {spec.test} questions ({spec.labeled} of training"
-        f" labelled), {megabytes:.1f} MB, {4 * count / seconds:.0f} images/s"
+        f"{out}: {f'{splits} splits of ' if suite else ''}{spec.train} + {spec.val} + {spec.test}"
+        f" questions ({spec.labeled} of training labelled), {megabytes:.1f} MB,"
+        f" {count / seconds:.0f} questions/s"
     )
     print_line(
         f"{out}: {tally.refused / max(1, tally.proposed):.0%} of {tally.proposed} proposed views"
@@ -174,7 +190,7 @@ def show(
     answers: bool,
     overwrite: bool,
 ) -> None:
-    """Draw questions of FILE: the reference on the left, its three answers beside it."""
+    """Draw questions of FILE: the reference on the left, its answers beside it."""
     from iqtt.files.preview import save_sheet
     from iqtt.files.reader import answers_beside, open_questions, parts
     from scenegen.common.errors import SpecError
@@ -186,7 +202,8 @@ def show(
         if answers and not (questions.has_answers or questions.has_truth):
             raise SpecError(file, "no answers, and no file of answers beside it", "answers")
         rows = pick_rows(len(questions), items)[: None if items else SHOWN]
-        save_sheet([questions[row] for row in rows], answers, out, overwrite)
+        task = questions.attributes.get("task", "")
+        save_sheet([questions[row] for row in rows], answers, out, overwrite, task)
     print_line(f"{out}: {len(rows)} of {file}'s {len(questions)} questions")
 
 

@@ -25,10 +25,10 @@ class Rendered:
     """A question with its pixels.
 
     Attributes:
-        images: reference and three answers, (4, H, W, 3), of the spec's `image_dtype`.
-        visible_pixels: number of pixels that show each cube, (4, largest number of cubes) int32.
-        depth: planar depth, (4, H, W) float32, cube edges, NaN on the background; None unless the
-            spec asks for it.
+        images: reference and K answers, (1 + K, H, W, 3), of the spec's `image_dtype`.
+        visible_pixels: pixels that show each cube, (1 + K, largest number of cubes) int32.
+        depth: planar depth, (1 + K, H, W) float32, cube edges, NaN on the background; None unless
+            the spec asks for it.
     """
 
     question: Question
@@ -115,9 +115,9 @@ def _launch(spec: SplitSpec, questions: Sequence[Question], device: str) -> Fetc
         shown = visible_pixels(pixels["object_id"], spec.cubes[1])
         result = []
         for i, question in enumerate(questions):
-            four = slice(4 * i, 4 * i + 4)
-            depth = pixels["depth"][four] if spec.with_depth else None
-            result.append(Rendered(question, pixels["image"][four], shown[four], depth))
+            own = slice((1 + spec.answers) * i, (1 + spec.answers) * (i + 1))
+            depth = pixels["depth"][own] if spec.with_depth else None
+            result.append(Rendered(question, pixels["image"][own], shown[own], depth))
         return result
 
     return rendered

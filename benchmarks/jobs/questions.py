@@ -58,7 +58,7 @@ def per_image(questions: int, repeats: int, variant: str) -> dict[str, Any]:
     plain.choose(variant)
     images = [_image(spec, question, i) for question in made for i in range(4)]
     integrator = mi.load_dict(plain.DIRECT)
-    seconds = repeat(partial(_render_all, spec, images, integrator), repeats)
+    seconds = repeat(partial(_render_all, images, integrator), repeats)
     return {"seconds": seconds, "images": len(images), "note": "one load_dict, one render each"}
 
 
@@ -69,7 +69,7 @@ def _questions(spec: SplitSpec, count: int) -> list[Question]:
 
 
 def _image(spec: SplitSpec, question: Question, i: int) -> dict[str, Any]:
-    """Return mesh, lights and background of an image as `mi.load_dict` wants them."""
+    """Return mesh, lights, background and camera of an image as `mi.load_dict` wants them."""
     cubes = question.shapes.cubes[i]
     box = welded(unit_shape("box"))
     corners = np.asarray(box.vertices) * np.sqrt(3) / 2
@@ -78,14 +78,14 @@ def _image(spec: SplitSpec, question: Question, i: int) -> dict[str, Any]:
     faces = np.concatenate([np.asarray(box.faces) + k * len(corners) for k in range(len(cubes))])
     mesh = Mesh(points, np.zeros_like(points), faces)
     contents = {"mesh": plain.mitsuba_mesh("cubes", mesh, plain.diffuse(spec.reflectance))}
+    contents["sensor"] = plain.sensor(spec, spec.camera(question.camera_distance))
     for j in range(int(question.light_count[i])):
         position, color = question.light_position[i, j], question.light_color[i, j]
         contents[f"light{j}"] = plain.point_light(position.tolist(), color.tolist())
     return contents
 
 
-def _render_all(spec: SplitSpec, images: list[dict[str, Any]], integrator: Any) -> None:
+def _render_all(images: list[dict[str, Any]], integrator: Any) -> None:
     for number, contents in enumerate(images):
-        own = {"type": "scene", "integrator": integrator, **contents}
-        scene = mi.load_dict({**own, "sensor": plain.sensor(spec, spec.camera)})
+        scene = mi.load_dict({"type": "scene", "integrator": integrator, **contents})
         np.array(mi.render(scene, spp=1, seed=number))

@@ -115,15 +115,14 @@ def _difference(questions: QuestionsFile, row: int, count: int) -> str:
     spec = questions.spec
     if spec is None:
         return ""
-    names = ("questions", "cubes", "world_from_shape", "visible_pixels")
-    images, cubes, views, visible = (questions.read(name, row) for name in names)
+    names = ("questions", "cubes", "world_from_shape", "visible_pixels", "camera_distance")
+    images, cubes, views, visible, distance = (questions.read(name, row) for name in names)
     lamps = ("light_count", "light_position", "light_color")
     lights, light_position, light_color = (questions.read(name, row) for name in lamps)
-    for k in range(4):
+    for k in range(len(images)):
         used = slice(0, int(lights[k]))
-        hit, radiance, sure = _cast(
-            spec, cubes[k, :count], views[k], light_position[k, used], light_color[k, used]
-        )
+        lamps_used = light_position[k, used], light_color[k, used]
+        hit, radiance, sure = _cast(spec, distance, cubes[k, :count], views[k], *lamps_used)
         shown = np.bincount(hit[hit >= 0], minlength=count)
         unsure = np.count_nonzero(~sure)
         if np.abs(shown - visible[k, :count]).max() > unsure:
@@ -137,11 +136,17 @@ def _difference(questions: QuestionsFile, row: int, count: int) -> str:
 
 
 def _cast(
-    spec: SplitSpec, cubes: Array, view: Array, light_position: Array, light_color: Array
+    spec: SplitSpec,
+    distance: float,
+    cubes: Array,
+    view: Array,
+    light_position: Array,
+    light_color: Array,
 ) -> tuple[Array, Array, Array]:
     """Cast a ray through the middle of each pixel.
 
     Args:
+        distance: from the camera to the origin, cube edges.
         cubes: integer coordinates, (n, 3).
         view: rotation world_from_shape, (3, 3).
         light_position, light_color: (L, 3) each.
@@ -150,8 +155,8 @@ def _cast(
     edge is so near that rounding may decide, (H, W).
     """
     height, width = spec.height, spec.width
-    world_from_camera = spec.camera.world_from_camera
-    rays = pixel_directions(height, width, spec.camera.fov_y_degrees).reshape(-1, 3)
+    world_from_camera = spec.camera(distance).world_from_camera
+    rays = pixel_directions(height, width, spec.fov_y_degrees).reshape(-1, 3)
     rays = rays @ world_from_camera[:3, :3].T @ view  # from here on, all is in the shape's frame
     eye = world_from_camera[:3, 3] @ view
     low = cubes - (cubes.min(axis=0) + cubes.max(axis=0) + 1) / 2
@@ -164,7 +169,7 @@ def _cast(
     nearest = depth[every, cube]
     hit = np.isfinite(nearest)
     # A ray is unsure if it grazes an edge of a cube in front, or if two cubes or faces are as near.
-    clear = GRAZING / spec.camera_distance
+    clear = GRAZING / distance
     close = (np.abs(last - first) < GRAZING) & (
         np.minimum(first, last) < nearest[:, None] + GRAZING
     )

@@ -59,6 +59,7 @@ def _header(path: Path, tables: Sequence[TableFile]) -> list[str]:
         f"  rendered by   {renderer_text(attributes)}",
         f"  command       {attributes.get('creation_command') or '-'}",
         f"  split         {tables[0].split}",
+        f"  task          {attributes.get('task') or '-'}",
         f"  conventions   {attributes.get('conventions')}",
         f"  content       {tables[0].stored_content_digest or 'no digest'}",
         "",
@@ -81,7 +82,9 @@ def _table_lines(table: TableFile) -> list[str]:
     heading = f"{table.part}: " if table.part else ""
     heading += f"{len(table)} questions"
     if isinstance(table, QuestionsFile):
-        heading += f" of four images of {table.height}x{table.width}, {table.image_dtype}"
+        heading += (
+            f" of {1 + table.answers} images of {table.height}x{table.width}, {table.image_dtype}"
+        )
     lines = [f"  {heading}"]
     lines += [f"    {name:14} {text}" for name, text in _facts(table).items()]
     units = {c.name: c.attributes["unit"] for c in truth_columns(table.spec)} if table.spec else {}

@@ -3,6 +3,8 @@
 from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +13,12 @@ import h5py
 from iqtt.files.layout import root_attributes
 from iqtt.files.writer import QuestionsWriter
 from iqtt.questions.distractors import make_pools
-from iqtt.questions.specs import SplitSpec
+from iqtt.questions.specs import SUITE, SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import DEFAULT_BATCH, Rendered, groups, render_questions
 from scenegen.common.hdf5.content import seal
 from scenegen.common.hdf5.row_file import new_file
-from scenegen.common.new_folder import folder_written_beside
+from scenegen.common.new_folder import check_folder, folder_written_beside
 from scenegen.common.records import check
 from scenegen.rendering.backend import select_variant, versions
 
@@ -88,6 +90,47 @@ def make_split(
             answers.attrs.update({**private, "split": "test"})
             write("test", test, answers)
     return tally
+
+
+def make_suite(
+    folder: str | Path,
+    spec: SplitSpec,
+    *,
+    overwrite: bool = False,
+    **options: Any,
+) -> Tally:
+    """Write a split of each kind of questions to a folder of its own in `folder`: see `SUITE`.
+
+    Each split is complete when it appears, and what could stop one of them is checked before the
+    first one is made.
+
+    Args:
+        spec: the settings of each split but its kind and number of answers.
+        options: as for `make_split`.
+
+    Raises as `make_split`.
+    """
+    specs = {
+        name: replace(spec, distractors=kind, answers=answers)
+        for name, (kind, answers) in SUITE.items()
+    }
+    home = Path(folder)
+    if home.exists():
+        for name in specs:
+            check_folder(home / name, FILES, overwrite)
+    for own in specs.values():
+        make_pools(own)
+    home.mkdir(exist_ok=True)
+    total = Tally()
+    try:
+        for name, own in specs.items():
+            tally = make_split(home / name, own, overwrite=overwrite, **options)
+            total.proposed += tally.proposed
+            total.refused += tally.refused
+    finally:
+        with suppress(OSError):  # it stays if anything is in it
+            home.rmdir()
+    return total
 
 
 def _append_all(

@@ -1,5 +1,6 @@
-"""Pictures of questions: a sheet with the reference and the three answers of each."""
+"""Pictures of questions: a sheet with the reference and the answers of each."""
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -19,26 +20,35 @@ GAP = 10  # pixels between answers
 WIDE_GAP = 34  # pixels between reference and answers, with a line in the middle
 MARGIN = 16  # pixels around a question
 LABEL_HEIGHT = 22
+LINE_HEIGHT, LETTER_WIDTH = 18, 7  # pixels of the text above the questions
 RIGHT = (0, 128, 94)  # Okabe and Ito's green, darker
 LINE = (190, 190, 190)
 MANY = 4  # more questions than this stand in two columns
 
 
-def question_sheet(records: Sequence[QuestionRecord], show_answers: bool) -> Image.Image:
+def question_sheet(
+    records: Sequence[QuestionRecord], show_answers: bool, task: str = ""
+) -> Image.Image:
     """Return a sheet with a row for each question: the reference, then answers A, B and C.
 
     Args:
         records: one or more questions with images of one size.
         show_answers: whether to frame the right answer, and to name the kind of the wrong ones.
+        task: what is asked; it stands above the questions.
     """
     pictures = [[_tile(image) for image in np.nan_to_num(record.radiance)] for record in records]
-    width, height = _slot(pictures[0][0])
-    cell = (4 * width + WIDE_GAP + 2 * GAP + 2 * MARGIN, height + LABEL_HEIGHT + MARGIN + 2 * FRAME)
+    (width, height), answers = _slot(pictures[0][0]), len(pictures[0]) - 1
+    wide = (1 + answers) * width + WIDE_GAP + (answers - 1) * GAP + 2 * MARGIN
+    cell = (wide, height + LABEL_HEIGHT + MARGIN + 2 * FRAME)
     columns = 2 if len(records) > MANY else 1
     lines = -(-len(records) // columns)
-    sheet = Image.new("RGB", (columns * cell[0], lines * cell[1] + MARGIN), BACKGROUND)
+    asked = textwrap.wrap(task, (columns * wide - 2 * MARGIN) // LETTER_WIDTH)
+    header = LINE_HEIGHT * len(asked)
+    sheet = Image.new("RGB", (columns * wide, header + lines * cell[1] + MARGIN), BACKGROUND)
+    font = ImageFont.load_default(size=12)
+    ImageDraw.Draw(sheet).text((MARGIN, MARGIN // 2), "\n".join(asked), fill=INK, font=font)
     for i, (record, tiles) in enumerate(zip(records, pictures, strict=True)):
-        corner = i % columns * cell[0] + MARGIN, i // columns * cell[1] + MARGIN
+        corner = i % columns * wide + MARGIN, header + i // columns * cell[1] + MARGIN
         _draw_question(sheet, corner, record, tiles, show_answers)
     return sheet
 
@@ -48,9 +58,10 @@ def save_sheet(
     show_answers: bool,
     path: str | Path,
     overwrite: bool = False,
+    task: str = "",
 ) -> None:
     """Write a sheet; the suffix of `path` names the format. Raises as `save_picture`."""
-    save_picture(question_sheet(records, show_answers), path, overwrite)
+    save_picture(question_sheet(records, show_answers, task), path, overwrite)
 
 
 def _draw_question(

@@ -28,8 +28,8 @@ class QuestionRecord:
 
     Attributes:
         index: row of the question.
-        images: the reference, then three answers, (4, H, W, 3), as stored.
-        answer: which of the three shows the reference's shape, 0 to 2; None if the file does not
+        images: the reference, then K answers, (1 + K, H, W, 3), as stored.
+        answer: which of these shows the reference's shape, 0 to K - 1; None if the file does not
             tell.
         truth: shapes, views and lights; None if the file does not tell them.
     """
@@ -41,7 +41,7 @@ class QuestionRecord:
 
     @property
     def radiance(self) -> Array:
-        """Linear RGB radiance, (4, H, W, 3) float32."""
+        """Linear RGB radiance, (1 + K, H, W, 3) float32."""
         return decode_image(self.images)
 
 

@@ -13,14 +13,16 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.files.attributes import has_digests, read_root
-from iqtt.files.layout import SCORED, named, truth_columns
+from iqtt.files.attributes import read_root, version_of
+from iqtt.files.layout import CAMERAS_SINCE, DIGESTS_SINCE, SCORED, named, truth_columns
+from iqtt.questions.specs import SplitSpec
+from scenegen.camera import Camera
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.hdf5 import content
 from scenegen.common.hdf5.attributes import read_digest, read_names, read_text
 from scenegen.common.hdf5.input_file import StoredArray, checking, open_file, reading
 from scenegen.common.hdf5.row_file import and_more, column_problems
-from scenegen.common.records import check
+from scenegen.common.records import LARGEST, check
 from scenegen.layout import TRUTH_DIGEST
 
 Array = NDArray[Any]
@@ -30,26 +32,28 @@ RELEASED = ("questions", "answers")
 
 @dataclass(frozen=True, eq=False)
 class QuestionTruth:
-    """What a file tells of the four images of a question: the reference, then three answers.
+    """What a file tells of the images of a question: the reference, then K answers.
 
     Attributes:
-        cubes: integer coordinates, (4, n, 3) int8.
+        cubes: integer coordinates, (1 + K, n, 3) int8.
         shape_id: identifier of the shape of each image, 32 bytes; equal if a rotation takes one
             shape to the other.
         class_id: the same, but equal for mirror images too.
-        world_from_shape: rotation of each shape about the centre of its box, (4, 3, 3).
+        world_from_shape: rotation of each shape about the centre of its box, (1 + K, 3, 3).
+        camera: the camera of all these images.
         light_position: positions of each image's point lights, (L, 3) each, world, cube edges.
         light_color: radiance of each image's point lights, RGB, (L, 3) each.
         distractor_kind: kind of each answer, such as "near"; None for the right one.
         angle_degrees: smallest rotation from the reference's view to the right answer's.
-        visible_pixels: number of pixels that show each cube, (4, n).
-        depth: planar depth, (4, H, W), cube edges, NaN on the background; None if not stored.
+        visible_pixels: number of pixels that show each cube, (1 + K, n).
+        depth: planar depth, (1 + K, H, W), cube edges, NaN on the background; None if not stored.
     """
 
     cubes: Array
     shape_id: tuple[bytes, ...]
     class_id: tuple[bytes, ...]
     world_from_shape: Array
+    camera: Camera
     light_position: tuple[Array, ...]
     light_color: tuple[Array, ...]
     distractor_kind: tuple[str | None, ...]
@@ -68,6 +72,7 @@ class TableFile:
         spec: the settings it was made with, without the seed unless it is a file of answers; None
             for a released file.
         split: "train", "val" or "test"; None for a released file.
+        answers: how many answers a question has, 2 or 3.
         kind_names: names of the kinds that `distractor_kind` counts; empty where it is not told.
         fingerprint: SHA-256 of settings, shapes, views and answers of this table; None for a
             released file.
@@ -93,7 +98,8 @@ class TableFile:
             self.part = self._chosen(part)
             self._datasets: dict[str, Any] = {}  # the answers are in memory
             self._stored: dict[str, h5py.Dataset] = {}
-            self._ranges: dict[str, tuple[int, int]] = {}
+            self._ranges: dict[str, tuple[float, float]] = {}
+            self.answers = self.spec.answers if self.spec else 3
             self.kind_names: list[str] = []
             self._count = self._open_content()
             self._open_truth()
@@ -147,7 +153,8 @@ class TableFile:
         if not self.has_truth:
             return None
         values = {name: self.read(name, row) for name in self.fields if name not in RELEASED}
-        return _question_truth(values, self.kind_names)
+        assert self.spec is not None  # truth is read only where there is one
+        return _question_truth(values, self.kind_names, self.spec)
 
     def stored_bytes(self) -> dict[str, tuple[int, int]]:
         """Return for each dataset of this table its bytes on disk and in memory."""
@@ -217,11 +224,10 @@ class TableFile:
                 f"shape ({'Q' if count is None else count},), whole numbers",
             )
         answers = dataset[()].reshape(-1)
-        wrong = np.flatnonzero((answers < 0) | (answers > 2))
+        wrong = np.flatnonzero((answers < 0) | (answers >= self.answers))
         if len(wrong):
-            raise FileFormatError(
-                self.place("answers", int(wrong[0])), answers[wrong[0]], "0, 1 or 2"
-            )
+            expected = f"0 to {self.answers - 1}"
+            raise FileFormatError(self.place("answers", int(wrong[0])), answers[wrong[0]], expected)
         self._datasets["answers"] = answers.astype(np.uint8)
         return len(answers)
 
@@ -230,7 +236,8 @@ class TableFile:
         group = self._file.get(name)
         if self.spec is None or group is None:
             return
-        columns = truth_columns(self.spec)
+        version = version_of(self.attributes)
+        columns = truth_columns(self.spec, version)
         problems = ["expected a group"]
         if isinstance(group, h5py.Group):
             problems = column_problems(group, columns, self._count)
@@ -239,6 +246,8 @@ class TableFile:
         for column in columns:
             dataset = self._stored[column.name] = group[column.name]
             self._datasets[column.name] = StoredArray(dataset)
+        if version < CAMERAS_SINCE:
+            self._datasets["camera_distance"] = np.full(self._count, self.spec.camera_distance)
         place = f"{self.path}: {name}/distractor_kind"
         self.kind_names = read_names(group["distractor_kind"], "names", place)
         self._ranges = {
@@ -246,11 +255,12 @@ class TableFile:
             "light_count": (0, self.spec.lights[1]),
             "distractor_kind": (-1, len(self.kind_names) - 1),
             "angle_degrees": (0, 180),
+            "camera_distance": (1e-3, LARGEST),
         }
 
     def _read_identity(self) -> None:
         """Read fingerprint and digests, which a file of ours must have."""
-        ours, needed = self.spec is not None, has_digests(self.attributes)
+        ours, needed = self.spec is not None, version_of(self.attributes) >= DIGESTS_SINCE
         self.fingerprint, self.stored_truth_digest, self.stored_content_digest = None, None, None
         if ours:
             mark, digest = named("fingerprint", self.part), named(TRUTH_DIGEST, self.part)
@@ -310,7 +320,9 @@ def table_parts(file: h5py.File, path: Path, content: str) -> tuple[str, ...]:
     raise FileFormatError(path, "no question file", expected)
 
 
-def _question_truth(values: Mapping[str, Any], kind_names: Sequence[str]) -> QuestionTruth:
+def _question_truth(
+    values: Mapping[str, Any], kind_names: Sequence[str], spec: SplitSpec
+) -> QuestionTruth:
     """Return the record of one row of `layout.truth_columns`, without the padding."""
     cubes = int(values["cube_count"])
 
@@ -323,6 +335,7 @@ def _question_truth(values: Mapping[str, Any], kind_names: Sequence[str]) -> Que
         shape_id=tuple(row.tobytes() for row in values["shape_id"]),
         class_id=tuple(row.tobytes() for row in values["class_id"]),
         world_from_shape=values["world_from_shape"],
+        camera=spec.camera(float(values["camera_distance"])),
         light_position=per_image("light_position"),
         light_color=per_image("light_color"),
         distractor_kind=tuple(

@@ -87,16 +87,16 @@ class QuestionsWriter:
 
 def _truth_rows(spec: SplitSpec, rendered: Sequence[Rendered]) -> list[dict[str, Any]]:
     """Return the values of `truth_columns` for each question."""
-    most = spec.cubes[1]
-    cubes = np.full((len(rendered), 4, most, 3), NO_CUBE, np.int8)
-    shape_ids, class_ids = np.zeros((2, len(rendered), 4, ID_BYTES), np.uint8)
+    most, images = spec.cubes[1], 1 + spec.answers
+    cubes = np.full((len(rendered), images, most, 3), NO_CUBE, np.int8)
+    shape_ids, class_ids = np.zeros((2, len(rendered), images, ID_BYTES), np.uint8)
     counts = np.array([one.question.shapes.cubes.shape[1] for one in rendered])
     for count in np.unique(counts).tolist():
         rows = np.flatnonzero(counts == count)
         cubes[rows, :, :count] = [rendered[i].question.shapes.cubes for i in rows.tolist()]
         flat = cubes[rows, :, :count].reshape(-1, count, 3)
         for ids, form in ((shape_ids, canonical), (class_ids, canonical_class)):
-            ids[rows] = set_ids(form(flat)).view(np.uint8).reshape(-1, 4, ID_BYTES)
+            ids[rows] = set_ids(form(flat)).view(np.uint8).reshape(-1, images, ID_BYTES)
     return [
         {
             "cube_count": counts[i],
@@ -110,6 +110,7 @@ def _truth_rows(spec: SplitSpec, rendered: Sequence[Rendered]) -> list[dict[str,
             "distractor_kind": one.question.shapes.kinds,
             "angle_degrees": one.question.angle_degrees,
             "visible_pixels": one.visible_pixels,
+            "camera_distance": one.question.camera_distance,
             "depth": one.depth,
         }
         for i, one in enumerate(rendered)

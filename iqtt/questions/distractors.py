@@ -1,43 +1,45 @@
-"""The shapes of a question: the right answer and its two distractors.
+"""The shapes of a question: the right answer and its distractors.
 
-The three answers are drawn first, and then which of them is right, each with the same probability.
-So nothing in the three answers alone tells which one is right:
+The answers are drawn first, and then which of them is right, each with the same probability. So
+nothing in the answers alone tells which one is right, except where the rule of the kind says so:
 
-- `other`: three classes, drawn in the same way.
-- `near`: a shape, and two shapes with the same one of its cubes moved; any two of the three differ
-  by the place of that cube.
+- `other`: classes, drawn in the same way.
+- `near`: a shape, and shapes with the same one of its cubes moved; any two of them differ by the
+  place of that cube.
 - `mirror`: a chiral shape, its mirror image, and a near shape. In a third of these questions the
   near shape is right: otherwise the answer that is unlike the other two would always be wrong.
+- `matched`: classes that `shapes.matched` finds alike in what outlines show.
+- `mirror-pair`: a chiral shape, and its mirror image twice. The right answer is the odd one out, so
+  that with three answers the reference is not needed; but only mental rotation finds it.
+
+With two answers there is one distractor, of the same kind.
 """
 
+import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.questions.specs import DISTRACTOR_KINDS, SPLITS, SplitSpec
+from iqtt.shapes.matched import matched_rows
 from iqtt.shapes.near import move_cubes
 from iqtt.shapes.polycube import canonical_class, is_chiral, mirror, set_ids
-from iqtt.shapes.splits import (
-    LISTED_CUBES,
-    SplitClasses,
-    TooFewShapesError,
-    assign_classes,
-    known_classes,
-)
+from iqtt.shapes.splits import TooFewShapesError, split_classes, split_of
 from scenegen.common.errors import PlacementError
 from scenegen.common.records import check
 from scenegen.common.seeding import Purpose, item_rng
 
 Array = NDArray[Any]
 Drawn: TypeAlias = tuple[Array, Array]
-"""The right answer and two distractors, (3, n, 3) int8, and their kinds, (3,); -1 is right."""
+"""The right answer and K - 1 distractors, (K, n, 3) int8, and their kinds, (K,); -1 is right."""
 SHAPE_ATTEMPTS = 400  # references tried for one question
 MOVES = 60  # moves of one cube that are tried for one reference
 TRIALS = 40  # references that are tried to see whether a kind of question can be asked
 DRAWN_CLASSES = 20_000  # classes of a split, where there are too many to list them all
+LEAST_MATCHED = 20  # shapes with matched ones that a split has at least, so that questions vary
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +47,10 @@ class Shapes:
     """The shapes of a question.
 
     Attributes:
-        cubes: reference and three answers, (4, n, 3) int8; the right answer repeats the reference.
-        kinds: kinds of the three answers, (3,) int8: -1 for the right one, else an index into
+        cubes: reference and K answers, (1 + K, n, 3) int8; the right answer repeats the reference.
+        kinds: kinds of the answers, (K,) int8: -1 for the right one, else an index into
             DISTRACTOR_KINDS.
-        answer: which of the three is right, 0 to 2.
+        answer: which of them is right, 0 to K - 1.
     """
 
     cubes: Array
@@ -66,76 +68,81 @@ class Pools:
     """The shapes that questions are drawn from.
 
     Attributes:
-        classes: the shape classes of each split, by number of cubes.
-        sizes: for each kind of distractor, the numbers of cubes that allow it in every split.
+        classes: the shape classes of training, validation and test, by number of cubes.
+        matched: for the same, the rows of matched classes (`matched_rows`); empty where no question
+            needs them.
+        sizes: for each kind of question, the numbers of cubes that allow it in every split; kinds
+            that no number allows are left out.
     """
 
-    classes: dict[int, SplitClasses]
+    classes: dict[int, tuple[Array, ...]]
+    matched: dict[int, tuple[Array, ...]]
     sizes: dict[str, tuple[int, ...]]
 
 
 def make_pools(spec: SplitSpec) -> Pools:
-    """Give each split its own shape classes, and find which kinds of questions they allow.
+    """Find the shape classes of each split, and which kinds of questions they allow.
 
     Raises:
         TooFewShapesError: no number of cubes allows the distractors in every split.
         SpecError: the spec has no seed, as in files that do not tell it.
     """
     check(spec.seed is not None, "seed", "none, as in files that do not tell it", "a number")
-    classes = {n: _split_classes(spec, n) for n in range(spec.cubes[0], spec.cubes[1] + 1)}
-    kinds = DISTRACTOR_KINDS if spec.distractors == "mixed" else (spec.distractors,)
-    allowed = {}
-    for kind in kinds:
-        allowed[kind] = tuple(n for n in classes if _allows(spec, classes[n], kind, n))
-        if not allowed[kind]:
-            raise TooFewShapesError(
-                "cubes",
-                f"too few {spec.shapes} shapes of {spec.cubes[0]}-{spec.cubes[1]} cubes within"
-                f" radius {spec.max_radius:g}",
-                f"enough for {kind!r} questions with shapes of their own in each of"
-                f" {', '.join(SPLITS)}",
-                "take more --cubes, or a larger --max-radius",
-            )
-    return Pools(classes, allowed)
+    classes = {}
+    for n in range(spec.cubes[0], spec.cubes[1] + 1):
+        rng = item_rng(spec.seed or 0, n, Purpose.CATALOGUE)
+        classes[n] = split_classes(rng, n, spec.shapes, spec.max_radius, DRAWN_CLASSES)
+    matched = {}
+    if "matched" in spec.kinds:
+        matched = {n: tuple(map(matched_rows, parts)) for n, parts in classes.items()}
+    pools = Pools(classes, matched, {})
+    for kind in spec.kinds:
+        allowed = tuple(n for n in classes if _allows(spec, pools, kind, n))
+        if allowed:
+            pools.sizes[kind] = allowed
+    if not pools.sizes:
+        raise TooFewShapesError(
+            "cubes",
+            f"too few {spec.shapes} shapes of {spec.cubes[0]}-{spec.cubes[1]} cubes within"
+            f" radius {spec.max_radius:g}",
+            f"enough for {spec.distractors!r} questions with shapes of their own in each of"
+            f" {', '.join(SPLITS)}",
+            "take more --cubes, or a larger --max-radius",
+        )
+    return pools
 
 
-def _split_classes(spec: SplitSpec, cubes: int) -> SplitClasses:
-    """Give each split as many classes as there are, or as are found where not all are listed."""
-    size = DRAWN_CLASSES
-    if cubes <= LISTED_CUBES[spec.shapes]:
-        size = len(known_classes(cubes, spec.shapes, spec.max_radius)) // len(SPLITS)
-    while True:
-        rng = item_rng(spec.seed or 0, cubes, Purpose.CATALOGUE)
-        try:
-            sizes = [size] * len(SPLITS)
-            return assign_classes(rng, cubes, sizes, spec.shapes, spec.max_radius)
-        except TooFewShapesError:  # the loop ends: 0 classes are always found
-            size //= 10
-
-
-def _allows(spec: SplitSpec, classes: SplitClasses, kind: str, cubes: int) -> bool:
+def _allows(spec: SplitSpec, pools: Pools, kind: str, cubes: int) -> bool:
     """Return whether at least every twentieth reference of every split has such distractors."""
     for split in range(len(SPLITS)):
-        if len(classes.splits[split]) < (3 if kind == "other" else 1):
+        if len(pools.classes[cubes][split]) < (spec.answers if kind == "other" else 1):
+            return False
+        if kind == "matched" and len(pools.matched[cubes][split]) < LEAST_MATCHED:
             return False
         rngs = [
             item_rng(spec.seed or 0, cubes, Purpose.CATALOGUE, 1 + split * TRIALS + trial)
             for trial in range(TRIALS)
         ]
-        made = _draw(spec, kind, classes, split, rngs)
+        made = _draw(spec, pools, kind, cubes, split, rngs)
         if sum(drawn is not None for drawn in made) < TRIALS / 20:
             return False
     return True
 
 
 def answer_positions(spec: SplitSpec, split: str, first: int, count: int) -> Array:
-    """Return the position of the right answer of each of some questions, (count,) uint8, 0 to 2.
+    """Return the position of the right answer of each of some questions, (count,) uint8, from 0.
 
-    They are the questions first .. first + count - 1. The three positions come equally often, as
-    nearly as the count allows, in random order.
+    They are the questions first .. first + count - 1. The positions come equally often, as nearly
+    as the count allows, in random order. The order follows from all settings, so that the key of
+    one split tells nothing about that of another, whatever they have in common; only the sizes of
+    other tables, and how the images are stored, make no difference.
     """
-    rng = item_rng(spec.seed or 0, question_key(split, first), Purpose.POSITIONS)
-    return np.asarray(rng.permutation(np.arange(count) % 3).astype(np.uint8))
+    plain = replace(
+        spec, train=count, labeled=0, val=0, test=0, image_dtype="uint8", with_depth=False
+    )
+    key = int.from_bytes(hashlib.sha256(plain.to_json().encode()).digest())
+    rng = item_rng(key, question_key(split, first), Purpose.POSITIONS)
+    return np.asarray(rng.permutation(np.arange(count) % spec.answers).astype(np.uint8))
 
 
 def draw_shapes(
@@ -163,7 +170,7 @@ def draw_shapes(
         rows = waiting
         for _ in range(SHAPE_ATTEMPTS):
             some = [rngs[i] for i in rows]
-            made = _draw(spec, kind, pools.classes[cubes], SPLITS.index(split), some)
+            made = _draw(spec, pools, kind, cubes, SPLITS.index(split), some)
             for i, one in zip(rows, made, strict=True):
                 drawn[i] = one
             rows = [i for i in rows if drawn[i] is None]
@@ -185,42 +192,68 @@ def _either_hand(cubes: Array, rng: np.random.Generator) -> Array:
 
 def _draw(
     spec: SplitSpec,
+    pools: Pools,
     kind: str,
-    split_classes: SplitClasses,
+    cubes: int,
     split: int,
     rngs: Sequence[np.random.Generator],
 ) -> list[Drawn | None]:
     """Draw the shapes of a question with each generator; None where they are not all found."""
-    if kind == "other":
-        pool, kinds = split_classes.splits[split], np.array([-1, 0, 0], np.int8)
-        chosen = [rng.choice(len(pool), 3, replace=False) for rng in rngs]
+    pool = pools.classes[cubes][split]
+    if kind in ("near", "mirror"):
+        return _near_questions(spec, kind, pool, split, rngs)
+    if kind == "mirror-pair":
+        shapes = np.stack([_either_hand(pool[rng.integers(len(pool))], rng) for rng in rngs])
+        kinds = np.array([-1, 2, 2], np.int8)[: spec.answers]
         return [
-            (np.stack([_either_hand(pool[i], rng) for i in three]), kinds)
-            for three, rng in zip(chosen, rngs, strict=True)
+            (np.stack([shape, mirror(shape), mirror(shape)][: spec.answers]), kinds)
+            if good
+            else None
+            for shape, good in zip(shapes, is_chiral(shapes), strict=True)
         ]
-    found = _moved(spec, split_classes, split, rngs)
+    code = DISTRACTOR_KINDS.index(kind)
+    kinds = np.array([-1, code, code], np.int8)[: spec.answers]
+    made: list[Drawn | None] = []
+    for rng in rngs:
+        if kind == "other":
+            rows = rng.choice(len(pool), spec.answers, replace=False)
+        else:
+            # A shape and two of its matched ones, in random order: any of the three may be right.
+            table = pools.matched[cubes][split]
+            alike = table[rng.integers(len(table))]
+            partners = 1 + rng.choice(np.count_nonzero(alike >= 0) - 1, 2, replace=False)
+            rows = rng.permutation(alike[[0, *partners]])[: spec.answers]
+        made.append((np.stack([_either_hand(pool[i], rng) for i in rows]), kinds))
+    return made
+
+
+def _near_questions(
+    spec: SplitSpec, kind: str, pool: Array, split: int, rngs: Sequence[np.random.Generator]
+) -> list[Drawn | None]:
+    """Draw the shapes of a question of the kinds `near` or `mirror` with each generator."""
+    found = _moved(spec, pool, split, rngs)
     chiral = is_chiral(np.stack([shape for shape, _ in found])) if kind == "mirror" else None
     made: list[Drawn | None] = []
     for i, (rng, (shape, moved)) in enumerate(zip(rngs, found, strict=True)):
         if chiral is None:
-            shapes, order, kinds = [shape, *moved], rng.permutation(3), np.array([-1, 1, 1])
+            shapes, order = [shape, *moved][: spec.answers], rng.permutation(spec.answers)
+            kinds = np.array([-1, 1, 1])[: spec.answers]
         else:
             shapes = [shape, mirror(shape), *moved[:1]] if chiral[i] else []
             order, kinds = _MIRROR_ROLES[rng.integers(3)]
-        complete = len(shapes) == 3
+        complete = len(shapes) == spec.answers
         made.append((np.stack(shapes)[order], kinds.astype(np.int8)) if complete else None)
     return made
 
 
 def _moved(
-    spec: SplitSpec, split_classes: SplitClasses, split: int, rngs: Sequence[np.random.Generator]
+    spec: SplitSpec, pool: Array, split: int, rngs: Sequence[np.random.Generator]
 ) -> list[tuple[Array, list[Array]]]:
     """Draw for each generator a shape of the split and up to two shapes with one cube moved.
 
     It is the same cube in both. They belong to the split too, and all three are of different
     classes.
     """
-    pool = split_classes.splits[split]
     references = np.stack([_either_hand(pool[rng.integers(len(pool))], rng) for rng in rngs])
     count = references.shape[1]
     per_cube = (count - 1) * 6
@@ -233,7 +266,7 @@ def _moved(
     moved = moved[valid]
     classes = canonical_class(np.concatenate([references, moved]))
     names = [bytes(name) for name in set_ids(classes)]
-    owned = split_classes.owner(classes[len(rngs) :]) == split
+    owned = split_of(classes[len(rngs) :], spec.shapes == "chain") == split
     found: list[tuple[Array, list[Array]]] = [(reference, []) for reference in references]
     seen = [{name} for name in names[: len(rngs)]]
     for i, cubes, name, own in zip(question, moved, names[len(rngs) :], owned, strict=True):
@@ -246,7 +279,7 @@ def _moved(
 def arrange(drawn: Drawn, answer: int, rng: np.random.Generator) -> Shapes:
     """Put the right answer at its position and the distractors, in random order, at the others."""
     cubes, kinds = drawn
-    order = 1 + rng.permutation(2)
+    order = 1 + rng.permutation(len(kinds) - 1)
     places = np.insert(order, answer, 0)
     return Shapes(np.concatenate([cubes[:1], cubes[places]]), kinds[places], answer)
 

@@ -27,17 +27,19 @@ class Question:
         index: row of the question in its split.
         attempt: how many choices of shapes were given up before this one.
         shapes: shapes of the reference and the answers.
+        camera_distance: from the camera of all its images to the world's origin, cube edges.
         world_from_shape: rotations about the shapes' box centres, which lie at the world's origin,
-            (4, 3, 3).
-        light_position: world, cube edges, (4, L, 3); zero in unused slots.
-        light_color: radiance, RGB, (4, L, 3); zero in unused slots.
-        light_count: number of lights of each image, (4,).
+            (1 + K, 3, 3) for K answers.
+        light_position: world, cube edges, (1 + K, L, 3); zero in unused slots.
+        light_color: radiance, RGB, (1 + K, L, 3); zero in unused slots.
+        light_count: number of lights of each image, (1 + K,).
         angle_degrees: smallest rotation from the reference's view to the right answer's.
     """
 
     index: int
     attempt: int
     shapes: Shapes
+    camera_distance: float
     world_from_shape: Array
     light_position: Array
     light_color: Array
@@ -68,6 +70,7 @@ def pack_views(
     centres: Array,
     counts: Array,
     world_from_shape: Array,
+    distances: Array,
     lights: tuple[Array, Array, Array] | None = None,
 ) -> SceneBatch:
     """Return a batch with one image for each of V views.
@@ -77,6 +80,7 @@ def pack_views(
         centres: centres of the cubes, as `cube_centres` gives them, (V, slots, 3).
         counts: number of cubes of each shape, (V,).
         world_from_shape: rotations, (V, 3, 3).
+        distances: from the camera to the origin, (V,), cube edges.
         lights: positions and colours, (V, L, 3) each, and numbers, (V,); None for no lights.
     """
     batch, slots = len(centres), render_spec.object_slots
@@ -88,7 +92,9 @@ def pack_views(
     world_from_object[~used] = 0.0
     reflectance = np.zeros((batch, 1 + slots, 3))
     reflectance[:, 1:][used] = spec.reflectance
-    camera, dark = spec.camera, np.zeros((batch, render_spec.light_slots, 3))
+    world_from_camera = np.tile(np.eye(4), (batch, 1, 1))
+    world_from_camera[:, 2, 3] = distances
+    dark = np.zeros((batch, render_spec.light_slots, 3))
     position, color, light_count = lights or (dark, dark, np.zeros(batch))
     return SceneBatch(
         spec=render_spec,
@@ -96,8 +102,8 @@ def pack_views(
         shape_of=unit_shape,
         index=np.zeros(batch, np.int64),
         view=np.zeros(batch, np.int32),
-        world_from_camera=np.repeat(camera.world_from_camera[None], batch, axis=0),
-        fov_y_degrees=np.full(batch, camera.fov_y_degrees),
+        world_from_camera=world_from_camera,
+        fov_y_degrees=np.full(batch, spec.fov_y_degrees),
         object_count=counts.astype(np.int32),
         light_count=light_count.astype(np.int32),
         shape=np.where(used, 0, -1).astype(np.int8),
@@ -116,8 +122,9 @@ def pack_views(
 
 
 def pack_questions(spec: SplitSpec, questions: Sequence[Question]) -> SceneBatch:
-    """Return a batch with the four images of each question, one question after another."""
+    """Return a batch with all images of each question, one question after another."""
     render_spec = spec.render_spec()
+    distances = [question.camera_distance for question in questions]
     shapes = [cubes for question in questions for cubes in question.shapes.cubes]
     return pack_views(
         spec,
@@ -125,6 +132,7 @@ def pack_questions(spec: SplitSpec, questions: Sequence[Question]) -> SceneBatch
         cube_centres(shapes, render_spec.object_slots),
         np.array([len(cubes) for cubes in shapes]),
         np.concatenate([question.world_from_shape for question in questions]),
+        np.repeat(distances, 1 + spec.answers),
         (
             np.concatenate([question.light_position for question in questions]),
             np.concatenate([question.light_color for question in questions]),

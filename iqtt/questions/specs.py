@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -13,15 +14,26 @@ from scenegen.common.records import check, check_range, from_json, normalise, to
 from scenegen.description.specs import IMAGE_DTYPES, MAX_LIGHTS, DatasetSpec
 
 SPLITS = ("train", "val", "test")
-DISTRACTOR_KINDS = ("other", "near", "mirror")
-DISTRACTORS = (*DISTRACTOR_KINDS, "mixed")
+DISTRACTOR_KINDS = ("other", "near", "mirror", "matched")  # of wrong answers; append only
+QUESTION_KINDS = (*DISTRACTOR_KINDS, "mirror-pair")
+DISTRACTORS = (*QUESTION_KINDS, "mixed")
 SMALLEST_SECRET, LARGEST_SECRET = 16, 1_000_000  # bytes of a file whose content is a seed
 MAX_QUESTIONS = 10**8  # of each of train, val and test
-PRESETS: dict[str, dict[str, int]] = {
+PRESETS: dict[str, dict[str, Any]] = {
     # training questions in all, labelled ones among them, validation, test
     "small": {"train": 1_000, "labeled": 100, "val": 200, "test": 200},
-    "v2": {"train": 100_000, "labeled": 10_000, "val": 10_000, "test": 10_000},
+    "v2": {"train": 100_000, "labeled": 10_000, "val": 10_000, "test": 10_000}
+    | {"image_dtype": "float32"},
     "paper": {"train": 100_000, "labeled": 1_000, "val": 100_000, "test": 100_000},
+    "suite": {"train": 5_000, "labeled": 1_000, "val": 500, "test": 2_000},
+}
+SUITE = {  # the splits of the suite: the kind and the number of answers of each
+    "matched": ("matched", 3),
+    "mirror-pair": ("mirror-pair", 3),
+    "mirror-pair-2": ("mirror-pair", 2),
+    "other": ("other", 3),
+    "near": ("near", 3),
+    "mirror": ("mirror", 3),
 }
 
 
@@ -36,14 +48,16 @@ class SplitSpec:
         labeled: how many of the training questions have answers.
         cubes: fewest and most cubes of a shape; every number in between is equally likely.
         shapes: "chain" for self-avoiding chains of cubes, "tree" for shapes that may branch.
-        distractors: kind of the wrong answers: "other", "near", "mirror", or "mixed", where every
-            question draws one of the three.
+        distractors: kind of the questions, one of QUESTION_KINDS, or "mixed", where every question
+            draws one of those that `cubes` allow.
+        answers: number of answers, 3 or 2; one of them is right.
         height, width: size of an image, pixels.
         image_dtype: "uint8", "float16" or "float32"; radiance lies within 0..1.
-        min_angle_degrees: smallest rotation allowed between the reference's view and an answer's.
+        min_angle_degrees: smallest rotation allowed between the reference's view and an answer's,
+            and between the views of two answers that show the same shape.
         min_cube_pixels: number of pixels that every cube shows at least, in every image.
-        max_radius: largest bounding sphere of a shape, cube edges; the camera frames this sphere.
-        lights: fewest and most point lights; the first is within 60 degrees of the camera.
+        max_radius: largest bounding sphere of a shape, cube edges.
+        lights: fewest and most point lights.
         background, ambient, reflectance: RGB, 0..1.
         light_level: radiance that all lights together give a white surface at the origin that
             faces them. With the defaults every surface stays darker than the background.
@@ -56,9 +70,10 @@ class SplitSpec:
     labeled: int = 100
     val: int = 200
     test: int = 200
-    cubes: tuple[int, int] = (5, 11)
+    cubes: tuple[int, int] = (8, 11)
     shapes: Kind = "chain"
     distractors: str = "mixed"
+    answers: int = 3
     height: int = 128
     width: int = 128
     image_dtype: str = "uint8"
@@ -89,6 +104,9 @@ class SplitSpec:
             ("image dtype", self.image_dtype, IMAGE_DTYPES),
         ):
             check(value in known, name, repr(value), f"one of {', '.join(known)}")
+        _check_within("answers", self.answers, 2, 3)
+        if self.distractors == "mirror":
+            check(self.answers == 3, "answers", self.answers, "3, or the distractors mirror-pair")
         sides = f"{self.height}x{self.width}"
         small, large = min(self.height, self.width), max(self.height, self.width)
         check(small >= 16 and large <= 4096, "size", sides, "from 16 to 4096 pixels a side")
@@ -104,34 +122,45 @@ class SplitSpec:
             check(all(0 <= c <= 1 for c in color), name, color, "channels from 0 to 1")
 
     @property
-    def camera_distance(self) -> float:
-        """Distance from camera to origin at which the bounding sphere fits the image with 2% to
-        spare; cube edges.
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds of questions there are, of QUESTION_KINDS.
+
+        With two answers a `mirror` question would be a `mirror-pair` question, so it is left out.
         """
-        return 1.02 * self.max_radius / math.sin(math.radians(self.fov_degrees) / 2)
+        if self.distractors != "mixed":
+            return (self.distractors,)
+        return tuple(k for k in QUESTION_KINDS if k != "mirror" or self.answers == 3)
 
     @property
-    def light_distance(self) -> float:
-        """Distance from the lights to the origin, cube edges: so far that the near parts of a shape
-        are hardly brighter than the others.
+    def camera_distance(self) -> float:
+        """The largest distance that the camera of a question has, cube edges; before format 2.0,
+        that of all of them.
         """
-        return 2 * self.camera_distance
+        return self.framing_distance(self.max_radius)
+
+    def framing_distance(self, radius: float) -> float:
+        """Return the distance from camera to origin at which a sphere about the origin fits the
+        image with 2% to spare; cube edges.
+        """
+        return 1.02 * radius / math.sin(math.radians(self.fov_degrees) / 2)
 
     @property
     def pixels_per_edge(self) -> float:
-        """Length in pixels of a cube edge at the origin that is parallel to the image."""
+        """Least length in pixels of a cube edge at the origin that is parallel to the image."""
         half = math.tan(math.radians(self.fov_degrees) / 2) * self.camera_distance
         return min(self.height, self.width) / 2 / half
 
     @property
-    def camera(self) -> Camera:
-        """The camera of all images; it lies on +z and looks at the origin."""
+    def fov_y_degrees(self) -> float:
+        """Field of view across the image's height, degrees."""
         if self.height <= self.width:
-            fov_y = self.fov_degrees
-        else:
-            half = math.tan(math.radians(self.fov_degrees) / 2) * self.height / self.width
-            fov_y = math.degrees(2 * math.atan(half))
-        return Camera((0.0, 0.0, self.camera_distance), (0.0, 0.0, 0.0), fov_y)
+            return self.fov_degrees
+        half = math.tan(math.radians(self.fov_degrees) / 2) * self.height / self.width
+        return math.degrees(2 * math.atan(half))
+
+    def camera(self, distance: float) -> Camera:
+        """Return the camera of a question's images; it lies on +z and looks at the origin."""
+        return Camera((0.0, 0.0, float(distance)), (0.0, 0.0, 0.0), self.fov_y_degrees)
 
     def render_spec(self, shrink: int = 1) -> DatasetSpec:
         """Return the renderer's settings for images that are `shrink` times smaller."""
@@ -191,6 +220,24 @@ def preset_spec(preset: str, **settings: Any) -> SplitSpec:
         edge = side / 128 * SplitSpec.max_radius / radius
         chosen["min_cube_pixels"] = max(1, round(SplitSpec.min_cube_pixels * edge**2))
     return SplitSpec(**chosen)
+
+
+def question_kind(kinds: Sequence[int]) -> str:
+    """Return the kind of a question by the kinds of its answers, such as "mirror-pair" or "near-2".
+
+    Args:
+        kinds: of each answer, -1 for the right one, else an index into DISTRACTOR_KINDS, as the
+            dataset `distractor_kind` has them.
+
+    Raises IndexError for an unknown kind, ValueError where no answer is wrong.
+    """
+    wrong = sorted({DISTRACTOR_KINDS[kind] for kind in kinds if kind >= 0})
+    if not wrong:
+        raise ValueError("a question has a wrong answer")
+    kind = "mirror" if "mirror" in wrong else wrong[0]
+    if wrong == ["mirror"]:
+        kind = "mirror-pair"
+    return kind if len(kinds) == 3 else f"{kind}-{len(kinds)}"
 
 
 def _check_within(name: str, value: float, low: float, high: float, unit: str = "") -> None:

@@ -19,7 +19,7 @@ Z_VIEW = 10  # of the code's 128 dimensions, those that tell the view, as in the
 
 
 class QuestionImages(Dataset[dict[str, Any]]):
-    """The four images of each question, a map-style dataset.
+    """The images of each question, a map-style dataset.
 
     The model is told the lights, the reflectance and the background of each image, as in the
     paper, and the answer where the file has one. Shapes, cameras and rotations are never read.
@@ -44,36 +44,39 @@ class QuestionImages(Dataset[dict[str, Any]]):
                 raise SpecError(path, found, expected, hint)
             self.spec = questions.spec
             self.has_answers = questions.has_answers
-        fields = ["questions", "light_position", "light_color", *["answers"] * self.has_answers]
+        fields = ["questions", "camera_distance", "light_position", "light_color"]
+        fields += ["answers"] * self.has_answers
         self._rows = QuestionsDataset(path, part, fields)
         self.fingerprint = self._rows.fingerprint
-        self.fov_y_degrees = self.spec.camera.fov_y_degrees
-        self._camera = self.spec.camera.world_from_camera
+        self.fov_y_degrees = self.spec.fov_y_degrees
 
     def __len__(self) -> int:
         return len(self._rows)
 
     def __getitem__(self, row: int) -> dict[str, Any]:
-        """Return a question: float32 arrays of four rows, and the answer if there is one."""
+        """Return a question: float32 arrays with a row an image, and the answer if there is one."""
         stored = self._rows[row]
         images = decode_image(stored["questions"])
-        place = self._camera[:3, 3]
+        # All lengths are scaled to one distance of the camera; no image changes by that, as the
+        # lights are made brighter by the square of the scale.
+        scale = self.spec.camera_distance / stored["camera_distance"]
+        place = (0.0, 0.0, self.spec.camera_distance)
         known = {
             "image": np.stack([channels_first(image, self._size) for image in images]),
-            "condition": np.empty((4, 0)),
-            "light_position": (stored["light_position"] - place) @ self._camera[:3, :3],
-            "light_color": stored["light_color"],
-            "attenuation": np.tile((0.0, 1.0), (4, 1)),
+            "condition": np.empty((len(images), 0)),
+            "light_position": scale * stored["light_position"] - place,
+            "light_color": scale**2 * stored["light_color"],
+            "attenuation": np.tile((0.0, 1.0), (len(images), 1)),
         }
         for name in ("ambient", "reflectance", "background"):
-            known[name] = np.tile(getattr(self.spec, name), (4, 1))
+            known[name] = np.tile(getattr(self.spec, name), (len(images), 1))
         item: dict[str, Any] = {name: np.float32(value) for name, value in known.items()}
         if self.has_answers:
             item["answer"] = int(stored["answers"])
         return item
 
     def as_batch(self, items: dict[str, Tensor]) -> Batch:
-        """Return the batch of collated questions, four images each, question by question."""
+        """Return the batch of collated questions, question by question."""
         flat = {name: value.flatten(0, 1) for name, value in items.items() if name != "answer"}
         return as_batch(flat, self.fov_y_degrees)
 
@@ -94,7 +97,7 @@ def for_questions(config: ModelConfig, path: str | Path, part: str | None) -> Mo
     with open_questions(path, part) as questions:
         if questions.spec is None:
             raise SpecError(path, "a released file", "one that `iqtt make-split` wrote")
-        distance = float(np.linalg.norm(questions.spec.camera.world_from_camera[:3, 3]))
+        distance = questions.spec.camera_distance
         radius = questions.spec.max_radius
     spec = replace(spec, camera=False, classes=0, standardised=True)
     spec = replace(spec, z_scene=spec.z - Z_VIEW, z_view=Z_VIEW)

@@ -1,5 +1,6 @@
 """The shapes of questions: right, fair, each on its own, and of no other split."""
 
+import itertools
 import math
 from collections import Counter
 from dataclasses import replace
@@ -20,7 +21,15 @@ from iqtt.questions.distractors import (
     make_pools,
     question_key,
 )
-from iqtt.questions.specs import DISTRACTOR_KINDS, SPLITS, SplitSpec
+from iqtt.questions.specs import (
+    DISTRACTOR_KINDS,
+    DISTRACTORS,
+    QUESTION_KINDS,
+    SPLITS,
+    SplitSpec,
+    question_kind,
+)
+from iqtt.shapes.matched import TOLERANCE, contacts, gyration_radii
 from iqtt.shapes.near import is_chain, is_connected
 from iqtt.shapes.polycube import (
     bounding_radius,
@@ -30,12 +39,13 @@ from iqtt.shapes.polycube import (
     set_ids,
     symmetries,
 )
-from iqtt.shapes.splits import TooFewShapesError, assign_classes
+from iqtt.shapes.splits import TooFewShapesError, split_of
 from scenegen.common.errors import PlacementError, SpecError
 
 SPEC = SplitSpec(seed=11, cubes=(6, 8), max_radius=2.7)
 CASES = [
-    (kind, shapes) for shapes in ("chain", "tree") for kind in ("other", "near", "mirror", "mixed")
+    *((kind, shapes, 3) for shapes in ("chain", "tree") for kind in DISTRACTORS),
+    *((kind, "chain", 2) for kind in DISTRACTORS if kind != "mirror"),
 ]
 RNG = np.random.default_rng
 
@@ -64,34 +74,51 @@ def shared_cubes(*shapes) -> int:
     return len(set.intersection(*({tuple(c) for c in shape.tolist()} for shape in shapes)))
 
 
-@pytest.mark.parametrize(("kind", "shapes"), CASES)
-def test_one_answer_is_right_and_the_others_are_what_their_kind_says(kind, shapes):
-    spec = replace(SPEC, distractors=kind, shapes=shapes)
+def check_near(three, names, mirrors):
+    """One of the three is the odd one: near to a shape, and the other two are mirror images."""
+    assert mirrors.sum() == 1
+    odd = int((2, 1, 0)[mirrors.argmax()])
+    assert names[odd] in (-1, 1)
+    pair = [i for i in range(3) if i != odd]
+    assert 2 in (names[pair[0]], names[pair[1]])
+    assert max(shared_cubes(three[odd], three[i]) for i in pair) == len(three[0]) - 1
+
+
+@pytest.mark.parametrize(("kind", "shapes", "answers"), CASES)
+def test_one_answer_is_right_and_the_others_are_what_their_kind_says(kind, shapes, answers):
+    spec = replace(SPEC, distractors=kind, shapes=shapes, answers=answers)
     met = set()
     for cubes, kinds in by_size(draw(spec, 60)):
         size, flat = cubes.shape[2], cubes.reshape(-1, *cubes.shape[2:])
-        assert (cubes.dtype, kinds.dtype) == (np.int8, np.int8)
+        assert (cubes.dtype, kinds.dtype, cubes.shape[1]) == (np.int8, np.int8, answers)
         assert 6 <= size <= 8
         assert (bounding_radius(flat) <= spec.max_radius).all()
         assert (is_chain if shapes == "chain" else is_connected)(flat).all()
-        pairs = [(cubes[:, i], cubes[:, j]) for i, j in ((0, 1), (0, 2), (1, 2))]
-        assert not any(congruent(*pair).any() for pair in pairs)
-        mirrored = np.stack([congruent(*pair, (1, 1, -1)) for pair in pairs], axis=1)
-        for three, names, mirrors in zip(cubes, kinds.tolist(), mirrored, strict=True):
-            met.add(tuple(names))
-            if 2 not in names:
+        pairs = list(itertools.combinations(range(answers), 2))
+        same, mirrored = (
+            np.stack([congruent(cubes[:, i], cubes[:, j], turned) for i, j in pairs], axis=1)
+            for turned in ((1, 1, 1), (1, 1, -1))
+        )
+        assert not same[:, : answers - 1].any(), "the right one is first, and unlike the others"
+        for three, names, alike, mirrors in zip(cubes, kinds.tolist(), same, mirrored, strict=True):
+            name = question_kind(names).removesuffix("-2")
+            met.add(name)
+            assert names.count(-1) == 1
+            assert alike.any() == (name == "mirror-pair" and answers == 3)
+            if name == "mirror":
+                check_near(three, names, mirrors)
+            elif name == "mirror-pair":
+                assert mirrors[: answers - 1].all()
+            else:
                 assert not mirrors.any()
-                assert names == [-1, 0, 0] or shared_cubes(*three) == size - 1
-                continue
-            assert mirrors.sum() == 1
-            odd = int((2, 1, 0)[mirrors.argmax()])
-            assert names[odd] in (-1, 1)
-            pair = [i for i in range(3) if i != odd]
-            assert 2 in (names[pair[0]], names[pair[1]])
-            assert max(shared_cubes(three[odd], three[i]) for i in pair) == size - 1
-    expected = {"other": {(-1, 0, 0)}, "near": {(-1, 1, 1)}, "mirror": {(-1, 2, 1), (-1, 1, 2)}}
-    expected["mixed"] = set().union(*expected.values())
-    assert met == expected[kind]
+            if name == "near":
+                assert shared_cubes(*three) == size - 1
+            if name == "matched":
+                edges = np.sort(np.ptp(three, axis=1), axis=1)
+                assert (edges == edges[0]).all()
+                assert len(set(contacts(three).tolist())) == 1
+                assert np.ptp(gyration_radii(three), axis=0).max() <= 2 * TOLERANCE
+    assert met == set(spec.kinds)
 
 
 @pytest.mark.parametrize("cubes", [(6, 7), (12, 12)])
@@ -102,8 +129,7 @@ def test_no_class_is_met_in_two_splits(cubes):
         met.append(set())
         for shapes, _ in by_size(draw(spec, 60, split)):
             flat = shapes.reshape(-1, *shapes.shape[2:])
-            owners = pools_of(spec).classes[shapes.shape[2]].owner(canonical_class(flat))
-            assert (owners == index).all()
+            assert (split_of(canonical_class(flat)) == index).all()
             met[-1] |= {bytes(i) for i in set_ids(canonical_class(flat))}
         assert len(met[-1]) > 20
     assert not met[0] & met[1] | met[0] & met[2] | met[1] & met[2]
@@ -132,10 +158,11 @@ def test_a_question_depends_on_itself_alone():
 
 
 def test_each_kind_each_size_and_each_hand_is_as_likely():
-    drawn = draw(replace(SPEC, cubes=(7, 9)), 900)
-    kinds = Counter(max(kinds) for _, kinds in drawn)
+    drawn = draw(replace(SPEC, cubes=(8, 9)), 900)
+    kinds = Counter(question_kind(kinds) for _, kinds in drawn)
     sizes = Counter(cubes.shape[1] for cubes, _ in drawn)
-    assert set(sizes) == {7, 8, 9}
+    assert set(sizes) == {8, 9}
+    assert set(kinds) == set(QUESTION_KINDS)
     for counts in (kinds, sizes):
         assert stats.chisquare(list(counts.values())).pvalue > 1e-3
     left = []
@@ -181,7 +208,18 @@ def check_that_answers_alone_tell_nothing(kind: str, cubes: int, count: int) -> 
 
 @pytest.mark.parametrize("kind", DISTRACTOR_KINDS)
 def test_answers_alone_tell_nothing(kind):
-    check_that_answers_alone_tell_nothing(kind, 7, 3000)
+    check_that_answers_alone_tell_nothing(kind, 8, 3000)
+
+
+def test_two_answers_of_a_mirror_pair_are_each_the_right_one_as_often():
+    """The hand that `canonical_class` shows is right in half of the questions."""
+    spec = replace(SPEC, distractors="mirror-pair", answers=2)
+    right = [
+        (canonical(c[:, 0]) == canonical_class(c[:, 0])).all(axis=(1, 2))
+        for c, _ in by_size(draw(spec, 1500))
+    ]
+    right = np.concatenate(right)
+    assert stats.binomtest(int(right.sum()), len(right)).pvalue > 1e-3
 
 
 @pytest.mark.slow
@@ -208,22 +246,40 @@ def test_arranging_puts_the_right_answer_at_its_place():
 
 
 def test_a_reference_without_distractors_is_searched_for_so_often_only(monkeypatch):
-    one_each = {4: assign_classes(RNG(0), 4, [1, 1, 1])}  # so no near shape is of the same split
+    rod = np.array(
+        [[[i, 0, 0] for i in range(4)]], np.int8
+    )  # no near shape is left: no split has it
+    monkeypatch.setattr(module, "split_of", lambda classes, chains: np.full(len(classes), 9))
     monkeypatch.setattr(module, "SHAPE_ATTEMPTS", 3)
     for kind in ("near", "mirror"):
         with pytest.raises(PlacementError) as error:
-            draw_shapes(SPEC, Pools(one_each, {kind: (4,)}), "test", [(4, 0), (9, 2)])
+            draw_shapes(SPEC, Pools({4: (rod,) * 3}, {}, {kind: (4,)}), "test", [(4, 0), (9, 2)])
         assert error.value.where == "test question 4"
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 200, 1001])
-def test_answer_positions_are_balanced_exactly(count):
+@pytest.mark.parametrize("answers", [2, 3])
+def test_answer_positions_are_balanced_exactly(count, answers):
+    spec = replace(SPEC, distractors="near", answers=answers)
     for split in SPLITS:
-        places = answer_positions(SPEC, split, 7, count)
+        places = answer_positions(spec, split, 7, count)
         assert (places.dtype, places.shape) == (np.uint8, (count,))
-        assert sorted(places.tolist()) == sorted(i % 3 for i in range(count))
-        others = replace(SPEC, train=7, labeled=3, val=8, test=9, cubes=(9, 9))
+        assert sorted(places.tolist()) == sorted(i % answers for i in range(count))
+        others = replace(spec, train=7, labeled=3, val=8, test=9, image_dtype="float32")
         assert (answer_positions(others, split, 7, count) == places).all()
+
+
+def test_answer_positions_of_one_split_tell_nothing_of_another_s():
+    """Whatever they have in common, two keys agree in a third of the questions."""
+    changes = (
+        *({"distractors": kind} for kind in QUESTION_KINDS),
+        {"seed": 12}, {"cubes": (6, 7)}, {"shapes": "tree"}, {"min_angle_degrees": 31},
+        {"max_radius": 2.8}, {"lights": (1, 2)}, {"height": 127}, {"background": (1, 1, 0)},
+    )  # fmt: skip
+    keys = [answer_positions(replace(SPEC, **change), "val", 0, 3000) for change in changes]
+    keys.append(answer_positions(SPEC, "test", 0, 3000))
+    for one, other in itertools.combinations(keys, 2):
+        assert stats.binomtest(int((one == other).sum()), 3000, 1 / 3).pvalue > 1e-4
 
 
 def test_answer_positions_follow_no_pattern():
@@ -241,12 +297,14 @@ def test_answer_positions_follow_no_pattern():
 @pytest.mark.parametrize(
     ("settings", "kind"),
     [
-        ({"cubes": (3, 3)}, "other"),
-        ({"cubes": (4, 4)}, "other"),
+        ({"cubes": (3, 3)}, "mixed"),
+        ({"cubes": (4, 4), "distractors": "other"}, "other"),
         ({"cubes": (4, 4), "shapes": "tree", "distractors": "near"}, "near"),
-        ({"cubes": (5, 5)}, "near"),
-        ({"cubes": (5, 5), "distractors": "mirror"}, "mirror"),
-        ({"cubes": (8, 8), "max_radius": 1.5, "min_cube_pixels": 1}, "other"),
+        ({"cubes": (4, 4), "distractors": "near"}, "near"),
+        ({"cubes": (4, 4), "distractors": "mirror"}, "mirror"),
+        ({"cubes": (8, 8), "max_radius": 1.5, "min_cube_pixels": 1}, "mixed"),
+        ({"cubes": (7, 7), "distractors": "matched"}, "matched"),
+        ({"cubes": (3, 3), "distractors": "mirror-pair"}, "mirror-pair"),
     ],
 )
 def test_too_few_shapes_are_told_before_anything_is_rendered(settings, kind, monkeypatch):
@@ -267,8 +325,16 @@ def test_a_request_that_does_not_tell_its_seed_is_refused():
 
 
 def test_sizes_that_do_not_allow_a_kind_are_left_out_of_it_alone():
-    sizes = make_pools(replace(SPEC, seed=0, cubes=(3, 7))).sizes
-    assert sizes == {"other": (5, 6, 7), "near": (6, 7), "mirror": (6, 7)}
+    sizes = make_pools(replace(SPEC, seed=0, cubes=(3, 8), max_radius=3.5)).sizes
+    assert sizes == {
+        "other": (5, 6, 7, 8),
+        "near": (5, 6, 7, 8),
+        "mirror": (6, 7, 8),
+        "matched": (8,),
+        "mirror-pair": (5, 6, 7, 8),
+    }
+    few = make_pools(replace(SPEC, cubes=(5, 7))).sizes
+    assert set(few) == {"other", "near", "mirror", "mirror-pair"}, "no shapes are matched"
     alone = replace(SPEC, cubes=(5, 5), distractors="other")
     assert len(draw_shapes(alone, make_pools(alone), "train", [(0, 0), (1, 0)])) == 2
 
@@ -277,6 +343,6 @@ def test_where_few_shapes_of_many_cubes_are_found_those_are_shared_out(monkeypat
     monkeypatch.setattr(module, "DRAWN_CLASSES", 4000)
     spec = replace(SPEC, cubes=(12, 12), max_radius=2.5)
     pools = make_pools(spec)
-    assert [len(split) for split in pools.classes[12].splits] == [40] * 3
+    assert all(3 < len(part) < 4000 for part in pools.classes[12])
     for shapes, _ in draw_shapes(spec, pools, "val", [(i, 0) for i in range(6)]):
         assert (bounding_radius(shapes) <= 2.5).all()

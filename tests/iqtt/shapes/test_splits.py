@@ -1,86 +1,96 @@
-"""The assignment of shape classes to splits: disjoint, fair, and decided by the seed."""
+"""Classes of shapes and their splits: even shares, for ever, whatever else is asked for."""
 
-import itertools
+import hashlib
 
 import numpy as np
 import pytest
 from polycubes import some_shapes
 
 from iqtt.shapes.chains_and_trees import Kind, all_classes
+from iqtt.shapes.near import is_chain
 from iqtt.shapes.polycube import bounding_radius, canonical_class, set_ids
-from iqtt.shapes.splits import LISTED_CUBES, TooFewShapesError, assign_classes, known_classes
+from iqtt.shapes.splits import LISTED_CUBES, known_classes, split_classes, split_of
+
+RNG = np.random.default_rng
+# SHA-256 of the splits of all classes in the order of their ids, one byte each. A change here
+# mixes the training and test shapes of all that was ever made.
+FOR_EVER = {
+    ("chain", 5): "b64b552703205089d08d4a065b0a30a7bf0b67b0994e038ba94040088a80cecc",
+    ("chain", 6): "dfd78799167d05bfb520766c8bb7b4d730a8deef5a72bac5a530acfdd7b823fd",
+    ("chain", 7): "e1f5d439c7b91e08652228e3bc80421f622b778ac2c5f89fa7614be489d919b8",
+    ("chain", 8): "3109bb95d844f74431f66c10d5a6e5aa250515b970627d04e25bb2d22633909c",
+    ("chain", 11): "43dc081af2624042b91947e1571da7c4294997bafa13da306f8bf10aa799a440",
+    ("tree", 5): "93ec4b019432c116e12b4feabcfdd7162fb40717bb42c086ad23da0b67286422",
+    ("tree", 8): "d23e227ccb3f0ecd23b5ba72ce439a64844a85c3c17d9b37f49643c205065f7e",
+}
 
 
 def ids_of(shapes: np.ndarray) -> set[bytes]:
     return {bytes(i) for i in set_ids(canonical_class(shapes))}
 
 
-@pytest.mark.parametrize(("kind", "cubes"), [("chain", 8), ("tree", 6), ("chain", 13)])
-def test_splits_have_their_sizes_share_no_class_and_own_theirs(kind: Kind, cubes: int) -> None:
-    sizes = (60, 0, 20, 30)
-    assigned = assign_classes(np.random.default_rng(0), cubes, sizes, kind)
-    ids = [ids_of(part) for part in assigned.splits]
-    assert tuple(map(len, assigned.splits)) == tuple(map(len, ids)) == sizes
-    assert all(not a & b for a, b in itertools.combinations(ids, 2))
-    for index, part in enumerate(assigned.splits):
-        assert (canonical_class(part) == part).all()
-        assert (assigned.owner(part) == index).all()
-    strangers = canonical_class(some_shapes(np.random.default_rng(5), 500, cubes, kind))
-    assert set(assigned.owner(strangers).tolist()) <= {0, 1, 2, 3}
+@pytest.mark.parametrize(("kind", "cubes"), FOR_EVER)
+def test_the_split_of_each_class_is_what_it_always_was(kind: Kind, cubes: int) -> None:
+    split = split_of(known_classes(cubes, kind))
+    assert hashlib.sha256(split.astype(np.uint8).tobytes()).hexdigest() == FOR_EVER[kind, cubes]
 
 
-def test_classes_in_no_split_are_owned_in_even_shares() -> None:
-    classes = known_classes(9)
-    assigned = assign_classes(np.random.default_rng(0), 9, (100, 10, 1))
-    surplus = np.bincount(assigned.owner(classes)) - (100, 10, 1)
-    assert surplus.sum() == len(classes) - 111
-    assert np.ptp(surplus) <= 1
+@pytest.mark.parametrize(("kind", "cubes"), [("chain", n) for n in range(3, 10)] + [("tree", 7)])
+def test_listed_classes_are_shared_out_evenly_by_their_hash(kind: Kind, cubes: int) -> None:
+    """Reckoned with a plain sort; chains among chains, and shapes that branch among these."""
+    classes = all_classes(cubes, kind)
+    split, chain = split_of(classes), is_chain(classes)
+    ranked = [hashlib.sha256(b"3D-IQTT split " + bytes(i)).digest()[:8] for i in set_ids(classes)]
+    for rows in (np.flatnonzero(chain), np.flatnonzero(~chain)):
+        order = sorted(rows, key=lambda row: ranked[row])
+        cut = [len(order) * i // 3 for i in range(4)]
+        for i in range(3):
+            assert (split[order[cut[i] : cut[i + 1]]] == i).all()
+            assert cut[i + 1] > cut[i] or len(order) < 3
+    assert kind == "tree" or (split_of(classes, chains=True) == split).all()
 
 
-@pytest.mark.parametrize("cubes", [7, 13])
-def test_the_seed_decides(cubes: int) -> None:
-    first, again, other = (
-        assign_classes(np.random.default_rng(seed), cubes, (40, 40)) for seed in (1, 1, 2)
-    )
-    probe = canonical_class(some_shapes(np.random.default_rng(0), 50, cubes))
-    assert (first.owner(probe) == again.owner(probe)).all()
-    assert (first.owner(probe) != other.owner(probe)).any()
-    for a, b, c in zip(first.splits, again.splits, other.splits, strict=True):
-        assert (a == b).all()
-        assert (a != c).any()
+@pytest.mark.parametrize(("kind", "cubes"), [("chain", 12), ("tree", 10)])
+def test_beyond_the_lists_the_hash_alone_decides(kind: Kind, cubes: int) -> None:
+    classes = canonical_class(some_shapes(RNG(0), 3000, cubes, kind))
+    classes = classes[is_chain(classes) == (kind == "chain")]
+    digests = [hashlib.sha256(b"3D-IQTT split " + bytes(i)).digest() for i in set_ids(classes)]
+    expected = [int.from_bytes(digest[:8]) * 3 // 2**64 for digest in digests]
+    assert split_of(classes).tolist() == expected
+    assert set(expected) == {0, 1, 2}
 
 
-def test_all_classes_there_are_can_be_shared_out() -> None:
-    assigned = assign_classes(np.random.default_rng(0), 5, (7, 4, 3))
-    assert ids_of(np.concatenate(assigned.splits)) == ids_of(all_classes(5))
+@pytest.mark.parametrize(("cubes", "radius"), [(8, np.inf), (8, 2.8), (13, np.inf), (13, 3.2)])
+def test_no_seed_kind_or_radius_puts_a_class_in_two_splits(cubes: int, radius: float) -> None:
+    met: list[set[bytes]] = [set(), set(), set()]
+    for seed, kind in ((1, "chain"), (2, "chain"), (3, "tree")):
+        parts = split_classes(RNG(seed), cubes, kind, radius, most=200)
+        again = split_classes(RNG(seed), cubes, kind, radius, most=200)
+        for i, part in enumerate(parts):
+            assert (part == again[i]).all()
+            assert (canonical_class(part) == part).all()
+            assert (split_of(part) == i).all()
+            assert bounding_radius(part).max() <= radius
+            assert len(ids_of(part)) == len(part) == 200 or cubes <= LISTED_CUBES[kind]
+            met[i] |= ids_of(part)
+    assert not met[0] & met[1] | met[0] & met[2] | met[1] & met[2]
+    assert min(map(len, met)) > 100
 
 
-@pytest.mark.parametrize(("cubes", "radius"), [(8, 2.8), (13, 3.2)])
-def test_the_radius_is_kept(cubes: int, radius: float) -> None:
-    assigned = assign_classes(np.random.default_rng(0), cubes, (50, 20), max_radius=radius)
-    assert max(bounding_radius(part).max() for part in assigned.splits) <= radius
+def test_all_classes_there_are_are_in_a_split() -> None:
+    assert ids_of(np.concatenate(split_classes(RNG(0), 8))) == ids_of(all_classes(8))
     rod = np.array([[[0, 0, 0], [1, 0, 0]]], np.int8)
     assert len(known_classes(2, max_radius=float(bounding_radius(rod)[0]))) == 1, "met exactly"
 
 
-@pytest.mark.parametrize(
-    ("cubes", "sizes", "radius", "found"),
-    [(5, (10, 3, 2), np.inf, "14"), (14, (100,), 1.2, "0 in 22,800 tries")],
-)
-def test_too_many_of_few_shapes_are_refused_in_bounded_work(
-    cubes: int, sizes: tuple[int, ...], radius: float, found: str
-) -> None:
-    with pytest.raises(TooFewShapesError) as error:
-        assign_classes(np.random.default_rng(0), cubes, sizes, max_radius=radius)
-    assert (error.value.found, error.value.expected) == (found, str(sum(sizes)))
+def test_the_search_for_shapes_that_there_are_not_is_bounded() -> None:
+    assert [len(part) for part in split_classes(RNG(0), 14, max_radius=1.2, most=100)] == [0] * 3
 
 
 def test_requests_without_sense_are_refused() -> None:
-    rng = np.random.default_rng(0)
-    for cubes, sizes, kind in ((6, (), "chain"), (6, (3, -1), "chain"), (0, (1,), "chain"),
-                               (5, (1,), "ring")):  # fmt: skip
-        with pytest.raises(ValueError, match=r"sizes|cubes|kind"):
-            assign_classes(rng, cubes, sizes, kind)  # type: ignore[arg-type]
+    for cubes, kind in ((0, "chain"), (5, "ring")):
+        with pytest.raises(ValueError, match=r"cubes|kind"):
+            split_classes(RNG(0), cubes, kind)  # type: ignore[arg-type]
     for listed, most in LISTED_CUBES.items():
         with pytest.raises(ValueError, match="not listed"):
             known_classes(most + 1, listed)
@@ -89,21 +99,3 @@ def test_requests_without_sense_are_refused() -> None:
 def test_listed_classes_cannot_be_changed_by_accident() -> None:
     known_classes(5)[:] = 0
     assert (known_classes(5) == all_classes(5)).all()
-
-
-def test_the_order_of_classes_is_that_of_splitmix64_on_salt_and_id() -> None:
-    """Reckoned in Python's integers, so that no machine orders them otherwise."""
-    mask, salt = 2**64 - 1, int(np.random.default_rng(7).integers(2**63))
-
-    def rank(identity: bytes) -> int:
-        mixed = salt
-        for i in range(0, 32, 8):
-            mixed = ((mixed ^ int.from_bytes(identity[i : i + 8])) + 0x9E3779B97F4A7C15) & mask
-            mixed = ((mixed ^ mixed >> 30) * 0xBF58476D1CE4E5B9) & mask
-            mixed = ((mixed ^ mixed >> 27) * 0x94D049BB133111EB) & mask
-            mixed ^= mixed >> 31
-        return mixed
-
-    (part,) = assign_classes(np.random.default_rng(7), 5, (14,)).splits
-    ranks = [rank(bytes(identity)) for identity in set_ids(part)]
-    assert ranks == sorted(ranks)
