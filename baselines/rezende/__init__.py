@@ -1,4 +1,4 @@
-"""Rezende et al. (NeurIPS 2016): a mesh deformed from a sphere, behind a renderer without gradients.
+"""Rezende et al. (NeurIPS 2016): meshes from images, through a renderer that is only sampled.
 
     sphere.py       the mesh that is deformed, and the smoothing of its offsets
     rasteriser.py   pictures of meshes, in numpy: the renderer, which can only be sampled

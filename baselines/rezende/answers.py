@@ -1,4 +1,4 @@
-"""Answers to questions: by comparing meshes under all rotations, or by the head that labels train."""
+"""Answers to questions: from meshes compared under all rotations, or from the trained head."""
 
 from collections.abc import Callable
 from functools import cache
@@ -24,6 +24,7 @@ from scenegen.common.rotations import rotation_matrix
 Array = NDArray[Any]
 METHOD = "rezende"
 ROTATIONS = 512  # tried for each answer; any rotation is within about 20 degrees of one
+FINE, STEPS = 8, 8  # rotations that are refined, and steps of that
 COARSE = 42  # vertices of the reference that are turned: those of the icosphere before the last cut
 Progress = Callable[[int, int], Any]
 
@@ -68,7 +69,7 @@ def write_submission(
 
 
 def answer_scores(model: Model, stored: Array, size: int, by_head: bool) -> Array:
-    """Return the score of each answer of one question, (A,), of images as stored, (1 + A, H, W, 3)."""
+    """Return the scores of a question's answers, (A,), of images as stored, (1 + A, H, W, 3)."""
     if by_head:
         with torch.no_grad():
             scores: Array = model.head(codes_of(model, stored[None], size))[0].double().numpy()
@@ -78,18 +79,44 @@ def answer_scores(model: Model, stored: Array, size: int, by_head: bool) -> Arra
 
 
 def mesh_distance(one: Array, other: Array) -> float:
-    """Return the distance of two meshes, (V, 3) each, under the best of ROTATIONS rotations.
+    """Return the distance of two meshes, (V, 3) each, under the best rotation that is found.
 
-    Both are moved to their centres of mass first. The distance is the mean from the first COARSE
-    vertices of one to the nearest of the other, plus the mean the other way round. Mirror images
-    are not rotations of each other, so they differ.
+    Both are moved to their centres of mass first. The distance is the mean from the vertices of one
+    to the nearest of the other, plus the mean the other way round. ROTATIONS are tried with COARSE
+    vertices of the one, and the best FINE of them are refined. Mirror images are not rotations of
+    each other, so they differ.
     """
     one, other = (mesh - mesh.mean(axis=0) for mesh in (one, other))
-    turned = one[:COARSE] @ rotations().swapaxes(1, 2)  # (R, COARSE, 3)
-    squared = (turned**2).sum(axis=2)[:, :, None] + (other**2).sum(axis=1) - 2 * turned @ other.T
-    there = np.sqrt(squared.min(axis=2).clip(0)).mean(axis=1)
-    back = np.sqrt(squared.min(axis=1).clip(0)).mean(axis=1)
-    return float((there + back).min())
+    chosen = rotations()[np.argpartition(_distances(one[:COARSE], other, rotations()), FINE)[:FINE]]
+    return float(_distances(one, other, refined(one, other, chosen)).min())
+
+
+def refined(one: Array, other: Array, turns: Array) -> Array:
+    """Return rotations, (R, 3, 3), moved towards the nearest ones at which two meshes agree.
+
+    Each step finds the rotation that best takes vertices to those that are nearest now (iterative
+    closest points: Besl and McKay, PAMI 14, 1992; the rotation by Kabsch, Acta Cryst. A32, 1976).
+    """
+    for _ in range(STEPS):
+        nearest = other[_squared(one, other, turns).argmin(axis=2)]
+        left, _, right = np.linalg.svd(np.swapaxes(nearest, 1, 2) @ one)
+        left[:, :, 2] *= np.linalg.det(left @ right)[:, None]  # no reflection
+        turns = left @ right
+    return turns
+
+
+def _squared(one: Array, other: Array, turns: Array) -> Array:
+    """Return squared distances of all vertices of one, turned, to all of the other, (R, V, W)."""
+    turned = one @ turns.swapaxes(1, 2)
+    square: Array = (one**2).sum(axis=1)[:, None] + (other**2).sum(axis=1) - 2 * turned @ other.T
+    return square.clip(0)
+
+
+def _distances(one: Array, other: Array, turns: Array) -> Array:
+    """Return the distance of two meshes for each rotation of the first, (R,)."""
+    squared = _squared(one, other, turns)
+    there, back = (np.sqrt(squared.min(axis=axis)).mean(axis=1) for axis in (2, 1))
+    return np.asarray(there + back)
 
 
 @cache

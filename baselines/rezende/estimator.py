@@ -21,7 +21,8 @@ def sampled_gradient(
     The score of a Gaussian is eps / width, where x = mean + width eps. Samples come in pairs of
     eps and -eps, each the baseline of the other:
 
-        gradient = 1 / pairs * sum_k eps_k (loss(mean + width eps_k) - loss(mean - width eps_k)) / (2 width)
+        gradient = sum_k eps_k (loss_k+ - loss_k-) / (2 width pairs)
+        loss_k+ = loss(mean + width eps_k),  loss_k- = loss(mean - width eps_k)
 
     It is exact in expectation for the smoothed loss, and for a quadratic loss equals the gradient
     of the loss itself. Where an element of x can only change a part of the loss, the rest of the
@@ -47,5 +48,3 @@ def sampled_gradient(
 def with_gradient(value: Tensor, gradient: Tensor) -> Tensor:
     """Return a number whose gradient with respect to `value` is `gradient`."""
     return (value * gradient.detach()).sum()
-
-

@@ -45,13 +45,13 @@ class Pictures:
         return replace(self.views, light_position=position, light_color=color)
 
 
-def read_question_pictures(
-    path: str | Path, size: int, part: str | None
-) -> Pictures:
+def read_question_pictures(path: str | Path, size: int, part: str | None) -> Pictures:
     """Read the images of a file's first questions, at most MOST_QUESTIONS, four after four.
 
-    As in the Pix2Shape paper, lights, reflectance and background are told; shapes, rotations and
-    answers are not read. The mesh starts from half the sphere that the camera frames.
+    As in the Pix2Shape paper, lights, cameras, reflectance and background are told; shapes,
+    rotations and answers are not read. The mesh starts from half the sphere that the camera frames.
+    Lengths are scaled so that every question has the same distance of the camera, which changes no
+    image.
 
     Raises as `QuestionsFile`, and SpecError where the file tells no lights, or its images cannot
     be reduced to `size` x `size`.
@@ -67,25 +67,24 @@ def read_question_pictures(
         images = []
         for row in range(count):
             images += question_images(questions.read("questions", row), size)
-        names = "light_position", "light_color"
-        lights_at = [questions.read(name, slice(0, count)) for name in names]
-        for name, value in zip(names, lights_at, strict=True):
-            if not np.isfinite(value).all():
-                found = "numbers that are not finite"
-                raise FileFormatError(f"{path}: {name}", found, "the lights of each image")
+        names = "light_position", "light_color", "camera_distance"
+        position, color, distance = (questions.read(name, slice(0, count)) for name in names)
+        if not (np.isfinite(position).all() and np.isfinite(color).all()):
+            found = "light_position or light_color that is not finite"
+            raise FileFormatError(path, found, "the lights of each image")
         fingerprint = str(questions.fingerprint)
-    position, color = (value.reshape(-1, *value.shape[2:]) for value in lights_at)
-    turn = spec.camera.world_from_camera[:3, :3]  # the camera looks at the origin
+    scale = (spec.camera_distance / distance)[:, None, None, None]
+    lights = len(images), position.shape[2], 3
     views = Views(
         size=size,
-        fov_y_degrees=spec.camera.fov_y_degrees,
+        fov_y_degrees=spec.fov_y_degrees,
         distance=spec.camera_distance,
         reflectance=np.array(spec.reflectance),
         ambient=np.array(spec.ambient),
         background=np.array(spec.background),
         attenuation=(0.0, 1.0),
-        light_position=position @ turn,
-        light_color=color,
+        light_position=(position * scale).reshape(lights),
+        light_color=(color * scale**2).reshape(lights),  # as light falls off with the square
     )
     return Pictures(np.stack(images), 0.5 * spec.max_radius, views, fingerprint)
 

@@ -54,7 +54,7 @@ class Model(nn.Module):
         return mean, log_variance.clamp(-10, 4)
 
     def offsets(self, code: Tensor) -> Tensor:
-        """Return the offsets of codes before they are smoothed, (B, V, 3); the sphere has radius 1."""
+        """Return the offsets of codes, (B, V, 3), not yet smoothed; the sphere has radius 1."""
         return self.decoder(code).view(len(code), -1, 3)
 
     def vertices(self, offsets: Tensor) -> Tensor:
@@ -82,4 +82,3 @@ class Head(nn.Module):
 def divergence(mean: Tensor, log_variance: Tensor) -> Tensor:
     """Return KL(q || N(0, 1)) of Gaussians with means and log variances (B, D), in nats, (B,)."""
     return 0.5 * (mean**2 + log_variance.exp() - 1 - log_variance).sum(dim=1)
-

@@ -1,8 +1,8 @@
 """Images of single basic shapes, rendered by scenegen: what the method can learn, and what not.
 
-The Pix2Shape paper's appendix "Implementation of Rezende et al." says that the method worked for one
-centred object without background, and failed for objects that are not centred or too complex, and
-before a background. Each set here is one of these cases.
+The Pix2Shape paper's appendix "Implementation of Rezende et al." says that the method worked for
+one centred object without background, and failed for objects that are not centred or too complex,
+and before a background. Each set here is one of these cases.
 """
 
 import hashlib
@@ -69,8 +69,8 @@ def render_primitives(name: str, count: int, size: int, seed: int = 0, first: in
         seed=seed, height=large, width=large, objects=(1, 1), shapes=case.shapes, lights=(1, 1),
         light_saturation=0.0, pose="any", image_dtype="float32",
     )  # fmt: skip
-    draw = _room if case.room else _alone
-    scenes = [draw(case, spec, index) for index in range(first, first + count)]
+    rows = range(first, first + count)
+    scenes = [_room(spec, i) if case.room else _alone(case, spec, i) for i in rows]
     images, depths = [], []
     for start in range(0, count, BATCH):
         truth = render(pack(spec, scenes[start : start + BATCH]))
@@ -110,7 +110,7 @@ def _alone(case: PrimitiveSet, spec: DatasetSpec, index: int) -> SceneSpec:
     )
 
 
-def _room(case: PrimitiveSet, spec: DatasetSpec, index: int) -> SceneSpec:
+def _room(spec: DatasetSpec, index: int) -> SceneSpec:
     """Return a room with one shape, of the first attempt at which it finds a place."""
     attempts = (sample_scene(spec, index, attempt) for attempt in range(100))
     scene = next((scene for scene in attempts if scene is not None), None)

@@ -1,4 +1,4 @@
-"""What trained weights see in images: meshes, their pictures, and how far both are from the truth."""
+"""What trained weights see in images: meshes and their pictures, and how far these are off."""
 
 from dataclasses import dataclass
 
@@ -67,7 +67,9 @@ def errors(found: Reconstruction, pictures: Pictures) -> dict[str, float]:
     pixels = both.sum(axis=(1, 2))
     depth = np.abs(difference).sum(axis=(1, 2))[pixels > 0] / pixels[pixels > 0]
     overlap = pixels / np.maximum(either.sum(axis=(1, 2)), 1)
-    radiance = np.sqrt(((found.image - np.moveaxis(pictures.image, 1, 3)) ** 2).mean(axis=(1, 2, 3)))
+    radiance = np.sqrt(
+        ((found.image - np.moveaxis(pictures.image, 1, 3)) ** 2).mean(axis=(1, 2, 3))
+    )
     return {
         "radiance": float(radiance.mean()),
         "silhouette_iou": float(overlap.mean()),

@@ -23,7 +23,9 @@ def icosphere(subdivisions: int = 2) -> tuple[Array, Array]:
     corners /= np.linalg.norm(corners, axis=1, keepdims=True)
     near = np.linalg.norm(corners[:, None] - corners, axis=2) < 1.1  # an edge is 1.051 long
     triples = [(i, j, k) for i in range(12) for j in range(i) for k in range(j)]
-    faces = np.array([t for t in triples if near[t[0], t[1]] and near[t[1], t[2]] and near[t[0], t[2]]])
+    faces = np.array(
+        [t for t in triples if near[t[0], t[1]] and near[t[1], t[2]] and near[t[0], t[2]]]
+    )
     inward = np.linalg.det(corners[faces]) < 0
     faces[inward] = faces[inward][:, ::-1]
     for _ in range(subdivisions):

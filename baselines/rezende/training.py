@@ -3,10 +3,12 @@
 Each iteration i takes a batch of images x and one step down this estimate of the negative evidence
 bound, all random choices of which derive from (seed, i):
 
-    E_{z ~ q(z|x)} E_{v ~ N(decoder(z), width^2)} |x - render(v)|^2 / (2 noise^2)  +  KL(q(z|x) || N(0, 1))
+    E_z E_v |x - render(v)|^2 / (2 noise^2)  +  KL(q(z | x) || N(0, 1))
+    with z ~ q(z | x) and offsets of vertices v ~ N(decoder(z), width^2)
 
-Gradients pass from the offsets v to decoder and encoder by the chain rule, as z is reparametrised;
-those of the first term with respect to decoder(z) are sampled by `estimator.sampled_gradient`.
+The gradient of the first term with respect to decoder(z) is sampled by
+`estimator.sampled_gradient`. From there it goes to decoder and encoder by the chain rule, as z is
+reparametrised.
 """
 
 import errno
@@ -88,7 +90,9 @@ def train(
     }  # fmt: skip
     folder = Path(run_folder)
     if start is not None:
-        check(isinstance(start, str | Path) and not resume, "start", start, "weights, for a new run")
+        check(
+            isinstance(start, str | Path) and not resume, "start", start, "weights, for a new run"
+        )
         model, card = load_weights(start)
         card = replace(card, labels=labels)
     else:
@@ -115,7 +119,10 @@ def train_pictures(
     resume: bool = False,
     progress: Progress = lambda done, total, numbers: None,
 ) -> State:
-    """Train encoder and decoder on pictures; raises as `train`. With `resume`, `card` is ignored."""
+    """Train encoder and decoder on pictures. Raises as `train`.
+
+    With `resume` the checkpoint's card counts, not `card`.
+    """
     if resume:
         state = load_state(folder)
         if (found := pictures.fingerprint) != (old := state.card.fingerprint):
@@ -192,8 +199,8 @@ def windows(model: Model, offsets: Tensor, pictures: Pictures) -> tuple[Array, .
     """Return the pixels around each vertex of the mean meshes: top, bottom, left, right, (B, V).
 
     A vertex only changes the pixels of its triangles, and, as offsets are smoothed, those of its
-    neighbours. What happens elsewhere is noise to it: with these windows eight pairs point as well
-    as many more do without. Smoothing reaches a little beyond them, which is the price.
+    neighbours. What happens elsewhere is noise to it. Smoothing reaches a little beyond the
+    windows, so they bias the gradient a little; docs/baselines.md has the figures.
     """
     size = pictures.views.size
     vertices = pictures.radius * model.vertices(offsets.detach()).numpy()

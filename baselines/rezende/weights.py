@@ -1,4 +1,4 @@
-"""Weights and checkpoints: safetensors files that hold their card, a record of where they come from."""
+"""Weights and checkpoints: safetensors files that hold a card, which says where they come from."""
 
 import errno
 from dataclasses import dataclass

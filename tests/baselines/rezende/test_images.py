@@ -27,16 +27,17 @@ def cubes_mesh(cubes, turn):
 def test_true_shapes_drawn_with_what_is_told_are_the_images(split):
     pictures = read_question_pictures(split / "iqtt-val.h5", 64, None)
     assert len(pictures) == 12
-    assert pictures.radius == 1.75
     with open_questions(split / "iqtt-val.h5") as questions:
         for row in range(3):
             truth = questions.truth(row)
             for place in range(4):
+                scale = pictures.views.distance / truth.camera.position[2]
                 mesh, faces = cubes_mesh(truth.cubes[place], truth.world_from_shape[place])
+                mesh = scale * mesh
                 views = pictures.views_of(np.array([4 * row + place]))
                 image, depth = rasterise(mesh[None], faces, views)
                 wanted = np.moveaxis(pictures.image[4 * row + place], 0, 2)
-                true = np.where(np.isfinite(truth.depth[place]), truth.depth[place], np.inf)
+                true = scale * np.where(np.isnan(truth.depth[place]), np.inf, truth.depth[place])
                 assert (np.isfinite(depth[0]) == np.isfinite(true)).mean() > 0.995
                 both = np.isfinite(depth[0]) & np.isfinite(true)
                 assert np.isclose(depth[0][both], true[both], atol=0.01).mean() > 0.98
@@ -64,7 +65,7 @@ def test_damaged_lights_are_refused(split, tmp_path):
     path = tmp_path / "iqtt-val.h5"
     shutil.copy(split / "iqtt-val.h5", path)
     with h5py.File(path, "r+") as file:
-        file["truth/light_position"][1, 2] = np.nan
+        file["truth/light_color"][1, 2] = np.nan
     with pytest.raises(FileFormatError):
         read_question_pictures(path, 32, None)
 

@@ -23,7 +23,7 @@ def views(count, size=SIZE):
         ambient=np.array([0.1, 0.2, 0.3]),
         background=np.array([1.0, 0.9, 0.8]),
         attenuation=(0.3, 0.7),
-        light_position=RNG.normal(size=(count, 2, 3)) + [2, 3, 6],
+        light_position=RNG.normal((2, 3, 6), size=(count, 2, 3)),
         light_color=RNG.uniform(1, 9, (count, 2, 3)),
     )
 
@@ -63,8 +63,11 @@ def test_a_box_has_the_silhouette_and_depth_of_its_slabs(seed):
     vertices, faces, axes, half = box(seed)
     _, depth = rasterise(vertices[None], faces, views(1))
     directions, origin = rays()
-    crossings = ((sign * half[:, None, None] - (axes @ origin)[:, None, None]) / (
-        np.moveaxis(directions @ axes.T, 2, 0)) for sign in (-1, 1))
+    crossings = (
+        (sign * half[:, None, None] - (axes @ origin)[:, None, None])
+        / (np.moveaxis(directions @ axes.T, 2, 0))
+        for sign in (-1, 1)
+    )
     both = np.sort(np.stack(list(crossings)), axis=0)
     enter, leave = both[0].max(axis=0), both[1].min(axis=0)
     shown = np.isfinite(depth[0])
@@ -122,8 +125,13 @@ def test_a_mesh_in_a_batch_has_the_bits_that_it_has_alone():
     these = views(5)
     together = rasterise(meshes, faces, these)
     for row in range(5):
-        own = Views(**{**vars(these), "light_position": these.light_position[row : row + 1],
-                       "light_color": these.light_color[row : row + 1]})
+        own = Views(
+            **{
+                **vars(these),
+                "light_position": these.light_position[row : row + 1],
+                "light_color": these.light_color[row : row + 1],
+            }
+        )
         for whole, alone in zip(together, rasterise(meshes[row : row + 1], faces, own)):
             np.testing.assert_array_equal(whole[row], alone[0])
 

@@ -32,4 +32,4 @@ def test_smoothing_keeps_constants_and_damps_what_alternates():
     assert 0 < smooth[7] < 0.5
     assert (smooth > 0).all()
     height = icosphere(2)[0][:, 1]  # the slowest function that is not constant loses little
-    assert np.linalg.norm(matrix @ height) > 0.85 * np.linalg.norm(height)
+    assert np.linalg.norm(matrix @ height) > 0.75 * np.linalg.norm(height)
