@@ -47,7 +47,7 @@ def train_head(
     for _ in range(STEPS):
         loss = functional.cross_entropy(head(codes), target)
         optimiser.zero_grad()
-        loss.backward()
+        torch.autograd.backward(loss)
         optimiser.step()
         losses.append(float(loss.detach()))
     return losses

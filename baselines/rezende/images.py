@@ -74,7 +74,7 @@ def read_question_pictures(path: str | Path, size: int, part: str | None) -> Pic
             raise FileFormatError(path, found, "the lights of each image")
         fingerprint = str(questions.fingerprint)
     scale = (spec.camera_distance / distance)[:, None, None, None]
-    lights = len(images), position.shape[2], 3
+    rows = len(images), position.shape[2], 3
     views = Views(
         size=size,
         fov_y_degrees=spec.fov_y_degrees,
@@ -83,8 +83,8 @@ def read_question_pictures(path: str | Path, size: int, part: str | None) -> Pic
         ambient=np.array(spec.ambient),
         background=np.array(spec.background),
         attenuation=(0.0, 1.0),
-        light_position=(position * scale).reshape(lights),
-        light_color=(color * scale**2).reshape(lights),  # as light falls off with the square
+        light_position=(position * scale).reshape(rows),
+        light_color=(color * scale**2).reshape(rows),  # as light falls off with the square
     )
     return Pictures(np.stack(images), 0.5 * spec.max_radius, views, fingerprint)
 

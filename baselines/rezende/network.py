@@ -23,6 +23,9 @@ class Model(nn.Module):
         subdivisions: of the icosphere; 2 for 162 vertices.
     """
 
+    sphere: Tensor
+    smooth: Tensor
+
     def __init__(self, size: int = 32, code: int = 64, subdivisions: int = 2) -> None:
         super().__init__()
         corners, faces = icosphere(subdivisions)
@@ -64,6 +67,9 @@ class Model(nn.Module):
 
 class Head(nn.Module):
     """Scores answers by a learned comparison of two codes; trained on labels alone."""
+
+    shift: Tensor
+    scale: Tensor
 
     def __init__(self, code: int) -> None:
         super().__init__()

@@ -172,7 +172,7 @@ def _step(state: State, pictures: Pictures, number: int) -> dict[str, float]:
     for group in state.optimiser.param_groups:
         group["lr"] = card.learning_rate * min(1.0, 2 * (1 - number / card.iterations))
     state.optimiser.zero_grad()
-    loss.backward()
+    torch.autograd.backward(loss)
     torch.nn.utils.clip_grad_norm_(state.optimiser.param_groups[0]["params"], 1000.0)
     state.optimiser.step()
     return terms
@@ -215,6 +215,6 @@ def near_vertices(squared: Array, around: tuple[Array, ...]) -> Array:
     sums = np.pad(squared, ((0, 0), (0, 0), (1, 0), (1, 0))).cumsum(axis=2).cumsum(axis=3)
     items = np.arange(squared.shape[1])[:, None]
     top, bottom, left, right = around
-    parts = ((bottom, right, 1), (top, right, -1), (bottom, left, -1), (top, left, 1))
-    total: Array = sum(sign * sums[:, items, y, x] for y, x, sign in parts)
+    total: Array = sums[:, items, bottom, right] - sums[:, items, top, right]
+    total += sums[:, items, top, left] - sums[:, items, bottom, left]
     return total.astype(np.float32)

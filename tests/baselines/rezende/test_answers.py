@@ -6,7 +6,7 @@ from refusals import refused
 from scipy.spatial.transform import Rotation
 
 from baselines.rezende import write_submission
-from baselines.rezende.answers import answer_scores, mesh_distance, rotations
+from baselines.rezende.answers import answer_scores, mesh_distance, refined, rotations
 from baselines.rezende.sphere import icosphere
 from baselines.rezende.weights import Card, new_state, save_weights
 from iqtt.files.reader import open_questions
@@ -51,6 +51,15 @@ def test_a_turned_and_moved_mesh_is_nearer_than_its_mirror_image_or_another():
         same = mesh_distance(mesh, mesh @ turn.T + np.float32([3, -1, 2]))
         mirrored = mesh_distance(mesh, (mesh * np.float32([-1, 1, 1])) @ turn.T)
         assert 0 <= same < 0.5 * min(mirrored, mesh_distance(mesh, wide @ turn.T))
+
+
+def test_refined_rotations_are_proper_even_towards_a_mirror_image():
+    mesh = chiral()
+    for other in (mesh, mesh * np.float32([-1, 1, 1])):
+        turns = refined(mesh, other, rotations()[::16])
+        np.testing.assert_allclose(np.linalg.det(turns), 1, atol=1e-4)
+    best = abs(refined(mesh, mesh, rotations()[::16]) - np.eye(3)).max(axis=(1, 2)).min()
+    assert best < 1e-3
 
 
 @pytest.mark.parametrize("by_head", [False, True], ids=["meshes", "head"])

@@ -20,7 +20,11 @@ def asked(count, seed):
 def test_questions_that_codes_can_answer_are_learned_and_the_encoder_stays():
     model = new_state(Card(size=16, code=16)).model
     before = {k: v.clone() for k, v in model.state_dict().items() if not k.startswith("head")}
-    losses = train_head(model, *asked(100, 0), 16, 0)
+    questions = asked(100, 0)
+    losses = train_head(model, *questions, 16, 0)
+    codes = (codes_of(model, questions[0], 16).flatten(0, 1) - model.head.shift) / model.head.scale
+    torch.testing.assert_close(codes.std(dim=0, correction=0), torch.ones(16), rtol=1e-3, atol=0)
+    torch.testing.assert_close(codes.mean(dim=0), torch.zeros(16), rtol=0, atol=1e-3)
     assert losses[-1] < 0.5 * losses[0]
     images, right = asked(200, 1)
     with torch.no_grad():

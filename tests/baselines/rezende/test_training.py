@@ -71,9 +71,11 @@ def test_what_moves_one_vertex_changes_errors_in_its_window_alone(one_box):
     offsets[1, :, vertex] = torch.tensor([0.02, -0.03, 0.1])
     squared = pixel_errors(state.model, offsets, one_box, np.arange(8))
     changed = squared[0] != squared[1]
-    near = near_vertices(
-        changed[None].astype(np.float32), windows(state.model, offsets[0], one_box)
-    )
+    around = windows(state.model, offsets[0], one_box)
+    top, bottom, left, right = (edge[:, vertex] for edge in around)
+    assert (top + bottom == 16).all()  # the vertex lies on the camera's axis
+    assert (left + right == 16).all()
+    near = near_vertices(changed[None].astype(np.float32), around)
     assert (changed.sum(axis=(1, 2)) > 3).all()
     np.testing.assert_allclose(near[0, :, vertex], changed.sum(axis=(1, 2)), rtol=0.4)
 
