@@ -150,6 +150,7 @@ def test_what_is_behind_the_camera_or_too_near_does_not_show():
     _, behind = rasterise(vertices[None] + [0, 0, 2 * DISTANCE], faces, views(1))
     assert np.isinf(behind).all()
     inside = (vertices + [0, 0, DISTANCE - 0.9])[None]  # the camera is within the sphere
+    assert np.isinf(rasterise(inside, faces, views(1))[1]).all()
     _, depth = rasterise(inside, faces[:, ::-1], views(1))
     directions, _ = rays()
     a, b = (directions**2).sum(axis=2), 0.9
