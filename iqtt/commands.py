@@ -86,7 +86,7 @@ option = partial(click.option, show_default=True)
 @option(
     "--min-cube-pixels",
     type=int,
-    help="Smallest number of pixels that show a cube [default: 12 at 128x128 and radius 3.5].",
+    help="Smallest number of pixels that show a cube [default: 30 at 128x128 and radius 3.5].",
 )
 @option("--max-radius", type=float, help="Largest radius of a shape, in cube edges [default: 3.5].")
 @command_line.SIZE

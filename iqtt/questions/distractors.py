@@ -16,8 +16,9 @@ With two answers there is one distractor, of the same kind.
 """
 
 import hashlib
+import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -39,6 +40,10 @@ SHAPE_ATTEMPTS = 400  # references tried for one question
 MOVES = 60  # moves of one cube that are tried for one reference
 TRIALS = 40  # references that are tried to see whether a kind of question can be asked
 DRAWN_CLASSES = 20_000  # classes of a split, where there are too many to list them all
+LOOKS_AND_SIZES = (  # settings that make no question another one
+    *("train", "labeled", "val", "test", "image_dtype", "with_depth"),
+    *("background", "ambient", "reflectance", "light_level"),
+)
 LEAST_MATCHED = 20  # shapes with matched ones that a split has at least, so that questions vary
 
 
@@ -133,14 +138,13 @@ def answer_positions(spec: SplitSpec, split: str, first: int, count: int) -> Arr
     """Return the position of the right answer of each of some questions, (count,) uint8, from 0.
 
     They are the questions first .. first + count - 1. The positions come equally often, as nearly
-    as the count allows, in random order. The order follows from all settings, so that the key of
-    one split tells nothing about that of another, whatever they have in common; only the sizes of
-    other tables, and how the images are stored, make no difference.
+    as the count allows, in random order. The order follows from all settings that decide what the
+    questions are, so that the key of one split tells nothing about that of another, whatever they
+    have in common; only the sizes of other tables and how images look make no difference.
     """
-    plain = replace(
-        spec, train=count, labeled=0, val=0, test=0, image_dtype="uint8", with_depth=False
-    )
-    key = int.from_bytes(hashlib.sha256(plain.to_json().encode()).digest())
+    told = {name: value for name, value in vars(spec).items() if name not in LOOKS_AND_SIZES}
+    text = json.dumps([told, count], sort_keys=True)
+    key = int.from_bytes(hashlib.sha256(text.encode()).digest())
     rng = item_rng(key, question_key(split, first), Purpose.POSITIONS)
     return np.asarray(rng.permutation(np.arange(count) % spec.answers).astype(np.uint8))
 

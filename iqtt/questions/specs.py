@@ -78,13 +78,13 @@ class SplitSpec:
     width: int = 128
     image_dtype: str = "uint8"
     min_angle_degrees: float = 30.0
-    min_cube_pixels: int = 12
+    min_cube_pixels: int = 30
     max_radius: float = 3.5
     lights: tuple[int, int] = (2, 2)
     background: Vector3 = (1.0, 1.0, 1.0)
-    ambient: Vector3 = (0.25, 0.25, 0.25)
+    ambient: Vector3 = (0.2, 0.2, 0.2)
     reflectance: Vector3 = (0.8, 0.8, 0.8)
-    light_level: float = 0.75
+    light_level: float = 0.85
     fov_degrees: float = 28.0
     with_depth: bool = False
 

@@ -26,8 +26,9 @@ PROPOSED = 2  # least number of views of one image that are judged at once
 PROPOSALS_AT_ONCE = 256  # views of all images that are judged at once, roughly
 QUESTION_ATTEMPTS = 50  # choices of shapes for one question
 CROWDED = 10  # from so many cubes on, a shape may well have no view that shows them all
-LIGHT_DISTANCE = 2  # camera distances from a light to the origin: near parts are hardly brighter
-FIRST_LIGHT_COSINE = 0.5  # cosine of the widest angle between the first light and the camera
+LIGHT_DISTANCE = 4  # camera distances from a light to the origin: near parts are hardly brighter
+# Cosines of the angles to the camera of the first light and of the others.
+FIRST_LIGHT, OTHER_LIGHTS = (0.7, 0.9), (0.0, 0.8)
 
 
 @dataclass
@@ -291,18 +292,19 @@ def draw_lights(
 ) -> tuple[Array, Array, Array]:
     """Draw light positions and colours, (images, L, 3) each, and their numbers, (images,).
 
-    They are uniform on a sphere around the shape; the first one is uniform on the part within 60
-    degrees of the camera, so that what the camera sees is lit. Unused slots are zero.
+    They are far away, on the camera's side, in uniform directions within bounds: the first at an
+    angle of 26 to 46 degrees to the camera, so that most of what it sees is lit and the faces of a
+    cube differ; the others at 37 to 90 degrees. Unused slots are zero.
     """
     most, distance = spec.lights[1], LIGHT_DISTANCE * camera_distance
     count = rng.integers(spec.lights[0], most, images, endpoint=True)
-    # A uniform z and a uniform angle about the z axis are uniform on the sphere, and on its caps.
-    z = rng.uniform(-1.0, 1.0, (images, most))
-    z[:, 0] = FIRST_LIGHT_COSINE + (1 - FIRST_LIGHT_COSINE) * (z[:, 0] + 1) / 2
+    # A uniform z and a uniform angle about the z axis are uniform on a zone of the sphere.
+    z = rng.uniform(*OTHER_LIGHTS, (images, most))
+    z[:, 0] = rng.uniform(*FIRST_LIGHT, images)
     around = rng.uniform(0.0, 2 * math.pi, (images, most))
     r = np.sqrt(1 - z * z)
     direction = np.stack([r * np.cos(around), r * np.sin(around), z], axis=2)
-    color = rng.uniform(0.5, 1.0, (images, most, 3))
+    color = rng.uniform(0.3, 1.0, (images, most, 3))
     level = spec.light_level * distance**2 / count
     color *= level[:, None, None] / color.max(axis=2, keepdims=True)
     used = (np.arange(most) < count[:, None])[..., None]

@@ -142,14 +142,14 @@ def test_neither_batch_nor_how_many_are_sampled_changes_a_bit(batch, first, samp
 
 def test_a_cube_hidden_in_the_full_image_after_all_has_its_question_made_anew(monkeypatch):
     """Where the small image is hardly asked, that is often; then too each depends on itself."""
-    spec = replace(SPEC, min_cube_pixels=4)
+    spec = replace(SPEC, cubes=(7, 7), min_cube_pixels=5)
     monkeypatch.setattr(views, "MARGIN", 0.01)
     table = rendered(spec, "train", "unlabeled", batch=3)
     attempts = [one.question.attempt for one in table]
     assert {0, 1} <= set(attempts)
     for one in table:
         used = one.question.shapes.cubes.shape[1]
-        assert (one.visible_pixels[:, :used] >= 4).all()
+        assert (one.visible_pixels[:, :used] >= 5).all()
         assert not one.visible_pixels[:, used:].any()
         assert bits(render_question(spec, pools_of(spec), "train", one.question.index)) == bits(one)
 

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from iqtt.files import make as module
-from iqtt.files.make import FILES, make_split
-from iqtt.questions.specs import SplitSpec
+from iqtt.files.make import FILES, make_split, make_suite
+from iqtt.files.reader import QuestionsFile
+from iqtt.questions.specs import SUITE, SplitSpec, preset_spec, question_kind
 from iqtt.shapes.splits import TooFewShapesError
 from scenegen.common.errors import PlacementError, SpecError
 from scenegen.common.workspace import remove_leftovers
@@ -204,8 +205,10 @@ def test_plain_h5py_reads_every_type_and_compression(compression, dtype, made, t
             assert truth["depth"].attrs["unit"] == "cube edge"
             surface = np.isfinite(truth["depth"][:])
             assert (radiance[~surface] == 1).all()
-            middle = spec.camera_distance
-            assert (abs(truth["depth"][:][surface] - middle) < spec.max_radius).all()
+            middle = np.broadcast_to(
+                truth["camera_distance"][:, None, None, None], truth["depth"].shape
+            )
+            assert (abs(truth["depth"][:] - middle)[surface] < spec.max_radius).all()
     with h5py.File(tmp_path / "split" / "iqtt-test.h5") as file:
         assert list(file) == ["questions"]
     with h5py.File(tmp_path / "split" / "iqtt-test-answers.h5") as file:
@@ -331,6 +334,85 @@ def test_errors_on_the_way_leave_all_as_it_was(old, tmp_path, monkeypatch):
     with pytest.raises(FileExistsError):  # somebody else makes the folder meanwhile
         make_split(new, TINY, progress=lambda count: new.mkdir(exist_ok=True))
     new.rmdir()
+    assert listing(tmp_path) == before
+
+
+def as_released(path: Path) -> list[tuple[np.ndarray, np.ndarray | None]]:
+    """Load images and answers as whoever has the released files does: with plain h5py, by the
+    names and types that their description tells.
+    """
+    tables = []
+    with h5py.File(path) as file:
+        for group in (file["labeled"], file["unlabeled"]) if "labeled" in file else (file,):
+            images = group["questions"][()]
+            assert (images.dtype, images.ndim) == (np.float32, 5)
+            assert images.shape[1:] == (4, 32, 32, 3)
+            assert 0 <= images.min() < 0.5 < images.max() <= 1
+            answers = group["answers"][()] if "answers" in group else None
+            assert answers is None or (answers.dtype, answers.shape) == (np.uint8, images.shape[:1])
+            tables.append((images, answers))
+    return tables
+
+
+def test_the_preset_v2_takes_the_place_of_the_released_files(tmp_path):
+    spec = preset_spec("v2", train=9, labeled=6, val=6, test=3, height=32, width=32)
+    make_split(tmp_path / "v2", spec)
+    labeled, unlabeled = as_released(tmp_path / "v2" / "iqtt-train.h5")
+    [val], [test] = (as_released(tmp_path / "v2" / f"iqtt-{name}.h5") for name in ("val", "test"))
+    assert [len(images) for images, _ in (labeled, unlabeled, val, test)] == [6, 3, 6, 3]
+    assert unlabeled[1] is test[1] is None
+    assert sorted(labeled[1]) == sorted(val[1]) == [0, 0, 1, 1, 2, 2]
+    for images, _ in (labeled, unlabeled, val, test):
+        assert (images[:, :, 0, 0] == 1).all(), "the background is white"
+        assert len(np.unique(images)) > 256, "more than bytes"
+
+
+SUITE_SPEC = replace(TINY, cubes=(8, 8), train=2, labeled=1, val=2, test=1)
+
+
+def test_the_suite_has_a_split_of_each_kind_in_a_folder_of_its_own(tmp_path):
+    done: list[int] = []
+    tally = make_suite(tmp_path / "suite", SUITE_SPEC, progress=done.append, compression="none")
+    assert sorted(os.listdir(tmp_path / "suite")) == sorted(SUITE)
+    assert (sum(done), tally.proposed > 5 * 6 * 3) == (5 * 6, True)
+    for name, (kind, answers) in SUITE.items():
+        with QuestionsFile(tmp_path / "suite" / name / "iqtt-val.h5") as questions:
+            expected = replace(SUITE_SPEC, seed=None, distractors=kind, answers=answers)
+            assert questions.spec == expected
+            kinds = questions.read("distractor_kind", slice(None))
+            assert {question_kind(row) for row in kinds.tolist()} == {name}
+            assert questions.read("questions", 0).shape == (1 + answers, 16, 16, 3)
+        with h5py.File(tmp_path / "suite" / name / "iqtt-train.h5") as file:
+            assert file["unlabeled/questions"].compression is None
+    with pytest.raises(FileExistsError):
+        make_suite(tmp_path / "suite", SUITE_SPEC)
+
+
+def test_a_suite_that_is_stopped_leaves_whole_splits_and_goes_over_none(tmp_path):
+    done: list[int] = []
+
+    def stop(count: int) -> None:
+        done.append(count)
+        if sum(done) > 7:
+            raise StopError
+
+    for folder in ("suite", "suite"):
+        done.clear()
+        with pytest.raises(StopError):
+            make_suite(tmp_path / folder, SUITE_SPEC, progress=stop, overwrite=True)
+        assert listing(tmp_path).keys() == {
+            *("suite", "suite/matched", *(f"suite/matched/{name}" for name in FILES))
+        }
+    before = listing(tmp_path)
+    (tmp_path / "file").write_text("mine")
+    for folder, error in (("suite", FileExistsError), ("file", NotADirectoryError)):
+        with pytest.raises(error):
+            make_suite(tmp_path / folder, SUITE_SPEC, progress=done.append)
+    with pytest.raises(TooFewShapesError):
+        make_suite(tmp_path / "new", replace(SUITE_SPEC, cubes=(6, 6)))
+    with pytest.raises(FileNotFoundError):
+        make_suite(tmp_path / "no" / "new", SUITE_SPEC)
+    (tmp_path / "file").unlink()
     assert listing(tmp_path) == before
 
 

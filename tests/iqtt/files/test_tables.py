@@ -1,5 +1,7 @@
 """Files that are no question files, or damaged ones: one clear error each, nothing kept open."""
 
+import json
+import math
 import os
 import shutil
 
@@ -21,6 +23,50 @@ def refused(path, place, read=open_questions) -> FileFormatError:
     assert "\n" not in str(error.value)
     assert len(str(error.value)) < 400
     return error.value
+
+
+def as_version_1(minor: int):
+    """Return an edit that makes of a file one as the format 1 was: no cameras, no task."""
+
+    def edit(file: h5py.File) -> None:
+        spec = json.loads(file.attrs["spec"])
+        del spec["answers"], file.attrs["task"], file["truth/camera_distance"]
+        file.attrs["spec"] = json.dumps(spec)
+        file.attrs["format_version"] = f"1.{minor}"
+        if minor < 2:
+            del file.attrs["content_digest"], file.attrs["truth_digest"]
+
+    return edit
+
+
+@pytest.mark.parametrize("minor", [0, 2])
+def test_files_of_format_1_are_read_with_the_one_camera_that_they_had(damaged, minor):
+    path = damaged(as_version_1(minor))
+    with open_questions(path) as questions:
+        expected = 1.02 * 3.5 / math.sin(math.radians(14))
+        assert questions.answers == 3
+        assert questions.read("camera_distance", slice(None)) == pytest.approx([expected] * 6)
+        assert questions[5].truth.camera.position == pytest.approx((0, 0, expected))
+        assert questions[5].truth.cubes.shape[0] == 4
+    with open_questions(damaged(lambda file: None)) as questions:
+        stored = questions.read("camera_distance", slice(None))
+        assert len(set(stored.tolist())) > 1
+        assert questions[2].truth.camera.position == (0, 0, stored[2])
+
+
+def test_versions_there_are_not(damaged):
+    for version in ("0.9", "3.0", "1.x", "2.", "11.0"):
+        refused(damaged(lambda file, v=version: attribute("format_version", v)(file)), "")
+
+
+@pytest.mark.parametrize("distance", [0.0, -1.0, np.nan, np.inf, 1e300])
+def test_cameras_that_cannot_be(damaged, distance):
+    def edit(file: h5py.File) -> None:
+        file["truth/camera_distance"][3] = distance
+
+    with open_questions(damaged(edit)) as questions, pytest.raises(FileFormatError) as error:
+        questions.truth(3)
+    assert "camera_distance, row 3" in error.value.where
 
 
 @pytest.mark.parametrize("read", [open_questions, parts, AnswersFile])

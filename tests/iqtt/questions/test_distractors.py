@@ -265,7 +265,9 @@ def test_answer_positions_are_balanced_exactly(count, answers):
         places = answer_positions(spec, split, 7, count)
         assert (places.dtype, places.shape) == (np.uint8, (count,))
         assert sorted(places.tolist()) == sorted(i % answers for i in range(count))
-        others = replace(spec, train=7, labeled=3, val=8, test=9, image_dtype="float32")
+        others = replace(
+            spec, train=7, labeled=3, val=8, test=9, image_dtype="float32", ambient=(0,) * 3
+        )
         assert (answer_positions(others, split, 7, count) == places).all()
 
 
@@ -274,7 +276,7 @@ def test_answer_positions_of_one_split_tell_nothing_of_another_s():
     changes = (
         *({"distractors": kind} for kind in QUESTION_KINDS),
         {"seed": 12}, {"cubes": (6, 7)}, {"shapes": "tree"}, {"min_angle_degrees": 31},
-        {"max_radius": 2.8}, {"lights": (1, 2)}, {"height": 127}, {"background": (1, 1, 0)},
+        {"max_radius": 2.8}, {"lights": (1, 2)}, {"height": 127},
     )  # fmt: skip
     keys = [answer_positions(replace(SPEC, **change), "val", 0, 3000) for change in changes]
     keys.append(answer_positions(SPEC, "test", 0, 3000))

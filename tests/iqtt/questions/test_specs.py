@@ -2,13 +2,22 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from iqtt.questions.specs import SPLITS, SplitSpec, preset_spec
+from iqtt.questions.specs import (
+    DISTRACTOR_KINDS,
+    QUESTION_KINDS,
+    SPLITS,
+    SplitSpec,
+    preset_spec,
+    question_kind,
+)
+from iqtt.questions.views import LIGHT_DISTANCE
 from scenegen.camera import intrinsics
 from scenegen.common.errors import SpecError
 
@@ -22,6 +31,7 @@ REFUSED = {
     "cubes": ("cubes", ((2, 5), (5, 17), (7, 6), (-3, 3))),
     "shapes": ("shapes", ("ring",)),
     "distractors": ("distractors", ("",)),
+    "answers": ("answers", (1, 4)),
     "height": ("size", (15, 4097)),
     "width": ("size", (15, 4097)),
     "image_dtype": ("image dtype", ("int8",)),
@@ -128,6 +138,35 @@ def test_settings_that_are_not_given_follow_others():
         assert error.value.where == where
 
 
+def test_kinds_of_questions():
+    mixed = SplitSpec()
+    assert mixed.kinds == QUESTION_KINDS
+    assert replace(mixed, answers=2).kinds == ("other", "near", "matched", "mirror-pair")
+    assert replace(mixed, distractors="near").kinds == ("near",)
+    with pytest.raises(SpecError) as error:
+        SplitSpec(distractors="mirror", answers=2)
+    assert error.value.where == "answers"
+
+
+@pytest.mark.parametrize(
+    ("kinds", "expected"),
+    [
+        ([-1, 0, 0], "other"), ([1, -1, 1], "near"), ([2, 1, -1], "mirror"),
+        ([3, 3, -1], "matched"), ([2, -1, 2], "mirror-pair"),
+        ([-1, 2], "mirror-pair-2"), ([0, -1], "other-2"),
+        ([3, -1], "matched-2"), (np.array([-1, 1, 2], np.int8), "mirror"),
+    ],
+)  # fmt: skip
+def test_the_kind_of_a_question_follows_from_those_of_its_answers(kinds, expected):
+    assert question_kind(kinds) == expected
+
+
+def test_kinds_that_no_question_has():
+    for kinds, error in (([-1, -1, -1], ValueError), ([-1, len(DISTRACTOR_KINDS)], IndexError)):
+        with pytest.raises(error):
+            question_kind(kinds)
+
+
 SIDES = st.integers(16, 600)
 
 
@@ -145,7 +184,7 @@ def test_no_point_of_the_bounding_sphere_leaves_the_image(height, width, fov, ra
     around, sine = rng.uniform(0, 2 * math.pi, 4000), radius / spec.camera_distance
     outline = np.stack([np.cos(around), np.sin(around), np.full(4000, sine)], axis=1)
     outline[:, :2] *= math.sqrt(1 - sine**2)
-    camera = spec.camera
+    camera = spec.camera(spec.framing_distance(radius))
     assert camera.position == (0, 0, spec.camera_distance)
     matrix = np.linalg.inv(camera.world_from_camera)
     seen = np.concatenate([points, radius * outline]) @ matrix[:3, :3].T + matrix[:3, 3]
@@ -159,15 +198,15 @@ def test_no_point_of_the_bounding_sphere_leaves_the_image(height, width, fov, ra
 def test_an_edge_has_the_length_in_pixels_that_is_said():
     for height, width in ((128, 128), (64, 96), (160, 96)):
         spec = SplitSpec(height=height, width=width, min_cube_pixels=1)
-        focal = intrinsics(height, width, spec.camera.fov_y_degrees)[0, 0]
+        focal = intrinsics(height, width, spec.fov_y_degrees)[0, 0]
         assert spec.pixels_per_edge == pytest.approx(focal / spec.camera_distance)
-        assert spec.light_distance > spec.camera_distance + spec.max_radius
 
 
 def test_no_surface_can_be_as_bright_as_the_background_by_default():
     """Nearest to all lights, facing them all."""
     spec = SplitSpec()
-    nearer = spec.light_distance / (spec.light_distance - spec.max_radius)
-    brightest = 0.8 * (0.25 + spec.light_level * nearer**2)
-    assert (spec.reflectance, spec.ambient) == ((0.8,) * 3, (0.25,) * 3)
+    distance = LIGHT_DISTANCE * spec.camera_distance
+    nearer = distance / (distance - spec.max_radius)
+    brightest = 0.8 * (0.2 + spec.light_level * nearer**2)
+    assert (spec.reflectance, spec.ambient) == ((0.8,) * 3, (0.2,) * 3)
     assert 0.9 < brightest < 0.98 < min(spec.background)

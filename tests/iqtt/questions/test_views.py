@@ -1,5 +1,6 @@
 """Views and lights of questions: every cube shows, far enough from the reference, all uniform."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -14,10 +15,12 @@ from iqtt.questions.packing import Question
 from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import (
     Tally,
+    camera_distances,
     draw_lights,
     draw_rotations,
     far_enough,
     find_views,
+    random_frames,
     rotation_angle_degrees,
     sample_questions,
     shape_symmetries,
@@ -27,6 +30,7 @@ from scenegen.common.errors import PlacementError
 from scenegen.common.seeding import Purpose, item_rng
 
 SPEC = SplitSpec(seed=4, cubes=(5, 8), height=64, width=64, min_cube_pixels=3, lights=(1, 3))
+RNG = np.random.default_rng
 REQUESTS = [(i, i % 3, 0) for i in (0, 1, 2, 3, 40, 41, 42, 10**6)]
 
 
@@ -49,12 +53,25 @@ def bits(question: Question) -> tuple:
     )
 
 
-def symmetry_group(cubes: np.ndarray) -> list[Rotation]:
-    """Return SciPy's rotations of the cube that leave a shape as it is."""
-    centred = 2 * cubes.astype(int) - cubes.min(axis=0) - cubes.max(axis=0)
-    own = sorted(centred.tolist())
+def turns_between(a: np.ndarray, b: np.ndarray) -> list[Rotation]:
+    """Return SciPy's rotations of the cube that take a shape to another one."""
+    one, other = (2 * c.astype(int) - c.min(axis=0) - c.max(axis=0) for c in (a, b))
+    expected = sorted(other.tolist())
     group = Rotation.create_group("O")
-    return [turn for turn in group if sorted(np.rint(turn.apply(centred)).tolist()) == own]
+    return [turn for turn in group if sorted(np.rint(turn.apply(one)).tolist()) == expected]
+
+
+def radius(cubes: np.ndarray) -> float:
+    """The largest distance from the middle of the box to any corner of a cube."""
+    corners = np.concatenate([cubes + offset for offset in itertools.product((0, 1), repeat=3)])
+    return float(
+        np.linalg.norm(corners - (corners.min(axis=0) + corners.max(axis=0)) / 2, axis=1).max()
+    )
+
+
+def spec_distance(radius: float) -> float:
+    """Where a sphere's outline is the image's inscribed circle, and 2% more."""
+    return 1.02 * radius / math.sin(math.radians(SPEC.fov_degrees / 2))
 
 
 @pytest.mark.parametrize("least", [0, 30, 90])
@@ -62,17 +79,62 @@ def test_answers_are_turned_far_enough_by_any_way_of_looking(pools, least):
     """Against SciPy's rotations, tried on each shape; the right answer's angle is the one told."""
     spec = replace(SPEC, min_angle_degrees=least, seed=4)
     questions = sample_questions(spec, pools, "train", REQUESTS, Tally())
+    pairs = replace(spec, distractors="mirror-pair")
+    questions += sample_questions(pairs, make_pools(pairs), "train", REQUESTS, Tally())
     angles = []
     for question in questions:
-        reference, *others = map(Rotation.from_matrix, question.world_from_shape)
-        for k, (cubes, turn) in enumerate(zip(question.shapes.cubes[1:], others, strict=True)):
-            same = [turn * symmetry * reference.inv() for symmetry in symmetry_group(cubes)]
-            angle = math.degrees(min(one.magnitude() for one in same))
-            assert angle >= least - 1e-9
-            angles.append(angle)
-            if k == question.shapes.answer:
-                assert question.angle_degrees == pytest.approx(angle, abs=1e-6)
+        views = [Rotation.from_matrix(turn) for turn in question.world_from_shape]
+        told = question.angle_degrees
+        for i, j in itertools.combinations(range(4), 2):
+            turns = turns_between(question.shapes.cubes[i], question.shapes.cubes[j])
+            if not turns:
+                continue
+            same = [views[j] * turn * views[i].inv() for turn in turns]
+            angles.append(math.degrees(min(one.magnitude() for one in same)))
+            assert angles[-1] >= least - 1e-9
+            if (i, j) == (0, 1 + question.shapes.answer):
+                assert told == pytest.approx(angles[-1], abs=1e-6)
+    assert len(angles) >= 24, "the right answer of each, and the wrong ones of pairs"
     assert (min(angles) < 90) == (least < 90)
+
+
+def test_frames_change_no_cube_in_the_world_and_tell_nothing(pools):
+    """Each of the 24 comes as often for each image, independently of the others."""
+    shapes = Shapes(draw_shapes(SPEC, pools, "val", [(0, 0)])[0][0][[0, 0, 1, 2]], None, 0)
+    turns, rng = draw_rotations(RNG(1), (4,)), RNG(2)
+    relative = []
+    for _ in range(600):
+        framed, turned = random_frames(shapes, turns, rng)
+        assert (framed.cubes.min(axis=1) == 0).all()
+        for k in range(4):
+            before, after = (
+                sorted(((c - (c.min(axis=0) + c.max(axis=0)) / 2) @ t.T).round(9).tolist())
+                for c, t in ((shapes.cubes[k], turns[k]), (framed.cubes[k], turned[k]))
+            )
+            np.testing.assert_allclose(before, after, atol=1e-8)
+        frames = np.rint(np.swapaxes(turned, 1, 2) @ turns).astype(int)
+        relative.append([(frames[0] @ frames[k].T).ravel() for k in (1, 2, 3)])
+    for k in range(3):
+        _, counts = np.unique([row[k] for row in relative], axis=0, return_counts=True)
+        assert len(counts) == 24
+        assert stats.chisquare(counts).pvalue > 1e-3
+    first = {random_frames(shapes, turns, rng)[0].cubes[1].tobytes() for _ in range(60)}
+    assert len(first) > 50, "cubes come in random order"
+
+
+@pytest.mark.parametrize("kind", ["mirror", "near"])
+def test_stored_rotations_tell_nothing_about_the_answer(kind):
+    """The angle from the reference's to each answer's, and the least of all its 24 versions."""
+    spec = replace(SPEC, distractors=kind, cubes=(6, 8))
+    requests = [(i, i % 3, 0) for i in range(400)]
+    wins = []
+    for question in sample_questions(spec, make_pools(spec), "val", requests, Tally()):
+        between = question.world_from_shape[0].T @ question.world_from_shape[1:]
+        wins.append([np.trace(turn) for turn in between])
+    wins = np.argsort(wins, axis=1)
+    for place in (0, 2):
+        right = sum(int(row[place] == i % 3) for i, row in enumerate(wins))
+        assert stats.binomtest(right, len(wins), 1 / 3).pvalue > 1e-3
 
 
 @pytest.mark.parametrize("least", [30, 90])
@@ -96,7 +158,10 @@ def test_questions_are_what_was_asked_for(sampled):
         assert (question.index, question.shapes.answer) == (index, place)
         assert question.shapes.kinds[place] == -1
         assert question.attempt >= attempt
-        assert (question.shapes.cubes[0] == question.shapes.cubes[1 + place]).all()
+        assert turns_between(question.shapes.cubes[0], question.shapes.cubes[1 + place])
+        assert question.camera_distance == pytest.approx(
+            spec_distance(max(map(radius, question.shapes.cubes[1:])))
+        )
         assert ((question.light_count >= 1) & (question.light_count <= 3)).all()
     assert len({bits(q) for q in questions}) == len(questions)
 
@@ -122,11 +187,13 @@ def test_neither_company_nor_order_nor_chunks_change_a_question(
     assert sample_questions(SPEC, pools, "val", [], tally) == []
 
 
-def proposed(question):
-    """The rotations of which its reference's and its answers' were chosen, (4, VIEWS, 3, 3)."""
+def is_proposed(question):
+    """Which of the rotations that were drawn for each image are its own, up to the frame of its
+    shape, (4, VIEWS)."""
     rng = item_rng(SPEC.seed, question_key("val", question.index), Purpose.VIEW, 0)
-    turns = draw_rotations(rng, (6, module.VIEWS))
-    return turns[[question.shapes.answer, 3, 4, 5]]
+    turns = draw_rotations(rng, (6, module.VIEWS))[[question.shapes.answer, 3, 4, 5]]
+    frames = np.swapaxes(question.world_from_shape, 1, 2)[:, None] @ turns
+    return abs(frames - np.rint(frames)).max(axis=(2, 3)) < 1e-9
 
 
 def test_views_are_the_first_good_ones_of_those_drawn(pools, sampled):
@@ -135,18 +202,14 @@ def test_views_are_the_first_good_ones_of_those_drawn(pools, sampled):
     assert {q.attempt for q in questions} == {0}
     refused = 0
     for question in questions:
-        proposals = proposed(question)
-        for image in range(4):
-            same = (proposals[image] == question.world_from_shape[image]).all(axis=(1, 2))
-            assert same.sum() == 1
-            refused += int(same.argmax())
+        same = is_proposed(question)
+        assert (same.sum(axis=1) == 1).all()
+        refused += int(same.argmax(axis=1).sum())
     assert tally.proposed == tally.refused + 4 * len(questions)
     assert tally.refused <= refused, "those too near to the reference's view do not count"
     free, every = replace(SPEC, min_angle_degrees=0), Tally()
     for question in sample_questions(free, pools, "val", REQUESTS, every):
-        proposals = proposed(question)
-        found = (proposals == question.world_from_shape[:, None]).all(axis=(2, 3)).argmax(axis=1)
-        every.refused -= int(found.sum())
+        every.refused -= int(is_proposed(question).argmax(axis=1).sum())
     assert every.refused == 0
     assert every.proposed > 4 * len(REQUESTS)
 
@@ -160,7 +223,7 @@ def test_a_shape_that_no_view_shows_whole_makes_way_for_another(pools, monkeypat
     assert tally.proposed > tally.refused > 0
     for question in questions:
         [(cubes, _)] = draw_shapes(SPEC, pools, "test", [(question.index, question.attempt)])
-        assert (question.shapes.cubes[0] == cubes[0]).all()
+        assert turns_between(question.shapes.cubes[0], cubes[0])
     alone = [sample_questions(SPEC, pools, "test", [request], Tally())[0] for request in REQUESTS]
     assert [bits(q) for q in alone] == [bits(q) for q in questions]
 
@@ -183,7 +246,8 @@ def test_whether_crowded_shapes_are_asked_for_does_not_tell_which_is_right(monke
                 for cubes, kinds in drawn
             ]
             symmetric = shape_symmetries(shapes)
-            turns = find_views(spec, "val", requests, shapes, symmetric, Tally(), "auto")
+            distances = camera_distances(spec, shapes)
+            turns = find_views(spec, "val", requests, shapes, distances, symmetric, Tally(), "auto")
             shown.append(np.isfinite(turns).all(axis=(1, 2, 3)))
         return np.array(shown)
 
@@ -233,25 +297,25 @@ def test_rotations_are_uniform_on_so3():
 
 def test_lights_are_uniform_where_they_may_be():
     spec = replace(SPEC, lights=(1, 4))
-    position, color, count = draw_lights(spec, np.random.default_rng(2), 8000)
+    position, color, count = draw_lights(spec, np.random.default_rng(2), 8000, 7.5)
     assert position.shape == color.shape == (8000, 4, 3)
     assert stats.chisquare(np.bincount(count)[1:]).pvalue > 1e-3
     used = np.arange(4) < count[:, None]
     assert not position[~used].any()
     assert not color[~used].any()
-    np.testing.assert_allclose(np.linalg.norm(position[used], axis=1), spec.light_distance)
-    direction = position / spec.light_distance
+    np.testing.assert_allclose(np.linalg.norm(position[used], axis=1), 30.0)
+    direction = position / 30.0
     first, others = direction[:, 0], direction[:, 1:][used[:, 1:]]
-    assert stats.kstest(first[:, 2], stats.uniform(0.5, 0.5).cdf).pvalue > 1e-3
-    assert stats.kstest(others[:, 2], stats.uniform(-1, 2).cdf).pvalue > 1e-3
+    assert stats.kstest(first[:, 2], stats.uniform(0.7, 0.2).cdf).pvalue > 1e-3
+    assert stats.kstest(others[:, 2], stats.uniform(0, 0.8).cdf).pvalue > 1e-3
     for some in (first, others):
         around = np.arctan2(some[:, 1], some[:, 0])
         assert stats.kstest(around, stats.uniform(-np.pi, 2 * np.pi).cdf).pvalue > 1e-3
-    level = color.max(axis=2) / spec.light_distance**2
+    level = color.max(axis=2) / 30.0**2
     np.testing.assert_allclose(level.sum(axis=1), spec.light_level)
     np.testing.assert_allclose(level[used], (spec.light_level / count)[np.nonzero(used)[0]])
-    assert (color[used].min(axis=1) >= 0.5 * color[used].max(axis=1)).all()
-    same = draw_lights(replace(SPEC, lights=(3, 3)), np.random.default_rng(0), 5)[2]
+    assert (color[used].min(axis=1) >= 0.3 * color[used].max(axis=1)).all()
+    same = draw_lights(replace(SPEC, lights=(3, 3)), np.random.default_rng(0), 5, 7.5)[2]
     assert same.tolist() == [3] * 5
 
 
@@ -269,7 +333,7 @@ SYMMETRIC = {
 def test_the_angle_between_views_is_the_least_that_symmetry_leaves(name):
     """Against SciPy's rotations of the cube, tried on the shape one by one."""
     cubes = np.array(SYMMETRIC[name])
-    group = symmetry_group(cubes)
+    group = turns_between(cubes, cubes)
     symmetric = symmetries(cubes[None])[0]
     order = {"straight": 8, "square": 8, "cube": 24, "corner": 2, "screw": 2, "none": 1}[name]
     assert len(group) == symmetric.sum() == order
