@@ -25,7 +25,7 @@ TRAIN_SEED, TEST_SEED = 1, 2
 @click.command()
 @click.option("--runs", type=click.Path(path_type=Path), required=True, help="Folder of the runs.")
 @click.option("--picture", type=click.Path(path_type=Path), required=True)
-@click.option("--iterations", default=4_000, show_default=True)
+@click.option("--iterations", default=2_000, show_default=True)
 @click.option("--only", type=click.Choice(list(PRIMITIVE_SETS)), multiple=True)
 def main(runs: Path, picture: Path, iterations: int, only: tuple[str, ...]) -> None:
     """Train, measure and draw."""

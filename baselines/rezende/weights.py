@@ -41,7 +41,7 @@ class Card:
 
     size: int = 32
     code: int = 64
-    iterations: int = 6_000
+    iterations: int = 2_000
     batch: int = 32
     pairs: int = 4
     width: float = 0.2

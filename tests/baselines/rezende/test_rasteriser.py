@@ -149,6 +149,8 @@ def test_what_is_behind_the_camera_or_too_near_does_not_show():
     vertices, faces = icosphere(3)
     _, behind = rasterise(vertices[None] + [0, 0, 2 * DISTANCE], faces, views(1))
     assert np.isinf(behind).all()
+    _, near = rasterise(0.05 * vertices[None] + [0, 0, DISTANCE - 0.15], faces, views(1))
+    assert np.isinf(near).all()
     inside = (vertices + [0, 0, DISTANCE - 0.9])[None]  # the camera is within the sphere
     assert np.isinf(rasterise(inside, faces, views(1))[1]).all()
     _, depth = rasterise(inside, faces[:, ::-1], views(1))
