@@ -62,7 +62,8 @@ class Model(nn.Module):
 
     def vertices(self, offsets: Tensor) -> Tensor:
         """Return the vertices that offsets, (..., V, 3), give: sphere + smoothed offsets."""
-        return self.sphere + self.smooth @ offsets
+        smoothed = offsets.transpose(-1, -2) @ self.smooth.T  # one product for all meshes
+        return self.sphere + smoothed.transpose(-1, -2)
 
 
 class Head(nn.Module):
