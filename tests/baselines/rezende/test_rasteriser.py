@@ -151,7 +151,7 @@ def test_what_is_behind_the_camera_or_too_near_does_not_show():
     assert np.isinf(behind).all()
     _, near = rasterise(0.05 * vertices[None] + [0, 0, DISTANCE - 0.15], faces, views(1))
     assert np.isinf(near).all()
-    inside = (vertices + [0, 0, DISTANCE - 0.9])[None]  # the camera is within the sphere
+    inside = vertices[None] + np.array([0, 0, DISTANCE - 0.9])  # the camera is within the sphere
     assert np.isinf(rasterise(inside, faces, views(1))[1]).all()
     _, depth = rasterise(inside, faces[:, ::-1], views(1))
     directions, _ = rays()
