@@ -61,9 +61,15 @@ class Model(nn.Module):
         return self.decoder(code).view(len(code), -1, 3)
 
     def vertices(self, offsets: Tensor) -> Tensor:
-        """Return the vertices that offsets, (..., V, 3), give: sphere + smoothed offsets."""
+        """Return the vertices that offsets, (..., V, 3), give: sphere + smoothed offsets.
+
+        The object is taken to be centred, so the mesh's middle is put at the depth of the sphere's:
+        one image cannot tell a large object from a small one that is near.
+        """
         smoothed = offsets.transpose(-1, -2) @ self.smooth.T  # one product for all meshes
-        return self.sphere + smoothed.transpose(-1, -2)
+        vertices = self.sphere + smoothed.transpose(-1, -2)
+        middle = vertices.mean(dim=-2, keepdim=True) * vertices.new_tensor([0.0, 0.0, 1.0])
+        return vertices - middle
 
 
 class Head(nn.Module):

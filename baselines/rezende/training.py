@@ -3,8 +3,11 @@
 Each iteration i takes a batch of images x and one step down this estimate of the negative evidence
 bound, all random choices of which derive from (seed, i):
 
-    E_z E_v |x - render(v)|^2 / (2 noise^2)  +  KL(q(z | x) || N(0, 1))
+    E_z E_v |x - render(v)|^2 / (2 noise^2)  +  |decoder(z)|^2 / (2 spread^2)
+    +  KL(q(z | x) || N(0, 1)),
     with z ~ q(z | x) and offsets of vertices v ~ N(decoder(z), width^2)
+
+The second term keeps at the sphere what no image shows, the far side.
 
 The gradient of the first term with respect to decoder(z) is sampled by
 `estimator.sampled_gradient`. From there it goes to decoder and encoder by the chain rule, as z is
@@ -62,6 +65,7 @@ def train(
     pairs: int = Card.pairs,
     width: float = Card.width,
     noise: float = Card.noise,
+    spread: float = Card.spread,
     learning_rate: float = Card.learning_rate,
     start: str | Path | None = None,
     resume: bool = False,
@@ -85,8 +89,8 @@ def train(
     """
     given = {
         "size": size, "code": code, "iterations": iterations, "batch": batch, "pairs": pairs,
-        "width": width, "noise": noise, "learning_rate": learning_rate, "seed": seed,
-        "labels": labels,
+        "width": width, "noise": noise, "spread": spread, "learning_rate": learning_rate,
+        "seed": seed, "labels": labels,
     }  # fmt: skip
     folder = Path(run_folder)
     if start is not None:
@@ -164,7 +168,8 @@ def _step(state: State, pictures: Pictures, number: int) -> dict[str, float]:
     around = windows(model, offsets, pictures)
     gradient, _ = sampled_gradient(misfit, offsets, card.width, card.pairs, generator)
     nats = divergence(mean, log_variance)
-    loss = (with_gradient(offsets, gradient) + nats.sum()) / card.batch
+    prior = (offsets**2).sum() / (2 * card.spread**2)
+    loss = (with_gradient(offsets, gradient) + prior + nats.sum()) / card.batch
     terms = {"misfit": float(totals[0]), "divergence": float(nats.mean().detach())}
     if not np.isfinite(sum(terms.values())):
         hint = "begin again with a smaller learning rate"
@@ -200,14 +205,20 @@ def windows(model: Model, offsets: Tensor, pictures: Pictures) -> tuple[Array, .
 
     A vertex only changes the pixels of its triangles, and, as offsets are smoothed, those of its
     neighbours. What happens elsewhere is noise to it. Smoothing reaches a little beyond the
-    windows, so they bias the gradient a little; docs/baselines.md has the figures.
+    windows, so they bias the gradient a little; docs/baselines.md has the figures. A vertex on the
+    far side, none of whose triangles faces the camera, changes no pixel: its window is empty.
     """
     size = pictures.views.size
     vertices = pictures.radius * model.vertices(offsets.detach()).numpy()
     x, y, _ = project(vertices, pictures.views)
-    half = WINDOW * size
+    (ax, bx, cx), (ay, by, cy) = (np.moveaxis(value[:, model.faces], 2, 0) for value in (x, y))
+    facing = (bx - ax) * (cy - ay) < (cx - ax) * (by - ay)  # rows go down, see the rasteriser
+    corner = np.zeros((len(model.faces), vertices.shape[1]), np.float32)
+    corner[np.arange(len(corner))[:, None], model.faces] = 1
+    half = np.where(facing @ corner > 0, WINDOW * size, -1)
     edges = (np.ceil(y - half), np.floor(y + half) + 1, np.ceil(x - half), np.floor(x + half) + 1)
-    return tuple(np.clip(edge, 0, size).astype(np.int64) for edge in edges)
+    top, bottom, left, right = (np.clip(edge, 0, size).astype(np.int64) for edge in edges)
+    return top, np.maximum(top, bottom), left, np.maximum(left, right)
 
 
 def near_vertices(squared: Array, around: tuple[Array, ...]) -> Array:

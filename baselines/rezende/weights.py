@@ -32,6 +32,7 @@ class Card:
         width: standard deviation of the meshes' offsets about the decoder's, before smoothing,
             where the sphere has radius 1.
         noise: standard deviation of pixels about the rendered ones, in radiance.
+        spread: standard deviation of offsets before anything is seen, about the sphere.
         learning_rate: of Adam; it falls linearly to 0 over the second half of training.
         seed: of the first weights and of every random choice.
         labels: answers that the head was trained on; 0 where it was not.
@@ -46,6 +47,7 @@ class Card:
     pairs: int = 4
     width: float = 0.2
     noise: float = 0.1
+    spread: float = 1.0
     learning_rate: float = 0.001
     seed: int = 0
     labels: int = 0
@@ -58,7 +60,7 @@ class Card:
         normalise(self)
         for name, low, high in (
             ("size", 16, 128), ("code", 2, 1024), ("iterations", 1, LARGEST), ("batch", 1, 1024),
-            ("pairs", 1, 256), ("width", 1e-4, 1.0), ("noise", 1e-3, 10.0),
+            ("pairs", 1, 256), ("width", 1e-4, 1.0), ("noise", 1e-3, 10.0), ("spread", 1e-3, 1e6),
             ("learning_rate", 1e-8, 1.0), ("seed", 0, LARGEST), ("labels", 0, LARGEST),
             ("iteration", 0, self.iterations), ("format_version", FORMAT_VERSION, FORMAT_VERSION),
         ):  # fmt: skip

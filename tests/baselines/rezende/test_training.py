@@ -63,6 +63,19 @@ def test_errors_are_summed_in_the_windows_of_vertices(one_box):
         assert 4 <= bottom - top <= 6 or min(top, 16 - bottom) == 0
 
 
+def test_the_far_side_is_charged_with_nothing_and_the_middle_keeps_its_depth(one_box):
+    model = new_state(TINY).model
+    offsets = torch.zeros(8, 162, 3)
+    sums = near_vertices(np.ones((1, 8, 16, 16), np.float32), windows(model, offsets, one_box))
+    height = model.sphere[:, 2].numpy()
+    assert (sums[0][:, height < -0.4] == 0).all()
+    assert (sums[0][:, height > 0.4] > 8).all()
+    offsets[:, :, 2] = torch.randn(8, 162) + 3
+    moved = model.vertices(offsets)
+    torch.testing.assert_close(moved[:, :, 2].mean(dim=1), torch.zeros(8), rtol=0, atol=1e-5)
+    torch.testing.assert_close(moved[:, :, :2], model.sphere[:, :2].expand(8, -1, -1))
+
+
 def test_what_moves_one_vertex_changes_errors_in_its_window_alone(one_box):
     state = new_state(TINY)
     state.model.smooth = torch.eye(162)
