@@ -35,6 +35,7 @@ UNTRAINED = {
 TRAINED = {
     "cnn": "answers to questions: ResNets and a softmax over the answers",
     "ptn": "voxels by Perspective Transformer Nets: rooms, and answers to questions",
+    "rezende": "answers to questions: meshes from images, through a renderer without gradients",
     "siamese": "answers to questions: the one whose features are nearest to the reference's",
 }
 ALL = {**UNTRAINED, **TRAINED}

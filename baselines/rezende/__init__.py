@@ -1,0 +1,23 @@
+"""Rezende et al. (NeurIPS 2016): meshes from images, through a renderer that is only sampled.
+
+    sphere.py       the mesh that is deformed, and the smoothing of its offsets
+    rasteriser.py   pictures of meshes, in numpy: the renderer, which can only be sampled
+    estimator.py    gradients of an expected loss by sampling it
+    network.py      encoder and decoder of the variational model, and the head that labels train
+    images.py       what it learns from: the images of question files
+    primitives.py   single basic shapes, rendered by scenegen, on which it works or fails
+    weights.py      files of weights and checkpoints
+    head.py         training on labels
+    training.py     training on images; start reading here
+    reconstruct.py  meshes and pictures of trained weights
+    answers.py      answers to questions
+
+docs/baselines.md says what the paper leaves open and where this method fails: objects must be
+alone, centred and without background. `train` and `write_submission` are loaded when they are
+first used.
+"""
+
+from scenegen.common.lazy_names import lazy_names
+
+HOMES = {"training": "train", "answers": "write_submission"}
+__getattr__ = lazy_names(__name__, HOMES)

@@ -1,0 +1,97 @@
+"""The networks: image -> Gaussian over codes -> offsets of a mesh; and the head that labels train.
+
+A small convolutional encoder and a perceptron, sized for two cores. The paper infers codes in
+several recurrent steps; this is its single-step form, an ordinary variational autoencoder.
+"""
+
+import torch
+from torch import Tensor, nn
+
+from baselines.rezende.sphere import icosphere, smoothing
+
+CHANNELS = (32, 64, 128)  # of the encoder's layers, each of which halves the image
+HIDDEN = 256
+HEAD = 64
+
+
+class Model(nn.Module):
+    """Encoder, decoder and head.
+
+    Args:
+        size: height and width of images, a multiple of 8.
+        code: length of a code.
+        subdivisions: of the icosphere; 2 for 162 vertices.
+    """
+
+    sphere: Tensor
+    smooth: Tensor
+
+    def __init__(self, size: int = 32, code: int = 64, subdivisions: int = 2) -> None:
+        super().__init__()
+        corners, faces = icosphere(subdivisions)
+        self.faces = faces
+        self.register_buffer("sphere", torch.from_numpy(corners).float(), persistent=False)
+        smooth = torch.from_numpy(smoothing(subdivisions)).float()
+        self.register_buffer("smooth", smooth, persistent=False)
+        layers: list[nn.Module] = []
+        before = 3
+        for channels in CHANNELS:
+            layers += [nn.Conv2d(before, channels, 4, 2, 1), nn.GroupNorm(8, channels), nn.ReLU()]
+            before = channels
+        flat = before * (size // 8) ** 2
+        hidden = [nn.Flatten(), nn.Linear(flat, HIDDEN), nn.ReLU(), nn.Linear(HIDDEN, 2 * code)]
+        self.encoder = nn.Sequential(*layers, *hidden)
+        self.decoder = nn.Sequential(
+            nn.Linear(code, HIDDEN), nn.ReLU(), nn.Linear(HIDDEN, 2 * HIDDEN), nn.ReLU(),
+            nn.Linear(2 * HIDDEN, corners.size),
+        )  # fmt: skip
+        last = self.decoder[-1]
+        assert isinstance(last, nn.Linear)
+        nn.init.normal_(last.weight, std=0.01)
+        nn.init.zeros_(last.bias)
+        self.head = Head(code)
+
+    def encode(self, image: Tensor) -> tuple[Tensor, Tensor]:
+        """Return means and log variances of q(z | x), (B, code) each, of images (B, 3, S, S)."""
+        mean, log_variance = self.encoder(1 - image).chunk(2, dim=1)
+        return mean, log_variance.clamp(-10, 4)
+
+    def offsets(self, code: Tensor) -> Tensor:
+        """Return the offsets of codes, (B, V, 3), not yet smoothed; the sphere has radius 1."""
+        return self.decoder(code).view(len(code), -1, 3)
+
+    def vertices(self, offsets: Tensor) -> Tensor:
+        """Return the vertices that offsets, (..., V, 3), give: sphere + smoothed offsets.
+
+        The object is taken to be centred, so the mesh's middle is put at the depth of the sphere's:
+        one image cannot tell a large object from a small one that is near.
+        """
+        smoothed = offsets.transpose(-1, -2) @ self.smooth.T  # one product for all meshes
+        vertices = self.sphere + smoothed.transpose(-1, -2)
+        middle = vertices.mean(dim=-2, keepdim=True) * vertices.new_tensor([0.0, 0.0, 1.0])
+        return vertices - middle
+
+
+class Head(nn.Module):
+    """Scores answers by a learned comparison of two codes; trained on labels alone."""
+
+    shift: Tensor
+    scale: Tensor
+
+    def __init__(self, code: int) -> None:
+        super().__init__()
+        self.register_buffer("shift", torch.zeros(code))
+        self.register_buffer("scale", torch.ones(code))
+        self.layers = nn.Sequential(nn.Linear(2 * code, HEAD), nn.ReLU(), nn.Linear(HEAD, 1))
+
+    def forward(self, codes: Tensor) -> Tensor:
+        """Return scores of the answers, (Q, A), of codes (Q, 1 + A, code), the reference first."""
+        codes = (codes - self.shift) / self.scale
+        reference, answers = codes[:, :1], codes[:, 1:]
+        pairs = torch.cat([(reference - answers).abs(), reference * answers], dim=2)
+        return self.layers(pairs).squeeze(2)
+
+
+def divergence(mean: Tensor, log_variance: Tensor) -> Tensor:
+    """Return KL(q || N(0, 1)) of Gaussians with means and log variances (B, D), in nats, (B,)."""
+    return 0.5 * (mean**2 + log_variance.exp() - 1 - log_variance).sum(dim=1)

@@ -1,0 +1,81 @@
+"""Images of question files, and what is told with them."""
+
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+from refusals import refused
+
+from baselines.rezende.images import labelled_answers, read_question_pictures
+from baselines.rezende.rasteriser import rasterise
+from iqtt.files.reader import open_questions
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.objects.basic_shapes import unit_shape
+
+
+def cubes_mesh(cubes, turn):
+    """Return the cubes of a shape as one mesh, turned about the centre of their box."""
+    triangles = unit_shape("box").triangles.reshape(-1, 3)
+    corners = triangles / np.abs(triangles).max() / 2
+    centre = (cubes.min(axis=0) + cubes.max(axis=0) + 1) / 2
+    vertices = np.concatenate([corners + cube + 0.5 - centre for cube in cubes])
+    faces = np.arange(len(vertices)).reshape(-1, 3)
+    return vertices @ turn.T, faces
+
+
+def test_true_shapes_drawn_with_what_is_told_are_the_images(split):
+    pictures = read_question_pictures(split / "iqtt-val.h5", 64, None)
+    assert len(pictures) == 12
+    with open_questions(split / "iqtt-val.h5") as questions:
+        for row in range(3):
+            truth = questions.truth(row)
+            for place in range(4):
+                scale = pictures.views.distance / truth.camera.position[2]
+                mesh, faces = cubes_mesh(truth.cubes[place], truth.world_from_shape[place])
+                mesh = scale * mesh
+                views = pictures.views_of(np.array([4 * row + place]))
+                image, depth = rasterise(mesh[None], faces, views)
+                wanted = np.moveaxis(pictures.image[4 * row + place], 0, 2)
+                true = scale * np.where(np.isnan(truth.depth[place]), np.inf, truth.depth[place])
+                assert (np.isfinite(depth[0]) == np.isfinite(true)).mean() > 0.995
+                both = np.isfinite(depth[0]) & np.isfinite(true)
+                assert np.isclose(depth[0][both], true[both], atol=0.01).mean() > 0.98
+                assert np.median(abs(image[0] - wanted)[both]) < 0.02  # light differs in a cube
+
+
+def test_images_are_reduced_and_their_questions_limited(split, monkeypatch):
+    large = read_question_pictures(split / "iqtt-train.h5", 64, "unlabeled")
+    monkeypatch.setattr("baselines.rezende.images.MOST_QUESTIONS", 2)
+    small = read_question_pictures(split / "iqtt-train.h5", 16, "unlabeled")
+    assert (len(large), len(small)) == (20, 8)
+    blocks = large.image[:8].reshape(8, 3, 16, 4, 16, 4).mean(axis=(3, 5))
+    np.testing.assert_allclose(small.image, blocks, atol=1e-5)
+    np.testing.assert_array_equal(small.views.light_position, large.views.light_position[:8])
+
+
+def test_what_tells_no_lights_or_has_another_size_is_refused(split):
+    with refused(SpecError, "iqtt-test.h5", "2 questions without lights"):
+        read_question_pictures(split / "iqtt-test.h5", 32, None)
+    with refused(SpecError, "iqtt-val.h5", "64x64", "48"):
+        read_question_pictures(split / "iqtt-val.h5", 48, None)
+
+
+def test_damaged_lights_are_refused(split, tmp_path):
+    path = tmp_path / "iqtt-val.h5"
+    shutil.copy(split / "iqtt-val.h5", path)
+    with h5py.File(path, "r+") as file:
+        file["truth/light_color"][1, 2] = np.nan
+    with pytest.raises(FileFormatError):
+        read_question_pictures(path, 32, None)
+
+
+def test_answers_are_the_first_ones_of_the_labelled_part(split):
+    images, right = labelled_answers(split / "iqtt-train.h5", 3)
+    with open_questions(split / "iqtt-train.h5", "labeled") as questions:
+        np.testing.assert_array_equal(images, questions.read("questions", slice(0, 3)))
+        np.testing.assert_array_equal(right, questions.read("answers", slice(0, 3)))
+    with refused(SpecError, "labels", "5", "0 to 4"):
+        labelled_answers(split / "iqtt-train.h5", 5)
+    with refused(SpecError, "iqtt-val.h5", "no training questions"):
+        labelled_answers(split / "iqtt-val.h5", 1)

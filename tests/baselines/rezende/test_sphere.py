@@ -1,0 +1,35 @@
+"""The icosphere is a closed sphere of known size, and smoothing keeps what is constant."""
+
+import numpy as np
+import pytest
+
+from baselines.rezende.sphere import icosphere, smoothing
+
+
+@pytest.mark.parametrize(("cuts", "corners", "triangles"), [(0, 12, 20), (2, 162, 320)])
+def test_an_icosphere_is_a_closed_mesh_that_faces_outwards(cuts, corners, triangles):
+    vertices, faces = icosphere(cuts)
+    assert vertices.shape == (corners, 3)
+    assert faces.shape == (triangles, 3)
+    np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 1, atol=1e-12)
+    edges = {(a, b) for face in faces.tolist() for a, b in zip(face, face[1:] + face[:1])}
+    assert edges == {(b, a) for a, b in edges}  # each edge once in each direction
+    assert len(edges) == 3 * triangles
+    volume = np.linalg.det(vertices[faces]).sum() / 6
+    assert 2.5 < volume < 4 * np.pi / 3
+    assert (np.linalg.det(vertices[faces]) > 0).all()
+
+
+def test_a_coarser_icosphere_is_the_beginning_of_a_finer_one():
+    np.testing.assert_array_equal(icosphere(2)[0][:42], icosphere(1)[0])
+
+
+def test_smoothing_keeps_constants_and_damps_what_alternates():
+    matrix = smoothing(2)
+    np.testing.assert_allclose(matrix.sum(axis=1), 1, atol=1e-9)
+    spike = np.eye(162)[7]
+    smooth = matrix @ spike
+    assert 0 < smooth[7] < 0.5
+    assert (smooth > 0).all()
+    height = icosphere(2)[0][:, 1]  # the slowest function that is not constant loses little
+    assert np.linalg.norm(matrix @ height) > 0.75 * np.linalg.norm(height)
