@@ -16,7 +16,7 @@ from baselines.depth_supervised.empty_rooms import empty_rooms
 from baselines.pix2shape.network.architecture import Decoder, Encoder, NetworkSpec
 from scenegen.common.records import check, normalise
 
-NETWORKS = ("unet", "code")
+KINDS = ("unet", "code")
 SIZES = (32, 64, 128, 256)  # pixels a side
 LEVELS = (32, 64, 96, 128)  # channels at 1/2, 1/4, 1/8 and 1/16 of the image size
 FINE = 16  # channels at full size
@@ -30,20 +30,20 @@ class ReliefSpec:
     """Which network, and how large.
 
     Attributes:
-        network: "unet" has skip connections and gives the relief at the input's own camera alone;
+        kind: "unet" has skip connections and gives the relief at the input's own camera alone;
             "code" is the reference model's encoder and decoder, which pass the image through a
             code of 128 numbers and give the relief at any camera.
         size: image size, pixels a side.
         width: multiplies the channels; of "code" those of the paper's tables.
     """
 
-    network: str = "unet"
+    kind: str = "unet"
     size: int = 64
     width: float = 1.0
 
     def __post_init__(self) -> None:
         normalise(self)
-        check(self.network in NETWORKS, "network", self.network, " or ".join(NETWORKS))
+        check(self.kind in KINDS, "network", self.kind, " or ".join(KINDS))
         check(self.size in SIZES, "size", self.size, f"one of {', '.join(map(str, SIZES))}")
         check(0.05 <= self.width <= 4, "width", self.width, "from 0.05 to 4")
 
@@ -61,7 +61,7 @@ def relief_network(spec: ReliefSpec) -> nn.Module:
 
     It returns the relief that the cameras asked for see, (B, S, S), which may be below 0.
     """
-    return CodeNetwork(spec) if spec.network == "code" else UNet(spec)
+    return CodeNetwork(spec) if spec.kind == "code" else UNet(spec)
 
 
 def predicted_depth(network: nn.Module, image: Tensor, own: Cameras, asked: Cameras) -> Tensor:

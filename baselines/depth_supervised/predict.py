@@ -67,7 +67,7 @@ def submit(
     """
     check_writable(Path(out), overwrite)
     network, card = load_weights(weights, method)
-    kind, size = card.network.network, card.network.size
+    kind, size = card.network.kind, card.network.size
     with RoomsFile(data) as rooms:
         check_reducible(data, rooms.spec.height, rooms.spec.width, size)
         poses, fov = camera_poses(rooms), rooms.spec.fov_y_degrees

@@ -40,8 +40,8 @@ class Card:
     method: str
     network: ReliefSpec = field(default_factory=ReliefSpec)
     seed: int = 0
-    iterations: int = 3000
-    batch: int = 32
+    iterations: int = 1200
+    batch: int = 16
     learning_rate: float = 0.003
     iteration: int = 0
     data: str = ""

@@ -53,28 +53,33 @@ def train(
     seed: int = 0,
     resume: bool = False,
     progress: Progress = lambda done, total, losses: None,
-    network: ReliefSpec | None = None,
-    **settings: Any,
+    iterations: int = 1200,
+    batch: int = 16,
+    learning_rate: float = 0.003,
+    network: str = "unet",
+    size: int = 64,
+    width: float = 1.0,
 ) -> Path:
     """Train a network with the true depth of rooms; return the path of the weights.
 
     Args:
-        data: rooms. For a network of kind "code" each scene's images are seen at other views of
-            the scene, too, if there are any.
+        data: rooms. The network "code" learns to predict each scene's other views, too, if there
+            are any.
         run_folder: gets checkpoint and weights.
         resume: go on from the folder's checkpoint, with its settings and seed.
-        progress: called after each iteration.
-        network: which network, and how large.
-        settings: further fields of `Card`: iterations, batch, learning_rate.
+        progress: called after each iteration with its number, how many there will be, and losses.
+        iterations, batch, learning_rate: as in `Card`.
+        network, size, width: as in `ReliefSpec`, where the network's name is its kind.
 
     Raises SpecError where settings and data do not fit; FileExistsError where a new run finds a
     checkpoint; SceneGenError where a loss is not finite; OSError, FileFormatError.
     """
-    card = Card(METHOD, network or ReliefSpec(), seed, **settings)
+    spec = ReliefSpec(network, size, width)
+    card = Card(METHOD, spec, seed, iterations, batch, learning_rate)
     state = begun(run_folder, card, resume)
     rooms = read_rooms(data, state.card.network.size, depth=True)
     state = suited(state, rooms, data)
-    size = state.card.network.size
+    size = state.card.network.size  # a resumed run has its own
 
     def target(rows: Tensor) -> Target:
         assert rooms.depth is not None, "it was asked for"
@@ -84,7 +89,7 @@ def train(
         known = depth.isfinite()
         return Target(torch.where(known, walls - depth, 0), known.float())
 
-    others = views_of_scenes(rooms) if state.card.network.network == "code" else None
+    others = views_of_scenes(rooms) if state.card.network.kind == "code" else None
     return fit(state, rooms, run_folder, target, progress, others=others)
 
 

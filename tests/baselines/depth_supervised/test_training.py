@@ -14,7 +14,7 @@ from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 torch = pytest.importorskip("torch")
 from baselines.depth_supervised import training  # noqa: E402
 from baselines.depth_supervised.empty_rooms import empty_rooms  # noqa: E402
-from baselines.depth_supervised.network import ReliefSpec, predicted_depth  # noqa: E402
+from baselines.depth_supervised.network import predicted_depth  # noqa: E402
 from baselines.depth_supervised.rooms import read_rooms  # noqa: E402
 from baselines.depth_supervised.storage import CHECKPOINT, Card, load_state, load_weights  # noqa: E402
 from baselines.depth_supervised.training import (  # noqa: E402
@@ -25,8 +25,8 @@ from baselines.depth_supervised.training import (  # noqa: E402
 )
 from baselines.tensor_files import load_tensors  # noqa: E402
 
-UNET = ReliefSpec("unet", 32, 0.25)
-CODE = ReliefSpec("code", 32, 0.05)
+UNET = {"network": "unet", "size": 32, "width": 0.25}
+CODE = {"network": "code", "size": 32, "width": 0.05}
 
 
 def weights_of(path: Path) -> dict[str, Any]:
@@ -40,7 +40,7 @@ def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
 def test_a_unet_learns_nine_images_by_heart(turned_path, tmp_path, monkeypatch):
     monkeypatch.setattr(training, "WARM_UP", 10)
     losses = []
-    told = {"network": UNET, "iterations": 80, "batch": 9, "learning_rate": 0.01}
+    told = {**UNET, "iterations": 80, "batch": 9, "learning_rate": 0.01}
     path = train(
         turned_path, tmp_path, **told, progress=lambda i, n, now: losses.append((i, n, now["loss"]))
     )
@@ -60,7 +60,7 @@ def test_a_unet_learns_nine_images_by_heart(turned_path, tmp_path, monkeypatch):
 @pytest.mark.parametrize("network", [UNET, CODE], ids=["unet", "code"])
 def test_a_run_goes_on_as_if_it_had_never_stopped(network, turned_path, tmp_path, monkeypatch):
     monkeypatch.setattr(training, "EVERY", 2)
-    told = {"network": network, "iterations": 5, "batch": 4, "seed": 7}
+    told = {**network, "iterations": 5, "batch": 4, "seed": 7}
     whole = train(turned_path, tmp_path / "whole", **told)
 
     def stop(done: int, total: int, losses: Any) -> None:
@@ -81,7 +81,7 @@ def test_a_run_goes_on_as_if_it_had_never_stopped(network, turned_path, tmp_path
 
 
 def test_a_new_run_leaves_an_old_one_alone(turned_path, tmp_path):
-    told = {"network": UNET, "iterations": 1, "batch": 2}
+    told = {**UNET, "iterations": 1, "batch": 2}
     train(turned_path, tmp_path, **told)
     before = (tmp_path / CHECKPOINT).read_bytes()
     with pytest.raises(FileExistsError, match="--resume"):
@@ -90,7 +90,7 @@ def test_a_new_run_leaves_an_old_one_alone(turned_path, tmp_path):
 
 
 def test_a_run_goes_on_with_its_own_rooms_only(turned_path, rooms_path, tmp_path):
-    train(turned_path, tmp_path, network=UNET, iterations=1, batch=2)
+    train(turned_path, tmp_path, **UNET, iterations=1, batch=2)
     with pytest.raises(SpecError, match="on which the run was trained"):
         train(rooms_path, tmp_path, resume=True)
     with pytest.raises(FileNotFoundError, match="no checkpoint"):
@@ -103,7 +103,7 @@ def test_pixels_without_a_surface_teach_nothing(turned_path, tmp_path):
         depth[:, :16] = value
         file["depth"][...] = depth
 
-    told = {"network": UNET, "iterations": 2, "batch": 4}
+    told = {**UNET, "iterations": 2, "batch": 4}
     holes = edited(turned_path, tmp_path / "holes.h5", lambda file: blank(file, np.nan))
     found = weights_of(train(holes, tmp_path / "holes", **told))
     assert all(torch.isfinite(value).all() for value in found.values())
@@ -121,13 +121,13 @@ def test_a_loss_that_is_not_finite_ends_the_run_and_keeps_the_checkpoint(turned_
 
     path = edited(turned_path, tmp_path / "huge.h5", spoil)
     with pytest.raises(SceneGenError, match="not finite"):
-        train(path, tmp_path / "run", network=UNET, iterations=3, batch=4)
+        train(path, tmp_path / "run", **UNET, iterations=3, batch=4)
     assert not (tmp_path / "run" / CHECKPOINT).exists()
 
 
 def test_images_of_another_size_are_reduced_or_refused(turned_path, tmp_path):
     with pytest.raises(SpecError, match="images of 32x32"):
-        train(turned_path, tmp_path, network=ReliefSpec("unet", 64))
+        train(turned_path, tmp_path, size=64)
 
 
 def test_each_row_is_seen_from_the_cameras_of_its_own_scene(turned_path):
@@ -153,5 +153,5 @@ def test_the_learning_rate_rises_and_falls_to_nothing():
 )
 def test_impossible_settings_are_refused(wrong, turned_path, tmp_path):
     with pytest.raises(SpecError, match=next(iter(wrong)).replace("_", " ")):
-        train(turned_path, tmp_path / "run", network=UNET, **wrong)
+        train(turned_path, tmp_path / "run", **UNET, **wrong)
     assert not (tmp_path / "run").exists()

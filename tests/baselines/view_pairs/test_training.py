@@ -10,13 +10,12 @@ from pix2shape_models import edited
 
 torch = pytest.importorskip("torch")
 from baselines.depth_supervised import training as shared  # noqa: E402
-from baselines.depth_supervised.network import ReliefSpec  # noqa: E402
 from baselines.depth_supervised.storage import load_weights  # noqa: E402
 from baselines.tensor_files import load_tensors  # noqa: E402
 from baselines.view_pairs import train, write_submission  # noqa: E402
 from baselines.view_pairs.labels import FOLDER  # noqa: E402
 
-TOLD = {"network": ReliefSpec("unet", 32, 0.25), "iterations": 4, "batch": 4, "seed": 5}
+TOLD = {"size": 32, "width": 0.25, "iterations": 4, "batch": 4, "seed": 5}
 UNSEEN = (
     "depth", "normal", "object_id", "object/shape", "object/world_from_object", "object/scale",
     "object/visible_pixels", "object/count", "light/position", "light/color", "light/ambient",
@@ -46,15 +45,14 @@ def test_a_run_goes_on_as_if_it_had_never_stopped(near_path, tmp_path, monkeypat
     monkeypatch.setattr(shared, "EVERY", 2)
     whole = train(near_path, tmp_path / "whole", **TOLD)
 
-    def stop(done: int, total: int, *_: Any) -> None:
+    def stop(*_: Any) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train(near_path, tmp_path / "cut", **TOLD, labelling=stop)
-    kept = sorted((tmp_path / "cut" / FOLDER).iterdir())
-    assert len(kept) == 1
+        train(near_path, tmp_path / "cut", **TOLD, progress=stop)
+    assert len(list((tmp_path / "cut" / FOLDER).iterdir())) == 1, "stopped after the labels"
     with pytest.raises(KeyboardInterrupt):
-        train(near_path, tmp_path / "cut", **TOLD, progress=lambda i, n, now: i == 3 and stop(i, n))
+        train(near_path, tmp_path / "cut", **TOLD, progress=lambda i, n, now: i == 3 and stop())
     again = train(near_path, tmp_path / "cut", resume=True)
     assert same(weights_of(again), weights_of(whole))
     assert load_weights(again, "view-pairs")[1].iteration == 4
