@@ -12,7 +12,8 @@ DEEPEST = 0.95  # of a ray's depth in the empty room; it enters the room before 
 def rays(size: int, fov_y_degrees: float, like: Tensor) -> Tensor:
     """Return the rays (x, y, -1) through the pixels' centres, camera frame, (3, S, S)."""
     x, y = pixel_rays(size, size, fov_y_degrees, like)
-    return torch.stack(torch.broadcast_tensors(x, y, -torch.ones_like(x)))
+    across, down = x.expand(size, size), y.expand(size, size)
+    return torch.stack([across, down, -torch.ones_like(across)])
 
 
 def empty_rooms(

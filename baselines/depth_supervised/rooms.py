@@ -61,12 +61,13 @@ def read_rooms(path: str | Path, size: int, *, depth: bool = False) -> Rooms:
                 depths[row] = reduced(rooms.read("depth", row), size)
                 if not np.isfinite(depths[row]).any():
                     raise FileFormatError(f"{path}: depth, row {row}", "no surface", "some")
-        numbers = (rooms.read(n, slice(None)) for n in ("scene_index", "view_angle_degrees"))
+        scene, angle = (rooms.read(n, slice(None)) for n in ("scene_index", "view_angle_degrees"))
         return Rooms(
             torch.from_numpy(images),
             poses,
             rooms.spec.fov_y_degrees,
-            *(torch.from_numpy(np.asarray(column)) for column in numbers),
+            torch.from_numpy(np.asarray(scene)),
+            torch.from_numpy(np.asarray(angle)),
             None if depths is None else torch.from_numpy(depths),
             rooms.spec.to_json(),
             rooms.fingerprint,

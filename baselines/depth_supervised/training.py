@@ -197,6 +197,6 @@ def _step(state: State, image: Tensor, own: Cameras, asked: Cameras, target: Tar
     loss = differences.sum() / target.weight.sum().clamp(min=1)
     if loss.isfinite():
         state.optimiser.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
+        loss.backward()
         state.optimiser.step()
     return float(loss.detach())

@@ -76,7 +76,7 @@ def labels(
     relief = torch.zeros(len(rooms), *rooms.image.shape[2:], dtype=torch.float16)
     blocks = rooms.scene[matched] // BLOCK
     done = 0
-    for block in blocks.unique().tolist():
+    for block in sorted(set(blocks.tolist())):
         rows = matched[blocks == block]
         path = folder / f"{block:05d}.safetensors"
         if path.exists():
