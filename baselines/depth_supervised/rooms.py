@@ -23,6 +23,7 @@ class Rooms:
         world_from_camera: (N, 4, 4).
         scene: number of the scene, (N,).
         angle: of the view, about the vertical axis from the scene's first one, degrees, (N,).
+        rounded: whether radiance was stored in 8 bits.
         depth: planar, scene units, (N, S, S), NaN where there is no surface; None if not asked for.
         data, fingerprint: request and fingerprint of the file.
     """
@@ -32,6 +33,7 @@ class Rooms:
     fov_y_degrees: float
     scene: Tensor
     angle: Tensor
+    rounded: bool
     depth: Tensor | None
     data: str
     fingerprint: str
@@ -68,6 +70,7 @@ def read_rooms(path: str | Path, size: int, *, depth: bool = False) -> Rooms:
             rooms.spec.fov_y_degrees,
             torch.from_numpy(np.asarray(scene)),
             torch.from_numpy(np.asarray(angle)),
+            rooms.spec.image_dtype == "uint8",
             None if depths is None else torch.from_numpy(depths),
             rooms.spec.to_json(),
             rooms.fingerprint,

@@ -13,7 +13,14 @@ from torch import Tensor
 
 from baselines.depth_supervised.rooms import Rooms
 from baselines.tensor_files import check_tensors, load_tensors, save_tensors
-from baselines.view_pairs.matching import best_relief, joint_cost, matching_cost, semi_global
+from baselines.view_pairs.matching import (
+    NOISE,
+    ROUNDED_NOISE,
+    best_relief,
+    joint_cost,
+    matching_cost,
+    semi_global,
+)
 from scenegen.common.errors import FileFormatError, SpecError
 
 WIDEST = 20.0  # degrees between two views that are matched
@@ -46,12 +53,13 @@ def matched_relief(rooms: Rooms, row: int, sides: tuple[list[int], list[int]]) -
 
     Costs are averaged over the images of one side; the better side counts.
     """
+    noise = ROUNDED_NOISE if rooms.rounded else NOISE
     costs = []
     for others in filter(None, sides):
         rows = torch.tensor([row]).expand(len(others))
         images = rooms.image[rows].float(), rooms.image[others].float()
         cameras = rooms.cameras(rows), rooms.cameras(torch.tensor(others))
-        cost = matching_cost(images[0], cameras[0], images[1], cameras[1])
+        cost = matching_cost(images[0], cameras[0], images[1], cameras[1], noise)
         costs.append(cost.mean(dim=0, keepdim=True))
     return best_relief(semi_global(joint_cost(costs)))[0]
 

@@ -15,7 +15,7 @@ from baselines.depth_supervised.network import Cameras
 from baselines.view_pairs.reprojection import reprojected
 
 STEPS, STEP = 32, 0.02  # reliefs that are tried: 0, STEP, ..., scene units
-NOISE = 0.001  # radiance; difference of colours that is expected everywhere
+NOISE, ROUNDED_NOISE = 0.001, 0.003  # radiance; differences expected everywhere; of 8 bits
 SHIFT = 0.25  # pixels; error of place that is expected, as pixels are samples
 SCALE = 0.5  # squared differences, over the expected ones, at which the cost is a half
 UNSEEN = 0.3  # cost where the other image does not show the point
@@ -29,7 +29,9 @@ def reliefs(like: Tensor) -> Tensor:
     return STEP * torch.arange(STEPS, dtype=like.dtype, device=like.device)
 
 
-def matching_cost(image: Tensor, cameras: Cameras, other: Tensor, others: Cameras) -> Tensor:
+def matching_cost(
+    image: Tensor, cameras: Cameras, other: Tensor, others: Cameras, noise: float = NOISE
+) -> Tensor:
     """Return the cost, 0 to about 1, of each relief at each pixel, (B, STEPS, S, S).
 
     With Geman and McClure's robust function of squared differences of colour, over those that are
@@ -37,6 +39,7 @@ def matching_cost(image: Tensor, cameras: Cameras, other: Tensor, others: Camera
 
     Args:
         image, other: linear radiance, (B, 3, S, S).
+        noise: difference of radiance that is expected everywhere.
     """
     size = image.shape[-1]
     walls, entry, _ = empty_rooms(cameras.world_from_camera, cameras.fov_y_degrees, size)
@@ -46,7 +49,7 @@ def matching_cost(image: Tensor, cameras: Cameras, other: Tensor, others: Camera
     told = torch.cat([other, other_slope], dim=1)
     found, seen = reprojected(told, others, depth, cameras)
     squared = (found[:, :3] - image[:, :, None]).square().sum(dim=1)
-    ratio = squared / (3 * NOISE**2 + SHIFT**2 * (found[:, 3] + slope) / 2)
+    ratio = squared / (3 * noise**2 + SHIFT**2 * (found[:, 3] + slope) / 2)
     return torch.where(seen, ratio / (ratio + SCALE), UNSEEN) + RISE * tried / tried[-1]
 
 

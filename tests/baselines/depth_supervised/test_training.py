@@ -133,6 +133,7 @@ def test_images_of_another_size_are_reduced_or_refused(turned_path, tmp_path):
 def test_each_row_is_seen_from_the_cameras_of_its_own_scene(turned_path):
     rooms = read_rooms(turned_path, 32)
     assert rooms.depth is None
+    assert rooms.rounded
     found = [rows.tolist() for rows in views_of_scenes(rooms)]
     assert found == [[row - row % 3 + k for k in range(3)] for row in range(9)]
     mixed = replace(rooms, scene=torch.tensor([2, 0, 1, 0, 2, 2, 1, 0, 1]))

@@ -1,6 +1,7 @@
 """Matching finds the surfaces of rendered rooms, and each of its steps what a slow one finds."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -24,9 +25,14 @@ from baselines.view_pairs.matching import (  # noqa: E402
 )
 
 
-def test_objects_are_found_without_depth(near_path):
+@pytest.mark.parametrize("bits", [16, 8])
+def test_objects_are_found_without_depth(bits, near_path):
     """Relief within two steps on most object pixels, and none on most of floor and walls."""
     rooms = read_rooms(near_path, 64, depth=True)
+    assert not rooms.rounded
+    if bits == 8:
+        image = (rooms.image.float() * 255).round() / 255
+        rooms = replace(rooms, image=image, rounded=True)
     walls, _, _ = empty_rooms(rooms.world_from_camera, rooms.fov_y_degrees, 64)
     true = walls - rooms.depth
     with RoomsFile(near_path) as file:
