@@ -57,7 +57,8 @@ def submit(
     """Write a submission of a method's weights.
 
     A network of kind "unet" predicts each view from its own image; of kind "code" each scene from
-    one image alone, view 0 or the first that the file holds. The submission's notes say which.
+    one image alone, view 0 or the first that the file holds, under the name "METHOD-code". The
+    submission's notes say it, too.
 
     Args:
         progress: called with the number of rows done and of all, a batch at a time.
@@ -76,9 +77,10 @@ def submit(
         if kind == "code":
             inputs, place = input_views(rooms)
             source = inputs[place]
+        name = method if kind == "unet" else f"{method}-{kind}"
         notes = f"{FROM[kind]}; {TOLD}"
         with RoomPredictionWriter(
-            out, data, method=method, notes=notes, overwrite=overwrite
+            out, data, method=name, notes=notes, overwrite=overwrite
         ) as submission:
             for some in batches(len(rooms)):
                 image = stacked(rooms, source[some], size)

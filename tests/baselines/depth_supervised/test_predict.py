@@ -58,7 +58,7 @@ def test_a_submission_is_valid_and_says_what_it_is(kind, weights, turned_path, t
     assert done == [(4, 9), (4, 9), (1, 9)]
     assert [p for p in validate(out) if not p.is_hint] == []
     found = submitted(turned_path, out, weights[kind])
-    assert found["method"] == "depth-supervised"
+    assert found["method"] == "depth-supervised" + ("" if kind == "unet" else "-code")
     assert ("its own image" if kind == "unet" else "scene's first one") in found["notes"]
     assert len({depth.tobytes() for depth in found["depth"]}) == 9
     np.testing.assert_allclose(np.linalg.norm(found["normal"], axis=-1), 1, rtol=1e-4)
