@@ -34,9 +34,11 @@ UNTRAINED = {
 # a baseline that is trained with `bench train NAME`. A new one is a line here.
 TRAINED = {
     "cnn": "answers to questions: ResNets and a softmax over the answers",
+    "depth-supervised": "rooms by a network that was trained with true depth: a ceiling",
     "ptn": "voxels by Perspective Transformer Nets: rooms, and answers to questions",
     "rezende": "answers to questions: meshes from images, through a renderer without gradients",
     "siamese": "answers to questions: the one whose features are nearest to the reference's",
+    "view-pairs": "rooms by a network that was trained with two images of each scene, no depth",
 }
 ALL = {**UNTRAINED, **TRAINED}
 

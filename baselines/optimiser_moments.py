@@ -27,7 +27,7 @@ def load_moments(optimiser: Adam, tensors: Mapping[str, Tensor], count: int) -> 
     parameters = optimiser.param_groups[0]["params"]
     moments: dict[int, dict[str, Tensor]] = {}
     for index in sorted({int(name.partition(".")[0]) for name in tensors}):
-        _check(index < len(parameters), f"moments of parameter {index}, not expected")
+        _check(0 <= index < len(parameters), f"moments of parameter {index}, not expected")
         moments[index] = {}
         for field in MOMENTS:
             value = moments[index][field] = tensors[f"{index}.{field}"]

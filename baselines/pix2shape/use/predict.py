@@ -93,7 +93,7 @@ def predict_rooms(
         size = rooms.spec.height
         check_reducible(data, size, rooms.spec.width, spec.size)
         condition = torch.from_numpy(_camera_positions(rooms).astype(np.float32)).to(device)
-        inputs, own = _input_views(rooms)
+        inputs, own = input_views(rooms)
         found = []
         for chosen in _batches(len(inputs)):
             images = [decode_image(rooms.read("image", int(row))) for row in inputs[chosen]]
@@ -176,7 +176,7 @@ def _camera_positions(rooms: RoomsFile) -> Array:
     return np.asarray(poses[:, :3, 3])
 
 
-def _input_views(rooms: RoomsFile) -> tuple[Array, Array]:
+def input_views(rooms: RoomsFile) -> tuple[Array, Array]:
     """Return each scene's input row, (S,), and for each row its scene's place in there, (N,)."""
     scene, view = (rooms.read(name, slice(None)) for name in ("scene_index", "view_index"))
     first: dict[int, int] = {}

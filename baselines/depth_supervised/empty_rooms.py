@@ -1,0 +1,46 @@
+"""What is known of every room before an image is seen: where rays enter and leave the unit box."""
+
+import torch
+from torch import Tensor
+
+from baselines.pix2shape.network.surfels import pixel_rays
+
+NEAREST = 0.4  # scene units; no ray is said to enter the room nearer to its camera
+DEEPEST = 0.95  # of a ray's depth in the empty room; it enters the room before that
+
+
+def rays(size: int, fov_y_degrees: float, like: Tensor) -> Tensor:
+    """Return the rays (x, y, -1) through the pixels' centres, camera frame, (3, S, S)."""
+    x, y = pixel_rays(size, size, fov_y_degrees, like)
+    across, down = x.expand(size, size), y.expand(size, size)
+    return torch.stack([across, down, -torch.ones_like(across)])
+
+
+def empty_rooms(
+    world_from_camera: Tensor, fov_y_degrees: float, size: int
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Return what cameras see of rooms without objects.
+
+    Args:
+        world_from_camera: (B, 4, 4).
+
+    Returns:
+        depth: planar, scene units, (B, S, S), of the nearest of floor and two walls. The planes
+            are continued beyond the room, as in the baseline empty-room.
+        entry: depth at which each ray enters the unit box, (B, S, S), between NEAREST and DEEPEST
+            of `depth`; every object lies behind it.
+        points: where rays meet floor and walls, world frame, (B, 3, S, S).
+    """
+    origin = world_from_camera[:, :3, 3, None]  # (B, 3, 1)
+    toward = world_from_camera[:, :3, :3] @ rays(size, fov_y_degrees, world_from_camera).flatten(1)
+    falling = toward < 0
+    steps = torch.where(falling, toward, -1.0)
+    leaving = torch.where(falling & (origin > 0), -origin / steps, torch.inf).amin(dim=1)
+    farthest = leaving.masked_fill(~leaving.isfinite(), 0).amax(dim=1, keepdim=True)
+    beyond = torch.where(farthest > 0, farthest, 1.0)  # of rays that meet no plane
+    depth = torch.where(leaving.isfinite(), leaving, beyond)
+    entering = torch.where(falling, (1 - origin) / steps, 0.0).amax(dim=1)
+    entry = torch.minimum(entering.clamp(min=NEAREST), DEEPEST * depth)
+    points = origin + toward * depth[:, None]
+    shape = (len(depth), size, size)
+    return depth.view(shape), entry.view(shape), points.view(-1, 3, size, size)

@@ -1,0 +1,152 @@
+"""The networks that give the relief of a room from one image and its camera.
+
+Relief is how far a surface lies before the empty room, along the viewing axis, in scene units:
+depth = depth of the empty room - relief. So both networks are told where floor and walls are, as
+the baseline empty-room is.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from baselines.depth_supervised.empty_rooms import empty_rooms
+from baselines.pix2shape.network.architecture import Decoder, Encoder, NetworkSpec
+from scenegen.common.records import check, normalise
+
+KINDS = ("unet", "code")
+SIZES = (32, 64, 128, 256)  # pixels a side
+LEVELS = (32, 64, 96, 128)  # channels at 1/2, 1/4, 1/8 and 1/16 of the image size
+FINE = 16  # channels at full size
+WINDOW = 9  # pixels a side, of the mean that is taken from an image to show faint differences
+CONTRAST = 8.0  # multiplies these differences
+FLAT = 0.02  # scene units; what stands out less is said to be floor or wall
+
+
+@dataclass(frozen=True)
+class ReliefSpec:
+    """Which network, and how large.
+
+    Attributes:
+        kind: "unet" has skip connections and gives the relief at the input's own camera alone;
+            "code" is the reference model's encoder and decoder, which pass the image through a
+            code of 128 numbers and give the relief at any camera.
+        size: image size, pixels a side.
+        width: multiplies the channels; of "code" those of the paper's tables.
+    """
+
+    kind: str = "unet"
+    size: int = 64
+    width: float = 1.0
+
+    def __post_init__(self) -> None:
+        normalise(self)
+        check(self.kind in KINDS, "network", self.kind, " or ".join(KINDS))
+        check(self.size in SIZES, "size", self.size, f"one of {', '.join(map(str, SIZES))}")
+        check(0.05 <= self.width <= 4, "width", self.width, "from 0.05 to 4")
+
+
+@dataclass(frozen=True, eq=False)
+class Cameras:
+    """The cameras of B images, all of one field of view: world_from_camera (B, 4, 4)."""
+
+    world_from_camera: Tensor
+    fov_y_degrees: float
+
+
+def relief_network(spec: ReliefSpec) -> nn.Module:
+    """Return an untrained network: (image (B, 3, S, S), its `Cameras`, `Cameras` asked for).
+
+    It returns the relief that the cameras asked for see, (B, S, S), which may be below 0.
+    """
+    return CodeNetwork(spec) if spec.kind == "code" else UNet(spec)
+
+
+def predicted_depth(network: nn.Module, image: Tensor, own: Cameras, asked: Cameras) -> Tensor:
+    """Return planar depth, (B, S, S), scene units: what the network gives, before the walls."""
+    relief = network(image, own, asked)
+    walls, entry, _ = empty_rooms(asked.world_from_camera, asked.fov_y_degrees, image.shape[-1])
+    return torch.maximum(walls - torch.where(relief > FLAT, relief, 0), entry)
+
+
+def planes_of(cameras: Cameras, size: int) -> Tensor:
+    """Return what a network is told of each pixel's ray: where it meets floor or wall, and how far.
+
+    (B, 4, S, S), of values about -1 to 1.
+    """
+    depth, _, points = empty_rooms(cameras.world_from_camera, cameras.fov_y_degrees, size)
+    return torch.cat([2 * points - 0.5, 2 * depth[:, None] - 3], dim=1)
+
+
+def contrast(image: Tensor) -> Tensor:
+    """Return how an image differs from its mean over a window: (B, C, S, S) -> (B, C, S, S)."""
+    border = functional.pad(image, (WINDOW // 2,) * 4, mode="replicate")
+    return CONTRAST * (image - functional.avg_pool2d(border, WINDOW, 1))
+
+
+class Residual(nn.Module):
+    """Two convolutions with batch normalisation, and a way around them (He et al. 2016)."""
+
+    def __init__(self, before: int, after: int) -> None:
+        super().__init__()
+        self.first = nn.Conv2d(before, after, 3, padding=1, bias=False)
+        self.second = nn.Conv2d(after, after, 3, padding=1, bias=False)
+        self.norms = nn.ModuleList(nn.BatchNorm2d(after) for _ in range(2))
+        self.around = nn.Conv2d(before, after, 1) if before != after else nn.Identity()
+
+    def forward(self, values: Tensor) -> Tensor:
+        """(B, before, H, W) -> (B, after, H, W)."""
+        inner = functional.relu(self.norms[0](self.first(values)))
+        return functional.relu(self.norms[1](self.second(inner)) + self.around(values))
+
+
+class UNet(nn.Module):
+    """An encoder and a decoder joined at every size (Ronneberger et al. 2015)."""
+
+    def __init__(self, spec: ReliefSpec) -> None:
+        super().__init__()
+        fine, *levels = (max(4, round(spec.width * n)) for n in (FINE, *LEVELS))
+        self.full = nn.Conv2d(3 + 3 + 4, fine, 3, padding=1)
+        self.halve = nn.Conv2d(fine, levels[0], 4, 2, 1)
+        before = [levels[0], *levels[:-1]]
+        self.down = nn.ModuleList(Residual(a, b) for a, b in zip(before, levels, strict=True))
+        rising = levels[::-1]
+        joined = itertools.pairwise(rising)
+        self.up = nn.ModuleList(Residual(a + b, b) for a, b in joined)
+        self.enlarge = nn.Conv2d(levels[0], 4 * fine, 1)
+        self.join = nn.Conv2d(2 * fine, fine, 3, padding=1)
+        self.last = nn.Conv2d(fine, 1, 3, padding=1)
+
+    def forward(self, image: Tensor, own: Cameras, asked: Cameras) -> Tensor:
+        """As `relief_network` says; only the image's own camera can be asked for."""
+        if asked is not own:
+            raise ValueError("a unet gives the relief at the image's own camera alone")
+        told = torch.cat([image, contrast(image), planes_of(own, image.shape[-1])], dim=1)
+        full = functional.relu(self.full(told.contiguous(memory_format=torch.channels_last)))
+        values, kept = functional.relu(self.halve(full)), []
+        for level, block in enumerate(self.down):
+            values = block(functional.max_pool2d(values, 2) if level else values)
+            kept.append(values)
+        for block, beside in zip(self.up, kept[-2::-1], strict=True):
+            larger = functional.interpolate(values, scale_factor=2.0, mode="nearest")
+            values = block(torch.cat([larger, beside], dim=1))
+        values = functional.relu(functional.pixel_shuffle(self.enlarge(values), 2))
+        values = functional.relu(self.join(torch.cat([values, full], dim=1)))
+        with torch.autocast(values.device.type, enabled=False):  # bfloat16 is too coarse
+            return self.last(values.float())[:, 0]
+
+
+class CodeNetwork(nn.Module):
+    """The reference model's encoder and decoder, as in the paper's tables, between them a code."""
+
+    def __init__(self, spec: ReliefSpec) -> None:
+        super().__init__()
+        networks = NetworkSpec(size=spec.size, width=spec.width)
+        self.encoder, self.decoder = Encoder(networks), Decoder(networks)
+
+    def forward(self, image: Tensor, own: Cameras, asked: Cameras) -> Tensor:
+        """As `relief_network` says."""
+        code = self.encoder(image, own.world_from_camera[:, :3, 3])
+        return self.decoder(code, asked.world_from_camera[:, :3, 3])[:, 0]

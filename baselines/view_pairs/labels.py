@@ -1,0 +1,107 @@
+"""Relief of all images of a file, found by matching, which training then takes for the truth.
+
+The labels lie in the folder of a run, a file for each block of scenes, so that a run that was
+stopped need not find them again.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from baselines.depth_supervised.rooms import Rooms
+from baselines.tensor_files import check_tensors, load_tensors, save_tensors
+from baselines.view_pairs.matching import (
+    NOISE,
+    ROUNDED_NOISE,
+    best_relief,
+    joint_cost,
+    matching_cost,
+    semi_global,
+)
+from scenegen.common.errors import FileFormatError, SpecError
+
+WIDEST = 20.0  # degrees between two views that are matched
+BLOCK = 50  # scenes in each file of labels
+FOLDER = "labels"
+Progress = Callable[[int, int], Any]  # images done, in all
+
+
+def pairs_of(rooms: Rooms) -> list[tuple[list[int], list[int]]]:
+    """Return for each row the rows that it is matched with, to its one side and to the other.
+
+    They show the same scene from at most WIDEST degrees away.
+    """
+    rows_of: dict[int, list[int]] = {}
+    for row, scene in enumerate(rooms.scene.tolist()):
+        rows_of.setdefault(scene, []).append(row)
+    angles = rooms.angle.tolist()
+    pairs = []
+    for row, scene in enumerate(rooms.scene.tolist()):
+        turns = [(angles[other] - angles[row], other) for other in rows_of[scene]]
+        before = [other for turn, other in turns if -WIDEST <= turn < 0]
+        after = [other for turn, other in turns if 0 < turn <= WIDEST]
+        pairs.append((before, after))
+    return pairs
+
+
+@torch.inference_mode()
+def matched_relief(rooms: Rooms, row: int, sides: tuple[list[int], list[int]]) -> Tensor:
+    """Return the relief of one row by matching, (S, S), scene units, at most 32 steps of 0.02.
+
+    Costs are averaged over the images of one side; the better side counts.
+    """
+    noise = ROUNDED_NOISE if rooms.rounded else NOISE
+    costs = []
+    for others in filter(None, sides):
+        rows = torch.tensor([row]).expand(len(others))
+        images = rooms.image[rows].float(), rooms.image[others].float()
+        cameras = rooms.cameras(rows), rooms.cameras(torch.tensor(others))
+        cost = matching_cost(images[0], cameras[0], images[1], cameras[1], noise)
+        costs.append(cost.mean(dim=0, keepdim=True))
+    return best_relief(semi_global(joint_cost(costs)))[0]
+
+
+def labels(
+    rooms: Rooms, run_folder: str | Path, progress: Progress = lambda done, total: None
+) -> tuple[Tensor, Tensor]:
+    """Return the relief of all rows, (N, S, S) float16, and the rows that have a partner, (M,).
+
+    Labels that the run's folder holds are read, the others found and written.
+
+    Raises SpecError where no row has a partner; OSError; FileFormatError where the folder's labels
+    are not those of these rooms.
+    """
+    pairs = pairs_of(rooms)
+    matched = torch.tensor([row for row, sides in enumerate(pairs) if any(sides)], dtype=torch.long)
+    if not len(matched):
+        expected = f"views of a scene at most {WIDEST:.0f} degrees apart"
+        raise SpecError("rooms", "no such views", expected, "render with --views 0,10,20")
+    folder = Path(run_folder) / FOLDER
+    folder.mkdir(parents=True, exist_ok=True)
+    relief = torch.zeros(len(rooms), *rooms.image.shape[2:], dtype=torch.float16)
+    blocks = rooms.scene[matched] // BLOCK
+    done = 0
+    for block in sorted(set(blocks.tolist())):
+        rows = matched[blocks == block]
+        path = folder / f"{block:05d}.safetensors"
+        if path.exists():
+            relief[rows] = _read(path, relief[rows], rooms.fingerprint)
+        else:
+            found = [matched_relief(rooms, row, pairs[row]) for row in rows.tolist()]
+            relief[rows] = torch.stack(found).half()
+            save_tensors(path, {"relief": relief[rows]}, {"fingerprint": rooms.fingerprint})
+        done += len(rows)
+        progress(done, len(matched))
+    return relief, matched
+
+
+def _read(path: Path, like: Tensor, fingerprint: str) -> Tensor:
+    tensors, notes = load_tensors(path)
+    if notes.get("fingerprint") != fingerprint:
+        expected = f"those of the rooms {fingerprint[:12]}"
+        raise FileFormatError(path, "labels of other rooms", expected, "name another folder")
+    check_tensors(path, tensors, {"relief": like})
+    return tensors["relief"]

@@ -1,0 +1,108 @@
+"""Relief from a few images of one scene and their cameras, by search: a plane sweep.
+
+For each pixel of an image every relief of a list is tried (Collins 1996): the point is projected
+into another image of the scene, and the colours are compared. So the photometric loss is minimised
+by search and not by gradients, which end in the nearest local minimum: a flat room. Nothing is
+learned here, and neither depth, normals nor ids are read.
+"""
+
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from baselines.depth_supervised.empty_rooms import empty_rooms
+from baselines.depth_supervised.network import Cameras
+from baselines.view_pairs.reprojection import reprojected
+
+STEPS, STEP = 32, 0.02  # reliefs that are tried: 0, STEP, ..., scene units
+NOISE, ROUNDED_NOISE = 0.001, 0.003  # radiance; differences expected everywhere; of 8 bits
+SHIFT = 0.25  # pixels; error of place that is expected, as pixels are samples
+SCALE = 0.5  # squared differences, over the expected ones, at which the cost is a half
+UNSEEN = 0.3  # cost where the other image does not show the point
+RISE = 0.15  # cost of the largest relief beside that of none, so that doubt decides for the room
+WINDOW = 3  # pixels a side; costs are averaged over it
+SMALL, LARGE = 0.05, 0.3  # costs of a change by one step, and by more, from pixel to pixel
+
+
+def reliefs(like: Tensor) -> Tensor:
+    """Return the reliefs that are tried, (STEPS,), scene units."""
+    return STEP * torch.arange(STEPS, dtype=like.dtype, device=like.device)
+
+
+def matching_cost(
+    image: Tensor, cameras: Cameras, other: Tensor, others: Cameras, noise: float = NOISE
+) -> Tensor:
+    """Return the cost, 0 to about 1, of each relief at each pixel, (B, STEPS, S, S).
+
+    With Geman and McClure's robust function of squared differences of colour, over those that are
+    expected where image and other image change quickly.
+
+    Args:
+        image, other: linear radiance, (B, 3, S, S).
+        noise: difference of radiance that is expected everywhere.
+    """
+    size = image.shape[-1]
+    walls, entry, _ = empty_rooms(cameras.world_from_camera, cameras.fov_y_degrees, size)
+    tried = reliefs(image)[:, None, None]
+    depth = torch.maximum(walls[:, None] - tried, entry[:, None])
+    slope, other_slope = _squared_slope(image), _squared_slope(other)
+    told = torch.cat([other, other_slope], dim=1)
+    found, seen = reprojected(told, others, depth, cameras)
+    squared = (found[:, :3] - image[:, :, None]).square().sum(dim=1)
+    ratio = squared / (3 * noise**2 + SHIFT**2 * (found[:, 3] + slope) / 2)
+    return torch.where(seen, ratio / (ratio + SCALE), UNSEEN) + RISE * tried / tried[-1]
+
+
+def _squared_slope(image: Tensor) -> Tensor:
+    """Return the squared change of colour from pixel to pixel, (B, 3, S, S) -> (B, 1, S, S)."""
+    wide = functional.pad(image, (1, 1, 1, 1), mode="replicate")
+    across = (wide[:, :, 1:-1, 2:] - wide[:, :, 1:-1, :-2]) / 2
+    down = (wide[:, :, 2:, 1:-1] - wide[:, :, :-2, 1:-1]) / 2
+    return (across.square() + down.square()).sum(dim=1, keepdim=True)
+
+
+def joint_cost(costs: list[Tensor]) -> Tensor:
+    """Return the least cost over the sides, each (B, STEPS, S, S), averaged over a window.
+
+    What is hidden from cameras on one side is mostly seen from the other (Kang et al. 2001).
+    """
+    least = torch.stack(costs).amin(dim=0)
+    wide = functional.pad(least, (WINDOW // 2,) * 4, mode="replicate")
+    return functional.avg_pool2d(wide, WINDOW, 1)
+
+
+def semi_global(cost: Tensor) -> Tensor:
+    """Return costs with those of the best ways to each pixel, (B, D, S, S).
+
+    Semi-global matching (Hirschmueller 2008), along four directions: relief should not change from
+    pixel to pixel but where colours demand it.
+    """
+    across, down = cost, cost.transpose(2, 3)
+    ways = _along_rows(across) + _along_rows(across.flip(3)).flip(3)
+    turned = _along_rows(down) + _along_rows(down.flip(3)).flip(3)
+    return ways + turned.transpose(2, 3)
+
+
+def _along_rows(cost: Tensor) -> Tensor:
+    """Return the cost of the best way from the left border to each pixel, less a constant."""
+    columns = cost.permute(3, 1, 0, 2).contiguous()  # (S, D, B, S): each step reads one block
+    ways = torch.empty_like(columns)
+    ways[0] = columns[0]
+    for number, column in enumerate(columns[1:]):
+        before, way = ways[number], ways[number + 1]
+        best = before.amin(dim=0)
+        least = torch.minimum(before, best + LARGE)
+        torch.minimum(least[1:], before[:-1] + SMALL, out=least[1:])
+        torch.minimum(least[:-1], before[1:] + SMALL, out=least[:-1])
+        torch.add(least - best, column, out=way)
+    return ways.permute(2, 1, 3, 0)
+
+
+def best_relief(cost: Tensor) -> Tensor:
+    """Return the relief of least cost, between the steps by a parabola: (B, S, S), scene units."""
+    best = cost.argmin(dim=1, keepdim=True)
+    middle = best.clamp(1, cost.shape[1] - 2)
+    below, at, above = (cost.gather(1, middle + step) for step in (-1, 0, 1))
+    curve = (below - 2 * at + above).clamp(min=1e-6)
+    between = (middle + ((below - above) / (2 * curve)).clamp(-0.5, 0.5)).clamp(min=0)
+    return STEP * torch.where(best == middle, between, best)[:, 0]

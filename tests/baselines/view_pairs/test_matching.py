@@ -1,0 +1,114 @@
+"""Matching finds the surfaces of rendered rooms, and each of its steps what a slow one finds."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scenegen.rooms.reader import RoomsFile
+
+torch = pytest.importorskip("torch")
+from baselines.depth_supervised.empty_rooms import empty_rooms  # noqa: E402
+from baselines.depth_supervised.rooms import read_rooms  # noqa: E402
+from baselines.view_pairs.labels import matched_relief, pairs_of  # noqa: E402
+from baselines.view_pairs.matching import (  # noqa: E402
+    LARGE,
+    SMALL,
+    STEP,
+    STEPS,
+    UNSEEN,
+    best_relief,
+    joint_cost,
+    matching_cost,
+    semi_global,
+)
+
+
+@pytest.mark.parametrize("bits", [16, 8])
+def test_objects_are_found_without_depth(bits, near_path):
+    """Relief within two steps on most object pixels, and none on most of floor and walls."""
+    rooms = read_rooms(near_path, 64, depth=True)
+    assert not rooms.rounded
+    if bits == 8:
+        image = (rooms.image.float() * 255).round() / 255
+        rooms = replace(rooms, image=image, rounded=True)
+    walls, _, _ = empty_rooms(rooms.world_from_camera, rooms.fov_y_degrees, 64)
+    true = walls - rooms.depth
+    with RoomsFile(near_path) as file:
+        objects = torch.tensor(file.read("object_id", slice(None)) > 0)
+    pairs = pairs_of(rooms)
+    assert [bool(a or b) for a, b in pairs] == [True, True, True, False] * 2
+    found = torch.stack([matched_relief(rooms, row, pairs[row]) for row in (0, 1, 2, 4, 5, 6)])
+    rows = torch.tensor([0, 1, 2, 4, 5, 6])
+    wrong, within = (found - true[rows]).abs(), objects[rows]
+    assert wrong[within].median() < STEP
+    assert (wrong[within] < 2 * STEP).float().mean() > 0.6
+    assert (found[~within] < 0.05).float().mean() > 0.9
+    raised, truly = found > 0.05, true[rows] > 0.05
+    assert (raised & truly).sum() / (raised | truly).sum() > 0.6
+
+
+def test_the_true_relief_costs_less_than_the_empty_room(near_path):
+    rooms = read_rooms(near_path, 64, depth=True)
+    row, other = torch.tensor([1]), torch.tensor([2])
+    views = [rooms.image[i].float() for i in (row, other)]
+    cost = matching_cost(views[0], rooms.cameras(row), views[1], rooms.cameras(other))[0]
+    assert cost.shape == (STEPS, 64, 64)
+    walls, _, _ = empty_rooms(rooms.world_from_camera[row], rooms.fov_y_degrees, 64)
+    true = (walls - rooms.depth[row])[0]
+    step = (true / STEP).round().long().clamp(0, STEPS - 1)
+    at_truth = cost.gather(0, step[None])[0]
+    standing = true > 0.1
+    assert standing.any()
+    assert at_truth[standing].median() < cost[0][standing].median() / 2
+    assert at_truth[~standing & (true < 0.01)].median() < 0.1
+
+
+def test_what_the_other_image_does_not_show_costs_the_same_at_every_relief(near_path):
+    rooms = read_rooms(near_path, 64)
+    row, other = torch.tensor([0]), torch.tensor([3])
+    turned = rooms.cameras(other)
+    away = torch.diag(torch.tensor([-1.0, 1.0, -1.0, 1.0]))
+    turned = type(turned)(turned.world_from_camera @ away, turned.fov_y_degrees)
+    image = rooms.image[row].float()
+    cost = matching_cost(image, rooms.cameras(row), image, turned)
+    torch.testing.assert_close(cost[:, 0], torch.full_like(cost[:, 0], UNSEEN))
+    assert (cost.diff(dim=1) > 0).all(), "so that the empty room is chosen"
+    assert (best_relief(semi_global(joint_cost([cost]))) == 0).all()
+
+
+def way_cost(cost: np.ndarray, x: int, last: int) -> float:
+    """Return the least cost of all ways from column 0 to column x of a row that end at `last`."""
+    best = np.inf
+    for way in itertools.product(range(cost.shape[0]), repeat=x):
+        steps = np.abs(np.diff([*way, last]))
+        changes = np.where(steps == 0, 0, np.where(steps == 1, SMALL, LARGE)).sum()
+        best = min(best, changes + sum(cost[d, i] for i, d in enumerate([*way, last])))
+    return best
+
+
+def test_semi_global_costs_are_those_of_the_best_ways():
+    cost = torch.rand(2, 3, 4, 4, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
+    found = semi_global(cost)
+    for b, y, x in ((0, 0, 0), (0, 1, 3), (1, 2, 1), (1, 3, 2)):
+        rows = cost[b, :, y].numpy(), cost[b, :, y].flip(1).numpy()
+        columns = cost[b, :, :, x].numpy(), cost[b, :, :, x].flip(1).numpy()
+        ends = (x, 3 - x), (y, 3 - y)
+        expected = np.array([
+            sum(way_cost(line, at, d) for lines, at2 in zip((rows, columns), ends, strict=True)
+                for line, at in zip(lines, at2, strict=True))
+            for d in range(3)
+        ])  # fmt: skip
+        seen = found[b, :, y, x].numpy()
+        np.testing.assert_allclose(seen - seen[0], expected - expected[0], atol=1e-9)
+
+
+def test_the_least_cost_is_found_between_the_steps():
+    steps = torch.arange(STEPS, dtype=torch.float64)
+    for at in (0.0, 0.3, 5.0, 7.4, STEPS - 1.0):
+        cost = (steps - at).square()[None, :, None, None]
+        expected = 0 if at < 0.5 else at
+        assert float(best_relief(cost)) == pytest.approx(STEP * expected, abs=STEP * 1e-5)
+    flat = torch.zeros(1, STEPS, 2, 2)
+    assert (best_relief(flat) == 0).all()

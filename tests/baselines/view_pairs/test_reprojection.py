@@ -1,0 +1,77 @@
+"""A textured plane seen by two cameras: with the right depth one image gives the other."""
+
+import math
+
+import numpy as np
+import pytest
+
+from scenegen.camera import Camera, pixel_directions
+
+torch = pytest.importorskip("torch")
+from baselines.depth_supervised.network import Cameras  # noqa: E402
+from baselines.view_pairs.reprojection import reprojected  # noqa: E402
+
+FOV, SIZE = 30.0, 64
+POSES = [
+    Camera((0.5 + 1.5 * math.sin(turn), 0.6, 0.2 + 1.5 * math.cos(turn)), (0.5, 0.4, 0.2), FOV)
+    for turn in (0.0, math.radians(8))
+]
+
+
+def seen(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+    """Return image, (S, S, 3), and depth of the plane z = 0 whose colour varies smoothly."""
+    pose = camera.world_from_camera
+    rays = pixel_directions(SIZE, SIZE, FOV) @ pose[:3, :3].T
+    depth = -pose[2, 3] / rays[..., 2]
+    x, y, _ = np.moveaxis(pose[:3, 3] + depth[..., None] * rays, -1, 0)
+    image = np.stack([np.sin(9 * x), np.cos(7 * y), np.sin(5 * (x + y))], axis=-1)
+    return 0.5 + 0.4 * image, depth
+
+
+def batched(array: np.ndarray) -> torch.Tensor:
+    return torch.tensor(array, dtype=torch.float64)[None]
+
+
+def reprojection(depth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the second image seen through the first one's depth, and where it shows it."""
+    other = batched(np.moveaxis(seen(POSES[1])[0], -1, 0))
+    cameras = [Cameras(batched(camera.world_from_camera), FOV) for camera in POSES]
+    found, inside = reprojected(other, cameras[1], batched(depth)[:, None], cameras[0])
+    return np.moveaxis(found[0, :, 0].numpy(), 0, -1), inside[0, 0].numpy()
+
+
+def test_the_true_depth_gives_the_same_image():
+    image, depth = seen(POSES[0])
+    found, inside = reprojection(depth)
+    assert 0.8 < inside.mean() < 1
+    inner = inside & np.roll(inside, 1, axis=1) & np.roll(inside, -1, axis=1)
+    inner[:2] = inner[-2:] = False  # the outermost half pixel is not interpolated
+    assert np.abs(found - image)[inner].max() < 2e-3
+
+
+@pytest.mark.parametrize("shift", [-0.1, -0.03, 0.03, 0.1])
+def test_another_depth_gives_another_image(shift):
+    image, depth = seen(POSES[0])
+    found, inside = reprojection(depth + shift)
+    right, _ = reprojection(depth)
+    error, least = (np.abs(one - image)[inside].mean() for one in (found, right))
+    assert error > 10 * least
+
+
+def test_points_behind_the_other_camera_are_not_seen():
+    _, depth = seen(POSES[0])
+    found, inside = reprojection(np.full_like(depth, -1.0))
+    assert not inside.any()
+    assert np.isfinite(found).all()
+
+
+def test_depths_are_tried_one_by_one():
+    _, depth = seen(POSES[0])
+    tried = np.stack([depth - 0.1, depth, depth + 0.2])
+    other = batched(np.moveaxis(seen(POSES[1])[0], -1, 0))
+    cameras = [Cameras(batched(camera.world_from_camera), FOV) for camera in POSES]
+    found, inside = reprojected(other, cameras[1], batched(tried), cameras[0])
+    for k, one in enumerate(tried):
+        alone, where = reprojection(one)
+        np.testing.assert_allclose(np.moveaxis(found[0, :, k].numpy(), 0, -1), alone, atol=1e-12)
+        np.testing.assert_array_equal(inside[0, k].numpy(), where)
