@@ -15,7 +15,10 @@ from metrics.leaderboard.table import INCOMPARABLE_MARK, REPORTED_MARK
 from metrics.scoring.records import ScoreFile
 from scenegen.common.errors import SceneGenError
 
-BASELINES = ("constant", "mean-depth", "empty-room", "chance", "oracle", "pix2shape")
+BASELINES = (
+    *("constant", "mean-depth", "empty-room", "oracle", "chance", "outline", "outline-trees"),
+    *("pix2shape", "cnn", "siamese", "ptn", "rezende", "depth-supervised", "view-pairs"),
+)
 RENAME = "rename the method and score it again"
 # Characters that show nothing although they count as letters, marks or symbols: joiners, fillers,
 # a blank of Braille, an empty note, and selectors of variants.

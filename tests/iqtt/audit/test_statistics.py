@@ -83,6 +83,10 @@ def test_rounding_is_no_silhouette() -> None:
 class Table(SimpleNamespace):
     """What proofs look at, of the cubes of some questions, (Q, 4, n, 3)."""
 
+    @property
+    def images(self) -> int:
+        return self.cubes.shape[1]
+
     def __len__(self) -> int:
         return len(self.cubes)
 
