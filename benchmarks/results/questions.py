@@ -17,11 +17,14 @@ from metrics.leaderboard.paper_tables import TABLES
 
 KINDS = ("matched", "mirror-pair", "mirror-pair-2", "other", "near", "mirror")
 TRAINING = Step(
-    "iqtt make-split --distractors mixed --train 20000 --labeled 1000 --val 1000 --test 1 --seed 7"
+    "iqtt make-split --distractors mixed --train 12000 --labeled 5000 --val 1000 --test 1000"
     " --out mixed",
     "mixed",
 )
-SUITE = Step("iqtt make-split --preset suite --out suite", "suite")
+SUITE = Step(
+    "iqtt make-split --preset suite --train 5000 --labeled 5000 --val 0 --test 2000 --out suite",
+    "suite",
+)
 TRAIN = "mixed/iqtt-train.h5"
 LABELS = (0, 200, 1000)
 

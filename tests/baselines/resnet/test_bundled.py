@@ -17,7 +17,10 @@ def test_bundled_weights(name, tmp_path):
     from iqtt.questions.specs import SplitSpec
 
     method = PACKAGES[name].network.METHOD
-    (path,) = method.files.glob("*.safetensors")
+    paths = list(method.files.glob("*.safetensors"))
+    if not paths:
+        pytest.skip("no weights are bundled")
+    (path,) = paths
     assert path.stat().st_size < 15_000_000
     _, card = load_weights(path, method)
     assert (card.labels, card.answers, card.seed) == (1000, 3, 0)
