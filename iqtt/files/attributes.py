@@ -1,5 +1,6 @@
 """The root attributes of question files of ours, and what their versions say."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -22,6 +23,8 @@ def read_root(file: h5py.File, path: Path) -> tuple[dict[str, str], SplitSpec | 
     check_attribute(path, "format", kind, kind == FORMAT_NAME, repr(FORMAT_NAME))
     old = str(texts.get("format_version")).startswith("1.")
     spec = read_spec(path, texts, OLD_VERSION if old else FORMAT_VERSION, SplitSpec.from_json)
+    if old:  # which knew no rule on lines of sight
+        spec = replace(spec, min_sight_angle_degrees=0.0)
     version, split = texts["format_version"], texts.get("split")
     minor = version.partition(".")[2]
     check_attribute(path, "format_version", version, minor.isdecimal(), FORMAT_VERSION)

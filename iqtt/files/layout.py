@@ -4,6 +4,7 @@ A training file has two tables of questions, in the groups `labeled` and `unlabe
 files have one, at the root. `truth` tells what is known of the questions of each table.
 """
 
+import math
 from typing import Any
 
 from numpy.typing import NDArray
@@ -39,6 +40,14 @@ TASK = (
     "One answer shows the shape of the reference, turned. Which one? Every cube of a shape shows in"
     " every picture."
 )
+
+
+def old_camera_distance(spec: SplitSpec) -> float:
+    """Return the distance of the camera in files before format 2.0, cube edges.
+
+    Their one camera framed the largest shape that was allowed, whatever the size of the image.
+    """
+    return 1.02 * spec.max_radius / math.sin(math.radians(spec.fov_degrees) / 2)
 
 
 def question_columns(spec: SplitSpec) -> list[Column]:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from iqtt.files.attributes import read_root
 from iqtt.files.layout import question_columns
-from iqtt.files.tables import QuestionTruth, TableFile, table_parts
+from iqtt.files.tables import TableFile, table_parts
+from iqtt.files.truth import QuestionTruth
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.hdf5 import trial
 from scenegen.common.hdf5.input_file import checking, open_file

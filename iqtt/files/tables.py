@@ -4,8 +4,6 @@ A training file holds two tables, its parts "labeled" and "unlabeled"; other fil
 `reader` has what users open: files of questions, and files of answers.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -14,9 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.files.attributes import read_root, version_of
-from iqtt.files.layout import CAMERAS_SINCE, DIGESTS_SINCE, SCORED, named, truth_columns
-from iqtt.questions.specs import SplitSpec
-from scenegen.camera import Camera
+from iqtt.files.layout import (
+    CAMERAS_SINCE,
+    DIGESTS_SINCE,
+    SCORED,
+    named,
+    old_camera_distance,
+    truth_columns,
+)
+from iqtt.files.truth import QuestionTruth, question_truth
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.hdf5 import content
 from scenegen.common.hdf5.attributes import read_digest, read_names, read_text
@@ -28,38 +32,6 @@ from scenegen.layout import TRUTH_DIGEST
 Array = NDArray[Any]
 PARTS = ("labeled", "unlabeled")
 RELEASED = ("questions", "answers")
-
-
-@dataclass(frozen=True, eq=False)
-class QuestionTruth:
-    """What a file tells of the images of a question: the reference, then K answers.
-
-    Attributes:
-        cubes: integer coordinates, (1 + K, n, 3) int8.
-        shape_id: identifier of the shape of each image, 32 bytes; equal if a rotation takes one
-            shape to the other.
-        class_id: the same, but equal for mirror images too.
-        world_from_shape: rotation of each shape about the centre of its box, (1 + K, 3, 3).
-        camera: the camera of all these images.
-        light_position: positions of each image's point lights, (L, 3) each, world, cube edges.
-        light_color: radiance of each image's point lights, RGB, (L, 3) each.
-        distractor_kind: kind of each answer, such as "near"; None for the right one.
-        angle_degrees: smallest rotation from the reference's view to the right answer's.
-        visible_pixels: number of pixels that show each cube, (1 + K, n).
-        depth: planar depth, (1 + K, H, W), cube edges, NaN on the background; None if not stored.
-    """
-
-    cubes: Array
-    shape_id: tuple[bytes, ...]
-    class_id: tuple[bytes, ...]
-    world_from_shape: Array
-    camera: Camera
-    light_position: tuple[Array, ...]
-    light_color: tuple[Array, ...]
-    distractor_kind: tuple[str | None, ...]
-    angle_degrees: float
-    visible_pixels: Array
-    depth: Array | None
 
 
 class TableFile:
@@ -154,7 +126,7 @@ class TableFile:
             return None
         values = {name: self.read(name, row) for name in self.fields if name not in RELEASED}
         assert self.spec is not None  # truth is read only where there is one
-        return _question_truth(values, self.kind_names, self.spec)
+        return question_truth(values, self.kind_names, self.spec)
 
     def stored_bytes(self) -> dict[str, tuple[int, int]]:
         """Return for each dataset of this table its bytes on disk and in memory."""
@@ -247,7 +219,7 @@ class TableFile:
             dataset = self._stored[column.name] = group[column.name]
             self._datasets[column.name] = StoredArray(dataset)
         if version < CAMERAS_SINCE:
-            self._datasets["camera_distance"] = np.full(self._count, self.spec.camera_distance)
+            self._datasets["camera_distance"] = np.full(self._count, old_camera_distance(self.spec))
         place = f"{self.path}: {name}/distractor_kind"
         self.kind_names = read_names(group["distractor_kind"], "names", place)
         self._ranges = {
@@ -318,30 +290,3 @@ def table_parts(file: h5py.File, path: Path, content: str) -> tuple[str, ...]:
         raise NoAnswersError(path, "questions but no answers", "answers", hint)
     expected = f"a dataset {content!r}, 'labeled/{content}' or 'unlabeled/{content}'"
     raise FileFormatError(path, "no question file", expected)
-
-
-def _question_truth(
-    values: Mapping[str, Any], kind_names: Sequence[str], spec: SplitSpec
-) -> QuestionTruth:
-    """Return the record of one row of `layout.truth_columns`, without the padding."""
-    cubes = int(values["cube_count"])
-
-    def per_image(name: str) -> tuple[Array, ...]:
-        pairs = zip(values[name], values["light_count"], strict=True)
-        return tuple(lights[:count] for lights, count in pairs)
-
-    return QuestionTruth(
-        cubes=values["cubes"][:, :cubes],
-        shape_id=tuple(row.tobytes() for row in values["shape_id"]),
-        class_id=tuple(row.tobytes() for row in values["class_id"]),
-        world_from_shape=values["world_from_shape"],
-        camera=spec.camera(float(values["camera_distance"])),
-        light_position=per_image("light_position"),
-        light_color=per_image("light_color"),
-        distractor_kind=tuple(
-            None if kind < 0 else kind_names[kind] for kind in values["distractor_kind"]
-        ),
-        angle_degrees=float(values["angle_degrees"]),
-        visible_pixels=values["visible_pixels"][:, :cubes],
-        depth=values.get("depth"),
-    )

@@ -80,7 +80,7 @@ def setting_lines(spec: Any) -> list[str]:
     for name, value in vars(spec).items():
         shown = ", ".join(map(str, value)) if isinstance(value, tuple) else value
         star = "*" if name in changed and value is not None else " "
-        lines.append(f"  {star} {name:20} {'not told' if value is None else shown}")
+        lines.append(f"  {star} {name:24} {'not told' if value is None else shown}")
     return lines
 
 

@@ -322,7 +322,7 @@ def test_errors_on_the_way_leave_all_as_it_was(old, tmp_path, monkeypatch):
     monkeypatch.setattr("iqtt.questions.views.QUESTION_ATTEMPTS", 1)
     monkeypatch.setattr("iqtt.questions.views.VIEWS", 1)
     with pytest.raises(PlacementError):
-        make_split(old, replace(TINY, height=64, width=64, min_cube_pixels=15), overwrite=True)
+        make_split(old, replace(TINY, height=64, width=64, min_cube_pixels=14), overwrite=True)
     monkeypatch.undo()
     monkeypatch.setattr(os, "statvfs", lambda path: SimpleNamespace(f_bavail=0, f_frsize=1))
     with pytest.raises(OSError, match="No space left on device") as error:

@@ -30,7 +30,12 @@ def as_version_1(minor: int):
 
     def edit(file: h5py.File) -> None:
         spec = json.loads(file.attrs["spec"])
-        del spec["answers"], file.attrs["task"], file["truth/camera_distance"]
+        del (
+            spec["answers"],
+            spec["min_sight_angle_degrees"],
+            file.attrs["task"],
+            file["truth/camera_distance"],
+        )
         file.attrs["spec"] = json.dumps(spec)
         file.attrs["format_version"] = f"1.{minor}"
         if minor < 2:
@@ -45,6 +50,7 @@ def test_files_of_format_1_are_read_with_the_one_camera_that_they_had(damaged, m
     with open_questions(path) as questions:
         expected = 1.02 * 3.5 / math.sin(math.radians(14))
         assert questions.answers == 3
+        assert questions.spec.min_sight_angle_degrees == 0
         assert questions.read("camera_distance", slice(None)) == pytest.approx([expected] * 6)
         assert questions[5].truth.camera.position == pytest.approx((0, 0, expected))
         assert questions[5].truth.cubes.shape[0] == 4

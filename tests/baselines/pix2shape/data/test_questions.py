@@ -51,7 +51,7 @@ def batch_of(source: QuestionImages) -> Any:
 
 def scales(file: h5py.File) -> np.ndarray:
     """How many times larger each question is shown than it is stored, (Q,)."""
-    distance = 1.02 * SPEC.max_radius / math.sin(math.radians(SPEC.fov_degrees) / 2)
+    distance = 64 / 62 * SPEC.max_radius / math.sin(math.radians(SPEC.fov_degrees) / 2)
     return distance / file["truth/unlabeled/camera_distance"][:]
 
 
@@ -175,7 +175,7 @@ def test_the_configuration_for_questions(train_path):
     assert (spec.camera, spec.classes, spec.z_view, spec.z) == (False, 0, 10, plain.networks.z)
     assert (spec.size, spec.width, config.batch, config.seed) == (32, 0.05, 12, 9)
     assert config.opacity
-    distance = 1.02 * SPEC.max_radius / math.sin(math.radians(SPEC.fov_degrees) / 2)
+    distance = 64 / 62 * SPEC.max_radius / math.sin(math.radians(SPEC.fov_degrees) / 2)
     assert config.depth_middle == pytest.approx(distance)
     assert config.depth_reach == pytest.approx(SPEC.max_radius / config.depth_middle)
     with h5py.File(train_path) as file:

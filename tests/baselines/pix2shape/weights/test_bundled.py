@@ -41,7 +41,7 @@ def test_they_predict_rooms(name: str, tmp_path: Path) -> None:
 
 
 def test_they_answer_questions(tmp_path: Path) -> None:
-    """More than four standard errors above chance; some of the shapes may have been seen."""
+    """More than three standard errors above chance."""
     spec = SplitSpec(seed=77, train=1, labeled=0, val=0, test=160, distractors="other")
     make_split(tmp_path / "split", spec)
     data, out = tmp_path / "split" / "iqtt-test.h5", tmp_path / "predictions.h5"
@@ -49,4 +49,4 @@ def test_they_answer_questions(tmp_path: Path) -> None:
     answer_file(open_weights("iqtt")[0], data, out)
     with h5py.File(tmp_path / "split" / "iqtt-test-answers.h5") as truth, h5py.File(out) as file:
         right = file["scores"][:].argmax(axis=1) == truth["answers"][:]
-    assert right.mean() > 1 / 3 + 4 * np.sqrt(2 / 9 / 160), right.mean()
+    assert right.mean() > 1 / 3 + 3 * np.sqrt(2 / 9 / 160), right.mean()
