@@ -37,10 +37,30 @@ class Floor:
 
 # Each measured on 2,000 questions of the preset `suite`, trees trained on others of the kind.
 FLOORS = (
-    Floor("mirror-pair", "outline", 0, 0.3300, 0.3097, 0.3509),
-    Floor("mirror-pair", "outline-trees", 200, 0.3095, 0.2896, 0.3301),
-    Floor("mirror-pair", "outline-trees", 1_000, 0.3250, 0.3048, 0.3458),
-    Floor("mirror-pair", "outline-trees", 5_000, 0.3290, 0.3088, 0.3499),
+    Floor("matched", "outline", 0, 0.3240, 0.3038, 0.3448),
+    Floor("matched", "outline-trees", 200, 0.3465, 0.3260, 0.3676),
+    Floor("matched", "outline-trees", 1_000, 0.3515, 0.3309, 0.3727),
+    Floor("matched", "outline-trees", 5_000, 0.3630, 0.3422, 0.3843),
+    Floor("mirror-pair", "outline", 0, 0.3345, 0.3142, 0.3555),
+    Floor("mirror-pair", "outline-trees", 200, 0.3335, 0.3132, 0.3545),
+    Floor("mirror-pair", "outline-trees", 1_000, 0.3225, 0.3024, 0.3433),
+    Floor("mirror-pair", "outline-trees", 5_000, 0.3175, 0.2975, 0.3382),
+    Floor("mirror-pair-2", "outline", 0, 0.4955, 0.4736, 0.5174),
+    Floor("mirror-pair-2", "outline-trees", 200, 0.4930, 0.4711, 0.5149),
+    Floor("mirror-pair-2", "outline-trees", 1_000, 0.4865, 0.4646, 0.5084),
+    Floor("mirror-pair-2", "outline-trees", 5_000, 0.4920, 0.4701, 0.5139),
+    Floor("other", "outline", 0, 0.5565, 0.5346, 0.5781),
+    Floor("other", "outline-trees", 200, 0.5720, 0.5502, 0.5935),
+    Floor("other", "outline-trees", 1_000, 0.5835, 0.5618, 0.6049),
+    Floor("other", "outline-trees", 5_000, 0.5910, 0.5693, 0.6124),
+    Floor("near", "outline", 0, 0.4315, 0.4099, 0.4533),
+    Floor("near", "outline-trees", 200, 0.4135, 0.3921, 0.4352),
+    Floor("near", "outline-trees", 1_000, 0.4290, 0.4075, 0.4508),
+    Floor("near", "outline-trees", 5_000, 0.4525, 0.4308, 0.4744),
+    Floor("mirror", "outline", 0, 0.3610, 0.3402, 0.3823),
+    Floor("mirror", "outline-trees", 200, 0.3410, 0.3205, 0.3621),
+    Floor("mirror", "outline-trees", 1_000, 0.3565, 0.3358, 0.3777),
+    Floor("mirror", "outline-trees", 5_000, 0.3860, 0.3649, 0.4075),
 )
 CHANCE_BEST = "chance, which no probe beats"
 CHANCE_ONLY = "chance, as no probe was measured"

@@ -17,7 +17,8 @@ def test_scores_are_minus_the_distance_from_the_reference(answers):
     assert scores.detach()[0, 1] == pytest.approx(0, abs=1e-4)
     features = network.last(network.resnet(images[1]))
     assert features.shape == (1 + answers, 2048)
-    assert scores.detach()[1, 0] == pytest.approx(-torch.dist(features[1], features[0]).item(), rel=1e-4)
+    apart = torch.dist(features[1], features[0]).item()
+    assert scores.detach()[1, 0] == pytest.approx(-apart, rel=1e-4)
 
 
 def test_resnet_50_has_the_features_itself():
