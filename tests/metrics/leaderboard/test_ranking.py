@@ -16,6 +16,13 @@ from metrics.scoring.floors import Floor
 from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import UnknownMetricError
 
+
+@pytest.fixture(autouse=True)
+def _no_floors(monkeypatch):
+    """Kinds of questions are taken as not measured, except where a test says otherwise."""
+    monkeypatch.setattr("metrics.scoring.floors.FLOORS", ())
+
+
 SCENES = [0, 0, 1, 1]
 PAPER = ("task", "all", "none")
 
