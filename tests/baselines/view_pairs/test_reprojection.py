@@ -59,10 +59,16 @@ def test_another_depth_gives_another_image(shift):
 
 
 def test_points_behind_the_other_camera_are_not_seen():
-    _, depth = seen(POSES[0])
-    found, inside = reprojection(np.full_like(depth, -1.0))
-    assert not inside.any()
-    assert np.isfinite(found).all()
+    """Points near the axis of a camera that looks away would fall into its image."""
+    image, depth = (batched(array) for array in seen(POSES[0]))
+    pose = batched(POSES[0].world_from_camera)
+    turned = pose @ torch.diag(torch.tensor([-1.0, 1.0, -1.0, 1.0], dtype=torch.float64))
+    values = image.movedim(3, 1)
+    for other, expected in ((pose, True), (turned, False)):
+        found, inside = reprojected(values, Cameras(other, FOV), depth[:, None], Cameras(pose, FOV))
+        assert bool(inside[0, 0, 31:33, 31:33].all()) is expected
+        assert bool(inside.any()) is expected
+        assert found.isfinite().all()
 
 
 def test_depths_are_tried_one_by_one():
