@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from baselines.trivial import empty_room
+from metrics.measures.empty_room import empty_room
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
@@ -27,8 +27,10 @@ def relief_iou(rooms_path: Path, submission: Path) -> np.ndarray:
     """Return the IoU of {relief > 0.05} with the true one, of each row, (N,)."""
     found = []
     with RoomsFile(rooms_path) as rooms, h5py.File(submission) as file:
+        size = rooms.spec.height, rooms.spec.width
         for row in range(len(rooms)):
-            walls = empty_room(rooms, row)[0]
+            pose = rooms.read("camera/world_from_camera", row)
+            walls = empty_room(pose, float(rooms.read("camera/fov_y_degrees", row)), *size)[0]
             one, other = (
                 walls - depth > 0.05 for depth in (rooms.read("depth", row), file["depth"][row])
             )
