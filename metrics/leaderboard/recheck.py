@@ -104,13 +104,15 @@ def _compare(
 
 def _compare_skills(file: ScoreFile) -> None:
     """Recompute the skills, with their intervals, which are paired for rooms."""
-    if not file.skills:
-        return
     meta = file.meta
-    if file.task == "iqtt":
-        expected = _question_skills(file)
-    else:
+    if file.task == "rooms":
         expected = skills(file.items, file.clusters, meta.seed, meta.resamples, meta.confidence)
+    else:
+        expected = _question_skills(file) if file.skills else {}
+    for name in expected:
+        if name not in file.skills:
+            told = "a skill, as items hold the floor"
+            raise RecheckError(f"{file.place}: skills.{name}", "no such key", told, SCORE_AGAIN)
     for name, skill in file.skills.items():
         place = f"skills.{name}"
         if name not in expected:
