@@ -120,8 +120,8 @@ def _compare_skills(file: ScoreFile) -> None:
             raise RecheckError(f"{file.place}: {place}", "a skill", told, SCORE_AGAIN)
         other = expected[name]
         for part in ("value", "low", "high", "floor"):
-            pair, scale = (getattr(one, part) for one in (skill, other)), max(1.0, abs(other.value))
-            _require_part(file, f"{place}.{part}", *pair, scale)
+            ours, theirs, scale = getattr(skill, part), getattr(other, part), abs(other.value)
+            _require_part(file, f"{place}.{part}", ours, theirs, max(1.0, scale))
         if skill.floor_name != other.floor_name:
             where = f"{file.place}: {place}.floor_name"
             raise RecheckError(where, repr(skill.floor_name), repr(other.floor_name), SCORE_AGAIN)
