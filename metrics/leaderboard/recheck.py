@@ -104,13 +104,15 @@ def _compare(
 
 def _compare_skills(file: ScoreFile) -> None:
     """Recompute the skills, with their intervals, which are paired for rooms."""
-    if not file.skills:
-        return
     meta = file.meta
-    if file.task == "iqtt":
-        expected = _question_skills(file)
-    else:
+    if file.task == "rooms":
         expected = skills(file.items, file.clusters, meta.seed, meta.resamples, meta.confidence)
+    else:
+        expected = _question_skills(file) if file.skills else {}
+    for name in expected:
+        if name not in file.skills:
+            told = "a skill, as items hold the floor"
+            raise RecheckError(f"{file.place}: skills.{name}", "no such key", told, SCORE_AGAIN)
     for name, skill in file.skills.items():
         place = f"skills.{name}"
         if name not in expected:
@@ -118,10 +120,8 @@ def _compare_skills(file: ScoreFile) -> None:
             raise RecheckError(f"{file.place}: {place}", "a skill", told, SCORE_AGAIN)
         other = expected[name]
         for part in ("value", "low", "high", "floor"):
-            scale = other.floor if part == "floor" else max(1.0, abs(other.value))
-            _require_part(
-                file, f"{place}.{part}", getattr(skill, part), getattr(other, part), scale
-            )
+            ours, theirs, scale = getattr(skill, part), getattr(other, part), abs(other.value)
+            _require_part(file, f"{place}.{part}", ours, theirs, max(1.0, scale))
         if skill.floor_name != other.floor_name:
             where = f"{file.place}: {place}.floor_name"
             raise RecheckError(where, repr(skill.floor_name), repr(other.floor_name), SCORE_AGAIN)

@@ -1,16 +1,19 @@
-"""Skill: a score on the scale where 0 is a floor and 1 is perfect; and its paired interval.
+"""Skill: a score on the scale where 0 is a floor and 1 is perfect; and paired intervals.
 
 Source: the skill scores of weather forecasts, Murphy 1988, (score - reference) / (perfect -
 reference).
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from metrics.measures.checks import as_float64, require, require_finite, require_some
 from metrics.measures.statistics import RESAMPLES, bca_ends, normal_quantile, resampled_means
+
+Array = NDArray[Any]
 
 
 def skill(score: float, floor: float, higher_is_better: bool) -> float | None:
@@ -25,43 +28,44 @@ def skill(score: float, floor: float, higher_is_better: bool) -> float | None:
     return gain / room if room > 0.0 and math.isfinite(gain) else None
 
 
-def skill_interval(
+def skill_intervals(
     scores: ArrayLike,
     floors: ArrayLike,
     seed: int,
     resamples: int = RESAMPLES,
     confidence: float = 0.95,
-) -> tuple[float, float]:
-    """Return the BCa interval of 1 - mean(scores) / mean(floors), of S clusters.
+) -> tuple[Array, Array]:
+    """Return BCa intervals, low (K,) and high (K,), of 1 - mean(scores) / mean(floors).
 
     Of scores of which 1 is perfect, give what they lack: 1 - score.
 
-    It is paired: each resample draws clusters with both of their
-    values. Its acceleration comes
+    They are paired: each resample draws clusters with all of their values. The acceleration comes
     from the ratio's empirical influence values (Efron and Tibshirani 1993, equation 22.28). Both
-    ends are NaN for a single cluster, and where a resample has floors of 0 only.
+    ends are NaN for a single cluster, and where a resample has floors of 0 only. The K skills share
+    their resamples, which take most of the time.
 
     Args:
-        scores, floors: means of the clusters, (S,) each, at least 0, lower is better.
+        scores, floors: means of S clusters, (S, K) each, at least 0, lower is better.
         seed, resamples, confidence: as in `statistics.bootstrap_interval`.
     """
     errors, lines = as_float64(scores, "scores"), as_float64(floors, "floors")
-    ok = errors.ndim == 1 and errors.shape == lines.shape
-    require(ok, "scores", f"shapes {errors.shape} and {lines.shape}", "(S,) each")
-    require_some(len(errors), "scores")
-    table = np.stack([errors, lines], axis=-1)
-    require_finite(table, "scores and floors")
-    score, floor = table.mean(axis=0)
-    require(floor > 0.0, "mean of the floors", floor, "above 0")
-    value = float((floor - score) / floor)
-    if len(table) == 1:
-        return math.nan, math.nan
-    ratio = score / floor
-    apart: NDArray[np.float64] = table[:, 0] - ratio * table[:, 1]
+    ok = errors.ndim == 2 and errors.shape == lines.shape
+    require(ok, "scores", f"shapes {errors.shape} and {lines.shape}", "(S, K) each")
+    require_some(errors.size, "scores")
+    require_finite(errors, "scores")
+    require_finite(lines, "floors")
+    score, floor = errors.mean(axis=0), lines.mean(axis=0)
+    require((floor > 0.0).all(), "mean of the floors", floor.min(), "above 0")
+    if len(errors) == 1:
+        return np.full(len(score), np.nan), np.full(len(score), np.nan)
+    apart = errors - score / floor * lines
     # Of scores that are all the same multiple of the floor, such as the floor itself, exactly 0.
-    apart[np.abs(apart) <= 1e-15 * np.abs(table[:, 0])] = 0.0
-    means = resampled_means(np.stack([apart, table[:, 1]], axis=-1), seed, resamples)
-    if not means[:, 1].all():
-        return math.nan, math.nan
-    low, high = bca_ends(apart / floor, means[:, 0] / means[:, 1], normal_quantile(confidence))
-    return value - max(high, 0.0), value - min(low, 0.0)
+    apart[np.abs(apart) <= 1e-15 * np.abs(errors)] = 0.0
+    means = resampled_means(np.concatenate([apart, lines], axis=-1), seed, resamples)
+    gains, bases = np.split(means, 2, axis=-1)
+    z, ends = normal_quantile(confidence), np.full((2, len(score)), np.nan)
+    for k in np.flatnonzero((bases > 0.0).all(axis=0)):
+        low, high = bca_ends(apart[:, k] / floor[k], gains[:, k] / bases[:, k], z)
+        value = (floor[k] - score[k]) / floor[k]
+        ends[:, k] = value - max(high, 0.0), value - min(low, 0.0)
+    return ends[0], ends[1]

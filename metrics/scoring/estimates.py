@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.objects import size_range
-from metrics.measures.skill import skill, skill_interval
+from metrics.measures.skill import skill, skill_intervals
 from metrics.measures.statistics import bootstrap_interval, cluster_means
 from metrics.scoring.metric_names import OBJECT_SCORES, SKILLED, metric
 from metrics.scoring.records import SHAPE_COLUMN, Groups, Score, Skill
@@ -63,27 +63,36 @@ def skills(
 ) -> dict[str, Skill]:
     """Return the skills of rooms from columns of items, (N,) each, those of floors among them.
 
-    There is none where no image shows an object that counts: the empty room is then the truth.
+    There is none where no image shows an object that counts: the empty room is then the truth. A
+    floor below 0, that of relief which goes against other scenes, counts as 0, the score of the
+    empty room: so a bad floor wins nothing, and the skill of a relief never exceeds its score.
     """
-    found: dict[str, Skill] = {}
     names = [name for name in SKILLED if {name, SKILLED[name] + name} <= items.keys()]
     of_objects = [name for name in names if name in OBJECT_SCORES]
     if not any(np.isfinite(items[name]).any() for name in of_objects):
-        return found
-    for name in names:
-        column, higher = SKILLED[name] + name, metric(name).higher_is_better
-        table = np.stack([items[name], items[column]], axis=-1)
-        there = ~np.isnan(table).any(axis=-1)
-        if not there.any():
+        return {}
+    found: dict[str, Skill] = {}
+    pairs = {name: np.stack([items[name], items[SKILLED[name] + name]]) for name in names}
+    for group, there in by_presence(pairs):
+        errors, floors = (
+            cluster_means(np.stack([pairs[name][i, there] for name in group], -1), scene[there])
+            for i in (0, 1)
+        )
+        floors[:, floors.mean(axis=0) < 0.0] = 0.0
+        score, floor = errors.mean(axis=0), floors.mean(axis=0)
+        higher = np.array([metric(name).higher_is_better for name in group])
+        errors[:, higher], floors[:, higher] = 1.0 - errors[:, higher], 1.0 - floors[:, higher]
+        values = [skill(*one) for one in zip(score.tolist(), floor.tolist(), higher, strict=True)]
+        kept = [k for k, value in enumerate(values) if value is not None]
+        if not kept:
             continue
-        means = cluster_means(table[there], scene[there])
-        score, floor = (float(value) for value in means.mean(axis=0))
-        value = skill(score, floor, higher)
-        if value is not None:
-            errors, floors = (1.0 - means if higher else means).T
-            ends = skill_interval(errors, floors, seed, resamples, confidence)
-            found[name] = Skill(value, known(ends[0]), known(ends[1]), floor, column)
-    return found
+        ends = skill_intervals(errors[:, kept], floors[:, kept], seed, resamples, confidence)
+        for k, low, high in zip(kept, *ends, strict=True):
+            name, value = group[k], values[k]
+            assert value is not None
+            column = SKILLED[name] + name
+            found[name] = Skill(value, known(low), known(high), float(floor[k]), column)
+    return {name: found[name] for name in names if name in found}
 
 
 def object_labels(objects: Mapping[str, Array], pixels: int) -> dict[str, Array]:

@@ -76,7 +76,7 @@ class Skill:
         value: 1 is perfect, 0 is the floor, below 0 is worse than it; see `measures.skill`.
         low, high: ends of the interval at `Meta.confidence`; None where there is none. That of
             rooms is paired: it resamples the scenes of score and floor together.
-        floor: the floor's score on the same items, in the unit of the score.
+        floor: the floor's score on the same items, in the unit of the score; 0 where it is less.
         floor_name: what has that score, such as "empty_room".
     """
 

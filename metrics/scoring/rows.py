@@ -85,28 +85,40 @@ def score_rows(
         )
     pairs = np.stack([rows, rows[other_scenes(scene, view)]], axis=-1)
     chunks = [pairs[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
-    table: list[_ScoredRow] = []
+    found, parts, done = ScoredRows(), list[dict[str, Array]](), 0
+    # Each chunk goes into arrays as it comes: as objects, 140,000 rows take 2 GB.
     for scored in _in_processes(job, chunks, processes):
-        table += scored
+        here, first = slice(done, done + len(scored)), scored[0]
+        done += len(scored)
+        numbers = rows[here]
+        for n, row in zip(numbers.tolist(), scored, strict=True):
+            found.digests[n] = row.digests
+            if row.bad is not None:
+                found.bad[n] = row.bad
+        for name in first.runs[0].scores:
+            column = _column(found.scores, name, (len(files), len(rows)))
+            column[:, here] = np.array([[run.scores[name] for run in row.runs] for row in scored]).T
+        for name in first.floors:
+            _column(found.floors, name, (len(rows),))[here] = [row.floors[name] for row in scored]
+        counts = [len(row.runs[0].objects["object"]) for row in scored]
+        parts.append({"row": np.repeat(numbers, counts)})
+        for name in first.runs[0].objects:
+            columns = [
+                np.concatenate([row.runs[run].objects[name] for row in scored])
+                for run in range(len(files))
+            ]
+            parts[-1][name] = np.stack(columns) if name in OBJECT_SCORES else columns[0]
         progress(len(scored))
-    numbers, first = rows.tolist(), table[0]
-    found = ScoredRows(
-        bad={n: row.bad for n, row in zip(numbers, table, strict=True) if row.bad is not None},
-        digests={n: row.digests for n, row in zip(numbers, table, strict=True)},
-    )
-    for name in first.runs[0].scores:
-        found.scores[name] = np.array([[run.scores[name] for run in row.runs] for row in table]).T
-    for name in first.floors:
-        found.floors[name] = np.array([row.floors[name] for row in table])
-    counts = [len(row.runs[0].objects["object"]) for row in table]
-    found.objects["row"] = np.repeat(rows, counts)
-    for name in first.runs[0].objects:
-        columns = [
-            np.concatenate([row.runs[run].objects[name] for row in table])
-            for run in range(len(files))
-        ]
-        found.objects[name] = np.stack(columns) if name in OBJECT_SCORES else columns[0]
+    for name in parts[0]:
+        found.objects[name] = np.concatenate([part[name] for part in parts], axis=-1)
     return found
+
+
+def _column(columns: dict[str, Array], name: str, shape: tuple[int, ...]) -> Array:
+    """Return a column of scores, which is added where it is new."""
+    if name not in columns:
+        columns[name] = np.full(shape, np.nan)
+    return columns[name]
 
 
 def other_scenes(scene_index: Array, view_index: Array) -> Array:

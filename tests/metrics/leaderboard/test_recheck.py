@@ -171,6 +171,12 @@ def test_skills_follow_from_the_items(scored_rooms, name, part):
         recheck(replace(scored_rooms, skills={**scored_rooms.skills, name: other}))
 
 
+def test_a_bad_skill_cannot_be_left_out(scored_rooms):
+    kept = {name: one for name, one in scored_rooms.skills.items() if name != "chamfer"}
+    with refused(RecheckError, "m.json: skills.chamfer", "no such key", "a skill"):
+        recheck(replace(scored_rooms, skills=kept))
+
+
 @pytest.mark.parametrize("grouping", ["by_object_shape", "by_object_size"])
 def test_groups_of_objects_follow_from_the_objects(scored_rooms, grouping):
     groups = getattr(scored_rooms, grouping)

@@ -4,10 +4,16 @@ import numpy as np
 import pytest
 
 from metrics.measures.checks import MeasureError
-from metrics.measures.skill import skill, skill_interval
+from metrics.measures.skill import skill, skill_intervals
 
 RNG = np.random.default_rng(8)
 FLOORS = RNG.gamma(2.0, 0.1, 60)
+
+
+def skill_interval(scores, floors, seed):
+    """That of one skill."""
+    low, high = skill_intervals(np.array(scores)[:, None], np.array(floors)[:, None], seed)
+    return low.item(), high.item()
 
 
 def test_perfect_is_1_and_the_floor_is_0():
@@ -41,6 +47,16 @@ def test_the_interval_is_about_that_of_plain_percentiles():
     assert high - low < 0.5 * np.ptp(unpaired)  # what pairing is for
     assert skill_interval(scores, FLOORS, 0) == (low, high)
     assert skill_interval(scores, FLOORS, 1) != (low, high)
+
+
+def test_skills_that_share_their_resamples_have_the_intervals_of_each_alone():
+    scores = np.stack([FLOORS * RNG.uniform(0.3, 0.9, 60), FLOORS, np.zeros(60)], axis=-1)
+    floors = np.stack([FLOORS, FLOORS, np.eye(60)[0]], axis=-1)
+    together = np.transpose(skill_intervals(scores, floors, 0))
+    assert np.isnan(together[2]).all()  # most resamples leave its only floor out
+    for k in (0, 1):
+        alone = skill_interval(scores[:, k], floors[:, k], 0)
+        assert together[k] == pytest.approx(alone, abs=1e-12)
 
 
 def test_where_there_is_no_interval():

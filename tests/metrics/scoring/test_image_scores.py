@@ -88,6 +88,36 @@ def test_one_relief_for_all_pictures_has_no_skill_at_all(folder, tmp_path):
         assert found.skills[name].value == pytest.approx(0.0, abs=0.02)
 
 
+def test_going_against_the_mean_relief_wins_nothing(folder, tmp_path):
+    """It scores below 0 with every scene, and a floor below 0 must not lift that."""
+    with RoomsFile(folder / "rooms.h5") as rooms:
+        reliefs = [true_relief(r.depth, r.world_from_camera, r.fov_y_degrees) for r in rooms]
+    mean = np.nan_to_num(reliefs).mean(axis=0)
+    write_scores(
+        guess(tmp_path / "g.h5", folder / "rooms.h5", lambda depth: depth + mean), tmp_path / "s"
+    )
+    found = read_scores(tmp_path / "s")
+    recheck(found)
+    skill, value = found.skills["relief_correlation"], found.metrics["relief_correlation"].value
+    assert found.items["other_scene_relief_correlation"].mean() < -0.2
+    assert (skill.floor, skill.value) == (0.0, value)
+    assert value < -0.2
+
+
+def test_true_outlines_without_any_shape_win_relief_but_find_no_object(folder, tmp_path):
+    """What relief cannot tell, as docs/scores.md says: flat outlines from shapes."""
+    path, truth = tmp_path / "flat.h5", folder / "rooms.h5"
+    with RoomsFile(truth) as rooms, RoomPredictionWriter(path, truth, method="flat") as out:
+        for row, room in enumerate(rooms):
+            size = room.depth.shape
+            depth, _ = empty_room(room.world_from_camera, room.fov_y_degrees, *size)
+            out.add(row, depth - 0.2 * (room.object_id > 0))
+    found = score([path], truth)
+    assert found.skills["relief_iou"].value > 0.5
+    assert found.metrics["object_recall_0.02"].value < 0.2
+    assert found.metrics["derived_object_normal_mean_degrees"].value > 40.0
+
+
 def test_scores_of_objects_and_relief_are_those_of_scipy_and_numpy(folder):
     found = score([folder / "noisy-0.h5"], folder / "rooms.h5")
     with RoomsFile(folder / "rooms.h5") as rooms, h5py.File(folder / "noisy-0.h5") as file:

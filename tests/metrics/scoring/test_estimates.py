@@ -1,0 +1,60 @@
+"""Skills of rooms: their bounds, whatever a submission does to its own floor."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from metrics.scoring.estimates import skills
+from metrics.scoring.metric_names import SKILLED
+
+SCENES = 6
+
+
+def columns(**given_columns):
+    """Items of SCENES rows, of which each has its own scene; columns that are not given are 0.5."""
+    items = {name: np.full(SCENES, 0.5) for name in SKILLED}
+    items |= {SKILLED[name] + name: np.full(SCENES, 0.5) for name in SKILLED}
+    return items | {name: np.asarray(column, np.float64) for name, column in given_columns.items()}
+
+
+def skills_of(items):
+    return skills(items, np.arange(SCENES), 0, 200, 0.95)
+
+
+SHARES = st.lists(st.floats(-1.0, 1.0), min_size=SCENES, max_size=SCENES)
+
+
+@given(SHARES, SHARES)
+def test_a_relief_that_goes_against_other_scenes_wins_nothing(own, other):
+    """A floor of -1 would lift a correlation of 0 to a skill of 0.5."""
+    items = columns(relief_correlation=own, other_scene_relief_correlation=other)
+    found = skills_of(items).get("relief_correlation")
+    if found is None:
+        assert np.mean(other) == 1.0
+    else:
+        assert found.value <= np.mean(own) + 1e-12
+        assert found.floor == pytest.approx(max(np.mean(other), 0.0), abs=1e-12)
+        assert found.low <= found.value <= found.high + 1e-12
+
+
+def test_below_a_floor_of_0_the_floor_has_no_part_in_the_interval():
+    own = np.linspace(-0.2, 0.6, SCENES)
+    told = [
+        skills_of(columns(relief_correlation=own, other_scene_relief_correlation=floor))
+        for floor in (np.zeros(SCENES), np.linspace(-1.0, 0.5, SCENES))
+    ]
+    first, other = (one["relief_correlation"] for one in told)
+    assert first == other
+    assert first.value == pytest.approx(0.2)
+
+
+def test_rows_without_objects_leave_the_other_skills_as_they_were():
+    """Skills that rest on other rows are resampled apart from them."""
+    rng = np.random.default_rng(0)
+    items = columns(chamfer=rng.random(SCENES))
+    without = {name: np.where(np.arange(SCENES) < 2, np.nan, items[name]) for name in items}
+    some = items | {name: c for name, c in without.items() if "relief" in name or "object" in name}
+    whole, less = skills_of(items), skills_of(some)
+    assert list(whole) == list(less) == list(SKILLED)
+    assert less["chamfer"].low == pytest.approx(whole["chamfer"].low, abs=1e-12)
