@@ -10,7 +10,7 @@ from iqtt.audit import kind_proofs
 from iqtt.audit.kind_proofs import answers_differ, matched, mirror_images
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.matched import contacts, matched_rows
-from iqtt.shapes.polycube import ROTATIONS, mirror
+from iqtt.shapes.polycube import ROTATIONS, is_chiral, mirror
 from iqtt.shapes.splits import known_classes
 from scenegen.common.rotations import rotation_matrix
 
@@ -36,6 +36,14 @@ def test_mirror_images() -> None:
     assert status(mirror_images, [ARM, ARM, IMAGE, NEAR], MIRROR) == "ok"
     assert status(mirror_images, [ARM, ARM, NEAR, IMAGE], MIRROR) == "FAIL"
     assert status(mirror_images, [ARM, ARM, IMAGE, NEAR], PAIR, views) == "FAIL"
+    of_another = [
+        ARM,
+        ARM,
+        NEAR,
+        mirror(NEAR[None])[0],
+    ]  # they mirror each other, not the right one
+    assert is_chiral(NEAR[None]).all()
+    assert status(mirror_images, of_another, PAIR, views) == "FAIL"
     assert status(mirror_images, [ARM, ARM, IMAGE], [-1, 2]) == "ok"
     assert status(mirror_images, [ARM, ARM, NEAR], [-1, 2]) == "FAIL"
     # Where the near shape is right, the mirror image is that of a wrong answer's class: none here.
