@@ -41,7 +41,7 @@ def test_mirror_images() -> None:
         ARM,
         NEAR,
         mirror(NEAR[None])[0],
-    ]  # they mirror each other, not the right one
+    ]  # not of the right one
     assert is_chiral(NEAR[None]).all()
     assert status(mirror_images, of_another, PAIR, views) == "FAIL"
     assert status(mirror_images, [ARM, ARM, IMAGE], [-1, 2]) == "ok"
