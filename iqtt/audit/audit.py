@@ -36,8 +36,8 @@ CAST = 48  # questions whose images are ray-cast again
 EXPLAINED = 2_000  # questions whose wrong answers are laid on the reference
 _BY_CUBES = (
     *("shapes", "one right answer", "answers differ", "mirror images", "matched", "stored ids"),
-    *("splits apart", "splits for ever", "rotations", "angles", "visibility", "cast again"),
-    "one explanation",
+    *("splits apart", "splits for ever", "rotations", "angles", "lines of sight"),
+    *("visibility", "cast again", "one explanation"),
 )
 
 
@@ -191,6 +191,7 @@ def _prove(
         split_proofs.splits_for_ever(told, shapes),
         view_proofs.rotations(told),
         view_proofs.angles(told, shapes),
+        view_proofs.lines_of_sight(told, shapes),
         proofs.visibility(told),
         view_proofs.cast_again(told, shapes, sample),
         explanations.no_other_explanation(told, shapes, _spread(counts, EXPLAINED)),

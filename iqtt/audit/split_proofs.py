@@ -51,7 +51,7 @@ def splits_for_ever(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> P
 
     Tables before format 2.0, whose splits were drawn anew by each seed, are left out.
     """
-    by_hash = [table.format_version is not None and _since_2(table) for table in tables]
+    by_hash = [table.since_format_2 for table in tables]
     if not any(by_hash):
         return Proof(
             "splits for ever", "skipped", "splits were drawn by the seed before format 2.0"
@@ -67,10 +67,6 @@ def splits_for_ever(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> P
             wrong[t][rows] = (owner != SPLITS.index(table.split or "test")).any(axis=1)
     rule = "every class of shapes is in the split that the hash of its canonical form names"
     return judge("splits for ever", rule, tables, wrong, lambda t, row: "a shape of another split")
-
-
-def _since_2(table: AuditTable) -> bool:
-    return int((table.format_version or "0").split(".")[0]) >= 2
 
 
 def class_splits(cubes: Array, chains: bool) -> Array:

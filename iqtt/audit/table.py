@@ -107,6 +107,11 @@ class AuditTable:
         blank = (len(self), self.images, 1, 3)
         return self.truth["cubes"] if self.truth else np.full(blank, NO_CUBE)
 
+    @property
+    def since_format_2(self) -> bool:
+        """Whether the rules of format 2.0 hold: splits by hash, and lines of sight apart."""
+        return int((self.format_version or "0").split(".")[0]) >= 2
+
     def __len__(self) -> int:
         return self.source.count
 

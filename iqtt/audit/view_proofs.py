@@ -1,4 +1,4 @@
-"""Proofs about views: how far they turn, and that images show what the file says.
+"""Proofs about views: how far apart they are, and that images show what the file says.
 
 No code is shared with the generator: rotations are found by a search, and rays are cast in NumPy.
 """
@@ -43,7 +43,7 @@ def rotations(tables: Sequence[AuditTable]) -> Proof:
 def angles(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     """Prove that right answers are turned far enough from the reference, and as far as stored."""
     least = [table.spec.min_angle_degrees if table.spec else 0.0 for table in tables]
-    found = [_angles(table, s) for table, s in zip(tables, shapes, strict=True)]
+    found = [_apart(table, s)[0] for table, s in zip(tables, shapes, strict=True)]
     wrong = []
     for table, s, angle, low in zip(tables, shapes, found, least, strict=True):
         told = np.abs(angle - table.truth["angle_degrees"]) <= STORED_DEGREES
@@ -60,12 +60,39 @@ def angles(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     )
 
 
-def _angles(table: AuditTable, shapes: Shapes) -> Array:
-    """Return the smallest rotation from the reference's view to the right answer's, degrees, (Q,).
+def lines_of_sight(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
+    """Prove that right answers are seen from far enough beside the reference's line of sight.
 
-    It is infinite where there is not exactly one right answer.
+    A line of sight is an axis in the frame of the shape, as the view from behind has the same
+    outline, flipped. Tables before format 2.0 had no such rule.
     """
-    result = np.full(len(table), np.inf)
+    least = [
+        table.spec.min_sight_angle_degrees if table.spec and table.since_format_2 else 0.0
+        for table in tables
+    ]
+    if not any(least):
+        return Proof("lines of sight", "skipped", "no smallest angle is specified")
+    found = [_apart(table, s)[1] for table, s in zip(tables, shapes, strict=True)]
+    return judge(
+        "lines of sight",
+        f"right answers seen from {max(least):g} degrees or more beside the reference's view,"
+        " from the front or from behind",
+        tables,
+        [
+            (s.place >= 0) & ~(angle >= low - LEAST_DEGREES)
+            for s, angle, low in zip(shapes, found, least, strict=True)
+        ],
+        lambda t, row: f"{found[t][row]:.4f} degrees beside it",
+    )
+
+
+def _apart(table: AuditTable, shapes: Shapes) -> Array:
+    """Return how far the right answer's view is from the reference's, degrees, (2, Q).
+
+    First the smallest rotation from one to the other, then the smallest angle between their lines
+    of sight, as axes. Both are infinite where there is not exactly one right answer.
+    """
+    result = np.full((2, len(table)), np.inf)
     for n in np.unique(shapes.count[shapes.place >= 0]).tolist():
         rows = np.flatnonzero((shapes.place >= 0) & (shapes.count == n))
         place = 1 + shapes.place[rows]
@@ -74,13 +101,15 @@ def _angles(table: AuditTable, shapes: Shapes) -> Array:
         reference, target = cubes[rows, 0], cube_codes(cubes[rows, place])
         for turn in cube_rotations():
             # Where this turn takes the stored reference to the stored right answer, the rotation
-            # between the views is: back by the reference's own, this turn, the answer's own.
+            # between the views is: back by the reference's own, this turn, the answer's own. It
+            # leaves the camera's axis, which is z, where it is if both see the shape along a line.
             fits = (cube_codes(reference @ turn.T) == target).all(axis=1)
             some = rows[fits]
             between = views[some, place[fits]] @ turn @ views[some, 0].swapaxes(1, 2)
             far = np.linalg.norm(between - np.eye(3), axis=(1, 2)) / (2 * math.sqrt(2))
-            angle = np.degrees(2 * np.arcsin(np.minimum(far, 1)))
-            result[some] = np.fmin(result[some], angle)
+            angle = 2 * np.arcsin(np.minimum(far, 1))
+            sight = np.arccos(np.minimum(np.abs(between[:, 2, 2]), 1))
+            result[:, some] = np.fmin(result[:, some], np.degrees([angle, sight]))
     return result
 
 

@@ -14,14 +14,23 @@ from polycubes import are_congruent
 from iqtt.audit.audit import audit, question_count, to_json
 from iqtt.audit.report import markdown, table
 from iqtt.files.layout import NO_CUBE
-from iqtt.shapes.polycube import ROTATIONS, canonical, canonical_class, is_chiral, mirror, set_ids
+from iqtt.questions.views import rotation_angle_degrees
+from iqtt.shapes.polycube import (
+    ROTATIONS,
+    canonical,
+    canonical_class,
+    is_chiral,
+    mirror,
+    set_ids,
+    symmetries,
+)
 from scenegen.common.errors import FileFormatError, SpecError
 
 OF_IMAGES = ("answer places", "pixel values", "framing", "distinct images", "distinct questions")
 BY_CUBES = {
     *("shapes", "one right answer", "answers differ", "mirror images", "matched", "stored ids"),
-    *("splits apart", "splits for ever", "rotations", "angles", "visibility", "cast again"),
-    "one explanation",
+    *("splits apart", "splits for ever", "rotations", "angles", "lines of sight"),
+    *("visibility", "cast again", "one explanation"),
 }
 PROOFS = {"content", *OF_IMAGES, *BY_CUBES}
 Edit = Callable[[h5py.File], Any]
@@ -103,6 +112,17 @@ def same_side(file: h5py.File) -> None:
     file["truth/angle_degrees"][1] = 0
 
 
+def from_behind(file: h5py.File) -> None:
+    """Turn the right answer to the reference's view and then by 180 degrees about the vertical."""
+    truth, right = file["truth"], 1 + int(file["answers"][1])
+    set_shape(truth, 1, right, shape(truth, 1, 0))
+    views = truth["world_from_shape"][1]
+    views[right] = np.diag([-1, 1, -1]) @ views[0]
+    truth["world_from_shape"][1] = views
+    turns = symmetries(shape(truth, 1, 0)[None].astype(np.int8))[0]
+    truth["angle_degrees"][1] = rotation_angle_degrees(views[0], views[right], turns)
+
+
 def scaled(image: int, factor: float) -> Callable[[Any], Any]:
     def change(values: Any) -> Any:
         values[image] *= factor
@@ -134,6 +154,7 @@ DAMAGES: list[tuple[str, Edit, str]] = [
     (VAL, changed("truth/visible_pixels", 2, hidden_cube), "visibility, cast again"),
     (VAL, changed("truth/visible_pixels", 2, few_pixels), "visibility, cast again"),
     (VAL, same_side, "angles, cast again"),
+    (VAL, from_behind, "lines of sight, cast again"),
     (VAL, changed("truth/angle_degrees", 4, lambda angle: angle + 0.01), "angles"),
     (VAL, lambda file: turned(file, -1.0), "rotations, ..."),
     (VAL, lambda file: turned(file, 1.001), "rotations, ..."),

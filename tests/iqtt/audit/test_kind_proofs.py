@@ -1,0 +1,98 @@
+"""Proofs of kinds: fair questions pass, and each rule is seen to be broken."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from audit_tables import audit_table
+
+from iqtt.audit import kind_proofs
+from iqtt.audit.kind_proofs import answers_differ, matched, mirror_images
+from iqtt.questions.specs import SplitSpec
+from iqtt.shapes.matched import contacts, matched_rows
+from iqtt.shapes.polycube import ROTATIONS, is_chiral, mirror
+from iqtt.shapes.splits import known_classes
+from scenegen.common.rotations import rotation_matrix
+
+ARM = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 1, 1], [2, 1, 2]], np.int8)
+IMAGE = mirror(ARM[None])[0]
+NEAR = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 1, 1], [3, 1, 1]], np.int8)
+PAIR, MIRROR = [-1, 2, 2], [-1, 2, 1]
+
+
+def about_z(degrees: float) -> Any:
+    half = np.radians(degrees) / 2
+    return rotation_matrix(np.array([np.cos(half), 0, 0, np.sin(half)]))
+
+
+def status(rule: Any, cubes: Any, kinds: Any, views: Any = None) -> str:
+    found = audit_table([cubes], [kinds], None if views is None else np.stack(views)[None])
+    return str(rule([found[0]], [found[1]]).status)
+
+
+def test_mirror_images() -> None:
+    views = [np.eye(3)] * 3 + [about_z(50)]
+    assert status(mirror_images, [ARM, ARM, IMAGE, IMAGE], PAIR, views) == "ok"
+    assert status(mirror_images, [ARM, ARM, IMAGE, NEAR], MIRROR) == "ok"
+    assert status(mirror_images, [ARM, ARM, NEAR, IMAGE], MIRROR) == "FAIL"
+    assert status(mirror_images, [ARM, ARM, IMAGE, NEAR], PAIR, views) == "FAIL"
+    of_another = [
+        ARM,
+        ARM,
+        NEAR,
+        mirror(NEAR[None])[0],
+    ]  # not of the right one
+    assert is_chiral(NEAR[None]).all()
+    assert status(mirror_images, of_another, PAIR, views) == "FAIL"
+    assert status(mirror_images, [ARM, ARM, IMAGE], [-1, 2]) == "ok"
+    assert status(mirror_images, [ARM, ARM, NEAR], [-1, 2]) == "FAIL"
+    # Where the near shape is right, the mirror image is that of a wrong answer's class: none here.
+    assert status(mirror_images, [NEAR, NEAR, ARM, IMAGE], [-1, 1, 2]) == "ok"
+
+
+def test_two_mirror_images_from_two_sides() -> None:
+    least = SplitSpec().min_angle_degrees
+    for apart, expected in ((least - 0.01, "FAIL"), (least + 0.01, "ok")):
+        turned = IMAGE @ ROTATIONS[5].T  # another frame makes no difference
+        views = [np.eye(3), np.eye(3), np.eye(3), about_z(apart) @ ROTATIONS[5].T]
+        assert status(mirror_images, [ARM, ARM, IMAGE, turned], PAIR, views) == expected
+
+
+def test_answers_differ() -> None:
+    assert status(answers_differ, [ARM, ARM, IMAGE, IMAGE], PAIR) == "ok"
+    assert status(answers_differ, [ARM, ARM, NEAR, NEAR], [-1, 1, 1]) == "FAIL"
+    assert status(answers_differ, [ARM, ARM, ARM @ ROTATIONS[3].T, NEAR], [-1, 2, 2]) == "FAIL"
+
+
+def test_matched() -> None:
+    pool = known_classes(9, "chain", 3.5)
+    row = next(iter(matched_rows(pool)))
+    first, one, two = pool[row[:3]]
+    kinds = [-1, 3, 3]
+    assert status(matched, [first, first, one, two], kinds) == "ok"
+    box = np.sort(np.ptp(pool, axis=1), axis=1)
+    same_box = (box == np.sort(np.ptp(first, axis=0))).all(axis=1)
+    touching = contacts(pool) == contacts(first[None])
+    radii = kind_proofs._gyration_radii(pool.astype(float))
+    far = np.linalg.norm(radii - kind_proofs._gyration_radii(first.astype(float)), axis=1)
+    for group in (
+        same_box & touching & (far > kind_proofs.GYRATION + 1e-3),
+        same_box & ~touching & (far < kind_proofs.GYRATION),
+        ~same_box & touching & (far < kind_proofs.GYRATION),
+    ):
+        other = pool[np.flatnonzero(group)[0]]
+        assert status(matched, [first, first, other, two], kinds) == "FAIL"
+        assert status(matched, [first, first, other, two], [-1, 0, 3]) == "ok"
+
+
+def test_radii_of_gyration_of_a_rod() -> None:
+    """A rod of n unit cubes has the moments of a solid box of sides n, 1 and 1."""
+    rod = np.array([[k, 0, 0] for k in range(4)], float)
+    expected = np.sqrt(np.array([1, 1, 16]) / 12)
+    np.testing.assert_allclose(kind_proofs._gyration_radii(rod), expected, atol=1e-12)
+
+
+def test_unknown_shapes_are_not_judged() -> None:
+    table, shapes = audit_table([[ARM, ARM, NEAR, NEAR]], [[-1, 1, 1]])
+    blind = replace(shapes, whole=np.zeros(1, np.bool_))
+    assert answers_differ([table], [blind]).status == "ok"

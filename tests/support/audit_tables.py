@@ -1,0 +1,57 @@
+"""Tables of questions as the audit reads them, made from cubes and views without any file."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from iqtt.audit.shape_proofs import Shapes, compare_shapes
+from iqtt.audit.table import AuditTable, Source
+from iqtt.questions.specs import SplitSpec
+
+
+def audit_table(
+    cubes: Any,
+    kinds: Any,
+    views: Any = None,
+    spec: SplitSpec | None = None,
+    split: str = "test",
+    version: str = "2.0",
+) -> tuple[AuditTable, Shapes]:
+    """Return a table of questions without images, and what its cubes say.
+
+    Args:
+        cubes: (Q, 1 + K, n, 3).
+        kinds: `distractor_kind` of the answers, (Q, K).
+        views: world_from_shape, (Q, 1 + K, 3, 3); the identity by default.
+    """
+    cubes = np.asarray(cubes, np.int8)
+    count, images = cubes.shape[:2]
+    spec = spec or SplitSpec()
+    truth = {
+        "cubes": cubes,
+        "distractor_kind": np.asarray(kinds),
+        "world_from_shape": np.tile(np.eye(3), (count, images, 1, 1)) if views is None else views,
+        "camera_distance": np.full(count, spec.camera_distance),
+    }
+    none = np.zeros((count, images))
+    table = AuditTable(
+        source=Source(split, Path(split), "", None, True, count, images),
+        spec=spec,
+        split=split,
+        fingerprint=None,
+        format_version=version,
+        image_dtype="uint8",
+        answers=None,
+        truth=truth,
+        contents={},
+        truth_changed=False,
+        background=np.full(3, 255),
+        measured=np.zeros(0, np.int64),
+        digests=none,
+        silhouette=none,
+        on_border=none,
+        unfit=none,
+        statistics=none,
+    )
+    return table, compare_shapes([table])[0]
