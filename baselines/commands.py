@@ -23,22 +23,22 @@ from scenegen.common.paths import InputPath, OutputFolder
 UNTRAINED = {
     "constant": "one depth everywhere, the mean of the training rooms",
     "mean-depth": "the mean depth of the training rooms at each pixel",
-    "empty-room": "the room's walls and floor, which it is told, without objects",
+    "empty-room": "the room's walls and floor, which it is told; no objects",
     "oracle": "the truth itself, which must score perfectly",
     "chance": "random answers to questions",
-    "outline": "answers to questions: the nearest outline, without any label or 3D",
-    "outline-trees": "answers to questions: trees on features of outlines, learned from --train",
+    "outline": "questions: the nearest outline, without labels or 3D",
+    "outline-trees": "questions: trees on outline features, learned from --train",
     "pix2shape": "the reference model, which `pix2shape train` trains",
 }
 # Packages `baselines.<name>`, - written as _, whose functions `train` and `write_submission` make
 # a baseline that is trained with `bench train NAME`. A new one is a line here.
 TRAINED = {
-    "cnn": "answers to questions: ResNets and a softmax over the answers",
-    "depth-supervised": "rooms by a network that was trained with true depth: a ceiling",
-    "ptn": "voxels by Perspective Transformer Nets: rooms, and answers to questions",
-    "rezende": "answers to questions: meshes from images, through a renderer without gradients",
-    "siamese": "answers to questions: the one whose features are nearest to the reference's",
-    "view-pairs": "rooms by a network that was trained with two images of each scene, no depth",
+    "cnn": "questions: ResNets and a softmax over the answers",
+    "depth-supervised": "rooms: a network trained with true depth, as a ceiling",
+    "ptn": "rooms and questions: voxels, learned from silhouettes",
+    "rezende": "questions: meshes, by a renderer without gradients",
+    "siamese": "questions: the answer whose features are nearest",
+    "view-pairs": "rooms: a network trained with pairs of images, no depth",
 }
 ALL = {**UNTRAINED, **TRAINED}
 

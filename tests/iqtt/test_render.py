@@ -60,8 +60,8 @@ def look(spec: SplitSpec, one: Rendered, k: int) -> tuple[np.ndarray, np.ndarray
     turn = np.eye(4)
     turn[:3, :3] = one.question.world_from_shape[k]
     mesh.apply_translation(-box_centre(cubes[None])[0]).apply_transform(turn)
-    rays = pixel_directions(spec.height, spec.width, spec.camera.fov_y_degrees).reshape(-1, 3)
-    eye = np.array([0.0, 0.0, spec.camera_distance])
+    rays = pixel_directions(spec.height, spec.width, spec.fov_y_degrees).reshape(-1, 3)
+    eye = np.array([0.0, 0.0, one.question.camera_distance])
     points, hit, faces = RayMeshIntersector(mesh).intersects_location(
         np.broadcast_to(eye, rays.shape), rays, multiple_hits=False
     )
