@@ -5,6 +5,7 @@ Python code can stop it; so a process that may be killed looks at everything tha
 `input_file` before: names, attributes, texts, and where chunks lie.
 """
 
+import math
 import os
 import signal
 import subprocess
@@ -13,8 +14,9 @@ from pathlib import Path
 
 from scenegen.common.errors import FileFormatError
 
-SECONDS = 8.0  # for any file
-BYTES_A_SECOND = 20e6  # that a slow disk and honest content take beyond that
+SECONDS = 8.0  # of a processor, for any file
+BYTES_A_SECOND = 20e6  # that honest content takes beyond that
+PATIENCE = 10  # by how much longer it may take by the clock, on a busy machine or a slow disk
 MEMORY = 2**31  # bytes of address space, beyond what Python takes
 BLOCK_ROWS = 1024  # of texts, read at once
 OUT_OF_MEMORY = 3  # exit code
@@ -38,7 +40,7 @@ def try_file(path: str | Path) -> None:
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     # -P: a file h5py.py in the working directory must not be imported.
     command = [sys.executable, "-P", "-m", __name__, os.path.abspath(path)]
-    command += [str(MEMORY), str(int(limit) + 1)]
+    command += [str(MEMORY), str(math.ceil(limit)), str(math.ceil(PATIENCE * limit) + 1)]
     try:
         done = subprocess.run(
             command,
@@ -46,11 +48,17 @@ def try_file(path: str | Path) -> None:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            timeout=limit,
+            timeout=PATIENCE * limit,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise _refusal(path, f"a structure that HDF5 had not read after {limit:.0f} s") from None
+        waited = f"a structure that HDF5 had not read after {PATIENCE * limit:.0f} s"
+        raise FileFormatError(
+            path, waited, "a file as h5py writes it", "broken, or the machine is very busy"
+        ) from None
+    if hasattr(signal, "SIGXCPU") and done.returncode == -signal.SIGXCPU:
+        spent = f"{math.ceil(limit)} s of a processor"
+        raise _refusal(path, f"a structure that HDF5 had not read after {spent}")
     if done.returncode == OUT_OF_MEMORY:
         raise _refusal(path, "texts or attributes that take more than 2 GiB of memory")
     if done.returncode < 0:
@@ -76,7 +84,7 @@ def _is_hdf5(path: str | Path) -> bool:
     return False
 
 
-def _read_structure(path: str, memory: int) -> None:
+def _read_structure(path: str, memory: int, seconds: int) -> None:
     """Read everything of a file but the values that are numbers; the child alone loads h5py.
 
     Errors of HDF5 are left to the caller, who will meet and tell them, but for those of memory.
@@ -95,7 +103,7 @@ def _read_structure(path: str, memory: int) -> None:
                     item[first : first + BLOCK_ROWS]
 
     if os.path.exists("/proc/self/statm"):
-        _limit_memory(memory)
+        _limit(memory, seconds)
     try:
         with h5py.File(path, "r") as file:
             dict(file.attrs)
@@ -106,14 +114,16 @@ def _read_structure(path: str, memory: int) -> None:
             sys.exit(OUT_OF_MEMORY)
 
 
-def _limit_memory(most: int) -> None:
+def _limit(memory: int, seconds: int) -> None:
+    """Let this process take so much more memory, and so many seconds of a processor in all."""
     import resource
 
-    most += int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    memory += int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
 
 
 if __name__ == "__main__":
     if hasattr(signal, "alarm"):
-        signal.alarm(int(sys.argv[3]))  # ends this process where its parent was killed
-    _read_structure(sys.argv[1], int(sys.argv[2]))
+        signal.alarm(int(sys.argv[4]))  # ends this process where its parent was killed
+    _read_structure(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
