@@ -122,11 +122,11 @@ def question_loss(codes: Tensor, answers: Tensor) -> Tensor:
     """Return the paper's L_theta (equation "app-loss") for labelled mental-rotation questions.
 
     It is half the squared distance between the codes of reference and right answer, minus half the
-    squared distances between the reference and the two wrong answers.
+    squared distances between the reference and the wrong answers.
 
     Args:
-        codes: z_scene of reference and three answers, (Q, 4, n).
-        answers: which of the three is right, (Q,) integers.
+        codes: z_scene of reference and K answers, (Q, 1 + K, n).
+        answers: which of them is right, (Q,) integers.
     """
     squared = squared_distances(codes)
     right = squared.gather(1, answers[:, None]).squeeze(1)
@@ -136,26 +136,26 @@ def question_loss(codes: Tensor, answers: Tensor) -> Tensor:
 def contrast_loss(codes: Tensor, answers: Tensor) -> Tensor:
     """Return how badly a reference's code tells its own answers from other questions' ones, nats.
 
-    One of a question's three answers shows the reference's shape, and hardly any answer of another
+    One of a question's answers shows the reference's shape, and hardly any answer of another
     question does. So among all answers of a batch, the nearest to the reference should be one of
-    its own three. That needs no label; where the right answer is told, it alone counts as own.
+    its own. That needs no label; where the right answer is told, it alone counts as own.
     This is MIL-NCE (Miech et al. 2020, "End-to-End Learning of Visual Representations").
 
     Args:
-        codes: z_scene of reference and three answers, standardised, (Q, 4, n).
-        answers: which of the three is right, (Q,) integers; -1 where that is not known.
+        codes: z_scene of reference and K answers, standardised, (Q, 1 + K, n).
+        answers: which of them is right, (Q,) integers; -1 where that is not known.
     """
-    count, _, n = codes.shape
+    count, offered, n = len(codes), codes.shape[1] - 1, codes.shape[2]
     everyone = codes[:, 1:].reshape(-1, n)
     squared = (codes[:, 0, None] - everyone).square().mean(dim=2)
-    likeness = -squared / TEMPERATURE  # (Q, 3 Q)
-    place = torch.arange(3 * count, device=codes.device)
-    own = place // 3 == torch.arange(count, device=codes.device)[:, None]
-    own &= (answers[:, None] < 0) | (place % 3 == answers[:, None])
+    likeness = -squared / TEMPERATURE  # (Q, K Q)
+    place = torch.arange(offered * count, device=codes.device)
+    own = place // offered == torch.arange(count, device=codes.device)[:, None]
+    own &= (answers[:, None] < 0) | (place % offered == answers[:, None])
     nearest = torch.logsumexp(likeness.masked_fill(~own, -torch.inf), dim=1)
     return (torch.logsumexp(likeness, dim=1) - nearest).mean()
 
 
 def squared_distances(codes: Tensor) -> Tensor:
-    """Return squared distances between reference and answers: codes (Q, 4, n) -> (Q, 3)."""
+    """Return squared distances between reference and answers: codes (Q, 1 + K, n) -> (Q, K)."""
     return ((codes[:, 1:] - codes[:, :1]) ** 2).sum(dim=2)

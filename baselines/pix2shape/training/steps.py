@@ -77,8 +77,8 @@ def generator_step(
     """Return what encoder and decoder minimise, and the losses by name.
 
     Args:
-        asked: four images for each of Q questions, and which answers are right, (Q,); -1 for a
-            question without a label.
+        asked: the images of Q questions, one after the other, and which answers are right, (Q,);
+            -1 for a question without a label.
     """
     config, views = model.config, batch.views
     code = model.encode(batch.image, views)
@@ -118,7 +118,7 @@ def generator_step(
     if asked is not None:
         images, answers = asked
         scene = model.encode(images.image, images.views)[:, : config.networks.z_scene]
-        codes, known = scene.view(-1, 4, scene.shape[1]), answers >= 0
+        codes, known = scene.view(len(answers), -1, scene.shape[1]), answers >= 0
         if config.questions and known.any():
             numbers["questions"] = losses.question_loss(codes[known], answers[known])
         if config.contrast:

@@ -132,11 +132,12 @@ def answer_file(
     with open_questions(data) as questions:
         check_reducible(data, questions.height, questions.width, spec.size)
         scores = []
-        for rows in _batches(len(questions), 4):
+        images = 1 + questions.answers
+        for rows in _batches(len(questions), images):
             stored = [questions.read("questions", int(row)) for row in rows]
-            image = _stacked(np.concatenate([decode_image(four) for four in stored]), model)
+            image = _stacked(np.concatenate([decode_image(one) for one in stored]), model)
             codes = model.encoder(image, image.new_empty(len(image), 0))[:, : spec.z_scene]
-            distance = squared_distances(codes.view(len(rows), 4, -1)).sqrt()
+            distance = squared_distances(codes.view(len(rows), images, -1)).sqrt()
             scores.append(-distance.cpu().double().numpy())
             progress(len(rows), len(questions))
     found = np.concatenate(scores)

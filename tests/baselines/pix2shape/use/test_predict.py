@@ -9,7 +9,9 @@ import pytest
 from h5_edits import damaged_chunk, gone, put, values
 from pix2shape_models import edited, made, of_questions, of_rows, released, tiny, told, written
 
+from iqtt.files.make import make_split
 from iqtt.files.reader import open_questions
+from iqtt.questions.specs import SplitSpec
 from metrics.scoring.evaluate import score
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
@@ -245,6 +247,16 @@ def test_the_nearest_scene_is_the_answer(answerer, truths, tmp_path):
     assert done == [(1, 6)] * 6
     assert [p for p in validate(tmp_path / "a.h5") if not p.is_hint] == []
     assert score([tmp_path / "a.h5"]).method == "pix2shape"
+
+
+def test_questions_may_have_two_answers(answerer, tmp_path):
+    numbers = {"train": 0, "labeled": 0, "val": 0, "test": 5, "min_cube_pixels": 3}
+    spec = SplitSpec(**numbers, height=64, width=64, distractors="mirror-pair", answers=2)
+    make_split(tmp_path / "two", spec)
+    path = tmp_path / "two" / "iqtt-test.h5"
+    _, scores = answered(answerer, path, tmp_path / "a.h5")
+    np.testing.assert_allclose(scores, -distances(answerer, path), rtol=1e-4)
+    assert scores.shape == (5, 2)
 
 
 def test_the_view_has_no_say(answerer, truths, tmp_path):
