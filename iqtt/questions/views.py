@@ -1,4 +1,4 @@
-"""The views of a question: rotations under which every cube shows, and the lights of each image."""
+"""The views of a question: rotations under which every cube shows, far enough from each other."""
 
 import itertools
 import math
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.questions.distractors import Pools, Shapes, arrange, draw_shapes, question_key
+from iqtt.questions.lights import draw_lights
 from iqtt.questions.packing import Question, cube_centres, pack_views
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.polycube import MAX_CUBES, ROTATIONS, bounding_radius, mirror, symmetries
@@ -27,9 +28,6 @@ PROPOSED = 2  # least number of views of one image that are judged at once
 PROPOSALS_AT_ONCE = 256  # views of all images that are judged at once, roughly
 QUESTION_ATTEMPTS = 50  # choices of shapes for one question
 CROWDED = 10  # from so many cubes on, a shape may well have no view that shows them all
-LIGHT_DISTANCE = 4  # camera distances from a light to the origin: near parts are hardly brighter
-# Cosines of the angles to the camera of the first light and of the others.
-FIRST_LIGHT, OTHER_LIGHTS = (0.7, 0.9), (0.0, 0.8)
 
 
 @dataclass
@@ -327,29 +325,3 @@ def draw_rotations(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
     """Draw rotations that are uniform on SO(3), (*shape, 3, 3)."""
     quaternion = rng.standard_normal((4, *shape))
     return rotation_matrix(quaternion / np.sqrt((quaternion * quaternion).sum(axis=0)))
-
-
-def draw_lights(
-    spec: SplitSpec, rng: np.random.Generator, images: int, camera_distance: float
-) -> tuple[Array, Array, Array]:
-    """Draw light positions and colours, (images, L, 3) each, and their numbers, (images,).
-
-    They are far away, on the camera's side, in uniform directions within bounds: the first at an
-    angle of 26 to 46 degrees to the camera, so that most of what it sees is lit and the faces of a
-    cube differ; the others at 37 to 90 degrees, on the other side of the camera. Unused slots
-    are zero.
-    """
-    most, distance = spec.lights[1], LIGHT_DISTANCE * camera_distance
-    count = rng.integers(spec.lights[0], most, images, endpoint=True)
-    # A uniform z and a uniform angle about the z axis are uniform on a zone of the sphere.
-    z = rng.uniform(*OTHER_LIGHTS, (images, most))
-    z[:, 0] = rng.uniform(*FIRST_LIGHT, images)
-    around = rng.uniform(0.0, 2 * math.pi, (images, most))
-    around[:, 1:] = around[:, :1] + math.pi / 2 + around[:, 1:] / 2
-    r = np.sqrt(1 - z * z)
-    direction = np.stack([r * np.cos(around), r * np.sin(around), z], axis=2)
-    color = rng.uniform(0.3, 1.0, (images, most, 3))
-    level = spec.light_level * distance**2 / count
-    color *= level[:, None, None] / color.max(axis=2, keepdims=True)
-    used = (np.arange(most) < count[:, None])[..., None]
-    return np.where(used, distance * direction, 0.0), np.where(used, color, 0.0), count

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from iqtt.questions.lights import LIGHT_DISTANCE
 from iqtt.questions.specs import (
     DISTRACTOR_KINDS,
     QUESTION_KINDS,
@@ -17,7 +18,6 @@ from iqtt.questions.specs import (
     preset_spec,
     question_kind,
 )
-from iqtt.questions.views import LIGHT_DISTANCE
 from scenegen.camera import intrinsics
 from scenegen.common.errors import SpecError
 
