@@ -91,7 +91,9 @@ def skills(
             name, value = group[k], values[k]
             assert value is not None
             column = SKILLED[name] + name
-            found[name] = Skill(value, known(low), known(high), float(floor[k]), column)
+            # The ends belong to the value but for rounding; min and max keep what is not a number.
+            span = known(min(low, value)), known(max(high, value))
+            found[name] = Skill(value, *span, float(floor[k]), column)
     return {name: found[name] for name in names if name in found}
 
 
