@@ -34,11 +34,18 @@ KNOWN_TESTS = (
         "scenegen render --n 8 --size 48 --out rooms.h5",
     ),
     KnownTest(
-        "1,000 rooms of the README",
+        "1,000 rooms, seed 1000",
         "rooms",
         "872faa79bffeaf8cd5e103b303586fe188d642d7746d98c6bf0b55d0191b4c20",
         1000,
         "scenegen render --n 1000 --seed 1000",
+    ),
+    KnownTest(
+        "300 rooms of the README",
+        "rooms",
+        "6db10483ae3f48792f0c64639823c02498cc90a8cf8ff50ffaf7475bee2f3861",
+        1500,
+        "scenegen render --preset shapes --views 0,5,35,55,80 --n 300 --seed 1000 --size 64",
     ),
     KnownTest(
         "test-shapes-single",
