@@ -1,7 +1,7 @@
 """Answers by outlines: the nearest one, without any label, or what trees learn from labels.
 
-Both see the silhouettes of `iqtt.audit.outlines` and nothing else, so they know neither cubes nor
-rotations. What they reach on a kind of questions is its floor.
+Both see the silhouettes of `iqtt.audit.features.outlines` and nothing else, so they know neither
+cubes nor rotations. What they reach on a kind of questions is its floor.
 """
 
 from collections.abc import Callable
@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit.outlines import nearest_outline, outlines
-from iqtt.audit.statistics import border_color, silhouettes
-from iqtt.audit.trees import AnswerTrees, next_to_reference
+from iqtt.audit.features.outlines import nearest_outline, outlines
+from iqtt.audit.features.statistics import border_color, silhouettes
+from iqtt.audit.probes.trees import AnswerTrees, next_to_reference
 from iqtt.files.reader import QuestionsFile, open_questions, parts
 from metrics.prediction_writer import write_answers
 from scenegen.common.errors import SpecError
@@ -31,7 +31,7 @@ class Outlines:
     """The outlines of Q questions with K answers each.
 
     Attributes:
-        features: (Q, 1 + K, D), as `iqtt.audit.outlines.outlines` gives them.
+        features: (Q, 1 + K, D), as `iqtt.audit.features.outlines.outlines` gives them.
         distances: between any two images of a question, (Q, 1 + K, 1 + K, P).
     """
 

@@ -13,19 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit import (
-    explanations,
-    kind_proofs,
-    proofs,
-    shape_proofs,
-    split_proofs,
-    view_proofs,
-)
-from iqtt.audit.frames import stored_frames
-from iqtt.audit.probes import Evidence, Probe, run_probes
-from iqtt.audit.proofs import Proof
-from iqtt.audit.shape_proofs import Shapes
-from iqtt.audit.statistics import SHAPE_STATISTICS, shape_statistics
+from iqtt.audit.features.frames import stored_frames
+from iqtt.audit.features.statistics import SHAPE_STATISTICS, shape_statistics
+from iqtt.audit.probes.rules import Evidence, Probe, run_probes
+from iqtt.audit.proofs import explanations, images, kinds, splits, views
+from iqtt.audit.proofs import shapes as shape_proofs
+from iqtt.audit.proofs.shapes import Shapes
+from iqtt.audit.proofs.verdict import Proof
 from iqtt.audit.table import AuditTable, find_tables, lacking, read_table
 from scenegen.common.hdf5.row_file import writer_name
 
@@ -167,12 +161,12 @@ def _prove(
 ) -> list[Proof]:
     """Run all proofs; right: positions of the right answers, (Q,) each, -1 where unknown."""
     found = [
-        proofs.content(tables),
-        proofs.balance(tables, right),
-        proofs.values(tables),
-        proofs.framing(tables),
-        proofs.distinct_images(tables),
-        proofs.distinct_questions(tables),
+        images.content(tables),
+        images.balance(tables, right),
+        images.values(tables),
+        images.framing(tables),
+        images.distinct_images(tables),
+        images.distinct_questions(tables),
     ]
     told = [table for table in tables if table.truth]
     shapes = [one for table, one in zip(tables, shapes, strict=True) if table.truth]
@@ -183,17 +177,17 @@ def _prove(
     by_cubes = [
         shape_proofs.whole_shapes(told, shapes),
         shape_proofs.one_right_answer(told, shapes),
-        kind_proofs.answers_differ(told, shapes),
-        kind_proofs.mirror_images(told, shapes),
-        kind_proofs.matched(told, shapes),
+        kinds.answers_differ(told, shapes),
+        kinds.mirror_images(told, shapes),
+        kinds.matched(told, shapes),
         shape_proofs.stored_ids(told, shapes),
-        split_proofs.splits_share_nothing(told, shapes),
-        split_proofs.splits_for_ever(told, shapes),
-        view_proofs.rotations(told),
-        view_proofs.angles(told, shapes),
-        view_proofs.lines_of_sight(told, shapes),
-        proofs.visibility(told),
-        view_proofs.cast_again(told, shapes, sample),
+        splits.splits_share_nothing(told, shapes),
+        splits.splits_for_ever(told, shapes),
+        views.rotations(told),
+        views.angles(told, shapes),
+        views.lines_of_sight(told, shapes),
+        images.visibility(told),
+        views.cast_again(told, shapes, sample),
         explanations.no_other_explanation(told, shapes, _spread(counts, EXPLAINED)),
     ]
     untold = [table.name for table in tables if not table.truth]

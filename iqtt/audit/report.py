@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from iqtt.audit.audit import Audit
-from iqtt.audit.probes import ERROR_RATE, FRAMES, LIGHT, MIRRORED, OUTLINE, WITHOUT, Probe
+from iqtt.audit.probes.rules import ERROR_RATE, FRAMES, LIGHT, MIRRORED, OUTLINE, WITHOUT, Probe
 from scenegen.common.text_table import aligned, piped, printable
 
 _BLOCKS = (

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit.statistics import border, border_color, measure, silhouettes
+from iqtt.audit.features.statistics import border, border_color, measure, silhouettes
 from iqtt.files.layout import NO_CUBE, SCORED
 from iqtt.files.reader import QuestionsFile, answers_beside, parts
 from iqtt.questions.specs import SplitSpec

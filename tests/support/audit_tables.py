@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from iqtt.audit.shape_proofs import Shapes, compare_shapes
+from iqtt.audit.proofs.shapes import Shapes, compare_shapes
 from iqtt.audit.table import AuditTable, Source
 from iqtt.questions.specs import SplitSpec
 

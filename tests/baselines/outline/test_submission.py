@@ -11,7 +11,7 @@ from baselines.outline.submission import (
     write_outline,
     write_outline_trees,
 )
-from iqtt.audit.outlines import DISTANCES, FEATURES, RINGS, outlines
+from iqtt.audit.features.outlines import DISTANCES, FEATURES, RINGS, outlines
 from scenegen.common.errors import SpecError
 
 

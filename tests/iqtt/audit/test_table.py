@@ -8,7 +8,7 @@ import pytest
 from h5_edits import attribute, gone
 from refusals import refused
 
-from iqtt.audit.proofs import content
+from iqtt.audit.proofs.images import content
 from iqtt.audit.table import content_problems, find_tables, read_table
 from iqtt.files.reader import AnswersFile
 from scenegen.common.errors import FileFormatError

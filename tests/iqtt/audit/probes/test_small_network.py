@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from iqtt.audit.small_network import SmallNetwork
+from iqtt.audit.probes.small_network import SmallNetwork
 
 
 def pictures(count: int, seed: int = 0) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from audit_tables import audit_table
 
-from iqtt.audit.split_proofs import class_splits, is_walk, splits_for_ever, splits_share_nothing
+from iqtt.audit.proofs.splits import class_splits, is_walk, splits_for_ever, splits_share_nothing
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.chains_and_trees import Kind
 from iqtt.shapes.polycube import ROTATIONS, canonical_class, mirror
@@ -64,7 +64,7 @@ def test_every_shape_is_in_its_split() -> None:
 
 
 def test_shapes_in_two_splits() -> None:
-    from iqtt.audit.shape_proofs import compare_shapes
+    from iqtt.audit.proofs.shapes import compare_shapes
 
     classes = known_classes(8, "chain", 3.5)
     first, second = question_of(classes[:3], "train")[0], question_of(classes[3:6], "test")[0]

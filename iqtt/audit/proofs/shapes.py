@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.audit.congruence import congruent_rows, name_shapes, row_keys
-from iqtt.audit.proofs import Proof, judge
+from iqtt.audit.proofs.verdict import Proof, judge
 from iqtt.audit.table import AuditTable
 from iqtt.files.layout import NO_CUBE
 

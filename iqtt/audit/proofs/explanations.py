@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.audit.congruence import cube_codes, cube_rotations
-from iqtt.audit.proofs import Proof, judge
-from iqtt.audit.shape_proofs import Shapes
+from iqtt.audit.proofs.shapes import Shapes
+from iqtt.audit.proofs.verdict import Proof, judge
 from iqtt.audit.table import AuditTable
 from iqtt.questions.specs import SplitSpec
 from scenegen.camera import pixel_directions

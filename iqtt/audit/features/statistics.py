@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit.outlines import DISTANCES, FEATURES, outlines
+from iqtt.audit.features.outlines import DISTANCES, FEATURES, outlines
 from iqtt.files.layout import NO_CUBE
 from scenegen.rendering.ground_truth import decode_image
 
@@ -181,7 +181,7 @@ def shape_statistics(
 
     Args:
         cubes: for each table its cubes, (Q, 1 + K, most, 3), as stored.
-        class_names, whole: for each table, as in `shape_proofs.Shapes`.
+        class_names, whole: for each table, as in `proofs.shapes.Shapes`.
     """
     everything = np.concatenate([names[:, 1:].reshape(-1) for names in class_names])
     names, times = np.unique(everything, return_counts=True)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from polycubes import some_shapes
 
-from iqtt.audit.shape_proofs import compare_shapes
-from iqtt.audit.statistics import measure, shape_statistics, silhouettes
-from iqtt.audit.view_proofs import angles
+from iqtt.audit.features.statistics import measure, shape_statistics, silhouettes
+from iqtt.audit.proofs.shapes import compare_shapes
+from iqtt.audit.proofs.views import angles
 from iqtt.files.layout import NO_CUBE
 from iqtt.questions.views import draw_rotations, rotation_angle_degrees
 from iqtt.shapes.polycube import ROTATIONS, mirror, symmetries

@@ -9,9 +9,18 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from iqtt.audit import probes
-from iqtt.audit.probes import FRAMES, LIGHT, MIRRORED, OUTLINE, WITHOUT, Evidence, Probe, run_probes
-from iqtt.audit.statistics import SHAPE_STATISTICS, statistics_record
+from iqtt.audit.features.statistics import SHAPE_STATISTICS, statistics_record
+from iqtt.audit.probes import rules
+from iqtt.audit.probes.rules import (
+    FRAMES,
+    LIGHT,
+    MIRRORED,
+    OUTLINE,
+    WITHOUT,
+    Evidence,
+    Probe,
+    run_probes,
+)
 
 
 def fair(seed: int, count: int = 300, answers: int = 3, **changes: Any) -> Evidence:
@@ -55,7 +64,7 @@ def changed(evidence: Evidence, name: str, values: Any) -> Evidence:
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out what is learned by forests."""
-    monkeypatch.setattr(probes, "LEAST_QUESTIONS", 10**9)
+    monkeypatch.setattr(rules, "LEAST_QUESTIONS", 10**9)
 
 
 @pytest.mark.usefixtures("quick")
@@ -139,7 +148,7 @@ def test_places_that_can_be_foretold(places: Any, rule: str) -> None:
 
 
 def test_places_are_learned_from_other_questions() -> None:
-    learned = probes.likely_places(np.array([1, 2, 1, 2, 1, 2]), np.array([0, 1, 2, 3, 4, 4]), 3)
+    learned = rules.likely_places(np.array([1, 2, 1, 2, 1, 2]), np.array([0, 1, 2, 3, 4, 4]), 3)
     assert learned.tolist() == [0, 0, 0, 0, 2, 1]
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from audit_tables import audit_table
 
-from iqtt.audit.explanations import no_other_explanation
-from iqtt.audit.proofs import Proof
+from iqtt.audit.proofs.explanations import no_other_explanation
+from iqtt.audit.proofs.verdict import Proof
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.polycube import ROTATIONS
 from scenegen.common.rotations import rotation_matrix

@@ -1,56 +1,17 @@
-"""Proofs about answers and images, from what `table` read; and how any proof is judged."""
+"""Proofs about images, the places of right answers, and digests, from what `table` read."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from iqtt.audit.proofs.verdict import Proof, judge
 from iqtt.audit.table import AuditTable, content_problems
 from iqtt.files.layout import NO_CUBE
 from scenegen.rendering.ground_truth import encode_image
 
 Array = NDArray[Any]
-SHOWN = 3  # questions that the detail of a proof names
-
-
-@dataclass(frozen=True)
-class Proof:
-    """A rule and whether all questions keep it; `detail` says what was expected and found."""
-
-    name: str
-    status: Literal["ok", "FAIL", "skipped"]
-    detail: str
-
-
-def judge(
-    name: str,
-    rule: str,
-    tables: Sequence[AuditTable],
-    wrong: Sequence[ArrayLike],
-    found: Callable[[int, int], str],
-    looked: int | None = None,
-) -> Proof:
-    """Return the verdict on a rule that each question must keep.
-
-    Args:
-        rule: what is expected, in words.
-        wrong: for each table which questions break the rule, (Q,) bool.
-        found: returns, for a (table, row) that breaks it, what was found there, in words.
-        looked: number of questions that were looked at, if not all.
-    """
-    total = f"{sum(map(len, tables)):,}"
-    total = total if looked is None else f"{looked:,} of {total}"
-    broken = [(t, row) for t, mask in enumerate(wrong) for row in np.flatnonzero(mask).tolist()]
-    if not broken:
-        return Proof(name, "ok", f"{rule} ({total} questions)")
-    named = [f"{tables[t].name} row {row}: {found(t, row)}" for t, row in broken[:SHOWN]]
-    more = f" and {len(broken) - SHOWN:,} more" if len(broken) > SHOWN else ""
-    text = "; ".join(named) + more
-    return Proof(
-        name, "FAIL", f"{text}; expected: {rule} ({len(broken):,} of {total} questions fail)"
-    )
 
 
 def balance(tables: Sequence[AuditTable], right: Sequence[Array]) -> Proof:

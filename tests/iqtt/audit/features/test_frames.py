@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from iqtt.audit.frames import stored_frames
+from iqtt.audit.features.frames import stored_frames
 from iqtt.files.layout import NO_CUBE
 from iqtt.shapes.polycube import ROTATIONS
 from scenegen.common.rotations import rotation_matrix

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from iqtt.audit.trees import AnswerTrees, among_others, choose, next_to_reference
+from iqtt.audit.probes.trees import AnswerTrees, among_others, choose, next_to_reference
 
 
 def noise(seed: int, *shape: int) -> np.ndarray:

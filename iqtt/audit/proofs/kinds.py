@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.audit.congruence import cube_codes, cube_rotations
-from iqtt.audit.proofs import Proof, judge
-from iqtt.audit.shape_proofs import Shapes
+from iqtt.audit.proofs.shapes import Shapes
+from iqtt.audit.proofs.verdict import Proof, judge
 from iqtt.audit.table import AuditTable
 from iqtt.questions.specs import DISTRACTOR_KINDS
 
@@ -145,14 +145,14 @@ def _gaps(table: AuditTable, shapes: Shapes) -> Array:
         apart = np.abs(cubes[:, :, :, None] - cubes[:, :, None]).sum(axis=4)
         touching = np.count_nonzero(apart == 1, axis=(2, 3))
         alike = (box == box[:, :1]).all(axis=2) & (touching == touching[:, :1])
-        radii = _gyration_radii(cubes)
+        radii = gyration_radii(cubes)
         far = np.linalg.norm(radii - radii[:, :1], axis=2)
         far = np.where(alike, far, np.inf)[:, 1:]
         result[here] = np.where(told[here], far, 0).max(axis=1)
     return result
 
 
-def _gyration_radii(cubes: Array) -> Array:
+def gyration_radii(cubes: Array) -> Array:
     """Return the principal radii of gyration of solid shapes, (..., n, 3) to (..., 3), rising.
 
     The singular values of the centred cubes give those of their middles; the inertia of a cube

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.audit.congruence import MIRROR_X, cube_rotations
-from iqtt.audit.proofs import Proof, judge
-from iqtt.audit.shape_proofs import Shapes
+from iqtt.audit.proofs.shapes import Shapes
+from iqtt.audit.proofs.verdict import Proof, judge
 from iqtt.audit.table import AuditTable
 
 Array = NDArray[Any]

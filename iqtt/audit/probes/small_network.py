@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit.trees import one_thread
+from iqtt.audit.probes.trees import one_thread
 from scenegen.common.seeding import Purpose, item_rng
 
 Array = NDArray[Any]

@@ -32,10 +32,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit.outlines import nearest_outline
-from iqtt.audit.small_network import SmallNetwork
-from iqtt.audit.statistics import THUMBNAIL
-from iqtt.audit.trees import FOLDS, among_others, choose, next_to_reference, one_thread
+from iqtt.audit.features.outlines import nearest_outline
+from iqtt.audit.features.statistics import THUMBNAIL
+from iqtt.audit.probes.small_network import SmallNetwork
+from iqtt.audit.probes.trees import FOLDS, among_others, choose, next_to_reference, one_thread
 
 Array = NDArray[Any]
 WITHOUT, LIGHT, MIRRORED = "without the reference", "light", "mirrored"

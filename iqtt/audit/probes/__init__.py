@@ -1,0 +1,1 @@
+"""Probes that try to answer questions without comparing shapes: fixed rules, trees, a network."""
