@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from audit_tables import audit_table
 
-from iqtt.audit.proofs import kinds
+from iqtt.audit.proofs import kinds as proofs_of_kinds
 from iqtt.audit.proofs.kinds import answers_differ, matched, mirror_images
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.matched import contacts, matched_rows
@@ -73,12 +73,12 @@ def test_matched() -> None:
     box = np.sort(np.ptp(pool, axis=1), axis=1)
     same_box = (box == np.sort(np.ptp(first, axis=0))).all(axis=1)
     touching = contacts(pool) == contacts(first[None])
-    radii = kinds.gyration_radii(pool.astype(float))
-    far = np.linalg.norm(radii - kinds.gyration_radii(first.astype(float)), axis=1)
+    radii = proofs_of_kinds.gyration_radii(pool.astype(float))
+    far = np.linalg.norm(radii - proofs_of_kinds.gyration_radii(first.astype(float)), axis=1)
     for group in (
-        same_box & touching & (far > kinds.GYRATION + 1e-3),
-        same_box & ~touching & (far < kinds.GYRATION),
-        ~same_box & touching & (far < kinds.GYRATION),
+        same_box & touching & (far > proofs_of_kinds.GYRATION + 1e-3),
+        same_box & ~touching & (far < proofs_of_kinds.GYRATION),
+        ~same_box & touching & (far < proofs_of_kinds.GYRATION),
     ):
         other = pool[np.flatnonzero(group)[0]]
         assert status(matched, [first, first, other, two], kinds) == "FAIL"
@@ -89,7 +89,7 @@ def test_radii_of_gyration_of_a_rod() -> None:
     """A rod of n unit cubes has the moments of a solid box of sides n, 1 and 1."""
     rod = np.array([[k, 0, 0] for k in range(4)], float)
     expected = np.sqrt(np.array([1, 1, 16]) / 12)
-    np.testing.assert_allclose(kinds.gyration_radii(rod), expected, atol=1e-12)
+    np.testing.assert_allclose(proofs_of_kinds.gyration_radii(rod), expected, atol=1e-12)
 
 
 def test_unknown_shapes_are_not_judged() -> None:
