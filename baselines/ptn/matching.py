@@ -6,6 +6,7 @@ correlation of occupancies within the ball that all rotations keep.
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -16,13 +17,14 @@ from baselines.ptn.network import VOXELS, Ptn
 from baselines.ptn.projection import sampled
 from scenegen.common.rotations import rotation_matrix
 
-COARSE = 16  # voxels a side of the volumes that are compared
+COARSE, FINE = 8, 16  # voxels a side of the volumes that are compared, at first and at last
 GRID = 1200  # rotations that are tried first, some 20 degrees apart
 KEPT, TURNS = 4, 32  # how many of the best are turned further, and in how many ways each
-FINER = (0.2, 0.1)  # radians of these turns, in each round
+FINER = ((0.2, COARSE), (0.1, FINE))  # radians of these turns, and voxels a side, in each round
 CHUNK = 256  # rotations at a time
 PSI = 1.533751168755204288118041  # positive root of psi^4 = psi + 4
 FEATURES = ("fit of volumes", "nearness of codes")
+BOX = torch.tensor([[-1.0] * 3, [1.0] * 3])
 RIDGE = 1e-3  # keeps the head's weights finite where labels are few
 
 
@@ -60,32 +62,47 @@ def best_fits(reference: Tensor, answers: Tensor) -> Tensor:
             middle.
         answers: (K, D, D, D).
     """
-    small = functional.avg_pool3d(torch.cat([reference[None], answers])[:, None], VOXELS // COARSE)
-    side = (torch.arange(COARSE) + 0.5) * 2 / COARSE - 1
-    points = torch.stack(torch.meshgrid(side, side, side, indexing="ij")[::-1], dim=-1)
-    inside = points.norm(dim=-1) <= 1
-    points, box = points[inside], torch.tensor([[-1.0] * 3, [1.0] * 3])
-    wanted = _centred(small[1:, 0][:, inside])
     start = rotation_grid(GRID)
-    found = _turned(small[0], box, points, start) @ wanted.T
+    found = _level(reference, answers, COARSE).fits(start)
     best = []
-    for k in range(len(answers)):
-        turns, fits = start, found[:, k]
-        for angle in FINER:
+    for answer, first in zip(answers, found.unbind(dim=1), strict=True):
+        turns, fits = start, first
+        for angle, side in FINER:
             top = turns[fits.topk(KEPT).indices]
             finer = (small_turns(TURNS, angle)[None] @ top[:, None]).flatten(0, 1)
             turns = torch.cat([top, finer])
-            fits = _turned(small[0], box, points, turns) @ wanted[k]
+            fits = _level(reference, answer[None], side).fits(turns)[:, 0]
         best.append(fits.amax())
     return torch.stack(best)
 
 
-def _turned(volume: Tensor, box: Tensor, points: Tensor, rotations: Tensor) -> Tensor:
+@dataclass(frozen=True, eq=False)
+class _Level:
+    """Volumes at one resolution: the reference, (1, S, S, S), and K answers at points, (K, P)."""
+
+    reference: Tensor
+    answers: Tensor
+    points: Tensor
+
+    def fits(self, rotations: Tensor) -> Tensor:
+        """Return how well the reference fits the answers when it is turned, (R, K)."""
+        return _turned(self.reference, self.points, rotations) @ self.answers.T
+
+
+def _level(reference: Tensor, answers: Tensor, side: int) -> _Level:
+    small = functional.avg_pool3d(torch.cat([reference[None], answers])[:, None], VOXELS // side)
+    place = (torch.arange(side) + 0.5) * 2 / side - 1
+    points = torch.stack(torch.meshgrid(place, place, place, indexing="ij")[::-1], dim=-1)
+    inside = points.norm(dim=-1) <= 1
+    return _Level(small[0], _centred(small[1:, 0][:, inside]), points[inside])
+
+
+def _turned(volume: Tensor, points: Tensor, rotations: Tensor) -> Tensor:
     """Return a volume's values at points when it is turned, centred: (1, D, D, D) -> (R, P)."""
     parts = []
     for some in torch.split(rotations, CHUNK):
         places = (points @ some).reshape(1, -1, 3)  # the inverse of each rotation, on the left
-        parts.append(sampled(volume, box, places).view(len(some), len(points)))
+        parts.append(sampled(volume, BOX, places).view(len(some), len(points)))
     return _centred(torch.cat(parts))
 
 
