@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 WORKERS ?= 2
 
-.PHONY: demo demo-model test test-all check bench results fuzz clean
+.PHONY: demo demo-model test test-all check bench bench-gpu results fuzz clean
 
 demo: $(VENV)/.runtime
 	mkdir -p demo
@@ -57,6 +57,10 @@ bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.nearest
 	$(BIN)/python -m benchmarks.surfels
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.score_rows
+
+# Needs an NVIDIA GPU; writes docs/gpu.md.
+bench-gpu: $(VENV)/.test
+	$(BIN)/python -m benchmarks.gpu --page docs/gpu.md
 
 # Hours; stop it when you like, and start it again. RESULTS="--only questions --seeds 1" runs a part.
 results: $(VENV)/.model
