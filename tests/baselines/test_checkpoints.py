@@ -197,10 +197,3 @@ def test_a_run_goes_on_with_its_own_data_alone():
     check_data("rooms.h5", "a" * 64, "a" * 64)
     with refused(SpecError, "rooms.h5", "b" * 12, "a" * 12):
         check_data("rooms.h5", "b" * 64, "a" * 64)
-
-
-def test_weights_name_the_method_that_they_are_of(saved, tmp_path):
-    saved.card = Card("yours")
-    save_weights(tmp_path / WEIGHTS, saved)
-    with refused(FileFormatError, "method", "yours", "mine"):
-        load_weights(tmp_path / WEIGHTS, RECIPE)
