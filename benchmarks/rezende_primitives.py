@@ -13,10 +13,11 @@ import numpy as np
 import torch
 from PIL import Image
 
+from baselines.checkpoints import CHECKPOINT, WEIGHTS, save_weights
+from baselines.rezende.card import Card
 from baselines.rezende.primitives import PRIMITIVE_SETS, render_primitives
 from baselines.rezende.reconstruct import errors, reconstruct, sheet, untrained
 from baselines.rezende.training import train_pictures
-from baselines.rezende.weights import CHECKPOINT, WEIGHTS, Card, save_weights
 
 TRAINED, TESTED, SHOWN = 4_000, 400, 10  # images of each set
 TRAIN_SEED, TEST_SEED = 1, 2
@@ -38,8 +39,8 @@ def main(runs: Path, picture: Path, iterations: int, only: tuple[str, ...]) -> N
         train = render_primitives(name, TRAINED, card.size, TRAIN_SEED)
         resume = (folder / CHECKPOINT).exists()
         state = train_pictures(train, folder, card, resume=resume)
-        model = state.model.eval()
-        save_weights(folder / WEIGHTS, model, state.card)
+        model = state.network.eval()
+        save_weights(folder / WEIGHTS, state)
         test = render_primitives(name, TESTED, card.size, TEST_SEED)
         found = reconstruct(model, test)
         for what, one in (("sphere", untrained(test)), ("trained", found)):

@@ -3,7 +3,7 @@
     empty_rooms.py  what is known before an image is seen
     network.py      two networks: with skip connections, and through the reference model's code
     rooms.py        a training file in memory
-    storage.py      weights and checkpoints
+    card.py         the card of weights: how they were made
     training.py     `train`, and the iterations that `view_pairs` shares
     predict.py      `write_submission`
 

@@ -1,6 +1,7 @@
 """Submissions of relief networks. Of the rooms only images and cameras are read."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from baselines.checkpoints import load_weights
+from baselines.depth_supervised.card import recipe
 from baselines.depth_supervised.network import Cameras, predicted_depth
-from baselines.depth_supervised.rooms import camera_poses
-from baselines.depth_supervised.storage import load_weights
-from baselines.pix2shape.data.rooms import channels_first, check_reducible
+from baselines.pix2shape.data.rooms import camera_poses, channels_first, check_reducible
 from baselines.pix2shape.use.predict import enlarged, input_views
 from metrics.prediction_writer import RoomPredictionWriter
 from scenegen.common.new_file import check_writable
@@ -30,48 +31,39 @@ WEIGHTS = Path(__file__).with_name("files") / "unet.safetensors"
 Progress = Callable[[int, int], Any]  # rows done, rows in all
 
 
-def write_submission(
+def submit(
+    method: str,
+    bundled: Path,
     data: str | Path,
     out: str | Path,
-    weights: str | Path = WEIGHTS,
+    weights: str | Path | None = None,
     *,
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> None:
-    """Write depth and normals of every view of a file of rooms; as `submit`.
-
-    Args:
-        weights: as `bench train depth-supervised` writes them; by default those of the package.
-    """
-    submit(METHOD, data, out, weights, overwrite, progress)
-
-
-def submit(
-    method: str,
-    data: str | Path,
-    out: str | Path,
-    weights: str | Path,
-    overwrite: bool,
-    progress: Progress,
-) -> None:
-    """Write a submission of a method's weights.
+    """Write depth and normals of every view of a file of rooms.
 
     A network of kind "unet" predicts each view from its own image; of kind "code" each scene from
     one image alone, view 0 or the first that the file holds, under the name "METHOD-code". The
     submission's notes say it, too.
 
     Args:
+        method: one of `card.METHODS`.
+        bundled: the method's weights that come with the package.
+        weights: as `bench train METHOD` writes them; None for those of the package.
         progress: called with the number of rows done and of all, a batch at a time.
 
     Raises OSError, FileFormatError for either file, also where a camera is not known; SpecError
     where images cannot be reduced to the network's size.
     """
     check_writable(Path(out), overwrite)
-    network, card = load_weights(weights, method)
+    state = load_weights(bundled if weights is None else weights, recipe(method))
+    network, card = state.network, state.card
     kind, size = card.network.kind, card.network.size
     with RoomsFile(data) as rooms:
         check_reducible(data, rooms.spec.height, rooms.spec.width, size)
-        poses, fov = camera_poses(rooms), rooms.spec.fov_y_degrees
+        poses = torch.from_numpy(camera_poses(rooms).astype(np.float32))
+        fov = rooms.spec.fov_y_degrees
         rows = np.arange(len(rooms))
         source = rows
         if kind == "code":
@@ -112,3 +104,6 @@ def stacked(rooms: RoomsFile, rows: NDArray[np.int64], size: int) -> Tensor:
 def batches(count: int) -> Iterator[NDArray[np.int64]]:
     """Yield the rows of batch after batch."""
     return (np.arange(first, min(first + BATCH, count)) for first in range(0, count, BATCH))
+
+
+write_submission = partial(submit, METHOD, WEIGHTS)

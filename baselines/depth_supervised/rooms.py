@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from baselines.depth_supervised.network import Cameras
-from baselines.pix2shape.data.rooms import channels_first, check_reducible, reduced
+from baselines.pix2shape.data.rooms import camera_poses, channels_first, check_reducible, reduced
 from scenegen.common.errors import FileFormatError
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
@@ -54,7 +54,7 @@ def read_rooms(path: str | Path, size: int, *, depth: bool = False) -> Rooms:
     """
     with RoomsFile(path) as rooms:
         check_reducible(path, rooms.spec.height, rooms.spec.width, size)
-        poses = camera_poses(rooms)
+        poses = camera_poses(rooms).astype(np.float32)
         images = np.empty((len(rooms), 3, size, size), np.float16)
         depths = np.empty((len(rooms), size, size), np.float32) if depth else None
         for row in range(len(rooms)):
@@ -66,7 +66,7 @@ def read_rooms(path: str | Path, size: int, *, depth: bool = False) -> Rooms:
         scene, angle = (rooms.read(n, slice(None)) for n in ("scene_index", "view_angle_degrees"))
         return Rooms(
             torch.from_numpy(images),
-            poses,
+            torch.from_numpy(poses),
             rooms.spec.fov_y_degrees,
             torch.from_numpy(np.asarray(scene)),
             torch.from_numpy(np.asarray(angle)),
@@ -75,17 +75,3 @@ def read_rooms(path: str | Path, size: int, *, depth: bool = False) -> Rooms:
             rooms.spec.to_json(),
             rooms.fingerprint,
         )
-
-
-def camera_poses(rooms: RoomsFile) -> Tensor:
-    """Return world_from_camera of all rows, (N, 4, 4). Raises FileFormatError if one is unknown."""
-    poses = rooms.read("camera/world_from_camera", slice(None))
-    unknown = np.flatnonzero(~np.isfinite(poses).all(axis=(1, 2)))
-    if len(unknown):
-        raise FileFormatError(
-            f"{rooms.path}: camera/world_from_camera, row {unknown[0]}",
-            "numbers that are not finite",
-            "the camera's pose, which the network has to be told",
-            "render the file anew with `scenegen render`, or leave this row out",
-        )
-    return torch.from_numpy(np.asarray(poses, np.float32))

@@ -4,7 +4,6 @@ Everything random in an iteration derives from the seed and the iteration's numb
 goes on after a kill as if it had never stopped.
 """
 
-import errno
 import math
 import time
 from collections.abc import Callable, Mapping
@@ -15,21 +14,13 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from baselines import checkpoints
+from baselines.depth_supervised.card import Card, State, recipe
 from baselines.depth_supervised.empty_rooms import empty_rooms
 from baselines.depth_supervised.network import Cameras, ReliefSpec
 from baselines.depth_supervised.rooms import Rooms, read_rooms
-from baselines.depth_supervised.storage import (
-    CHECKPOINT,
-    WEIGHTS,
-    Card,
-    State,
-    load_state,
-    new_state,
-    save_state,
-    save_weights,
-)
 from baselines.pix2shape.data.rooms import Draws
-from scenegen.common.errors import SceneGenError, SpecError
+from scenegen.common.errors import SceneGenError
 from scenegen.common.seeding import Purpose, item_rng
 
 METHOD = "depth-supervised"
@@ -76,9 +67,7 @@ def train(
     """
     spec = ReliefSpec(network, size, width)
     card = Card(METHOD, spec, seed, iterations, batch, learning_rate)
-    state = begun(run_folder, card, resume)
-    rooms = read_rooms(data, state.card.network.size, depth=True)
-    state = suited(state, rooms, data)
+    state, rooms = begun(data, run_folder, card, resume, depth=True)
     size = state.card.network.size  # a resumed run has its own
 
     def target(rows: Tensor) -> Target:
@@ -93,28 +82,25 @@ def train(
     return fit(state, rooms, run_folder, target, progress, others=others)
 
 
-def begun(run_folder: str | Path, card: Card, resume: bool) -> State:
-    """Return the state of a new run, or that of the folder's checkpoint.
+def begun(
+    data: str | Path, run_folder: str | Path, card: Card, resume: bool, *, depth: bool = False
+) -> tuple[State, Rooms]:
+    """Return the state of a new run, or that of the folder's checkpoint, and the rooms.
 
-    Raises FileExistsError where a new run finds a checkpoint; OSError, FileFormatError.
+    Raises FileExistsError where a new run finds a checkpoint; SpecError where a run began on other
+    rooms; OSError, FileFormatError.
     """
-    folder = Path(run_folder)
+    folder, made = Path(run_folder), recipe(card.method)
     if resume:
-        return load_state(folder, card.method)
-    if (folder / CHECKPOINT).exists():
-        what = "holds a checkpoint; say --resume, or name another folder"
-        raise FileExistsError(errno.EEXIST, what, str(folder))
-    return new_state(card)
-
-
-def suited(state: State, rooms: Rooms, where: str | Path) -> State:
-    """Note the training file in the card. Raises SpecError if a run began on another one."""
-    old = state.card.fingerprint
-    if old not in ("", rooms.fingerprint):
-        found, expected = (f"fingerprint {one[:12]}" for one in (rooms.fingerprint, old))
-        raise SpecError(where, found, f"{expected}, on which the run was trained")
+        state = checkpoints.load_checkpoint(folder, made)
+    else:
+        checkpoints.check_new(folder)
+        state = checkpoints.new_state(made, card)
+    rooms = read_rooms(data, state.card.network.size, depth=depth)
+    if resume:
+        checkpoints.check_data(data, rooms.fingerprint, state.card.fingerprint)
     state.card = replace(state.card, data=rooms.data, fingerprint=rooms.fingerprint)
-    return state
+    return state, rooms
 
 
 def views_of_scenes(rooms: Rooms) -> list[Tensor]:
@@ -150,6 +136,7 @@ def fit(
     """
     folder = Path(run_folder)
     folder.mkdir(parents=True, exist_ok=True)
+    state.network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]  # faster
     allowed = torch.arange(len(rooms)) if allowed is None else allowed
     before, started = state.card.seconds, time.monotonic()
     batches = iter(Draws(len(allowed), state.card.batch, state.card.seed, state.card.iteration))
@@ -167,10 +154,10 @@ def fit(
         seconds = round(before + time.monotonic() - started, 1)
         state.card = replace(state.card, iteration=number + 1, seconds=seconds)
         if state.card.iteration % EVERY == 0 or state.card.iteration == state.card.iterations:
-            save_state(folder, state)
-            save_weights(folder / WEIGHTS, state)
+            checkpoints.save_checkpoint(folder, state)
+            checkpoints.save_weights(folder / checkpoints.WEIGHTS, state)
         progress(state.card.iteration, state.card.iterations, {"loss": loss})
-    return folder / WEIGHTS
+    return folder / checkpoints.WEIGHTS
 
 
 def learning_rate(card: Card, iteration: int) -> float:

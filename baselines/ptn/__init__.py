@@ -6,7 +6,7 @@
     silhouettes.py  silhouettes of a room's objects, from the image or from ids
     rooms.py        batches of rooms of several views
     questions.py    batches of polycubes
-    storage.py      weights, checkpoints and their card
+    card.py         the card of weights
     matching.py     which of the answers shows the reference's volume
     submission.py   `write_submission`
     training.py     `train`

@@ -12,12 +12,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from baselines.pix2shape.data.rooms import channels_first, check_reducible
+from baselines.pix2shape.data.rooms import camera_poses, channels_first, check_reducible
 from baselines.ptn.batches import Batch
 from baselines.ptn.network import PtnConfig
 from baselines.ptn.silhouettes import Silhouettes
 from scenegen.camera import pixel_directions
-from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.errors import SpecError
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
 
@@ -51,12 +51,8 @@ class RoomImages:
         check_reducible(rooms.path, rooms.spec.height, rooms.spec.width, size)
         self.rooms, self._size = rooms, size
         self.shape = rooms.spec.height, rooms.spec.width
-        self.poses: Array = rooms.read("camera/world_from_camera", slice(None))
+        self.poses = camera_poses(rooms)
         self.fov_y_degrees: Array = rooms.read("camera/fov_y_degrees", slice(None))
-        unknown = np.flatnonzero(~np.isfinite(self.poses).all(axis=(1, 2)))
-        if len(unknown):
-            where = f"{rooms.path}: camera/world_from_camera, row {unknown[0]}"
-            raise FileFormatError(where, "numbers that are not finite", "the camera's pose")
         self.mirrored = self.poses[:, 2, 3] > self.poses[:, 0, 3]
         scene, view = (rooms.read(name, slice(None)) for name in ("scene_index", "view_index"))
         order = np.lexsort((view, scene))

@@ -14,12 +14,13 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from baselines.checkpoints import load_weights
 from baselines.pix2shape.data.rooms import channels_first, check_reducible, is_question_file
+from baselines.ptn.card import RECIPE, Card
 from baselines.ptn.matching import features
 from baselines.ptn.network import Ptn
 from baselines.ptn.projection import first_hit, outward
 from baselines.ptn.rooms import SWAPPED, RoomImages
-from baselines.ptn.storage import Card, load_weights
 from iqtt.files.reader import QuestionsFile, open_questions, parts
 from metrics.measures.empty_room import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
@@ -61,7 +62,8 @@ def write_submission(
         if not weights.is_file():
             hint = "train some with `bench train ptn` and name them with --weights"
             raise SpecError("weights", "none", f"some of ptn for {task}", hint)
-    model, card = load_weights(weights)
+    state = load_weights(weights, RECIPE)
+    model, card = state.network, state.card
     if card.config.task != task:
         raise SpecError(weights, f"weights for {card.config.task}", f"some for {task}")
     check_writable(Path(out), overwrite)

@@ -4,7 +4,6 @@ The loss is the projection loss of Yan et al. (NeurIPS 2016): the mean squared d
 volume's silhouettes from the true ones, over the views of each image. There is no loss on volumes.
 """
 
-import errno
 import time
 from collections.abc import Callable, Mapping
 from contextlib import closing
@@ -15,25 +14,16 @@ from typing import Any, Protocol
 import numpy as np
 import torch
 from torch import Tensor
-from torch.optim import Adam
 
+from baselines import checkpoints
 from baselines.pix2shape.data.rooms import check_reducible, is_question_file
 from baselines.ptn import projection
 from baselines.ptn.batches import Batch
+from baselines.ptn.card import RECIPE, Card, State
 from baselines.ptn.matching import fitted_head
 from baselines.ptn.network import Ptn, PtnConfig
 from baselines.ptn.questions import BOX, TrainingShapes, check_questions
 from baselines.ptn.rooms import TrainingRooms, room_box
-from baselines.ptn.storage import (
-    CHECKPOINT,
-    WEIGHTS,
-    Card,
-    load_checkpoint,
-    load_weights,
-    new_model,
-    save_checkpoint,
-    save_weights,
-)
 from baselines.ptn.submission import feature_batches
 from iqtt.files.reader import QuestionsFile, open_questions
 from scenegen.common.errors import SceneGenError, SpecError
@@ -99,48 +89,46 @@ def train(
     given = {name: value for name, value in locals().items() if name in SETTINGS}
     settings = {name: value for name, value in given.items() if value is not None}
     folder = Path(run_folder)
-    if not resume and (folder / CHECKPOINT).exists():
-        what = "holds a checkpoint; say --resume, or name another folder"
-        raise FileExistsError(errno.EEXIST, what, str(folder))
     if resume:
-        model, optimiser, card = load_checkpoint(folder)
-    elif networks is not None:
-        model, card = load_weights(networks)
-        check(not settings, "networks", networks, "no other settings: they have their own")
-        _check_task(data, card.config)
+        state = checkpoints.load_checkpoint(folder, RECIPE)
     else:
-        card = Card(_config(data, settings | {"seed": seed}), labels=labels)
-        model, optimiser = new_model(card.config)
-    card = replace(card, labels=card.labels if resume else labels)
-    found = labelled(data, card.config, card.labels)  # before hours of training
+        checkpoints.check_new(folder)
+        if networks is not None:
+            state = checkpoints.load_weights(networks, RECIPE)
+            check(not settings, "networks", networks, "no other settings: they have their own")
+            _check_task(data, state.card.config)
+            state.card = replace(state.card, labels=labels)
+        else:
+            config = _config(data, settings | {"seed": seed})
+            state = checkpoints.new_state(RECIPE, Card(config, labels=labels))
+    labels = state.card.labels
+    found = labelled(data, state.card.config, labels)  # before hours of training
     if networks is None or resume:
-        card = _iterate(data, folder, model, optimiser, card, progress)
+        _iterate(data, folder, state, progress)
     if found is not None:
         with found:
-            right = torch.from_numpy(found.read("answers", slice(0, card.labels)).astype(np.int64))
-            told = torch.cat(list(feature_batches(model.eval(), found, card.labels)))
-        card = replace(card, head=fitted_head(told, right))
+            right = torch.from_numpy(found.read("answers", slice(0, labels)).astype(np.int64))
+            told = torch.cat(list(feature_batches(state.network.eval(), found, labels)))
+        state.card = replace(state.card, head=fitted_head(told, right))
     folder.mkdir(parents=True, exist_ok=True)
-    save_weights(folder / WEIGHTS, model, card)
-    return folder / WEIGHTS
+    checkpoints.save_weights(folder / checkpoints.WEIGHTS, state)
+    return folder / checkpoints.WEIGHTS
 
 
-def _iterate(
-    data: str | Path, folder: Path, model: Ptn, optimiser: Adam, card: Card, progress: Progress
-) -> Card:
+def _iterate(data: str | Path, folder: Path, state: State, progress: Progress) -> None:
     """Take the iterations that are left, with a checkpoint every now and then."""
-    with closing(_source(data, card.config)) as source:
-        if card.iteration and source.fingerprint != card.fingerprint:
-            expected = f"{card.fingerprint[:12]}, on which the run was trained"
-            raise SpecError(data, f"fingerprint {source.fingerprint[:12]}", expected)
+    card, config, optimiser = state.card, state.card.config, state.optimiser
+    with closing(_source(data, config)) as source:
+        if card.iteration:
+            checkpoints.check_data(data, source.fingerprint, card.fingerprint)
         card = replace(card, fingerprint=source.fingerprint, data=source.data)
         folder.mkdir(parents=True, exist_ok=True)
-        began, last = time.monotonic() - card.seconds, card.config.iterations
+        began, last = time.monotonic() - card.seconds, config.iterations
         for iteration in range(card.iteration, last):
-            batch = source.batch(item_rng(card.config.seed, iteration, Purpose.TRAINING))
+            batch = source.batch(item_rng(config.seed, iteration, Purpose.TRAINING))
             for group in optimiser.param_groups:
-                group["lr"] = card.config.learning_rate * min(1.0, 2 * (1 - iteration / last))
-            loss = projection_loss(model, batch)
+                group["lr"] = config.learning_rate * min(1.0, 2 * (1 - iteration / last))
+            loss = projection_loss(state.network, batch)
             if not torch.isfinite(loss):
                 hint = "begin again with a smaller learning rate"
                 raise SceneGenError(
@@ -152,11 +140,10 @@ def _iterate(
             done = iteration + 1
             if done % EVERY == 0 or done == last:
                 seconds = round(time.monotonic() - began, 1)
-                card = replace(card, iteration=done, seconds=seconds)
-                save_checkpoint(folder, model, optimiser, card)
-                save_weights(folder / WEIGHTS, model, card)
+                state.card = replace(card, iteration=done, seconds=seconds)
+                checkpoints.save_checkpoint(folder, state)
+                checkpoints.save_weights(folder / checkpoints.WEIGHTS, state)
             progress(done, last, {"loss": float(loss.detach())})
-    return card
 
 
 def labelled(data: str | Path, config: PtnConfig, labels: int) -> QuestionsFile | None:

@@ -9,9 +9,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from baselines.checkpoints import load_weights
 from baselines.pix2shape.data.rooms import channels_first, check_reducible
 from baselines.pix2shape.use.predict import chosen_device
-from baselines.resnet.methods import Method, load_weights
+from baselines.resnet.methods import Method
 from iqtt.files.reader import QuestionsFile, open_questions, parts
 from metrics.prediction_writer import write_answers
 from scenegen.common.errors import SpecError
@@ -42,7 +43,8 @@ def write_submission(
 
     Raises OSError, FileFormatError, and SpecError where the weights do not suit the questions.
     """
-    network, card = load_weights(_bundled(method) if weights is None else weights, method)
+    state = load_weights(_bundled(method) if weights is None else weights, method.recipe)
+    network, card = state.network, state.card
     check_writable(Path(out), overwrite)
     if len(parts(data)) > 1:
         raise SpecError(data, "training questions", "questions to answer, such as iqtt-test.h5")

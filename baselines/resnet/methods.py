@@ -1,25 +1,15 @@
-"""The settings of a run, and its files: weights, and checkpoints from which training goes on.
+"""The settings of a run, which are the card of its weights, and what tells methods apart."""
 
-A file holds everything: the settings are JSON in its metadata.
-"""
-
-import errno
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
-import torch
 from torch import Tensor, nn
 from torch.optim import Adam
 
-from baselines.optimiser_moments import load_moments, moments_of
+from baselines import checkpoints
 from baselines.resnet.architecture import DEPTHS
-from baselines.tensor_files import check_tensors, load_tensors, save_tensors, shortened
-from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.records import check, from_json, normalise, to_json
-from scenegen.common.seeding import Purpose, item_seed
-
-CHECKPOINT, WEIGHTS = "checkpoint.safetensors", "weights.safetensors"
+from scenegen.common.records import check, normalise
 
 
 @dataclass(frozen=True)
@@ -95,90 +85,17 @@ class Method:
     files: Path
     any_number: bool
 
+    @property
+    def recipe(self) -> checkpoints.Recipe[Card, nn.Module]:
+        """How the networks of the method are made of its cards."""
+        return checkpoints.Recipe(self.name, Card, self.network, _optimiser, self._check)
 
-@dataclass(eq=False)
-class State:
-    """Everything that training changes."""
-
-    card: Card
-    network: nn.Module
-    optimiser: Adam = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.optimiser = Adam(self.network.parameters(), lr=self.card.learning_rate)
+    def _check(self, card: Card) -> None:
+        check(card.method == self.name, "method", f"{card.method:.40}", self.name)
 
 
-def new_state(method: Method, card: Card) -> State:
-    """Return an untrained network, whose weights the seed decides, and its optimiser."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(item_seed(card.seed, 0, Purpose.WEIGHTS))
-        return State(card, method.network(card))
+def _optimiser(card: Card, network: nn.Module) -> Adam:
+    return Adam(network.parameters(), lr=card.learning_rate)
 
 
-def save_weights(path: Path, state: State) -> None:
-    """Write weights and card, as 16-bit numbers; replaces the file."""
-    save_tensors(path, shortened(state.network.state_dict()), {"card": to_json(state.card)})
-
-
-def load_weights(path: str | Path, method: Method) -> tuple[nn.Module, Card]:
-    """Read a network, in evaluation mode, and its card.
-
-    Raises OSError; FileFormatError where the file is damaged or holds something else.
-    """
-    tensors, notes = load_tensors(path)
-    if "moments" in notes:
-        raise FileFormatError(path, "a checkpoint", "weights", f"name {WEIGHTS} beside it")
-    card = _card(path, notes, method)
-    return _network(path, card, tensors, method).eval(), card
-
-
-def save_state(folder: Path, state: State) -> None:
-    """Write the folder's checkpoint; the old one stays until this one is complete."""
-    tensors = {f"network.{name}": value for name, value in state.network.state_dict().items()}
-    moments, count = moments_of(state.optimiser)
-    tensors |= {f"moments.{name}": value for name, value in moments.items()}
-    save_tensors(folder / CHECKPOINT, tensors, {"card": to_json(state.card), "moments": count})
-
-
-def load_state(folder: Path, method: Method) -> State:
-    """Read a folder's checkpoint. Raises OSError, FileFormatError."""
-    path = folder / CHECKPOINT
-    if not path.is_file():
-        raise FileNotFoundError(errno.ENOENT, "holds no checkpoint to resume", str(folder))
-    tensors, notes = load_tensors(path)
-    card = _card(path, notes, method)
-    own: dict[str, dict[str, Tensor]] = {"network": {}, "moments": {}}
-    try:
-        for name, value in tensors.items():
-            kind, _, rest = name.partition(".")
-            own[kind][rest] = value
-        state = State(card, _network(path, card, own["network"], method))
-        load_moments(state.optimiser, own["moments"], int(notes["moments"]))
-    except (KeyError, ValueError) as error:
-        if isinstance(error, FileFormatError):
-            raise
-        raise FileFormatError(path, f"{error}", "a checkpoint of this release") from error
-    return state
-
-
-def _card(path: str | Path, notes: Mapping[str, str], method: Method) -> Card:
-    try:
-        card = from_json(Card, notes.get("card", ""), "card")
-    except SpecError as error:
-        wrong = error.inside(path)
-        hint = f"`bench train {method.name}` writes weights"
-        raise FileFormatError(wrong.where, wrong.found, wrong.expected, hint) from error
-    if card.method != method.name:
-        raise FileFormatError(path, f"weights of {card.method!r:.40}", f"those of {method.name}")
-    return replace(card, iteration=min(card.iteration, card.iterations))
-
-
-def _network(
-    path: str | Path, card: Card, tensors: Mapping[str, Tensor], method: Method
-) -> nn.Module:
-    """Return the card's network with these weights; shapes are compared before it is allocated."""
-    with torch.device("meta"):
-        check_tensors(path, tensors, method.network(card).state_dict())
-    network = method.network(card)
-    network.load_state_dict(dict(tensors))
-    return network
+State = checkpoints.State[Card, nn.Module]

@@ -4,7 +4,6 @@ Everything random in an iteration derives from the seed and the iteration's numb
 goes on after a kill as if it had never stopped.
 """
 
-import errno
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -15,20 +14,11 @@ import torch
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
+from baselines import checkpoints
 from baselines.pix2shape.data.rooms import Draws, check_reducible
 from baselines.pix2shape.use.predict import chosen_device
 from baselines.resnet.answering import accuracy, images_of
-from baselines.resnet.methods import (
-    CHECKPOINT,
-    WEIGHTS,
-    Card,
-    Method,
-    State,
-    load_state,
-    new_state,
-    save_state,
-    save_weights,
-)
+from baselines.resnet.methods import Card, Method, State
 from iqtt.files.reader import QuestionsDataset, open_questions, parts
 from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.common.records import check
@@ -111,15 +101,11 @@ def train(
     """
     folder = Path(run_folder)
     if resume:
-        state = load_state(folder, method)
+        state = checkpoints.load_checkpoint(folder, method.recipe)
         source = LabelledQuestions(data, state.card.size, state.card.labels)
-        if (found := source.fingerprint) != (old := state.card.fingerprint):
-            expected = f"{old[:12]}, on which the run was trained"
-            raise SpecError(data, f"fingerprint {found[:12]}", expected)
+        checkpoints.check_data(data, source.fingerprint, state.card.fingerprint)
     else:
-        if (folder / CHECKPOINT).exists():
-            what = "holds a checkpoint; say --resume, or name another folder"
-            raise FileExistsError(errno.EEXIST, what, str(folder))
+        checkpoints.check_new(folder)
         given = Card(
             method.name,
             answers=2,
@@ -135,23 +121,23 @@ def train(
         source = LabelledQuestions(data, size, labels)
         mark = source.fingerprint
         card = replace(given, answers=source.answers, labels=len(source), fingerprint=mark)
-        state = new_state(method, card)
+        state = checkpoints.new_state(method.recipe, card)
     _to_device(state, chosen_device(device))
     folder.mkdir(parents=True, exist_ok=True)
     last = state.card.iterations
     for loss in _steps(method, state, source):
         progress(state.card.iteration, last, {"loss": loss})
         if state.card.iteration % EVERY == 0:
-            save_state(folder, state)
+            checkpoints.save_checkpoint(folder, state)
     beside = Path(data).with_name(VALIDATION)
     if beside.is_file():
         share = accuracy(state.network, beside, state.card.size, state.card.answers)
         state.card = replace(state.card, validation=share)
         if share is not None:
             progress(last, last, {f"accuracy on {VALIDATION}": share})
-    save_weights(folder / WEIGHTS, state)
-    save_state(folder, state)
-    return folder / WEIGHTS
+    checkpoints.save_weights(folder / checkpoints.WEIGHTS, state)
+    checkpoints.save_checkpoint(folder, state)
+    return folder / checkpoints.WEIGHTS
 
 
 def _to_device(state: State, device: torch.device) -> None:

@@ -6,7 +6,7 @@
     network.py      encoder and decoder of the variational model, and the head that labels train
     images.py       what it learns from: the images of question files
     primitives.py   single basic shapes, rendered by scenegen, on which it works or fails
-    weights.py      files of weights and checkpoints
+    card.py         the card of weights: settings, and where they come from
     head.py         training on labels
     training.py     training on images; start reading here
     reconstruct.py  meshes and pictures of trained weights

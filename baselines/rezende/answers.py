@@ -9,12 +9,13 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from baselines.checkpoints import load_weights
 from baselines.pix2shape.data.rooms import check_reducible, is_question_file
+from baselines.rezende.card import RECIPE
 from baselines.rezende.head import codes_of
 from baselines.rezende.images import question_images
 from baselines.rezende.network import Model
 from baselines.rezende.reconstruct import meshes_of
-from baselines.rezende.weights import bundled, load_weights
 from iqtt.files.reader import open_questions, parts
 from metrics.prediction_writer import write_answers
 from scenegen.common.errors import SpecError
@@ -23,6 +24,7 @@ from scenegen.common.rotations import rotation_matrix
 
 Array = NDArray[Any]
 METHOD = "rezende"
+WEIGHTS = Path(__file__).with_name("files") / "questions-0.safetensors"
 ROTATIONS = 512  # tried for each answer; any rotation is within about 20 degrees of one
 FINE, STEPS = 8, 8  # rotations that are refined, and steps of that
 COARSE = 42  # vertices of the reference that are turned: those of the icosphere before the last cut
@@ -32,7 +34,7 @@ Progress = Callable[[int, int], Any]
 def write_submission(
     data: str | Path,
     out: str | Path,
-    weights: str | Path | None = None,
+    weights: str | Path = WEIGHTS,
     *,
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
@@ -44,7 +46,7 @@ def write_submission(
 
     Args:
         data: a file such as iqtt-test.h5; its answers are not read.
-        weights: None for those that come with the package, trained without labels.
+        weights: by default those of the package, trained without labels.
         progress: called with the number of questions done since the last call, and of all.
 
     Raises SpecError for rooms, which the method cannot do, and where images do not suit the
@@ -53,7 +55,8 @@ def write_submission(
     if not is_question_file(data):
         hint = "it reconstructs single objects without background; docs/baselines.md says why"
         raise SpecError(data, "rooms", "questions, the only data that rezende answers", hint)
-    model, card = load_weights(bundled() if weights is None else weights)
+    state = load_weights(weights, RECIPE)
+    model, card = state.network, state.card
     check_writable(Path(out), overwrite)
     if len(parts(data)) > 1:
         raise SpecError(data, "training questions", "questions to answer, such as iqtt-test.h5")

@@ -14,7 +14,6 @@ The gradient of the first term with respect to decoder(z) is sampled by
 reparametrised.
 """
 
-import errno
 import json
 import time
 from collections.abc import Callable, Mapping
@@ -26,24 +25,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from baselines import checkpoints
+from baselines.rezende.card import RECIPE, Card, State
 from baselines.rezende.estimator import sampled_gradient, with_gradient
 from baselines.rezende.head import train_head
 from baselines.rezende.images import Array, Pictures, labelled_answers, read_question_pictures
 from baselines.rezende.network import Model, divergence
 from baselines.rezende.rasteriser import project, rasterise
-from baselines.rezende.weights import (
-    CHECKPOINT,
-    WEIGHTS,
-    Card,
-    State,
-    load_state,
-    load_weights,
-    new_state,
-    save_state,
-    save_weights,
-)
 from iqtt.files.reader import parts
-from scenegen.common.errors import SceneGenError, SpecError
+from scenegen.common.errors import SceneGenError
 from scenegen.common.records import check, from_json
 from scenegen.common.seeding import Purpose, item_rng, item_seed
 
@@ -97,22 +87,24 @@ def train(
         check(
             isinstance(start, str | Path) and not resume, "start", start, "weights, for a new run"
         )
-        model, card = load_weights(start)
-        card = replace(card, labels=labels)
+        state = checkpoints.load_weights(start, RECIPE)
+        state.card = replace(state.card, labels=labels)
     else:
-        card = load_state(folder).card if resume else from_json(Card, json.dumps(given), "settings")
+        if resume:
+            card = checkpoints.load_checkpoint(folder, RECIPE).card
+        else:
+            card = from_json(Card, json.dumps(given), "settings")
         if card.labels:
             labelled_answers(data, card.labels)  # raises before the long work, not after it
         part = "unlabeled" if len(parts(data)) > 1 else None
         pictures = read_question_pictures(data, card.size, part)
         state = train_pictures(pictures, folder, card, resume=resume, progress=progress)
-        model, card = state.model, state.card
-    if card.labels:
-        questions = labelled_answers(data, card.labels)
-        train_head(model, *questions, card.size, card.seed)
+    if state.card.labels:
+        questions = labelled_answers(data, state.card.labels)
+        train_head(state.network, *questions, state.card.size, state.card.seed)
     folder.mkdir(parents=True, exist_ok=True)
-    save_weights(folder / WEIGHTS, model, card)
-    return folder / WEIGHTS
+    checkpoints.save_weights(folder / checkpoints.WEIGHTS, state)
+    return folder / checkpoints.WEIGHTS
 
 
 def train_pictures(
@@ -128,15 +120,11 @@ def train_pictures(
     With `resume` the checkpoint's card counts, not `card`.
     """
     if resume:
-        state = load_state(folder)
-        if (found := pictures.fingerprint) != (old := state.card.fingerprint):
-            expected = f"{old[:12]}, on which the run was trained"
-            raise SpecError("data", f"fingerprint {found[:12]}", expected)
+        state = checkpoints.load_checkpoint(folder, RECIPE)
+        checkpoints.check_data("data", pictures.fingerprint, state.card.fingerprint)
     else:
-        if (folder / CHECKPOINT).exists():
-            what = "holds a checkpoint; say --resume, or name another folder"
-            raise FileExistsError(errno.EEXIST, what, str(folder))
-        state = new_state(replace(card, fingerprint=pictures.fingerprint))
+        checkpoints.check_new(folder)
+        state = checkpoints.new_state(RECIPE, replace(card, fingerprint=pictures.fingerprint))
     folder.mkdir(parents=True, exist_ok=True)
     began = time.monotonic() - state.card.seconds
     while (number := state.card.iteration) < (last := state.card.iterations):
@@ -144,14 +132,14 @@ def train_pictures(
         seconds = round(time.monotonic() - began, 3)
         state.card = replace(state.card, iteration=number + 1, seconds=seconds)
         if (number + 1) % EVERY == 0 or number + 1 == last:
-            save_state(folder, state)
+            checkpoints.save_checkpoint(folder, state)
         progress(number + 1, last, numbers)
     return state
 
 
 def _step(state: State, pictures: Pictures, number: int) -> dict[str, float]:
     """Take one step; return the bound's two terms for an image, in nats."""
-    card, model = state.card, state.model
+    card, model = state.card, state.network
     rows = item_rng(card.seed, number, Purpose.TRAINING).integers(len(pictures), size=card.batch)
     generator = torch.Generator().manual_seed(item_seed(card.seed, number, Purpose.TRAINING))
     image = torch.from_numpy(pictures.image[rows])

@@ -5,10 +5,9 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from baselines.depth_supervised.card import Card
 from baselines.depth_supervised.network import ReliefSpec
-from baselines.depth_supervised.rooms import read_rooms
-from baselines.depth_supervised.storage import Card
-from baselines.depth_supervised.training import Progress, Target, begun, fit, suited
+from baselines.depth_supervised.training import Progress, Target, begun, fit
 from baselines.view_pairs.labels import labels
 
 METHOD = "view-pairs"
@@ -40,9 +39,8 @@ def train(
     network is "unet".
     """
     spec = ReliefSpec("unet", size, width)
-    state = begun(run_folder, Card(METHOD, spec, seed, iterations, batch, learning_rate), resume)
-    rooms = read_rooms(data, state.card.network.size)
-    state = suited(state, rooms, data)
+    card = Card(METHOD, spec, seed, iterations, batch, learning_rate)
+    state, rooms = begun(data, run_folder, card, resume)
     at, last = state.card.iteration, state.card.iterations
 
     def matching(done: int, total: int) -> None:

@@ -1,6 +1,7 @@
-"""Shapes of cubes for tests: so many random ones, and whether two are congruent."""
+"""Shapes of cubes for tests: so many random ones, and how two of them are congruent."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from iqtt.audit.congruence import congruent_rows
 from iqtt.shapes.chains_and_trees import Kind, random_shapes
@@ -16,3 +17,11 @@ def some_shapes(
 def are_congruent(a: np.ndarray, b: np.ndarray) -> bool:
     """Return whether two shapes, (n, 3) and (m, 3), are congruent."""
     return len(a) == len(b) and bool(congruent_rows(a[None], b[None])[0])
+
+
+def turns_between(a: np.ndarray, b: np.ndarray) -> list[Rotation]:
+    """Return SciPy's rotations of the cube that take a shape to another one."""
+    one, other = (2 * c.astype(int) - c.min(axis=0) - c.max(axis=0) for c in (a, b))
+    expected = sorted(other.tolist())
+    group = Rotation.create_group("O")
+    return [turn for turn in group if sorted(np.rint(turn.apply(one)).tolist()) == expected]

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import torch
 
+from baselines.checkpoints import new_state
+from baselines.ptn.card import RECIPE, Card
 from baselines.ptn.network import VOXELS, Ptn, PtnConfig
-from baselines.ptn.storage import new_model
 
 torch.set_num_threads(1)
 TINY: dict[str, Any] = {"width": 2, "size": 16, "batch": 2, "rays": 40, "samples": 12}
@@ -15,7 +16,8 @@ TINY: dict[str, Any] = {"width": 2, "size": 16, "batch": 2, "rays": 40, "samples
 def tiny(task: str = "rooms", **settings: Any) -> Ptn:
     """Return an untrained model of the unit box, or of a cube around 0."""
     low, high = ((0, 0, 0), (1, 0.5, 1)) if task == "rooms" else ((-1,) * 3, (1,) * 3)
-    return new_model(PtnConfig(task, low, high, **{**TINY, **settings}))[0].eval()
+    card = Card(PtnConfig(task, low, high, **{**TINY, **settings}))
+    return new_state(RECIPE, card).network.eval()
 
 
 def voxel_centres(model: Ptn) -> Any:

@@ -19,7 +19,7 @@ from torch.utils.data import Dataset, Sampler
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Views, mapped
 from baselines.pix2shape.network.surfels import Scene
-from scenegen.common.errors import SpecError
+from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.hdf5.input_file import open_file
 from scenegen.common.seeding import Purpose, item_rng
 from scenegen.rendering.ground_truth import decode_image
@@ -64,6 +64,20 @@ def check_reducible(where: object, height: int, width: int, size: int) -> None:
     if height != width or height % size:
         expected = f"squares of a multiple of {size} pixels, the size that the networks take"
         raise SpecError(where, f"images of {height}x{width}", expected)
+
+
+def camera_poses(rooms: RoomsFile) -> Array:
+    """Return world_from_camera of all rows, (N, 4, 4). Raises FileFormatError if one is unknown."""
+    poses: Array = rooms.read("camera/world_from_camera", slice(None))
+    unknown = np.flatnonzero(~np.isfinite(poses).all(axis=(1, 2)))
+    if len(unknown):
+        raise FileFormatError(
+            f"{rooms.path}: camera/world_from_camera, row {unknown[0]}",
+            "numbers that are not finite",
+            "the camera's pose, which the networks have to be told",
+            "render the file anew with `scenegen render`, or leave this row out",
+        )
+    return poses
 
 
 class RoomImages(Dataset[dict[str, Any]]):

@@ -1,6 +1,5 @@
 """A training run and its folder: checkpoint, TensorBoard logs, a picture, and the weights."""
 
-import errno
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from lightning_fabric import Fabric
 from torch.utils.data import DataLoader
 from torch.utils.tensorboard import SummaryWriter
 
+from baselines.checkpoints import WEIGHTS, check_data, check_new
 from baselines.pix2shape.data.questions import QuestionImages, for_questions
 from baselines.pix2shape.data.rooms import Batch, RoomImages, is_question_file
 from baselines.pix2shape.network.config import ModelConfig
@@ -19,7 +19,7 @@ from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.pictures import training_sheet
 from baselines.pix2shape.training.batches import Source
 from baselines.pix2shape.training.loop import train
-from baselines.pix2shape.training.state import CHECKPOINT, State, load_state, new_state, save_state
+from baselines.pix2shape.training.state import State, load_state, new_state, save_state
 from baselines.pix2shape.training.steps import draw
 from baselines.pix2shape.weights.storage import Card, save_weights
 from iqtt.files.reader import open_questions
@@ -28,7 +28,7 @@ from scenegen.common.records import check
 from scenegen.rooms.preview import save_picture
 from scenegen.rooms.reader import RoomsFile
 
-WEIGHTS, PICTURE, LOGS = "weights.safetensors", "pictures.png", "logs"
+PICTURE, LOGS = "pictures.png", "logs"
 LOG_EVERY = 20  # iterations
 PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and batch size for that
 
@@ -77,15 +77,9 @@ def train_run(
         state, card = load_state(folder)
         labels = card.labels
         source, labelled = _sources(data, card.config, labels)
-        if (found := _fingerprint(source, labelled)) != card.fingerprint:
-            expected = f"{card.fingerprint[:12]}, on which the run was trained"
-            raise SpecError(
-                data, f"fingerprint {found[:12]}", expected, "resume with the same data"
-            )
+        check_data(data, _fingerprint(source, labelled), card.fingerprint)
     else:
-        if (folder / CHECKPOINT).exists():
-            what = "holds a checkpoint; say --resume, or name another folder"
-            raise FileExistsError(errno.EEXIST, what, str(folder))
+        check_new(folder)
         config = _suited(config, data, labels, conditional)
         source, labelled = _sources(data, config, labels)
         card = Card(

@@ -8,6 +8,7 @@ import torch
 from torch import nn
 from torch.optim import Adam
 
+from baselines.checkpoints import CHECKPOINT
 from baselines.optimiser_moments import load_moments, moments_of
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
@@ -17,7 +18,6 @@ from baselines.tensor_files import load_tensors, save_tensors
 from scenegen.common.errors import FileFormatError
 from scenegen.common.seeding import Purpose, item_seed
 
-CHECKPOINT = "checkpoint.safetensors"
 KINDS = ("generator", "critic")  # the optimisers of a state
 
 

@@ -11,14 +11,19 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from baselines.pix2shape.data.rooms import channels_first, check_reducible, is_question_file
+from baselines.pix2shape.data.rooms import (
+    camera_poses,
+    channels_first,
+    check_reducible,
+    is_question_file,
+)
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.network.surfels import extrapolated, normals_from_depth
 from baselines.pix2shape.training.losses import squared_distances
 from baselines.pix2shape.weights.bundled import open_weights
 from iqtt.files.reader import open_questions, parts
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
-from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.errors import SpecError
 from scenegen.common.new_file import check_writable
 from scenegen.common.records import check
 from scenegen.rendering.ground_truth import decode_image
@@ -92,7 +97,8 @@ def predict_rooms(
     with RoomsFile(data) as rooms:
         size = rooms.spec.height
         check_reducible(data, size, rooms.spec.width, spec.size)
-        condition = torch.from_numpy(_camera_positions(rooms).astype(np.float32)).to(device)
+        positions = camera_poses(rooms)[:, :3, 3].astype(np.float32)
+        condition = torch.from_numpy(positions).to(device)
         inputs, own = input_views(rooms)
         found = []
         for chosen in _batches(len(inputs)):
@@ -161,20 +167,6 @@ def enlarged(depth: Tensor, fov_y_degrees: float, size: int) -> tuple[Tensor, Te
     least = 0.5 / depth.amax(dim=(1, 2), keepdim=True)  # keeps extrapolated depth finite
     normals = functional.interpolate(normals, scale_factor=factor, mode="bilinear")
     return 1 / torch.maximum(inverse, least), functional.normalize(normals, dim=1)
-
-
-def _camera_positions(rooms: RoomsFile) -> Array:
-    """Return the position of each row's camera, (N, 3), world frame."""
-    poses = rooms.read("camera/world_from_camera", slice(None))
-    unknown = np.flatnonzero(~np.isfinite(poses).all(axis=(1, 2)))
-    if len(unknown):
-        raise FileFormatError(
-            f"{rooms.path}: camera/world_from_camera, row {unknown[0]}",
-            "numbers that are not finite",
-            "the camera's pose, which the model has to be told",
-            "render the file anew with `scenegen render`, or leave this row out",
-        )
-    return np.asarray(poses[:, :3, 3])
 
 
 def input_views(rooms: RoomsFile) -> tuple[Array, Array]:

@@ -13,10 +13,12 @@ from metrics.submissions.validation import validate
 from scenegen.common.errors import FileFormatError, SpecError
 
 torch = pytest.importorskip("torch")
+from baselines.checkpoints import new_state, save_weights  # noqa: E402
 from baselines.depth_supervised import predict, write_submission  # noqa: E402
+from baselines.depth_supervised.card import Card, recipe  # noqa: E402
 from baselines.depth_supervised.network import ReliefSpec  # noqa: E402
-from baselines.depth_supervised.storage import Card, new_state, save_weights  # noqa: E402
 
+METHOD = "depth-supervised"
 TRUTH = (
     "depth", "normal", "object_id", "object/shape", "object/world_from_object", "object/scale",
     "object/visible_pixels", "object/count", "light/position", "light/color", "light/ambient",
@@ -35,7 +37,7 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Return weights of both kinds whose relief differs clearly from image to image."""
     found = {}
     for kind in ("unet", "code"):
-        state = new_state(Card("depth-supervised", ReliefSpec(kind, 32, 0.1)))
+        state = new_state(recipe(METHOD), Card(METHOD, ReliefSpec(kind, 32, 0.1)))
         with torch.no_grad():
             for name, value in state.network.named_parameters():
                 value.mul_(10 if name.endswith("last.weight") else 1)

@@ -12,11 +12,12 @@ from pix2shape_models import edited
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 
 torch = pytest.importorskip("torch")
+from baselines.checkpoints import CHECKPOINT, load_checkpoint, load_weights  # noqa: E402
 from baselines.depth_supervised import training  # noqa: E402
+from baselines.depth_supervised.card import Card, recipe  # noqa: E402
 from baselines.depth_supervised.empty_rooms import empty_rooms  # noqa: E402
 from baselines.depth_supervised.network import predicted_depth  # noqa: E402
 from baselines.depth_supervised.rooms import read_rooms  # noqa: E402
-from baselines.depth_supervised.storage import CHECKPOINT, Card, load_state, load_weights  # noqa: E402
 from baselines.depth_supervised.training import (  # noqa: E402
     METHOD,
     learning_rate,
@@ -45,7 +46,8 @@ def test_a_unet_learns_nine_images_by_heart(turned_path, tmp_path, monkeypatch):
         turned_path, tmp_path, **told, progress=lambda i, n, now: losses.append((i, n, now["loss"]))
     )
     assert losses[-1][:2] == (80, 80)
-    network, card = load_weights(path, METHOD)
+    state = load_weights(path, recipe(METHOD))
+    network, card = state.network, state.card
     rooms = read_rooms(turned_path, 32, depth=True)
     cameras = rooms.cameras(torch.arange(len(rooms)))
     with torch.no_grad():
@@ -69,7 +71,7 @@ def test_a_run_goes_on_as_if_it_had_never_stopped(network, turned_path, tmp_path
 
     with pytest.raises(KeyboardInterrupt):
         train(turned_path, tmp_path / "cut", **told, progress=stop)
-    assert load_state(tmp_path / "cut", METHOD).card.iteration == 2
+    assert load_checkpoint(tmp_path / "cut", recipe(METHOD)).card.iteration == 2
     steps: list[int] = []
     again = train(
         turned_path, tmp_path / "cut", resume=True, progress=lambda i, n, now: steps.append(i)

@@ -8,8 +8,9 @@ torch = pytest.importorskip("torch")
 
 from ptn_models import TINY, tiny, volume_of, voxel_centres  # noqa: E402
 
+from baselines.checkpoints import new_state, save_weights  # noqa: E402
+from baselines.ptn.card import RECIPE, Card  # noqa: E402
 from baselines.ptn.rooms import RoomImages  # noqa: E402
-from baselines.ptn.storage import Card, save_weights  # noqa: E402
 from baselines.ptn.submission import FILES, seen, write_submission  # noqa: E402
 from baselines.ptn.training import train  # noqa: E402
 from iqtt.files.make import make_split  # noqa: E402
@@ -25,7 +26,7 @@ VIEWS = {"views": (0.0, 80.0), "objects": (1, 1), "shapes": ("sphere",)}
 def stored(folder, task="rooms", **settings):
     model = tiny(task, **settings)
     path = folder / f"{task}.safetensors"
-    save_weights(path, model, Card(model.config))
+    save_weights(path, new_state(RECIPE, Card(model.config)))
     return path
 
 

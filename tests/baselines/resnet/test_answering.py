@@ -12,8 +12,8 @@ from scenegen.common.errors import SceneGenError, SpecError
 
 torch = pytest.importorskip("torch")
 from baselines import cnn, siamese  # noqa: E402
+from baselines.checkpoints import WEIGHTS, load_weights  # noqa: E402
 from baselines.resnet.answering import accuracy, images_of  # noqa: E402
-from baselines.resnet.methods import WEIGHTS, load_weights  # noqa: E402
 
 PACKAGES = {"cnn": cnn, "siamese": siamese}
 each = pytest.mark.parametrize("name", PACKAGES)
@@ -26,7 +26,8 @@ def test_a_submission_is_valid_and_holds_the_networks_scores(name, run_folders, 
     package = PACKAGES[name]
     package.write_submission(truths.iqtt, out, weights, progress=lambda *done: told.append(done))
     assert told == [(6, 6)]
-    network, card = load_weights(weights, package.network.METHOD)
+    state = load_weights(weights, package.network.METHOD.recipe)
+    network, card = state.network, state.card
     with h5py.File(out) as file, h5py.File(truths.iqtt) as questions:
         found, answer = file["scores"][:], file.attrs["run"]
         for row in range(6):
@@ -97,7 +98,8 @@ def test_questions_of_two_answers(run_folders, small, tmp_path):
 
 
 def test_no_answers_no_accuracy(run_folders, truths, tmp_path):
-    network, card = load_weights(run_folders["cnn"] / WEIGHTS, cnn.network.METHOD)
+    state = load_weights(run_folders["cnn"] / WEIGHTS, cnn.network.METHOD.recipe)
+    network, card = state.network, state.card
     assert accuracy(network, truths.iqtt, card.size, 3) is None
     val = truths.iqtt.with_name("iqtt-val.h5")
     assert accuracy(network, val, card.size, 2) is None

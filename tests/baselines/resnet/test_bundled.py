@@ -6,7 +6,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 from baselines import cnn, siamese  # noqa: E402
-from baselines.resnet.methods import load_weights  # noqa: E402
+from baselines.checkpoints import load_weights  # noqa: E402
 
 PACKAGES = {"cnn": cnn, "siamese": siamese}
 
@@ -22,7 +22,7 @@ def test_bundled_weights(name, tmp_path):
         pytest.skip("no weights are bundled")
     (path,) = paths
     assert path.stat().st_size < 15_000_000
-    _, card = load_weights(path, method)
+    card = load_weights(path, method.recipe).card
     assert (card.labels, card.answers, card.seed) == (1000, 3, 0)
     assert card.iteration == card.iterations
     spec = SplitSpec(train=0, labeled=0, val=0, test=2, height=64, width=64, min_cube_pixels=0)

@@ -11,8 +11,8 @@ from scenegen.common.errors import SceneGenError, SpecError
 
 torch = pytest.importorskip("torch")
 from baselines import cnn, siamese  # noqa: E402
+from baselines.checkpoints import CHECKPOINT, WEIGHTS, load_weights  # noqa: E402
 from baselines.resnet import training  # noqa: E402
-from baselines.resnet.methods import CHECKPOINT, WEIGHTS  # noqa: E402
 from baselines.resnet.training import LabelledQuestions, permuted  # noqa: E402
 from baselines.tensor_files import load_tensors  # noqa: E402
 
@@ -92,9 +92,7 @@ def test_who_is_stopped_goes_on_as_if_never_stopped(
 
 
 def test_the_card_tells_how_it_was_trained(run_folders, questions):
-    from baselines.resnet.methods import load_weights
-
-    _, card = load_weights(run_folders["cnn"] / WEIGHTS, cnn.network.METHOD)
+    card = load_weights(run_folders["cnn"] / WEIGHTS, cnn.network.METHOD.recipe).card
     with h5py.File(questions) as file:
         mark = file.attrs["fingerprint_labeled"]
     assert (card.labels, card.answers, card.seed, card.iteration) == (3, 3, 1, 3)

@@ -1,14 +1,17 @@
 """Answers: meshes are compared under rotations, never reflections; submissions are valid."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from refusals import refused
 from scipy.spatial.transform import Rotation
 
+from baselines.checkpoints import new_state, save_weights
 from baselines.rezende import write_submission
 from baselines.rezende.answers import answer_scores, mesh_distance, refined, rotations
+from baselines.rezende.card import RECIPE, Card
 from baselines.rezende.sphere import icosphere
-from baselines.rezende.weights import Card, new_state, save_weights
 from iqtt.files.reader import open_questions
 from metrics.submissions.validation import validate
 from scenegen.common.errors import FileFormatError, SpecError
@@ -19,7 +22,7 @@ CARD = Card(size=16, code=4)
 @pytest.fixture
 def weights(tmp_path):
     path = tmp_path / "weights.safetensors"
-    save_weights(path, new_state(CARD).model, CARD)
+    save_weights(path, new_state(RECIPE, CARD))
     return path
 
 
@@ -64,7 +67,7 @@ def test_refined_rotations_are_proper_even_towards_a_mirror_image():
 
 @pytest.mark.parametrize("by_head", [False, True], ids=["meshes", "head"])
 def test_an_equal_image_has_the_best_score(split, by_head):
-    model = new_state(CARD).model.eval()
+    model = new_state(RECIPE, CARD).network.eval()
     model.decoder[-1].weight.data *= 300  # untrained meshes are almost spheres
     with open_questions(split / "iqtt-val.h5") as questions:
         stored = questions.read("questions", 0).copy()
@@ -78,7 +81,7 @@ def test_an_equal_image_has_the_best_score(split, by_head):
 
 @pytest.mark.parametrize("labels", [0, 5])
 def test_submissions_are_valid_and_do_not_depend_on_the_answers(split, tmp_path, weights, labels):
-    save_weights(weights, new_state(CARD).model, Card(size=16, code=4, labels=labels))
+    save_weights(weights, new_state(RECIPE, replace(CARD, labels=labels)))
     told = []
     for name in ("iqtt-test.h5", "iqtt-val.h5"):
         out = tmp_path / f"answers-{name}"
@@ -99,7 +102,7 @@ def test_rooms_training_files_and_other_sizes_are_refused(split, tmp_path, weigh
         write_submission(tmp_path / "rooms.h5", out, weights)
     with refused(SpecError, "iqtt-train.h5", "training questions"):
         write_submission(split / "iqtt-train.h5", out, weights)
-    save_weights(weights, new_state(Card(size=24)).model, Card(size=24))
+    save_weights(weights, new_state(RECIPE, Card(size=24)))
     with refused(SpecError, "iqtt-test.h5", "64x64", "24"):
         write_submission(split / "iqtt-test.h5", out, weights)
     with pytest.raises(FileFormatError):

@@ -3,8 +3,9 @@
 import numpy as np
 import torch
 
+from baselines.checkpoints import new_state
+from baselines.rezende.card import RECIPE, Card
 from baselines.rezende.head import codes_of, train_head
-from baselines.rezende.weights import Card, new_state
 
 
 def asked(count, seed):
@@ -18,7 +19,7 @@ def asked(count, seed):
 
 
 def test_questions_that_codes_can_answer_are_learned_and_the_encoder_stays():
-    model = new_state(Card(size=16, code=16)).model
+    model = new_state(RECIPE, Card(size=16, code=16)).network
     before = {k: v.clone() for k, v in model.state_dict().items() if not k.startswith("head")}
     questions = asked(100, 0)
     losses = train_head(model, *questions, 16, 0)
@@ -35,7 +36,7 @@ def test_questions_that_codes_can_answer_are_learned_and_the_encoder_stays():
 
 def test_the_seed_decides_the_head():
     questions = asked(20, 2)
-    models = [new_state(Card(size=16, code=4)).model for _ in range(3)]
+    models = [new_state(RECIPE, Card(size=16, code=4)).network for _ in range(3)]
     for model, seed in zip(models, (0, 0, 1)):
         train_head(model, *questions, 16, seed)
     heads = [model.head.layers[0].weight for model in models]
@@ -44,7 +45,7 @@ def test_the_seed_decides_the_head():
 
 
 def test_answers_are_scored_alike_wherever_they_stand():
-    model = new_state(Card(size=16, code=4)).model
+    model = new_state(RECIPE, Card(size=16, code=4)).network
     images, _ = asked(5, 3)
     order = [0, 3, 1, 2]
     with torch.no_grad():

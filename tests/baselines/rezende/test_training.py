@@ -8,10 +8,11 @@ import torch
 from refusals import refused
 from safetensors.torch import load_file
 
+from baselines.checkpoints import CHECKPOINT, load_weights, new_state
 from baselines.rezende import train, training
+from baselines.rezende.card import RECIPE, Card
 from baselines.rezende.reconstruct import errors, reconstruct, untrained
 from baselines.rezende.training import near_vertices, pixel_errors, train_pictures, windows
-from baselines.rezende.weights import CHECKPOINT, Card, load_weights, new_state
 from scenegen.common.errors import SpecError
 
 TINY = Card(size=16, code=4, iterations=80, batch=8, pairs=4, learning_rate=0.003)
@@ -25,17 +26,17 @@ def test_one_view_of_a_box_is_learned(one_box, tmp_path):
     )
     assert np.mean(misfits[-5:]) < 0.4 * np.mean(misfits[:5])
     before = errors(untrained(one_box), one_box)
-    after = errors(reconstruct(state.model, one_box), one_box)
+    after = errors(reconstruct(state.network, one_box), one_box)
     assert after["silhouette_iou"] > max(0.8, before["silhouette_iou"] + 0.1)
     assert after["radiance"] < 0.6 * before["radiance"]
 
 
 def test_the_renderer_has_no_gradient_and_yet_the_networks_get_one(one_box, monkeypatch):
-    state = new_state(replace(TINY, spread=1e6))
+    state = new_state(RECIPE, replace(TINY, spread=1e6))
     offsets = torch.zeros(2, 8, 162, 3, requires_grad=True)
-    squared = pixel_errors(state.model, offsets, one_box, np.arange(8))
+    squared = pixel_errors(state.network, offsets, one_box, np.arange(8))
     assert isinstance(squared, np.ndarray)  # no tensor, so nothing to differentiate
-    around = windows(state.model, offsets[0], one_box)
+    around = windows(state.network, offsets[0], one_box)
     assert not torch.from_numpy(near_vertices(squared, around)).requires_grad
     given = {}
 
@@ -46,12 +47,12 @@ def test_the_renderer_has_no_gradient_and_yet_the_networks_get_one(one_box, monk
 
     monkeypatch.setattr(training, "sampled_gradient", fixed)
     training._step(state, one_box, 0)
-    bias = state.model.decoder[-1].bias
+    bias = state.network.decoder[-1].bias
     np.testing.assert_allclose(bias.grad, torch.ones_like(bias), rtol=1e-5)
 
 
 def test_errors_are_summed_in_the_windows_of_vertices(one_box):
-    model = new_state(TINY).model
+    model = new_state(RECIPE, TINY).network
     offsets = torch.zeros(8, 162, 3)
     around = windows(model, offsets, one_box)
     squared = np.random.default_rng(0).random((2, 8, 16, 16), np.float32)
@@ -64,7 +65,7 @@ def test_errors_are_summed_in_the_windows_of_vertices(one_box):
 
 
 def test_the_far_side_is_charged_with_nothing_and_the_middle_keeps_its_depth(one_box):
-    model = new_state(TINY).model
+    model = new_state(RECIPE, TINY).network
     offsets = torch.zeros(8, 162, 3)
     sums = near_vertices(np.ones((1, 8, 16, 16), np.float32), windows(model, offsets, one_box))
     height = model.sphere[:, 2].numpy()
@@ -77,14 +78,14 @@ def test_the_far_side_is_charged_with_nothing_and_the_middle_keeps_its_depth(one
 
 
 def test_what_moves_one_vertex_changes_errors_in_its_window_alone(one_box):
-    state = new_state(TINY)
-    state.model.smooth = torch.eye(162)
+    state = new_state(RECIPE, TINY)
+    state.network.smooth = torch.eye(162)
     offsets = torch.zeros(2, 8, 162, 3)
-    vertex = int(state.model.sphere[:, 2].argmax())  # it faces the camera
+    vertex = int(state.network.sphere[:, 2].argmax())  # it faces the camera
     offsets[1, :, vertex] = torch.tensor([0.08, -0.1, 0.0])
-    squared = pixel_errors(state.model, offsets, one_box, np.arange(8))
+    squared = pixel_errors(state.network, offsets, one_box, np.arange(8))
     changed = squared[0] != squared[1]
-    around = windows(state.model, offsets[0], one_box)
+    around = windows(state.network, offsets[0], one_box)
     top, bottom, left, right = (edge[:, vertex] for edge in around)
     assert (top + bottom == 16).all()  # the vertex lies on the camera's axis
     assert (left + right == 16).all()
@@ -108,8 +109,8 @@ def test_a_run_that_was_stopped_ends_with_the_same_bits(one_box, tmp_path, monke
         train_pictures(one_box, tmp_path / "parts", card)
     parts = train_pictures(one_box, tmp_path / "parts", card, resume=True)
     assert parts.card.iteration == 5
-    for name, value in whole.model.state_dict().items():
-        assert torch.equal(value, parts.model.state_dict()[name]), name
+    for name, value in whole.network.state_dict().items():
+        assert torch.equal(value, parts.network.state_dict()[name]), name
     ends = [load_file(tmp_path / run / CHECKPOINT) for run in ("whole", "parts")]
     assert all(torch.equal(value, ends[1][name]) for name, value in ends[0].items())
     with refused(SpecError, "data", "other"):
@@ -123,7 +124,10 @@ def test_questions_are_trained_on_and_labels_change_the_head_alone(split, tmp_pa
     )
     assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
     second = train(data, tmp_path / "b", labels=4, start=first)
-    (model, card), (other, labelled) = load_weights(first), load_weights(second)
+    (model, card), (other, labelled) = (
+        (state.network, state.card)
+        for state in (load_weights(first, RECIPE), load_weights(second, RECIPE))
+    )
     assert (card.labels, labelled.labels) == (0, 4)
     assert (card.iteration, labelled.iteration) == (4, 4)
     for name, value in model.state_dict().items():
@@ -133,7 +137,7 @@ def test_questions_are_trained_on_and_labels_change_the_head_alone(split, tmp_pa
     direct = train(data, tmp_path / "c", labels=4, **QUICK)
     assert direct.read_bytes() != first.read_bytes()
     again = train(data, tmp_path / "c", resume=True)
-    assert load_weights(again)[1].labels == 4
+    assert load_weights(again, RECIPE).card.labels == 4
 
 
 @pytest.mark.parametrize(

@@ -54,6 +54,8 @@ def test_objects_are_seen_through_the_code_from_80_degrees_away(unseen_path, tmp
 
 
 def test_weights_of_the_other_method_are_refused(unseen_path, tmp_path):
-    with pytest.raises(FileFormatError, match="weights of depth-supervised"):
+    with pytest.raises(FileFormatError) as error:
         view_pairs.write_submission(unseen_path, tmp_path / "p.h5", WEIGHTS)
+    assert error.value.where == f"{WEIGHTS}: method"
+    assert (error.value.found, error.value.expected) == ("depth-supervised", "view-pairs")
     assert not (tmp_path / "p.h5").exists()

@@ -9,8 +9,9 @@ from h5_edits import put, values
 from pix2shape_models import edited
 
 torch = pytest.importorskip("torch")
+from baselines.checkpoints import load_weights  # noqa: E402
 from baselines.depth_supervised import training as shared  # noqa: E402
-from baselines.depth_supervised.storage import load_weights  # noqa: E402
+from baselines.depth_supervised.card import recipe  # noqa: E402
 from baselines.tensor_files import load_tensors  # noqa: E402
 from baselines.view_pairs import train, write_submission  # noqa: E402
 from baselines.view_pairs.labels import FOLDER  # noqa: E402
@@ -55,6 +56,6 @@ def test_a_run_goes_on_as_if_it_had_never_stopped(near_path, tmp_path, monkeypat
         train(near_path, tmp_path / "cut", **TOLD, progress=lambda i, n, now: i == 3 and stop())
     again = train(near_path, tmp_path / "cut", resume=True)
     assert same(weights_of(again), weights_of(whole))
-    assert load_weights(again, "view-pairs")[1].iteration == 4
+    assert load_weights(again, recipe("view-pairs")).card.iteration == 4
     write_submission(near_path, tmp_path / "p.h5", again)
     assert (tmp_path / "p.h5").exists()

@@ -1,4 +1,4 @@
-"""Splits as wholes: the same request, the same bytes; odd requests; runs that end early."""
+"""Splits as wholes: the same request, the same bytes; what is told of it; odd requests."""
 
 import os
 import re
@@ -6,19 +6,15 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
+from made_splits import TINY
 
-from iqtt.files import make as module
-from iqtt.files.make import FILES, make_split, make_suite
-from iqtt.files.reader import QuestionsFile
-from iqtt.questions.specs import SUITE, SplitSpec, preset_spec, question_kind
-from iqtt.shapes.splits import TooFewShapesError
-from scenegen.common.errors import PlacementError, SpecError
-from scenegen.common.workspace import remove_leftovers
+from iqtt.files.make import make_split
+from iqtt.questions.specs import SplitSpec
+from scenegen.common.errors import SpecError
 from scenegen.rendering.backend import versions
 
 ENDS = ("little", "big")
@@ -34,16 +30,6 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.files.make import make_split
 make_split(sys.argv[1], SplitSpec.from_json(sys.argv[2]), batch=3, command=sys.argv[3])
 """
-KILLED = """
-import os, signal, sys
-from iqtt.questions.specs import SplitSpec
-from iqtt.files.make import make_split
-kill = lambda done: os.kill(os.getpid(), signal.SIGKILL)
-make_split(sys.argv[1], SplitSpec.from_json(sys.argv[2]), batch=1, overwrite=True, progress=kill)
-"""
-TINY = SplitSpec(
-    seed=1, train=3, labeled=2, val=2, test=2, cubes=(6, 6), height=16, width=16, min_cube_pixels=0
-)
 
 
 @pytest.fixture(scope="module")
@@ -122,31 +108,6 @@ def test_a_table_does_not_depend_on_the_size_of_the_others(folder, tmp_path):
         assert a.attrs["fingerprint_labeled"] != b.attrs["fingerprint_labeled"]
 
 
-def listing(folder: Path) -> dict[str, bytes | None]:
-    """All there is in a folder, hidden names too."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None
-        for path in folder.rglob("*")
-    }
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("made") / "split"
-    make_split(folder, TINY)
-    return folder
-
-
-@pytest.fixture
-def old(made: Path, tmp_path: Path) -> Path:
-    """The folder of an older split."""
-    folder = tmp_path / "old"
-    folder.mkdir()
-    for name, raw in listing(made).items():
-        (folder / name).write_bytes(raw)
-    return folder
-
-
 @pytest.mark.parametrize(
     "changed",
     [
@@ -188,11 +149,15 @@ def test_odd_requests_are_answered_in_full(changed, tmp_path):
 @pytest.mark.parametrize(
     ("compression", "dtype"), [("none", "float16"), ("lzf", "float32"), ("gzip", "uint8")]
 )
-def test_plain_h5py_reads_every_type_and_compression(compression, dtype, made, tmp_path):
+def test_plain_h5py_reads_every_type_and_compression(compression, dtype, tmp_path):
+    make_split(tmp_path / "plain", TINY)
     spec = replace(TINY, image_dtype=dtype, with_depth=True)
     make_split(tmp_path / "split", spec, compression=compression)
     for name, path in (("iqtt-train.h5", "unlabeled/questions"), ("iqtt-val.h5", "questions")):
-        with h5py.File(made / name) as plain, h5py.File(tmp_path / "split" / name) as file:
+        with (
+            h5py.File(tmp_path / "plain" / name) as plain,
+            h5py.File(tmp_path / "split" / name) as file,
+        ):
             images = file[path]
             assert images.dtype == dtype
             assert images.compression == (None if compression == "none" else compression)
@@ -211,207 +176,6 @@ def test_plain_h5py_reads_every_type_and_compression(compression, dtype, made, t
         assert list(file) == ["questions"]
     with h5py.File(tmp_path / "split" / "iqtt-test-answers.h5") as file:
         assert file["truth/depth"].shape == (2, 4, 16, 16)
-
-
-def test_an_older_split_is_replaced_only_on_request(old, tmp_path):
-    before = listing(tmp_path)
-    with pytest.raises(FileExistsError):
-        make_split(old, replace(TINY, seed=2))
-    assert listing(tmp_path) == before
-    (old / "iqtt-val.h5").unlink()
-    beside = set()
-    look = lambda _: beside.update(os.listdir(tmp_path))  # noqa: E731
-    make_split(old, replace(TINY, seed=2), overwrite=True, progress=look)
-    assert len(beside) == 2, "the new one is made beside the old one"
-    after = listing(tmp_path)
-    assert set(after) == set(before)
-    assert all(after[f"old/{name}"] != before[f"old/{name}"] for name in FILES)
-
-
-def test_the_folder_that_one_is_in_is_filled_where_it_is(old, tmp_path, monkeypatch):
-    (tmp_path / "empty").mkdir()
-    monkeypatch.chdir(tmp_path / "empty")
-    make_split(".", TINY, overwrite=True)
-    assert listing(Path()) == listing(old)
-
-
-def test_a_killed_run_is_in_nobody_s_way(old, tmp_path):
-    """Killed while it makes the split, and then started again."""
-    command = [sys.executable, "-c", KILLED, old, replace(TINY, seed=2).to_json()]
-    for folder in (old, tmp_path / "new"):
-        before = listing(old)
-        command[3] = str(folder)
-        assert subprocess.run(command, check=False, capture_output=True).returncode == -9
-        assert listing(old) == before
-        assert len(os.listdir(tmp_path)) == 2, "the split and what the killed run left"
-        with pytest.warns(UserWarning, match="partial"):
-            remove_leftovers(tmp_path)
-        make_split(folder, replace(TINY, seed=2), overwrite=True)
-        assert sorted(os.listdir(folder)) == sorted(FILES)
-
-
-@pytest.mark.parametrize(
-    "stranger", ["notes.txt", "iqtt-test-predictions.h5", ".hidden", "iqtt-train.h5/"]
-)
-def test_a_folder_with_other_things_is_never_replaced(stranger, old, tmp_path):
-    if stranger.endswith("/"):
-        (old / stranger).unlink()
-        (old / stranger).mkdir()
-    else:
-        (old / stranger).write_text("mine")
-    before = listing(tmp_path)
-    with pytest.raises(FileExistsError) as error:
-        make_split(old, TINY, overwrite=True)
-    assert stranger.rstrip("/") in str(error.value.strerror)
-    assert error.value.filename == str(old)
-    assert listing(tmp_path) == before
-
-
-def test_places_that_cannot_be_a_folder_are_refused_before_anything_is_made(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "make_pools", None)
-    (tmp_path / "file").write_text("mine")
-    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
-    before = listing(tmp_path)
-    for overwrite in (False, True):
-        for name, kind in (
-            ("file", NotADirectoryError),
-            ("file/split", NotADirectoryError),
-            ("missing/split", FileNotFoundError),
-            ("nowhere", OSError),
-        ):
-            with pytest.raises(kind):
-                make_split(tmp_path / name, TINY, overwrite=overwrite)
-    (tmp_path / "locked").mkdir()
-    monkeypatch.setattr(os, "access", lambda path, mode: False)
-    for path in ("locked", "locked/split"):
-        with pytest.raises(PermissionError) as error:
-            make_split(tmp_path / path, TINY, overwrite=True)
-        assert error.value.filename == str(tmp_path / "locked")
-    del before["file"]
-    assert set(listing(tmp_path)) == {*before, "file", "locked"}
-
-
-class StopError(Exception):
-    """What the test's progress bar raises."""
-
-
-@pytest.mark.parametrize("kind", [StopError, KeyboardInterrupt])
-@pytest.mark.parametrize("after", [1, 7])
-def test_an_interrupted_run_leaves_all_as_it_was(kind, after, old, tmp_path):
-    done = []
-
-    def progress(count: int) -> None:
-        done.append(count)
-        if sum(done) >= after:
-            raise kind
-
-    before = listing(tmp_path)
-    for folder in (tmp_path / "new", old):
-        done.clear()
-        with pytest.raises(kind):
-            make_split(folder, replace(TINY, seed=2), batch=1, progress=progress, overwrite=True)
-        assert listing(tmp_path) == before
-
-
-def test_errors_on_the_way_leave_all_as_it_was(old, tmp_path, monkeypatch):
-    before, new = listing(tmp_path), tmp_path / "new"
-    with pytest.raises(SpecError):
-        make_split(new, TINY, compression="zip")
-    with pytest.raises(TooFewShapesError):
-        make_split(new, replace(TINY, cubes=(3, 3)))
-    monkeypatch.setattr("iqtt.questions.views.QUESTION_ATTEMPTS", 1)
-    monkeypatch.setattr("iqtt.questions.views.VIEWS", 1)
-    with pytest.raises(PlacementError):
-        make_split(old, replace(TINY, height=64, width=64, min_cube_pixels=14), overwrite=True)
-    monkeypatch.undo()
-    monkeypatch.setattr(os, "statvfs", lambda path: SimpleNamespace(f_bavail=0, f_frsize=1))
-    with pytest.raises(OSError, match="No space left on device") as error:
-        make_split(new, TINY)
-    assert error.value.filename == str(new / "iqtt-train.h5")
-    monkeypatch.undo()
-    with pytest.raises(FileExistsError):  # somebody else makes the folder meanwhile
-        make_split(new, TINY, progress=lambda count: new.mkdir(exist_ok=True))
-    new.rmdir()
-    assert listing(tmp_path) == before
-
-
-def as_released(path: Path) -> list[tuple[np.ndarray, np.ndarray | None]]:
-    """Load images and answers as whoever has the released files does: with plain h5py, by the
-    names and types that their description tells.
-    """
-    tables = []
-    with h5py.File(path) as file:
-        for group in (file["labeled"], file["unlabeled"]) if "labeled" in file else (file,):
-            images = group["questions"][()]
-            assert (images.dtype, images.ndim) == (np.float32, 5)
-            assert images.shape[1:] == (4, 32, 32, 3)
-            assert 0 <= images.min() < 0.5 < images.max() <= 1
-            answers = group["answers"][()] if "answers" in group else None
-            assert answers is None or (answers.dtype, answers.shape) == (np.uint8, images.shape[:1])
-            tables.append((images, answers))
-    return tables
-
-
-def test_the_preset_v2_takes_the_place_of_the_released_files(tmp_path):
-    spec = preset_spec("v2", train=9, labeled=6, val=6, test=3, height=32, width=32)
-    make_split(tmp_path / "v2", spec)
-    labeled, unlabeled = as_released(tmp_path / "v2" / "iqtt-train.h5")
-    [val], [test] = (as_released(tmp_path / "v2" / f"iqtt-{name}.h5") for name in ("val", "test"))
-    assert [len(images) for images, _ in (labeled, unlabeled, val, test)] == [6, 3, 6, 3]
-    assert unlabeled[1] is test[1] is None
-    assert sorted(labeled[1]) == sorted(val[1]) == [0, 0, 1, 1, 2, 2]
-    for images, _ in (labeled, unlabeled, val, test):
-        assert (images[:, :, 0, 0] == 1).all(), "the background is white"
-        assert len(np.unique(images)) > 256, "more than bytes"
-
-
-SUITE_SPEC = replace(TINY, cubes=(9, 9), train=2, labeled=1, val=2, test=1)
-
-
-def test_the_suite_has_a_split_of_each_kind_in_a_folder_of_its_own(tmp_path):
-    done: list[int] = []
-    tally = make_suite(tmp_path / "suite", SUITE_SPEC, progress=done.append, compression="none")
-    assert sorted(os.listdir(tmp_path / "suite")) == sorted(SUITE)
-    assert (sum(done), tally.proposed > 5 * 6 * 3) == (5 * 6, True)
-    for name, (kind, answers) in SUITE.items():
-        with QuestionsFile(tmp_path / "suite" / name / "iqtt-val.h5") as questions:
-            expected = replace(SUITE_SPEC, seed=None, distractors=kind, answers=answers)
-            assert questions.spec == expected
-            kinds = questions.read("distractor_kind", slice(None))
-            assert {question_kind(row) for row in kinds.tolist()} == {name}
-            assert questions.read("questions", 0).shape == (1 + answers, 16, 16, 3)
-        with h5py.File(tmp_path / "suite" / name / "iqtt-train.h5") as file:
-            assert file["unlabeled/questions"].compression is None
-    with pytest.raises(FileExistsError):
-        make_suite(tmp_path / "suite", SUITE_SPEC)
-
-
-def test_a_suite_that_is_stopped_leaves_whole_splits_and_goes_over_none(tmp_path):
-    done: list[int] = []
-
-    def stop(count: int) -> None:
-        done.append(count)
-        if sum(done) > 7:
-            raise StopError
-
-    for folder in ("suite", "suite"):
-        done.clear()
-        with pytest.raises(StopError):
-            make_suite(tmp_path / folder, SUITE_SPEC, progress=stop, overwrite=True)
-        assert listing(tmp_path).keys() == {
-            *("suite", "suite/matched", *(f"suite/matched/{name}" for name in FILES))
-        }
-    before = listing(tmp_path)
-    (tmp_path / "file").write_text("mine")
-    for folder, error in (("suite", FileExistsError), ("file", NotADirectoryError)):
-        with pytest.raises(error):
-            make_suite(tmp_path / folder, SUITE_SPEC, progress=done.append)
-    with pytest.raises(TooFewShapesError):
-        make_suite(tmp_path / "new", replace(SUITE_SPEC, cubes=(6, 6)))
-    with pytest.raises(FileNotFoundError):
-        make_suite(tmp_path / "no" / "new", SUITE_SPEC)
-    (tmp_path / "file").unlink()
-    assert listing(tmp_path) == before
 
 
 def test_a_split_without_any_question_is_refused(tmp_path):

@@ -157,12 +157,18 @@ def test_scores_of_objects_and_relief_are_those_of_scipy_and_numpy(folder):
             )
 
 
+def scored(baseline, truth, folder):
+    """Return the scores of a baseline as they are read back from their file, rechecked."""
+    write_room_baseline(baseline, truth, folder / "p.h5")
+    write_scores(score([folder / "p.h5"], truth), folder / "s.json")
+    found = read_scores(folder / "s.json")
+    recheck(found)
+    return found
+
+
 def test_rooms_without_objects_have_no_such_scores(make_rooms, tmp_path):
     truth = make_rooms(tmp_path / "bare.h5", 3, objects=(0, 0))
-    write_room_baseline("empty-room", truth, tmp_path / "p.h5")
-    write_scores(score([tmp_path / "p.h5"], truth), tmp_path / "s.json")
-    found = read_scores(tmp_path / "s.json")
-    recheck(found)
+    found = scored("empty-room", truth, tmp_path)
     assert not [name for name in found.metrics if metric(name).lacking]
     assert found.metrics["chamfer"].value < 1e-5
     assert (dict(found.skills), dict(found.by_object_shape)) == ({}, {})
@@ -172,10 +178,7 @@ def test_rooms_without_objects_have_no_such_scores(make_rooms, tmp_path):
 
 def test_rows_without_objects_are_left_out_and_counted(folder, make_rooms, tmp_path):
     truth = make_rooms(tmp_path / "some.h5", 8, objects=(0, 1), seed=5)
-    write_room_baseline("oracle", truth, tmp_path / "p.h5")
-    write_scores(score([tmp_path / "p.h5"], truth), tmp_path / "s.json")
-    found = read_scores(tmp_path / "s.json")
-    recheck(found)
+    found = scored("oracle", truth, tmp_path)
     bare = found.meta.counts["rows_without_objects"]
     assert 0 < bare < 8
     assert np.isnan(found.items["object_recall_0.02"]).sum() == bare
@@ -225,10 +228,7 @@ def test_every_row_serves_once_as_that_of_another_scene():
 
 def test_the_scores_of_one_scene_have_no_skill_of_relief(make_rooms, tmp_path):
     truth = make_rooms(tmp_path / "one.h5", 1, views=(0.0, 35.0))
-    write_room_baseline("empty-room", truth, tmp_path / "p.h5")
-    write_scores(score([tmp_path / "p.h5"], truth), tmp_path / "s.json")
-    found = read_scores(tmp_path / "s.json")
-    recheck(found)
+    found = scored("empty-room", truth, tmp_path)
     assert "relief_iou" not in found.skills
     assert found.skills["chamfer"].low is None
 
