@@ -14,7 +14,6 @@ from torch import Tensor
 from torch.nn import functional
 
 from baselines.ptn.network import VOXELS, Ptn
-from baselines.ptn.projection import sampled
 from scenegen.common.rotations import rotation_matrix
 
 COARSE, FINE = 8, 16  # voxels a side of the volumes that are compared, at first and at last
@@ -24,7 +23,7 @@ FINER = ((0.2, COARSE), (0.1, FINE))  # radians of these turns, and voxels a sid
 CHUNK = 256  # rotations at a time
 PSI = 1.533751168755204288118041  # positive root of psi^4 = psi + 4
 FEATURES = ("fit of volumes", "nearness of codes")
-BOX = torch.tensor([[-1.0] * 3, [1.0] * 3])
+FINELY = 4
 RIDGE = 1e-3  # keeps the head's weights finite where labels are few
 
 
@@ -78,7 +77,11 @@ def best_fits(reference: Tensor, answers: Tensor) -> Tensor:
 
 @dataclass(frozen=True, eq=False)
 class _Level:
-    """Volumes at one resolution: the reference, (1, S, S, S), and K answers at points, (K, P)."""
+    """Volumes at one resolution: the reference, (S, S, S), and K answers at P points, (K, P).
+
+    The points are the voxels of the ball. The reference is interpolated to FINELY times as many
+    voxels a side, so that a turned volume is a lookup of the nearest ones.
+    """
 
     reference: Tensor
     answers: Tensor
@@ -86,7 +89,15 @@ class _Level:
 
     def fits(self, rotations: Tensor) -> Tensor:
         """Return how well the reference fits the answers when it is turned, (R, K)."""
-        return _turned(self.reference, self.points, rotations) @ self.answers.T
+        side = len(self.reference)
+        voxels, parts = self.reference.flatten(), []
+        strides = torch.tensor([1.0, side, side * side])
+        for some in torch.split(rotations, CHUNK):
+            places = self.points @ some  # the inverse of each rotation, on the left
+            nearest = places.add_(1).mul_(side / 2).floor_().clamp_(0, side - 1) @ strides
+            found = voxels.index_select(0, nearest.flatten().int()).view(nearest.shape)
+            parts.append(_centred(found))
+        return torch.cat(parts) @ self.answers.T
 
 
 def _level(reference: Tensor, answers: Tensor, side: int) -> _Level:
@@ -94,16 +105,8 @@ def _level(reference: Tensor, answers: Tensor, side: int) -> _Level:
     place = (torch.arange(side) + 0.5) * 2 / side - 1
     points = torch.stack(torch.meshgrid(place, place, place, indexing="ij")[::-1], dim=-1)
     inside = points.norm(dim=-1) <= 1
-    return _Level(small[0], _centred(small[1:, 0][:, inside]), points[inside])
-
-
-def _turned(volume: Tensor, points: Tensor, rotations: Tensor) -> Tensor:
-    """Return a volume's values at points when it is turned, centred: (1, D, D, D) -> (R, P)."""
-    parts = []
-    for some in torch.split(rotations, CHUNK):
-        places = (points @ some).reshape(1, -1, 3)  # the inverse of each rotation, on the left
-        parts.append(sampled(volume, BOX, places).view(len(some), len(points)))
-    return _centred(torch.cat(parts))
+    fine = functional.interpolate(small[:1], scale_factor=FINELY, mode="trilinear")[0, 0]
+    return _Level(fine, _centred(small[1:, 0][:, inside]), points[inside])
 
 
 def _centred(values: Tensor) -> Tensor:
