@@ -134,7 +134,9 @@ def columns(spec: DatasetSpec) -> list[Column]:
         shape = tuple(sizes[axis] for axis in field.axes)
         names = tuple(NAMES.get(axis, axis) for axis in field.axes)
         dtype = spec.image_dtype if field.dtype == "image" else field.dtype
-        found.append(Column(field.name, shape, dtype, field.per_pixel, attributes, names))
+        # A plane has one normal: 12 bytes again and again, which deflate packs better as they are.
+        shuffle = field.name != "normal"
+        found.append(Column(field.name, shape, dtype, field.per_pixel, attributes, names, shuffle))
     return found
 
 

@@ -144,6 +144,8 @@ class RoomPredictionWriter:
                 "every one" if self._rows else "at least one",
                 "nothing was written",
             )
+        if self._table is not None:
+            self._table.write_packed()
         for name in self._columns if len(missing) else ():
             file[name].resize(len(self._rows), axis=0)
         file.attrs.update({**self._texts, "truth_fingerprint": self._truth.fingerprint})
