@@ -1,5 +1,6 @@
 """Shapes in the form that the ray caster takes: triangles grown by a hair, and their normals."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +9,6 @@ from scenegen.common.rotations import cross
 from scenegen.objects.solids import Array, UnitShape
 
 OVERLAP = 4e-6  # of neighbouring triangles; rays slip between them if it is below 2e-6
-_NEXT, _BEFORE = [1, 2, 0], [2, 0, 1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +38,12 @@ def normal_table(shape: UnitShape) -> Array:
     if shape.is_sphere:
         return np.zeros((0, 12), np.float32)
     edges = shape.triangles[:, 1:] - shape.triangles[:, :1]
-    face = np.stack(cross(edges[:, 0].T, edges[:, 1].T), axis=1)
-    face /= np.sqrt(np.einsum("fi,fi->f", face, face))[:, None]
-    table = np.empty((len(face), 12), np.float32)
-    table[:, :3], table[:, 3:] = face, shape.normals.reshape(-1, 9)
+    face = cross(*(np.ascontiguousarray(edges[:, k].T) for k in range(2)))
+    length = _norm(face)
+    table = np.empty((len(edges), 12), np.float32)
+    for i in range(3):
+        table[:, i] = face[i] / length
+    table[:, 3:] = shape.normals.reshape(-1, 9)
     return table
 
 
@@ -51,14 +53,22 @@ def overlapping(triangles: Array) -> Array:
     Otherwise a ray that meets a shared edge may slip through, as rounding can put it outside both
     triangles. No corner moves by more than four times OVERLAP.
     """
-    edges = triangles[:, _NEXT] - triangles  # from each corner to the next
-    length = np.sqrt(np.einsum("fki,fki->fk", edges, edges))
-    along = edges / np.maximum(length, 1e-30)[..., None]
-    # Moving a corner against the sum of its two edges' directions moves both edges outwards.
-    outward = along[:, _BEFORE] - along
-    first, second = edges[:, 0].T, edges[:, 1].T
-    double_area = np.sqrt(sum(c * c for c in cross(first, second)))
-    sine = double_area[:, None] / np.maximum(length * length[:, _BEFORE], 1e-30)
-    reach = np.sqrt(np.einsum("fki,fki->fk", outward, outward))
-    scale = OVERLAP / np.maximum(np.maximum(sine, reach / 4), 1e-30)
-    return np.asarray(triangles + outward * scale[..., None])
+    corners = [np.ascontiguousarray(triangles[:, k].T) for k in range(3)]  # (3, F) each: faster
+    edges = [corners[(k + 1) % 3] - corners[k] for k in range(3)]  # from each corner to the next
+    length = [_norm(edge) for edge in edges]
+    along = [edges[k] / np.maximum(length[k], 1e-30) for k in range(3)]
+    double_area = _norm(cross(edges[0], edges[1]))
+    grown = np.empty(triangles.shape)
+    for k in range(3):
+        # Moving a corner against the sum of its two edges' directions moves both edges outwards.
+        outward = along[k - 1] - along[k]
+        sine = double_area / np.maximum(length[k] * length[k - 1], 1e-30)
+        scale = OVERLAP / np.maximum(np.maximum(sine, _norm(outward) / 4), 1e-30)
+        grown[:, k] = (corners[k] + outward * scale).T
+    return grown
+
+
+def _norm(vectors: Sequence[Array]) -> Array:
+    """Return the lengths of vectors given by components."""
+    x, y, z = vectors
+    return np.asarray(np.sqrt(x * x + y * y + z * z))

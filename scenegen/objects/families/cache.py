@@ -26,13 +26,13 @@ from scenegen.description.scenes import FAMILY_NAMES
 from scenegen.objects.cast_meshes import CastMesh, cast_mesh
 from scenegen.objects.families.members import make_member
 from scenegen.objects.families.parts.assembly import UPRIGHT
-from scenegen.objects.solids import UnitShape, without_triangles
+from scenegen.objects.solids import Array, UnitShape, without_triangles
 
 MOST_FACES_KEPT = 1_000_000  # of the meshes in memory; a face takes 84 bytes
 _SOURCES = ("common/rotations.py", "objects/solids.py", "objects/cast_meshes.py")
-_HEAD = struct.Struct(
-    "<4I"
-)  # faces, rows of the hull; CRC-32 of the hull's bytes, and of the mesh's
+_SIZES = struct.Struct("<2I")  # faces, rows of the hull
+_CHECKS = struct.Struct("<2I")  # CRC-32 of sizes and hull, and of the mesh
+_HEAD = struct.Struct("<4I")  # sizes and checks
 _HULL_ROW, _FACE = 4 * 8, (9 + 12) * 4  # bytes
 _MOST_BYTES = 2**24  # of a file; a member takes some 0.2 MB
 _FIRST_READ = 2**14  # bytes, which hold the head and nearly every hull
@@ -92,7 +92,7 @@ class MemberCache:
         data = self._read(member, _FIRST_READ)
         faces, rows, check, _ = _HEAD.unpack_from(data) if data else (0, 0, 0, 0)
         hull = data[_HEAD.size : _HEAD.size + rows * _HULL_ROW]
-        if not rows or len(hull) < rows * _HULL_ROW or isal_zlib.crc32(hull) != check:
+        if not rows or isal_zlib.crc32(hull, isal_zlib.crc32(data[: _SIZES.size])) != check:
             return None
         values = np.frombuffer(hull, "<f8").astype(float)
         points, discs = values[: 3 * rows].reshape(rows, 3), values[3 * rows :]
@@ -122,16 +122,15 @@ class MemberCache:
         return self.folder / f"{member[0]}-{member[1]:04d}.bin"
 
     def _write(self, member: Member, outline: UnitShape, mesh: CastMesh) -> None:
-        points, discs = (a.astype("<f8") for a in (outline.hull_points, outline.hull_discs))
-        triangles, normals = (a.astype("<f4") for a in (mesh.triangles, mesh.normals))
-        hull, body = points.tobytes() + discs.tobytes(), triangles.tobytes() + normals.tobytes()
-        checks = isal_zlib.crc32(hull), isal_zlib.crc32(body)
-        head = _HEAD.pack(len(normals), len(discs), *checks)
+        hull = _bytes("<f8", outline.hull_points, outline.hull_discs)
+        body = _bytes("<f4", mesh.triangles, mesh.normals)
+        sizes = _SIZES.pack(len(mesh.normals), len(outline.hull_discs))
+        checks = isal_zlib.crc32(hull, isal_zlib.crc32(sizes)), isal_zlib.crc32(body)
         try:
             path = self._path(member)
             path.parent.mkdir(parents=True, exist_ok=True)
             with written_beside(path, overwrite=True) as temporary:
-                temporary.write_bytes(head + hull + body)
+                temporary.write_bytes(sizes + _CHECKS.pack(*checks) + hull + body)
         except OSError as error:
             self._give_up(error)
 
@@ -145,6 +144,10 @@ class MemberCache:
                 " made in every process; choose another --cache-dir",
                 stacklevel=2,
             )
+
+
+def _bytes(kind: str, *arrays: Array) -> bytes:
+    return b"".join(np.ascontiguousarray(array, kind).tobytes() for array in arrays)
 
 
 @functools.cache
