@@ -1,10 +1,12 @@
 """The models of a batch in one Mitsuba scene, each with an acceleration structure of its own.
 
 There are thousands of models, too many for one scene. Their meshes are cached, and the scene of a
-batch refers to those that it shows, on a compact lattice. A model's place on the lattice differs
-from batch to batch, but the bits of an image must not. So rays start from the points of a grid that
-is fine compared with the precision needed, and coarse enough that adding and subtracting a place of
-the lattice is exact in float32.
+batch refers to those that it shows, on a compact lattice. Their structures are built for every
+batch: Mitsuba keeps them with the scene, and those of all models would take more than 1 GiB.
+
+A model's place on the lattice differs from batch to batch, but the bits of an image must not. So
+rays start from the points of a grid that is fine compared with the precision needed, and coarse
+enough that adding and subtracting a place of the lattice is exact in float32.
 """
 
 from collections import OrderedDict
