@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,15 @@ def _untried(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
     """
     if request.node.get_closest_marker("tried") is None:
         monkeypatch.setattr("scenegen.common.hdf5.trial.try_file", lambda path: None)
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep models in no folder but the tests' own, whatever an earlier test said."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "cache"))
+    cache = sys.modules.get("scenegen.objects.families.cache")
+    if cache:
+        cache.MEMBERS_KEPT.use(None)
 
 
 @pytest.fixture(scope="session")

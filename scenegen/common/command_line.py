@@ -270,7 +270,7 @@ SEED = click.option("--seed", type=int, default=0, show_default=True,
 UP = click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True,
                   help="Axis that points up in the meshes; in ShapeNet it is y.")
 CACHE_DIR = click.option("--cache-dir", type=OutputFolder(),
-                         help="Folder for cleaned meshes [the user's cache].")
+                         help="Folder for meshes that are ready to render [the user's cache].")
 # fmt: on
 
 

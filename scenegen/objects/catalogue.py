@@ -1,20 +1,20 @@
 """The catalogue of a data set's objects: its classes, the models of each, and their shapes."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
-
-import numpy as np
 
 from scenegen.common.errors import SpecError
 from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.basic_shapes import unit_shape
+from scenegen.objects.cast_meshes import CastMesh, cast_mesh
+from scenegen.objects.families.cache import MEMBERS_KEPT
 from scenegen.objects.families.members import MEMBERS, member_shape
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import object_split
 from scenegen.objects.meshes.store import MeshStore
-from scenegen.objects.solids import UnitShape
+from scenegen.objects.solids import UnitShape, without_triangles
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +65,14 @@ def changed_meshes(objects: Objects, scene: SceneSpec) -> list[str]:
 
 def built_in_shape(name: str) -> UnitShape:
     """Return a basic shape or a member of a family. Raises SpecError for any other name."""
-    if name in SHAPE_NAMES:
-        return unit_shape(name)
+    return unit_shape(name) if name in SHAPE_NAMES else member_shape(*_family_and_number(name))
+
+
+def _family_and_number(name: str) -> tuple[str, int]:
     family, _, member = name.partition("/")
     if not member.isdecimal() or len(member) > 4:
         raise SpecError("object", repr(name), "a basic shape, or family/number")
-    return member_shape(family, int(member))
+    return family, int(member)
 
 
 def outline(shape_of: Callable[[str], UnitShape], name: str) -> UnitShape:
@@ -83,11 +85,23 @@ def face_count(shape_of: Callable[[str], UnitShape], name: str) -> int:
     return _known(shape_of, name)[1]
 
 
+def mesh_to_cast(shape_of: Callable[[str], UnitShape], name: str) -> CastMesh:
+    """Return a unit shape as the ray caster takes it; members of families come from their cache."""
+    if _is_member(shape_of, name):
+        return MEMBERS_KEPT.mesh(*_family_and_number(name))
+    return cast_mesh(shape_of(name))
+
+
+def _is_member(shape_of: Callable[[str], UnitShape], name: str) -> bool:
+    return shape_of is built_in_shape and name not in SHAPE_NAMES
+
+
 @lru_cache(maxsize=20_000)
 def _known(shape_of: Callable[[str], UnitShape], name: str) -> tuple[UnitShape, int]:
+    if _is_member(shape_of, name):
+        return MEMBERS_KEPT.outline(*_family_and_number(name))
     shape = shape_of(name)
-    nothing = np.zeros((0, 3, 3))
-    return replace(shape, triangles=nothing, normals=nothing), len(shape.triangles)
+    return without_triangles(shape), len(shape.triangles)
 
 
 @lru_cache(maxsize=16)

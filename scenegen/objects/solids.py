@@ -1,6 +1,6 @@
 """The type of all shapes, `UnitShape`, and its making from polyhedra and from turned profiles."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -43,6 +43,12 @@ class UnitShape:
         if self.hull_discs.any():
             reach += self.hull_discs[:, None] * np.hypot(directions[:, 0], directions[:, 2])
         return np.asarray(reach.max(axis=0) + self.rounding)
+
+
+def without_triangles(shape: UnitShape) -> UnitShape:
+    """Return a shape without its triangles: the outline, which is all that placement needs."""
+    nothing = np.zeros((0, 3, 3))
+    return replace(shape, triangles=nothing, normals=nothing)
 
 
 def polyhedron(name: str, points: Array) -> UnitShape:

@@ -12,13 +12,12 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.rotations import cross
 from scenegen.objects.basic_shapes import unit_shape
+from scenegen.objects.cast_meshes import normal_table, overlapping
 from scenegen.objects.solids import UnitShape
 
 Array = NDArray[Any]
 LATTICE = 4.0  # distance between the shapes' origins; their bounding radius is 1
-OVERLAP = 4e-6  # of neighbouring triangles; rays slip between them if it is below 2e-6
 SPHERE = 0xFFFFFFFF  # stands for the first triangle of the exact sphere
 
 
@@ -59,21 +58,6 @@ def unit_scene(variant: str, shapes: tuple[str, ...]) -> UnitScene:
     return UnitScene(mi.load_dict(contents), offset, first_triangle, 0.0, normals)
 
 
-def normal_table(shape: UnitShape) -> Array:
-    """Return face normal and three corner normals of each triangle, (F, 12) float32.
-
-    The exact sphere has none, (0, 12).
-    """
-    if shape.is_sphere:
-        return np.zeros((0, 12), np.float32)
-    edges = shape.triangles[:, 1:] - shape.triangles[:, :1]
-    face = np.stack(cross(edges[:, 0].T, edges[:, 1].T), axis=1)
-    face /= np.sqrt(np.einsum("fi,fi->f", face, face))[:, None]
-    table = np.empty((len(face), 12), np.float32)
-    table[:, :3], table[:, 3:] = face, shape.normals.reshape(-1, 9)
-    return table
-
-
 def stacked(tables: Sequence[Array]) -> tuple[Array, Any]:
     """Join tables of normals; return the first row of each, or SPHERE, and the whole, flat."""
     sizes = np.array([len(table) for table in tables])
@@ -98,31 +82,9 @@ def triangle_mesh(
         properties["bsdf"] = bsdf
     mesh = mi.Mesh(name, count, len(triangles), properties, has_vertex_normals=normals is not None)
     parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = triangles.astype(np.float32).ravel()
+    parameters["vertex_positions"] = triangles.astype(np.float32, copy=False).ravel()
     parameters["faces"] = np.arange(count, dtype=np.uint32)
     if normals is not None:
         parameters["vertex_normals"] = normals.astype(np.float32).ravel()
     parameters.update()
     return mesh
-
-
-def overlapping(triangles: Array) -> Array:
-    """Move the edges of triangles, (F, 3, 3), outwards by OVERLAP, within their planes.
-
-    Otherwise a ray that meets a shared edge may slip through, as rounding can put it outside both
-    triangles. No corner moves by more than four times OVERLAP.
-    """
-    edges = triangles[:, _NEXT] - triangles  # from each corner to the next
-    length = np.sqrt(np.einsum("fki,fki->fk", edges, edges))
-    along = edges / np.maximum(length, 1e-30)[..., None]
-    # Moving a corner against the sum of its two edges' directions moves both edges outwards.
-    outward = along[:, _BEFORE] - along
-    first, second = edges[:, 0].T, edges[:, 1].T
-    double_area = np.sqrt(sum(c * c for c in cross(first, second)))
-    sine = double_area[:, None] / np.maximum(length * length[:, _BEFORE], 1e-30)
-    reach = np.sqrt(np.einsum("fki,fki->fk", outward, outward))
-    scale = OVERLAP / np.maximum(np.maximum(sine, reach / 4), 1e-30)
-    return np.asarray(triangles + outward * scale[..., None])
-
-
-_NEXT, _BEFORE = [1, 2, 0], [2, 0, 1]

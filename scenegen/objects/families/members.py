@@ -32,6 +32,14 @@ _ENTROPY = 0x5E1F_0B7E  # part of every member's seed, so it must never change
 def member_shape(family: str, member: int) -> UnitShape:
     """Return a family's member as a unit shape: +y is up, the front faces +z.
 
+    Raises SpecError as `make_member`.
+    """
+    return make_member(family, member)
+
+
+def make_member(family: str, member: int) -> UnitShape:
+    """Return what `member_shape` returns, and do not keep it in memory.
+
     The member's random choices depend on the family and the number alone, not on the seed of a
     data set.
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from scenegen.objects import cast_meshes
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.catalogue import built_in_shape
 from scenegen.objects.solids import UnitShape
@@ -17,7 +18,6 @@ from scenegen.objects.solids import UnitShape
 Array = NDArray[Any]
 RAYS = 40_000
 BASIC = ("box", "torus", "teapot", "icosahedron", "cone")
-OVERLAP = 4e-6
 MODELS = ("mug/0001", "chair/0002", "bottle/0003", "bag/0004", "table/0005")
 
 
@@ -67,7 +67,7 @@ def test_no_ray_slips_through_basic_shapes_and_without_overlap_some_do(
         return [slips(scene, i, unit_shape(name)) for i, name in enumerate(BASIC)]
 
     assert count(unit.unit_scene) == [0] * len(BASIC)
-    monkeypatch.setattr(unit, "OVERLAP", 0.0)
+    monkeypatch.setattr(cast_meshes, "OVERLAP", 0.0)
     assert min(count(unit.unit_scene.__wrapped__)) > 30
 
 
@@ -75,7 +75,6 @@ def test_no_ray_slips_through_basic_shapes_and_without_overlap_some_do(
 def test_no_ray_slips_through_models_and_without_overlap_some_do(
     names: tuple[str, ...],
     variant: str,
-    unit: ModuleType,
     models: ModuleType,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -89,36 +88,8 @@ def test_no_ray_slips_through_models_and_without_overlap_some_do(
         return sum(slips(scene, i, own(names[i % 55])) for i in places)
 
     assert count() == 0
-    monkeypatch.setattr(unit, "OVERLAP", 0.0)
+    monkeypatch.setattr(cast_meshes, "OVERLAP", 0.0)
     assert count() > 3000
-
-
-@pytest.mark.parametrize("name", [*BASIC, *MODELS])
-def test_triangles_grow_by_the_overlap_each_in_its_plane(name: str, unit: ModuleType) -> None:
-    triangles = built_in_shape(name).triangles
-    grown = unit.overlapping(triangles)
-    edges = np.roll(triangles, -1, axis=1) - triangles
-    normals = np.cross(edges[:, 0], edges[:, 1])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    moved = grown - triangles
-    assert abs(np.einsum("fki,fi->fk", moved, normals)).max() < 1e-12
-    assert np.linalg.norm(moved, axis=2).max() <= 4.0001 * OVERLAP
-    outward = np.cross(edges, normals[:, None])
-    outward /= np.linalg.norm(outward, axis=2, keepdims=True)
-    start, end = (np.einsum("fki,fki->fk", m, outward) for m in (moved, np.roll(moved, -1, axis=1)))
-    assert min(start.min(), end.min()) > -1e-15
-    sharp = np.linalg.norm(moved, axis=2) > 3.99 * OVERLAP
-    blunt = ~(sharp | np.roll(sharp, -1, axis=1))
-    np.testing.assert_allclose(start[blunt], OVERLAP, rtol=1e-6)
-    np.testing.assert_allclose(end[blunt], OVERLAP, rtol=1e-6)
-
-
-def test_degenerate_triangles_stay_finite(unit: ModuleType) -> None:
-    point, line = np.ones((1, 3, 3)), np.arange(9.0).reshape(1, 3, 3)
-    for triangle in (point, line):
-        grown = unit.overlapping(triangle)
-        assert np.isfinite(grown).all()
-        assert np.linalg.norm(grown - triangle, axis=2).max() <= 4.0001 * OVERLAP
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 9, 700, "most"])

@@ -164,15 +164,16 @@ def hull_rows(points: Array) -> list[int]:
     order = np.lexsort((points[:, 1], points[:, 0]))
     repeats = (np.diff(points[order], axis=0) == 0.0).all(axis=1)
     once = np.delete(order, np.flatnonzero(repeats) + 1).tolist()
-    place = points.tolist()
+    across, up = points.T.tolist()
     rows: set[int] = set()
     for sweep in (once, once[::-1]):  # the lower chain, then the upper
         chain: list[int] = []
         for i in sweep:
-            x, y = place[i]
+            x, y = across[i], up[i]
             while len(chain) > 1:
-                (ax, ay), (bx, by) = place[chain[-2]], place[chain[-1]]
-                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
+                a, b = chain[-2:]
+                ax, ay = across[a], up[a]
+                if (across[b] - ax) * (y - ay) - (up[b] - ay) * (x - ax) > 0.0:
                     break
                 chain.pop()
             chain.append(i)

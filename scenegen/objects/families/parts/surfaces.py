@@ -153,6 +153,7 @@ def strips(grid: Array, normals: Array) -> tuple[Array, Array]:
         ]
     )
     corners = (np.arange(copies)[:, None, None] * (rows * count) + corners).reshape(-1, 3)
-    length = np.sqrt((normals * normals).sum(axis=-1))
+    x, y, z = (normals[..., i] for i in range(3))
+    length = np.sqrt(x * x + y * y + z * z)
     unit = normals / np.maximum(length, 1e-300)[..., None]
-    return grid.reshape(-1, 3)[corners], unit.reshape(-1, 3)[corners]
+    return grid.reshape(-1, 3).take(corners, axis=0), unit.reshape(-1, 3).take(corners, axis=0)

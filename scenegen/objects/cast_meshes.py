@@ -1,0 +1,74 @@
+"""Shapes in the form that the ray caster takes: triangles grown by a hair, and their normals."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenegen.common.rotations import cross
+from scenegen.objects.solids import Array, UnitShape
+
+OVERLAP = 4e-6  # of neighbouring triangles; rays slip between them if it is below 2e-6
+
+
+@dataclass(frozen=True, eq=False)
+class CastMesh:
+    """What is cast and shaded. The exact sphere has no triangles.
+
+    Attributes:
+        triangles: corners as from `overlapping`, (F, 3, 3) float32.
+        normals: as from `normal_table`, (F, 12) float32.
+    """
+
+    triangles: Array
+    normals: Array
+
+
+def cast_mesh(shape: UnitShape) -> CastMesh:
+    """Return a unit shape as the ray caster takes it."""
+    triangles = shape.triangles[:0] if shape.is_sphere else shape.triangles
+    return CastMesh(overlapping(triangles).astype(np.float32), normal_table(shape))
+
+
+def normal_table(shape: UnitShape) -> Array:
+    """Return face normal and three corner normals of each triangle, (F, 12) float32.
+
+    The exact sphere has none, (0, 12).
+    """
+    if shape.is_sphere:
+        return np.zeros((0, 12), np.float32)
+    edges = shape.triangles[:, 1:] - shape.triangles[:, :1]
+    face = cross(*(np.ascontiguousarray(edges[:, k].T) for k in range(2)))
+    length = _norm(face)
+    table = np.empty((len(edges), 12), np.float32)
+    for i in range(3):
+        table[:, i] = face[i] / length
+    table[:, 3:] = shape.normals.reshape(-1, 9)
+    return table
+
+
+def overlapping(triangles: Array) -> Array:
+    """Move the edges of triangles, (F, 3, 3), outwards by OVERLAP, within their planes.
+
+    Otherwise a ray that meets a shared edge may slip through, as rounding can put it outside both
+    triangles. No corner moves by more than four times OVERLAP.
+    """
+    corners = [np.ascontiguousarray(triangles[:, k].T) for k in range(3)]  # (3, F) each: faster
+    edges = [corners[(k + 1) % 3] - corners[k] for k in range(3)]  # from each corner to the next
+    length = [_norm(edge) for edge in edges]
+    along = [edges[k] / np.maximum(length[k], 1e-30) for k in range(3)]
+    double_area = _norm(cross(edges[0], edges[1]))
+    grown = np.empty(triangles.shape)
+    for k in range(3):
+        # Moving a corner against the sum of its two edges' directions moves both edges outwards.
+        outward = along[k - 1] - along[k]
+        sine = double_area / np.maximum(length[k] * length[k - 1], 1e-30)
+        scale = OVERLAP / np.maximum(np.maximum(sine, _norm(outward) / 4), 1e-30)
+        grown[:, k] = (corners[k] + outward * scale).T
+    return grown
+
+
+def _norm(vectors: Sequence[Array]) -> Array:
+    """Return the lengths of vectors given by components."""
+    x, y, z = vectors
+    return np.asarray(np.sqrt(x * x + y * y + z * z))

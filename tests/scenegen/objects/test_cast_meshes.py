@@ -1,0 +1,55 @@
+"""Shapes as the ray caster takes them: grown triangles, and normals."""
+
+import numpy as np
+import pytest
+
+from scenegen.objects.basic_shapes import unit_shape
+from scenegen.objects.cast_meshes import OVERLAP, cast_mesh, overlapping
+from scenegen.objects.catalogue import built_in_shape
+
+BASIC = ("box", "torus", "teapot", "icosahedron", "cone")
+MODELS = ("mug/0001", "chair/0002", "bottle/0003", "bag/0004", "table/0005")
+
+
+def test_normals_stand_on_faces_and_at_corners() -> None:
+    shape = unit_shape("cone")
+    mesh = cast_mesh(shape)
+    a, b, c = (shape.triangles[:, i] for i in range(3))
+    cross = np.cross(b - a, c - a)
+    cross /= np.linalg.norm(cross, axis=1, keepdims=True)
+    np.testing.assert_allclose(mesh.normals[:, :3], cross, atol=1e-6)
+    np.testing.assert_array_equal(mesh.normals[:, 3:].reshape(-1, 3, 3), np.float32(shape.normals))
+    np.testing.assert_array_equal(mesh.triangles, np.float32(overlapping(shape.triangles)))
+
+
+def test_the_exact_sphere_has_no_triangles() -> None:
+    mesh = cast_mesh(unit_shape("sphere"))
+    assert (mesh.triangles.shape, mesh.normals.shape) == ((0, 3, 3), (0, 12))
+
+
+@pytest.mark.parametrize("name", [*BASIC, *MODELS])
+def test_triangles_grow_by_the_overlap_each_in_its_plane(name: str) -> None:
+    triangles = built_in_shape(name).triangles
+    grown = overlapping(triangles)
+    edges = np.roll(triangles, -1, axis=1) - triangles
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    moved = grown - triangles
+    assert abs(np.einsum("fki,fi->fk", moved, normals)).max() < 1e-12
+    assert np.linalg.norm(moved, axis=2).max() <= 4.0001 * OVERLAP
+    outward = np.cross(edges, normals[:, None])
+    outward /= np.linalg.norm(outward, axis=2, keepdims=True)
+    start, end = (np.einsum("fki,fki->fk", m, outward) for m in (moved, np.roll(moved, -1, axis=1)))
+    assert min(start.min(), end.min()) > -1e-15
+    sharp = np.linalg.norm(moved, axis=2) > 3.99 * OVERLAP
+    blunt = ~(sharp | np.roll(sharp, -1, axis=1))
+    np.testing.assert_allclose(start[blunt], OVERLAP, rtol=1e-6)
+    np.testing.assert_allclose(end[blunt], OVERLAP, rtol=1e-6)
+
+
+def test_degenerate_triangles_stay_finite() -> None:
+    point, line = np.ones((1, 3, 3)), np.arange(9.0).reshape(1, 3, 3)
+    for triangle in (point, line):
+        grown = overlapping(triangle)
+        assert np.isfinite(grown).all()
+        assert np.linalg.norm(grown - triangle, axis=2).max() <= 4.0001 * OVERLAP
