@@ -19,12 +19,30 @@ BITS = 64
 VIEWS_AT_ONCE = 256  # of 64x64 pixels: the working arrays stay in cache
 _RUNS = np.array([(1 << n) - 1 for n in range(BITS + 1)], np.uint64)  # the first n bits set
 _CORNERS = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
-# The twelve edges: two corners, and the two faces (axis, whether on its positive side) that meet.
-_EDGES = [
-    (i, j, [(axis, bool(_CORNERS[i, axis] > 0)) for axis in range(3) if i ^ j != 4 >> axis])
-    for i, j in itertools.combinations(range(8), 2)
-    if (i ^ j) in (1, 2, 4)
-]
+
+
+def _outline_edges() -> Array:
+    """Return which edges lie on a cube's outline, (3, 2, 2, 3, 3): two of each direction, or none.
+
+    Each is told by its two corners; where there is none, they are the same. The last indices say
+    where the eye is along the other two axes: 0 and 2 where it sees the face on the negative or
+    positive side, 1 where neither. An edge on the outline is between a face that is seen and one
+    that is not.
+    """
+    edges = np.zeros((3, 2, 2, 3, 3), np.intp)
+    for axis, *eye in itertools.product(range(3), *2 * [range(3)]):
+        one, other = (4 >> k for k in range(3) if k != axis)
+        found = [
+            (i * one + j * other, i * one + j * other + (4 >> axis))
+            for i, j in itertools.product((0, 1), repeat=2)
+            if (eye[0] == 2 * i) != (eye[1] == 2 * j)
+        ]
+        for place, ends in enumerate(found):
+            edges[axis, place, :, eye[0], eye[1]] = ends
+    return edges
+
+
+_OUTLINE = _outline_edges()
 
 
 def cube_pixels(
@@ -42,7 +60,10 @@ def cube_pixels(
 
     Args:
         size: height and width of the images, pixels.
-        centres, counts, world_from_shape, distances: as for `packing.pack_views`.
+        centres: centres of the cubes, as `cube_centres` gives them, (V, slots, 3).
+        counts: number of cubes of each shape, (V,).
+        world_from_shape: rotations, (V, 3, 3).
+        distances: from the camera to the origin, (V,), cube edges.
     """
     height, width = size
     at_once = max(1, VIEWS_AT_ONCE * BITS // (height * -(-width // BITS)))
@@ -50,7 +71,12 @@ def cube_pixels(
     for start in range(0, len(centres), at_once):
         some = slice(start, start + at_once)
         shown[some] = _cube_pixels(
-            size, fov_y_degrees, centres[some], counts[some], world_from_shape[some], distances[some]
+            size,
+            fov_y_degrees,
+            centres[some],
+            counts[some],
+            world_from_shape[some],
+            distances[some],
         )
     return shown
 
@@ -58,45 +84,54 @@ def cube_pixels(
 def _cube_pixels(
     size: tuple[int, int], fov_y: float, centres: Array, counts: Array, turns: Array, away: Array
 ) -> Array:
-    """Count as `cube_pixels` does. Arrays of all cubes are (..., slots, V), for long inner loops."""
+    """Count as `cube_pixels` does. Arrays of all cubes are (..., slots, V): long inner loops."""
     height, width = size
     views, slots = centres.shape[:2]
     to_eye = (away[:, None] * turns[:, 2])[:, None] - centres
     used = np.arange(slots) < counts[:, None]
     order = np.argsort(np.where(used, np.abs(to_eye).sum(axis=2), np.inf), axis=1)
     to_eye = np.take_along_axis(to_eye, order[..., None], axis=1).transpose(2, 1, 0)
-    faces = {(axis, side): (to_eye[axis] if side else -to_eye[axis]) > 0.5
-             for axis in range(3) for side in (False, True)}  # those that face the eye
     turned = np.ascontiguousarray(turns.transpose(1, 2, 0))  # (3, 3, V)
     # In the frame of the camera: the middle of each cube, and its corners.
     middle = -(turned[:, :, None] * to_eye).sum(axis=1)
-    corner = middle[:, None] + np.einsum("ijv,cj->icv", turned, _CORNERS)[:, :, None]
+    corner = middle[:, None] + (turned[:, None] * _CORNERS[..., None]).sum(axis=2)[:, :, None]
     per_pixel = 1 / pixel_size(height, fov_y)
-    u, v = (half + sign * per_pixel * place / corner[2]
-            for half, sign, place in ((width / 2, -1, corner[0]), (height / 2, 1, corner[1])))
+    u, v = (
+        half + sign * per_pixel * place / corner[2]
+        for half, sign, place in ((width / 2, -1, corner[0]), (height / 2, 1, corner[1]))
+    )
     top = np.clip(np.ceil(v.min(axis=0) - 0.5), 0, height).astype(np.intp)
     below = np.clip(np.floor(v.max(axis=0) + 0.5), 0, height).astype(np.intp)  # one row further
-    below[order.T >= counts] = 0  # unused slots
-    tall = np.arange(max(0, int((below - top).max())))[:, None, None]
-    # Each edge of the outline bounds the run of a row on the left or on the right.
-    left = np.full((len(tall), slots, views), -np.inf, np.float32)
-    right = -left
+    below *= np.take_along_axis(used, order, axis=1).T  # unused slots cover no row
+    rows = max(0, int((below - top).max()))
+    seen = 1 + (to_eye > 0.5) - (to_eye < -0.5)
+    others = ((1, 2), (0, 2), (0, 1))
+    ends = np.stack([_OUTLINE[k][..., seen[i], seen[j]] for k, (i, j) in enumerate(others)])
+    ends = ends.reshape(6, 2, slots, views)
+    (u, u_end), (v, v_end) = (
+        np.take_along_axis(each, ends.reshape(12, slots, views), axis=0)
+        .reshape(ends.shape)
+        .swapaxes(0, 1)
+        for each in (u, v)
+    )
+    fall = v_end - v
+    slope = np.divide(u_end - u, fall, out=np.zeros_like(u), where=fall != 0)
     middle_u = width / 2 - per_pixel * middle[0] / middle[2]
     middle_v = height / 2 + per_pixel * middle[1] / middle[2]
-    for i, j, (one, other) in _EDGES:
-        fall = v[j] - v[i]
-        outline = (faces[one] != faces[other]) & (fall != 0)
-        slope = (u[j] - u[i]) / np.where(outline, fall, 1)
-        at_top = u[i] + (top + 0.5 - v[i]) * slope
-        on_left = u[i] + (middle_v - v[i]) * slope < middle_u
-        for bound, sharper, bounds, none in (
-            (left, np.maximum, outline & on_left, -np.inf),
-            (right, np.minimum, outline & ~on_left, np.inf),
-        ):
-            first = np.where(bounds, at_top, none).astype(np.float32)
-            line = np.where(bounds, slope, 0).astype(np.float32) * tall.astype(np.float32)
-            line += first
-            sharper(bound, line, out=bound)
+    on_left = u + (middle_v - v) * slope < middle_u
+    at_top = u + (top + 0.5 - v) * slope
+    # Each edge of the outline bounds the run of a row on the left or on the right.
+    left = np.where((fall != 0) & on_left, at_top, -np.inf).astype(np.float32)
+    right = np.where((fall != 0) & ~on_left, at_top, np.inf).astype(np.float32)
+    slope = slope.astype(np.float32)
+    bounds = np.empty((2, rows, slots, views), np.float32)
+    for row in range(rows):
+        np.max(left, axis=0, out=bounds[0, row])
+        np.min(right, axis=0, out=bounds[1, row])
+        left += slope
+        right += slope
+    left, right = bounds
+    tall = np.arange(rows)[:, None, None]
     start = np.clip(np.ceil(left - 0.5), 0, width).astype(np.int16)
     stop = np.clip(np.floor(right + 0.5), start, width).astype(np.int16)
     stop = np.where(tall < below - top, stop, start)
@@ -104,7 +139,7 @@ def _cube_pixels(
     shown = np.zeros((slots, views), np.int32)
     for word in range(0, width, BITS):
         runs = _RUNS[np.clip(stop - word, 0, BITS)] ^ _RUNS[np.clip(start - word, 0, BITS)]
-        covered = np.zeros((height + len(tall)) * views, np.uint64)
+        covered = np.zeros((height + rows) * views, np.uint64)
         for k in range(slots):
             before = covered[at[:, k]]
             covered[at[:, k]] = before | runs[:, k]
