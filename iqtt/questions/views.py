@@ -1,6 +1,5 @@
 """The views of a question: rotations under which every cube shows, far enough from each other."""
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -209,19 +208,32 @@ def relations(shapes: Sequence[Shapes]) -> tuple[Array, Array]:
     """
     answers = len(shapes[0].cubes) - 1 if shapes else 0
     mirrored, related = np.zeros((2, len(shapes), answers, answers), bool)
-    for row, one in enumerate(shapes):
-        cubes, images = one.cubes[1:].astype(np.int64), mirror(one.cubes[1:]).astype(np.int64)
-        for i, j in itertools.permutations(range(answers), 2):
-            plain, turned = _in_common(cubes[i], cubes[j]), _in_common(images[i], cubes[j])
-            mirrored[row, i, j] = turned > plain
-            related[row, i, j] = max(plain, turned) == len(cubes[i])
+    counts = np.array([one.cubes.shape[1] for one in shapes])
+    for count in np.unique(counts).tolist():
+        rows = np.flatnonzero(counts == count)
+        cubes = np.stack([shapes[i].cubes[1:] for i in rows.tolist()]).astype(np.int32)
+        plain, turned = _in_common(cubes, cubes), _in_common(mirror(cubes), cubes)
+        others = ~np.eye(answers, dtype=bool)
+        mirrored[rows] = (turned > plain) & others
+        related[rows] = (np.maximum(plain, turned) == count) & others
     return mirrored, related
 
 
-def _in_common(a: Array, b: Array) -> int:
-    """Return how many cubes two shapes have in common, one of them moved as fits best."""
-    apart = (a[:, None] - b + 2 * MAX_CUBES) @ (1, 256, 65536)
-    return int(np.unique(apart, return_counts=True)[1].max())
+def _in_common(a: Array, b: Array) -> Array:
+    """Return how many cubes each two of K shapes have in common, one of them moved as fits best.
+
+    Args:
+        a, b: cubes of the shapes of each of Q questions, (Q, K, n, 3) int32.
+
+    Returns (Q, K, K), for shapes of `a` and of `b`.
+    """
+    apart = a[:, :, None, :, None] - b[:, None, :, None] + 2 * MAX_CUBES
+    moves = np.sort((apart @ np.array((1, 256, 65536), np.int32)).reshape(*apart.shape[:3], -1))
+    # Cubes in common are equal moves; so many in a row as there are after sorting.
+    common = np.ones(moves.shape[:3], int)
+    for more in range(1, a.shape[2]):
+        common[(moves[..., more:] == moves[..., :-more]).any(axis=-1)] = 1 + more
+    return common
 
 
 def far_enough(
