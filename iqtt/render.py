@@ -1,6 +1,7 @@
 """Images of questions: many in batches, or one question alone with the same bits."""
 
 import itertools
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -16,7 +17,8 @@ from scenegen.rendering.renderer import launch_fields
 
 Array = NDArray[Any]
 DEFAULT_BATCH = 64  # questions in one wavefront
-SAMPLED = 512  # questions whose shapes and views are found together
+SAMPLED = 128  # questions whose shapes and views are found together
+AHEAD = 2  # batches that are rendered meanwhile
 FIRST_SAMPLED = 16  # the first ones are few, so that a request that cannot be met fails soon
 
 
@@ -59,19 +61,18 @@ def render_questions(
     """
     tally = tally or Tally()
     places = answer_positions(spec, split, first, count)
-    pending: Fetch | None = None
+    pending = deque[Fetch]()
     starts = [0, *range(min(FIRST_SAMPLED, count), count, SAMPLED), count]
     for start, stop in itertools.pairwise(starts):
         rows = range(start, stop)
         requests = [(first + i, int(places[i]), 0) for i in rows]
-        sampled = sample_questions(spec, pools, split, requests, tally, device)
+        sampled = sample_questions(spec, pools, split, requests, tally)
         for i in range(0, len(sampled), batch):
-            following = _launch(spec, sampled[i : i + batch], device)
-            if pending is not None:
-                yield _checked(spec, pools, split, pending(), tally, device)
-            pending = following
-    if pending is not None:
-        yield _checked(spec, pools, split, pending(), tally, device)
+            pending.append(_launch(spec, sampled[i : i + batch], device))
+            if len(pending) > AHEAD:
+                yield _checked(spec, pools, split, pending.popleft()(), tally, device)
+    while pending:
+        yield _checked(spec, pools, split, pending.popleft()(), tally, device)
 
 
 def render_question(
@@ -89,7 +90,7 @@ def render_question(
         if first <= index < first + count:
             place = int(answer_positions(spec, split, first, count)[index - first])
             tally = Tally()
-            questions = sample_questions(spec, pools, split, [(index, place, 0)], tally, device)
+            questions = sample_questions(spec, pools, split, [(index, place, 0)], tally)
             done = _launch(spec, questions, device)()
             return _checked(spec, pools, split, done, tally, device)[0]
     raise IndexError(f"{split} has {getattr(spec, split)} questions, none with index {index}")
@@ -130,7 +131,7 @@ def _checked(
     while hidden := [i for i, one in enumerate(done) if not _shows_all(spec, one)]:
         again = [done[i].question for i in hidden]
         requests = [(q.index, q.shapes.answer, q.attempt + 1) for q in again]
-        anew = sample_questions(spec, pools, split, requests, tally, device)
+        anew = sample_questions(spec, pools, split, requests, tally)
         for i, one in zip(hidden, _launch(spec, anew, device)(), strict=True):
             done[i] = one
     return done

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from iqtt.questions.distractors import Shapes
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.polycube import box_centre
-from scenegen.description.specs import DatasetSpec
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.rendering.packing import SceneBatch
 
@@ -64,26 +63,15 @@ def cube_centres(shapes: Sequence[Array], slots: int) -> Array:
     return centres
 
 
-def pack_views(
-    spec: SplitSpec,
-    render_spec: DatasetSpec,
-    centres: Array,
-    counts: Array,
-    world_from_shape: Array,
-    distances: Array,
-    lights: tuple[Array, Array, Array] | None = None,
-) -> SceneBatch:
-    """Return a batch with one image for each of V views.
-
-    Args:
-        render_spec: tells the size of the images (see `SplitSpec.render_spec`).
-        centres: centres of the cubes, as `cube_centres` gives them, (V, slots, 3).
-        counts: number of cubes of each shape, (V,).
-        world_from_shape: rotations, (V, 3, 3).
-        distances: from the camera to the origin, (V,), cube edges.
-        lights: positions and colours, (V, L, 3) each, and numbers, (V,); None for no lights.
-    """
-    batch, slots = len(centres), render_spec.object_slots
+def pack_questions(spec: SplitSpec, questions: Sequence[Question]) -> SceneBatch:
+    """Return a batch with all images of each question, one question after another."""
+    render_spec = spec.render_spec()
+    shapes = [cubes for question in questions for cubes in question.shapes.cubes]
+    centres = cube_centres(shapes, render_spec.object_slots)
+    counts = np.array([len(cubes) for cubes in shapes])
+    world_from_shape = np.concatenate([question.world_from_shape for question in questions])
+    distances = [question.camera_distance for question in questions]
+    batch, slots = centres.shape[:2]
     used = np.arange(slots) < counts[:, None]
     world_from_object = np.zeros((batch, slots, 4, 4))
     world_from_object[..., :3, :3] = CUBE_SCALE * world_from_shape[:, None]
@@ -93,9 +81,8 @@ def pack_views(
     reflectance = np.zeros((batch, 1 + slots, 3))
     reflectance[:, 1:][used] = spec.reflectance
     world_from_camera = np.tile(np.eye(4), (batch, 1, 1))
-    world_from_camera[:, 2, 3] = distances
-    dark = np.zeros((batch, render_spec.light_slots, 3))
-    position, color, light_count = lights or (dark, dark, np.zeros(batch))
+    world_from_camera[:, 2, 3] = np.repeat(distances, 1 + spec.answers)
+    light_count = np.concatenate([question.light_count for question in questions])
     return SceneBatch(
         spec=render_spec,
         names=render_spec.shapes,
@@ -111,31 +98,11 @@ def pack_views(
         object_scale=np.where(used, CUBE_SCALE, 0.0),
         reflectance=reflectance,
         gloss=np.zeros((*reflectance.shape[:2], 2)),
-        light_position=position,
-        light_color=color,
+        light_position=np.concatenate([question.light_position for question in questions]),
+        light_color=np.concatenate([question.light_color for question in questions]),
         ambient=np.tile(spec.ambient, (batch, 1)),
         attenuation=np.tile((0.0, 1.0), (batch, 1)),
         has_room=np.zeros(batch, bool),
         background=np.tile(spec.background, (batch, 1)),
         cubes_only=True,
-    )
-
-
-def pack_questions(spec: SplitSpec, questions: Sequence[Question]) -> SceneBatch:
-    """Return a batch with all images of each question, one question after another."""
-    render_spec = spec.render_spec()
-    distances = [question.camera_distance for question in questions]
-    shapes = [cubes for question in questions for cubes in question.shapes.cubes]
-    return pack_views(
-        spec,
-        render_spec,
-        cube_centres(shapes, render_spec.object_slots),
-        np.array([len(cubes) for cubes in shapes]),
-        np.concatenate([question.world_from_shape for question in questions]),
-        np.repeat(distances, 1 + spec.answers),
-        (
-            np.concatenate([question.light_position for question in questions]),
-            np.concatenate([question.light_color for question in questions]),
-            np.concatenate([question.light_count for question in questions]),
-        ),
     )

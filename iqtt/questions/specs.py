@@ -170,11 +170,11 @@ class SplitSpec:
         """Return the camera of a question's images; it lies on +z and looks at the origin."""
         return Camera((0.0, 0.0, float(distance)), (0.0, 0.0, 0.0), self.fov_y_degrees)
 
-    def render_spec(self, shrink: int = 1) -> DatasetSpec:
-        """Return the renderer's settings for images that are `shrink` times smaller."""
+    def render_spec(self) -> DatasetSpec:
+        """Return the renderer's settings."""
         return DatasetSpec(
-            height=max(8, self.height // shrink),
-            width=max(8, self.width // shrink),
+            height=self.height,
+            width=self.width,
             objects=self.cubes,
             shapes=("box",),
             lights=self.lights,

@@ -1,6 +1,5 @@
 """The views of a question: rotations under which every cube shows, far enough from each other."""
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,21 +10,19 @@ from numpy.typing import NDArray
 
 from iqtt.questions.distractors import Pools, Shapes, arrange, draw_shapes, question_key
 from iqtt.questions.lights import draw_lights
-from iqtt.questions.packing import Question, cube_centres, pack_views
+from iqtt.questions.packing import Question, cube_centres
 from iqtt.questions.specs import SplitSpec
+from iqtt.questions.visibility import cube_pixels
 from iqtt.shapes.polycube import MAX_CUBES, ROTATIONS, bounding_radius, mirror, symmetries
 from scenegen.common.errors import PlacementError
 from scenegen.common.rotations import rotation_matrix
 from scenegen.common.seeding import Purpose, item_rng
-from scenegen.rendering.ground_truth import visible_pixels
-from scenegen.rendering.renderer import launch_fields
 
 Array = NDArray[Any]
-SHRINK = 2  # how many times smaller the images are by which visibility is first judged
-MARGIN = 1.5  # in them a cube needs so many times the pixels, so that full images seldom fall short
+SHRINK = 2  # how many times smaller than images the grids are on which visibility is judged
+MARGIN = 1.5  # on them a cube needs so many times the pixels, so that full images seldom fall short
 VIEWS = 100  # rotations proposed for one image before the question gets other shapes
-PROPOSED = 2  # least number of views of one image that are judged at once
-PROPOSALS_AT_ONCE = 256  # views of all images that are judged at once, roughly
+PROPOSALS_AT_ONCE = 512  # views of all images that are judged at once, roughly
 QUESTION_ATTEMPTS = 50  # choices of shapes for one question
 CROWDED = 10  # from so many cubes on, a shape may well have no view that shows them all
 
@@ -44,7 +41,6 @@ def sample_questions(
     split: str,
     requests: Sequence[tuple[int, int, int]],
     tally: Tally,
-    device: str = "auto",
 ) -> list[Question]:
     """Draw shapes, views and lights of questions until every cube shows in every image.
 
@@ -72,7 +68,7 @@ def sample_questions(
             rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.ANSWERS, attempt)
             shapes.append(arrange(one, place, rng))
         symmetric, distances = shape_symmetries(shapes), camera_distances(spec, shapes)
-        turns = find_views(spec, split, waiting, shapes, distances, symmetric, tally, device)
+        turns = find_views(spec, split, waiting, shapes, distances, symmetric, tally)
         again = []
         for i, (index, place, attempt) in enumerate(waiting):
             if np.isfinite(turns[i]).all():
@@ -139,7 +135,6 @@ def find_views(
     distances: Array,
     symmetric: Array,
     tally: Tally,
-    device: str,
 ) -> Array:
     """Return rotations under which every cube shows, (Q, 1 + K, 3, 3); NaN where none was found.
 
@@ -173,7 +168,6 @@ def find_views(
             np.repeat(counts, answers),
             np.repeat(distances, answers),
             tally,
-            device,
         ).reshape(-1, answers)
         question, image = np.nonzero(chosen >= 0)
         best = turns[question, some.start + image, chosen[question, image]]
@@ -214,19 +208,32 @@ def relations(shapes: Sequence[Shapes]) -> tuple[Array, Array]:
     """
     answers = len(shapes[0].cubes) - 1 if shapes else 0
     mirrored, related = np.zeros((2, len(shapes), answers, answers), bool)
-    for row, one in enumerate(shapes):
-        cubes, images = one.cubes[1:].astype(np.int64), mirror(one.cubes[1:]).astype(np.int64)
-        for i, j in itertools.permutations(range(answers), 2):
-            plain, turned = _in_common(cubes[i], cubes[j]), _in_common(images[i], cubes[j])
-            mirrored[row, i, j] = turned > plain
-            related[row, i, j] = max(plain, turned) == len(cubes[i])
+    counts = np.array([one.cubes.shape[1] for one in shapes])
+    for count in np.unique(counts).tolist():
+        rows = np.flatnonzero(counts == count)
+        cubes = np.stack([shapes[i].cubes[1:] for i in rows.tolist()]).astype(np.int32)
+        plain, turned = _in_common(cubes, cubes), _in_common(mirror(cubes), cubes)
+        others = ~np.eye(answers, dtype=bool)
+        mirrored[rows] = (turned > plain) & others
+        related[rows] = (np.maximum(plain, turned) == count) & others
     return mirrored, related
 
 
-def _in_common(a: Array, b: Array) -> int:
-    """Return how many cubes two shapes have in common, one of them moved as fits best."""
-    apart = (a[:, None] - b + 2 * MAX_CUBES) @ (1, 256, 65536)
-    return int(np.unique(apart, return_counts=True)[1].max())
+def _in_common(a: Array, b: Array) -> Array:
+    """Return how many cubes each two of K shapes have in common, one of them moved as fits best.
+
+    Args:
+        a, b: cubes of the shapes of each of Q questions, (Q, K, n, 3) int32.
+
+    Returns (Q, K, K), for shapes of `a` and of `b`.
+    """
+    apart = a[:, :, None, :, None] - b[:, None, :, None] + 2 * MAX_CUBES
+    moves = np.sort((apart @ np.array((1, 256, 65536), np.int32)).reshape(*apart.shape[:3], -1))
+    # Cubes in common are equal moves; so many in a row as there are after sorting.
+    common = np.ones(moves.shape[:3], int)
+    for more in range(1, a.shape[2]):
+        common[(moves[..., more:] == moves[..., :-more]).any(axis=-1)] = 1 + more
+    return common
 
 
 def far_enough(
@@ -268,7 +275,6 @@ def _first_good(
     counts: Array,
     distances: Array,
     tally: Tally,
-    device: str,
 ) -> Array:
     """Return for each of R images its first allowed rotation that shows every cube, or -1, (R,).
 
@@ -279,24 +285,27 @@ def _first_good(
         counts: numbers of cubes, (R,).
         distances: from the camera to the origin, (R,).
     """
-    small = spec.render_spec(SHRINK)
-    scale = (small.height * small.width) / (spec.height * spec.width)
+    size = (max(8, spec.height // SHRINK), max(8, spec.width // SHRINK))
+    scale = (size[0] * size[1]) / (spec.height * spec.width)
     enough = math.ceil(MARGIN * spec.min_cube_pixels * scale)
     rank = np.cumsum(allowed, axis=1) - 1
     chosen = np.full(len(turns), -1)
     tried = 0
     while (waiting := np.flatnonzero((chosen < 0) & (rank[:, -1] >= tried))).size:
         # The first good one is taken, so how many are judged at once does not change the result.
-        upto = tried + max(PROPOSED, PROPOSALS_AT_ONCE // len(waiting))
+        upto = tried + max(1, PROPOSALS_AT_ONCE // len(waiting))
         ranks = rank[waiting]
         row, proposal = np.nonzero(allowed[waiting] & (ranks >= tried) & (ranks < upto))
         row = waiting[row]
-        batch = pack_views(
-            spec, small, centres[row], counts[row], turns[row, proposal], distances[row]
+        shown = cube_pixels(
+            size,
+            spec.fov_y_degrees,
+            centres[row],
+            counts[row],
+            turns[row, proposal],
+            distances[row],
         )
-        ids = launch_fields(batch, ("object_id",), device)()["object_id"]
-        shown = visible_pixels(ids, small.object_slots)
-        unused = np.arange(small.object_slots) >= counts[row][:, None]
+        unused = np.arange(centres.shape[1]) >= counts[row][:, None]
         good = ((shown >= enough) | unused).all(axis=1)
         first_rows, first = np.unique(row[good], return_index=True)
         chosen[first_rows] = proposal[good][first]

@@ -22,7 +22,7 @@ MAX_CUBES = 16
 Cubes: TypeAlias = NDArray[np.signedinteger[Any]]
 """Cube coordinates, (S, n, 3) unless said otherwise, any signed integer type."""
 
-_CHUNK = 8192  # shapes at a time: the working arrays stay in cache, and memory stays flat
+_CHUNK = 1024  # shapes at a time: the working arrays stay in cache, and memory stays flat
 _NO_CUBE = 0xFFFF  # above every packed cube, so it also fills the end of an id
 
 
@@ -174,18 +174,41 @@ def _oriented_keys(
 def _least_keys(cubes: Cubes, matrices: NDArray[np.int8]) -> NDArray[np.uint16]:
     """Return the first of the key lists of each shape under these matrices, (S, n)."""
     low, extent = _boxed(cubes)
-    best = np.full(low.shape[1:], _NO_CUBE, dtype=np.uint16)
+    best = np.empty(low.shape[1:], dtype=np.uint16)
+    axes, flipped = np.abs(matrices).argmax(axis=2), matrices.sum(axis=2) < 0
     for start in range(0, len(best), _CHUNK):
-        for matrix in matrices:
-            # Only orientations with a descending box compete: for most a sixth of the sorting.
-            x, y, z = extent[np.abs(matrix).argmax(axis=1), start : start + _CHUNK]
-            rows = start + np.flatnonzero((x >= y) & (y >= z))
-            keys = _oriented_keys(low[:, rows], extent[:, rows], matrix)
-            rival = best[rows]
-            first = (keys != rival).argmax(axis=1)[:, None]
-            smaller = np.take_along_axis(keys, first, 1) < np.take_along_axis(rival, first, 1)
-            best[rows] = np.where(smaller, keys, rival)
+        some = slice(start, start + _CHUNK)
+        box = extent[:, some][axes]
+        # Only orientations with a descending box compete: for most a sixth of the sorting.
+        shape, matrix = np.nonzero(((box[:, 0] >= box[:, 1]) & (box[:, 1] >= box[:, 2])).T)
+        keys = np.zeros((len(shape), best.shape[1]), dtype=np.uint16)
+        for k in range(3):
+            axis = axes[matrix, k]
+            along = low[axis, start + shape]
+            back = flipped[matrix, k]
+            along[back] = extent[axis[back], start + shape[back], None] - along[back]
+            keys = (keys << 4) | along
+        keys.sort(axis=1)
+        best[some] = keys[_first_of_each(keys, shape)]
     return best
+
+
+def _first_of_each(keys: NDArray[np.uint16], group: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the row of `keys`, lists of 12-bit numbers, that comes first in each group.
+
+    Args:
+        group: the group of each row, 0 to G - 1, rising; none is empty.
+    """
+    starts = np.searchsorted(group, np.arange(group[-1] + 1))
+    leads = np.ones(len(keys), np.bool_)
+    for column in range(0, keys.shape[1], 5):  # five numbers fit in a word
+        word = np.zeros(len(keys), np.uint64)
+        for part in keys[:, column : column + 5].T:
+            word = (word << np.uint64(12)) | part
+        word[~leads] = ~np.uint64(0)
+        leads &= word == np.minimum.reduceat(word, starts)[group]
+    leading = np.flatnonzero(leads)
+    return np.asarray(leading[np.searchsorted(leading, starts)])
 
 
 def _unpacked(keys: NDArray[np.uint16]) -> NDArray[np.int8]:

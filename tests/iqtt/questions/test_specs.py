@@ -84,7 +84,7 @@ def test_the_ends_of_each_range_are_accepted_and_survive_json(changed):
     assert spec.render_spec().object_slots == spec.cubes[1]
     assert spec.render_spec().light_slots == spec.lights[1]
     assert (spec.render_spec().height, spec.render_spec().width) == (spec.height, spec.width)
-    assert spec.render_spec(2).image_dtype == spec.image_dtype
+    assert spec.render_spec().image_dtype == spec.image_dtype
 
 
 def test_json_is_one_sorted_line_of_pythons_own_types():

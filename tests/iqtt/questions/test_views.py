@@ -126,7 +126,7 @@ def test_questions_are_what_was_asked_for(sampled):
 
 @pytest.mark.parametrize(
     "constants",
-    [{}, {"PROPOSED": 1, "PROPOSALS_AT_ONCE": 1}, {"PROPOSED": 60}, {"PROPOSALS_AT_ONCE": 5000}],
+    [{}, {"PROPOSALS_AT_ONCE": 1}, {"PROPOSALS_AT_ONCE": 5000}],
 )
 def test_neither_company_nor_order_nor_chunks_change_a_question(
     pools, sampled, constants, monkeypatch
@@ -205,7 +205,7 @@ def test_whether_crowded_shapes_are_asked_for_does_not_tell_which_is_right(monke
             ]
             symmetric = shape_symmetries(shapes)
             distances = camera_distances(spec, shapes)
-            turns = find_views(spec, "val", requests, shapes, distances, symmetric, Tally(), "auto")
+            turns = find_views(spec, "val", requests, shapes, distances, symmetric, Tally())
             shown.append(np.isfinite(turns).all(axis=(1, 2, 3)))
         return np.array(shown)
 
