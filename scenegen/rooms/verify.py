@@ -8,7 +8,6 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +31,7 @@ from scenegen.rooms.row_rules import (
     row_problems,
     row_rules,
 )
-from scenegen.sampling.scenes import MAX_ATTEMPTS, sample_scene
+from scenegen.sampling.scenes import MAX_ATTEMPTS, sample_scenes
 
 Array = NDArray[Any]
 # Rows rendered again agree bit for bit where variant and versions are those that wrote the file.
@@ -128,8 +127,10 @@ def _sampled_again(rooms: RoomsFile, rows: Array, objects: Objects) -> Check:
     for i in rows.tolist():
         try:
             stored = rooms.scene(i)
-            draw = partial(sample_scene, rooms.spec, stored.index, objects=objects)
-            same = any(draw(k) == stored for k in range(MAX_ATTEMPTS))
+            attempts = range(MAX_ATTEMPTS)
+            index = [stored.index] * MAX_ATTEMPTS
+            _, drawn = sample_scenes(rooms.spec, index, attempts, objects)
+            same = any(drawn.scene(k) == stored for k in range(len(drawn)))
         except (FileFormatError, SpecError):
             same = False
         if not same:
