@@ -22,7 +22,7 @@ def test_reach_is_the_support_of_each_shape(coarse: bool) -> None:
     found = BODIES.reach(KIND, TURN, DIRECTIONS, coarse)
     expected = [SHAPES[k].support(DIRECTIONS @ turn) for k, turn in zip(KIND, TURN, strict=True)]
     more = found - np.array(expected)
-    teapots = (KIND == SHAPE_NAMES.index("teapot"))[:, None] & coarse
+    teapots = (SHAPE_NAMES.index("teapot") == KIND)[:, None] & coarse
     assert abs(more[~teapots[:, 0]]).max() < 1e-7
     assert more.min() > -1e-7, "a coarse body contains the exact one"
     assert more.max() < (4e-3 if coarse else 1e-7)
