@@ -135,7 +135,7 @@ def test_no_place_where_there_is_none() -> None:
 
 def test_places_are_uniform_over_the_floor() -> None:
     side = 0.1 / 3**0.5
-    found, places = places_of_boxes(2000, 0.1, [], [], seed=3)
+    found, places = places_of_boxes(2000, 0.1, [], [])
     assert found.all()
     np.testing.assert_allclose(places[:, 1], side, atol=1e-7)
     for axis in (0, 2):
@@ -145,7 +145,7 @@ def test_places_are_uniform_over_the_floor() -> None:
 
 def test_the_first_free_candidate_is_taken() -> None:
     """Its other side of the room being full, a box stands where the first draw in the free one."""
-    full = np.array([0.25, 0.5, 0.5]) @ SEPARATORS.T + supports("box", np.eye(3), 0.5)[0]
+    full = SEPARATORS @ [0.25, 0.1, 0.5] + supports("box", np.eye(3), 0.5)[0]
     found, places = places_of_boxes(200, 0.1, [], [full], seed=2)
     draws = numbers(200, 2 * CANDIDATES, 2).reshape(200, CANDIDATES, 2)
     side, wall = 0.1 / 3**0.5, 0.25 + 0.5 / 3**0.5

@@ -63,13 +63,20 @@ def test_an_impossible_item_is_named_and_the_first_one() -> None:
     with pytest.raises(PlacementError) as refused:
         queue.take(64, 3000)
     assert refused.value.where == "item 0"
-    hidden = ProposalQueue(SPEC, ITEMS, objects_of(SPEC))
-    with pytest.raises(PlacementError, match=r"item 100: .* of which were rendered"):
+
+
+def test_an_item_that_is_always_refused_ends_the_run() -> None:
+    queue = ProposalQueue(SPEC, ITEMS, objects_of(SPEC))
+
+    def refuse_the_first() -> None:
         for _ in range(200):
-            scenes = hidden.take(4, 104)
-            assert scenes is not None
-            for item in scenes.index.tolist():
-                (hidden.refuse if item == 100 else hidden.accept)(item)
+            scenes = queue.take(4, 104)
+            for item in [] if scenes is None else scenes.index.tolist():
+                (queue.refuse if item == 100 else queue.accept)(item)
+
+    with pytest.raises(PlacementError, match=r"of which were rendered") as refused:
+        refuse_the_first()
+    assert refused.value.where == "item 100"
 
 
 def test_waiting_items_do_not_pile_up_proposals(monkeypatch: pytest.MonkeyPatch) -> None:
