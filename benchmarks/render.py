@@ -34,6 +34,8 @@ def jobs(folder: str, quick: bool) -> Iterator[Job]:
     yield "b", what, "rooms:end_to_end", whole
     shared = {"rooms": rooms, "count": scenes, "repeats": repeats}
     yield "stage", "(b) scenegen, rendering stage alone", "rooms:stage", shared
+    what = "(b) scenegen, proposing scenes alone"
+    yield "sampling", what, "rooms:sampling", {"count": 1000 if quick else 5000, "repeats": repeats}
     yield "c, unit scene", "(c) bare cast, unit scene", "bare_cast:unit_scene", shared
     yield "c, lattice", "(c) bare cast, lattice of instances", "bare_cast:lattice", shared
     plain = {"rooms": rooms, "count": per_scene, "repeats": min(repeats, 3), "folder": folder}

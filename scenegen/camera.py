@@ -51,23 +51,34 @@ class Camera:
     @property
     def world_from_camera(self) -> NDArray[np.float64]:
         """(4, 4) rigid transform from camera to world coordinates."""
-        back = np.subtract(self.position, self.target, dtype=np.float64)
-        back /= np.linalg.norm(back)
-        right = np.array([back[2], 0.0, -back[0]])  # y axis x back
-        length = math.hypot(back[2], back[0])
-        if length < 1e-9:
+        matrix = look_at(np.array(self.position, float), np.array(self.target, float))
+        if not np.isfinite(matrix).all():
             raise SpecError(
                 "camera",
                 f"a view straight along y from {self.position}",
                 "a direction of view that is not vertical",
             )
-        right /= length
-        matrix = np.eye(4)
-        matrix[:3, 0] = right
-        matrix[:3, 1] = cross(back, right)
-        matrix[:3, 2] = back
-        matrix[:3, 3] = self.position
         return matrix
+
+
+def look_at(position: Array, target: Array) -> NDArray[np.float64]:
+    """Return the (..., 4, 4) `world_from_camera` of cameras at positions (..., 3), with y up.
+
+    NaN where a camera looks straight along y. A matrix has the same bits on every machine.
+    """
+    x, y, z = np.moveaxis(position - target, -1, 0)
+    length = np.sqrt(x * x + y * y + z * z)
+    x, y, z = x / length, y / length, z / length
+    across = np.sqrt(x * x + z * z)
+    across = np.where(across < 1e-9, np.nan, across)
+    right = z / across, np.zeros_like(x), -x / across  # y axis x back
+    matrix = np.zeros((*np.shape(x), 4, 4))
+    for column, values in enumerate((right, cross((x, y, z), right), (x, y, z))):
+        for row in range(3):
+            matrix[..., row, column] = values[row]
+    matrix[..., :3, 3] = position
+    matrix[..., 3, 3] = 1.0
+    return matrix
 
 
 def pixel_size(height: int, fov_y_degrees: float) -> float:

@@ -14,7 +14,7 @@ from scenegen.common.text_table import piped
 from scenegen.description.specs import DatasetSpec
 
 FORMAT_NAME = "pix2shape-bench/rooms"
-FORMAT_VERSION = "2.2"
+FORMAT_VERSION = "2.3"
 TRUTH_DIGEST = "truth_digest"
 CONVENTIONS = (
     "world: right-handed, y up, room = unit box with floor y = 0 and walls x = 0, z = 0; camera:"
@@ -143,6 +143,11 @@ def columns(spec: DatasetSpec) -> list[Column]:
 def has_digests(attributes: Mapping[str, Any]) -> bool:
     """Return whether a file has digests and names of axes; formats 2.0 and 2.1 had none."""
     return CONTENT_DIGEST in attributes or attributes.get("format_version") not in ("2.0", "2.1")
+
+
+def has_old_draws(attributes: Mapping[str, Any]) -> bool:
+    """Return whether a file's scenes were drawn in the way of formats before 2.3."""
+    return attributes.get("format_version") in ("2.0", "2.1", "2.2")
 
 
 def root_problems(attributes: Mapping[str, Any]) -> list[str]:

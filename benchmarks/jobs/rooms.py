@@ -87,6 +87,30 @@ def make_meshes(folder: str, count: int) -> dict[str, Any]:
     return {"faces": len(ball.faces)}
 
 
+def sampling(count: int, repeats: int) -> dict[str, Any]:
+    """Take the processor time of proposing `count` scenes that all find room for their objects."""
+    from scenegen.description.specs import DatasetSpec
+    from scenegen.objects.catalogue import objects_of
+    from scenegen.rooms.make import DEFAULT_BATCH
+    from scenegen.sampling.proposals import ProposalQueue
+
+    spec = DatasetSpec()
+
+    def propose_all() -> None:
+        queue = ProposalQueue(spec, range(count), objects_of(spec))
+        while (scenes := queue.take(DEFAULT_BATCH, count)) is not None:
+            for item in scenes.index.tolist():
+                queue.accept(item)
+
+    propose_all()
+    seconds = []
+    for _ in range(repeats):
+        start = time.process_time()
+        propose_all()
+        seconds.append(time.process_time() - start)
+    return {"seconds": seconds, "images": count, "note": "processor time, on one core"}
+
+
 def stage(rooms: str, count: int, repeats: int, root: str = "") -> dict[str, Any]:
     """Time pack, launch and fetch of scenes that were sampled before.
 

@@ -12,8 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.camera import look_at
 from scenegen.common.errors import SpecError
+from scenegen.common.records import check
 from scenegen.common.rotations import rotation_matrix
+from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
@@ -96,82 +99,122 @@ def pack(
     """Pack these views of each scene into arrays, scene after scene.
 
     Raises SpecError where a scene has more objects or lights, or other shapes, than `spec` allows,
-    or lacks one of the views.
+    lacks one of the views, or has a camera that looks straight up or down.
     """
-    batch, slots, light_slots = len(scenes), spec.object_slots, spec.light_slots
-    items = [item for scene in scenes for item in scene.objects]
-    lights = [light for scene in scenes for light in scene.lights]
-    object_count = np.array([len(scene.objects) for scene in scenes], np.int32)
-    light_count = np.array([len(scene.lights) for scene in scenes], np.int32)
-    for name, count, most in (
-        ("objects", object_count, spec.objects[1]),
-        ("lights", light_count, spec.lights[1]),
-    ):
-        if count.max(initial=0) > most:
-            worst = scenes[int(count.argmax())].index
-            raise SpecError(f"scene {worst}", f"{count.max()} {name}", f"at most {most}")
     for scene in scenes:
+        for name, most in (("objects", spec.objects[1]), ("lights", spec.lights[1])):
+            found = len(getattr(scene, name))
+            check(found <= most, f"scene {scene.index}", f"{found} {name}", f"at most {most}")
         if not 0 <= min(views) <= max(views) < len(scene.cameras):
             known = f"views from 0 to {len(scene.cameras) - 1}"
             raise SpecError(f"scene {scene.index}", ", ".join(map(str, views)), known)
-    unknown = {item.name for item in items} - set(spec.shapes)
+    unknown = {item.name for scene in scenes for item in scene.objects} - set(spec.shapes)
     if unknown:
         raise SpecError("scene shapes", sorted(unknown), f"some of {spec.shapes}")
-    # All basic shapes are listed, used or not, so that their Mitsuba scene is built only once.
-    basic = spec.source == "shapes"
-    names = spec.shapes if basic else tuple(sorted({item.shape for item in items}))
-    number = {name: i for i, name in enumerate(names)}
+    return pack_arrays(spec, _arrays(spec, scenes, views), views, objects)
 
-    used = np.arange(slots) < object_count[:, None]
-    shape = np.full((batch, slots), -1, np.int32)
-    shape[used] = [number[item.shape] for item in items]
-    scale = np.zeros((batch, slots))
-    scale[used] = [item.scale for item in items]
-    placed = np.zeros((len(items), 4, 4))
-    if items:
-        rotation = np.stack([rotation_matrix(item.rotation) for item in items])
-        placed[:, :3, :3] = scale[used][:, None, None] * rotation
-        placed[:, :3, 3] = [item.position for item in items]
-        placed[:, 3, 3] = 1.0
-    world_from_object = np.zeros((batch, slots, 4, 4))
-    world_from_object[used] = placed
-    reflectance = np.zeros((batch, 1 + slots, 3))
-    reflectance[:, 0] = [scene.room_reflectance or (0.0, 0.0, 0.0) for scene in scenes]
-    reflectance[:, 1:][used] = np.array([i.reflectance for i in items]).reshape(-1, 3)
-    gloss = np.zeros((batch, 1 + slots, 2))
-    gloss[..., 1] = 1.0
-    gloss[:, 1:][used] = np.array([(i.specular, i.shininess) for i in items]).reshape(-1, 2)
 
-    lit = np.arange(light_slots) < light_count[:, None]
-    light_position = np.zeros((batch, light_slots, 3))
-    light_position[lit] = np.array([light.position for light in lights]).reshape(-1, 3)
-    light_color = np.zeros((batch, light_slots, 3))
-    light_color[lit] = np.array([light.color for light in lights]).reshape(-1, 3)
-    cameras = [scene.cameras[view] for scene in scenes for view in views]
+def pack_arrays(
+    spec: DatasetSpec, scenes: SceneArrays, views: Sequence[int], objects: Objects | None = None
+) -> SceneBatch:
+    """Pack all views of each scene into arrays, scene after scene; their numbers are `views`.
+
+    Raises SpecError where a camera looks straight up or down.
+    """
+    count, slots = scenes.shape.shape
+    world_from_camera = look_at(scenes.camera_position, scenes.camera_target)
+    vertical = np.isnan(world_from_camera).any(axis=(1, 2, 3))
+    if vertical.any():
+        expected = "a direction of view that is not vertical"
+        raise SpecError(
+            f"scene {scenes.index[vertical][0]}", "a camera that looks along y", expected
+        )
+    world_from_object = np.zeros((count, slots, 4, 4))
+    turned = rotation_matrix(np.moveaxis(scenes.rotation, -1, 0))
+    world_from_object[..., :3, :3] = scenes.scale[..., None, None] * turned
+    world_from_object[..., :3, 3] = scenes.position
+    world_from_object[..., 3, 3] = scenes.shape >= 0
+    has_room = ~np.isnan(scenes.room_reflectance).any(axis=1)
+    room = np.where(has_room[:, None], scenes.room_reflectance, 0.0)
+    matte = np.broadcast_to((0.0, 1.0), (count, 1, 2))
 
     def each(values: Array) -> Array:
         """Repeat what the views of a scene share."""
         return np.repeat(values, len(views), axis=0)
 
-    return SceneBatch(
+    batch = SceneBatch(
         spec=spec,
-        names=names,
+        names=tuple(scenes.names),
         shape_of=(objects or objects_of(spec)).shape,
-        index=each(np.array([scene.index for scene in scenes], np.int64)),
-        view=np.tile(np.array(views, np.int32), batch),
-        world_from_camera=np.stack([camera.world_from_camera for camera in cameras]),
-        fov_y_degrees=np.array([camera.fov_y_degrees for camera in cameras]),
-        object_count=each(object_count),
-        light_count=each(light_count),
-        shape=each(shape),
+        index=each(scenes.index),
+        view=np.tile(np.array(views, np.int32), count),
+        world_from_camera=world_from_camera.reshape(-1, 4, 4),
+        fov_y_degrees=scenes.fov_y_degrees.reshape(-1),
+        object_count=each(scenes.object_count),
+        light_count=each(scenes.light_count),
+        shape=each(scenes.shape),
         world_from_object=each(world_from_object),
-        object_scale=each(scale),
-        reflectance=each(reflectance),
-        gloss=each(gloss),
-        light_position=each(light_position),
-        light_color=each(light_color),
-        ambient=each(np.array([scene.ambient for scene in scenes])),
-        attenuation=each(np.array([scene.attenuation for scene in scenes])),
-        has_room=each(np.array([scene.room_reflectance is not None for scene in scenes])),
-        background=each(np.array([scene.background for scene in scenes])),
+        object_scale=each(scenes.scale),
+        reflectance=each(np.concatenate([room[:, None], scenes.reflectance], axis=1)),
+        gloss=each(np.concatenate([matte, scenes.gloss], axis=1)),
+        light_position=each(scenes.light_position),
+        light_color=each(scenes.light_color),
+        ambient=each(scenes.ambient),
+        attenuation=each(scenes.attenuation),
+        has_room=each(has_room),
+        background=each(scenes.background),
     )
+    # All basic shapes are listed, used or not, so that their Mitsuba scene is built only once.
+    return batch if spec.source == "shapes" else batch.rows(0, len(batch))
+
+
+def _arrays(spec: DatasetSpec, scenes: Sequence[SceneSpec], views: Sequence[int]) -> SceneArrays:
+    """Return scenes as arrays, with these views alone."""
+    shown = {item.shape for scene in scenes for item in scene.objects}
+    names = spec.shapes if spec.source == "shapes" else tuple(sorted(shown))
+    number = {name: i for i, name in enumerate(names)}
+    objects = [
+        [
+            (number[item.shape], item.mesh, item.position, item.rotation, item.scale,
+             item.reflectance, (item.specular, item.shininess))
+            for item in scene.objects
+        ]
+        for scene in scenes
+    ]  # fmt: skip
+    lights = [[(light.position, light.color) for light in scene.lights] for scene in scenes]
+    cameras = [[scene.cameras[view] for view in views] for scene in scenes]
+    shape, mesh, position, rotation, scale, reflectance, gloss = _slots(
+        objects, spec.object_slots, (-1, "", (0.0,) * 3, (0.0,) * 4, 0.0, (0.0,) * 3, (0.0, 1.0))
+    )
+    light_position, light_color = _slots(lights, spec.light_slots, ((0.0,) * 3, (0.0,) * 3))
+    return SceneArrays(
+        names=names,
+        index=np.array([scene.index for scene in scenes], np.int64),
+        camera_position=np.array([[c.position for c in some] for some in cameras], float),
+        camera_target=np.array([[c.target for c in some] for some in cameras], float),
+        fov_y_degrees=np.array([[c.fov_y_degrees for c in some] for some in cameras], float),
+        object_count=np.array([len(some) for some in objects], np.int32),
+        shape=shape.astype(np.int32),
+        mesh=mesh.astype(object),
+        position=position,
+        rotation=rotation,
+        scale=scale,
+        reflectance=reflectance,
+        gloss=gloss,
+        light_count=np.array([len(some) for some in lights], np.int32),
+        light_position=light_position,
+        light_color=light_color,
+        ambient=np.array([scene.ambient for scene in scenes], float),
+        attenuation=np.array([scene.attenuation for scene in scenes], float),
+        room_reflectance=np.array(
+            [scene.room_reflectance or (np.nan,) * 3 for scene in scenes], float
+        ),
+        background=np.array([scene.background for scene in scenes], float),
+    )
+
+
+def _slots(rows: list[list[Any]], slots: int, empty: tuple[Any, ...]) -> list[Array]:
+    """Return each part of the rows' entries as (S, slots, ...), filled up with `empty`."""
+    filled = [entry for row in rows for entry in [*row, *[empty] * (slots - len(row))]]
+    columns = [np.array(column) for column in zip(*filled, strict=True)]
+    return [column.reshape(len(rows), slots, *column.shape[1:]) for column in columns]

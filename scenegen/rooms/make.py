@@ -5,30 +5,32 @@ is rendered, the next is proposed and the one before is written. Memory does not
 number of scenes.
 """
 
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from scenegen.common.new_file import check_writable
 from scenegen.common.records import check
-from scenegen.description.scenes import SceneSpec
+from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.ground_truth import GroundTruth, visible_pixels
-from scenegen.rendering.packing import SceneBatch, pack
+from scenegen.rendering.packing import SceneBatch, pack_arrays
 from scenegen.rendering.renderer import launch
 from scenegen.rooms.writer import RenderedScene, create_rooms
-from scenegen.sampling.scenes import MAX_ATTEMPTS, refusal, sample_scene
+from scenegen.sampling.proposals import ProposalQueue
 
 DEFAULT_BATCH = 64
 MAX_BATCH = 4096
 MAX_RAYS = 2**28  # pixels of one batch; they take 8 GiB
-WINDOW = 4  # batches that may be begun while the oldest item is still being proposed again
+WINDOW = 8  # batches that may be begun while the oldest item is still being proposed again
 
-_Begun = tuple[list[SceneSpec], SceneBatch, Callable[[], GroundTruth]]  # a batch being rendered
+_Begun = tuple[SceneArrays, SceneBatch, Callable[[], GroundTruth]]  # a batch being rendered
 
 
 def make_dataset(
@@ -95,46 +97,23 @@ def render_items(
     """Yield the accepted items in order, a list of them whenever some are complete.
 
     While a batch is rendered, the next one is proposed. An item whose objects do not all show
-    enough pixels is proposed again in the next batch. No new item is begun while the oldest one
-    that is incomplete is more than WINDOW batches behind.
+    enough pixels is proposed again. No new item is begun while the oldest one that is incomplete is
+    more than WINDOW batches behind.
     """
     objects = objects or objects_of(spec)
     views = range(len(spec.views))
     batch = max(1, batch // len(views))  # scenes
-    next_in = 0
-    retries: deque[int] = deque()
-    attempts, rendered = Counter[int](), Counter[int]()  # of items that are not finished
+    proposals = ProposalQueue(spec, indices, objects)
     finished: dict[int, RenderedScene] = {}
     next_out = 0
 
-    def proposal(index: int) -> SceneSpec:
-        """Return the item's next proposal that places all its objects."""
-        while attempts[index] < MAX_ATTEMPTS:
-            attempts[index] += 1
-            scene = sample_scene(spec, index, attempts[index] - 1, objects)
-            if scene is not None:
-                return scene
-        raise refusal(spec, index, rendered[index], objects)
+    def propose() -> tuple[SceneArrays, SceneBatch] | None:
+        last = min(len(indices), next_out + WINDOW * batch)
+        scenes = proposals.take(batch, indices.start + last)
+        return None if scenes is None else (scenes, pack_arrays(spec, scenes, views, objects))
 
-    def propose() -> list[SceneSpec]:
-        nonlocal next_in
-        scenes: list[SceneSpec] = []
-        while len(scenes) < batch:
-            if retries:
-                index = retries.popleft()
-            elif next_in < len(indices) and next_in - next_out < WINDOW * batch:
-                index = indices[next_in]
-                next_in += 1
-            else:
-                break
-            scenes.append(proposal(index))
-        return scenes
-
-    def begin(scenes: list[SceneSpec]) -> _Begun | None:
-        if not scenes:
-            return None
-        packed = pack(spec, scenes, views, objects)
-        return scenes, packed, launch(packed, device)
+    def begin(proposed: tuple[SceneArrays, SceneBatch] | None) -> _Begun | None:
+        return None if proposed is None else (*proposed, launch(proposed[1], device))
 
     begun: _Begun | None = None
     while begun := begun or begin(propose()):
@@ -142,13 +121,12 @@ def render_items(
         following = propose()
         truth = fetch()
         begun = begin(following)
-        for scene, shown in zip(scenes, _shown(scenes, packed, truth), strict=True):
+        for item, shown in zip(scenes.index.tolist(), _shown(scenes, packed, truth), strict=True):
             if shown is None:
-                retries.append(scene.index)
-                rendered[scene.index] += 1
+                proposals.refuse(item)
             else:
-                finished[scene.index] = shown
-                del attempts[scene.index], rendered[scene.index]
+                proposals.accept(item)
+                finished[item] = shown
         ready = []
         while next_out < len(indices) and indices[next_out] in finished:
             ready.append(finished.pop(indices[next_out]))
@@ -158,14 +136,15 @@ def render_items(
 
 
 def _shown(
-    scenes: list[SceneSpec], batch: SceneBatch, truth: GroundTruth
+    scenes: SceneArrays, batch: SceneBatch, truth: GroundTruth
 ) -> Iterator[RenderedScene | None]:
     """Yield each scene with its pixels, or None where an object shows too few in some view."""
     spec = batch.spec
     visible = visible_pixels(truth.object_id, spec.object_slots)
-    for first, scene in zip(range(0, len(batch), len(spec.views)), scenes, strict=True):
+    missing = np.arange(spec.object_slots) >= batch.object_count[:, None]
+    enough = (missing | (visible >= spec.min_visible_pixels)).all(axis=1)
+    for row, first in enumerate(range(0, len(batch), len(spec.views))):
         images = slice(first, first + len(spec.views))
-        enough = visible[images, : len(scene.objects)] >= spec.min_visible_pixels
         pixels = {name: values[images] for name, values in vars(truth).items()}
-        shown = RenderedScene(scene, batch, first, pixels, visible[images])
-        yield shown if enough.all() else None
+        shown = RenderedScene(scenes, row, batch, first, pixels, visible[images])
+        yield shown if enough[images].all() else None

@@ -89,7 +89,7 @@ def _description_problems(
         return
     if room.view_index and block.read("scene", room.index) != block.read("scene", first):
         yield "the scene's description differs from that of its first view"
-    for name, expected in described(batch, 0, room.scene).items():
+    for name, expected in described(batch, 0).items():
         found = block.read(name, room.index)
         if name == "object/model":
             same = [model.decode("utf-8", "replace") for model in found] == expected

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scenegen.common.hdf5.content import seal
 from scenegen.common.hdf5.row_file import Table, new_file, writer_name
 from scenegen.common.records import check
-from scenegen.description.scenes import SceneSpec
+from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec, Fingerprint
 from scenegen.layout import (
     CONVENTIONS,
@@ -33,17 +33,23 @@ class RenderedScene:
     """An accepted item with the pixels of its V views.
 
     Attributes:
-        scene: its description.
+        scenes, row: its description is a row of `scenes`.
         batch, first: where it is packed: its views are the images from `first` on.
         pixels: image, depth, normal and object_id of the views, (V, ...) as in `GroundTruth`.
         visible_pixels: how many pixels of each view show each object, (V, K).
     """
 
-    scene: SceneSpec
+    scenes: SceneArrays
+    row: int
     batch: SceneBatch
     first: int
     pixels: dict[str, Array]
     visible_pixels: Array
+
+    @property
+    def index(self) -> int:
+        """The item's number in its data set."""
+        return int(self.scenes.index[self.row])
 
 
 class RoomsWriter:
@@ -57,24 +63,22 @@ class RoomsWriter:
     def append(self, rooms: Sequence[RenderedScene]) -> None:
         """Write a row for each view of each scene."""
         for room in rooms:
-            description = room.scene.to_json()
+            description = room.scenes.to_json(room.row)
             self.fingerprint.add(description.encode())
             for view in self.views:
                 row = {name: values[view] for name, values in room.pixels.items()}
-                row |= described(room.batch, room.first + view, room.scene)
+                row |= described(room.batch, room.first + view)
                 row |= {"object/visible_pixels": room.visible_pixels[view], "scene": description}
                 self.table.append(row)
 
 
-def described(batch: SceneBatch, i: int, scene: SceneSpec) -> dict[str, Any]:
-    """Return what a row holds that follows from a scene's description, by name of the dataset.
-
-    Image `i` of `batch` shows a view of `scene`.
-    """
+def described(batch: SceneBatch, i: int) -> dict[str, Any]:
+    """Return what the row of image `i` holds that its scene says, by name of the dataset."""
     spec, view = batch.spec, int(batch.view[i])
-    unused = spec.object_slots - len(scene.objects)
+    models = [batch.names[k] if k >= 0 else "" for k in batch.shape[i].tolist()]
+    classes = [name.partition("/")[0] for name in models]
     return {
-        "scene_index": scene.index,
+        "scene_index": batch.index[i],
         "view_index": view,
         "view_angle_degrees": spec.views[view],
         "camera/world_from_camera": batch.world_from_camera[i],
@@ -88,8 +92,8 @@ def described(batch: SceneBatch, i: int, scene: SceneSpec) -> dict[str, Any]:
         "material/specular": batch.gloss[i, :, 0],
         "material/shininess": batch.gloss[i, :, 1],
         "object/count": batch.object_count[i],
-        "object/shape": [spec.shapes.index(item.name) for item in scene.objects] + [-1] * unused,
-        "object/model": [item.shape for item in scene.objects] + [""] * unused,
+        "object/shape": [spec.shapes.index(name) if name else -1 for name in classes],
+        "object/model": models,
         "object/world_from_object": batch.world_from_object[i],
         "object/scale": batch.object_scale[i],
     }

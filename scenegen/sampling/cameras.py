@@ -1,30 +1,29 @@
 """Where the cameras of a scene are."""
 
-import math
+from typing import Any
 
-from scenegen.camera import Camera
-from scenegen.common.seeding import Purpose, item_rng
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.common.seeding import Purpose, item_numbers
 from scenegen.description.specs import DatasetSpec
-from scenegen.sampling.octant import around, octant_point
+from scenegen.sampling.octant import octant_points
+
+Array = NDArray[Any]
 
 
-def sample_cameras(spec: DatasetSpec, index: int) -> tuple[Camera, ...]:
-    """Draw the input view of item `index`, and turn it about the vertical axis for the other views.
+def sample_cameras(spec: DatasetSpec, index: Array) -> Array:
+    """Draw where the cameras of items `index`, (N,), are: (N, V, 3), world.
 
-    The axis goes through the target. One view is uniform by area on the positive octant. Several
-    views stay in the octant, where no wall hides the room: the input view lies near one side of it,
-    left or right with equal chance, so that the widest turn towards the other side fits. Its height
-    and its azimuth within that span are uniform.
+    The input view is turned about the vertical axis through the target for the other views. One
+    view is uniform by area on the positive octant. Several views stay in the octant, where no wall
+    hides the room: the input view lies near one side of it, left or right with equal chance, so
+    that the widest turn towards the other side fits. Its height and its azimuth within that span
+    are uniform.
     """
-    rng = item_rng(spec.seed, index, Purpose.CAMERA)
-    height, turn = (float(x) for x in rng.random(2))
-    widest = math.radians(spec.views[-1])
-    first = turn * (math.pi / 2 - widest)
-    mirrored = widest > 0 and bool(rng.random() < 0.5)
-    cameras = []
-    for degrees in spec.views:
-        azimuth = first + math.radians(degrees)
-        direction = octant_point(height, math.pi / 2 - azimuth if mirrored else azimuth)
-        position = around(spec.camera_target, spec.camera_radius, direction)
-        cameras.append(Camera(position, spec.camera_target, spec.fov_y_degrees))
-    return tuple(cameras)
+    height, turn, side = item_numbers(spec.seed, index, Purpose.CAMERA, count=3).T
+    widest = spec.views[-1] / 360
+    azimuth = (turn * (0.25 - widest))[:, None] + np.array(spec.views) / 360  # in full turns
+    mirrored = (side < 0.5) & (widest > 0)
+    azimuth = np.where(mirrored[:, None], 0.25 - azimuth, azimuth)
+    return octant_points(spec.camera_target, spec.camera_radius, height[:, None], azimuth)

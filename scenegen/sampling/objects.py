@@ -1,64 +1,118 @@
-"""Which objects a scene shows: how many, their classes, models and materials."""
+"""Which objects scenes show: how many, their classes, models and materials."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
-from scenegen.camera import Vector3
+import numpy as np
+from numpy.typing import NDArray
+
 from scenegen.common.errors import SpecError
-from scenegen.common.seeding import Purpose, item_rng
+from scenegen.common.seeding import Purpose, item_numbers
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, outline
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.solids import UnitShape
 
+Array = NDArray[Any]
 MAX_MODELS = 100  # models of a class drawn for one object before the class is given up
 
 
 @dataclass(frozen=True, eq=False)
 class Unplaced:
-    """An object before it has a size, an orientation and a place.
+    """The objects of N items before they have sizes, orientations and places.
 
-    `shape` has no triangles, only what placement needs; `mesh` is the digest of its file.
+    Attributes:
+        names: of all models of the classes that are drawn from, which `model` counts.
+        outlines: of the models that come up, without triangles: what placement needs.
+        count: of objects of each item, (N,) int32.
+        model: (N, K) int32; -1 in unused slots.
+        outline: index into `outlines`, (N, K); 0 in unused slots.
+        mesh: digests of the models' files, (N, K) texts; empty for built-in objects.
+        reflectance, gloss: rho, (N, K, 3), and Phong's k_s and exponent, (N, K, 2).
     """
 
-    shape: UnitShape
-    mesh: str
-    reflectance: Vector3
-    specular: float
-    shininess: float
+    names: Sequence[str]
+    outlines: tuple[UnitShape, ...]
+    count: Array
+    model: Array
+    outline: Array
+    mesh: Array
+    reflectance: Array
+    gloss: Array
 
 
-def sample_objects(spec: DatasetSpec, index: int, objects: Objects) -> list[Unplaced]:
-    """Draw the objects of item `index`; for a model that cannot be used another one is drawn."""
-    rng = item_rng(spec.seed, index, Purpose.OBJECTS)
-    count = int(rng.integers(spec.objects[0], spec.objects[1] + 1))
-    names = [spec.shapes[i] for i in rng.integers(len(spec.shapes), size=count)]
-    rng = item_rng(spec.seed, index, Purpose.MATERIALS)
-    colors = rng.uniform(0.15, 0.95, (count, 3)) if spec.random_reflectance else None
-    specular, shininess = (rng.uniform(*r, count).tolist() for r in (spec.specular, spec.shininess))
-    drawn = []
-    for k, name in enumerate(names):
-        shape, mesh = _sample_model(spec, index, k, name, objects)
-        red, green, blue = spec.reflectance if colors is None else colors[k].tolist()
-        drawn.append(Unplaced(shape, mesh, (red, green, blue), specular[k], shininess[k]))
-    return drawn
-
-
-def _sample_model(
-    spec: DatasetSpec, index: int, k: int, name: str, objects: Objects
-) -> tuple[UnitShape, str]:
-    """Draw a usable model of a class for object k; return its outline and file's digest."""
-    models = objects.models[name]
-    if spec.source == "shapes":
-        return outline(objects.shape, models[0]), objects.digest(models[0])
-    rng = item_rng(spec.seed, index, Purpose.MODELS, k)
-    for _ in range(MAX_MODELS):
-        model = models[int(rng.integers(len(models)))]
-        try:
-            return outline(objects.shape, model), objects.digest(model)
-        except BadMeshError as error:
-            reason = str(error)
-    raise SpecError(
-        f"classes: {MAX_MODELS} models drawn from {name!r} cannot be used, the last one since"
-        f" {reason}",
-        hint="`scenegen check-objects` tells of all",
+def sample_counts(spec: DatasetSpec, index: Array) -> Array:
+    """Draw the number of objects of each item, (N,) int32."""
+    (number,) = item_numbers(spec.seed, index, Purpose.OBJECTS, count=1).T
+    return (spec.objects[0] + np.floor(number * (spec.objects[1] - spec.objects[0] + 1))).astype(
+        np.int32
     )
+
+
+def sample_objects(spec: DatasetSpec, index: Array, objects: Objects) -> Unplaced:
+    """Draw the objects of items `index`, (N,).
+
+    For a model that cannot be used another one is drawn. Raises SpecError where no model of a class
+    can be used.
+    """
+    slots = spec.object_slots
+    count = sample_counts(spec, index)
+    used = np.arange(slots) < count[:, None]
+    kinds = item_numbers(spec.seed, index, Purpose.OBJECTS, start=2, count=slots)
+    kind = np.floor(kinds * len(spec.shapes)).astype(np.int64)
+    paint = item_numbers(spec.seed, index, Purpose.MATERIALS, count=5 * slots)
+    paint = paint.reshape(-1, slots, 5)
+    color = 0.15 + (0.95 - 0.15) * paint[..., :3] if spec.random_reflectance else spec.reflectance
+    low, high = np.array([spec.specular, spec.shininess]).T
+    names, first, models = _models(objects, spec.shapes)
+    model = np.full(used.shape, -1, np.int32)
+    problems: dict[int, str] = {}  # why models cannot be used
+    outlines: dict[int, UnitShape] = {}
+    for draw in range(MAX_MODELS):
+        rows, columns = np.nonzero(used & (model < 0))
+        if not len(rows):
+            break
+        chosen = kind[rows, columns]
+        number = first[chosen]
+        if (models[chosen] > 1).any():
+            numbers = item_numbers(
+                spec.seed, index[rows], Purpose.MODELS, columns, start=2 * draw, count=1
+            )
+            number += np.floor(numbers[:, 0] * models[chosen]).astype(np.int64)
+        for one in np.unique(number).tolist():
+            if one not in outlines and one not in problems:
+                try:
+                    outlines[one] = outline(objects.shape, names[one])
+                except BadMeshError as error:
+                    problems[one] = str(error)
+        model[rows, columns] = np.where(np.isin(number, list(problems)), -1, number)
+    else:
+        row, column = np.argwhere(used & (model < 0))[0].tolist()
+        raise SpecError(
+            f"classes: {MAX_MODELS} models drawn from {spec.shapes[kind[row, column]]!r} cannot be"
+            f" used, the last one since {list(problems.values())[-1]}",
+            hint="`scenegen check-objects` tells of all",
+        )
+    known = sorted(outlines)
+    digests = np.array(["", *(objects.digest(names[one]) for one in known)], object)
+    place = np.where(used, np.searchsorted(known, model), -1)
+    return Unplaced(
+        names=names,
+        outlines=tuple(outlines[one] for one in known),
+        count=count,
+        model=model,
+        outline=np.maximum(place, 0),
+        mesh=digests[place + 1],
+        reflectance=np.where(used[..., None], color, 0.0),
+        gloss=np.where(used[..., None], low + (high - low) * paint[..., 3:], (0.0, 1.0)),
+    )
+
+
+@lru_cache(maxsize=8)
+def _models(objects: Objects, classes: tuple[str, ...]) -> tuple[tuple[str, ...], Array, Array]:
+    """Return the names of all models of some classes, and where each class's begin; how many."""
+    counts = np.array([len(objects.models[name]) for name in classes])
+    names = tuple(model for name in classes for model in objects.models[name])
+    return names, np.cumsum(counts) - counts, counts

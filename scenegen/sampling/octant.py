@@ -1,28 +1,24 @@
 """The positive octant of a sphere around the target, on which cameras and lights are placed."""
 
-import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenegen.camera import Vector3
+from scenegen.common.rotations import cos_sin
+
+Array = NDArray[Any]
 
 
-def octant_direction(rng: np.random.Generator) -> Vector3:
-    """Draw a unit direction uniform by area on the positive octant of the sphere.
+def octant_points(center: Vector3, radius: float, height: Array, turns: Array) -> Array:
+    """Return points (..., 3) on the sphere of a radius around `center`.
 
-    By Archimedes' hat-box theorem its height is uniform.
+    `height` is from -1 to 1 in radii, `turns` the azimuth in full turns, from +x towards +z. For
+    both uniform, up to 1 and to 1/4, points are uniform by area on the octant: by Archimedes'
+    hat-box theorem a uniform point's height is uniform.
     """
-    height, turn = rng.random(2)
-    return octant_point(float(height), float(turn) * math.pi / 2)
-
-
-def octant_point(height: float, azimuth: float) -> Vector3:
-    """Return the unit direction with y = `height` and an azimuth in radians, from +x towards +z."""
-    radius = math.sqrt(1.0 - height * height)
-    return (radius * math.cos(azimuth), height, radius * math.sin(azimuth))
-
-
-def around(center: Vector3, radius: float, direction: Vector3) -> Vector3:
-    """Return the point at distance `radius` from `center` in a unit direction."""
-    x, y, z = (c + radius * d for c, d in zip(center, direction, strict=True))
-    return (x, y, z)
+    around = np.sqrt(1.0 - height * height)
+    cosine, sine = cos_sin(turns)
+    directions = np.broadcast_arrays(around * cosine, height, around * sine)
+    return np.stack([c + radius * d for c, d in zip(center, directions, strict=True)], axis=-1)

@@ -1,4 +1,4 @@
-"""Where objects stand: the search for a free place on the floor.
+"""Where objects stand: the search for a free place on the floor, for many items at once.
 
 Bodies are compared by their support functions: the support in direction d is the largest p . d
 over all points p of the body. Floor, walls and the image's borders are planes, so the supports
@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import Camera
-from scenegen.objects.solids import UnitShape
+from scenegen.common.rotations import cos_sin
+from scenegen.sampling.bodies import DIRECTION_STEP, POINT_STEP, Bodies, rounded
 
 Array = NDArray[Any]
 GAP = 2e-3  # least distance between two objects, scene units
@@ -26,83 +26,134 @@ CANDIDATES = 48  # places tried at once for one orientation
 
 def _separators() -> Array:
     """Upright planes every 7.5 degrees, and every 22.5 degrees ones that lean by 30 degrees."""
-    upright = np.arange(48) * (math.pi / 24)
-    leaning = np.arange(32) * (math.pi / 8)
-    slope = np.repeat([0.5, -0.5], 16)
-    azimuth = np.concatenate([upright, leaning])
-    y = np.concatenate([np.zeros(48), slope])
-    radius = np.sqrt(1 - y**2)
-    return np.stack([radius * np.cos(azimuth), y, radius * np.sin(azimuth)], axis=1)
+    upright, leaning = np.arange(48) / 48, np.arange(32) / 16
+    y = np.concatenate([np.zeros(48), np.repeat([0.5, -0.5], 16)])
+    cosine, sine = cos_sin(np.concatenate([upright, leaning]))
+    radius = np.sqrt(1 - y * y)
+    return rounded(np.stack([radius * cosine, y, radius * sine], axis=1), DIRECTION_STEP)
 
 
 SEPARATORS = _separators()
-_WALLS = np.array([[-1.0, 0, 0], [1, 0, 0], [0, 0, -1], [0, 0, 1], [0, -1, 0]])
+_OPPOSITE = np.array([np.flatnonzero((-one == SEPARATORS).all(axis=1))[0] for one in SEPARATORS])
+_WEST, _EAST, _NORTH, _SOUTH = (
+    int(np.flatnonzero((np.array(one) == SEPARATORS).all(axis=1))[0])
+    for one in ((-1, 0, 0), (1, 0, 0), (0, 0, -1), (0, 0, 1))
+)
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
-    """A placed object's convex body.
+class Frustums:
+    """What the images of N scenes show: V pyramids with their tops at the cameras.
 
     Attributes:
-        position: world, (3,).
-        support: along SEPARATORS and against them, from the position, (2, M).
+        position: of the cameras, world, (N, V, 3).
+        camera_from_world: rotations, (N, V, 3, 3).
+        normals: outward normals of an image's four borders in the camera frame, about unit, (4, 3).
     """
 
     position: Array
-    support: Array
+    camera_from_world: Array
+    normals: Array
+
+    def reach(self, bodies: Bodies, kind: Array, rotation: Array, rows: Array) -> Array:
+        """Return how far turned bodies reach along `normals`, and down: (n, V + 1, 5), in radii.
+
+        [:, :V, :4] is along the borders of each view, [:, V, 4] along the world's -y. `kind` and
+        `rotation` are as in `Bodies.reach`, `rows` as in `hold`.
+        """
+        turn = self.camera_from_world[rows]
+        rotation = rotation[:, None]
+        seen = sum(turn[..., i, None] * rotation[..., i, None, :] for i in range(3))
+        frames = np.concatenate([seen, rotation], axis=1)
+        directions = np.concatenate([self.normals, [[0.0, -1.0, 0.0]]])
+        each = np.repeat(kind, frames.shape[1])
+        found = bodies.reach(each, frames.reshape(-1, 3, 3), directions)
+        return found.reshape(*frames.shape[:2], 5)
+
+    def hold(self, rows: Array, places: Array, border: Array) -> Array:
+        """Return at which places all images of a scene show a body whole.
+
+        Args:
+            rows: which scene each body is in, (n,).
+            places: (n, C, 3).
+            border: how far bodies reach along `normals`, (n, V, 4), scene units.
+
+        Returns: (n, C).
+        """
+        away = places[:, None] - self.position[rows][:, :, None]
+        turn = self.camera_from_world[rows][:, :, None]
+        seen = [turn[..., i, 0] * away[..., 0] + turn[..., i, 1] * away[..., 1]
+                + turn[..., i, 2] * away[..., 2] for i in range(3)]  # fmt: skip
+        inside = np.ones(places.shape[:2], bool)
+        for k, (x, y, z) in enumerate(self.normals.tolist()):
+            across = x * seen[0] if x else y * seen[1]
+            inside &= (across + z * seen[2] + border[..., k, None] <= 0.0).all(axis=1)
+        return inside
 
 
-def are_apart(places: Array, support: Array, other: Body) -> Array:
-    """Return at which places, (C, 3), a plane keeps a body more than GAP away from another.
+def border_normals(fov_y_degrees: float, height: int, width: int) -> Array:
+    """Return the outward normals of the image's four border planes, camera frame: (4, 3).
 
-    True is a proof. False means that the bodies touch, or nearly: every plane tried cuts one.
-    `support` is the first body's, as in `Body`.
+    They are unit vectors within DIRECTION_STEP, of which they are multiples.
     """
-    distance = (places - other.position) @ SEPARATORS.T
-    return np.asarray((distance > support[1] + other.support[0] + GAP).any(axis=1))
-
-
-def frustum_normals(camera: Camera, height: int, width: int) -> Array:
-    """Return the outward normals of the image's four border planes, world, unit: (4, 3)."""
-    half_y = math.tan(math.radians(camera.fov_y_degrees) / 2)
+    half_y = math.tan(math.radians(fov_y_degrees) / 2)
     half_x = half_y * width / height
     normals = np.array([[1, 0, half_x], [-1, 0, half_x], [0, 1, half_y], [0, -1, half_y]])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.asarray(normals @ camera.world_from_camera[:3, :3].T)
+    length = np.sqrt(1 + np.array([half_x, half_x, half_y, half_y]) ** 2)
+    return rounded(normals / length[:, None], DIRECTION_STEP)
 
 
-def find_place(
-    shape: UnitShape,
-    rotation: Array,
-    scale: float,
-    frustums: list[tuple[Array, Array]],
-    cropped: bool,
-    placed: list[Body],
-    rng: np.random.Generator,
-) -> Body | None:
-    """Try `CANDIDATES` places on the floor, uniform over it; return the first that is free.
+def find_places(
+    rows: Array,
+    reach: Array,
+    down: Array,
+    border: Array,
+    frustums: Frustums,
+    placed: Array,
+    numbers: Array,
+) -> tuple[Array, Array]:
+    """Try `CANDIDATES` places on the floor for each body, uniform over it; the first free one wins.
 
-    Free is: inside the walls, inside every camera's image (only the centre if `cropped`), and a
-    plane away from each body in `placed`. `frustums` are each camera's position, (3,), and its
-    outward border normals, (4, 3).
+    Free is: inside the walls, inside every camera's image, and a plane away from each body placed
+    before.
+
+    Args:
+        rows: which scene each body is in, (n,).
+        reach, down: the body's supports along SEPARATORS, (n, 80), and downwards, (n,), from its
+            origin, scene units.
+        border: how far it must stay inside the borders of each image, (n, V, 4).
+        placed: supports of the J bodies placed before along SEPARATORS, world, (N, J, 80).
+        numbers: uniform on [0, 1), (n, CANDIDATES, 2).
+
+    Returns: (n,) bool, whether there is such a place, and the place, (n, 3).
     """
-    borders = [normals for _, normals in frustums]
-    directions = np.concatenate([_WALLS, *borders, SEPARATORS, -SEPARATORS])
-    reach = scale * shape.support(directions @ rotation)
-    west, east, north, south, down = reach[:5]
-    width, depth = 1.0 - west - east, 1.0 - north - south
-    if width <= 0.0 or depth <= 0.0:
-        return None
-    places = rng.random((CANDIDATES, 3))
-    places[:, 0] = west + width * places[:, 0]
-    places[:, 1] = down
-    places[:, 2] = north + depth * places[:, 2]
-    free = np.ones(CANDIDATES, bool)
-    for i, (position, normals) in enumerate(frustums):
-        border = 0.0 if cropped else reach[5 + 4 * i : 9 + 4 * i]
-        free &= ((places - position) @ normals.T + border <= 0.0).all(axis=1)
-    support = reach[-2 * len(SEPARATORS) :].reshape(2, -1)
-    for other in placed:
-        free &= are_apart(places, support, other)
-    first = int(free.argmax())
-    return Body(places[first], support) if free[first] else None
+    count = numbers.shape[1]
+    width = 1.0 - reach[:, _WEST] - reach[:, _EAST]
+    depth = 1.0 - reach[:, _NORTH] - reach[:, _SOUTH]
+    places = np.empty((len(rows), count, 3))
+    places[..., 0] = reach[:, _WEST, None] + width[:, None] * numbers[..., 0]
+    places[..., 1] = down[:, None]
+    places[..., 2] = reach[:, _NORTH, None] + depth[:, None] * numbers[..., 1]
+    places = rounded(places, POINT_STEP)
+    free = frustums.hold(rows, places, border)
+    free &= ((width > 0.0) & (depth > 0.0))[:, None]
+    if placed.shape[1]:
+        bodies, tried = np.nonzero(free)
+        free[bodies, tried] = are_apart(places[bodies, tried], reach[bodies], placed[rows[bodies]])
+    first = free.argmax(axis=1)
+    each = np.arange(len(rows))
+    return free[each, first], places[each, first]
+
+
+def are_apart(places: Array, reach: Array, others: Array) -> Array:
+    """Return which bodies a plane keeps more than GAP away from each of J others: (n,).
+
+    True is a proof. False means that two bodies touch, or nearly: every plane tried cuts one.
+
+    Args:
+        places: (n, 3), multiples of POINT_STEP.
+        reach: the body's supports along SEPARATORS from its place, (n, 80).
+        others: supports of the others along SEPARATORS, world, (n, J, 80).
+    """
+    ahead = places @ SEPARATORS.T - reach[:, _OPPOSITE] - GAP
+    return np.asarray((ahead[:, None] > others).any(axis=2).all(axis=1))

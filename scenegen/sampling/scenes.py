@@ -1,63 +1,106 @@
-"""Propose scenes: `DatasetSpec` and item index -> `SceneSpec`. All randomness ends here.
+"""Propose scenes: `DatasetSpec`, indices and attempts -> `SceneArrays`. All randomness ends here.
 
 Camera, lights, and the number, classes and materials of objects are drawn once for an item, so that
 a refused proposal cannot bend their distributions. Another attempt draws only the sizes,
 orientations and places of the objects again.
 """
 
-from collections.abc import Sequence
+import itertools
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from scenegen.camera import Camera
+from scenegen.camera import look_at
 from scenegen.common.errors import PlacementError
 from scenegen.common.rotations import rotation_matrix
-from scenegen.common.seeding import Purpose, item_rng
-from scenegen.description.scenes import PlacedObject, SceneSpec
+from scenegen.common.seeding import Purpose, item_numbers
+from scenegen.description.scene_arrays import SceneArrays
+from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
+from scenegen.sampling.bodies import MARGIN, bodies_of
 from scenegen.sampling.cameras import sample_cameras
 from scenegen.sampling.lights import sample_lights
-from scenegen.sampling.objects import Unplaced, sample_objects
-from scenegen.sampling.placement import Body, find_place, frustum_normals
-from scenegen.sampling.poses import random_rotation
+from scenegen.sampling.objects import Unplaced, sample_counts, sample_objects
+from scenegen.sampling.placement import (
+    CANDIDATES,
+    SEPARATORS,
+    Frustums,
+    border_normals,
+    find_places,
+)
+from scenegen.sampling.poses import random_rotations
 
+Array = NDArray[Any]
 MAX_ATTEMPTS = 100  # scenes proposed for one item before the request is called impossible
 POSES_PER_OBJECT = 8  # sizes and orientations tried for one object of a proposal
+_TOGETHER = (0, 1, 3, POSES_PER_OBJECT)  # poses 0, 1 to 2, and 3 to 7 are tried at once
+_POSE_NUMBERS = 6  # size, rotation, heading, and one to spare: positions in a stream are even
+_NUMBERS = _POSE_NUMBERS + 2 * CANDIDATES  # of one pose
+
+
+def sample_scenes(
+    spec: DatasetSpec, index: Any, attempt: Any, objects: Objects | None = None
+) -> tuple[Array, SceneArrays]:
+    """Propose scenes of items, many at once.
+
+    Pure: an (index, attempt) gives the same scene, on any machine, in any order and company. The
+    caller renders a proposal, and asks for the next attempt if some object is not visible enough.
+
+    Args:
+        index, attempt: integers, (N,), of which each pair is a proposal.
+        objects: those of the spec by default.
+
+    Returns: whether each proposal found room for its objects, (N,) bool, and the scenes of those
+    that did. Raises SpecError where no model of a class can be used.
+    """
+    index, attempt = np.asarray(index, np.int64), np.asarray(attempt, np.int64)
+    unplaced = sample_objects(spec, index, objects or objects_of(spec))
+    cameras = sample_cameras(spec, index)
+    placed, position, rotation, scale = _place_objects(spec, index, attempt, cameras, unplaced)
+    light_count, light_position, light_color = sample_lights(spec, index)
+
+    def same(values: Any, *shape: int) -> Array:
+        return np.broadcast_to(np.array(values, float), (len(index), *shape))
+
+    views = cameras.shape[1]
+    scenes = SceneArrays(
+        names=unplaced.names,
+        index=index,
+        camera_position=cameras,
+        camera_target=same(spec.camera_target, views, 3),
+        fov_y_degrees=same(spec.fov_y_degrees, views),
+        object_count=unplaced.count,
+        shape=unplaced.model,
+        mesh=unplaced.mesh,
+        position=position,
+        rotation=rotation,
+        scale=scale,
+        reflectance=unplaced.reflectance,
+        gloss=unplaced.gloss,
+        light_count=light_count,
+        light_position=light_position,
+        light_color=light_color,
+        ambient=same(spec.ambient, 3),
+        attenuation=same(spec.attenuation, 2),
+        room_reflectance=same(spec.room_reflectance, 3),
+        background=same((0.0, 0.0, 0.0), 3),
+    )
+    return placed, scenes.take(placed)
 
 
 def sample_scene(
     spec: DatasetSpec, index: int, attempt: int = 0, objects: Objects | None = None
 ) -> SceneSpec | None:
-    """Propose the scene of item `index`; None where this attempt could not place its objects.
-
-    Pure: the same arguments give the same scene, on any machine, in any order. The caller renders
-    a proposal, and asks for the next attempt if some object is not visible enough. `objects` are
-    those of the spec by default.
-
-    Raises SpecError where no model of a class can be used.
-    """
-    cameras = sample_cameras(spec, index)
-    unplaced = sample_objects(spec, index, objects or objects_of(spec))
-    placed = _place_objects(spec, index, attempt, cameras, unplaced)
-    if len(placed) < len(unplaced):
-        return None
-    return SceneSpec(
-        index=index,
-        cameras=cameras,
-        objects=tuple(item for item, _ in placed),
-        lights=sample_lights(spec, index),
-        ambient=spec.ambient,
-        attenuation=spec.attenuation,
-        room_reflectance=spec.room_reflectance,
-    )
+    """Propose the scene of one item, as `sample_scenes`; None where this attempt found no room."""
+    _, scenes = sample_scenes(spec, [index], [attempt], objects)
+    return scenes.scene(0) if len(scenes) else None
 
 
-def refusal(
-    spec: DatasetSpec, index: int, placed_but_hidden: int, objects: Objects | None = None
-) -> PlacementError:
+def refusal(spec: DatasetSpec, index: int, placed_but_hidden: int) -> PlacementError:
     """Return why item `index` got no scene, `placed_but_hidden` of its proposals being rendered."""
-    wanted = len(sample_objects(spec, index, objects or objects_of(spec)))
+    wanted = int(sample_counts(spec, np.array([index]))[0])
     if placed_but_hidden:
         return PlacementError(
             f"item {index}",
@@ -75,38 +118,55 @@ def refusal(
 
 
 def _place_objects(
-    spec: DatasetSpec, index: int, attempt: int, cameras: Sequence[Camera], unplaced: list[Unplaced]
-) -> list[tuple[PlacedObject, Body]]:
-    """Place the item's objects one after another; the list ends before the first without room."""
-    rng = item_rng(spec.seed, index, Purpose.POSES, attempt)
-    frustums = [
-        (np.array(camera.position), frustum_normals(camera, spec.height, spec.width))
-        for camera in cameras
-    ]
-    placed: list[tuple[PlacedObject, Body]] = []
-    for kind in unplaced:
-        bodies = [body for _, body in placed]
-        for _ in range(POSES_PER_OBJECT):
-            scale = float(rng.uniform(*spec.object_radius))
-            quaternion = random_rotation(kind.shape, spec.pose, rng)
-            rotation = rotation_matrix(quaternion)
-            body = find_place(
-                kind.shape, rotation, scale, frustums, spec.allow_cropped, bodies, rng
-            )
-            if body is not None:
-                x, y, z = body.position.tolist()
-                item = PlacedObject(
-                    shape=kind.shape.name,
-                    position=(x, y, z),
-                    rotation=quaternion,
-                    scale=scale,
-                    reflectance=kind.reflectance,
-                    specular=kind.specular,
-                    shininess=kind.shininess,
-                    mesh=kind.mesh,
-                )
-                placed.append((item, body))
+    spec: DatasetSpec, index: Array, attempt: Array, cameras: Array, unplaced: Unplaced
+) -> tuple[Array, Array, Array, Array]:
+    """Place the objects of N items one after another; items without room for one get no more.
+
+    Returns: whether all of an item's found room, (N,); and of the objects, zero in unused slots,
+    positions (N, K, 3), rotations (N, K, 4) and scales (N, K).
+    """
+    slots = unplaced.model.shape[1]
+    position, rotation = np.zeros((len(index), slots, 3)), np.zeros((len(index), slots, 4))
+    scale = np.zeros((len(index), slots))
+    placed = np.zeros((len(index), slots, len(SEPARATORS)))
+    world_from_camera = look_at(cameras, np.array(spec.camera_target))[..., :3, :3]
+    frustums = Frustums(
+        cameras,
+        world_from_camera.swapaxes(-1, -2),
+        border_normals(spec.fov_y_degrees, spec.height, spec.width),
+    )
+    bodies = bodies_of(unplaced.outlines)
+    going = np.ones(len(index), bool)
+    for slot in range(slots):
+        looking = np.flatnonzero(going & (unplaced.count > slot))
+        for first, last in itertools.pairwise(_TOGETHER):
+            if not len(looking):
                 break
-        else:
-            break
-    return placed
+            tries = last - first
+            rows = np.repeat(looking, tries)
+            pose = slot * POSES_PER_OBJECT + np.tile(np.arange(first, last), len(looking))
+            numbers = item_numbers(
+                spec.seed, index[rows], Purpose.POSES, attempt[rows], _NUMBERS * pose,
+                count=_NUMBERS,
+            )  # fmt: skip
+            kind = unplaced.outline[rows, slot]
+            low, high = spec.object_radius
+            size = low + (high - low) * numbers[:, 0]
+            turn = random_rotations(bodies, kind, spec.pose, numbers[:, 1:5])
+            matrix = rotation_matrix(turn.T)
+            reach = size[:, None] * bodies.reach(kind, matrix, SEPARATORS, coarse=True) + MARGIN
+            ends = size[:, None, None] * frustums.reach(bodies, kind, matrix, rows) + MARGIN
+            border = 0.0 * ends[:, :-1, :4] if spec.allow_cropped else ends[:, :-1, :4]
+            found, place = find_places(
+                rows, reach, ends[:, -1, 4], border, frustums, placed[:, :slot],
+                numbers[:, _POSE_NUMBERS:].reshape(-1, CANDIDATES, 2),
+            )  # fmt: skip
+            found = found.reshape(-1, tries)
+            best = np.arange(len(looking)) * tries + found.argmax(axis=1)
+            done = found.any(axis=1)
+            who, best, looking = looking[done], best[done], looking[~done]
+            position[who, slot], rotation[who, slot] = place[best], turn[best]
+            scale[who, slot] = size[best]
+            placed[who, slot] = place[best] @ SEPARATORS.T + reach[best]
+        going[looking] = False
+    return going, position, rotation, scale

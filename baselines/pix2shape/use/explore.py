@@ -18,10 +18,9 @@ from baselines.pix2shape.network.model import Pix2Shape, Views, mapped
 from baselines.pix2shape.network.surfels import Scene
 from baselines.pix2shape.pictures import drawn, image_tiles, sheet
 from baselines.pix2shape.weights.storage import Card
-from scenegen.camera import Camera
+from scenegen.camera import Camera, look_at
 from scenegen.common.errors import SpecError
 from scenegen.common.seeding import Purpose, item_seed
-from scenegen.description.scenes import Light
 from scenegen.description.specs import DatasetSpec
 from scenegen.sampling.cameras import sample_cameras
 from scenegen.sampling.lights import sample_lights
@@ -60,8 +59,9 @@ def sample_sheet(
     one_hot = np.zeros((count, len(card.classes)))
     for i in range(count if card.classes else 0):
         one_hot[i, i % len(card.classes) if label is None else card.classes.index(label)] = 1
-    cameras = [sample_cameras(replace(spec, views=(0.0,)), i)[0] for i in range(count)]
-    views = known_views(spec, cameras, [sample_lights(spec, i) for i in range(count)], one_hot)
+    items = np.arange(count)
+    positions = sample_cameras(replace(spec, views=(0.0,)), items)[:, 0]
+    views = known_views(spec, positions, *sample_lights(spec, items)[1:], one_hot)
     source = torch.Generator().manual_seed(item_seed(seed, 0, Purpose.PICTURES))
     noise = torch.randn(count, model.config.networks.z, generator=source)
     tiles = drawn(model, model.prior(noise), views)
@@ -119,18 +119,18 @@ def turned(world_from_camera: Array, spec: DatasetSpec, degrees: float) -> Camer
 
 
 def known_views(
-    spec: DatasetSpec, cameras: Sequence[Camera], lights: Sequence[Sequence[Light]], one_hot: Array
+    spec: DatasetSpec, positions: Array, light_position: Array, light_color: Array, one_hot: Array
 ) -> Views:
-    """Return the cameras, lights and reflectance of views that were never rendered."""
-    position, color = np.zeros((2, len(cameras), max(1, *map(len, lights)), 3))
-    for i, (camera, own) in enumerate(zip(cameras, lights, strict=True)):
-        pose = camera.world_from_camera
-        for j, light in enumerate(own):
-            position[i, j] = (np.array(light.position) - pose[:3, 3]) @ pose[:3, :3]
-            color[i, j] = light.color
-    condition = np.concatenate([[c.position for c in cameras], one_hot], axis=1)
+    """Return the cameras, lights and reflectance of views that were never rendered.
+
+    Cameras are at `positions`, (N, 3), and look at the spec's target; lights are (N, L, 3), world.
+    """
+    poses = look_at(positions, np.array(spec.camera_target))
+    lights = (light_position - positions[:, None]) @ poses[:, :3, :3]
+    condition = np.concatenate([positions, one_hot], axis=1)
     same = (spec.ambient, spec.attenuation, spec.room_reflectance)
-    known = (condition, position, color, *(np.tile(one, (len(cameras), 1)) for one in same))
+    each = (np.tile(one, (len(positions), 1)) for one in same)
+    known = (condition, lights, light_color, *each)
     told, *scene = (torch.from_numpy(np.float32(values)) for values in known)
     return Views(told, Scene(spec.fov_y_degrees, *scene))
 

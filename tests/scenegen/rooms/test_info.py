@@ -26,7 +26,7 @@ def test_header_and_spec(float_path):
     assert value(text, "truth digest") == root["truth_digest"]
     assert value(text, "content digest") == root["content_digest"]
     assert value(text, "command") == "tests"
-    assert value(text, "format") == "pix2shape-bench/rooms 2.2"
+    assert value(text, "format") == "pix2shape-bench/rooms 2.3"
     assert value(text, "written by") == f"{root['writer']}, {root['variant']}"
     assert "y up" in value(text, "conventions")
     for name, setting in json.loads(root["spec"]).items():

@@ -151,7 +151,7 @@ def test_waiting_items_take_no_memory():
     next(render_items(SPEC, range(4), 4))
     before = resident()
     rooms = render_items(SPEC, range(3_000_000), 4)
-    assert next(rooms)[0].scene.index == 0
+    assert next(rooms)[0].index == 0
     assert resident() - before < 60e6, "24 MB for the pointers alone, 96 MB for the numbers"
     rooms.close()
 

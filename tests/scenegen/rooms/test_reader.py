@@ -89,7 +89,7 @@ def test_root_attributes(rooms_path):
     with h5py.File(rooms_path) as file:
         root = dict(file.attrs)
     assert root["format"] == "pix2shape-bench/rooms"
-    assert root["format_version"] == "2.2"
+    assert root["format_version"] == "2.3"
     assert root["writer"].startswith("pix2shape-bench ")
     assert root["count"] == 8
     assert root["creation_command"] == "tests"

@@ -16,8 +16,15 @@ from scenegen.camera import Camera
 from scenegen.common.errors import PlacementError
 from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
 from scenegen.description.specs import DatasetSpec
+from scenegen.rendering.packing import pack, pack_arrays
 from scenegen.sampling import scenes as sampling
-from scenegen.sampling.scenes import MAX_ATTEMPTS, POSES_PER_OBJECT, refusal, sample_scene
+from scenegen.sampling.scenes import (
+    MAX_ATTEMPTS,
+    POSES_PER_OBJECT,
+    refusal,
+    sample_scene,
+    sample_scenes,
+)
 
 Array = NDArray[Any]
 CROWD = DatasetSpec(objects=(40, 40))
@@ -40,6 +47,37 @@ def test_sampling_is_pure() -> None:
     forwards = [sample_scene(spec, i, a) for i in range(8) for a in (0, 1)]
     backwards = [sample_scene(replace(spec), i, a) for i in range(7, -1, -1) for a in (1, 0)]
     assert forwards == backwards[::-1]
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"random_reflectance": True, "views": (0.0, 30.0, 80.0), "lights": (0, 5)},
+        {"objects": (0, 6), "pose": "any", "height": 60, "width": 90, "seed": 2**63 - 1},
+        {"source": "families", "shapes": ("mug", "cap"), "specular": (0.1, 0.9)},
+    ],
+)
+def test_a_scene_is_the_same_alone_and_in_any_company(settings: dict[str, Any]) -> None:
+    """To the bit: as a record, as arrays, and as JSON."""
+    spec = DatasetSpec(**settings)
+    pairs = [(i, a) for i in (0, 3, 2**40, 2**62) for a in (0, 1, 7)]
+    placed, many = sample_scenes(spec, *zip(*pairs, strict=True))
+    alone = [sample_scene(spec, *pair) for pair in pairs]
+    assert [scene is not None for scene in alone] == placed.tolist()
+    assert placed.sum() > 8
+    found = [scene for scene in alone if scene is not None]
+    assert [many.scene(row) for row in range(len(many))] == found
+    assert [many.to_json(row) for row in range(len(many))] == [one.to_json() for one in found]
+    backwards = sample_scenes(spec, *zip(*pairs[::-1], strict=True))[1].take(slice(None, None, -1))
+    ours, theirs = (
+        pack(spec, found, range(len(spec.views))),
+        pack_arrays(spec, backwards, range(len(spec.views))),
+    )
+    assert ours.names == theirs.names
+    for name, values in vars(ours).items():
+        if isinstance(values, np.ndarray):
+            assert values.tobytes() == getattr(theirs, name).tobytes(), name
+            assert values.dtype == getattr(theirs, name).dtype, name
 
 
 def test_a_new_attempt_changes_poses_and_nothing_else(scenes_of: Callable[..., Any]) -> None:
@@ -163,21 +201,23 @@ def test_the_room_fills_the_image_from_everywhere_on_the_octant(size: tuple[int,
 
 
 def test_a_crowd_is_refused_after_bounded_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = 0
-    find_place = sampling.find_place
+    tried = 0
+    find_places = sampling.find_places
 
-    def counted(*args: Any) -> Any:
-        nonlocal calls
-        calls += 1
-        return find_place(*args)
+    def counted(rows: Array, *args: Any) -> Any:
+        nonlocal tried
+        tried += len(rows)
+        return find_places(rows, *args)
 
-    monkeypatch.setattr(sampling, "find_place", counted)
-    assert all(sample_scene(CROWD, 0, attempt) is None for attempt in range(10))
-    assert 0 < calls <= 10 * 40 * POSES_PER_OBJECT
-    before = calls
+    monkeypatch.setattr(sampling, "find_places", counted)
+    placed, scenes = sample_scenes(CROWD, [0] * 10, range(10))
+    assert not placed.any()
+    assert len(scenes) == 0
+    assert 0 < tried <= 10 * 40 * POSES_PER_OBJECT
+    before = tried
     error = refusal(CROWD, 0, 0)
     assert isinstance(error, PlacementError)
-    assert calls == before, "it is not tried again"
+    assert tried == before, "it is not tried again"
 
 
 def test_refusals_say_what_and_what_to_try() -> None:

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pix2shape_models import edited, made, tiny
 
-from scenegen.camera import Camera
+from scenegen.camera import Camera, look_at
 from scenegen.description.presets import PAPER_VIEWS
 from scenegen.description.specs import DatasetSpec
 from scenegen.rooms.reader import RoomsFile
@@ -63,12 +63,12 @@ def pixels(picture: Any) -> np.ndarray:
 def test_turned_by_the_files_angles_is_the_files_views():
     """Views up to 80 degrees leave one side only; both sides come up."""
     spec, sides = replace(SPEC, views=PAPER_VIEWS), []
-    for index in range(30):
-        cameras = sample_cameras(spec, index)
-        for camera, degrees in zip(cameras, PAPER_VIEWS, strict=True):
-            found = turned(cameras[0].world_from_camera, spec, degrees)
-            np.testing.assert_allclose(found.world_from_camera, camera.world_from_camera, atol=1e-9)
-        sides.append(cameras[0].position[0] > cameras[0].position[2])
+    for places in sample_cameras(spec, np.arange(30)):
+        poses = look_at(places, np.array(spec.camera_target))
+        for pose, degrees in zip(poses, PAPER_VIEWS, strict=True):
+            found = turned(poses[0], spec, degrees)
+            np.testing.assert_allclose(found.world_from_camera, pose, atol=1e-9)
+        sides.append(places[0, 0] > places[0, 2])
     assert 5 < sum(sides) < 25
 
 
@@ -94,14 +94,14 @@ def test_what_is_known_of_views_is_what_training_was_told(several_path):
     expected = source.as_batch(default_collate([source[row] for row in range(9)])).views
     with RoomsFile(several_path) as rooms:
         spec, depth = rooms.spec, torch.tensor(rooms.read("depth", slice(None)))
-    cameras = [camera for i in range(3) for camera in sample_cameras(spec, i)]
-    lights = [sample_lights(spec, row // 3) for row in range(9)]
-    assert len({len(own) for own in lights}) > 1
-    found = explore.known_views(spec, cameras, lights, np.zeros((9, 0)))
+    positions = sample_cameras(spec, np.arange(3)).reshape(9, 3)
+    count, *lights = (np.repeat(own, 3, axis=0) for own in sample_lights(spec, np.arange(3)))
+    assert len(set(count.tolist())) > 1
+    found = explore.known_views(spec, positions, *lights, np.zeros((9, 0)))
     assert found.scene.fov_y_degrees == expected.scene.fov_y_degrees
     slots = found.scene.light_color.shape[1]
     there = (found.scene.light_color != 0).any(dim=2)
-    assert there.sum(dim=1).tolist() == [len(own) for own in lights]
+    assert there.sum(dim=1).tolist() == count.tolist()
     assert not expected.scene.light_color[:, slots:].any()
     close = partial(torch.testing.assert_close, rtol=1e-6, atol=1e-6)
     close(found.condition, expected.condition)
@@ -135,9 +135,9 @@ def test_samples_are_seen_as_training_images_were(conditional, monkeypatch):
         conditional.prior.mean.zero_()
     ((_, code, views),) = seen
     spec = replace(SPEC, seed=6, views=(0.0,))
-    places = [sample_cameras(spec, i)[0].position for i in range(5)]
+    places = sample_cameras(spec, np.arange(5))[:, 0]
     np.testing.assert_allclose(views.condition[:, :3], places, rtol=1e-6)
-    colors = [np.sum([light.color for light in sample_lights(spec, i)], axis=0) for i in range(5)]
+    colors = sample_lights(spec, np.arange(5))[2].sum(axis=1)
     np.testing.assert_allclose(views.scene.light_color.sum(dim=1), colors, rtol=1e-5)
     assert 6 < float(code.mean()) < 8, "codes are the prior's"
     assert views.condition[:, 3:].argmax(dim=1).tolist() == [0, 1, 2, 0, 1], "each in turn"

@@ -1,0 +1,150 @@
+"""The convex bodies of shapes, many of different shapes at once: how far they reach, how they rest.
+
+Everything is the same on every machine, although matrix products may add in any order: a product
+of numbers rounded to 2**-26 and 2**-25 is a multiple of 2**-51, of which doubles add up to four
+units exactly.
+"""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.common.rotations import cos_sin
+from scenegen.objects.solids import UnitShape
+
+Array = NDArray[Any]
+POINT_STEP, DIRECTION_STEP = 2.0**-26, 2.0**-25
+MOST_CORNERS = 500  # of a body before its supports along many directions are those of a coarser one
+COARSE_CORNERS = 128
+_TRIED = 6000  # directions along which a coarse body is compared with its original
+MARGIN = 2.0**-24  # scene units; more than rounding can take away from what an object reaches
+
+
+def rounded(values: Array, step: float) -> Array:
+    """Return the nearest multiples of a power of two."""
+    return np.asarray(np.rint(values * (1 / step)) * step)
+
+
+class Bodies:
+    """What placement needs of a number of shapes, in groups of shapes with about as many points."""
+
+    def __init__(self, shapes: Sequence[UnitShape]) -> None:
+        """Collect the hulls and the resting directions of shapes, which are then known by place."""
+        # Hulls and sides come from libraries whose last bits differ between machines.
+        hulls = [rounded(_corners(one), POINT_STEP) for one in shapes]
+        coarse = [_coarse(one) if len(hull) > MOST_CORNERS else (hull, 0.0)
+                  for one, hull in zip(shapes, hulls, strict=True)]  # fmt: skip
+        self._hulls = _groups(hulls, 8)
+        self._coarse = _groups([hull for hull, _ in coarse], 8)
+        self._sides = _groups([rounded(one.resting_directions, POINT_STEP) for one in shapes], 32)
+        self._rounding = np.array([one.rounding for one in shapes])
+        self._growth = np.array([growth for _, growth in coarse])
+
+    def reach(self, kind: Array, rotation: Array, directions: Array, coarse: bool = False) -> Array:
+        """Return how far turned bodies reach along directions: (N, D), in bounding radii.
+
+        Args:
+            kind: which shape each is, (N,).
+            rotation: matrices, (N, 3, 3).
+            directions: about unit, multiples of DIRECTION_STEP, (D, 3).
+            coarse: whether bodies with very many corners may be larger than they are, by a few
+                thousandths.
+        """
+        found = np.empty((len(kind), len(directions)))
+        for rows, corners in _members(self._coarse if coarse else self._hulls, kind):
+            turned = _turned(rotation[rows, None], corners[..., :3])
+            reach = (turned.reshape(-1, 3) @ directions.T).reshape(*turned.shape[:2], -1)
+            radius = corners[..., 3:]
+            if radius.any():
+                flat = rounded(rotation[rows], POINT_STEP)
+                along, across = flat[:, :, 0] @ directions.T, flat[:, :, 2] @ directions.T
+                reach += radius * np.sqrt(along * along + across * across)[:, None]
+            found[rows] = reach.max(axis=1)
+        more = self._rounding + self._growth if coarse else self._rounding
+        return found + more[kind, None]
+
+    def resting_side(self, kind: Array, down: Array) -> Array:
+        """Return the resting direction next to `down`, (N, 3), object frame: (N, 3).
+
+        NaN for shapes that rest on any side.
+        """
+        found = np.full((len(kind), 3), np.nan)
+        for rows, sides in _members(self._sides, kind):
+            x, y, z = np.moveaxis(sides, -1, 0)
+            dx, dy, dz = down[rows, :, None].swapaxes(0, 1)
+            nearest = (x * dx + y * dy + z * dz).argmax(axis=1)
+            found[rows] = np.broadcast_to(sides, (len(rows), *sides.shape[1:]))[
+                np.arange(len(rows)), nearest
+            ]
+        return found
+
+
+@lru_cache(maxsize=4)
+def bodies_of(shapes: tuple[UnitShape, ...]) -> Bodies:
+    """Return `Bodies`, kept for the shapes of the last few calls."""
+    return Bodies(shapes)
+
+
+def _corners(shape: UnitShape) -> Array:
+    """Return the centres and radii of a hull's discs, (V, 4)."""
+    return np.column_stack([shape.hull_points, shape.hull_discs])
+
+
+@lru_cache(maxsize=256)
+def _coarse(shape: UnitShape) -> tuple[Array, float]:
+    """Return COARSE_CORNERS of a body's corners, and by how much they must grow to contain all.
+
+    One after another, that corner is taken which reaches farthest beyond those taken before.
+    """
+    height = 1 - (2 * np.arange(_TRIED) + 1) / _TRIED
+    cosine, sine = cos_sin(np.arange(_TRIED) * ((5**0.5 - 1) / 2))
+    radius = np.sqrt(1 - height * height)
+    directions = np.stack([radius * cosine, height, radius * sine])
+    corners = _corners(shape)
+    reach = corners[:, :3] @ directions + corners[:, 3:] * radius
+    farthest, best, chosen = reach.max(axis=0), np.full(_TRIED, -1.0), []
+    for _ in range(COARSE_CORNERS):
+        chosen.append(int(reach[:, (farthest - best).argmax()].argmax()))
+        best = np.maximum(best, reach[chosen[-1]])
+    # Twice, since the directions that were not tried may need a little more than those that were.
+    growth = 2 * float((farthest - best).max())
+    return rounded(corners[chosen], POINT_STEP), float(rounded(np.array(growth), POINT_STEP))
+
+
+_Group = tuple[Array, Array]  # each shape's place in `rows`, or -1; and the rows, (M, V, ...)
+
+
+def _groups(parts: Sequence[Array], least: int) -> list[_Group]:
+    """Stack arrays of about the same length, or of at most `least`; shorter ones repeat a row."""
+    sizes = np.array([max(least, 1 << max(0, len(part) - 1).bit_length()) for part in parts])
+    sizes[[not len(part) for part in parts]] = 0
+    groups = []
+    for size in sorted(set(sizes.tolist()) - {0}):
+        members = np.flatnonzero(sizes == size)
+        longest = max(len(parts[i]) for i in members)
+        places = np.full(len(parts), -1)
+        places[members] = np.arange(len(members))
+        filled = [np.concatenate([parts[i], *[parts[i][:1]] * (longest - len(parts[i]))])
+                  for i in members]  # fmt: skip
+        groups.append((places, np.stack(filled)))
+    return groups
+
+
+def _members(groups: list[_Group], kind: Array) -> Any:
+    """Yield, for each group, which of `kind` belong to it, and their rows, (n, V, ...)."""
+    for places, rows in groups:
+        place = places[kind]
+        found = np.flatnonzero(place >= 0)
+        if len(found):
+            yield found, rows if len(rows) == 1 else rows[place[found]]
+
+
+def _turned(rotation: Array, points: Array) -> Array:
+    """Return rotation (..., 3, 3) applied to points (..., 3), rounded to POINT_STEP."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    rows = [rotation[..., i, 0] * x + rotation[..., i, 1] * y + rotation[..., i, 2] * z
+            for i in range(3)]  # fmt: skip
+    return rounded(np.stack(rows, axis=-1), POINT_STEP)

@@ -1,0 +1,98 @@
+"""The queue of proposals: each item's attempts in order, whatever is drawn at once."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenegen.common.errors import PlacementError
+from scenegen.description.specs import DatasetSpec
+from scenegen.objects.catalogue import objects_of
+from scenegen.sampling import proposals
+from scenegen.sampling.proposals import ProposalQueue
+from scenegen.sampling.scenes import sample_scene
+
+SPEC = DatasetSpec(objects=(2, 4), seed=9)
+ITEMS = range(100, 140)
+
+
+def refused(item: int, turn: int) -> bool:
+    """Some items are refused once, a few three times."""
+    return turn < (3 if item % 10 == 0 else item % 3 == 0)
+
+
+def accepted(batch: int, end: int) -> dict[int, tuple[int, Any]]:
+    """Run a queue dry: each item's position among what was taken, and its scene."""
+    queue, turns = ProposalQueue(SPEC, ITEMS, objects_of(SPEC)), dict.fromkeys(ITEMS, 0)
+    found: dict[int, tuple[int, Any]] = {}
+    while (scenes := queue.take(batch, end)) is not None:
+        assert 0 < len(scenes) <= batch
+        for row, item in enumerate(scenes.index.tolist()):
+            assert item < end
+            if refused(item, turns[item]):
+                queue.refuse(item)
+            else:
+                queue.accept(item)
+                found[item] = (len(found), scenes.scene(row))
+            turns[item] += 1
+    return found
+
+
+@pytest.mark.parametrize(("ahead", "batch"), [(1, 1), (7, 5), (256, 64)])
+def test_an_item_gets_its_first_attempt_that_is_not_refused(
+    ahead: int, batch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(proposals, "AHEAD", ahead)
+    found = accepted(batch, 1000)
+    assert sorted(found) == [*ITEMS]
+    for item, (_, scene) in found.items():
+        attempts = (s for a in range(100) if (s := sample_scene(SPEC, item, a)) is not None)
+        for turn, expected in enumerate(attempts):
+            if not refused(item, turn):
+                assert scene == expected
+                break
+
+
+def test_no_item_is_taken_at_or_after_the_end() -> None:
+    assert sorted(accepted(8, 120)) == [*range(100, 120)]
+
+
+def test_an_impossible_item_is_named_and_the_first_one() -> None:
+    spec = DatasetSpec(objects=(40, 40))
+    queue = ProposalQueue(spec, range(3000), objects_of(spec))
+    with pytest.raises(PlacementError) as refused:
+        queue.take(64, 3000)
+    assert refused.value.where == "item 0"
+
+
+def test_an_item_that_is_always_refused_ends_the_run() -> None:
+    queue = ProposalQueue(SPEC, ITEMS, objects_of(SPEC))
+
+    def refuse_the_first() -> None:
+        for _ in range(200):
+            scenes = queue.take(4, 104)
+            for item in [] if scenes is None else scenes.index.tolist():
+                (queue.refuse if item == 100 else queue.accept)(item)
+
+    with pytest.raises(PlacementError, match=r"of which were rendered") as refused:
+        refuse_the_first()
+    assert refused.value.where == "item 100"
+
+
+def test_waiting_items_do_not_pile_up_proposals(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While one item is refused again and again, no more than two draws wait."""
+    drawn = []
+    sample = proposals.sample_scenes
+
+    def counted(spec: DatasetSpec, index: Any, *rest: Any) -> Any:
+        drawn.append(len(index))
+        return sample(spec, index, *rest)
+
+    monkeypatch.setattr(proposals, "sample_scenes", counted)
+    monkeypatch.setattr(proposals, "AHEAD", 16)
+    queue = ProposalQueue(SPEC, range(10**9), objects_of(SPEC))
+    for _ in range(20):
+        scenes = queue.take(4, 8)
+        for item in [] if scenes is None else scenes.index.tolist():
+            (queue.refuse if item == 0 else queue.accept)(item)
+    assert np.sum(drawn) < 2 * 16 + 8 + 100
