@@ -18,6 +18,23 @@ from scenegen.rendering.model_scene import model_scene
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.pixel_samples import SAMPLE_STEPS
 from scenegen.rendering.rays import Scenes, closest_hit, gather_row, normal_at, radiance_at
+from scenegen.rendering.exact_hits import Surfaces, surface_tables
+from scenegen.objects.exact_surfaces import *
+from scenegen.objects.basic_shapes import unit_shape
+from scipy.spatial import ConvexHull
+
+
+def exact(name):
+    s = 0.5**0.5
+    q = 1.64**-0.5
+    round_ones = {"sphere": Turned(1, 0, -1, -FAR, FAR), "cone": cone_of(-s, s, s), "torus": Torus(0.68, 0.32),
+        "cylinder": Turned((0.8 * q) ** 2, 0, 0, -q, q), "capsule": Capsule(0.5, 0.5)}
+    if name in round_ones: return round_ones[name]
+    if name == "teapot": return None
+    e = ConvexHull(unit_shape(name).triangles.reshape(-1, 3)).equations
+    return polyhedron_of(np.c_[e[:, :3], -e[:, 3]])
+
+
 from scenegen.rendering.unit_scene import unit_scene
 
 Array = NDArray[Any]
@@ -60,7 +77,7 @@ def upload_scenes(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
     # The inverse of a similarity s R is its transpose over s squared.
     linear = np.swapaxes(batch.world_from_object[..., :3, :3], -1, -2) / squared
     place = unit.offset[shape]
-    offset = -np.einsum("bkij,bkj->bki", linear, center) + (0.0 if unit.grid else place)
+    offset = -np.einsum("bkij,bkj->bki", linear, center)
     per_light = np.concatenate([batch.light_position, batch.light_color], axis=-1)
     lights = [batch.ambient, batch.attenuation, per_light.reshape(count, -1)]
     pixel = np.array([pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()])
@@ -81,8 +98,17 @@ def upload_scenes(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
         reflectance=_table(batch.reflectance),
         gloss=_table(batch.gloss) if spec.specular[1] > 0 else None,
         lights=_table(np.concatenate(lights, axis=1)),
+        surfaces=_surfaces(batch),
     )
     return scenes, _table(np.concatenate(camera, axis=1))
+
+
+def _surfaces(batch):
+    import os
+    skip = os.environ.get("MESHES", "").split(",")
+    kind, first, count, rows = surface_tables([exact(n) if n not in skip else None for n in batch.names])
+    shape = np.maximum(batch.shape, 0)
+    return Surfaces(frozenset(kind.tolist()), mi.UInt32(kind[shape].ravel()), mi.UInt32(first[shape].ravel()), mi.UInt32(count[shape].ravel()), _table(rows))
 
 
 def _table(rows: Array) -> Any:

@@ -14,7 +14,9 @@ import drjit as dr
 import mitsuba as mi
 
 from scenegen.rendering.shading import SHADOW_OFFSET
-from scenegen.rendering.unit_scene import SPHERE
+from scenegen.rendering.exact_hits import (
+    CAPSULE, CURVED, MESH, POLYHEDRON, TORUS, TURNED, away_from_zero, interval, row_of, torus,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +56,7 @@ class Scenes:
     reflectance: Any
     gloss: Any
     lights: Any
+    surfaces: Any
 
 
 def gather_row(table: Any, row: Any, width: int) -> list[Any]:
@@ -85,17 +88,52 @@ def closest_hit(scenes: Scenes, item: Any, o: Any, d: Any) -> Any:
         near = dr.maximum(near, 0)
         if dr.hint(meets & (near < t) & (near < far), exclude=[scenes]):
             start, along = _to_unit_scene(scenes, row, o + near * d, d)
-            length = dr.norm(along)  # Mitsuba's sphere misses hits of rays with long directions
-            ray = mi.Ray3f(mi.Ray3f(start, along / length), (far - near) * length)
-            hit = scenes.unit.ray_intersect_preliminary(ray, coherent=False)
-            hit_t = near + hit.t / length
-            nearer = hit.is_valid() & (hit_t <= t)
+            length = dr.norm(along)
+            u = along / length
+            reach = (far - near) * length
+            x, face, at = first_hit(scenes, row, start, u, reach)
+            hit_t = near + x / length
+            nearer = hit_t <= t
             t = dr.select(nearer, hit_t, t)
             object_id = dr.select(nearer, mi.Int32(k) + 1, object_id)
-            triangle = dr.select(nearer, hit.prim_index, triangle)
-            uv = dr.select(nearer, hit.prim_uv, uv)
+            triangle = dr.select(nearer, face, triangle)
+            uv = dr.select(nearer, at, uv)
         k += 1
     return t, object_id, triangle, uv
+
+
+@dr.syntax
+def first_hit(scenes: Scenes, row: Any, start: Any, u: Any, reach: Any) -> Any:
+    kind = dr.gather(mi.UInt32, scenes.surfaces.kind, row)
+    x = mi.Float(dr.inf)
+    face = mi.UInt32(CURVED)
+    uv = mi.Point2f(0)
+    if dr.hint(MESH in scenes.surfaces.kinds, mode="scalar"):
+        if dr.hint(kind == MESH, exclude=[scenes]):
+            place = mi.Point3f(*gather_row(scenes.place, row, 3))
+            ray = mi.Ray3f(mi.Ray3f(start + place, u), reach)
+            hit = scenes.unit.ray_intersect_preliminary(ray, coherent=False)
+            x = dr.select(hit.is_valid(), hit.t, dr.inf)
+            face = hit.prim_index
+            uv = hit.prim_uv
+    b = -dr.dot(start, u)
+    c = mi.Vector3f(start) + b * u
+    first = dr.gather(mi.UInt32, scenes.surfaces.first, row)
+    if dr.hint(TORUS in scenes.surfaces.kinds, mode="scalar"):
+        if dr.hint(kind == TORUS, exclude=[scenes]):
+            ring, tube = row_of(scenes.surfaces, first, 2)
+            inverse = 1 / away_from_zero(u.y)
+            p = dr.abs(1.05 * tube * inverse)
+            mid = -c.y * inverse
+            x = b + torus(ring, tube, c, u, dr.maximum(-b, mid - p), dr.minimum(reach - b, mid + p))
+    if dr.hint((kind != MESH) & (kind != TORUS), exclude=[scenes]):
+        count = dr.gather(mi.UInt32, scenes.surfaces.count, row)
+        near, far, near_face, far_face = interval(scenes.surfaces, kind, first, count, c, u)
+        outside = near > -b
+        x = b + dr.select(outside, near, far)
+        face = dr.select(outside, near_face, far_face)
+        x = dr.select((near < far) & (x > 0), x, dr.inf)
+    return x, face, uv
 
 
 @dr.syntax
@@ -112,8 +150,8 @@ def occluded(scenes: Scenes, item: Any, o: Any, d: Any, active: Any) -> Any:
         if dr.hint(meets & (near < far), exclude=[scenes]):
             start, along = _to_unit_scene(scenes, row, o + near * d, d)
             length = dr.norm(along)
-            ray = mi.Ray3f(mi.Ray3f(start, along / length), (far - near) * length)
-            blocked |= scenes.unit.ray_test(ray, coherent=False)
+            x, _, _ = first_hit(scenes, row, start, along / length, (far - near) * length)
+            blocked |= x <= (far - near) * length
         k += 1
     return blocked & active
 
@@ -129,19 +167,31 @@ def normal_at(
     n = mi.Vector3f(mi.Float(on_x), mi.Float(on_y), mi.Float(~on_x & ~on_y))
     if dr.hint(object_id > 0, exclude=[scenes]):
         row = item * scenes.slots + mi.UInt32(object_id - 1)
-        first = dr.gather(mi.UInt32, scenes.first_triangle, row)
-        is_sphere = first == SPHERE
-        table = gather_row(scenes.triangles, dr.select(is_sphere, 0, first + triangle), 12)
-        place = gather_row(scenes.place, row, 3)
-        at, _ = _to_unit_scene(scenes, row, p, d)
-        out = mi.Vector3f(at) - mi.Vector3f(*place)
-        face = dr.select(is_sphere, out, mi.Vector3f(*table[:3]))
-        smooth = (
-            (1 - uv.x - uv.y) * mi.Vector3f(*table[3:6])
-            + uv.x * mi.Vector3f(*table[6:9])
-            + uv.y * mi.Vector3f(*table[9:])
-        )
-        n = dr.normalize(_to_world(scenes, row, dr.select(is_sphere, out, smooth)))
+        face = mi.Vector3f(0, 1, 0)
+        smooth = mi.Vector3f(0, 1, 0)
+        kind = dr.gather(mi.UInt32, scenes.surfaces.kind, row)
+        if dr.hint(kind == MESH, exclude=[scenes]):
+            first = dr.gather(mi.UInt32, scenes.first_triangle, row)
+            table = gather_row(scenes.triangles, first + triangle, 12)
+            face = mi.Vector3f(*table[:3])
+            smooth = (
+                (1 - uv.x - uv.y) * mi.Vector3f(*table[3:6])
+                + uv.x * mi.Vector3f(*table[6:9])
+                + uv.y * mi.Vector3f(*table[9:])
+            )
+        if dr.hint(kind == POLYHEDRON, exclude=[scenes]):
+            face = mi.Vector3f(*row_of(scenes.surfaces, triangle, 3))
+            smooth = face
+        if dr.hint((kind > POLYHEDRON) & (triangle == CURVED), exclude=[scenes]):
+            at, _ = _to_unit_scene(scenes, row, p, d)
+            first = dr.gather(mi.UInt32, scenes.surfaces.first, row)
+            a0, b0, c0 = row_of(scenes.surfaces, first, 3)
+            y = dr.select(kind == TURNED, -0.5 * b0 - c0 * at.y, at.y)
+            y = dr.select(kind == CAPSULE, at.y - dr.clip(at.y, -a0, a0), y)
+            m = dr.select(kind == TORUS, 1 - a0 * dr.rsqrt(at.x * at.x + at.z * at.z), 1)
+            face = mi.Vector3f(at.x * m, y, at.z * m)
+            smooth = face
+        n = dr.normalize(_to_world(scenes, row, smooth))
         n = dr.select(dr.dot(_to_world(scenes, row, face), d) > 0, -n, n)
         # A smooth normal may lean away just inside a silhouette: make it perpendicular to the ray.
         away = dr.dot(n, d)
@@ -196,9 +246,6 @@ def _to_unit_scene(scenes: Scenes, row: Any, p: Any, d: Any) -> tuple[Any, Any]:
     table = gather_row(scenes.from_world, row, 12)
     linear = [mi.Vector3f(*table[i : i + 3]) for i in (0, 4, 8)]
     point = mi.Point3f(*(dr.dot(linear[i], p) + table[4 * i + 3] for i in range(3)))
-    if scenes.grid:
-        place = mi.Point3f(*gather_row(scenes.place, row, 3))
-        point = dr.round(point / scenes.grid) * scenes.grid + place
     return point, mi.Vector3f(*(dr.dot(linear[i], d) for i in range(3)))
 
 
