@@ -55,21 +55,21 @@ Surface = Polyhedron | Turned | Capsule | Torus
 
 
 def polyhedron_of(planes: Array) -> Polyhedron:
-    """Return the polyhedron with the planes n . p = d, (F, 4) rows of a unit normal n and d.
+    """Return the polyhedron n . p + d <= 0 for all planes, (F, 4) rows of a unit normal n and d.
 
     Planes may be given several times, as triangles of one face do; opposite ones make one slab.
     """
     slabs: list[list[float]] = []
-    for *normal, bound in planes.tolist():
+    for *normal, offset in planes.tolist():
         for slab in slabs:
             cosine = float(np.dot(slab[:3], normal))
             if cosine > 1 - 1e-9:
                 break
             if cosine < 1e-9 - 1:
-                slab[3] = -bound
+                slab[3] = offset
                 break
         else:
-            slabs.append([*normal, -FAR, bound])
+            slabs.append([*normal, -FAR, -offset])
     return Polyhedron(np.array(slabs))
 
 
