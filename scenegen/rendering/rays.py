@@ -100,7 +100,7 @@ def occluded(scenes: Scenes, item: Any, o: Any, d: Any, active: Any) -> Any:
     """Return whether an object blocks the segment o + t d, 0 < t < 1."""
     blocked = ~active
     k = mi.UInt32(0)
-    _, count = _about_scene(scenes, item)
+    count = _about_scene(scenes, item)[1]
     while dr.hint((k < count) & ~blocked, exclude=[scenes]):
         row = item * scenes.slots + k
         near, far, meets = _bounding_interval(scenes, row, o, d)
@@ -110,8 +110,7 @@ def occluded(scenes: Scenes, item: Any, o: Any, d: Any, active: Any) -> Any:
             start, along = _to_object(scenes, row, o + near * d, d)
             length = dr.norm(along)
             reach = (far - near) * length
-            distance, _, _ = _first_hit(scenes, row, start, along / length, reach)
-            blocked |= distance <= reach
+            blocked |= _first_hit(scenes, row, start, along / length, reach)[0] <= reach
         k += 1
     return blocked & active
 
