@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from scenegen.camera import pixel_size
 from scenegen.objects.exact_surfaces import Surface
 from scenegen.rendering.cubes import Cubes, closest_cube, upload_cubes
-from scenegen.rendering.exact_hits import upload_surfaces
 from scenegen.rendering.model_scene import model_scene
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.pixel_samples import SAMPLE_STEPS
@@ -27,6 +26,7 @@ from scenegen.rendering.rays import (
     normal_at,
     radiance_at,
 )
+from scenegen.rendering.surfaces.in_kernel import upload_surfaces
 from scenegen.rendering.tables import gather_row, upload_table
 from scenegen.rendering.unit_scene import unit_scene
 

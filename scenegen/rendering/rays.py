@@ -1,9 +1,9 @@
 """One ray, in Dr.Jit: its nearest hit, and the normal, shadows and radiance there.
 
 A ray visits the objects of its scene one after another. If it meets an object's bounding sphere, it
-is transformed into the object's frame and cast at the unit scene, from the point where it enters
-the sphere to the point where it leaves, so that it can hit no other unit shape. The room's three
-faces are planes and need no acceleration structure. Ray directions are not normalised: a camera ray
+is transformed into the object's frame and cast at the exact surface there, or at a mesh in the unit
+scene, from the point where it enters the sphere to the point where it leaves, so that it can hit no
+other unit shape. The room's three faces are planes and need no acceleration structure. Ray directions are not normalised: a camera ray
 has -z = 1 in the camera frame, so its parameter t is the planar depth of the hit.
 """
 
@@ -13,15 +13,14 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from scenegen.rendering.exact_hits import (
+from scenegen.rendering.shading import SHADOW_OFFSET
+from scenegen.rendering.surfaces.in_kernel import (
     MESH,
     Surfaces,
     first_on_surface,
     normal_on_surface,
 )
-from scenegen.rendering.shading import SHADOW_OFFSET
 from scenegen.rendering.tables import PACKET, gather_packet, gather_row
-
 
 OBJECT = 6  # packets of an object's row
 BEFORE_LIGHTS = 11  # floats of a scene's row
@@ -64,7 +63,7 @@ class Scenes:
 def closest_hit(scenes: Scenes, item: Any, o: Any, d: Any) -> Any:
     """Return t, object id (0: room, -1: nothing), face and barycentrics of the nearest hit.
 
-    The face is a triangle of a mesh, or what `exact_hits` calls a face.
+    The face is a triangle of a mesh, or what `surfaces.in_kernel` calls a face.
     """
     has_room, count = _about_scene(scenes, item)
     walls = [dr.select(d[i] < 0, -o[i] / d[i], dr.inf) for i in range(3)]
@@ -116,14 +115,12 @@ def occluded(scenes: Scenes, item: Any, o: Any, d: Any, active: Any) -> Any:
 
 
 @dr.syntax
-def _first_hit(
-    scenes: Scenes, row: Any, start: Any, u: Any, reach: Any
-) -> tuple[Any, Any, Any]:
+def _first_hit(scenes: Scenes, row: Any, start: Any, u: Any, reach: Any) -> tuple[Any, Any, Any]:
     """Return how far from `start` a ray meets an object, inf for never, its face, barycentrics."""
     record = gather_packet(scenes.objects, row * OBJECT + 4)
     distance, face = first_on_surface(scenes.surfaces, record, start, u, reach)
     uv = mi.Point2f(0)
-    if dr.hint(MESH in scenes.surfaces.kinds, mode="scalar"):
+    if dr.hint(MESH in scenes.surfaces.kinds, mode="scalar"):  # noqa: SIM102
         if dr.hint(record[0] == MESH, exclude=[scenes]):
             place = gather_packet(scenes.objects, row * OBJECT + 5)
             if dr.hint(scenes.grid > 0, mode="scalar"):
@@ -138,9 +135,7 @@ def _first_hit(
 
 
 @dr.syntax
-def normal_at(
-    scenes: Scenes, item: Any, p: Any, d: Any, object_id: Any, face: Any, uv: Any
-) -> Any:
+def normal_at(scenes: Scenes, item: Any, p: Any, d: Any, object_id: Any, face: Any, uv: Any) -> Any:
     """Return the unit world normal of a hit, facing the viewer; zero if nothing is hit."""
     least = dr.minimum(dr.abs(p.x), dr.minimum(dr.abs(p.y), dr.abs(p.z)))
     on_x = dr.abs(p.x) == least
@@ -152,7 +147,7 @@ def normal_at(
         at, _ = _to_object(scenes, row, p, d)
         smooth = normal_on_surface(scenes.surfaces, record, at, face)
         flat = mi.Vector3f(smooth)
-        if dr.hint(MESH in scenes.surfaces.kinds, mode="scalar"):
+        if dr.hint(MESH in scenes.surfaces.kinds, mode="scalar"):  # noqa: SIM102
             if dr.hint(record[0] == MESH, exclude=[scenes]):
                 first = mi.UInt32(gather_packet(scenes.objects, row * OBJECT + 5)[3])
                 table = gather_row(scenes.triangles, first + face, 12)

@@ -14,8 +14,8 @@ from scenegen.objects.solids import UnitShape
 from scenegen.rendering.backend import HOW_TO_GET_LLVM, select_variant
 from scenegen.rendering.ground_truth import GroundTruth
 from scenegen.rendering.numpy_renderer import render_in_numpy, smooth_normals
-from scenegen.rendering.numpy_surfaces import cast_at_surface
 from scenegen.rendering.packing import SceneBatch
+from scenegen.rendering.surfaces.in_numpy import cast_at_surface
 
 Array = NDArray[Any]
 MOST_FACES = 2_000_000  # of the models in one Mitsuba scene

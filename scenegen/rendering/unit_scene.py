@@ -1,5 +1,6 @@
 """The basic shapes of a data set in one Mitsuba scene, which is built once per process.
 
+Those with exact surfaces are left out: `surfaces.in_kernel` casts rays at them.
 `model_scene` does the same for models, of which there are too many for one scene.
 """
 
@@ -19,7 +20,7 @@ from scenegen.rendering.tables import upload_table
 Array = NDArray[Any]
 LATTICE = 4.0  # distance between the shapes' origins; their bounding radius is 1
 OVERLAP = 4e-6  # of neighbouring triangles; rays slip between them if it is below 2e-6
-SPHERE = 0xFFFFFFFF  # stands for the first triangle of the exact sphere
+SPHERE = 0xFFFFFFFF  # stands for the first triangle of a shape without triangles
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +32,8 @@ class UnitScene:
         offset: position of each shape's origin, (S, 3).
         first_triangle: each shape's first row in `normals`, or SPHERE, (S,) uint32.
         grid: spacing of the grid from whose points rays start; 0 if they may start anywhere.
-        normals: face normal and three corner normals of each triangle, (1 + F, 12) as a flat array
-            of the variant; row 0 belongs to no triangle.
+        normals: face normal and three corner normals of each triangle, (1 + F, 12) as a table of
+            `tables.upload_table`; row 0 belongs to no triangle.
     """
 
     scene: Any

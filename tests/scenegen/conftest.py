@@ -109,7 +109,7 @@ def embree_cast() -> Callable[[str, Array, Array], tuple[Array, Array]]:
 
     from scenegen.objects.basic_shapes import unit_shape
     from scenegen.rendering.numpy_renderer import smooth_normals
-    from scenegen.rendering.numpy_surfaces import cast_at_surface
+    from scenegen.rendering.surfaces.in_numpy import cast_at_surface
 
     @cache
     def intersector(name: str) -> Any:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.objects.exact_surfaces import Capsule, Polyhedron, Surface, Torus, Turned
-from scenegen.rendering.tables import PACKET, gather_packet, gather_row, upload_table
+from scenegen.rendering.tables import gather_row, upload_table
 
 WIDTH = 5  # floats of a row: a polyhedron has one for each slab, the others have one
 MESH, POLYHEDRON, TURNED, CAPSULE, TORUS = range(5)  # the kinds of surfaces
@@ -83,19 +83,19 @@ def first_on_surface(
     far_face = mi.UInt32(CURVED)
     kind = record[0]
     first = mi.UInt32(record[1])
-    if dr.hint(POLYHEDRON in surfaces.kinds, mode="scalar"):
+    if dr.hint(POLYHEDRON in surfaces.kinds, mode="scalar"):  # noqa: SIM102
         if dr.hint(kind == POLYHEDRON, exclude=[surfaces]):
             last = first + mi.UInt32(record[2])
             near, far, near_face, far_face = _polyhedron(surfaces, first, last, c, u)
-    if dr.hint(TURNED in surfaces.kinds, mode="scalar"):
+    if dr.hint(TURNED in surfaces.kinds, mode="scalar"):  # noqa: SIM102
         if dr.hint(kind == TURNED, exclude=[surfaces]):
             row = gather_row(surfaces.rows, first, WIDTH)
             near, far, near_face, far_face = _turned(row, c, u)
-    if dr.hint(CAPSULE in surfaces.kinds, mode="scalar"):
+    if dr.hint(CAPSULE in surfaces.kinds, mode="scalar"):  # noqa: SIM102
         if dr.hint(kind == CAPSULE, exclude=[surfaces]):
             half, radius = gather_row(surfaces.rows, first, WIDTH)[:2]
             near, far = _capsule(half, radius, c, u)
-    if dr.hint(TORUS in surfaces.kinds, mode="scalar"):
+    if dr.hint(TORUS in surfaces.kinds, mode="scalar"):  # noqa: SIM102
         if dr.hint(kind == TORUS, exclude=[surfaces]):
             ring, tube = gather_row(surfaces.rows, first, WIDTH)[:2]
             near = _torus(ring, tube, c, u, behind, behind + reach)

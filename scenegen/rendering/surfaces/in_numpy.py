@@ -1,6 +1,6 @@
 """Where rays meet exact surfaces (`objects.exact_surfaces`), in numpy and double precision.
 
-It shares no formula with `exact_hits`: convex bodies are unions of simpler ones, and the torus is
+It shares no formula with `in_kernel`: convex bodies are unions of simpler ones, and the torus is
 solved by eigenvalues.
 """
 
