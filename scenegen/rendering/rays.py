@@ -3,8 +3,9 @@
 A ray visits the objects of its scene one after another. If it meets an object's bounding sphere, it
 is transformed into the object's frame and cast at the exact surface there, or at a mesh in the unit
 scene, from the point where it enters the sphere to the point where it leaves, so that it can hit no
-other unit shape. The room's three faces are planes and need no acceleration structure. Ray directions are not normalised: a camera ray
-has -z = 1 in the camera frame, so its parameter t is the planar depth of the hit.
+other unit shape. The room's three faces are planes and need no acceleration structure. Ray
+directions are not normalised: a camera ray has -z = 1 in the camera frame, so its parameter t is
+the planar depth of the hit.
 """
 
 from dataclasses import dataclass
