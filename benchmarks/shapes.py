@@ -48,9 +48,9 @@ def main() -> None:
         spent = [[milliseconds(way) for way in ways] for _ in range(1 + repeats)][1:]
         ours, mesh = (statistics.median(times) for times in zip(*spent, strict=True))
         if unit_shape(name).surface is None:
-            print(f"| {name} | - | {mesh:.2f} | |")
+            print(f"| {name} | - | {mesh:.2f} | |", flush=True)
         else:
-            print(f"| {name} | {ours:.2f} | {mesh:.2f} | {mesh / ours:.2f} |")
+            print(f"| {name} | {ours:.2f} | {mesh:.2f} | {mesh / ours:.2f} |", flush=True)
 
 
 if __name__ == "__main__":
