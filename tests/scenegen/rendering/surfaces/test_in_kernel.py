@@ -25,7 +25,8 @@ def cast(names: tuple[str, ...], which: int, start: Array, u: Array) -> tuple[Ar
     record = [mi.Float(float(value)) for value in surfaces.record[which]]
     o, d = (mi.Vector3f(*(mi.Float(x) for x in v.astype(np.float32).T)) for v in (start, u))
     x, face = hits.first_on_surface(surfaces, record, o, d, mi.Float(2.001))
-    n = hits.normal_on_surface(surfaces, record, o + x * d, face)
+    points = o + mi.Float(np.nan_to_num(np.asarray(x), posinf=0.0)) * d
+    n = hits.normal_on_surface(surfaces, record, points, face)
     normals = np.asarray(n).T
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return np.asarray(x), normals / np.where(length > 0, length, 1.0)  # misses may have none
