@@ -174,7 +174,7 @@ def _oriented_keys(
 def _least_keys(cubes: Cubes, matrices: NDArray[np.int8]) -> NDArray[np.uint16]:
     """Return the first of the key lists of each shape under these matrices, (S, n)."""
     low, extent = _boxed(cubes)
-    best = np.empty(low.shape[1:], dtype=np.uint16)
+    best = np.empty((low.shape[1], low.shape[2]), dtype=np.uint16)
     axes, flipped = np.abs(matrices).argmax(axis=2), matrices.sum(axis=2) < 0
     for start in range(0, len(best), _CHUNK):
         some = slice(start, start + _CHUNK)

@@ -1,7 +1,7 @@
 """Many scenes as one struct of arrays; each can be had as a `SceneSpec` or as its JSON."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -70,7 +70,9 @@ class SceneArrays:
             name: tuple(value) if isinstance(value, list) else value
             for name, value in found.items()
         }
-        for name, kind in (("cameras", Camera), ("objects", PlacedObject), ("lights", Light)):
+        kinds: dict[str, Callable[..., Any]]
+        kinds = {"cameras": Camera, "objects": PlacedObject, "lights": Light}
+        for name, kind in kinds.items():
             parts[name] = tuple(
                 kind(**{k: tuple(v) if isinstance(v, list) else v for k, v in one.items()})
                 for one in found[name]
@@ -133,5 +135,6 @@ def joined(parts: Sequence[SceneArrays]) -> SceneArrays:
     """Return the scenes of all parts, which have the same slots and the same names."""
     if len(parts) == 1:
         return parts[0]
+    arrays: dict[str, Any]
     arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS}
     return replace(parts[0], **arrays)

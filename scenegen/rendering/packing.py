@@ -134,7 +134,7 @@ def pack_arrays(
     world_from_object[..., :3, :3] = scenes.scale[..., None, None] * turned
     world_from_object[..., :3, 3] = scenes.position
     world_from_object[..., 3, 3] = scenes.shape >= 0
-    has_room = ~np.isnan(scenes.room_reflectance).any(axis=1)
+    has_room = np.asarray(~np.isnan(scenes.room_reflectance).any(axis=1))
     room = np.where(has_room[:, None], scenes.room_reflectance, 0.0)
     matte = np.broadcast_to((0.0, 1.0), (count, 1, 2))
 

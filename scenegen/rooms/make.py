@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenegen.common.new_file import check_writable
 from scenegen.common.records import check
@@ -25,6 +26,7 @@ from scenegen.rendering.renderer import launch
 from scenegen.rooms.writer import RenderedScene, create_rooms
 from scenegen.sampling.proposals import ProposalQueue
 
+Array = NDArray[Any]
 DEFAULT_BATCH = 64
 MAX_BATCH = 4096
 MAX_RAYS = 2**28  # pixels of one batch; they take 8 GiB
@@ -141,8 +143,8 @@ def _shown(
     """Yield each scene with its pixels, or None where an object shows too few in some view."""
     spec = batch.spec
     visible = visible_pixels(truth.object_id, spec.object_slots)
-    missing = np.arange(spec.object_slots) >= batch.object_count[:, None]
-    enough = (missing | (visible >= spec.min_visible_pixels)).all(axis=1)
+    missing: Array = np.arange(spec.object_slots) >= batch.object_count[:, None]
+    enough = np.asarray((missing | (visible >= spec.min_visible_pixels)).all(axis=1))
     for row, first in enumerate(range(0, len(batch), len(spec.views))):
         images = slice(first, first + len(spec.views))
         pixels = {name: values[images] for name, values in vars(truth).items()}

@@ -64,7 +64,7 @@ class Bodies:
                 reach += radius * np.sqrt(along * along + across * across)[:, None]
             found[rows] = reach.max(axis=1)
         more = self._rounding + self._growth if coarse else self._rounding
-        return found + more[kind, None]
+        return np.asarray(found + more[kind, None])
 
     def resting_side(self, kind: Array, down: Array) -> Array:
         """Return the resting direction next to `down`, (N, 3), object frame: (N, 3).
@@ -123,7 +123,7 @@ def _groups(parts: Sequence[Array], least: int) -> list[_Group]:
     sizes[[not len(part) for part in parts]] = 0
     groups = []
     for size in sorted(set(sizes.tolist()) - {0}):
-        members = np.flatnonzero(sizes == size)
+        members = np.flatnonzero(sizes == size).tolist()
         longest = max(len(parts[i]) for i in members)
         places = np.full(len(parts), -1)
         places[members] = np.arange(len(members))

@@ -46,9 +46,8 @@ class Unplaced:
 def sample_counts(spec: DatasetSpec, index: Array) -> Array:
     """Draw the number of objects of each item, (N,) int32."""
     (number,) = item_numbers(spec.seed, index, Purpose.OBJECTS, count=1).T
-    return (spec.objects[0] + np.floor(number * (spec.objects[1] - spec.objects[0] + 1))).astype(
-        np.int32
-    )
+    least, most = spec.objects
+    return np.asarray(least + np.floor(number * (most - least + 1)), np.int32)
 
 
 def sample_objects(spec: DatasetSpec, index: Array, objects: Objects) -> Unplaced:

@@ -156,4 +156,5 @@ def are_apart(places: Array, reach: Array, others: Array) -> Array:
         others: supports of the others along SEPARATORS, world, (n, J, 80).
     """
     ahead = places @ SEPARATORS.T - reach[:, _OPPOSITE] - GAP
-    return np.asarray((ahead[:, None] > others).any(axis=2).all(axis=1))
+    apart: Array = np.asarray((ahead[:, None] > others).any(axis=2))
+    return np.asarray(apart.all(axis=1))

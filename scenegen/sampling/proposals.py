@@ -78,7 +78,8 @@ class ProposalQueue:
         new = self._items[self._begun : self._begun + max(room, 0)]
         self._begun += len(new)
         tries += [(item, 0) for item in new]
-        _, scenes = sample_scenes(self._spec, *zip(*tries, strict=True), self._objects)
+        items, attempts = zip(*tries, strict=True)
+        _, scenes = sample_scenes(self._spec, items, attempts, self._objects)
         for row, item in enumerate(scenes.index.tolist()):
             self._scenes[item].append((scenes, row))
         self._attempts.update(item for item, _ in tries)
