@@ -1,9 +1,10 @@
 """Measurements of speed and of results. The packages import nothing of this.
 
-`make bench` runs the first five, each of which prints one table:
+`make bench` runs the first seven, each of which prints one table:
 
     render      images of rooms a second, beside plain Mitsuba and the bare ray cast
-    models      the same for scenes of modelled objects, and the cost of `--shading path`
+    shapes      CPU time of each basic shape as an exact surface and as a mesh
+    models      images a second for scenes of modelled objects, and the cost of `--shading path`
     questions   images of questions a second, beside plain Mitsuba
     nearest     milliseconds of the scorer's nearest neighbours, beside other libraries
     surfels     milliseconds of the reference model's renderer, beside the plain way to write it

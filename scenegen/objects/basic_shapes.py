@@ -1,11 +1,12 @@
 """The basic shapes as unit shapes: box, sphere, cone, torus, cylinder, teapot and polyhedra.
 
-Curved shapes other than the sphere are fine triangle meshes with the exact normals of the smooth
-surface at their corners. The mesh is the ground truth. It lies within 4.5e-5 of the smooth surface,
-and the teapot's within 6.5e-4 of Newell's patches. The sphere is rendered as an exact quadric; its
-mesh is for export only.
+All but the teapot are rendered as exact surfaces (`exact_surfaces`). Their triangle meshes are for
+export and for `--shading path`; those of curved shapes lie within 4.5e-5 of the exact surface and
+have its normals at their corners. The teapot's mesh is its ground truth, within 6.5e-4 of Newell's
+patches.
 """
 
+import math
 from collections.abc import Callable
 from functools import cache
 
@@ -14,6 +15,7 @@ from scipy.spatial import ConvexHull
 
 from scenegen.common.errors import SpecError
 from scenegen.objects import teapot
+from scenegen.objects.exact_surfaces import FAR, Capsule, Torus, Turned, cone_of
 from scenegen.objects.solids import (
     Array,
     UnitShape,
@@ -41,21 +43,26 @@ def _box() -> UnitShape:
 
 def _sphere() -> UnitShape:
     half, anywhere = [arc((0, 0), 1, -90, 90, 256)], np.empty((0, 3))
-    return revolution("sphere", half, [(0, 0)], 1.0, anywhere, is_sphere=True)
+    return revolution("sphere", half, [(0, 0)], 1.0, anywhere, True, Turned(1, 0, -1, -FAR, FAR))
 
 
 def _cone() -> UnitShape:
-    return revolution("cone", [line((0, -1), (1, -1)), line((1, -1), (0, 1))], [(1, -1), (0, 1)])
+    pieces = [line((0, -1), (1, -1)), line((1, -1), (0, 1))]
+    size = 0.5**0.5
+    return revolution("cone", pieces, [(1, -1), (0, 1)], exact=cone_of(-size, size, size))
 
 
 def _cylinder() -> UnitShape:
     pieces = [line((0, -1), (0.8, -1)), line((0.8, -1), (0.8, 1)), line((0.8, 1), (0, 1))]
-    return revolution("cylinder", pieces, [(0.8, -1), (0.8, 1)])
+    half = 1 / math.hypot(0.8, 1)
+    exact = Turned((0.8 * half) ** 2, 0, 0, -half, half)
+    return revolution("cylinder", pieces, [(0.8, -1), (0.8, 1)], exact=exact)
 
 
 def _torus() -> UnitShape:
     flat = np.array([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]])
-    return revolution("torus", [arc((0.68, 0), 0.32, 0, 360, 256)], [(0.68, 0)], 0.32, flat)
+    tube = [arc((0.68, 0), 0.32, 0, 360, 256)]
+    return revolution("torus", tube, [(0.68, 0)], 0.32, flat, exact=Torus(0.68, 0.32))
 
 
 def _capsule() -> UnitShape:
@@ -63,7 +70,7 @@ def _capsule() -> UnitShape:
     lying = np.stack([np.cos(angle), np.zeros(256), np.sin(angle)], axis=1)
     ends = arc((0, -0.5), 0.5, -90, 0, 96), arc((0, 0.5), 0.5, 0, 90, 96)
     pieces = [ends[0], line((0.5, -0.5), (0.5, 0.5)), ends[1]]
-    return revolution("capsule", pieces, [(0, -0.5), (0, 0.5)], 0.5, lying)
+    return revolution("capsule", pieces, [(0, -0.5), (0, 0.5)], 0.5, lying, exact=Capsule(0.5, 0.5))
 
 
 def _pyramid() -> UnitShape:

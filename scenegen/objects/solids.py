@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from scenegen.objects.exact_surfaces import Surface, polyhedron_of
+
 Array = NDArray[Any]
 SEGMENTS = 512  # around an axis
 STRIPS = 16  # along a straight profile; with long slivers rays take three times as long
@@ -25,7 +27,8 @@ class UnitShape:
             the distance `rounding` in all directions.
         resting_directions: unit directions, (S, 3), of the shape's frame that may point down when
             it lies at rest; empty if all may.
-        is_sphere: whether it is rendered as the exact unit sphere instead of its triangles.
+        is_sphere: whether it is the unit sphere.
+        surface: what is rendered instead of the triangles; None if those are rendered.
     """
 
     name: str
@@ -36,6 +39,7 @@ class UnitShape:
     rounding: float
     resting_directions: Array
     is_sphere: bool = False
+    surface: Surface | None = None
 
     def support(self, directions: Array) -> Array:
         """Return how far the convex body reaches along unit directions, (M, 3) -> (M,)."""
@@ -53,7 +57,9 @@ def polyhedron(name: str, points: Array) -> UnitShape:
     triangles = points[hull.simplices]
     surface = face_outwards(triangles, np.repeat(hull.equations[:, None, :3], 3, axis=1))
     resting = resting_directions(points)
-    return UnitShape(name, *surface, points, np.zeros(len(points)), 0.0, resting)
+    exact = polyhedron_of(hull.equations)
+    discs = np.zeros(len(points))
+    return UnitShape(name, *surface, points, discs, 0.0, resting, surface=exact)
 
 
 def revolution(
@@ -63,6 +69,7 @@ def revolution(
     rounding: float = 0.0,
     resting: Array | None = None,
     is_sphere: bool = False,
+    exact: Surface | None = None,
 ) -> UnitShape:
     """Turn profile pieces about the y axis and scale the result to bounding radius 1.
 
@@ -71,6 +78,7 @@ def revolution(
         hull_rings: (radius, height) of the discs of the convex body.
         rounding: by which the convex body extends beyond the discs' hull.
         resting: resting directions; by default those of the discs' hull.
+        exact: the surface of the scaled shape.
     """
     angle = np.linspace(0, 2 * np.pi, SEGMENTS + 1)
 
@@ -93,7 +101,7 @@ def revolution(
         resting = resting_directions(np.unique(turn(rings, angle[:-1]).reshape(-1, 3), axis=0))
     discs, heights = (rings * scale).T
     hull = np.stack([0 * heights, heights, 0 * heights], axis=1)
-    return UnitShape(name, *surface, hull, discs, rounding * scale, resting, is_sphere)
+    return UnitShape(name, *surface, hull, discs, rounding * scale, resting, is_sphere, exact)
 
 
 def face_outwards(triangles: Array, normals: Array) -> tuple[Array, Array]:

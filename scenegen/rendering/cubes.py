@@ -13,14 +13,14 @@ import mitsuba as mi
 import numpy as np
 
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.rays import gather_row
+from scenegen.rendering.tables import gather_row, upload_table
 
 SMALLEST = 1e-20  # least component of a direction, to avoid a division by zero
 
 
 @dataclass(frozen=True, eq=False)
 class Cubes:
-    """The cubes of a batch on the device. Tables are flat arrays of floats, row after row.
+    """The cubes of a batch on the device. Tables are from `tables.upload_table`.
 
     Attributes:
         slots: K, the most cubes an image can have.
@@ -46,8 +46,8 @@ def upload_cubes(batch: SceneBatch) -> Cubes:
     return Cubes(
         slots=batch.spec.object_slots,
         count=mi.UInt32(batch.object_count),
-        frame=mi.Float(frame.astype(np.float32).ravel()),
-        center=mi.Float(center.astype(np.float32).ravel()),
+        frame=upload_table(frame.reshape(-1, 9)),
+        center=upload_table(center),
     )
 
 

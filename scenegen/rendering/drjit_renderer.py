@@ -13,11 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import pixel_size
+from scenegen.objects.exact_surfaces import Surface
 from scenegen.rendering.cubes import Cubes, closest_cube, upload_cubes
 from scenegen.rendering.model_scene import model_scene
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.pixel_samples import SAMPLE_STEPS
-from scenegen.rendering.rays import Scenes, closest_hit, gather_row, normal_at, radiance_at
+from scenegen.rendering.rays import (
+    BEFORE_LIGHTS,
+    OBJECT,
+    Scenes,
+    closest_hit,
+    normal_at,
+    radiance_at,
+)
+from scenegen.rendering.surfaces.in_kernel import upload_surfaces
+from scenegen.rendering.tables import gather_row, upload_table
 from scenegen.rendering.unit_scene import unit_scene
 
 Array = NDArray[Any]
@@ -34,14 +44,18 @@ def launch_pixels(
     scenes, cameras = upload_scenes(batch, variant)
     cubes = upload_cubes(batch) if batch.cubes_only else None
     everything = _trace(batch, scenes, cameras, cubes)
-    results = {name: everything[name] for name in fields}
-    dr.eval(*results.values())
+    components = {name: everything[name] for name in fields}
+    dr.eval(components)
     spec, count = batch.spec, len(batch)
 
     def pixels(name: str) -> Array:
-        channels = (3,) if name in ("image", "normal") else ()
-        rows = results[name].numpy().reshape(count, -1, *channels)[:, : spec.height * spec.width]
-        return np.ascontiguousarray(rows).reshape(count, spec.height, spec.width, *channels)
+        # Vectors are fetched by component: to interleave them on the device takes scattered writes.
+        planes = [one.numpy().reshape(count, -1) for one in components[name]]
+        found = np.empty((count, spec.height * spec.width, len(planes)), planes[0].dtype)
+        for i, plane in enumerate(planes):
+            found[..., i] = plane[:, : found.shape[1]]
+        channels = (len(planes),) if len(planes) > 1 else ()
+        return found.reshape(count, spec.height, spec.width, *channels)
 
     return lambda: {name: pixels(name) for name in fields}
 
@@ -49,20 +63,32 @@ def launch_pixels(
 def upload_scenes(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
     """Return the scenes on the device, and the cameras, (B, 13): world_from_camera, pixel size."""
     spec, count = batch.spec, len(batch)
+    shapes = [batch.shape_of(name) for name in batch.names]
+    surfaces: list[Surface | None] = [shape.surface for shape in shapes]
     if spec.source == "shapes":
-        unit = unit_scene(variant, batch.names)
+        unit = unit_scene(variant, tuple(shapes))
     else:
-        unit = model_scene(variant, batch.shape_of, batch.names)
+        unit, surfaces = model_scene(variant, batch.shape_of, batch.names), [None]
     mi.set_variant(variant)
+    exact = upload_surfaces(surfaces)
     shape = np.maximum(batch.shape, 0)
     center = batch.world_from_object[..., :3, 3]
     squared = np.where(batch.shape >= 0, batch.object_scale, 1.0)[..., None, None] ** 2
     # The inverse of a similarity s R is its transpose over s squared.
     linear = np.swapaxes(batch.world_from_object[..., :3, :3], -1, -2) / squared
-    place = unit.offset[shape]
-    offset = -np.einsum("bkij,bkj->bki", linear, center) + (0.0 if unit.grid else place)
-    per_light = np.concatenate([batch.light_position, batch.light_color], axis=-1)
-    lights = [batch.ambient, batch.attenuation, per_light.reshape(count, -1)]
+    objects = np.zeros((count, spec.object_slots, 4 * OBJECT))
+    objects[..., :3], objects[..., 3] = center, batch.object_scale
+    into = objects[..., 4:16].reshape(count, -1, 3, 4)  # a view
+    into[..., :3], into[..., 3] = linear, -np.einsum("bkij,bkj->bki", linear, center)
+    objects[..., 16:19] = exact.record[shape % len(exact.record)]
+    objects[..., 20:23], objects[..., 23] = unit.offset[shape], unit.first_triangle[shape]
+    about = np.zeros((count, BEFORE_LIGHTS + 6 * spec.light_slots))
+    about[:, :3], about[:, 3:5] = batch.ambient, batch.attenuation
+    about[:, 5], about[:, 6], about[:, 8:11] = batch.has_room, batch.object_count, batch.background
+    lights = np.concatenate([batch.light_position, batch.light_color], axis=-1)
+    about[:, BEFORE_LIGHTS:] = lights.reshape(count, -1)
+    glossy = spec.specular[1] > 0
+    materials = [batch.reflectance, batch.gloss] if glossy else [batch.reflectance]
     pixel = np.array([pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()])
     camera = [batch.world_from_camera[:, :3].reshape(count, 12), pixel[:, None]]
     scenes = Scenes(
@@ -70,23 +96,14 @@ def upload_scenes(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
         grid=unit.grid,
         slots=spec.object_slots,
         light_slots=spec.light_slots,
-        count=mi.UInt32(batch.object_count),
-        has_room=mi.Bool(batch.has_room),
-        background=_table(batch.background),
-        spheres=_table(np.concatenate([center, batch.object_scale[..., None]], axis=-1)),
-        from_world=_table(np.concatenate([linear, offset[..., None]], axis=-1)),
-        place=_table(place),
-        first_triangle=mi.UInt32(unit.first_triangle[shape].ravel()),
+        surfaces=exact,
         triangles=unit.normals,
-        reflectance=_table(batch.reflectance),
-        gloss=_table(batch.gloss) if spec.specular[1] > 0 else None,
-        lights=_table(np.concatenate(lights, axis=1)),
+        objects=upload_table(objects),
+        scenes=upload_table(about),
+        materials=upload_table(np.concatenate(materials, axis=-1)),
+        glossy=glossy,
     )
-    return scenes, _table(np.concatenate(camera, axis=1))
-
-
-def _table(rows: Array) -> Any:
-    return mi.Float(rows.astype(np.float32).ravel())
+    return scenes, upload_table(np.concatenate(camera, axis=1))
 
 
 def _cast(kind: Any, values: Any) -> Any:
@@ -94,8 +111,10 @@ def _cast(kind: Any, values: Any) -> Any:
     return kind(values)
 
 
-def _trace(batch: SceneBatch, scenes: Scenes, cameras: Any, cubes: Cubes | None) -> dict[str, Any]:
-    """Return the fields of `GroundTruth` for every ray, not yet evaluated."""
+def _trace(
+    batch: SceneBatch, scenes: Scenes, cameras: Any, cubes: Cubes | None
+) -> dict[str, list[Any]]:
+    """Return the components of the fields of `GroundTruth` for every ray, not yet evaluated."""
     spec = batch.spec
     height, width = spec.height, spec.width
     rays = -(-height * width // LANES) * LANES
@@ -115,9 +134,9 @@ def _trace(batch: SceneBatch, scenes: Scenes, cameras: Any, cubes: Cubes | None)
         if cubes:
             t, object_id, n = closest_cube(cubes, item, origin, d)
             return t, object_id, origin + dr.select(object_id >= 0, t, 0) * d, n
-        t, object_id, triangle, uv = closest_hit(scenes, item, origin, d)
+        t, object_id, face, uv = closest_hit(scenes, item, origin, d)
         p = origin + dr.select(object_id >= 0, t, 0) * d
-        return t, object_id, p, normal_at(scenes, item, p, d, object_id, triangle, uv)
+        return t, object_id, p, normal_at(scenes, item, p, d, object_id, face, uv)
 
     d = direction(mi.Float(column) + 0.5, mi.Float(row) + 0.5)
     t, object_id, p, n = hit(d)
@@ -144,8 +163,8 @@ def _trace(batch: SceneBatch, scenes: Scenes, cameras: Any, cubes: Cubes | None)
         image = _cast(dr.float16_array_t(mi.Vector3f), image)
     normal = mi.Vector3f(dr.dot(n, right), dr.dot(n, up), dr.dot(n, back))
     return {
-        "image": dr.ravel(image),
-        "depth": dr.select(object_id >= 0, t, dr.nan),
-        "normal": dr.ravel(normal),
-        "object_id": _cast(dr.int8_array_t(mi.Float), object_id),
+        "image": list(image),
+        "depth": [dr.select(object_id >= 0, t, dr.nan)],
+        "normal": list(normal),
+        "object_id": [_cast(dr.int8_array_t(mi.Float), object_id)],
     }

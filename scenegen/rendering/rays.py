@@ -1,10 +1,11 @@
 """One ray, in Dr.Jit: its nearest hit, and the normal, shadows and radiance there.
 
 A ray visits the objects of its scene one after another. If it meets an object's bounding sphere, it
-is transformed into the object's frame and cast at the unit scene, from the point where it enters
-the sphere to the point where it leaves, so that it can hit no other unit shape. The room's three
-faces are planes and need no acceleration structure. Ray directions are not normalised: a camera ray
-has -z = 1 in the camera frame, so its parameter t is the planar depth of the hit.
+is transformed into the object's frame and cast at the exact surface there, or at a mesh in the unit
+scene, from the point where it enters the sphere to the point where it leaves, so that it can hit no
+other unit shape. The room's three faces are planes and need no acceleration structure. Ray
+directions are not normalised: a camera ray has -z = 1 in the camera frame, so its parameter t is
+the planar depth of the hit.
 """
 
 from dataclasses import dataclass
@@ -14,88 +15,84 @@ import drjit as dr
 import mitsuba as mi
 
 from scenegen.rendering.shading import SHADOW_OFFSET
-from scenegen.rendering.unit_scene import SPHERE
+from scenegen.rendering.surfaces.in_kernel import (
+    MESH,
+    Surfaces,
+    first_on_surface,
+    normal_on_surface,
+)
+from scenegen.rendering.tables import PACKET, gather_packet, gather_row
+
+OBJECT = 6  # packets of an object's row
+BEFORE_LIGHTS = 11  # floats of a scene's row
 
 
 @dataclass(frozen=True, eq=False)
 class Scenes:
-    """The scenes of a batch on the device. Tables are flat arrays of floats, row after row.
+    """The scenes of a batch on the device. Tables are from `tables.upload_table`.
 
     Attributes:
-        unit: the Mitsuba scene of unit shapes.
-        grid: as in `UnitScene`; if it is not 0, `from_world` leaves out the shift by `place`.
+        unit: the Mitsuba scene of those unit shapes that are meshes.
+        grid: as in `UnitScene`.
         slots, light_slots: K and L, the most objects and lights a scene can have.
-        count: number of objects in each scene, (B,).
-        has_room: whether each scene has a room, (B,).
-        background: radiance of rays that hit nothing, (B, 3).
-        spheres: centre and radius of each object's bounding sphere, (B K, 4); the radius of an
-            unused slot is 0.
-        from_world: affine map into the unit scene, (B K, 12): three rows of (linear, offset).
-        place: position of the object's unit shape in the unit scene, (B K, 3).
-        first_triangle: first row of the object's shape in `triangles`, or SPHERE, (B K).
+        surfaces: the exact surfaces of the other shapes.
         triangles: face normal and three corner normals of each triangle, (F, 12).
-        reflectance: rho by object id, (B (1 + K), 3).
-        gloss: Phong's k_s and exponent by object id, (B (1 + K), 2); None if all is matte.
-        lights: ambient, k_l, k_q, then position and colour of each light, (B, 5 + 6 L).
+        objects: of each slot, (B K, 24): bounding sphere (centre, radius, which is 0 if the slot is
+            unused); three rows of the affine map into the unit shape's frame (linear, offset);
+            `Surfaces.record` and an unused float; position in the unit scene and first row in
+            `triangles`.
+        scenes: of each scene, (B, 11 + 6 L): ambient, k_l, k_q, whether it has a room, number of
+            objects, an unused float, radiance of rays that hit nothing; then position and colour
+            of each light.
+        materials: by object id, (B (1 + K), 3): rho; or with Phong's k_s and exponent, (.., 5).
+        glossy: whether they have these.
     """
 
     unit: Any
     grid: float
     slots: int
     light_slots: int
-    count: Any
-    has_room: Any
-    background: Any
-    spheres: Any
-    from_world: Any
-    place: Any
-    first_triangle: Any
+    surfaces: Surfaces
     triangles: Any
-    reflectance: Any
-    gloss: Any
-    lights: Any
-
-
-def gather_row(table: Any, row: Any, width: int) -> list[Any]:
-    """Return the `width` floats of each lane's row, gathered one by one.
-
-    Dr.Jit's packet gathers are no faster here. It chooses them by the address of the data, so the
-    kernel would be compiled again from time to time.
-    """
-    return [dr.gather(mi.Float, table, row * width + i) for i in range(width)]
+    objects: Any
+    scenes: Any
+    materials: Any
+    glossy: bool
 
 
 @dr.syntax
 def closest_hit(scenes: Scenes, item: Any, o: Any, d: Any) -> Any:
-    """Return t, object id (0: room, -1: nothing), triangle and barycentrics of the nearest hit."""
+    """Return t, object id (0: room, -1: nothing), face and barycentrics of the nearest hit.
+
+    The face is a triangle of a mesh, or what `surfaces.in_kernel` calls a face.
+    """
+    has_room, count = _about_scene(scenes, item)
     walls = [dr.select(d[i] < 0, -o[i] / d[i], dr.inf) for i in range(3)]
     t = dr.minimum(walls[0], dr.minimum(walls[1], walls[2]))
     p = o + t * d
-    has_room = dr.gather(mi.Bool, scenes.has_room, item)
     on_room = has_room & (t < dr.inf) & (p.x <= 1) & (p.y <= 1) & (p.z <= 1)
     t = dr.select(on_room, t, dr.inf)
     object_id = dr.select(on_room, mi.Int32(0), mi.Int32(-1))
-    triangle = mi.UInt32(0)
+    face = mi.UInt32(0)
     uv = mi.Point2f(0)
     k = mi.UInt32(0)
-    count = dr.gather(mi.UInt32, scenes.count, item)
     while dr.hint(k < count, exclude=[scenes]):
         row = item * scenes.slots + k
         near, far, meets = _bounding_interval(scenes, row, o, d)
         near = dr.maximum(near, 0)
         if dr.hint(meets & (near < t) & (near < far), exclude=[scenes]):
-            start, along = _to_unit_scene(scenes, row, o + near * d, d)
-            length = dr.norm(along)  # Mitsuba's sphere misses hits of rays with long directions
-            ray = mi.Ray3f(mi.Ray3f(start, along / length), (far - near) * length)
-            hit = scenes.unit.ray_intersect_preliminary(ray, coherent=False)
-            hit_t = near + hit.t / length
-            nearer = hit.is_valid() & (hit_t <= t)
+            start, along = _to_object(scenes, row, o + near * d, d)
+            length = dr.norm(along)
+            reach = (far - near) * length
+            distance, its_face, its_uv = _first_hit(scenes, row, start, along / length, reach)
+            hit_t = near + distance / length
+            nearer = (distance <= reach) & (hit_t <= t)
             t = dr.select(nearer, hit_t, t)
             object_id = dr.select(nearer, mi.Int32(k) + 1, object_id)
-            triangle = dr.select(nearer, hit.prim_index, triangle)
-            uv = dr.select(nearer, hit.prim_uv, uv)
+            face = dr.select(nearer, its_face, face)
+            uv = dr.select(nearer, its_uv, uv)
         k += 1
-    return t, object_id, triangle, uv
+    return t, object_id, face, uv
 
 
 @dr.syntax
@@ -103,25 +100,43 @@ def occluded(scenes: Scenes, item: Any, o: Any, d: Any, active: Any) -> Any:
     """Return whether an object blocks the segment o + t d, 0 < t < 1."""
     blocked = ~active
     k = mi.UInt32(0)
-    count = dr.gather(mi.UInt32, scenes.count, item)
+    count = _about_scene(scenes, item)[1]
     while dr.hint((k < count) & ~blocked, exclude=[scenes]):
         row = item * scenes.slots + k
         near, far, meets = _bounding_interval(scenes, row, o, d)
         near = dr.maximum(near, 0)
         far = dr.minimum(far, 1)
         if dr.hint(meets & (near < far), exclude=[scenes]):
-            start, along = _to_unit_scene(scenes, row, o + near * d, d)
+            start, along = _to_object(scenes, row, o + near * d, d)
             length = dr.norm(along)
-            ray = mi.Ray3f(mi.Ray3f(start, along / length), (far - near) * length)
-            blocked |= scenes.unit.ray_test(ray, coherent=False)
+            reach = (far - near) * length
+            blocked |= _first_hit(scenes, row, start, along / length, reach)[0] <= reach
         k += 1
     return blocked & active
 
 
 @dr.syntax
-def normal_at(
-    scenes: Scenes, item: Any, p: Any, d: Any, object_id: Any, triangle: Any, uv: Any
-) -> Any:
+def _first_hit(scenes: Scenes, row: Any, start: Any, u: Any, reach: Any) -> tuple[Any, Any, Any]:
+    """Return how far from `start` a ray meets an object, inf for never, its face, barycentrics."""
+    record = gather_packet(scenes.objects, row * OBJECT + 4)
+    distance, face = first_on_surface(scenes.surfaces, record, start, u, reach)
+    uv = mi.Point2f(0)
+    if dr.hint(MESH in scenes.surfaces.kinds, mode="scalar"):  # noqa: SIM102
+        if dr.hint(record[0] == MESH, exclude=[scenes]):
+            place = gather_packet(scenes.objects, row * OBJECT + 5)
+            if dr.hint(scenes.grid > 0, mode="scalar"):
+                start = dr.round(start / scenes.grid) * scenes.grid
+            origin = mi.Point3f(start.x + place.x, start.y + place.y, start.z + place.z)
+            ray = mi.Ray3f(mi.Ray3f(origin, u), reach)
+            hit = scenes.unit.ray_intersect_preliminary(ray, coherent=False)
+            distance = dr.select(hit.is_valid(), hit.t, dr.inf)
+            face = hit.prim_index
+            uv = hit.prim_uv
+    return distance, face, uv
+
+
+@dr.syntax
+def normal_at(scenes: Scenes, item: Any, p: Any, d: Any, object_id: Any, face: Any, uv: Any) -> Any:
     """Return the unit world normal of a hit, facing the viewer; zero if nothing is hit."""
     least = dr.minimum(dr.abs(p.x), dr.minimum(dr.abs(p.y), dr.abs(p.z)))
     on_x = dr.abs(p.x) == least
@@ -129,20 +144,22 @@ def normal_at(
     n = mi.Vector3f(mi.Float(on_x), mi.Float(on_y), mi.Float(~on_x & ~on_y))
     if dr.hint(object_id > 0, exclude=[scenes]):
         row = item * scenes.slots + mi.UInt32(object_id - 1)
-        first = dr.gather(mi.UInt32, scenes.first_triangle, row)
-        is_sphere = first == SPHERE
-        table = gather_row(scenes.triangles, dr.select(is_sphere, 0, first + triangle), 12)
-        place = gather_row(scenes.place, row, 3)
-        at, _ = _to_unit_scene(scenes, row, p, d)
-        out = mi.Vector3f(at) - mi.Vector3f(*place)
-        face = dr.select(is_sphere, out, mi.Vector3f(*table[:3]))
-        smooth = (
-            (1 - uv.x - uv.y) * mi.Vector3f(*table[3:6])
-            + uv.x * mi.Vector3f(*table[6:9])
-            + uv.y * mi.Vector3f(*table[9:])
-        )
-        n = dr.normalize(_to_world(scenes, row, dr.select(is_sphere, out, smooth)))
-        n = dr.select(dr.dot(_to_world(scenes, row, face), d) > 0, -n, n)
+        record = gather_packet(scenes.objects, row * OBJECT + 4)
+        at, _ = _to_object(scenes, row, p, d)
+        smooth = normal_on_surface(scenes.surfaces, record, at, face)
+        flat = mi.Vector3f(smooth)
+        if dr.hint(MESH in scenes.surfaces.kinds, mode="scalar"):  # noqa: SIM102
+            if dr.hint(record[0] == MESH, exclude=[scenes]):
+                first = mi.UInt32(gather_packet(scenes.objects, row * OBJECT + 5)[3])
+                table = gather_row(scenes.triangles, first + face, 12)
+                flat = mi.Vector3f(*table[:3])
+                smooth = (
+                    (1 - uv.x - uv.y) * mi.Vector3f(*table[3:6])
+                    + uv.x * mi.Vector3f(*table[6:9])
+                    + uv.y * mi.Vector3f(*table[9:])
+                )
+        n = dr.normalize(_to_world(scenes, row, smooth))
+        n = dr.select(dr.dot(_to_world(scenes, row, flat), d) > 0, -n, n)
         # A smooth normal may lean away just inside a silhouette: make it perpendicular to the ray.
         away = dr.dot(n, d)
         n = dr.select(away > 0, dr.normalize(n - away / dr.dot(d, d) * d), n)
@@ -153,14 +170,15 @@ def radiance_at(
     scenes: Scenes, item: Any, p: Any, d: Any, n: Any, object_id: Any, shadows: bool
 ) -> Any:
     """Return the radiance of a hit by the shading equation (`shading.shade`), or the background."""
-    record = gather_row(scenes.lights, item, 5 + 6 * scenes.light_slots)
+    record = gather_row(scenes.scenes, item, BEFORE_LIGHTS + 6 * scenes.light_slots)
     row = item * (1 + scenes.slots) + mi.UInt32(dr.maximum(object_id, 0))
     total, shine = mi.Vector3f(*record[:3]), mi.Vector3f(0)
-    if scenes.gloss is not None:
-        specular, shininess = gather_row(scenes.gloss, row, 2)
+    material = gather_row(scenes.materials, row, 5 if scenes.glossy else 3)
+    if scenes.glossy:
+        specular, shininess = material[3:]
         mirrored = dr.normalize(d - 2 * dr.dot(d, n) * n)  # the viewing ray, mirrored
     for j in range(scenes.light_slots):
-        light = record[5 + 6 * j : 11 + 6 * j]
+        light = record[BEFORE_LIGHTS + 6 * j :][:6]
         to_light = mi.Vector3f(*light[:3]) - p
         distance = dr.norm(to_light)
         cosine = dr.maximum(dr.dot(n, to_light) / distance, 0)
@@ -170,18 +188,24 @@ def radiance_at(
             start = p + SHADOW_OFFSET * n
             amount = dr.select(occluded(scenes, item, start, to_light, cosine > 0), 0, amount)
         total += amount * mi.Vector3f(*light[3:])
-        if scenes.gloss is not None:
+        if scenes.glossy:
             toward = dr.maximum(dr.dot(mirrored, to_light) / distance, 0)
             lobe = dr.select(amount > 0, specular * dr.power(toward, shininess) / falloff, 0)
             shine += lobe * mi.Vector3f(*light[3:])
-    rho = mi.Vector3f(*gather_row(scenes.reflectance, row, 3))
-    background = mi.Vector3f(*gather_row(scenes.background, item, 3))
+    rho, background = mi.Vector3f(*material[:3]), mi.Vector3f(*record[8:BEFORE_LIGHTS])
     return dr.select(object_id >= 0, rho * total + shine, background)
+
+
+def _about_scene(scenes: Scenes, item: Any) -> tuple[Any, Any]:
+    """Return whether a scene has a room, and its number of objects."""
+    packets = -(-(BEFORE_LIGHTS + 6 * scenes.light_slots) // PACKET)
+    packet = gather_packet(scenes.scenes, item * packets + 1)
+    return packet[1] > 0, mi.UInt32(packet[2])
 
 
 def _bounding_interval(scenes: Scenes, row: Any, o: Any, d: Any) -> tuple[Any, Any, Any]:
     """Return the ray parameters where it enters and leaves the bounding sphere, and if it does."""
-    x, y, z, radius = gather_row(scenes.spheres, row, 4)
+    x, y, z, radius = gather_packet(scenes.objects, row * OBJECT)
     to_center = mi.Vector3f(x, y, z) - o
     squared = dr.dot(d, d)
     middle = dr.dot(to_center, d) / squared
@@ -192,20 +216,19 @@ def _bounding_interval(scenes: Scenes, row: Any, o: Any, d: Any) -> tuple[Any, A
     return middle - half, middle + half, inside > 0
 
 
-def _to_unit_scene(scenes: Scenes, row: Any, p: Any, d: Any) -> tuple[Any, Any]:
-    table = gather_row(scenes.from_world, row, 12)
-    linear = [mi.Vector3f(*table[i : i + 3]) for i in (0, 4, 8)]
-    point = mi.Point3f(*(dr.dot(linear[i], p) + table[4 * i + 3] for i in range(3)))
-    if scenes.grid:
-        place = mi.Point3f(*gather_row(scenes.place, row, 3))
-        point = dr.round(point / scenes.grid) * scenes.grid + place
+def _to_object(scenes: Scenes, row: Any, p: Any, d: Any) -> tuple[Any, Any]:
+    """Return a point and a direction in the frame of an object's unit shape."""
+    table = [gather_packet(scenes.objects, row * OBJECT + 1 + i) for i in range(3)]
+    linear = [mi.Vector3f(one.x, one.y, one.z) for one in table]
+    point = mi.Point3f(*(dr.dot(linear[i], p) + table[i].w for i in range(3)))
     return point, mi.Vector3f(*(dr.dot(linear[i], d) for i in range(3)))
 
 
 def _to_world(scenes: Scenes, row: Any, n: Any) -> Any:
     """Return a normal in the world frame, not normalised.
 
-    `from_world` is a similarity, so its transpose turns a normal back.
+    The map into the unit shape's frame is a similarity, so its transpose turns a normal back.
     """
-    table = gather_row(scenes.from_world, row, 12)
-    return sum((n[i] * mi.Vector3f(*table[4 * i : 4 * i + 3]) for i in range(3)), mi.Vector3f(0))
+    table = [gather_packet(scenes.objects, row * OBJECT + 1 + i) for i in range(3)]
+    rows = (mi.Vector3f(one.x, one.y, one.z) * n[i] for i, one in enumerate(table))
+    return sum(rows, mi.Vector3f(0))

@@ -13,8 +13,9 @@ from scenegen.objects.catalogue import face_count
 from scenegen.objects.solids import UnitShape
 from scenegen.rendering.backend import HOW_TO_GET_LLVM, select_variant
 from scenegen.rendering.ground_truth import GroundTruth
-from scenegen.rendering.numpy_renderer import face_viewer, render_in_numpy, smooth_normals
+from scenegen.rendering.numpy_renderer import render_in_numpy, smooth_normals
 from scenegen.rendering.packing import SceneBatch
+from scenegen.rendering.surfaces.in_numpy import cast_at_surface
 
 Array = NDArray[Any]
 MOST_FACES = 2_000_000  # of the models in one Mitsuba scene
@@ -116,7 +117,11 @@ def _scalar_scene(shape: UnitShape) -> Any:
 
 
 def _scalar_cast(shape: UnitShape, origins: Array, directions: Array) -> tuple[Array, Array]:
-    """Cast rays one by one with Mitsuba's scalar variant, as a `numpy_renderer.Cast`."""
+    """Cast rays as a `numpy_renderer.Cast`: at meshes one by one, with Mitsuba's scalar variant."""
+    if shape.surface is not None:
+        t, normals = cast_at_surface(shape.surface, origins, directions)
+        behind = np.einsum("ri,ri->r", normals, directions) > 0  # seen from inside
+        return t, np.where(behind[:, None], -normals, normals)
     import mitsuba as mi
 
     mi.set_variant("scalar_rgb")
@@ -130,7 +135,4 @@ def _scalar_cast(shape: UnitShape, origins: Array, directions: Array) -> tuple[A
         if hit.is_valid():
             t[i], triangle[i] = hit.t, hit.prim_index
             u[i], v[i] = hit.prim_uv
-    if not shape.is_sphere:
-        return t, smooth_normals(shape, triangle, u, v, directions)
-    points = origins + np.where(np.isfinite(t), t, 0.0)[:, None] * directions
-    return t, face_viewer(points / np.linalg.norm(points, axis=1, keepdims=True), directions)
+    return t, smooth_normals(shape, triangle, u, v, directions)

@@ -1,5 +1,6 @@
 """The basic shapes of a data set in one Mitsuba scene, which is built once per process.
 
+Those with exact surfaces are left out: `surfaces.in_kernel` casts rays at them.
 `model_scene` does the same for models, of which there are too many for one scene.
 """
 
@@ -13,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.rotations import cross
-from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.solids import UnitShape
+from scenegen.rendering.tables import upload_table
 
 Array = NDArray[Any]
 LATTICE = 4.0  # distance between the shapes' origins; their bounding radius is 1
 OVERLAP = 4e-6  # of neighbouring triangles; rays slip between them if it is below 2e-6
-SPHERE = 0xFFFFFFFF  # stands for the first triangle of the exact sphere
+SPHERE = 0xFFFFFFFF  # stands for the first triangle of a shape without triangles
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +32,8 @@ class UnitScene:
         offset: position of each shape's origin, (S, 3).
         first_triangle: each shape's first row in `normals`, or SPHERE, (S,) uint32.
         grid: spacing of the grid from whose points rays start; 0 if they may start anywhere.
-        normals: face normal and three corner normals of each triangle, (1 + F, 12) as a flat array
-            of the variant; row 0 belongs to no triangle.
+        normals: face normal and three corner normals of each triangle, (1 + F, 12) as a table of
+            `tables.upload_table`; row 0 belongs to no triangle.
     """
 
     scene: Any
@@ -43,18 +44,18 @@ class UnitScene:
 
 
 @lru_cache(maxsize=4)
-def unit_scene(variant: str, shapes: tuple[str, ...]) -> UnitScene:
-    """Build the scene of these shapes for a Mitsuba variant."""
+def unit_scene(variant: str, shapes: tuple[UnitShape, ...]) -> UnitScene:
+    """Build the scene of those of the shapes that have no exact surface."""
     mi.set_variant(variant)
     side = int(np.ceil(len(shapes) ** (1 / 3)))
     cell = np.stack(np.unravel_index(np.arange(len(shapes)), (side, side, side)), axis=1)
     offset = (cell - (side - 1) / 2) * LATTICE
     contents: dict[str, Any] = {"type": "scene"}
     tables = []
-    for name, place in zip(shapes, offset, strict=True):
-        shape = unit_shape(name)
-        contents[name] = mitsuba_shape(shape, place)
-        tables.append(normal_table(shape))
+    for shape, place in zip(shapes, offset, strict=True):
+        if shape.surface is None:
+            contents[shape.name] = mitsuba_shape(shape, place)
+        tables.append(normal_table(shape)[: None if shape.surface is None else 0])
     first_triangle, normals = stacked(tables)
     return UnitScene(mi.load_dict(contents), offset, first_triangle, 0.0, normals)
 
@@ -78,7 +79,7 @@ def stacked(tables: Sequence[Array]) -> tuple[Array, Any]:
     """Join tables of normals; return the first row of each, or SPHERE, and the whole, flat."""
     sizes = np.array([len(table) for table in tables])
     first = np.where(sizes > 0, 1 + np.cumsum(sizes) - sizes, SPHERE).astype(np.uint32)
-    return first, mi.Float(np.concatenate([np.zeros((1, 12), np.float32), *tables]).ravel())
+    return first, upload_table(np.concatenate([np.zeros((1, 12), np.float32), *tables]))
 
 
 def mitsuba_shape(shape: UnitShape, place: Array) -> Any:

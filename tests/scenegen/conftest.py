@@ -102,13 +102,14 @@ def model_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def embree_cast() -> Callable[[str, Array, Array], tuple[Array, Array]]:
-    """A `numpy_renderer.Cast` by trimesh and Embree; the sphere in closed form."""
+    """A `numpy_renderer.Cast` by trimesh and Embree; exact surfaces in closed form, in float64."""
     from trimesh import Trimesh
     from trimesh.ray.ray_pyembree import RayMeshIntersector
     from trimesh.triangles import points_to_barycentric
 
     from scenegen.objects.basic_shapes import unit_shape
-    from scenegen.rendering.numpy_renderer import face_viewer, smooth_normals
+    from scenegen.rendering.numpy_renderer import smooth_normals
+    from scenegen.rendering.surfaces.in_numpy import cast_at_surface
 
     @cache
     def intersector(name: str) -> Any:
@@ -116,20 +117,11 @@ def embree_cast() -> Callable[[str, Array, Array], tuple[Array, Array]]:
         faces = np.arange(len(corners)).reshape(-1, 3)
         return RayMeshIntersector(Trimesh(corners, faces, process=False))
 
-    def sphere(origins: Array, directions: Array) -> tuple[Array, Array]:
-        a = np.einsum("ri,ri->r", directions, directions)
-        b = np.einsum("ri,ri->r", directions, origins)
-        root = b * b - a * (np.einsum("ri,ri->r", origins, origins) - 1)
-        near, far = ((-b + sign * np.sqrt(np.maximum(root, 0))) / a for sign in (-1, 1))
-        t = np.where(near > 0, near, far)
-        t = np.where((root > 0) & (t > 0), t, np.inf)
-        points = origins + np.where(np.isfinite(t), t, 1.0)[:, None] * directions
-        normals = points / np.linalg.norm(points, axis=1, keepdims=True)
-        return t, face_viewer(normals, directions)
-
     def cast(name: str, origins: Array, directions: Array) -> tuple[Array, Array]:
-        if name == "sphere":
-            return sphere(origins, directions)
+        surface = unit_shape(name).surface
+        if surface is not None:
+            t, normals = cast_at_surface(surface, origins, directions)
+            return t, -normals * np.sign(np.einsum("ri,ri->r", normals, directions))[:, None]
         t = np.full(len(origins), np.inf)
         triangle, weights = np.zeros(len(origins), np.int64), np.zeros((len(origins), 3))
         if len(origins):

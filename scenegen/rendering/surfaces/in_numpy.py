@@ -1,0 +1,115 @@
+"""Where rays meet exact surfaces (`objects.exact_surfaces`), in numpy and double precision.
+
+It shares no formula with `in_kernel`: convex bodies are unions of simpler ones, and the torus is
+solved by eigenvalues.
+"""
+
+from functools import reduce
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.objects.exact_surfaces import FAR, Capsule, Polyhedron, Surface, Torus, Turned
+
+Array = NDArray[Any]
+Interval = tuple[Array, Array]  # where rays enter and leave; empty where the first is larger
+
+
+def cast_at_surface(surface: Surface, origins: Array, directions: Array) -> tuple[Array, Array]:
+    """Return ray parameters (R,), inf for a miss, and outward unit normals (R, 3) of first hits."""
+    squared = np.einsum("ri,ri->r", directions, directions)
+    middle = -np.einsum("ri,ri->r", origins, directions) / squared
+    c = origins + middle[:, None] * directions  # the nearest points to the shape's centre
+    roots = np.stack(_roots(surface, c, directions), axis=1)
+    roots = np.where(roots > -middle[:, None], roots, np.inf)  # behind the origin
+    first = roots.min(axis=1, initial=np.inf)
+    points = c + np.where(np.isfinite(first), first, 0.0)[:, None] * directions
+    return middle + first, _normals(surface, points)
+
+
+def _roots(surface: Surface, c: Array, d: Array) -> list[Array]:
+    """Return all x at which c + x d is on the surface; inf for those that are none."""
+    if isinstance(surface, Torus):
+        return _torus(surface, c, d)
+    if isinstance(surface, Capsule):
+        half, radius = surface.half, surface.radius
+        ball = Turned(radius**2 - half**2, 2 * half, -1.0, -FAR, FAR)  # about y = half
+        other = Turned(ball.a, -ball.b, -1.0, -FAR, FAR)
+        parts = [ball, other, Turned(radius**2, 0.0, 0.0, -half, half)]
+        found = [_turned(part, c, d) for part in parts]
+        found = [(np.where(e < x, e, np.inf), np.where(e < x, x, -np.inf)) for e, x in found]
+        enter = np.minimum.reduce([e for e, _ in found])
+        leave = np.maximum.reduce([x for _, x in found])
+    elif isinstance(surface, Turned):
+        enter, leave = _turned(surface, c, d)
+    else:
+        enter, leave = reduce(_both, [_slab(slab, c, d) for slab in surface.slabs])
+    return [np.where(enter <= leave, x, np.inf) for x in (enter, leave)]
+
+
+def _both(one: Interval, other: Interval) -> Interval:
+    return np.maximum(one[0], other[0]), np.minimum(one[1], other[1])
+
+
+def _slab(slab: Array, c: Array, d: Array) -> Interval:
+    slope = d @ slab[:3]
+    slope = np.where(slope == 0, 1e-300, slope)
+    ends = (slab[3:, None] - c @ slab[:3]) / slope
+    return ends.min(axis=0), ends.max(axis=0)
+
+
+def _turned(surface: Turned, c: Array, d: Array) -> Interval:
+    """Cut the ray with the quadric in the half of it that is between `low` and `high`."""
+    slab = _slab(np.array([0.0, 1.0, 0.0, surface.low, surface.high]), c, d)
+    square = np.array([1.0, -surface.c, 1.0])
+    pairs = (d, d), (c, d), (c, c)
+    q2, q1, q0 = (np.einsum("ri,i,ri->r", one, square, other) for one, other in pairs)
+    q1, q0 = q1 - surface.b / 2 * d[:, 1], q0 - surface.a - surface.b * c[:, 1]
+    q2 = np.where(abs(q2) < 1e-14, 1e-14, q2)
+    root = np.sqrt(np.maximum(q1 * q1 - q2 * q0, 0.0))
+    low, high = np.sort([(-q1 - root) / q2, (-q1 + root) / q2], axis=0)
+    between = np.where(q1 * q1 > q2 * q0, low, np.inf), high
+    down = d[:, 1] < 0
+    outside = np.where(down, high, -np.inf), np.where(down, np.inf, low)
+    enter, leave = (np.where(q2 > 0, b, o) for b, o in zip(between, outside, strict=True))
+    return _both((enter, leave), slab)
+
+
+def _torus(surface: Torus, c: Array, d: Array) -> list[Array]:
+    ring, tube = surface.ring, surface.tube
+    flat = np.array([1.0, 0.0, 1.0])
+    pairs = (d, d), (2 * c, d), (c, c)
+    p2, p1, p0 = (np.einsum("ri,ri->r", *pair) for pair in pairs)
+    r2, r1, r0 = (np.einsum("ri,i,ri->r", one, flat, other) for one, other in pairs)
+    m, f = p0 + ring**2 - tube**2, 4 * ring**2
+    lower = np.stack(
+        [2 * p2 * p1, p1**2 + 2 * p2 * m - f * r2, 2 * p1 * m - f * r1, m**2 - f * r0], axis=1
+    )
+    companion = np.zeros((len(c), 4, 4))
+    companion[:, [1, 2, 3], [0, 1, 2]] = 1.0
+    companion[:, 0] = -lower / (p2**2)[:, None]
+    roots = np.linalg.eigvals(companion)
+    return list(np.where(abs(roots.imag) < 1e-9, roots.real, np.inf).T)
+
+
+def _normals(surface: Surface, p: Array) -> Array:
+    """Return outward unit normals at points of the surface."""
+    x, y, z = p.T
+    if isinstance(surface, Polyhedron):
+        normal, low, high = surface.slabs[:, :3], surface.slabs[:, 3], surface.slabs[:, 4]
+        at = p @ normal.T
+        beyond = np.concatenate([at - high, low - at], axis=1)
+        return np.concatenate([normal, -normal])[beyond.argmax(axis=1)]
+    if isinstance(surface, Torus):
+        across = 1 - surface.ring / np.maximum(np.hypot(x, z), 1e-300)
+        n = np.stack([x * across, y, z * across], axis=1)
+    elif isinstance(surface, Capsule):
+        n = np.stack([x, y - np.clip(y, -surface.half, surface.half), z], axis=1)
+    else:
+        n = np.stack([x, -surface.b / 2 - surface.c * y, z], axis=1)
+        q = x * x + z * z - surface.a - surface.b * y - surface.c * y * y
+        side = abs(q) / (2 * np.maximum(np.linalg.norm(n, axis=1), 1e-300))
+        face = np.argmin([side, abs(y - surface.low), abs(y - surface.high)], axis=0)
+        n[face > 0] = np.array([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]])[face[face > 0] - 1]
+    return np.asarray(n / np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-300))

@@ -1,0 +1,43 @@
+"""Tables of floats on the device, whose rows are gathered four floats at a time.
+
+Without that, a gather of what a whole image shares takes one load for each ray and float, and most
+of a kernel's time where the processor has no fast gathers.
+"""
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+PACKET = 4
+ALIGNMENT = 64  # bytes
+
+
+def upload_table(rows: NDArray[Any]) -> Any:
+    """Copy rows, (..., width), to the device as float32, each padded to whole packets.
+
+    Dr.Jit gathers packets only from aligned data, and compiles another kernel for other data. It
+    may use numpy's memory as it is, so that is aligned here.
+    """
+    width = rows.shape[-1]
+    padded = -(-width // PACKET) * PACKET
+    count = rows.size // width
+    memory = np.zeros(4 * count * padded + ALIGNMENT, np.uint8)
+    start = -memory.ctypes.data % ALIGNMENT
+    table = memory[start : start + 4 * count * padded].view(np.float32)
+    table.reshape(count, padded)[:, :width] = rows.reshape(count, width)
+    return mi.Float(table)
+
+
+def gather_packet(table: Any, index: Any) -> Any:
+    """Return four floats of each lane: those from 4 `index` on."""
+    return dr.gather(mi.Vector4f, table, index)
+
+
+def gather_row(table: Any, row: Any, width: int) -> list[Any]:
+    """Return the `width` floats of each lane's row of a table with rows of that width."""
+    count = -(-width // PACKET)
+    packets = [gather_packet(table, row * count + i) for i in range(count)]
+    return [packet[i] for packet in packets for i in range(PACKET)][:width]

@@ -1,0 +1,60 @@
+"""Exact surfaces in numpy against Embree on their meshes, and from the inside."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from trimesh import Trimesh
+from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+from scenegen.description.scenes import SHAPE_NAMES
+from scenegen.objects.basic_shapes import unit_shape
+from scenegen.rendering.surfaces.in_numpy import cast_at_surface
+
+Array = NDArray[np.float64]
+EXACT = tuple(name for name in SHAPE_NAMES if name != "teapot")
+POLYHEDRA = set(EXACT) - {"sphere", "cone", "torus", "cylinder", "capsule"}
+RAYS = 10_000
+TESSELLATION = 4.5e-5  # how far a mesh may lie off its surface
+
+
+def rays(distance: float, seed: int) -> tuple[Array, Array]:
+    """Return rays from this distance towards points of the unit ball, directions of any length."""
+    rng = np.random.default_rng(seed)
+    origins, targets = rng.standard_normal((2, RAYS, 3))
+    origins *= distance / np.linalg.norm(origins, axis=1, keepdims=True)
+    targets *= rng.random((RAYS, 1)) ** (1 / 3) / np.linalg.norm(targets, axis=1, keepdims=True)
+    return origins, (targets - origins) * rng.uniform(0.3, 3.0, (RAYS, 1))
+
+
+@pytest.mark.parametrize("distance", [3.0, 0.2], ids=["outside", "inside"])
+@pytest.mark.parametrize("name", EXACT)
+def test_hits_are_those_of_the_mesh_within_its_tessellation(name: str, distance: float) -> None:
+    shape = unit_shape(name)
+    assert shape.surface is not None
+    origins, directions = rays(distance, seed=1)
+    t, normals = cast_at_surface(shape.surface, origins, directions)
+    corners = shape.triangles.reshape(-1, 3)
+    mesh = Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
+    points, which, faces = RayMeshIntersector(mesh).intersects_location(
+        origins, directions, multiple_hits=False
+    )
+    met = np.zeros(RAYS, bool)
+    met[which] = True
+    assert (np.isfinite(t) != met).sum() <= (0 if name in POLYHEDRA else 3)
+    both = np.isfinite(t[which])
+    points, which, faces = points[both], which[both], faces[both]
+    assert len(which) > RAYS / 4
+    found = origins[which] + t[which, None] * directions[which]
+    off = np.einsum("ri,ri->r", found - points, mesh.face_normals[faces])
+    aligned = np.einsum("ri,ri->r", normals[which], mesh.face_normals[faces])
+    some = 1.0 if name in POLYHEDRA else 0.999  # a ray at a rim may hit its other side
+    assert np.quantile(abs(off), some) < (1e-14 if name in POLYHEDRA else TESSELLATION)
+    assert np.quantile(aligned, 1 - some) > (1 - 1e-14 if name in POLYHEDRA else 0.9999)
+
+
+def test_nothing_behind_a_ray_is_hit() -> None:
+    origins, directions = rays(3.0, seed=2)
+    for name in EXACT:
+        surface = unit_shape(name).surface
+        assert surface is not None
+        assert np.isinf(cast_at_surface(surface, origins, -directions)[0]).all()
