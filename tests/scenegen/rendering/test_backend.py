@@ -42,7 +42,7 @@ from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import render
 from scenegen.sampling.scenes import sample_scene
 from scenegen.description.specs import DatasetSpec
-spec = DatasetSpec(height=8, width=8, objects=(1, 1), shapes=("box",), min_visible_pixels=0)
+spec = DatasetSpec(height=8, width=8, objects=(1, 1), shapes=("teapot",), min_visible_pixels=0)
 scene = next(s for i in range(9) if (s := sample_scene(spec, i)))
 with warnings.catch_warnings(record=True) as found:
     warnings.simplefilter("always", SlowFallbackWarning)
