@@ -23,7 +23,7 @@ RENDER_MISTAKES = [
     (f"--batch {10**9}", f"batch: found {10**9}", "1 to 4096"),
     ("--object-radius 0.5", "item 0", "objects", "smaller --object-radius"),
     ("--min-visible-pixels 1024", "item ", "1024 pixels", "--min-visible-pixels"),
-    ("--objects 1-40", "item 0", "its 16 objects", "try", "--objects", "--object-radius"),
+    ("--objects 1-40", "item 0", "its 8 objects", "try", "--objects", "--object-radius"),
     ("--preset nosuch", "preset: found nosuch", "shapes-single", "views"),
     ("--pose flying", "--pose", "'flying'", "'resting', 'any'"),
     ("--device tpu", "--device", "'tpu'", "'auto', 'cpu', 'cuda'"),

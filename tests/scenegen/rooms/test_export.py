@@ -139,7 +139,7 @@ def test_obj_cast_by_another_engine_gives_the_depth(tmp_path, make_rooms):
         obj, _ = export(room, tmp_path, "obj", overwrite=True)
         return trimesh.load(obj, force="mesh", process=False)
 
-    path = make_rooms(tmp_path / "x.h5", 3, height=64, width=64, seed=11)
+    path = make_rooms(tmp_path / "x.h5", 6, height=64, width=64, seed=11)
     assert len(check_depth_by_embree(path, mesh_of)) >= 4
 
 

@@ -129,8 +129,8 @@ def test_retries_keep_the_order_and_do_not_depend_on_batches(tmp_path):
 
 def test_progress_counts_rows_and_comes_before_the_end(tmp_path):
     told = []
-    make_dataset(tmp_path / "x.h5", SPEC, 20, batch=4, progress=told.append)
-    assert sum(told) == 20
+    make_dataset(tmp_path / "x.h5", SPEC, 60, batch=4, progress=told.append)
+    assert sum(told) == 60
     assert len(told) > 2
 
 

@@ -131,7 +131,7 @@ def test_a_raw_chunk_decodes_by_the_books(rooms_path, name):
         np.testing.assert_array_equal(
             np.frombuffer(data, expected.dtype).reshape(expected.shape), expected
         )
-        assert dataset.shuffle == (expected.itemsize > 1)
+        assert dataset.shuffle == (expected.itemsize > 1 and name != "normal")
 
 
 def test_every_compression_gives_equal_contents(rooms_path, make_rooms, tmp_path):

@@ -160,7 +160,7 @@ def test_what_two_views_see_is_one_scene(views_path: Path) -> None:
                 at = y[inside].astype(int), x[inside].astype(int)
                 near, far = minimum_filter(depth[b], 3)[at], maximum_filter(depth[b], 3)[at]
                 hidden_by_nothing = z[inside] < near - 2e-3
-                assert hidden_by_nothing.mean() < 1e-3, (a, b)
+                assert hidden_by_nothing.mean() < 2e-3, (a, b)
                 alone = (minimum_filter(ids[b], 5) == maximum_filter(ids[b], 5))[at]
                 both = alone & (z[inside] > near - 2e-3) & (z[inside] < far + 2e-3)
                 assert both.mean() > 0.1, (a, b)
