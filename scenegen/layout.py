@@ -146,7 +146,7 @@ def has_digests(attributes: Mapping[str, Any]) -> bool:
 
 
 def has_old_draws(attributes: Mapping[str, Any]) -> bool:
-    """Return whether a file's scenes were drawn in the way of formats before 2.3."""
+    """Return whether a file is older than format 2.3, which draws and shows other scenes."""
     return attributes.get("format_version") in ("2.0", "2.1", "2.2")
 
 

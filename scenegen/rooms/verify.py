@@ -145,6 +145,10 @@ def _sampled_again(rooms: RoomsFile, rows: Array, objects: Objects) -> Check:
 
 def _rendered_again(rooms: RoomsFile, rows: Array, device: str, objects: Objects) -> Check:
     """Check that the stored descriptions still give the stored pixels."""
+    if has_old_draws(rooms.attributes) and rooms.spec.source == "shapes":
+        version = rooms.attributes["format_version"]
+        detail = f"not checked: format {version} showed meshes of basic shapes"
+        return Check("rendered again", True, detail)
     here = {"variant": select_variant(device), "format_version": FORMAT_VERSION, **versions()}
     stored = {name: str(rooms.attributes.get(name, "not stored")) for name in here}
     others = [f"{x} {stored[x]}, here {here[x]}" for x in here if stored[x] != here[x]]
