@@ -20,7 +20,21 @@ POINT_STEP, DIRECTION_STEP = 2.0**-26, 2.0**-25
 MOST_CORNERS = 500  # of a body before its supports along many directions are those of a coarser one
 COARSE_CORNERS = 128
 _TRIED = 6000  # directions along which a coarse body is compared with its original
+BLOCK = 512  # points that are multiplied at once
 MARGIN = 2.0**-24  # scene units; more than rounding can take away from what an object reaches
+
+
+def along(points: Array, directions: Array) -> Array:
+    """Return the products of points, (N, 3), and directions, (D, 3): (N, D).
+
+    In blocks so small that BLAS keeps to one thread: its threads would wait for each other, and the
+    renderer needs the other cores.
+    """
+    found = np.empty((len(points), len(directions)))
+    for start in range(0, len(points), BLOCK):
+        some = slice(start, start + BLOCK)
+        np.matmul(points[some], directions.T, out=found[some])
+    return found
 
 
 def rounded(values: Array, step: float) -> Array:
@@ -56,12 +70,12 @@ class Bodies:
         found = np.empty((len(kind), len(directions)))
         for rows, corners in _members(self._coarse if coarse else self._hulls, kind):
             turned = _turned(rotation[rows, None], corners[..., :3])
-            reach = (turned.reshape(-1, 3) @ directions.T).reshape(*turned.shape[:2], -1)
+            reach = along(turned.reshape(-1, 3), directions).reshape(*turned.shape[:2], -1)
             radius = corners[..., 3:]
             if radius.any():
                 flat = rounded(rotation[rows], POINT_STEP)
-                along, across = flat[:, :, 0] @ directions.T, flat[:, :, 2] @ directions.T
-                reach += radius * np.sqrt(along * along + across * across)[:, None]
+                ahead, across = along(flat[:, :, 0], directions), along(flat[:, :, 2], directions)
+                reach += radius * np.sqrt(ahead * ahead + across * across)[:, None]
             found[rows] = reach.max(axis=1)
         more = self._rounding + self._growth if coarse else self._rounding
         return np.asarray(found + more[kind, None])

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.rotations import cos_sin
-from scenegen.sampling.bodies import DIRECTION_STEP, POINT_STEP, Bodies, rounded
+from scenegen.sampling.bodies import DIRECTION_STEP, POINT_STEP, Bodies, along, rounded
 
 Array = NDArray[Any]
 GAP = 2e-3  # least distance between two objects, scene units
@@ -155,6 +155,6 @@ def are_apart(places: Array, reach: Array, others: Array) -> Array:
         reach: the body's supports along SEPARATORS from its place, (n, 80).
         others: supports of the others along SEPARATORS, world, (n, J, 80).
     """
-    ahead = places @ SEPARATORS.T - reach[:, _OPPOSITE] - GAP
+    ahead = along(places, SEPARATORS) - reach[:, _OPPOSITE] - GAP
     apart: Array = np.asarray((ahead[:, None] > others).any(axis=2))
     return np.asarray(apart.all(axis=1))
