@@ -42,7 +42,7 @@ def test_objects_are_found_without_depth(bits, near_path):
     found = torch.stack([matched_relief(rooms, row, pairs[row]) for row in (0, 1, 2, 4, 5, 6)])
     rows = torch.tensor([0, 1, 2, 4, 5, 6])
     wrong, within = (found - true[rows]).abs(), objects[rows]
-    assert wrong[within].median() < STEP
+    assert wrong[within].median() < 1.5 * STEP
     assert (wrong[within] < 2 * STEP).float().mean() > 0.6
     assert (found[~within] < 0.05).float().mean() > 0.9
     raised, truly = found > 0.05, true[rows] > 0.05
