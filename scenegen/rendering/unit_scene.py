@@ -13,6 +13,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.common.records import check
 from scenegen.objects.cast_meshes import normal_table, overlapping
 from scenegen.objects.solids import UnitShape
 from scenegen.rendering.tables import upload_table
@@ -60,8 +61,13 @@ def unit_scene(variant: str, shapes: tuple[UnitShape, ...]) -> UnitScene:
 
 
 def stacked(tables: Sequence[Array]) -> tuple[Array, Any]:
-    """Join tables of normals; return the first row of each, or SPHERE, and the whole, flat."""
+    """Join tables of normals; return the first row of each, or SPHERE, and the whole.
+
+    Raises SpecError for more triangles than a float counts, as rows of objects hold their number.
+    """
     sizes = np.array([len(table) for table in tables])
+    most = 2**24 - 1
+    check(sizes.sum() <= most, "one scene", f"{sizes.sum():,} triangles", f"at most {most:,}")
     first = np.where(sizes > 0, 1 + np.cumsum(sizes) - sizes, SPHERE).astype(np.uint32)
     return first, upload_table(np.concatenate([np.zeros((1, 12), np.float32), *tables]))
 
