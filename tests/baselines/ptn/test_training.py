@@ -19,7 +19,7 @@ VIEWS = {"views": (0.0, 80.0), "objects": (1, 1), "shapes": ("sphere",)}
 
 @pytest.fixture(scope="module")
 def rooms(make_rooms, tmp_path_factory):
-    return make_rooms(tmp_path_factory.mktemp("ptn") / "rooms.h5", 2, **VIEWS)
+    return make_rooms(tmp_path_factory.mktemp("ptn") / "rooms.h5", 2, **VIEWS, seed=1)
 
 
 def weights_of(path):
@@ -41,7 +41,7 @@ def test_a_few_rooms_are_learnt_by_heart(rooms):
         losses.append(float(loss.detach()) / empty)
     source.close()
     assert np.mean(losses[:5]) > 0.7
-    assert np.mean(losses[-10:]) < 0.45
+    assert np.mean(losses[-10:]) < 0.4
 
 
 def test_a_run_that_is_resumed_gives_the_same_weights(rooms, tmp_path, monkeypatch):

@@ -183,15 +183,19 @@ def test_rooms_have_shadows_and_light_in_them() -> None:
 
 
 def test_a_glossy_room_scene_is_the_same_picture_as_the_papers(scenes_of: Scenes) -> None:
-    """The image is upright, and the lights are in their places."""
-    spec = replace(PATH, specular=(0.3, 0.5), shininess=(5.0, 9.0), lights=(1, 2), spp=64)
+    """The image is upright, and the lights are in their places.
+
+    Over 32 scenes the correlation is 0.75 to 0.94, least where much light has bounced; these
+    three scenes have 0.87 to 0.94.
+    """
+    spec = replace(PATH, specular=(0.3, 0.5), shininess=(5.0, 9.0), lights=(1, 2), spp=64, seed=6)
     scenes = scenes_of(spec, 3)
     traced = render(pack(spec, scenes)).image
     paper = render(pack(replace(spec, shading="paper", shadows=True, spp=16), scenes)).image
     for one, other in zip(traced, paper, strict=True):
         match = np.corrcoef(one.ravel(), other.ravel())[0, 1]
         flipped = [np.corrcoef(one.ravel(), x.ravel())[0, 1] for x in (other[::-1], other[:, ::-1])]
-        assert match > 0.7
+        assert match > 0.85
         assert match > max(flipped)
 
 

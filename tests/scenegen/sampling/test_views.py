@@ -31,7 +31,7 @@ ANGLES = (0.0, 5.0, 35.0, 55.0, 80.0)
 MANY = DatasetSpec(views=ANGLES, seed=4)
 TINY = {
     "views": ANGLES, "objects": (2, 2), "object_radius": (0.08, 0.15), "min_visible_pixels": 8,
-    "height": 64, "width": 64, "image_dtype": "float32", "random_reflectance": True,
+    "height": 64, "width": 64, "image_dtype": "float32", "random_reflectance": True, "seed": 4,
 }  # fmt: skip
 
 
@@ -139,7 +139,11 @@ def test_objects_are_whole_in_every_view(
 
 
 def test_what_two_views_see_is_one_scene(views_path: Path) -> None:
-    """No surfel of a view lies in front of what another view sees there; many are seen by both."""
+    """No surfel of a view lies in front of what another view sees there; many are seen by both.
+
+    But for few at tips and outlines, which lie between the centres of the other view's pixels: of
+    24 scenes of seeds 0 to 5, the worst pair of views has 1.3e-3 of them, that of this seed 0.6e-3.
+    """
     with h5py.File(views_path) as file:
         depth, ids = file["depth"][:].astype(float), file["object_id"][:]
         matrix, fov = file["camera/world_from_camera"][:], file["camera/fov_y_degrees"][:]
@@ -160,7 +164,7 @@ def test_what_two_views_see_is_one_scene(views_path: Path) -> None:
                 at = y[inside].astype(int), x[inside].astype(int)
                 near, far = minimum_filter(depth[b], 3)[at], maximum_filter(depth[b], 3)[at]
                 hidden_by_nothing = z[inside] < near - 2e-3
-                assert hidden_by_nothing.mean() < 2e-3, (a, b)
+                assert hidden_by_nothing.mean() < 1e-3, (a, b)
                 alone = (minimum_filter(ids[b], 5) == maximum_filter(ids[b], 5))[at]
                 both = alone & (z[inside] > near - 2e-3) & (z[inside] < far + 2e-3)
                 assert both.mean() > 0.1, (a, b)
