@@ -18,8 +18,8 @@ from torch.optim import Adam
 from baselines.optimiser_moments import load_moments, moments_of
 from baselines.tensor_files import check_tensors, load_tensors, save_tensors, shortened
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.random.seeding import Purpose, item_seed
 from scenegen.common.records import from_json, to_json
-from scenegen.common.seeding import Purpose, item_seed
 
 CHECKPOINT, WEIGHTS = "checkpoint.safetensors", "weights.safetensors"
 NETWORK, MOMENTS = "network.", "moments."

@@ -15,7 +15,7 @@ from iqtt.files.reader import open_questions
 from metrics.measures.empty_room import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from scenegen.common.errors import SpecError
-from scenegen.common.seeding import Purpose, item_rng
+from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]

@@ -21,7 +21,7 @@ from baselines.depth_supervised.network import Cameras, ReliefSpec
 from baselines.depth_supervised.rooms import Rooms, read_rooms
 from baselines.pix2shape.data.rooms import Draws
 from scenegen.common.errors import SceneGenError
-from scenegen.common.seeding import Purpose, item_rng
+from scenegen.common.random.seeding import Purpose, item_rng
 
 METHOD = "depth-supervised"
 EVERY = 100  # iterations between checkpoints

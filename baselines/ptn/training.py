@@ -27,8 +27,8 @@ from baselines.ptn.rooms import TrainingRooms, room_box
 from baselines.ptn.submission import feature_batches
 from iqtt.files.reader import QuestionsFile, open_questions
 from scenegen.common.errors import SceneGenError, SpecError
+from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.records import check
-from scenegen.common.seeding import Purpose, item_rng
 
 EVERY = 200  # iterations between checkpoints
 SETTINGS = {field.name for field in fields(PtnConfig)} - {"task", "low", "high", "seed"}

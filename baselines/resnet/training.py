@@ -21,8 +21,8 @@ from baselines.resnet.answering import accuracy, images_of
 from baselines.resnet.methods import Card, Method, State
 from iqtt.files.reader import QuestionsDataset, open_questions, parts
 from scenegen.common.errors import SceneGenError, SpecError
+from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.records import check
-from scenegen.common.seeding import Purpose, item_rng
 
 LABELED = "labeled"  # the part of a training file whose answers are told
 VALIDATION = "iqtt-val.h5"

@@ -10,7 +10,7 @@ from torch.optim import AdamW
 
 from baselines.rezende.images import question_images
 from baselines.rezende.network import Head, Model
-from scenegen.common.seeding import Purpose, item_seed
+from scenegen.common.random.seeding import Purpose, item_seed
 
 STEPS, LEARNING_RATE, WEIGHT_DECAY = 300, 0.002, 0.3
 

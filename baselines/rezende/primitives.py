@@ -16,7 +16,7 @@ from baselines.rezende.images import Array, Pictures
 from baselines.rezende.rasteriser import Views
 from scenegen.camera import Camera, Vector3
 from scenegen.common.errors import SpecError
-from scenegen.common.seeding import Purpose, item_rng
+from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.ground_truth import decode_image

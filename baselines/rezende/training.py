@@ -34,8 +34,8 @@ from baselines.rezende.network import Model, divergence
 from baselines.rezende.rasteriser import project, rasterise
 from iqtt.files.reader import parts
 from scenegen.common.errors import SceneGenError
+from scenegen.common.random.seeding import Purpose, item_rng, item_seed
 from scenegen.common.records import check, from_json
-from scenegen.common.seeding import Purpose, item_rng, item_seed
 
 WINDOW = 0.16  # half the side of the window of pixels around a vertex, as a share of the picture
 EVERY = 200  # iterations between checkpoints

@@ -30,8 +30,8 @@ from iqtt.shapes.near import move_cubes
 from iqtt.shapes.polycube import canonical_class, is_chiral, mirror, set_ids
 from iqtt.shapes.splits import TooFewShapesError, split_classes, split_of
 from scenegen.common.errors import PlacementError
+from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.records import check
-from scenegen.common.seeding import Purpose, item_rng
 
 Array = NDArray[Any]
 Drawn: TypeAlias = tuple[Array, Array]

@@ -15,8 +15,8 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.questions.visibility import cube_pixels
 from iqtt.shapes.polycube import MAX_CUBES, ROTATIONS, bounding_radius, mirror, symmetries
 from scenegen.common.errors import PlacementError
+from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.rotations import rotation_matrix
-from scenegen.common.seeding import Purpose, item_rng
 
 Array = NDArray[Any]
 SHRINK = 2  # how many times smaller than images the grids are on which visibility is judged

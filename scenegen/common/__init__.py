@@ -1,6 +1,6 @@
 """Helpers that every part of every package uses; none of them knows about rooms or questions.
 
-Errors with fields (`errors`), records as JSON and back (`records`), random streams (`seeding`),
+Errors with fields (`errors`), records as JSON and back (`records`), random numbers (`random`),
 files and folders that appear only when complete (`new_file`, `new_folder`), HDF5 files of rows
 (`row_file`), options and error lines of commands (`command_line`), worker processes, text tables,
 and rotations.

@@ -5,8 +5,8 @@
 - `drjit_renderer` is the fast path: one kernel computes all pixels of a batch. `rays` finds what
   one ray hits and its colour; `cubes` does so faster for polycubes; `unit_scene` and
   `model_scene` hold the geometry in Mitsuba.
-- `shading` is the shading equation, with the fall-off of light, in numpy; `phong_material` and
-  `path_tracer` are the path-traced variant of the colour.
+- `shading` is the shading equation, with the fall-off of light, in numpy; `path_tracing`
+  is the path-traced variant of the colour.
 - `numpy_renderer` renders the same images slowly, as fallback and as reference for tests.
 - `backend` chooses the Mitsuba variant; `pixel_samples` places the samples of `--spp`.
 

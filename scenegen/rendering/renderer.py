@@ -75,7 +75,7 @@ def _with_traced_image(
     if variant == "scalar_rgb":
         raise BackendError("shading path", "no LLVM", hint=HOW_TO_GET_LLVM)
     from scenegen.rendering.model_scene import MODELS  # imports drjit, as above
-    from scenegen.rendering.path_tracer import trace_images
+    from scenegen.rendering.path_tracing.path_tracer import trace_images
 
     fetch = launch_fields(batch, [name for name in names if name != "image"], device)
 

@@ -10,8 +10,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from scenegen.common.errors import SpecError
 from scenegen.common.new_file import written_beside
+from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.records import check
-from scenegen.common.seeding import Purpose, item_rng
 from scenegen.rooms.reader import Room
 
 Array = NDArray[Any]

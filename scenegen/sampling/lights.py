@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.seeding import Purpose, item_numbers
+from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.description.specs import DatasetSpec
 from scenegen.sampling.octant import octant_points
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.errors import SpecError
-from scenegen.common.seeding import Purpose, item_numbers
+from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, outline
 from scenegen.objects.meshes.errors import BadMeshError

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from scenegen.camera import look_at
 from scenegen.common.errors import PlacementError
+from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.common.rotations import rotation_matrix
-from scenegen.common.seeding import Purpose, item_numbers
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec

@@ -21,7 +21,7 @@ from baselines.pix2shape.network.model import Views, mapped
 from baselines.pix2shape.network.surfels import Scene
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.hdf5.input_file import open_file
-from scenegen.common.seeding import Purpose, item_rng
+from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsDataset, RoomsFile
 

@@ -23,8 +23,8 @@ from baselines.pix2shape.training.batches import Source
 from baselines.pix2shape.training.state import State
 from baselines.pix2shape.training.steps import critic_step, draw, generator_step
 from scenegen.common.errors import SceneGenError, SpecError
+from scenegen.common.random.seeding import Purpose, item_seed
 from scenegen.common.records import check
-from scenegen.common.seeding import Purpose, item_seed
 
 
 class TrainingError(SceneGenError):

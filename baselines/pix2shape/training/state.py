@@ -16,7 +16,7 @@ from baselines.pix2shape.weights import storage
 from baselines.pix2shape.weights.storage import Card
 from baselines.tensor_files import load_tensors, save_tensors
 from scenegen.common.errors import FileFormatError
-from scenegen.common.seeding import Purpose, item_seed
+from scenegen.common.random.seeding import Purpose, item_seed
 
 KINDS = ("generator", "critic")  # the optimisers of a state
 

@@ -20,7 +20,7 @@ from baselines.pix2shape.pictures import drawn, image_tiles, sheet
 from baselines.pix2shape.weights.storage import Card
 from scenegen.camera import Camera, look_at
 from scenegen.common.errors import SpecError
-from scenegen.common.seeding import Purpose, item_seed
+from scenegen.common.random.seeding import Purpose, item_seed
 from scenegen.description.specs import DatasetSpec
 from scenegen.sampling.cameras import sample_cameras
 from scenegen.sampling.lights import sample_lights

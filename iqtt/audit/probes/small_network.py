@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.audit.probes.trees import one_thread
-from scenegen.common.seeding import Purpose, item_rng
+from scenegen.common.random.seeding import Purpose, item_rng
 
 Array = NDArray[Any]
 CHANNELS, SIDE, STRIDE = (8, 16), 3, 2  # of the convolutions

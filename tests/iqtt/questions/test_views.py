@@ -24,7 +24,7 @@ from iqtt.questions.views import (
 )
 from iqtt.shapes.polycube import mirror
 from scenegen.common.errors import PlacementError
-from scenegen.common.seeding import Purpose, item_rng
+from scenegen.common.random.seeding import Purpose, item_rng
 
 SPEC = SplitSpec(seed=4, cubes=(5, 8), height=64, width=64, min_cube_pixels=3, lights=(1, 3))
 RNG = np.random.default_rng

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chisquare, kstest
 
 from scenegen.camera import Camera
+from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.common.rotations import rotation_matrix
-from scenegen.common.seeding import Purpose, item_numbers
 from scenegen.description.scenes import SHAPE_NAMES
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.sampling.bodies import POINT_STEP, Bodies, rounded

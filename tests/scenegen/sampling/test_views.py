@@ -16,7 +16,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.stats import binomtest, kstest
 
 from scenegen.camera import look_at
-from scenegen.common.seeding import Purpose, item_numbers
+from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.packing import SceneBatch, pack

@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import pixel_size
-from scenegen.common.seeding import Purpose, item_seed
+from scenegen.common.random.seeding import Purpose, item_seed
 from scenegen.objects.scene_mesh import room_mesh
 from scenegen.rendering.ground_truth import encode_image
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.phong_material import phong_bsdf
+from scenegen.rendering.path_tracing.phong_material import phong_bsdf
 from scenegen.rendering.pixel_samples import sample_positions
 from scenegen.rendering.unit_scene import triangle_mesh
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from scenegen.common.seeding import Purpose, item_numbers, item_rng
+from scenegen.common.random.seeding import Purpose, item_numbers, item_rng
 
 LENGTH = 1000
 

@@ -21,7 +21,7 @@ COUNT = 100_000
 @pytest.fixture(scope="module")
 def phong_material(variant: str) -> ModuleType:
     """Return the module, whose import needs the variant to be chosen."""
-    return importlib.import_module("scenegen.rendering.phong_material")
+    return importlib.import_module("scenegen.rendering.path_tracing.phong_material")
 
 
 def toward(angle: float, azimuth: float = 0.7) -> Array:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scenegen.common.philox import philox
+from scenegen.common.random.philox import philox
 
 FULL = 0xFFFFFFFF
 PI = (0x243F6A88, 0x85A308D3, 0x13198A2E, 0x03707344)

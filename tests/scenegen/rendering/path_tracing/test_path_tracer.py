@@ -219,7 +219,7 @@ def test_samples_in_several_goes_make_the_same_picture(
     batch = pack(replace(PATH, spp=spp), [scene])
     best = render(pack(replace(PATH, spp=512), [scene])).image  # in one go: shares no noise
     once, two = render(batch).image, render(pack(replace(PATH, spp=2), [scene])).image
-    path_tracer = importlib.import_module("scenegen.rendering.path_tracer")
+    path_tracer = importlib.import_module("scenegen.rendering.path_tracing.path_tracer")
     monkeypatch.setattr(path_tracer, "RAYS_AT_ONCE", 2 * 24 * 32)
     parts = render(batch).image
     assert parts.tobytes() != once.tobytes()

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.philox import philox
+from scenegen.common.random.philox import philox
 
 
 class Purpose(IntEnum):
