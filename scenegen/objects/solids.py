@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from scenegen.common.rotations import cross
 from scenegen.objects.exact_surfaces import Surface, polyhedron_of
 
 Array = NDArray[Any]
@@ -111,11 +112,16 @@ def revolution(
 
 
 def face_outwards(triangles: Array, normals: Array) -> tuple[Array, Array]:
-    """Drop degenerate triangles and wind the others so that they agree with their normals."""
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    keep = np.linalg.norm(cross, axis=1) > 1e-12
-    triangles, normals, cross = triangles[keep], normals[keep], cross[keep]
-    inward = np.einsum("fi,fi->f", cross, normals.sum(1)) < 0
+    """Drop degenerate triangles and wind the others to agree with their normals, maybe in place."""
+    first, second = (np.ascontiguousarray((triangles[:, k] - triangles[:, 0]).T) for k in (1, 2))
+    across = np.array(cross(first, second))
+    keep = np.square(across).sum(axis=0) > 1e-24
+    if not keep.all():
+        triangles, normals, across = triangles[keep], normals[keep], across[:, keep]
+    outward = sum(
+        across[i] * (normals[:, 0, i] + normals[:, 1, i] + normals[:, 2, i]) for i in range(3)
+    )
+    inward = outward < 0
     triangles[inward] = triangles[inward][:, ::-1]
     normals[inward] = normals[inward][:, ::-1]
     return triangles, normals

@@ -55,7 +55,9 @@ def unit_scene(variant: str, shapes: tuple[UnitShape, ...]) -> UnitScene:
     for shape, place in zip(shapes, offset, strict=True):
         if shape.surface is None:
             contents[shape.name] = mitsuba_shape(shape, place)
-        tables.append(normal_table(shape)[: None if shape.surface is None else 0])
+            tables.append(normal_table(shape))
+        else:
+            tables.append(np.empty((0, 12), np.float32))
     first_triangle, normals = stacked(tables)
     return UnitScene(mi.load_dict(contents), offset, first_triangle, 0.0, normals)
 
