@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenegen.common.rotations import cross
-from scenegen.objects.solids import Array, UnitShape
+from scenegen.objects.solids import Array, UnitShape, face_vectors
 
 OVERLAP = 4e-6  # of neighbouring triangles; rays slip between them if it is below 2e-6
 
@@ -37,10 +37,9 @@ def normal_table(shape: UnitShape) -> Array:
     """
     if shape.is_sphere:
         return np.zeros((0, 12), np.float32)
-    edges = shape.triangles[:, 1:] - shape.triangles[:, :1]
-    face = cross(*(np.ascontiguousarray(edges[:, k].T) for k in range(2)))
+    face = face_vectors(shape.triangles)
     length = _norm(face)
-    table = np.empty((len(edges), 12), np.float32)
+    table = np.empty((len(shape.triangles), 12), np.float32)
     for i in range(3):
         table[:, i] = face[i] / length
     table[:, 3:] = shape.normals.reshape(-1, 9)

@@ -112,19 +112,20 @@ def revolution(
 
 
 def face_outwards(triangles: Array, normals: Array) -> tuple[Array, Array]:
-    """Drop degenerate triangles and wind the others to agree with their normals, maybe in place."""
-    first, second = (np.ascontiguousarray((triangles[:, k] - triangles[:, 0]).T) for k in (1, 2))
-    across = np.array(cross(first, second))
+    """Drop degenerate triangles and wind the others so that they agree with their normals."""
+    across = np.array(face_vectors(triangles))
     keep = np.square(across).sum(axis=0) > 1e-24
-    if not keep.all():
-        triangles, normals, across = triangles[keep], normals[keep], across[:, keep]
-    outward = sum(
-        across[i] * (normals[:, 0, i] + normals[:, 1, i] + normals[:, 2, i]) for i in range(3)
-    )
-    inward = outward < 0
+    triangles, normals, across = triangles[keep], normals[keep], across[:, keep]
+    inward = np.einsum("if,fi->f", across, normals[:, 0] + normals[:, 1] + normals[:, 2]) < 0
     triangles[inward] = triangles[inward][:, ::-1]
     normals[inward] = normals[inward][:, ::-1]
     return triangles, normals
+
+
+def face_vectors(triangles: Array) -> tuple[Array, Array, Array]:
+    """Return normals of triangles, (F, 3, 3), by components, as long as twice their areas."""
+    first, second = (np.ascontiguousarray((triangles[:, k] - triangles[:, 0]).T) for k in (1, 2))
+    return cross(first, second)
 
 
 def resting_directions(points: Array) -> Array:

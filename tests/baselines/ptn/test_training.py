@@ -27,6 +27,7 @@ def weights_of(path):
 
 
 def test_a_few_rooms_are_learnt_by_heart(rooms):
+    # Of the rooms of seeds 0 to 5, those of seed 4 alone end above the bound, at 0.55.
     model = tiny(width=4, batch=4, rays=200, samples=24, views=2, size=32)
     source, rng = TrainingRooms(rooms, model.config), np.random.default_rng(0)
     optimiser = torch.optim.Adam(model.parameters(), lr=3e-3)

@@ -185,8 +185,8 @@ def test_rooms_have_shadows_and_light_in_them() -> None:
 def test_a_glossy_room_scene_is_the_same_picture_as_the_papers(scenes_of: Scenes) -> None:
     """The image is upright, and the lights are in their places.
 
-    Over 32 scenes the correlation is 0.75 to 0.94, least where much light has bounced; these
-    three scenes have 0.87 to 0.94.
+    Light that bounced is in one alone: over 32 scenes of seeds 3 to 6 the correlation is 0.75 to
+    0.94, and of these three 0.87 to 0.94.
     """
     spec = replace(PATH, specular=(0.3, 0.5), shininess=(5.0, 9.0), lights=(1, 2), spp=64, seed=6)
     scenes = scenes_of(spec, 3)
