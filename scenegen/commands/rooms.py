@@ -91,7 +91,9 @@ from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_co
 @IMAGE_DTYPE
 @COMPRESSION
 @click.option("--batch", type=int, default=64, show_default=True,
-              help="Images rendered at once; more take more memory.")
+              help="Images that a process renders at once; more take more memory.")
+@click.option("--workers", type=int, default=0, show_default="one a processor, up to 8",
+              help="Processes that render; each takes about 0.4 GiB.")
 @DEVICE
 @OVERWRITE
 def render(
@@ -100,6 +102,7 @@ def render(
     preset: str,
     size: tuple[int, int] | None,
     batch: int,
+    workers: int,
     device: str,
     compression: str,
     overwrite: bool,
@@ -129,6 +132,7 @@ def render(
             spec,
             count,
             batch=batch,
+            workers=workers,
             device=device,
             compression=compression,
             overwrite=overwrite,

@@ -1,7 +1,7 @@
 """The catalogue of a data set's objects: its classes, the models of each, and their shapes."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 from scenegen.common.errors import SpecError
@@ -25,11 +25,13 @@ class Objects:
         models: names of models, as in `scenes.PlacedObject.shape`, by class.
         shape: returns the unit shape of a name; raises BadMeshError if its file cannot be used.
         digest: returns the content hash of a model's file; empty for built-in objects.
+        problems: reasons, by name, why models were refused so far.
     """
 
     models: Mapping[str, Sequence[str]]
     shape: Callable[[str], UnitShape]
     digest: Callable[[str], str]
+    problems: dict[str, str] = field(default_factory=dict)
 
 
 def objects_of(spec: DatasetSpec) -> Objects:
@@ -47,7 +49,7 @@ def objects_of(spec: DatasetSpec) -> Objects:
 def mesh_objects(store: MeshStore) -> Objects:
     """Return the objects of a folder of meshes."""
     models = {name: [one.name for one in some] for name, some in store.folder.models.items()}
-    return Objects(models, store.shape, store.digest)
+    return Objects(models, store.shape, store.digest, store.problems)
 
 
 def changed_meshes(objects: Objects, scene: SceneSpec) -> list[str]:
@@ -111,4 +113,8 @@ def _built_in(source: str, names: tuple[str, ...], split: str) -> Objects:
         for name in names:
             members = (f"{name}/{i:04d}" for i in range(MEMBERS))
             models[name] = [m for m in members if split in ("all", object_split(m))]
-    return Objects(models, built_in_shape, lambda name: "")
+    return Objects(models, built_in_shape, _no_digest)
+
+
+def _no_digest(_name: str) -> str:
+    return ""

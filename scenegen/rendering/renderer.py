@@ -22,6 +22,14 @@ MOST_FACES = 2_000_000  # of the models in one Mitsuba scene
 MOST_MODELS = 2000  # in one Mitsuba scene; must not exceed `model_scene.MOST_MODELS`
 
 
+def use_threads(count: int, device: str = "auto") -> None:
+    """Let the CPU variant render with so many threads. Raises BackendError as `render`."""
+    if select_variant(device) == "llvm_ad_rgb":
+        import drjit
+
+        drjit.set_thread_count(count)
+
+
 def render(batch: SceneBatch, device: str = "auto") -> GroundTruth:
     """Render a batch and wait for it. Raises BackendError if `device` cannot be used."""
     return launch(batch, device)()

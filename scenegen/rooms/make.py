@@ -1,35 +1,48 @@
 """Render a data set to a file of rooms.
 
-Scenes are proposed, rendered, checked and written in batches. These steps overlap: while one batch
-is rendered, the next is proposed and the one before is written. Memory does not grow with the
-number of scenes.
+Scenes are proposed, rendered, checked, compressed and written in batches. These steps overlap, and
+each worker process takes its own block of scenes through all of them but the last. Memory does not
+grow with the number of scenes.
 """
 
+import functools
+import pickle
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.common.hdf5.row_file import MOST_PACKERS, PackedRows
 from scenegen.common.new_file import check_writable
 from scenegen.common.records import check
+from scenegen.common.worker_pool import in_processes, processors
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec
+from scenegen.layout import columns
 from scenegen.objects.catalogue import Objects, objects_of
+from scenegen.objects.families.cache import MEMBERS_KEPT
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.ground_truth import GroundTruth, visible_pixels
 from scenegen.rendering.packing import SceneBatch, pack_arrays
-from scenegen.rendering.renderer import launch
-from scenegen.rooms.writer import RenderedScene, create_rooms
+from scenegen.rendering.renderer import launch, use_threads
+from scenegen.rooms.writer import RenderedScene, create_rooms, pack_rooms
 from scenegen.sampling.proposals import ProposalQueue
 
 Array = NDArray[Any]
 DEFAULT_BATCH = 64
 MAX_BATCH = 4096
 MAX_RAYS = 2**28  # pixels of one batch; they take 8 GiB
+MAX_WORKERS = 256
+MOST_WORKERS = 8  # that are used unasked; each takes about 0.4 GiB
+WORTHWHILE = 1000  # images for each worker; below, starting it takes longer than it saves
+BLOCK = 512  # images that a worker makes in one go
+PACKED = 16  # scenes that are packed in one go
 WINDOW = 8  # batches that may be begun while the oldest item is still being proposed again
 
 _Begun = tuple[SceneArrays, SceneBatch, Callable[[], GroundTruth]]  # a batch being rendered
@@ -41,6 +54,7 @@ def make_dataset(
     count: int,
     *,
     batch: int = DEFAULT_BATCH,
+    workers: int = 1,
     device: str = "auto",
     compression: str = "gzip",
     overwrite: bool = False,
@@ -52,6 +66,9 @@ def make_dataset(
 
     Args:
         batch: images rendered at once; it bounds memory and changes no byte of the file.
+        workers: processes that render; 0 for one a processor where that is worth while. They
+            change no byte either. More than one need a script whose own work is inside
+            `if __name__ == "__main__":`, and `objects` that can be pickled.
         device, compression: as in `backend.DEVICES` and `row_file.COMPRESSIONS`.
         command: stored as the file's creation command.
         objects: what the scenes are made of; None for `objects_of(spec)`.
@@ -61,6 +78,7 @@ def make_dataset(
     PlacementError where no scene meets the request, and OSError where the disk refuses.
     """
     check(1 <= batch <= MAX_BATCH, "batch", batch, f"from 1 to {MAX_BATCH}")
+    check(0 <= workers <= MAX_WORKERS, "workers", workers, f"from 0 to {MAX_WORKERS}")
     most = MAX_RAYS // (spec.height * spec.width)
     found = f"{batch}, with {len(spec.views)} views of a scene"
     enough = max(batch, len(spec.views)) <= most
@@ -68,25 +86,89 @@ def make_dataset(
     check_writable(Path(path), overwrite)
     variant = select_variant(device)
     objects = objects or objects_of(spec)
+    workers = workers or _enough_workers(spec, count, variant)
     attributes = {"creation_command": command, "variant": variant, **versions()}
-    with (
-        create_rooms(
-            path, spec, count, compression=compression, overwrite=overwrite, attributes=attributes
-        ) as writer,
-        ThreadPoolExecutor(1) as pool,
-    ):
-        writing: deque[Future[int]] = deque()
+    with create_rooms(
+        path, spec, count, compression=compression, overwrite=overwrite, attributes=attributes
+    ) as writer:
+        work = _Work(spec, batch, device, objects, compression, MEMBERS_KEPT.home)
+        for rows in work.blocks(count, workers) if workers > 1 else work.rows(range(count)):
+            writer.extend(rows)
+            progress(rows.count)
 
-        def write(items: list[RenderedScene]) -> int:
-            writer.append(items)
-            return len(items) * len(spec.views)
 
-        for items in render_items(spec, range(count), batch, device, objects):
-            writing.append(pool.submit(write, items))
-            if len(writing) > 2:
-                progress(writing.popleft().result())
-        while writing:
-            progress(writing.popleft().result())
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """What is done to each block of scenes, here or in another process."""
+
+    spec: DatasetSpec
+    batch: int
+    device: str
+    objects: Objects
+    compression: str
+    cache_dir: Path | None
+
+    def rows(self, indices: range, workers: int = 1) -> Iterator[PackedRows]:
+        """Render scenes in order, and meanwhile pack their rows in threads."""
+        fields = columns(self.spec)
+        packers = max(1, min(MOST_PACKERS, processors() // workers))
+        with ThreadPoolExecutor(packers, "pack") as threads:
+            packing: deque[Future[PackedRows]] = deque()
+            for items in render_items(self.spec, indices, self.batch, self.device, self.objects):
+                for first in range(0, len(items), PACKED):
+                    some = items[first : first + PACKED]
+                    packing.append(threads.submit(pack_rooms, some, fields, self.compression))
+                while len(packing) * PACKED > 2 * self.batch:
+                    yield packing.popleft().result()
+            while packing:
+                yield packing.popleft().result()
+
+    def blocks(self, count: int, workers: int) -> Iterator[PackedRows]:
+        """Let processes render scenes 0 .. count - 1, a block at a time; yield rows in order."""
+        step = max(1, BLOCK // len(self.spec.views))
+        blocks = (range(i, min(i + step, count)) for i in range(0, count, step))
+        pickled = pickle.dumps(self)
+        tasks = ((pickled, block, workers) for block in blocks)
+        for done in in_processes(_render_block, tasks, workers):
+            self.objects.problems.update(done.problems)
+            for text, category in done.warned:
+                warnings.warn(text, category, stacklevel=3)
+            yield from done.rows
+
+
+@dataclass(frozen=True, eq=False)
+class _Done:
+    """A block's rows, the models that were refused with reasons, and what was warned of."""
+
+    rows: list[PackedRows]
+    problems: dict[str, str]
+    warned: list[tuple[str, type[Warning]]]
+
+
+def _render_block(pickled: bytes, block: range, workers: int) -> _Done:
+    work = _work_of_this_process(pickled)
+    with warnings.catch_warnings(record=True) as caught:
+        use_threads(max(1, processors() // workers), work.device)
+        rows = list(work.rows(block, workers))
+    warned = [(str(one.message), one.category) for one in caught]
+    return _Done(rows, dict(work.objects.problems), warned)
+
+
+@functools.lru_cache(maxsize=1)
+def _work_of_this_process(pickled: bytes) -> _Work:
+    """Return the same objects for each block, as they keep models in memory."""
+    work: _Work = pickle.loads(pickled)
+    MEMBERS_KEPT.use(work.cache_dir)
+    return work
+
+
+def _enough_workers(spec: DatasetSpec, count: int, variant: str) -> int:
+    """Return how many processes to use: one a processor, as far as each has enough to do.
+
+    A GPU has enough to do with one.
+    """
+    most = 1 if variant == "cuda_ad_rgb" else min(processors(), MOST_WORKERS)
+    return max(1, min(most, count * len(spec.views) // WORTHWHILE))
 
 
 def render_items(

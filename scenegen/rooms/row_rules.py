@@ -89,10 +89,10 @@ def _description_problems(
         return
     if room.view_index and block.read("scene", room.index) != block.read("scene", first):
         yield "the scene's description differs from that of its first view"
-    for name, expected in described(batch, 0).items():
+    for name, (expected,) in described(batch, np.array([0])).items():
         found = block.read(name, room.index)
         if name == "object/model":
-            same = [model.decode("utf-8", "replace") for model in found] == expected
+            same = [model.decode("utf-8", "replace") for model in found] == expected.tolist()
         else:
             same = np.array_equal(found, expected) or np.allclose(
                 found, expected, rtol=0, atol=1e-12

@@ -7,10 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.hdf5.content import seal
-from scenegen.common.hdf5.row_file import Table, new_file, writer_name
+from scenegen.common.hdf5.row_file import (
+    Column,
+    PackedRows,
+    Table,
+    new_file,
+    pack_rows,
+    writer_name,
+)
 from scenegen.common.records import check
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec, Fingerprint
@@ -56,46 +64,76 @@ class RoomsWriter:
     """Writes the rows of a new file of rooms; `create_rooms` makes one."""
 
     def __init__(self, file: h5py.File, spec: DatasetSpec, count: int, compression: str) -> None:
-        self.views = range(len(spec.views))
-        self.table = Table(file, columns(spec), count * len(spec.views), compression)
+        self.views = len(spec.views)
+        self.table = Table(file, columns(spec), count * self.views, compression)
         self.fingerprint = Fingerprint(spec)
 
     def append(self, rooms: Sequence[RenderedScene]) -> None:
-        """Write a row for each view of each scene."""
-        for room in rooms:
-            description = room.scenes.to_json(room.row)
-            self.fingerprint.add(description.encode())
-            for view in self.views:
-                row = {name: values[view] for name, values in room.pixels.items()}
-                row |= described(room.batch, room.first + view)
-                row |= {"object/visible_pixels": room.visible_pixels[view], "scene": description}
-                self.table.append(row)
+        """Write a row for each view of each scene, at least one."""
+        self.extend(pack_rooms(rooms, self.table.columns, self.table.compression))
+
+    def extend(self, rows: PackedRows) -> None:
+        """Write rows from `pack_rooms`."""
+        for text in rows.others["scene"][:: self.views]:
+            self.fingerprint.add(text.encode())
+        self.table.extend_packed(rows)
 
 
-def described(batch: SceneBatch, i: int) -> dict[str, Any]:
-    """Return what the row of image `i` holds that its scene says, by name of the dataset."""
-    spec, view = batch.spec, int(batch.view[i])
-    models = [batch.names[k] if k >= 0 else "" for k in batch.shape[i].tolist()]
-    classes = [name.partition("/")[0] for name in models]
+def pack_rooms(
+    rooms: Sequence[RenderedScene], columns: Sequence[Column], compression: str
+) -> PackedRows:
+    """Return a row for each view of each scene, at least one, packed to be written."""
+    views = len(rooms[0].visible_pixels)
+    rows: dict[str, Any] = _described(rooms, views)
+    for name in rooms[0].pixels:
+        rows[name] = [image for room in rooms for image in room.pixels[name]]
+    rows["object/visible_pixels"] = np.concatenate([room.visible_pixels for room in rooms])
+    rows["scene"] = [text for room in rooms for text in [room.scenes.to_json(room.row)] * views]
+    return pack_rows(rows, columns, compression)
+
+
+def _described(rooms: Sequence[RenderedScene], views: int) -> dict[str, Array]:
+    """Return what the rows hold that their scenes say, by name of the dataset."""
+    batches = {id(room.batch): room.batch for room in rooms}
+    images: dict[int, list[int]] = {key: [] for key in batches}
+    places: dict[int, list[int]] = {key: [] for key in batches}
+    for place, room in enumerate(rooms):
+        key = id(room.batch)
+        images[key] += range(room.first, room.first + views)
+        places[key] += range(place * views, (place + 1) * views)
+    parts = [described(batch, np.array(images[key])) for key, batch in batches.items()]
+    order = np.argsort([place for some in places.values() for place in some])
+    return {name: np.concatenate([part[name] for part in parts])[order] for name in parts[0]}
+
+
+def described(batch: SceneBatch, images: Array) -> dict[str, Array]:
+    """Return what rows hold that their scenes say, by name of the dataset: n rows of each.
+
+    `images` are the numbers of the rows' images in the batch, (n,).
+    """
+    spec = batch.spec
+    models = np.array([*batch.names, ""], object)  # -1, an unused slot, takes the last
+    classes = [spec.shapes.index(name.partition("/")[0]) for name in batch.names]
+    shape, view = batch.shape[images], batch.view[images]
     return {
-        "scene_index": batch.index[i],
+        "scene_index": batch.index[images],
         "view_index": view,
-        "view_angle_degrees": spec.views[view],
-        "camera/world_from_camera": batch.world_from_camera[i],
-        "camera/fov_y_degrees": batch.fov_y_degrees[i],
-        "light/count": batch.light_count[i],
-        "light/position": batch.light_position[i],
-        "light/color": batch.light_color[i],
-        "light/ambient": batch.ambient[i],
-        "light/attenuation": batch.attenuation[i],
-        "material/reflectance": batch.reflectance[i],
-        "material/specular": batch.gloss[i, :, 0],
-        "material/shininess": batch.gloss[i, :, 1],
-        "object/count": batch.object_count[i],
-        "object/shape": [spec.shapes.index(name) if name else -1 for name in classes],
-        "object/model": models,
-        "object/world_from_object": batch.world_from_object[i],
-        "object/scale": batch.object_scale[i],
+        "view_angle_degrees": np.array(spec.views)[view],
+        "camera/world_from_camera": batch.world_from_camera[images],
+        "camera/fov_y_degrees": batch.fov_y_degrees[images],
+        "light/count": batch.light_count[images],
+        "light/position": batch.light_position[images],
+        "light/color": batch.light_color[images],
+        "light/ambient": batch.ambient[images],
+        "light/attenuation": batch.attenuation[images],
+        "material/reflectance": batch.reflectance[images],
+        "material/specular": batch.gloss[images, :, 0],
+        "material/shininess": batch.gloss[images, :, 1],
+        "object/count": batch.object_count[images],
+        "object/shape": np.array([*classes, -1])[shape],
+        "object/model": models[shape],
+        "object/world_from_object": batch.world_from_object[images],
+        "object/scale": batch.object_scale[images],
     }
 
 

@@ -8,7 +8,7 @@ from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects
 from scenegen.sampling.scenes import MAX_ATTEMPTS, refusal, sample_scenes
 
-AHEAD = 256  # proposals drawn at once: with few, arrays are slow; with many, retries wait
+AHEAD = 512  # proposals drawn at once: with few, arrays are slow; with many, retries wait
 RETRIES = 3  # least number of attempts that are drawn at once for an item that needs another
 
 

@@ -34,14 +34,16 @@ from scenegen.common.hdf5.content import (
 )
 from scenegen.common.hdf5.input_file import StoredArray, reading
 from scenegen.common.new_file import written_beside
+from scenegen.common.worker_pool import processors
 
 Array = NDArray[Any]
 Spec = TypeVar("Spec")
 COMPRESSIONS = ("gzip", "lzf", "none")
 DEFLATE_LEVEL = 1
 CLOSING_SLACK = 8192  # bytes that HDF5 may need to close a file beyond what it says it needs
-MOST_PACKING = 256  # chunks that may wait to be written; bounds the memory
-PACKERS = min(8, os.cpu_count() or 1)  # threads that compress
+PACK_ROWS = 4  # whose images a thread compresses in one go
+MOST_PACKING = 128  # rows that may wait to be written; bounds the memory
+MOST_PACKERS = 8  # threads that compress
 BLOCK_ROWS = 1024  # rows of the small datasets that are kept and written together
 
 
@@ -68,12 +70,12 @@ class Column:
 
 
 class Table:
-    """Columns of equal length in one HDF5 group, filled row by row.
+    """Columns of equal length in one HDF5 group, filled in order.
 
     The bytes written depend on the rows alone, not on how many are appended at a time. Chunks are
-    compressed by threads of their own, which the GIL does not hold up, so a row may be written
-    after `append` returns; it must not change then. When the last row is appended, all are written,
-    and each dataset gets its digest (`content.column_digest`) as an attribute.
+    compressed by threads of their own, which the GIL does not hold up, so rows may be written
+    after `append` returns; they must not change then. When the last row is appended, all are
+    written, and each dataset gets its digest (`content.column_digest`) as an attribute.
     """
 
     def __init__(
@@ -85,35 +87,56 @@ class Table:
             raise SpecError("compression", repr(compression), known)
         if count < 0:
             raise SpecError("count", count, "0 or more")
-        self.count, self.rows = count, 0
-        self._columns, self._compression = columns, compression
+        self.count, self.rows, self._given = count, 0, 0
+        self.columns, self.compression = tuple(columns), compression
+        self._images = [column for column in columns if column.own_chunk]
         self._datasets = {column.name: self._create(group, column) for column in columns}
         self._block: dict[str, list[Any]] = {c.name: [] for c in columns if not c.own_chunk}
         self._digests = {column.name: ColumnDigest() for column in columns}
-        self._packing: deque[tuple[Column, int, Future[tuple[bytes, Any]]]] = deque()
+        self._packing: deque[Future[PackedRows]] = deque()
         if not count:
             self._write_digests()
 
     def append(self, row: Mapping[str, Any]) -> None:
         """Write the next row: one value for each column."""
-        for column in self._columns:
-            if column.own_chunk:
-                packed = _threads(os.getpid()).submit(self._packed, column, row[column.name])
-                self._packing.append((column, self.rows, packed))
-            else:
-                self._block[column.name].append(row[column.name])
-        self.rows += 1
-        last = self.rows == self.count
-        self.write_packed(0 if last else MOST_PACKING)
-        if self.rows % BLOCK_ROWS == 0 or last:
-            self._flush()
-        if last:
-            self._write_digests()
+        self.extend({name: [value] for name, value in row.items()})
+
+    def extend(self, rows: "Rows") -> None:
+        """Write the next rows, at least one: as many values for each column."""
+        count = len(next(iter(rows.values())))
+        for first in range(0, count, PACK_ROWS):
+            some = {name: values[first : first + PACK_ROWS] for name, values in rows.items()}
+            pack = _threads(os.getpid()).submit
+            self._packing.append(pack(pack_rows, some, self.columns, self.compression))
+        self._given += count
+        self.write_packed(0 if self._given == self.count else MOST_PACKING)
 
     def write_packed(self, waiting: int = 0) -> None:
-        """Write chunks until so many are left; needed only where fewer rows than `count` come."""
-        while len(self._packing) > waiting:
-            self._write_chunk(*self._packing.popleft())
+        """Write rows until about so many are left; needed only where fewer than `count` come."""
+        while len(self._packing) * PACK_ROWS > waiting:
+            self.extend_packed(self._packing.popleft().result())
+
+    def extend_packed(self, packed: "PackedRows") -> None:
+        """Write the next rows, which `pack_rows` packed for the columns of this table."""
+        for row, images in enumerate(packed.images, self.rows):
+            for column, (digest, chunk) in zip(self._images, images, strict=True):
+                self._digests[column.name].add(digest)
+                dataset = self._datasets[column.name]
+                if self.compression == "lzf":
+                    dataset[row] = chunk
+                else:
+                    dataset.id.write_direct_chunk((row, *(0 for _ in column.shape)), chunk)
+        first = 0
+        while first < packed.count:
+            room = BLOCK_ROWS - self.rows % BLOCK_ROWS
+            for name, values in packed.others.items():
+                self._block[name].extend(values[first : first + room])
+            self.rows += min(room, packed.count - first)
+            first += room
+            if self.rows % BLOCK_ROWS == 0 or self.rows == self.count:
+                self._flush()
+        if self.rows == self.count:
+            self._write_digests()
 
     def _write_digests(self) -> None:
         for name, digest in self._digests.items():
@@ -125,10 +148,10 @@ class Table:
         if self.count:
             chunk = 1 if column.own_chunk else min(self.count, BLOCK_ROWS)
             options["chunks"] = (chunk, *column.shape)
-        if self.count and column.own_chunk and self._compression != "none":
-            options["compression"] = self._compression
+        if self.count and column.own_chunk and self.compression != "none":
+            options["compression"] = self.compression
             options["shuffle"] = _is_shuffled(column)
-            if self._compression == "gzip":
+            if self.compression == "gzip":
                 options["compression_opts"] = DEFLATE_LEVEL
         dtype = h5py.string_dtype() if text else column.dtype
         dataset = group.create_dataset(column.name, (self.count, *column.shape), dtype, **options)
@@ -136,26 +159,6 @@ class Table:
         if column.axes is not None:
             name_axes(group, dataset, ("row", *column.axes))
         return dataset
-
-    def _packed(self, column: Column, values: Any) -> tuple[bytes, Any]:
-        """Return a row's digest, and its chunk's bytes; for lzf, which h5py packs, the row."""
-        raw = np.ascontiguousarray(values, column.dtype)
-        packed: Any = raw
-        if self._compression == "gzip":
-            plain = shuffle_bytes(raw) if _is_shuffled(column) else raw
-            packed = isal_zlib.compress(plain, DEFLATE_LEVEL)
-        elif self._compression == "none":
-            packed = raw.tobytes()
-        return row_digest(raw), packed
-
-    def _write_chunk(self, column: Column, row: int, packing: Future[tuple[bytes, Any]]) -> None:
-        digest, packed = packing.result()
-        self._digests[column.name].add(digest)
-        dataset = self._datasets[column.name]
-        if self._compression == "lzf":
-            dataset[row] = packed
-        else:
-            dataset.id.write_direct_chunk((row, *(0 for _ in column.shape)), packed)
 
     def _flush(self) -> None:
         for name, rows in self._block.items():
@@ -168,6 +171,42 @@ class Table:
                 rows.clear()
 
 
+Rows = Mapping[str, Sequence[Any] | Array]  # values of as many rows for each column
+
+
+@dataclass(frozen=True, eq=False)
+class PackedRows:
+    """Rows ready to be written; other processes may have made them.
+
+    Attributes:
+        count: number of rows.
+        images: of each row, the digest and the chunk's bytes of each column with own chunks.
+        others: values of the other columns by name.
+    """
+
+    count: int
+    images: list[list[tuple[bytes, Any]]]
+    others: Rows
+
+
+def pack_rows(rows: Rows, columns: Sequence[Column], compression: str) -> PackedRows:
+    """Compress the images of rows, and compute their digests."""
+    count = len(next(iter(rows.values())))
+    images: list[list[tuple[bytes, Any]]] = [[] for _ in range(count)]
+    for column in columns:
+        for row, value in zip(images, rows[column.name], strict=True) if column.own_chunk else ():
+            raw = np.ascontiguousarray(value, column.dtype)
+            packed: Any = raw  # for lzf, which h5py packs
+            if compression == "gzip":
+                plain = shuffle_bytes(raw) if _is_shuffled(column) else raw
+                packed = isal_zlib.compress(plain, DEFLATE_LEVEL)
+            elif compression == "none":
+                packed = raw.tobytes()
+            row.append((row_digest(raw), packed))
+    others = {column.name: rows[column.name] for column in columns if not column.own_chunk}
+    return PackedRows(count, images, others)
+
+
 def _is_shuffled(column: Column) -> bool:
     return column.shuffle and np.dtype(column.dtype).itemsize > 1
 
@@ -175,7 +214,7 @@ def _is_shuffled(column: Column) -> bool:
 @cache
 def _threads(_pid: int) -> ThreadPoolExecutor:
     """Return this process's threads; those of a parent do not live on in a forked child."""
-    return ThreadPoolExecutor(PACKERS, thread_name_prefix="pack")
+    return ThreadPoolExecutor(min(MOST_PACKERS, processors()), thread_name_prefix="pack")
 
 
 @contextmanager

@@ -45,7 +45,8 @@ class MemberCache:
     """Members in a folder, and those used last in memory. Several threads may share it.
 
     Attributes:
-        folder: where the files are; None to keep none.
+        home: the folder that was given; None to keep no files.
+        folder: where in it the files are.
     """
 
     def __init__(self, folder: str | Path | None = None) -> None:
@@ -56,7 +57,8 @@ class MemberCache:
 
     def use(self, folder: str | Path | None) -> None:
         """Keep files in this folder from now on, or none."""
-        self.folder = None if folder is None else Path(folder) / f"members-{code_version()}"
+        self.home = None if folder is None else Path(folder)
+        self.folder = None if self.home is None else self.home / f"members-{code_version()}"
         self._writes = folder is not None
 
     def outline(self, family: str, number: int) -> tuple[UnitShape, int]:

@@ -3,6 +3,7 @@
 import threading
 from collections import OrderedDict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +32,10 @@ class MeshStore:
         self._shapes: OrderedDict[str, UnitShape] = OrderedDict()
         self._faces = 0
         self._lock = threading.Lock()
+
+    def __reduce__(self) -> Any:
+        """Pickle what was told; another process loads its own models, and finds their problems."""
+        return MeshStore, (self.folder, self._cache.folder), {"problems": self.problems}
 
     def shape(self, name: str) -> UnitShape:
         """Return the model named "class/id" as a unit shape with flat faces, resting on its base.
