@@ -106,7 +106,13 @@ option = partial(click.option, show_default=True)
 )
 @option("--with-depth", is_flag=True, help="Store planar depth as well.")
 @command_line.COMPRESSION
-@option("--batch", type=click.IntRange(1, 4096), default=64, help="Questions rendered at once.")
+@option(
+    "--batch",
+    type=click.IntRange(1, 4096),
+    default=64,
+    help="Questions that a process renders at once.",
+)
+@command_line.WORKERS
 @command_line.DEVICE
 @command_line.OVERWRITE
 def make_split(
@@ -114,6 +120,7 @@ def make_split(
     preset: str,
     size: tuple[int, int],
     batch: int,
+    workers: int,
     device: str,
     compression: str,
     overwrite: bool,
@@ -151,6 +158,7 @@ def make_split(
             out,
             spec,
             batch=batch,
+            workers=workers,
             device=device,
             compression=compression,
             overwrite=overwrite,

@@ -49,23 +49,26 @@ def render_questions(
     first: int,
     count: int,
     *,
+    rows: range | None = None,
     batch: int = DEFAULT_BATCH,
     device: str = "auto",
     tally: Tally | None = None,
 ) -> Iterator[list[Rendered]]:
     """Yield questions first .. first + count - 1 of a split in order, at most `batch` at a time.
 
-    The positions of the right answers are balanced over just these questions.
+    The positions of the right answers are balanced over just these questions. Of these, only `rows`
+    are made where they are given; 0 is the first of them.
 
     Raises PlacementError where the bounded search finds no question that meets the spec.
     """
     tally = tally or Tally()
     places = answer_positions(spec, split, first, count)
     pending = deque[Fetch]()
-    starts = [0, *range(min(FIRST_SAMPLED, count), count, SAMPLED), count]
+    begin, end = (rows.start, rows.stop) if rows else (0, count)
+    few = SAMPLED if begin else FIRST_SAMPLED
+    starts = [begin, *range(min(begin + few, end), end, SAMPLED), end]
     for start, stop in itertools.pairwise(starts):
-        rows = range(start, stop)
-        requests = [(first + i, int(places[i]), 0) for i in rows]
+        requests = [(first + i, int(places[i]), 0) for i in range(start, stop)]
         sampled = sample_questions(spec, pools, split, requests, tally)
         for i in range(0, len(sampled), batch):
             pending.append(_launch(spec, sampled[i : i + batch], device))

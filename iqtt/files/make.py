@@ -1,29 +1,30 @@
-"""Make the files of a split: draw, render and write questions, the three at the same time."""
+"""Make the files of a split: draw, render, pack and write questions, all at the same time."""
 
-from collections import deque
-from collections.abc import Callable, Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
-from dataclasses import replace
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import h5py
 
 from iqtt.files.layout import root_attributes
-from iqtt.files.writer import QuestionsWriter
-from iqtt.questions.distractors import make_pools
-from iqtt.questions.specs import SUITE, SplitSpec
+from iqtt.files.writer import PackedQuestions, QuestionsWriter, pack_questions
+from iqtt.questions.distractors import Pools, make_pools
+from iqtt.questions.specs import SPLITS, SUITE, SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import DEFAULT_BATCH, Rendered, groups, render_questions
 from scenegen.common.hdf5.content import seal
-from scenegen.common.hdf5.row_file import new_file
+from scenegen.common.hdf5.row_file import new_file, packing_threads
 from scenegen.common.new_folder import check_folder, folder_written_beside
 from scenegen.common.records import check
+from scenegen.common.worker_pool import in_processes, in_threads, processors
 from scenegen.rendering.backend import select_variant, versions
+from scenegen.rendering.renderer import use_threads, useful_workers
 
 FILES = ("iqtt-train.h5", "iqtt-val.h5", "iqtt-test.h5", "iqtt-test-answers.h5")
-MOST_WAITING = 2  # batches that may wait to be written
+BLOCK = 128  # questions that a worker process makes in one go
+PACKED = 8  # questions that a thread packs in one go
 
 
 def make_split(
@@ -31,6 +32,7 @@ def make_split(
     spec: SplitSpec,
     *,
     batch: int = DEFAULT_BATCH,
+    workers: int = 1,
     device: str = "auto",
     overwrite: bool = False,
     compression: str = "gzip",
@@ -45,6 +47,7 @@ def make_split(
 
     Args:
         batch: questions in one wavefront; bounds the memory, never changes a byte of the files.
+        workers: processes that render, as in `rooms.make.make_dataset`.
         device, compression: as in `backend.DEVICES` and `row_file.COMPRESSIONS`.
         command: what to record as the command that made the files.
         secret: keep the seed out of the file of the test answers too.
@@ -59,37 +62,104 @@ def make_split(
     """
     count = spec.train + spec.val + spec.test
     check(count > 0, "train, val and test", count, "at least 1 question in all")
+    variant = select_variant(device)
+    workers = workers or useful_workers(count * (1 + spec.answers), variant)
     with folder_written_beside(folder, FILES, overwrite) as temporary:
-        renderer = {"variant": select_variant(device), **versions()}
-        pools, tally = make_pools(spec), Tally()
+        renderer = {"variant": variant, **versions()}
+        tally = Tally()
         public = root_attributes(spec.public(), renderer, "")
         private = root_attributes(spec.public() if secret else spec, renderer, command)
+        work = _Work(spec, make_pools(spec), batch, workers, device, compression)
+        made = work.in_blocks(tally) if workers > 1 else work.here(tally)
 
         def write(split: str, images_file: h5py.File, truth_file: h5py.File) -> None:
-            for part, (first, count) in groups(spec, split).items():
+            for part, (_, count) in groups(spec, split).items():
                 writer = QuestionsWriter(
                     images_file, truth_file, spec, split, part, count, compression
                 )
-                rendered = render_questions(
-                    spec, pools, split, first, count, batch=batch, device=device, tally=tally
-                )
-                _append_all(writer, rendered, progress)
+                while writer.rows < count:
+                    some = next(made)
+                    writer.extend(some)
+                    progress(some.count)
                 writer.close()
             for file in {images_file, truth_file}:
                 seal(file)
 
-        for split in ("train", "val"):
-            with new_file(temporary / f"iqtt-{split}.h5") as file:
-                file.attrs.update({**public, "split": split})
-                write(split, file, file)
-        with (
-            new_file(temporary / "iqtt-test.h5") as test,
-            new_file(temporary / "iqtt-test-answers.h5") as answers,
-        ):
-            test.attrs.update({**public, "split": "test"})
-            answers.attrs.update({**private, "split": "test"})
-            write("test", test, answers)
+        with closing(made):
+            for split in ("train", "val"):
+                with new_file(temporary / f"iqtt-{split}.h5") as file:
+                    file.attrs.update({**public, "split": split})
+                    write(split, file, file)
+            with (
+                new_file(temporary / "iqtt-test.h5") as test,
+                new_file(temporary / "iqtt-test-answers.h5") as answers,
+            ):
+                test.attrs.update({**public, "split": "test"})
+                answers.attrs.update({**private, "split": "test"})
+                write("test", test, answers)
     return tally
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Some rows of a part of a split, which begins with question `first` and has `count`."""
+
+    split: str
+    part: str
+    first: int
+    count: int
+    rows: range
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """What is done to questions, here or in another process."""
+
+    spec: SplitSpec
+    pools: Pools
+    batch: int
+    workers: int
+    device: str
+    compression: str
+
+    def blocks(self, size: int) -> Iterator[_Block]:
+        """Cut all parts of all splits into blocks of questions."""
+        for split in SPLITS:
+            for part, (first, count) in groups(self.spec, split).items():
+                for start in range(0, count, size):
+                    yield _Block(split, part, first, count, range(start, min(start + size, count)))
+
+    def questions(self, block: _Block, tally: Tally) -> Generator[PackedQuestions]:
+        """Render questions in order, and meanwhile pack them in threads."""
+        rendered = render_questions(
+            self.spec, self.pools, block.split, block.first, block.count,
+            rows=block.rows, batch=self.batch, device=self.device, tally=tally,
+        )  # fmt: skip
+        pieces = (some[i : i + PACKED] for some in rendered for i in range(0, len(some), PACKED))
+
+        def packed(questions: list[Rendered]) -> PackedQuestions:
+            return pack_questions(self.spec, block.part, questions, self.compression)
+
+        ahead = 2 * self.batch // PACKED
+        return in_threads(packed, pieces, packing_threads(self.workers), ahead)
+
+    def here(self, tally: Tally) -> Generator[PackedQuestions]:
+        """Yield all questions, made in this process."""
+        for block in self.blocks(self.spec.train + self.spec.val + self.spec.test):
+            yield from self.questions(block, tally)
+
+    def in_blocks(self, tally: Tally) -> Generator[PackedQuestions]:
+        """Yield all questions, made by processes a block at a time."""
+        for questions, found in in_processes(self.block, self.blocks(BLOCK), self.workers):
+            tally.proposed += found.proposed
+            tally.refused += found.refused
+            yield from questions
+
+    def block(self, block: _Block) -> tuple[list[PackedQuestions], Tally]:
+        """Return the questions of a block; to be called by a worker."""
+        use_threads(max(1, processors() // self.workers), self.device)
+        tally = Tally()
+        return list(self.questions(block, tally)), tally
 
 
 def make_suite(
@@ -131,17 +201,3 @@ def make_suite(
         with suppress(OSError):  # it stays if anything is in it
             home.rmdir()
     return total
-
-
-def _append_all(
-    writer: QuestionsWriter, batches: Iterable[list[Rendered]], progress: Callable[[int], Any]
-) -> None:
-    """Write batches in a thread of its own, while the next ones are rendered."""
-    with ThreadPoolExecutor(1) as pool:
-        writing: deque[Future[int]] = deque()
-        for rendered in batches:
-            writing.append(pool.submit(writer.append, rendered))
-            if len(writing) > MOST_WAITING:
-                progress(writing.popleft().result())
-        while writing:
-            progress(writing.popleft().result())

@@ -2,10 +2,12 @@
 
 import hashlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from iqtt.files.layout import (
     ID_BYTES,
@@ -21,9 +23,13 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.render import Rendered
 from iqtt.shapes.polycube import canonical, canonical_class, set_ids
 from scenegen.common.hdf5.content import SHA256, joint_digest
-from scenegen.common.hdf5.row_file import Table
+from scenegen.common.hdf5.row_file import Column, PackedRows, Table, pack_rows
 from scenegen.layout import TRUTH_DIGEST
 
+OF_QUESTION = (
+    *("world_from_shape", "light_count", "light_position", "light_color"),
+    *("angle_degrees", "camera_distance"),
+)
 FINGERPRINTED = ("cubes", "world_from_shape", "light_position", "light_color")
 
 
@@ -53,26 +59,29 @@ class QuestionsWriter:
         """
         self._spec, self._part = spec, part
         self._files = (images_file, truth_file)
-        answers = [] if part == "unlabeled" else [answer_column()]
         truth = truth_file.require_group(f"truth/{part}")
         truth.attrs.update(truth_attributes(spec))
-        images = images_file.require_group(part or "/")
-        self._images = Table(images, question_columns(spec), count, compression)
-        self._truth = Table(truth, truth_columns(spec), count, compression)
-        self._answers = Table(truth_file.require_group(part or "/"), answers, count, compression)
+        groups = (
+            images_file.require_group(part or "/"),
+            truth,
+            truth_file.require_group(part or "/"),
+        )
+        self._tables = [
+            Table(group, columns, count, compression)
+            for group, columns in zip(groups, _columns(spec, part), strict=True)
+        ]
         self._digest = hashlib.sha256(f"{spec.public().to_json()} {split} {part}".encode())
 
-    def append(self, questions: Sequence[Rendered]) -> int:
-        """Write the next questions; return their number."""
-        for one, row in zip(questions, _truth_rows(self._spec, questions), strict=True):
-            answer = one.question.shapes.answer
-            for name in FINGERPRINTED:
-                self._digest.update(np.ascontiguousarray(row[name]).tobytes())
-            self._digest.update(bytes([answer]))
-            self._images.append({"questions": one.images})
-            self._truth.append(row)
-            self._answers.append({"answers": answer})
-        return len(questions)
+    @property
+    def rows(self) -> int:
+        """The number of questions that are written."""
+        return self._tables[0].rows
+
+    def extend(self, questions: "PackedQuestions") -> None:
+        """Write the next questions."""
+        self._digest.update(questions.fingerprinted)
+        for table, rows in zip(self._tables, questions.rows, strict=True):
+            table.extend_packed(rows)
 
     def close(self) -> None:
         """Write the fingerprint, and beside answers the digest of what scores depend on."""
@@ -85,8 +94,44 @@ class QuestionsWriter:
             truth_file.attrs[named(TRUTH_DIGEST, self._part)] = joint_digest(scored)
 
 
-def _truth_rows(spec: SplitSpec, rendered: Sequence[Rendered]) -> list[dict[str, Any]]:
-    """Return the values of `truth_columns` for each question."""
+@dataclass(frozen=True, eq=False)
+class PackedQuestions:
+    """Questions ready to be written; other processes may have made them.
+
+    Attributes:
+        count: number of questions.
+        rows: of the images, of the truth and of the answers.
+        fingerprinted: what goes into the fingerprint.
+    """
+
+    count: int
+    rows: tuple[PackedRows, ...]
+    fingerprinted: bytes
+
+
+def pack_questions(
+    spec: SplitSpec, part: str, questions: Sequence[Rendered], compression: str
+) -> PackedQuestions:
+    """Pack questions, at least one, of the part of a split that `QuestionsWriter` tells of."""
+    truth = _truth(spec, questions)
+    answers = np.array([one.question.shapes.answer for one in questions], np.uint8)
+    rows = ({"questions": [one.images for one in questions]}, truth, {"answers": answers})
+    packed = tuple(
+        pack_rows(values, columns, compression)
+        for values, columns in zip(rows, _columns(spec, part), strict=True)
+    )
+    marks = zip(*(truth[name] for name in FINGERPRINTED), answers, strict=True)
+    fingerprinted = b"".join(value.tobytes() for row in marks for value in row)
+    return PackedQuestions(len(questions), packed, fingerprinted)
+
+
+def _columns(spec: SplitSpec, part: str) -> tuple[list[Column], list[Column], list[Column]]:
+    answers = [] if part == "unlabeled" else [answer_column()]
+    return question_columns(spec), truth_columns(spec), answers
+
+
+def _truth(spec: SplitSpec, rendered: Sequence[Rendered]) -> dict[str, Any]:
+    """Return the values of `truth_columns`, for each question."""
     most, images = spec.cubes[1], 1 + spec.answers
     cubes = np.full((len(rendered), images, most, 3), NO_CUBE, np.int8)
     shape_ids, class_ids = np.zeros((2, len(rendered), images, ID_BYTES), np.uint8)
@@ -97,21 +142,18 @@ def _truth_rows(spec: SplitSpec, rendered: Sequence[Rendered]) -> list[dict[str,
         flat = cubes[rows, :, :count].reshape(-1, count, 3)
         for ids, form in ((shape_ids, canonical), (class_ids, canonical_class)):
             ids[rows] = set_ids(form(flat)).view(np.uint8).reshape(-1, images, ID_BYTES)
-    return [
-        {
-            "cube_count": counts[i],
-            "cubes": cubes[i],
-            "shape_id": shape_ids[i],
-            "class_id": class_ids[i],
-            "world_from_shape": one.question.world_from_shape,
-            "light_count": one.question.light_count,
-            "light_position": one.question.light_position,
-            "light_color": one.question.light_color,
-            "distractor_kind": one.question.shapes.kinds,
-            "angle_degrees": one.question.angle_degrees,
-            "visible_pixels": one.visible_pixels,
-            "camera_distance": one.question.camera_distance,
-            "depth": one.depth,
-        }
-        for i, one in enumerate(rendered)
-    ]
+    questions = [one.question for one in rendered]
+
+    def each(name: str) -> NDArray[Any]:
+        return np.array([getattr(question, name) for question in questions])
+
+    return {
+        "cube_count": counts,
+        "cubes": cubes,
+        "shape_id": shape_ids,
+        "class_id": class_ids,
+        **{name: each(name) for name in OF_QUESTION},
+        "distractor_kind": np.array([question.shapes.kinds for question in questions]),
+        "visible_pixels": np.array([one.visible_pixels for one in rendered]),
+        "depth": [one.depth for one in rendered],
+    }

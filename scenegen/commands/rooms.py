@@ -19,6 +19,7 @@ from scenegen.common.command_line import (
     MESHES,
     OVERWRITE,
     SEED,
+    WORKERS,
     Color,
     Items,
     Names,
@@ -92,8 +93,7 @@ from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_co
 @COMPRESSION
 @click.option("--batch", type=int, default=64, show_default=True,
               help="Images that a process renders at once; more take more memory.")
-@click.option("--workers", type=int, default=0, show_default="one a processor, up to 8",
-              help="Processes that render; each takes about 0.4 GiB.")
+@WORKERS
 @DEVICE
 @OVERWRITE
 def render(

@@ -22,6 +22,7 @@ NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
 LONGEST_ERROR = 2000  # characters; what a file holds may be of any length
 LARGEST = 2**63 - 1  # whole number that files can hold
 MOST_PROCESSES = 1024
+WITHOUT_EFFECT = ("--batch", "--workers")  # options that change no byte of what is made
 MOST_ITEMS = 1_000_000  # numbers of a range; keeps 0-99999999999 from filling the memory
 
 
@@ -233,12 +234,14 @@ def print_line(text: str, err: bool = False) -> None:
 
 
 def creation_command(program: str) -> str:
-    """Return the command line for a file to record, without the batch, which changes no byte."""
-    words = [program, *sys.argv[1:]]
-    while "--batch" in words:
-        at = words.index("--batch")
-        del words[at : at + 2]
-    return " ".join(word for word in words if not word.startswith("--batch="))
+    """Return the command line for a file to record, without options that change no byte."""
+    words, recorded = iter(sys.argv[1:]), [program]
+    for word in words:
+        if word in WITHOUT_EFFECT:
+            next(words, None)
+        elif word.partition("=")[0] not in WITHOUT_EFFECT:
+            recorded.append(word)
+    return " ".join(recorded)
 
 
 def progress_bar(count: int | None, unit: str) -> Any:
@@ -254,6 +257,9 @@ def progress_bar(count: int | None, unit: str) -> Any:
 
 
 # fmt: off
+WORKERS = click.option("--workers", type=click.IntRange(0, 256), default=0,
+                       show_default="one a processor, up to 8",
+                       help="Processes that render; each takes about 0.4 GiB.")
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 DEVICE = click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
                       show_default=True,

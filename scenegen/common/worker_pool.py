@@ -1,12 +1,13 @@
-"""Pools of worker processes that end with the process that started them, however that ends."""
+"""Work in threads and processes; processes end with the one that started them, however it ends."""
 
 import multiprocessing
 import os
 import signal
 import threading
+import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing.context import SpawnContext, SpawnProcess
@@ -15,6 +16,7 @@ from typing import Any, TypeVar
 from scenegen.common.errors import SceneGenError
 
 T = TypeVar("T")
+Task = TypeVar("Task")
 AHEAD = 2  # tasks for each process that are begun, or done and not yet taken
 
 
@@ -51,13 +53,15 @@ class _Spawning(SpawnContext):
 
 
 @contextmanager
-def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
+def worker_pool(
+    count: int, function: Callable[[Any], Any] | None = None
+) -> Iterator[ProcessPoolExecutor]:
     """Open a pool of spawned processes: forked ones would share open files and threads' locks.
 
     The block waits for them at its end. Where it ends by an error, they are killed instead.
     """
     context = _Spawning()
-    with ProcessPoolExecutor(count, context, initializer=_follow_parent) as pool:
+    with ProcessPoolExecutor(count, context, _begin, (function,)) as pool:
         try:
             yield pool
         except BaseException:
@@ -67,25 +71,50 @@ def worker_pool(count: int) -> Iterator[ProcessPoolExecutor]:
             raise
 
 
-def in_processes(
-    function: Callable[..., T], tasks: Iterable[tuple[Any, ...]], count: int
-) -> Iterator[T]:
-    """Call a function with the arguments of each task, in `count` processes; yield in order.
+def in_threads(
+    function: Callable[[Task], T], tasks: Iterable[Task], count: int, ahead: int
+) -> Generator[T]:
+    """Call a function for each task, in `count` threads; yield the results in order.
 
-    No more than AHEAD tasks for each process are begun before their results are taken. Raises what
-    the function raises, and SceneGenError where a process ends by itself.
+    The tasks are made in the caller's thread. At most `ahead` of them wait for one of the threads,
+    or to be taken. Raises what the function raises.
+    """
+    with ThreadPoolExecutor(count) as pool:
+        running: deque[Future[T]] = deque()
+        for task in tasks:
+            running.append(pool.submit(function, task))
+            if len(running) > ahead:
+                yield running.popleft().result()
+        while running:
+            yield running.popleft().result()
+
+
+def in_processes(function: Callable[[Task], T], tasks: Iterable[Task], count: int) -> Generator[T]:
+    """Call a function for each task, in `count` processes; yield the results in order.
+
+    The function is pickled once for each process. At most AHEAD tasks for each process are begun
+    before their results are taken. Warnings are given again here, where Python drops repeated ones.
+
+    Raises what the function raises, and SceneGenError where a process ends by itself.
     """
     done = False
     try:
-        with worker_pool(count) as pool:
-            running: deque[Future[T]] = deque()
+        with worker_pool(count, function) as pool:
+            running: deque[Future[tuple[T, list[_Warned]]]] = deque()
+
+            def oldest() -> T:
+                result, warned = running.popleft().result()
+                for text, category in warned:
+                    warnings.warn(text, category, stacklevel=3)
+                return result
+
             for task in tasks:
-                running.append(pool.submit(function, *task))
+                running.append(pool.submit(_do, task))
                 if len(running) >= AHEAD * count:
-                    yield running.popleft().result()
+                    yield oldest()
                     done = True
             while running:
-                yield running.popleft().result()
+                yield oldest()
                 done = True
     except BrokenProcessPool as error:
         short = "memory may be short: use fewer workers"
@@ -94,8 +123,19 @@ def in_processes(
         raise SceneGenError("worker processes", "one that was killed", "", hint) from error
 
 
-def _follow_parent() -> None:
-    """End this process when the one that started it is gone."""
+_Warned = tuple[str, type[Warning]]
+_work: list[Callable[[Any], Any]] = []  # of this process, if it is a worker of `in_processes`
+
+
+def _do(task: Any) -> tuple[Any, list[_Warned]]:
+    with warnings.catch_warnings(record=True) as caught:
+        result = _work[0](task)
+    return result, [(str(one.message), one.category) for one in caught]
+
+
+def _begin(function: Callable[[Any], Any] | None) -> None:
+    """Keep what this process is to do, and end it when the one that started it is gone."""
+    _work[:] = [] if function is None else [function]
     threading.Thread(target=_end_after_parent, daemon=True).start()
 
 

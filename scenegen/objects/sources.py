@@ -34,7 +34,7 @@ class ObjectSource:
 
     def notes(self) -> list[str]:
         """Return lines that name the models refused so far, with reasons."""
-        problems = list(self.store.problems.items()) if self.store else []
+        problems = sorted(self.store.problems.items()) if self.store else []
         lines = [f"note: {name} was passed over: {why}" for name, why in problems[:NOTES_SHOWN]]
         if len(problems) > NOTES_SHOWN:
             more = len(problems) - NOTES_SHOWN

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.errors import BackendError
+from scenegen.common.worker_pool import processors
 from scenegen.objects.catalogue import face_count
 from scenegen.objects.solids import UnitShape
 from scenegen.rendering.backend import HOW_TO_GET_LLVM, select_variant
@@ -18,8 +19,19 @@ from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.surfaces.in_numpy import cast_at_surface
 
 Array = NDArray[Any]
+MOST_WORKERS = 8  # that are used unasked; each takes about 0.4 GiB
+WORTHWHILE = 2000  # images for each worker; below, starting it takes longer than it saves
 MOST_FACES = 2_000_000  # of the models in one Mitsuba scene
 MOST_MODELS = 2000  # in one Mitsuba scene; must not exceed `model_scene.MOST_MODELS`
+
+
+def useful_workers(images: int, variant: str) -> int:
+    """Return how many processes should render so many images.
+
+    One for each processor, as far as each has enough to do; a GPU has enough to do with one.
+    """
+    most = 1 if variant == "cuda_ad_rgb" else min(processors(), MOST_WORKERS)
+    return max(1, min(most, images // WORTHWHILE))
 
 
 def use_threads(count: int, device: str = "auto") -> None:

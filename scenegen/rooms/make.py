@@ -5,12 +5,8 @@ each worker process takes its own block of scenes through all of them but the la
 grow with the number of scenes.
 """
 
-import functools
-import pickle
-import warnings
-from collections import deque
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.hdf5.row_file import MOST_PACKERS, PackedRows
+from scenegen.common.hdf5.row_file import PackedRows, packing_threads
 from scenegen.common.new_file import check_writable
 from scenegen.common.records import check
-from scenegen.common.worker_pool import in_processes, processors
+from scenegen.common.worker_pool import in_processes, in_threads, processors
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec
 from scenegen.layout import columns
@@ -30,7 +26,7 @@ from scenegen.objects.families.cache import MEMBERS_KEPT
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.ground_truth import GroundTruth, visible_pixels
 from scenegen.rendering.packing import SceneBatch, pack_arrays
-from scenegen.rendering.renderer import launch, use_threads
+from scenegen.rendering.renderer import launch, use_threads, useful_workers
 from scenegen.rooms.writer import RenderedScene, create_rooms, pack_rooms
 from scenegen.sampling.proposals import ProposalQueue
 
@@ -39,10 +35,8 @@ DEFAULT_BATCH = 64
 MAX_BATCH = 4096
 MAX_RAYS = 2**28  # pixels of one batch; they take 8 GiB
 MAX_WORKERS = 256
-MOST_WORKERS = 8  # that are used unasked; each takes about 0.4 GiB
-WORTHWHILE = 1000  # images for each worker; below, starting it takes longer than it saves
-BLOCK = 512  # images that a worker makes in one go
-PACKED = 16  # scenes that are packed in one go
+BLOCK = 512  # images that a worker process makes in one go
+PACKED = 16  # scenes that a thread packs in one go
 WINDOW = 8  # batches that may be begun while the oldest item is still being proposed again
 
 _Begun = tuple[SceneArrays, SceneBatch, Callable[[], GroundTruth]]  # a batch being rendered
@@ -86,89 +80,59 @@ def make_dataset(
     check_writable(Path(path), overwrite)
     variant = select_variant(device)
     objects = objects or objects_of(spec)
-    workers = workers or _enough_workers(spec, count, variant)
+    workers = workers or useful_workers(count * len(spec.views), variant)
     attributes = {"creation_command": command, "variant": variant, **versions()}
     with create_rooms(
         path, spec, count, compression=compression, overwrite=overwrite, attributes=attributes
     ) as writer:
-        work = _Work(spec, batch, device, objects, compression, MEMBERS_KEPT.home)
-        for rows in work.blocks(count, workers) if workers > 1 else work.rows(range(count)):
-            writer.extend(rows)
-            progress(rows.count)
+        work = _Work(spec, batch, workers, device, objects, compression, MEMBERS_KEPT.home)
+        made = work.in_blocks(count) if workers > 1 else work.rows(range(count))
+        with closing(made):
+            for rows in made:
+                writer.extend(rows)
+                progress(rows.count)
 
 
 @dataclass(frozen=True, eq=False)
 class _Work:
-    """What is done to each block of scenes, here or in another process."""
+    """What is done to scenes, here or in another process."""
 
     spec: DatasetSpec
     batch: int
+    workers: int
     device: str
     objects: Objects
     compression: str
     cache_dir: Path | None
 
-    def rows(self, indices: range, workers: int = 1) -> Iterator[PackedRows]:
+    def rows(self, indices: range) -> Generator[PackedRows]:
         """Render scenes in order, and meanwhile pack their rows in threads."""
         fields = columns(self.spec)
-        packers = max(1, min(MOST_PACKERS, processors() // workers))
-        with ThreadPoolExecutor(packers, "pack") as threads:
-            packing: deque[Future[PackedRows]] = deque()
-            for items in render_items(self.spec, indices, self.batch, self.device, self.objects):
-                for first in range(0, len(items), PACKED):
-                    some = items[first : first + PACKED]
-                    packing.append(threads.submit(pack_rooms, some, fields, self.compression))
-                while len(packing) * PACKED > 2 * self.batch:
-                    yield packing.popleft().result()
-            while packing:
-                yield packing.popleft().result()
+        pieces = (
+            items[first : first + PACKED]
+            for items in render_items(self.spec, indices, self.batch, self.device, self.objects)
+            for first in range(0, len(items), PACKED)
+        )
 
-    def blocks(self, count: int, workers: int) -> Iterator[PackedRows]:
+        def packed(rooms: list[RenderedScene]) -> PackedRows:
+            return pack_rooms(rooms, fields, self.compression)
+
+        ahead = 2 * self.batch // PACKED
+        return in_threads(packed, pieces, packing_threads(self.workers), ahead)
+
+    def in_blocks(self, count: int) -> Generator[PackedRows]:
         """Let processes render scenes 0 .. count - 1, a block at a time; yield rows in order."""
         step = max(1, BLOCK // len(self.spec.views))
         blocks = (range(i, min(i + step, count)) for i in range(0, count, step))
-        pickled = pickle.dumps(self)
-        tasks = ((pickled, block, workers) for block in blocks)
-        for done in in_processes(_render_block, tasks, workers):
-            self.objects.problems.update(done.problems)
-            for text, category in done.warned:
-                warnings.warn(text, category, stacklevel=3)
-            yield from done.rows
+        for rows, problems in in_processes(self.block, blocks, self.workers):
+            self.objects.problems.update(problems)
+            yield from rows
 
-
-@dataclass(frozen=True, eq=False)
-class _Done:
-    """A block's rows, the models that were refused with reasons, and what was warned of."""
-
-    rows: list[PackedRows]
-    problems: dict[str, str]
-    warned: list[tuple[str, type[Warning]]]
-
-
-def _render_block(pickled: bytes, block: range, workers: int) -> _Done:
-    work = _work_of_this_process(pickled)
-    with warnings.catch_warnings(record=True) as caught:
-        use_threads(max(1, processors() // workers), work.device)
-        rows = list(work.rows(block, workers))
-    warned = [(str(one.message), one.category) for one in caught]
-    return _Done(rows, dict(work.objects.problems), warned)
-
-
-@functools.lru_cache(maxsize=1)
-def _work_of_this_process(pickled: bytes) -> _Work:
-    """Return the same objects for each block, as they keep models in memory."""
-    work: _Work = pickle.loads(pickled)
-    MEMBERS_KEPT.use(work.cache_dir)
-    return work
-
-
-def _enough_workers(spec: DatasetSpec, count: int, variant: str) -> int:
-    """Return how many processes to use: one a processor, as far as each has enough to do.
-
-    A GPU has enough to do with one.
-    """
-    most = 1 if variant == "cuda_ad_rgb" else min(processors(), MOST_WORKERS)
-    return max(1, min(most, count * len(spec.views) // WORTHWHILE))
+    def block(self, indices: range) -> tuple[list[PackedRows], dict[str, str]]:
+        """Return the rows of scenes, and why models were refused; to be called by a worker."""
+        MEMBERS_KEPT.use(self.cache_dir)
+        use_threads(max(1, processors() // self.workers), self.device)
+        return list(self.rows(indices)), self.objects.problems
 
 
 def render_items(

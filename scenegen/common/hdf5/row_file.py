@@ -39,7 +39,7 @@ from scenegen.common.worker_pool import processors
 Array = NDArray[Any]
 Spec = TypeVar("Spec")
 COMPRESSIONS = ("gzip", "lzf", "none")
-DEFLATE_LEVEL = 1
+DEFLATE_LEVEL = 2  # at 1, one image in some 10,000 was packed otherwise in another run
 CLOSING_SLACK = 8192  # bytes that HDF5 may need to close a file beyond what it says it needs
 PACK_ROWS = 4  # whose images a thread compresses in one go
 MOST_PACKING = 128  # rows that may wait to be written; bounds the memory
@@ -118,25 +118,29 @@ class Table:
 
     def extend_packed(self, packed: "PackedRows") -> None:
         """Write the next rows, which `pack_rows` packed for the columns of this table."""
-        for row, images in enumerate(packed.images, self.rows):
-            for column, (digest, chunk) in zip(self._images, images, strict=True):
-                self._digests[column.name].add(digest)
-                dataset = self._datasets[column.name]
-                if self.compression == "lzf":
-                    dataset[row] = chunk
-                else:
-                    dataset.id.write_direct_chunk((row, *(0 for _ in column.shape)), chunk)
         first = 0
         while first < packed.count:
-            room = BLOCK_ROWS - self.rows % BLOCK_ROWS
+            # Up to the end of a block, so that the file's layout depends on the rows alone.
+            end = min(packed.count, first + BLOCK_ROWS - self.rows % BLOCK_ROWS)
+            for images in packed.images[first:end]:
+                self._write_chunks(images)
+                self.rows += 1
             for name, values in packed.others.items():
-                self._block[name].extend(values[first : first + room])
-            self.rows += min(room, packed.count - first)
-            first += room
+                self._block[name].extend(values[first:end])
+            first = end
             if self.rows % BLOCK_ROWS == 0 or self.rows == self.count:
                 self._flush()
         if self.rows == self.count:
             self._write_digests()
+
+    def _write_chunks(self, images: Sequence[tuple[bytes, Any]]) -> None:
+        for column, (digest, chunk) in zip(self._images, images, strict=True):
+            self._digests[column.name].add(digest)
+            dataset = self._datasets[column.name]
+            if self.compression == "lzf":
+                dataset[self.rows] = chunk
+            else:
+                dataset.id.write_direct_chunk((self.rows, *(0 for _ in column.shape)), chunk)
 
     def _write_digests(self) -> None:
         for name, digest in self._digests.items():
@@ -211,10 +215,15 @@ def _is_shuffled(column: Column) -> bool:
     return column.shuffle and np.dtype(column.dtype).itemsize > 1
 
 
+def packing_threads(workers: int = 1) -> int:
+    """Return how many threads should pack rows in each of so many worker processes."""
+    return max(1, min(MOST_PACKERS, processors() // workers))
+
+
 @cache
 def _threads(_pid: int) -> ThreadPoolExecutor:
     """Return this process's threads; those of a parent do not live on in a forked child."""
-    return ThreadPoolExecutor(min(MOST_PACKERS, processors()), thread_name_prefix="pack")
+    return ThreadPoolExecutor(packing_threads(), thread_name_prefix="pack")
 
 
 @contextmanager
