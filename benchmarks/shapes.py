@@ -25,7 +25,7 @@ IMAGES = 64
 @cache
 def as_mesh(name: str) -> UnitShape:
     """Return a unit shape whose triangles are rendered."""
-    return replace(unit_shape(name), surface=None, is_sphere=False)
+    return replace(unit_shape(name), surface=None)
 
 
 def milliseconds(batch: SceneBatch) -> float:

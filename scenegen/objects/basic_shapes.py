@@ -129,8 +129,8 @@ def _teapot() -> UnitShape:
     corners = (corners - center) * scale
     triangles = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
     corner_normals = np.concatenate([normals[:, [0, 1, 2]], normals[:, [0, 2, 3]]])
-    surface = face_outwards(triangles, corner_normals)
-    return UnitShape("teapot", *surface, hull, discs, 0.0, resting)
+    mesh = face_outwards(triangles, corner_normals)
+    return UnitShape("teapot", lambda: mesh, hull, discs, 0.0, resting)
 
 
 _BUILDERS: dict[str, Callable[[], UnitShape]] = {

@@ -13,7 +13,7 @@ OVERLAP = 4e-6  # of neighbouring triangles; rays slip between them if it is bel
 
 @dataclass(frozen=True, eq=False)
 class CastMesh:
-    """What is cast and shaded. The exact sphere has no triangles.
+    """What is cast and shaded.
 
     Attributes:
         triangles: corners as from `overlapping`, (F, 3, 3) float32.
@@ -26,17 +26,11 @@ class CastMesh:
 
 def cast_mesh(shape: UnitShape) -> CastMesh:
     """Return a unit shape as the ray caster takes it."""
-    triangles = shape.triangles[:0] if shape.is_sphere else shape.triangles
-    return CastMesh(overlapping(triangles).astype(np.float32), normal_table(shape))
+    return CastMesh(overlapping(shape.triangles).astype(np.float32), normal_table(shape))
 
 
 def normal_table(shape: UnitShape) -> Array:
-    """Return face normal and three corner normals of each triangle, (F, 12) float32.
-
-    The exact sphere has none, (0, 12).
-    """
-    if shape.is_sphere:
-        return np.zeros((0, 12), np.float32)
+    """Return face normal and three corner normals of each triangle, (F, 12) float32."""
     face = face_vectors(shape.triangles)
     length = _norm(face)
     table = np.empty((len(shape.triangles), 12), np.float32)

@@ -83,7 +83,7 @@ def outline(shape_of: Callable[[str], UnitShape], name: str) -> UnitShape:
 
 
 def face_count(shape_of: Callable[[str], UnitShape], name: str) -> int:
-    """Return the number of a unit shape's triangles without keeping them in memory."""
+    """Return how many triangles of a unit shape are cast, without keeping them in memory."""
     return _known(shape_of, name)[1]
 
 
@@ -103,6 +103,8 @@ def _known(shape_of: Callable[[str], UnitShape], name: str) -> tuple[UnitShape, 
     if _is_member(shape_of, name):
         return MEMBERS_KEPT.outline(*_family_and_number(name))
     shape = shape_of(name)
+    if name in SHAPE_NAMES:
+        return shape, 0 if shape.surface else len(shape.triangles)
     return without_triangles(shape), len(shape.triangles)
 
 

@@ -1,6 +1,8 @@
 """The type of all shapes, `UnitShape`, and its making from polyhedra and from turned profiles."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ from scenegen.common.rotations import cross
 from scenegen.objects.exact_surfaces import Surface, polyhedron_of
 
 Array = NDArray[Any]
+Mesh = tuple[Array, Array]  # triangles and normals
 SEGMENTS = 512  # around an axis
 STRIPS = 16  # along a straight profile; with long slivers rays take three times as long
 
@@ -21,26 +24,39 @@ class UnitShape:
 
     Attributes:
         name: as in `scenes.PlacedObject.shape`.
-        triangles: corners, (F, 3, 3), counter-clockwise seen from outside.
-        normals: unit normals of the smooth surface at those corners, (F, 3, 3).
+        make_mesh: returns `triangles` and `normals`; it is called when one is first asked for.
         hull_points, hull_discs, rounding: a convex body that contains the shape, for placement. It
             is the convex hull of horizontal discs with centres (V, 3) and radii (V,), extended by
             the distance `rounding` in all directions.
         resting_directions: unit directions, (S, 3), of the shape's frame that may point down when
             it lies at rest; empty if all may.
-        is_sphere: whether it is the unit sphere.
+        is_sphere: whether it is the unit sphere, which path tracers know.
         surface: what is rendered instead of the triangles; None if those are rendered.
     """
 
     name: str
-    triangles: Array
-    normals: Array
+    make_mesh: Callable[[], Mesh]
     hull_points: Array
     hull_discs: Array
     rounding: float
     resting_directions: Array
     is_sphere: bool = False
     surface: Surface | None = None
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        """The triangles and their normals."""
+        return self.make_mesh()
+
+    @property
+    def triangles(self) -> Array:
+        """Corners, (F, 3, 3), counter-clockwise seen from outside."""
+        return self.mesh[0]
+
+    @property
+    def normals(self) -> Array:
+        """Unit normals of the smooth surface at those corners, (F, 3, 3)."""
+        return self.mesh[1]
 
     def support(self, directions: Array) -> Array:
         """Return how far the convex body reaches along unit directions, (M, 3) -> (M,)."""
@@ -53,7 +69,7 @@ class UnitShape:
 def without_triangles(shape: UnitShape) -> UnitShape:
     """Return a shape without its triangles: the outline, which is all that placement needs."""
     nothing = np.zeros((0, 3, 3))
-    return replace(shape, triangles=nothing, normals=nothing)
+    return replace(shape, make_mesh=lambda: (nothing, nothing))
 
 
 def polyhedron(name: str, points: Array) -> UnitShape:
@@ -61,12 +77,12 @@ def polyhedron(name: str, points: Array) -> UnitShape:
     points = points - (points.min(0) + points.max(0)) / 2
     points = points / np.linalg.norm(points, axis=1).max()
     hull = ConvexHull(points)
-    triangles = points[hull.simplices]
-    surface = face_outwards(triangles, np.repeat(hull.equations[:, None, :3], 3, axis=1))
+    normals = np.repeat(hull.equations[:, None, :3], 3, axis=1)
+    mesh = face_outwards(points[hull.simplices], normals)
     resting = resting_directions(points)
     exact = polyhedron_of(hull.equations)
     discs = np.zeros(len(points))
-    return UnitShape(name, *surface, points, discs, 0.0, resting, surface=exact)
+    return UnitShape(name, lambda: mesh, points, discs, 0.0, resting, surface=exact)
 
 
 def revolution(
@@ -93,22 +109,25 @@ def revolution(
         height = np.broadcast_to(values[:, 1:], (len(values), at.size))
         return np.stack([values[:, :1] * np.cos(at), height, values[:, :1] * np.sin(at)], axis=-1)
 
-    corners, normals = [], []
-    for profile, profile_normals in pieces:
-        p, n = turn(profile, angle), turn(profile_normals, angle)
-        for a, b, c in (((0, 0), (1, 0), (1, 1)), ((0, 0), (1, 1), (0, 1))):
-            rows, columns = len(profile) - 1, SEGMENTS
-            take = [np.s_[i : i + rows, j : j + columns] for i, j in (a, b, c)]
-            corners.append(np.stack([p[t] for t in take], axis=2).reshape(-1, 3, 3))
-            normals.append(np.stack([n[t] for t in take], axis=2).reshape(-1, 3, 3))
     rings = np.array(hull_rings)
     scale = 1 / (np.linalg.norm(rings, axis=1).max() + rounding)
-    surface = face_outwards(np.concatenate(corners) * scale, np.concatenate(normals))
+
+    def mesh() -> Mesh:
+        corners, normals = [], []
+        for profile, profile_normals in pieces:
+            p, n = turn(profile, angle), turn(profile_normals, angle)
+            for a, b, c in (((0, 0), (1, 0), (1, 1)), ((0, 0), (1, 1), (0, 1))):
+                rows, columns = len(profile) - 1, SEGMENTS
+                take = [np.s_[i : i + rows, j : j + columns] for i, j in (a, b, c)]
+                corners.append(np.stack([p[t] for t in take], axis=2).reshape(-1, 3, 3))
+                normals.append(np.stack([n[t] for t in take], axis=2).reshape(-1, 3, 3))
+        return face_outwards(np.concatenate(corners) * scale, np.concatenate(normals))
+
     if resting is None:
         resting = resting_directions(np.unique(turn(rings, angle[:-1]).reshape(-1, 3), axis=0))
     discs, heights = (rings * scale).T
     hull = np.stack([0 * heights, heights, 0 * heights], axis=1)
-    return UnitShape(name, *surface, hull, discs, rounding * scale, resting, is_sphere, exact)
+    return UnitShape(name, mesh, hull, discs, rounding * scale, resting, is_sphere, exact)
 
 
 def face_outwards(triangles: Array, normals: Array) -> tuple[Array, Array]:

@@ -20,10 +20,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.objects.cast_meshes import CastMesh
 from scenegen.objects.catalogue import mesh_to_cast
 from scenegen.objects.solids import UnitShape
-from scenegen.rendering.unit_scene import SPHERE, UnitScene, stacked, triangle_mesh
+from scenegen.rendering.unit_scene import NO_TRIANGLE, UnitScene, stacked, triangle_mesh
 
 Array = NDArray[Any]
 ShapeOf = Callable[[str], UnitShape]
@@ -59,7 +58,9 @@ class ModelCache:
         key = (variant, shape_of, name)
         if key not in self.kept:
             mesh = mesh_to_cast(shape_of, name)
-            group = mi.load_dict({"type": "shapegroup", "mesh": _geometry(name, mesh)})
+            group = mi.load_dict(
+                {"type": "shapegroup", "mesh": triangle_mesh(name, mesh.triangles)}
+            )
             self.kept[key] = _Model(group, mesh.normals)
             self.faces += len(mesh.normals)
             while self.faces > MOST_FACES_KEPT and len(self.kept) > 1:
@@ -70,12 +71,6 @@ class ModelCache:
 
 
 MODELS = ModelCache()
-
-
-def _geometry(name: str, mesh: CastMesh) -> Any:
-    if not len(mesh.normals):
-        return {"type": "sphere"}
-    return triangle_mesh(name, mesh.triangles)
 
 
 def model_scene(variant: str, shape_of: ShapeOf, names: Sequence[str]) -> UnitScene:
@@ -96,7 +91,7 @@ def model_scene(variant: str, shape_of: ShapeOf, names: Sequence[str]) -> UnitSc
         }
     first_triangle, normals = stacked([model.normals for model in models])
     if not names:  # images without objects: their unused slots refer to a first model
-        offset, first_triangle = np.zeros((1, 3)), np.full(1, SPHERE, np.uint32)
+        offset, first_triangle = np.zeros((1, 3)), np.full(1, NO_TRIANGLE, np.uint32)
     return UnitScene(mi.load_dict(contents), offset, first_triangle, GRID, normals)
 
 

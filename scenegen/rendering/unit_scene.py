@@ -20,7 +20,7 @@ from scenegen.rendering.tables import upload_table
 
 Array = NDArray[Any]
 LATTICE = 4.0  # distance between the shapes' origins; their bounding radius is 1
-SPHERE = 0xFFFFFFFF  # stands for the first triangle of a shape without triangles
+NO_TRIANGLE = 0xFFFFFFFF  # stands for the first triangle of a shape without triangles
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,8 @@ class UnitScene:
     Attributes:
         scene: the Mitsuba scene.
         offset: position of each shape's origin, (S, 3).
-        first_triangle: each shape's first row in `normals`, or SPHERE, (S,) uint32.
+        first_triangle: each shape's first row in `normals`, or NO_TRIANGLE, (S,)
+            uint32.
         grid: spacing of the grid from whose points rays start; 0 if they may start anywhere.
         normals: face normal and three corner normals of each triangle, (1 + F, 12) as a table of
             `tables.upload_table`; row 0 belongs to no triangle.
@@ -63,21 +64,19 @@ def unit_scene(variant: str, shapes: tuple[UnitShape, ...]) -> UnitScene:
 
 
 def stacked(tables: Sequence[Array]) -> tuple[Array, Any]:
-    """Join tables of normals; return the first row of each, or SPHERE, and the whole.
+    """Join tables of normals; return the first row of each, or NO_TRIANGLE, and all.
 
     Raises SpecError for more triangles than a float counts, as rows of objects hold their number.
     """
     sizes = np.array([len(table) for table in tables])
     most = 2**24 - 1
     check(sizes.sum() <= most, "one scene", f"{sizes.sum():,} triangles", f"at most {most:,}")
-    first = np.where(sizes > 0, 1 + np.cumsum(sizes) - sizes, SPHERE).astype(np.uint32)
+    first = np.where(sizes > 0, 1 + np.cumsum(sizes) - sizes, NO_TRIANGLE).astype(np.uint32)
     return first, upload_table(np.concatenate([np.zeros((1, 12), np.float32), *tables]))
 
 
 def mitsuba_shape(shape: UnitShape, place: Array) -> Any:
     """Return the unit shape, moved to `place`, as geometry of the current Mitsuba variant."""
-    if shape.is_sphere:
-        return {"type": "sphere", "center": place.tolist(), "radius": 1.0}
     return triangle_mesh(shape.name, overlapping(shape.triangles) + place)
 
 

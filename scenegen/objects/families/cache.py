@@ -98,8 +98,9 @@ class MemberCache:
             return None
         values = np.frombuffer(hull, "<f8").astype(float)
         points, discs = values[: 3 * rows].reshape(rows, 3), values[3 * rows :]
-        nothing, name = np.zeros((0, 3, 3)), f"{member[0]}/{member[1]:04d}"
-        return UnitShape(name, nothing, nothing, points, discs, 0.0, UPRIGHT), faces
+        name, nothing = f"{member[0]}/{member[1]:04d}", np.zeros((0, 3, 3))
+        mesh = nothing, nothing
+        return UnitShape(name, lambda: mesh, points, discs, 0.0, UPRIGHT), faces
 
     def _read_mesh(self, member: Member) -> CastMesh | None:
         data = self._read(member, _MOST_BYTES)

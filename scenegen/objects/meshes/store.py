@@ -90,4 +90,4 @@ def _unit_shape(name: str, model: CachedModel) -> UnitShape:
     flat = np.broadcast_to(normals[:, None], triangles.shape)  # one copy for the three corners
     hull = model.hull_points
     down = np.array([[0.0, -1.0, 0.0]])
-    return UnitShape(name, triangles, flat, hull, np.zeros(len(hull)), 0.0, down)
+    return UnitShape(name, lambda: (triangles, flat), hull, np.zeros(len(hull)), 0.0, down)

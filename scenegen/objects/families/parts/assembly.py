@@ -22,4 +22,4 @@ def assemble(name: str, parts: Sequence[Part]) -> UnitShape:
     corners *= scale
     hull = (np.concatenate([part.hull_points for part in parts]) - center) * scale
     discs = np.concatenate([part.hull_discs for part in parts]) * scale
-    return UnitShape(name, triangles, normals, hull, discs, 0.0, UPRIGHT)
+    return UnitShape(name, lambda: (triangles, normals), hull, discs, 0.0, UPRIGHT)

@@ -138,8 +138,8 @@ def test_bodies_hold_their_parts_closely() -> None:
         "box": boxes([box((0, 0, 0), (1, 2, 3), (0.5, 0.0), (0.5, 1.0))]),
     }
     for name, part in parts.items():
-        fields = part.triangles, part.normals, part.hull_points, part.hull_discs
-        shape = UnitShape(name, *fields, 0.0, DOWN)
+        mesh = part.triangles, part.normals
+        shape = UnitShape(name, lambda: mesh, part.hull_points, part.hull_discs, 0.0, DOWN)
         check_body(shape, part.triangles, 0.02, unit_vectors(200))
 
 

@@ -109,7 +109,9 @@ def test_a_coarser_hull_holds_the_model_and_stands_where_it_stands() -> None:
         centered = corners - (corners.min(axis=0) + corners.max(axis=0)) / 2
         points = np.asarray(centered / np.linalg.norm(centered, axis=1).max())
         body = hull_points(points)
-        shape = UnitShape("x", points[:, None], points, body, np.zeros(len(body)), 0.0, DOWN)
+        shape = UnitShape(
+            "x", lambda p=points: (p[:, None], p), body, np.zeros(len(body)), 0.0, DOWN
+        )
         check_hull(shape)
         assert len(body) < 2 * hull.MOST_POINTS
         assert body[:, 1].min() == points[:, 1].min(), "nothing below the floor"
