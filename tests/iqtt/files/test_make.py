@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from made_splits import TINY
 
+from iqtt.files import make
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from scenegen.common.errors import SpecError
@@ -91,6 +92,14 @@ def test_the_same_request_gives_the_same_bytes(folder, tmp_path):
     subprocess.run(command, check=True, capture_output=True)
     assert contents(tmp_path / "again") == contents(folder)
     assert os.listdir(tmp_path) == ["again"]
+
+
+def test_worker_processes_never_change_a_byte(folder, tmp_path, monkeypatch):
+    """And all views that are proposed are counted."""
+    monkeypatch.setattr(make, "BLOCK", 2)
+    tally = make_split(tmp_path / "again", SPEC, workers=2, command=COMMAND)
+    assert contents(tmp_path / "again") == contents(folder)
+    assert tally == make_split(tmp_path / "alone", SPEC, command=COMMAND)
 
 
 def test_a_table_does_not_depend_on_the_size_of_the_others(folder, tmp_path):

@@ -22,11 +22,6 @@ def test_normals_stand_on_faces_and_at_corners() -> None:
     np.testing.assert_array_equal(mesh.triangles, np.float32(overlapping(shape.triangles)))
 
 
-def test_the_exact_sphere_has_no_triangles() -> None:
-    mesh = cast_mesh(unit_shape("sphere"))
-    assert (mesh.triangles.shape, mesh.normals.shape) == ((0, 3, 3), (0, 12))
-
-
 @pytest.mark.parametrize("name", [*BASIC, *MODELS])
 def test_triangles_grow_by_the_overlap_each_in_its_plane(name: str) -> None:
     triangles = built_in_shape(name).triangles

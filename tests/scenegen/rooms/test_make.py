@@ -1,5 +1,6 @@
 """A data set depends on its request alone: not on batches, on its own length, or on retries."""
 
+import multiprocessing
 import os
 import subprocess
 import sys
@@ -8,9 +9,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from trimesh import creation
 
 from scenegen import open_rooms
+from scenegen.common.errors import SceneGenError
 from scenegen.description.specs import DatasetSpec
+from scenegen.objects.sources import object_source
+from scenegen.rooms import make
 from scenegen.rooms.make import make_dataset, render_items
 
 SPEC = DatasetSpec(height=32, width=32, min_visible_pixels=3, seed=3)
@@ -23,6 +28,14 @@ spec = DatasetSpec(height=64, width=64, min_visible_pixels=3)
 make_dataset(f"{sys.argv[1]}.h5", spec, int(sys.argv[1]))
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
+
+
+def write_models(folder):
+    """Write two meshes that can be used, and one that cannot."""
+    (folder / "odd").mkdir(parents=True, exist_ok=True)
+    for name, mesh in (("ball", creation.icosphere(subdivisions=2)), ("box", creation.box())):
+        (folder / "odd" / f"{name}.ply").write_bytes(mesh.export(file_type="ply"))
+    (folder / "odd" / "bad.ply").write_bytes(b"ply")
 
 
 def contents(path):
@@ -125,6 +138,40 @@ def test_retries_keep_the_order_and_do_not_depend_on_batches(tmp_path):
     assert 2 <= retried.sum() <= 11, "some were proposed again, some were not: a sharp test"
     for name in ("camera/world_from_camera", "light/color", "object/shape", "object/count"):
         np.testing.assert_array_equal(strict[name], relaxed[name], err_msg=name)
+
+
+@pytest.mark.parametrize("kind", ["shapes", "views", "family", "folder"])
+def test_worker_processes_never_change_a_byte(tmp_path, monkeypatch, kind):
+    """Nor do they forget which models were refused."""
+    monkeypatch.setattr(make, "BLOCK", 16)
+    how = {"height": 32, "width": 32, "min_visible_pixels": 20, "seed": 5}
+    how |= {"views": (0.0, 40.0)} if kind == "views" else {}
+    how |= {"source": "families", "shapes": ("mug", "bowl")} if kind == "family" else {}
+    found = []
+    for workers in (1, 2):
+        objects, spec = None, DatasetSpec(**how)
+        if kind == "folder":
+            write_models(tmp_path / "meshes")
+            where = {"objects_root": str(tmp_path / "meshes"), "cache_dir": str(tmp_path / "cache")}
+            source = object_source("shapes", **where)
+            objects, spec = source.objects, DatasetSpec(**how, **source.settings)
+        path = tmp_path / f"{workers}.h5"
+        make_dataset(path, spec, 40, workers=workers, objects=objects, command="tests")
+        found.append((path.read_bytes(), objects.problems if objects else {}))
+    assert found[0] == found[1]
+    assert (set(found[0][1]) == {"odd/bad"}) == (kind == "folder")
+
+
+def test_a_worker_that_is_killed_ends_the_run(tmp_path, monkeypatch):
+    def kill(done):
+        for worker in multiprocessing.active_children():
+            worker.kill()
+
+    monkeypatch.setattr(make, "BLOCK", 8)
+    with pytest.raises(SceneGenError) as refused:
+        make_dataset(tmp_path / "x.h5", SPEC, 400, workers=2, progress=kill)
+    assert "worker" in refused.value.where
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_progress_counts_rows_and_comes_before_the_end(tmp_path):
