@@ -11,8 +11,9 @@ import sys
 from benchmarks.jobs.timing import peak_mib
 from scenegen.rendering.backend import select_variant
 
-select_variant("auto")  # first: a job's module may import Dr.Jit, which then looks for LLVM
-module, function = sys.argv[1].split(":")
-job = getattr(importlib.import_module(f"benchmarks.jobs.{module}"), function)
-result = job(**json.loads(sys.argv[2]))
-print(json.dumps({**result, "peak_mib": peak_mib()}))
+if __name__ == "__main__":  # not in worker processes, which import this module again
+    select_variant("auto")  # first: a job's module may import Dr.Jit, which then looks for LLVM
+    module, function = sys.argv[1].split(":")
+    job = getattr(importlib.import_module(f"benchmarks.jobs.{module}"), function)
+    result = job(**json.loads(sys.argv[2]))
+    print(json.dumps({**result, "peak_mib": peak_mib(result.get("workers", 1))}))

@@ -1,6 +1,7 @@
 """iqtt's pipeline for questions, its parts, and one Mitsuba render for each of the images."""
 
 import shutil
+import statistics
 import tempfile
 from dataclasses import replace
 from functools import partial
@@ -12,7 +13,7 @@ import numpy as np
 
 from benchmarks.jobs import plain_mitsuba as plain
 from benchmarks.jobs.inputs import Mesh
-from benchmarks.jobs.timing import repeat, seconds_of
+from benchmarks.jobs.timing import processors_busy, repeat
 from iqtt.files.make import make_split
 from iqtt.questions.distractors import make_pools
 from iqtt.questions.packing import Question, cube_centres, pack_questions
@@ -20,7 +21,7 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.render import render_questions
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.scene_mesh import welded
-from scenegen.rendering.renderer import launch_fields
+from scenegen.rendering.renderer import launch_fields, useful_workers
 
 
 def end_to_end(questions: int, repeats: int, folder: str) -> dict[str, Any]:
@@ -28,14 +29,18 @@ def end_to_end(questions: int, repeats: int, folder: str) -> dict[str, Any]:
     spec = SplitSpec(train=questions, labeled=0, val=0, test=0)
     out = Path(tempfile.mkdtemp(dir=folder)) / "split"
     make_split(out, replace(spec, train=64))  # compiles the kernels
-    seconds = []
+    seconds, busy = [], []
     for _ in range(repeats):
         shutil.rmtree(out)
-        seconds.append(seconds_of(lambda: make_split(out, spec)))
+        found = processors_busy(lambda: make_split(out, spec, workers=0))
+        seconds.append(found[0])
+        busy.append(found[1])
     size = sum(path.stat().st_size for path in out.iterdir())
     shutil.rmtree(out)
-    note = f"{questions / min(seconds):.0f} questions/s; {size / questions / 1024:.1f} KiB each"
-    return {"seconds": seconds, "images": 4 * questions, "note": note}
+    used = useful_workers(4 * questions, "llvm_ad_rgb")
+    note = f"{questions / min(seconds):.0f} questions/s; {size / questions / 1024:.1f} KiB each;"
+    note += f" {used} workers, {statistics.median(busy):.2f} processors busy"
+    return {"seconds": seconds, "images": 4 * questions, "note": note, "workers": used}
 
 
 def cast(questions: int, repeats: int, blocks: bool) -> dict[str, Any]:

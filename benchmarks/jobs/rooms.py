@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks.jobs.timing import STARTED, repeat, seconds_of
+from benchmarks.jobs.timing import STARTED, processors_busy, repeat
 
 
 def machine() -> dict[str, Any]:
@@ -19,33 +19,28 @@ def machine() -> dict[str, Any]:
     return {"versions": found, "variant": select_variant("auto")}
 
 
-def end_to_end(rooms: str, count: int, repeats: int) -> dict[str, Any]:
+def end_to_end(rooms: str, count: int, repeats: int, workers: int = 0) -> dict[str, Any]:
     """Time make_dataset from nothing to a closed file; the last file stays.
 
-    Three figures: the time to the first, one-batch file from the start of the process, all imports
-    and compilations included; whole files in the process thus warmed; and the steady rate, which
-    two file sizes give: (count - count / 4) rows in the difference of their times, so that what
-    opening, filling and draining cost drops out.
+    The process is warm: it has made a small file before. Worker processes start anew for each file.
     """
     from scenegen.description.specs import DatasetSpec
+    from scenegen.rendering.renderer import useful_workers
     from scenegen.rooms.make import DEFAULT_BATCH, make_dataset
 
-    def make(rows: int) -> float:
+    def make(rows: int) -> tuple[float, float]:
         Path(rooms).unlink(missing_ok=True)  # so that no file's disk pages burden the next one
-        return seconds_of(lambda: make_dataset(rooms, DatasetSpec(), rows))
+        how = {"workers": workers}
+        return processors_busy(lambda: make_dataset(rooms, DatasetSpec(), rows, **how))
 
     make(DEFAULT_BATCH)
     first = time.perf_counter() - STARTED
-    quarter = count // 4
-    seconds, steady = [], []
-    for _ in range(repeats):
-        short = make(quarter)
-        seconds.append(make(count))
-        steady.append((count - quarter) / (seconds[-1] - short))
+    seconds, busy = zip(*(make(count) for _ in range(repeats)), strict=True)
     size = Path(rooms).stat().st_size / count / 1024
-    note = f"steady {statistics.median(steady):.0f}; first {DEFAULT_BATCH} rows {first:.1f} s after"
-    note += f" the process began; {size:.0f} KiB a row"
-    return {"seconds": seconds, "images": count, "note": note}
+    used = workers or useful_workers(count, "llvm_ad_rgb")
+    note = f"{used} workers, {statistics.median(busy):.2f} processors busy; {size:.0f} KiB a row"
+    note += f"; first {DEFAULT_BATCH} rows {first:.1f} s after the process began"
+    return {"seconds": seconds, "images": count, "note": note, "workers": used}
 
 
 def from_nothing(
@@ -58,6 +53,7 @@ def from_nothing(
     from benchmarks.jobs.inputs import read_scenes
     from scenegen.description.presets import preset_spec
     from scenegen.objects.sources import object_source
+    from scenegen.rendering.renderer import useful_workers
     from scenegen.rooms.make import DEFAULT_BATCH, make_dataset
 
     object_source(preset, cache_dir=f"{rooms}-warm")
@@ -65,11 +61,13 @@ def from_nothing(
     make_dataset(rooms, warm, DEFAULT_BATCH, overwrite=True)
     source = object_source(preset, objects_root=root or None, cache_dir=cache)
     spec = preset_spec(preset, **source.settings, **settings)
-    make = partial(make_dataset, rooms, spec, count, objects=source.objects, overwrite=True)
-    seconds = seconds_of(make)
+    how = {"objects": source.objects, "workers": 0, "overwrite": True}
+    seconds, busy = processors_busy(partial(make_dataset, rooms, spec, count, **how))
     _, scenes = read_scenes(rooms, count)
     models = len({item.shape for scene in scenes for item in scene.objects})
-    return {"seconds": [seconds], "images": count, "note": f"{models:,} different models"}
+    used = 1 if settings.get("shading") == "path" else useful_workers(count, "llvm_ad_rgb")
+    note = f"{models:,} different models; {used} workers, {busy:.2f} processors busy"
+    return {"seconds": [seconds], "images": count, "note": note, "workers": used}
 
 
 def make_meshes(folder: str, count: int) -> dict[str, Any]:
@@ -112,26 +110,35 @@ def sampling(count: int, repeats: int) -> dict[str, Any]:
 
 
 def stage(rooms: str, count: int, repeats: int, root: str = "") -> dict[str, Any]:
-    """Time pack, launch and fetch of scenes that were sampled before.
+    """Time pack, launch and fetch of scenes that were proposed before, as arrays.
 
     As in make_dataset, a batch is packed while the one before is cast.
     """
-    from benchmarks.jobs.inputs import read_scenes
+    import numpy as np
+
     from scenegen.objects.sources import file_objects
-    from scenegen.rendering.packing import pack
+    from scenegen.rendering.packing import SceneBatch, pack_arrays
     from scenegen.rendering.renderer import launch
     from scenegen.rooms.make import DEFAULT_BATCH
+    from scenegen.rooms.reader import RoomsFile
+    from scenegen.sampling.scenes import sample_scenes
 
-    spec, scenes = read_scenes(rooms, count)
+    with RoomsFile(rooms) as file:
+        spec = file.spec
     objects = file_objects(spec, objects_root=root or None)
-    parts = [scenes[i : i + DEFAULT_BATCH] for i in range(0, count, DEFAULT_BATCH)]
+    _, scenes = sample_scenes(spec, np.arange(2 * count), np.zeros(2 * count, int), objects)
+    rows = np.arange(count)  # of these; a few proposals find no room
+    parts = [scenes.take(rows[i : i + DEFAULT_BATCH]) for i in range(0, count, DEFAULT_BATCH)]
+
+    def packed(part: Any) -> SceneBatch:
+        return pack_arrays(spec, part, range(len(spec.views)), objects)
 
     def render_all() -> None:
-        batch = pack(spec, parts[0], objects=objects)
+        batch = packed(parts[0])
         for following in [*parts[1:], None]:
             fetch = launch(batch)
-            if following:
-                batch = pack(spec, following, objects=objects)
+            if following is not None:
+                batch = packed(following)
             fetch()
 
     note = f"batches of {DEFAULT_BATCH}; pack, launch, fetch"
