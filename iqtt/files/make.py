@@ -97,6 +97,7 @@ def make_split(
                 test.attrs.update({**public, "split": "test"})
                 answers.attrs.update({**private, "split": "test"})
                 write("test", test, answers)
+            next(made, None)  # there is none; so workers end by themselves
     return tally
 
 

@@ -65,10 +65,9 @@ def worker_pool(
         try:
             yield pool
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
             for worker in context.started:
                 worker.kill()
-            raise
+            raise  # and the pool, which finds them dead, waits for no task
 
 
 def in_threads(
