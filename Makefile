@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 WORKERS ?= 2
 
-.PHONY: demo demo-model test test-all check bench bench-gpu results fuzz clean
+.PHONY: demo demo-model test test-all check bench bench-gpu results fuzz torture clean
 
 demo: $(VENV)/.runtime
 	mkdir -p demo
@@ -69,6 +69,10 @@ results: $(VENV)/.model
 
 fuzz: $(VENV)/.test
 	$(BIN)/python -m fuzz --seconds 600 --corpus fuzz-corpus
+
+# Half an hour of runs that are killed, stopped or without room, and then go on.
+torture: $(VENV)/.test
+	$(BIN)/python -m benchmarks.torture
 
 clean:
 	rm -rf $(VENV) demo build dist *.egg-info

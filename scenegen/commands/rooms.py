@@ -94,6 +94,9 @@ from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_co
 @click.option("--batch", type=int, default=64, show_default=True,
               help="Images that a process renders at once; more take more memory.")
 @WORKERS
+@click.option("--shard-size", type=int, default=10_000, show_default=True,
+              help="Most scenes of a file; more go to several files beside --out, which shows them as"
+              " one.")
 @DEVICE
 @OVERWRITE
 def render(
@@ -103,6 +106,7 @@ def render(
     size: tuple[int, int] | None,
     batch: int,
     workers: int,
+    shard_size: int,
     device: str,
     compression: str,
     overwrite: bool,
@@ -111,7 +115,8 @@ def render(
     """Render rooms with objects to an HDF5 file, with exact ground truth.
 
     Every image comes with its depth, normals, object ids, camera, lights and scene description.
-    Square brackets hold the defaults, which presets may change.
+    Square brackets hold the defaults, which presets may change. Where a run with several files was
+    ended, the same command goes on.
     """
     from scenegen.description.presets import preset_spec
     from scenegen.objects.sources import object_source
@@ -126,13 +131,14 @@ def render(
     spec = preset_spec(preset, **chosen, **source.settings)
     images = count * len(spec.views)
     started = time.perf_counter()
-    with progress_bar(images, "image") as bar:
+    with _told_how_to_go_on(out), progress_bar(images, "image") as bar:
         make_dataset(
             out,
             spec,
             count,
             batch=batch,
             workers=workers,
+            shard_size=shard_size,
             device=device,
             compression=compression,
             overwrite=overwrite,
@@ -141,13 +147,48 @@ def render(
             progress=bar.update,
         )
     seconds = time.perf_counter() - started
-    megabytes = Path(out).stat().st_size / 1e6
+    files = [Path(out), *Path(out).parent.glob(f"{Path(out).stem}-?????-of-?????.h5")]
+    megabytes = sum(file.stat().st_size for file in files) / 1e6
     print_line(f"{out}: {images} images, {megabytes:.1f} MB, {images / seconds:.0f} images/s")
     for line in source.notes():
         print_line(line, err=True)
 
 
 # fmt: on
+@contextmanager
+def _told_how_to_go_on(out: str) -> Iterator[None]:
+    """Say which shards are complete, and what to do, where the block is ended from outside."""
+    from scenegen.common.errors import FileFormatError
+    from scenegen.common.manifest import manifest_path, read_manifest
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        with suppress(OSError, FileFormatError):
+            found = read_manifest(manifest_path(out))
+            if not found.complete:
+                done, all_ = len(found.shards), -(-found.count // found.shard_size)
+                told = f"{done} of {all_} shards are complete; the same command goes on"
+                print_line(f"{out}: {told}", err=True)
+        raise
+
+
+@click.command(epilog=f"{EXAMPLE}scenegen merge rooms.h5 --out one.h5")
+@click.argument("file", type=InputPath())
+@click.option("--out", type=OutputPath(), required=True, help="File to write.")
+@OVERWRITE
+def merge(file: str, out: str, overwrite: bool) -> None:
+    """Make one file of rooms that were rendered to several."""
+    from scenegen.rooms.merge import merge_rooms
+    from scenegen.rooms.reader import RoomsFile
+
+    with RoomsFile(file) as rooms:
+        count = len(rooms)
+    with progress_bar(count, "image") as bar:
+        merge_rooms(file, out, overwrite, bar.update)
+    print_line(f"{out}: {count} images, {Path(out).stat().st_size / 1e6:.1f} MB")
+
+
 @click.command(epilog=f"{EXAMPLE}scenegen presets")
 def presets() -> None:
     """List the presets of `render` with their settings: the paper's data sets."""
@@ -197,7 +238,7 @@ def info(file: str) -> None:
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen verify rooms.h5 --items 20")
-@click.argument("file", type=InputPath())
+@click.argument("file", type=InputPath(within=(".h5",)))
 @click.option(
     "--items",
     type=click.IntRange(0),
@@ -211,18 +252,24 @@ def info(file: str) -> None:
 def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: Any) -> None:
     """Check digests and values of every row of a file, and render some rows again.
 
+    Of a folder with a manifest, check the SHA-256 of every file and that every row is there once.
     Rows rendered again must agree bit for bit, or within a stated tolerance where the file was
     rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.
     """
+    from scenegen.common.manifest import manifests_in
     from scenegen.objects.sources import file_objects
     from scenegen.rooms.reader import RoomsFile
-    from scenegen.rooms.verify import verify_file
+    from scenegen.rooms.verify import verify_file, verify_set
 
-    with RoomsFile(file) as rooms:
-        count = len(rooms)
-        objects = file_objects(rooms.spec, **meshes)
-    with progress_bar(count, "image") as bar:
-        checks = verify_file(file, items, device, objects, bar.update)
+    manifests = manifests_in(Path(file)) if Path(file).is_dir() else []
+    checks = []
+    for path in [place.with_name(found.file) for place, found in manifests] or [Path(file)]:
+        with RoomsFile(path) as rooms:
+            count = len(rooms)
+            objects = file_objects(rooms.spec, **meshes)
+        with progress_bar(count, "image") as bar:
+            check_all = verify_set if manifests else verify_file
+            checks += check_all(path, items, device, objects, bar.update)
     for check in checks:
         print_line(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:26} {check.detail}")
     failed = sum(not check.ok for check in checks)
@@ -297,4 +344,4 @@ def _folder_made(folder: Path) -> Iterator[None]:
         raise
 
 
-COMMANDS = (render, presets, preview, info, verify, export)
+COMMANDS = (render, merge, presets, preview, info, verify, export)

@@ -1,45 +1,26 @@
-"""Render a data set to a file of rooms.
+"""Render a data set to a file of rooms, or to a set of shards that can be read as one file."""
 
-Scenes are proposed, rendered, checked, compressed and written in batches. These steps overlap, and
-each worker process takes its own block of scenes through all of them but the last. Memory does not
-grow with the number of scenes.
-"""
-
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from scenegen.common.hdf5.row_file import PackedRows, packing_threads
 from scenegen.common.new_file import check_writable
 from scenegen.common.records import check
-from scenegen.common.worker_pool import in_processes, in_threads, processors
-from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec
-from scenegen.layout import columns
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.families.cache import MEMBERS_KEPT
 from scenegen.rendering.backend import select_variant, versions
-from scenegen.rendering.ground_truth import GroundTruth, visible_pixels
-from scenegen.rendering.packing import SceneBatch, pack_arrays
-from scenegen.rendering.renderer import launch, use_threads, useful_workers
-from scenegen.rooms.writer import RenderedScene, create_rooms, pack_rooms
-from scenegen.sampling.proposals import ProposalQueue
+from scenegen.rendering.renderer import useful_workers
+from scenegen.rooms.render import Work
+from scenegen.rooms.shards import make_shards
+from scenegen.rooms.writer import MAX_COUNT, create_rooms
 
-Array = NDArray[Any]
 DEFAULT_BATCH = 64
 MAX_BATCH = 4096
 MAX_RAYS = 2**28  # pixels of one batch; they take 8 GiB
 MAX_WORKERS = 256
-BLOCK = 512  # images that a worker process makes in one go
-PACKED = 16  # scenes that a thread packs in one go
-WINDOW = 8  # batches that may be begun while the oldest item is still being proposed again
-
-_Begun = tuple[SceneArrays, SceneBatch, Callable[[], GroundTruth]]  # a batch being rendered
+SHARD_SIZE = 10_000  # scenes
 
 
 def make_dataset(
@@ -49,6 +30,7 @@ def make_dataset(
     *,
     batch: int = DEFAULT_BATCH,
     workers: int = 1,
+    shard_size: int = SHARD_SIZE,
     device: str = "auto",
     compression: str = "gzip",
     overwrite: bool = False,
@@ -63,6 +45,9 @@ def make_dataset(
         workers: processes that render; 0 for one a processor where that is worth while. They
             change no byte either. More than one need a script whose own work is inside
             `if __name__ == "__main__":`, and `objects` that can be pickled.
+        shard_size: if there are more scenes, they go to shards of so many beside `path`, which then
+            shows all of them as one (`shards.make_shards`). The same call goes on where an earlier
+            one was killed.
         device, compression: as in `backend.DEVICES` and `row_file.COMPRESSIONS`.
         command: stored as the file's creation command.
         objects: what the scenes are made of; None for `objects_of(spec)`.
@@ -77,122 +62,22 @@ def make_dataset(
     found = f"{batch}, with {len(spec.views)} views of a scene"
     enough = max(batch, len(spec.views)) <= most
     check(enough, "batch", found, f"at most {most} images of this size")
-    check_writable(Path(path), overwrite)
+    check(1 <= shard_size <= MAX_COUNT, "shard-size", shard_size, f"from 1 to {MAX_COUNT:,}")
     variant = select_variant(device)
     objects = objects or objects_of(spec)
     workers = workers or useful_workers(count * len(spec.views), variant)
     attributes = {"creation_command": command, "variant": variant, **versions()}
-    with create_rooms(
-        path, spec, count, compression=compression, overwrite=overwrite, attributes=attributes
-    ) as writer:
-        work = _Work(spec, batch, workers, device, objects, compression, MEMBERS_KEPT.home)
-        made = work.in_blocks(count) if workers > 1 else work.rows(range(count))
-        with closing(made):
-            for rows in made:
-                writer.extend(rows)
-                progress(rows.count)
-
-
-@dataclass(frozen=True, eq=False)
-class _Work:
-    """What is done to scenes, here or in another process."""
-
-    spec: DatasetSpec
-    batch: int
-    workers: int
-    device: str
-    objects: Objects
-    compression: str
-    cache_dir: Path | None
-
-    def rows(self, indices: range) -> Generator[PackedRows]:
-        """Render scenes in order, and meanwhile pack their rows in threads."""
-        fields = columns(self.spec)
-        pieces = (
-            items[first : first + PACKED]
-            for items in render_items(self.spec, indices, self.batch, self.device, self.objects)
-            for first in range(0, len(items), PACKED)
-        )
-
-        def packed(rooms: list[RenderedScene]) -> PackedRows:
-            return pack_rooms(rooms, fields, self.compression)
-
-        ahead = 2 * self.batch // PACKED
-        return in_threads(packed, pieces, packing_threads(self.workers), ahead)
-
-    def in_blocks(self, count: int) -> Generator[PackedRows]:
-        """Let processes render scenes 0 .. count - 1, a block at a time; yield rows in order."""
-        step = max(1, BLOCK // len(self.spec.views))
-        blocks = (range(i, min(i + step, count)) for i in range(0, count, step))
-        for rows, problems in in_processes(self.block, blocks, self.workers):
-            self.objects.problems.update(problems)
-            yield from rows
-
-    def block(self, indices: range) -> tuple[list[PackedRows], dict[str, str]]:
-        """Return the rows of scenes, and why models were refused; to be called by a worker."""
-        MEMBERS_KEPT.use(self.cache_dir)
-        use_threads(max(1, processors() // self.workers), self.device)
-        return list(self.rows(indices)), self.objects.problems
-
-
-def render_items(
-    spec: DatasetSpec,
-    indices: range,
-    batch: int,
-    device: str = "auto",
-    objects: Objects | None = None,
-) -> Iterator[list[RenderedScene]]:
-    """Yield the accepted items in order, a list of them whenever some are complete.
-
-    While a batch is rendered, the next one is proposed. An item whose objects do not all show
-    enough pixels is proposed again. No new item is begun while the oldest one that is incomplete is
-    more than WINDOW batches behind.
-    """
-    objects = objects or objects_of(spec)
-    views = range(len(spec.views))
-    batch = max(1, batch // len(views))  # scenes
-    proposals = ProposalQueue(spec, indices, objects)
-    finished: dict[int, RenderedScene] = {}
-    next_out = 0
-
-    def propose() -> tuple[SceneArrays, SceneBatch] | None:
-        last = min(len(indices), next_out + WINDOW * batch)
-        scenes = proposals.take(batch, indices.start + last)
-        return None if scenes is None else (scenes, pack_arrays(spec, scenes, views, objects))
-
-    def begin(proposed: tuple[SceneArrays, SceneBatch] | None) -> _Begun | None:
-        return None if proposed is None else (*proposed, launch(proposed[1], device))
-
-    begun: _Begun | None = None
-    while begun := begun or begin(propose()):
-        scenes, packed, fetch = begun
-        following = propose()
-        truth = fetch()
-        begun = begin(following)
-        for item, shown in zip(scenes.index.tolist(), _shown(scenes, packed, truth), strict=True):
-            if shown is None:
-                proposals.refuse(item)
-            else:
-                proposals.accept(item)
-                finished[item] = shown
-        ready = []
-        while next_out < len(indices) and indices[next_out] in finished:
-            ready.append(finished.pop(indices[next_out]))
-            next_out += 1
-        if ready:
-            yield ready
-
-
-def _shown(
-    scenes: SceneArrays, batch: SceneBatch, truth: GroundTruth
-) -> Iterator[RenderedScene | None]:
-    """Yield each scene with its pixels, or None where an object shows too few in some view."""
-    spec = batch.spec
-    visible = visible_pixels(truth.object_id, spec.object_slots)
-    missing: Array = np.arange(spec.object_slots) >= batch.object_count[:, None]
-    enough = np.asarray((missing | (visible >= spec.min_visible_pixels)).all(axis=1))
-    for row, first in enumerate(range(0, len(batch), len(spec.views))):
-        images = slice(first, first + len(spec.views))
-        pixels = {name: values[images] for name, values in vars(truth).items()}
-        shown = RenderedScene(scenes, row, batch, first, pixels, visible[images])
-        yield shown if enough[images].all() else None
+    work = Work(spec, batch, workers, device, objects, compression, MEMBERS_KEPT.home)
+    if count > shard_size:
+        make_shards(path, work, count, shard_size, attributes, overwrite, progress)
+        return
+    check_writable(Path(path), overwrite)
+    with (
+        create_rooms(
+            path, spec, count, compression=compression, overwrite=overwrite, attributes=attributes
+        ) as writer,
+        closing(work.in_order([range(count)])) as made,
+    ):
+        for rows in made:
+            writer.extend(rows)
+            progress(rows.count)

@@ -17,6 +17,7 @@ from scenegen.common.hdf5 import input_file, row_file
 from scenegen.common.hdf5.attributes import check_attribute, read_digest, read_text, read_texts
 from scenegen.common.hdf5.content import SHA256, joint_digest
 from scenegen.common.hdf5.input_file import StoredArray
+from scenegen.common.hdf5.shards import JoinedArray, open_with_shards
 from scenegen.common.records import check
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
@@ -88,7 +89,7 @@ class RoomsFile:
         or damaged.
         """
         self.path = Path(path)
-        self._file = input_file.open_file(path, "rooms file")
+        self._file, self._shards = open_with_shards(self.path, "rooms file")
         with input_file.checking(self._file):
             self.attributes: dict[str, Any] = dict(self._file.attrs)
             self._check_format()
@@ -100,8 +101,20 @@ class RoomsFile:
             problems = _layout_problems(self._file, self.spec)
             if problems:
                 raise FileFormatError(f"{path}: {row_file.and_more(problems)}")
-            self._datasets = {f.name: StoredArray(self._file[f.name]) for f in FIELDS}
+            self._datasets = {f.name: self._stored(self._file[f.name]) for f in FIELDS}
         self._count = len(self._datasets["image"])
+
+    def _stored(self, dataset: h5py.Dataset) -> StoredArray | JoinedArray:
+        if self._shards is not None and dataset.is_virtual:
+            return JoinedArray(self._shards, dataset)
+        return StoredArray(dataset)
+
+    def _parts(self) -> Iterator[h5py.File]:
+        """Yield the files that hold the values: this one, or its shards."""
+        if self._shards is None:
+            yield self._file
+        else:
+            yield from map(self._shards.file, range(len(self._shards.shards)))
 
     def __len__(self) -> int:
         return self._count
@@ -145,7 +158,7 @@ class RoomsFile:
         """Return what is wrong with the layout and with the attributes of root and datasets."""
         with input_file.reading(self.path):
             problems = _layout_problems(self._file, self.spec) + root_problems(self.attributes)
-            stored = self._file["image"].compression or "none"
+            stored = next(self._parts())["image"].compression or "none"
             if stored != self.attributes.get("compression"):
                 problems.append(f"root attribute compression is not {stored!r}, as of the images")
             return problems + _attribute_problems(self._file, self.spec)
@@ -155,7 +168,7 @@ class RoomsFile:
 
         `digests` are the `content.column_digest`s of datasets that were read already.
         """
-        problems = row_file.digest_problems(self._file, digests)
+        problems = row_file.digest_problems(self._file, digests, self._stored)
         with input_file.reading(self.path):
             if self.attributes.get(TRUTH_DIGEST) != truth_digest(self._file):
                 problems.append(f"the digests of {', '.join(SCORED)} do not give {TRUTH_DIGEST!r}")
@@ -182,9 +195,13 @@ class RoomsFile:
         take what all others leave of the file.
         """
         with input_file.reading(self.path):
-            sizes = {f.name: self._file[f.name].id.get_storage_size() for f in FIELDS}
+            sizes, total = dict.fromkeys((f.name for f in FIELDS), 0), 0
+            for file in self._parts():
+                total += Path(file.filename).stat().st_size
+                for name in sizes:
+                    sizes[name] += file[name].id.get_storage_size()
             memory = {f.name: self._file[f.name].nbytes for f in FIELDS}
-        texts = self.path.stat().st_size - sum(sizes.values()) + sizes["scene"]
+        texts = total - sum(sizes.values()) + sizes["scene"]
         sizes["scene"] = memory["scene"] = texts
         memory["object/model"] = sizes["object/model"]
         return {name: (sizes[name], memory[name]) for name in sizes}
@@ -192,6 +209,8 @@ class RoomsFile:
     def close(self) -> None:
         """Close the file; idempotent."""
         self._file.close()
+        if self._shards is not None:
+            self._shards.close()
 
     def __enter__(self) -> "RoomsFile":
         return self

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.hdf5.content import ColumnDigest
+from scenegen.common.manifest import ShardRecord, manifest_path, read_manifest, shard_problem
+from scenegen.common.worker_pool import in_threads, processors
 from scenegen.description.specs import DatasetSpec, Fingerprint
 from scenegen.layout import FIELDS, FORMAT_VERSION, has_digests, has_old_draws
 from scenegen.objects.catalogue import Objects, objects_of
@@ -98,11 +100,58 @@ def verify_file(
             checks.append(_check(name, f"{rule} ({len(rooms)} rows)", broken[name]))
         same = fingerprint.hex == rooms.fingerprint
         checks.append(Check("fingerprint", same, rooms.fingerprint if same else "does not match"))
-        rows = np.unique(np.linspace(0, len(rooms) - 1, min(items, len(rooms))).round().astype(int))
-        if len(rows):
-            checks.append(_sampled_again(rooms, rows, objects))
-            checks.append(_rendered_again(rooms, rows, device, objects))
+        return checks + _some_again(rooms, items, device, objects)
+
+
+def verify_set(
+    path: str | Path,
+    items: int = 8,
+    device: str = "auto",
+    objects: Objects | None = None,
+    progress: Callable[[int], Any] = lambda done: None,
+) -> list[Check]:
+    """Check the shards of a set against its manifest, and render `items` rows again.
+
+    Every byte is checked by the SHA-256 of its file, so values are not looked at one by one.
+
+    Args and errors as `verify_file`; FileFormatError also where the manifest cannot be read.
+    """
+    path = Path(path)
+    manifest = read_manifest(manifest_path(path))
+
+    def problem(record: ShardRecord) -> tuple[ShardRecord, str | None]:
+        return record, shard_problem(path.parent, record)
+
+    wrong = []
+    for record, found in in_threads(problem, manifest.shards, processors(), 2 * processors()):
+        if found:
+            wrong.append(f"{record.file} {found}")
+        progress(record.rows)
+    told = "every shard and the set are complete"
+    checks = [_check("manifest", told, [] if manifest.complete else ["the set is not complete"])]
+    checks.append(_check("checksums", f"SHA-256 of {len(manifest.shards)} shards", wrong))
+    if wrong:
+        return checks
+    with RoomsFile(path) as rooms:
+        checks.append(_check("layout", f"{len(rooms)} rows", rooms.problems()))
+        views = len(rooms.spec.views)
+        scene, view = (rooms.read(n, slice(None)) for n in ("scene_index", "view_index"))
+        every = np.arange(manifest.count * views)
+        missing = [] if len(scene) == len(every) else [f"{len(scene)} rows, not {len(every)}"]
+        if not missing:
+            out = np.flatnonzero((scene != every // views) | (view != every % views))
+            missing = [f"row {row}" for row in out[:SHOWN].tolist()]
+        checks.append(_check("rows", f"each of {len(every)} once, in order", missing))
+        checks += _some_again(rooms, items, device, objects or objects_of(rooms.spec))
     return checks
+
+
+def _some_again(rooms: RoomsFile, items: int, device: str, objects: Objects) -> list[Check]:
+    """Draw and render some rows again, spread evenly over the file."""
+    rows = np.unique(np.linspace(0, len(rooms) - 1, min(items, len(rooms))).round().astype(int))
+    if not len(rows):
+        return []
+    return [_sampled_again(rooms, rows, objects), _rendered_again(rooms, rows, device, objects)]
 
 
 def _check(name: str, detail: str, problems: Sequence[str]) -> Check:

@@ -63,9 +63,11 @@ class RenderedScene:
 class RoomsWriter:
     """Writes the rows of a new file of rooms; `create_rooms` makes one."""
 
-    def __init__(self, file: h5py.File, spec: DatasetSpec, count: int, compression: str) -> None:
+    def __init__(
+        self, file: h5py.File, spec: DatasetSpec, count: int, compression: str, is_shard: bool
+    ) -> None:
         self.views = len(spec.views)
-        self.table = Table(file, columns(spec), count * self.views, compression)
+        self.table = Table(file, columns(spec), count * self.views, compression, is_shard)
         self.fingerprint = Fingerprint(spec)
 
     def append(self, rooms: Sequence[RenderedScene]) -> None:
@@ -137,6 +139,19 @@ def described(batch: SceneBatch, images: Array) -> dict[str, Array]:
     }
 
 
+def root_attributes(spec: DatasetSpec, rows: int, compression: str) -> dict[str, Any]:
+    """Return the root attributes that a file of rooms has from the start."""
+    return {
+        "format": FORMAT_NAME,
+        "format_version": FORMAT_VERSION,
+        "writer": writer_name(),
+        "spec": spec.to_json(),
+        "count": rows,
+        "compression": compression,
+        "conventions": CONVENTIONS,
+    }
+
+
 @contextmanager
 def create_rooms(
     path: str | Path,
@@ -146,6 +161,7 @@ def create_rooms(
     compression: str = "gzip",
     overwrite: bool = False,
     attributes: dict[str, str] | None = None,
+    is_shard: bool = False,
 ) -> Iterator[RoomsWriter]:
     """Open a new file of rooms for `count` scenes; it gets its name when the block ends well.
 
@@ -156,17 +172,8 @@ def create_rooms(
     most = MAX_COUNT // len(spec.views)
     check(1 <= count <= most, "n", count, f"from 1 to {most:,} scenes")
     with new_file(path, overwrite) as file:
-        file.attrs.update(
-            format=FORMAT_NAME,
-            format_version=FORMAT_VERSION,
-            writer=writer_name(),
-            spec=spec.to_json(),
-            count=rows,
-            compression=compression,
-            conventions=CONVENTIONS,
-            **(attributes or {}),
-        )
-        writer = RoomsWriter(file, spec, count, compression)
+        file.attrs.update(root_attributes(spec, rows, compression), **(attributes or {}))
+        writer = RoomsWriter(file, spec, count, compression, is_shard)
         yield writer
         if writer.table.rows != rows:
             raise RuntimeError(f"{path}: got {writer.table.rows} of {rows} rows")

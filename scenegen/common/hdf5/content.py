@@ -22,10 +22,15 @@ BLOCK_BYTES = 2**24  # of a data set that are in memory at once
 
 
 class ColumnDigest:
-    """The digest of a data set whose rows are given one after another, in their order."""
+    """The digest of a data set whose rows are given one after another, in their order.
 
-    def __init__(self) -> None:
+    Attributes:
+        rows: the digests of all rows, 32 bytes each; None if they are not kept.
+    """
+
+    def __init__(self, keep_rows: bool = False) -> None:
         self._hash = hashlib.sha256()
+        self.rows = bytearray() if keep_rows else None
 
     def update(self, rows: Iterable[Any]) -> None:
         """Take the next rows."""
@@ -41,6 +46,8 @@ class ColumnDigest:
     def add(self, digest: bytes) -> None:
         """Take the next row's `row_digest`."""
         self._hash.update(digest)
+        if self.rows is not None:
+            self.rows += digest
 
     @property
     def hex(self) -> str:

@@ -49,12 +49,14 @@ class Fault:
     Attributes:
         name: of the object, without a slash before it.
         rule: in a word, as in `metrics.submissions.problems.Problem`.
+        virtual: whether it is a virtual data set, which the file of a set of shards may have.
     """
 
     name: str
     rule: str
     found: str
     expected: str
+    virtual: bool = False
 
 
 def open_file(path: str | Path, kind: str) -> h5py.File:
@@ -178,7 +180,9 @@ def _dataset_faults(name: str, dataset: Any) -> Iterator[Fault]:
     layout = storage.get_layout()
     if layout == h5d.VIRTUAL or storage.get_external_count():
         expected = "values in this file itself"
-        yield Fault(name, "link", "values that lie in another file", expected)
+        yield Fault(
+            name, "link", "values that lie in another file", expected, layout == h5d.VIRTUAL
+        )
         return
     shape, size = dataset.shape or (), stored_bytes(dataset)
     written = dataset.get_storage_size()

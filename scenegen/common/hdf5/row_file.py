@@ -33,6 +33,7 @@ from scenegen.common.hdf5.content import (
     row_digest,
 )
 from scenegen.common.hdf5.input_file import StoredArray, reading
+from scenegen.common.hdf5.shards import Opened, write_row_digests
 from scenegen.common.new_file import written_beside
 from scenegen.common.worker_pool import processors
 
@@ -76,12 +77,25 @@ class Table:
     compressed by threads of their own, which the GIL does not hold up, so rows may be written
     after `append` returns; they must not change then. When the last row is appended, all are
     written, and each dataset gets its digest (`content.column_digest`) as an attribute.
+
+    Attributes:
+        count, rows: numbers of rows, in all and written so far.
+        columns, compression: as given.
+        datasets: by name.
     """
 
     def __init__(
-        self, group: h5py.Group, columns: Sequence[Column], count: int, compression: str = "gzip"
+        self,
+        group: h5py.Group,
+        columns: Sequence[Column],
+        count: int,
+        compression: str = "gzip",
+        row_digests: bool = False,
     ) -> None:
-        """Create the datasets. Raises SpecError for an unknown compression or a negative count."""
+        """Create the datasets; with `row_digests` the last row adds those of a shard.
+
+        Raises SpecError for an unknown compression or a negative count.
+        """
         if compression not in COMPRESSIONS:
             known = f"one of {', '.join(COMPRESSIONS)}"
             raise SpecError("compression", repr(compression), known)
@@ -90,9 +104,10 @@ class Table:
         self.count, self.rows, self._given = count, 0, 0
         self.columns, self.compression = tuple(columns), compression
         self._images = [column for column in columns if column.own_chunk]
-        self._datasets = {column.name: self._create(group, column) for column in columns}
+        self.datasets = {column.name: self._create(group, column) for column in columns}
         self._block: dict[str, list[Any]] = {c.name: [] for c in columns if not c.own_chunk}
-        self._digests = {column.name: ColumnDigest() for column in columns}
+        self._digests = {column.name: ColumnDigest(row_digests) for column in columns}
+        self._group, self._row_digests = group, row_digests
         self._packing: deque[Future[PackedRows]] = deque()
         if not count:
             self._write_digests()
@@ -136,7 +151,7 @@ class Table:
     def _write_chunks(self, images: Sequence[tuple[bytes, Any]]) -> None:
         for column, (digest, chunk) in zip(self._images, images, strict=True):
             self._digests[column.name].add(digest)
-            dataset = self._datasets[column.name]
+            dataset = self.datasets[column.name]
             if self.compression == "lzf":
                 dataset[self.rows] = chunk
             else:
@@ -144,7 +159,11 @@ class Table:
 
     def _write_digests(self) -> None:
         for name, digest in self._digests.items():
-            self._datasets[name].attrs[SHA256] = digest.hex
+            self.datasets[name].attrs[SHA256] = digest.hex
+        if self._row_digests:
+            write_row_digests(
+                self._group, {n: bytes(x.rows or b"") for n, x in self._digests.items()}
+            )
 
     def _create(self, group: h5py.Group, column: Column) -> h5py.Dataset:
         text = column.dtype == "text"
@@ -167,7 +186,7 @@ class Table:
     def _flush(self) -> None:
         for name, rows in self._block.items():
             if rows:
-                dataset = self._datasets[name]
+                dataset = self.datasets[name]
                 text = h5py.check_string_dtype(dataset.dtype) is not None
                 values = np.array(rows, object) if text else np.stack(rows).astype(dataset.dtype)
                 dataset[self.rows - len(rows) : self.rows] = values
@@ -262,11 +281,13 @@ def column_problems(group: h5py.Group, columns: Sequence[Column], count: int) ->
     return problems
 
 
-def digest_problems(file: h5py.File, known: Mapping[str, str]) -> list[str]:
+def digest_problems(
+    file: h5py.File, known: Mapping[str, str], stored: Opened = StoredArray
+) -> list[str]:
     """Return a sentence for each dataset that is not as it was sealed, and one for the attributes.
 
-    `known` are the `content.column_digest`s of datasets that the caller has read already. Raises
-    FileFormatError where the attributes cannot be read.
+    `known` are the `content.column_digest`s of datasets that the caller has read already; `stored`
+    opens the others. Raises FileFormatError where the attributes cannot be read.
     """
     problems = []
     with reading(file.filename):
@@ -274,7 +295,7 @@ def digest_problems(file: h5py.File, known: Mapping[str, str]) -> list[str]:
             told = dataset.attrs.get(SHA256)
             try:
                 with reading(name):
-                    found = known.get(name) or dataset_digest(StoredArray(dataset))
+                    found = known.get(name) or dataset_digest(stored(dataset))
             except FileFormatError as error:
                 problems.append(str(error))
                 continue

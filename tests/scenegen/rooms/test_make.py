@@ -15,8 +15,9 @@ from scenegen import open_rooms
 from scenegen.common.errors import SceneGenError
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.sources import object_source
-from scenegen.rooms import make
-from scenegen.rooms.make import make_dataset, render_items
+from scenegen.rooms import render as rendering
+from scenegen.rooms.make import make_dataset
+from scenegen.rooms.render import render_items
 
 SPEC = DatasetSpec(height=32, width=32, min_visible_pixels=3, seed=3)
 PIXELS = ("image", "depth", "normal", "object_id")
@@ -143,7 +144,7 @@ def test_retries_keep_the_order_and_do_not_depend_on_batches(tmp_path):
 @pytest.mark.parametrize("kind", ["shapes", "views", "family", "folder"])
 def test_worker_processes_never_change_a_byte(tmp_path, monkeypatch, kind):
     """Nor do they forget which models were refused."""
-    monkeypatch.setattr(make, "BLOCK", 16)
+    monkeypatch.setattr(rendering, "BLOCK", 16)
     how = {"height": 32, "width": 32, "min_visible_pixels": 20, "seed": 5}
     how |= {"views": (0.0, 40.0)} if kind == "views" else {}
     how |= {"source": "families", "shapes": ("mug", "bowl")} if kind == "family" else {}
@@ -167,7 +168,7 @@ def test_a_worker_that_is_killed_ends_the_run(tmp_path, monkeypatch):
         for worker in multiprocessing.active_children():
             worker.kill()
 
-    monkeypatch.setattr(make, "BLOCK", 8)
+    monkeypatch.setattr(rendering, "BLOCK", 8)
     with pytest.raises(SceneGenError) as refused:
         make_dataset(tmp_path / "x.h5", SPEC, 400, workers=2, progress=kill)
     assert "worker" in refused.value.where

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scenegen.common.errors import SpecError
 from scenegen.common.hdf5.row_file import shuffle_bytes
 from scenegen.description.specs import DatasetSpec
-from scenegen.rooms.make import render_items
+from scenegen.rooms.render import render_items
 from scenegen.rooms.writer import create_rooms
 
 SPEC = DatasetSpec(height=32, width=32, min_visible_pixels=3, seed=3)

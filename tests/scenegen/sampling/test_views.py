@@ -21,8 +21,8 @@ from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.packing import SceneBatch, pack
 from scenegen.rendering.renderer import render
-from scenegen.rooms import make as dataset
-from scenegen.rooms.make import render_items
+from scenegen.rooms import render as dataset
+from scenegen.rooms.render import render_items
 from scenegen.sampling.cameras import sample_cameras
 from scenegen.sampling.scenes import sample_scene
 

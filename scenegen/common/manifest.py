@@ -1,0 +1,168 @@
+"""The manifest of a set of shards: what was asked for, and which shards are complete.
+
+It is JSON beside the set, such as `rooms.manifest.json`, written anew after each shard. So a run
+that was killed can go on, and anyone can check the files by their SHA-256.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
+from scenegen.common.new_file import written_beside
+from scenegen.common.records import LONGEST_JSON, from_json
+
+try:
+    import fcntl
+except ImportError:  # Windows has no such locks
+    fcntl = None  # type: ignore[assignment]
+
+ENDING = ".manifest.json"
+FORMAT = "pix2shape-bench manifest 1"
+MOST_BYTES = LONGEST_JSON
+
+
+@dataclass(frozen=True)
+class ShardRecord:
+    """A complete shard.
+
+    Attributes:
+        file: its name, without a folder.
+        first, items: its first item, and their number.
+        rows: the number of its rows.
+        bytes: its size.
+        sha256: of the whole file.
+        content_digest: its attribute of that name.
+        seconds: that it took to make.
+    """
+
+    file: str
+    first: int
+    items: int
+    rows: int
+    bytes: int
+    sha256: str
+    content_digest: str
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a set of shards is, and how far it is made.
+
+    Attributes:
+        format: FORMAT.
+        file: name of the file that shows all shards as one.
+        spec: the request, as JSON.
+        count, shard_size: numbers of items, in all and of a shard.
+        settings: what else the bytes depend on: compression, variant, versions.
+        command: that made it.
+        complete: whether the file of the set is there.
+        shards: those that are complete, in their order.
+    """
+
+    format: str
+    file: str
+    spec: str
+    count: int
+    shard_size: int
+    settings: tuple[tuple[str, str], ...]
+    command: str
+    complete: bool
+    shards: tuple[ShardRecord, ...]
+
+    def differences(self, other: "Manifest") -> list[str]:
+        """Return what makes the bytes of another set other ones: `name here, name there`."""
+        ours, theirs = self._request(), other._request()
+        names = sorted(ours.keys() | theirs.keys())
+        return [
+            f"{n} {ours.get(n)}, not {theirs.get(n)}" for n in names if ours.get(n) != theirs.get(n)
+        ]
+
+    def _request(self) -> dict[str, Any]:
+        spec = json.loads(self.spec)
+        return {**spec, **dict(self.settings), "n": self.count, "shard-size": self.shard_size}
+
+    def with_shard(self, shard: ShardRecord) -> "Manifest":
+        """Return the manifest with one more shard."""
+        shards = [one for one in self.shards if one.file != shard.file] + [shard]
+        return replace(self, shards=tuple(sorted(shards, key=lambda one: one.first)))
+
+
+def manifest_path(path: str | Path) -> Path:
+    """Return where the manifest of a set is."""
+    return Path(path).with_suffix(ENDING)
+
+
+def write_manifest(path: Path, manifest: Manifest) -> None:
+    """Write the manifest of the set at `path`, in one step."""
+    text = json.dumps(manifest, default=vars, indent=1)
+    with written_beside(manifest_path(path), overwrite=True) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def read_manifest(place: Path) -> Manifest:
+    """Read a manifest. Raises FileFormatError where it is not one, and OSError."""
+    with place.open("rb") as file:
+        data = file.read(MOST_BYTES + 1)
+    try:
+        found = from_json(Manifest, data, "manifest")
+    except SpecError as error:
+        raise FileFormatError(f"{place}: {error.where}", error.found, error.expected) from error
+    if found.format != FORMAT:
+        raise FileFormatError(place, f"format {found.format!r:.60}", FORMAT)
+    return found
+
+
+def manifests_in(folder: Path) -> list[tuple[Path, Manifest]]:
+    """Return the manifests in a folder, at least one, in order of their names.
+
+    Raises FileFormatError where there is none, and as `read_manifest`.
+    """
+    places = sorted(folder.glob(f"*{ENDING}"))
+    if not places:
+        expected = f"one that ends in {ENDING}, as of a set of shards"
+        raise FileFormatError(folder, "no manifest in it", expected, "name a file instead")
+    return [(place, read_manifest(place)) for place in places]
+
+
+def file_sha256(path: Path) -> str:
+    """Return the SHA-256 of a file, as hex. Raises OSError."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def shard_problem(folder: Path, shard: ShardRecord) -> str | None:
+    """Return what is wrong with the file of a shard; None if it is as it was made."""
+    path = folder / shard.file
+    if not path.is_file():
+        return "is missing"
+    if path.stat().st_size != shard.bytes:
+        return f"has {path.stat().st_size} bytes, not {shard.bytes}"
+    if file_sha256(path) != shard.sha256:
+        return "has another SHA-256 than the manifest tells"
+    return None
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Let nobody else make the set at `path` meanwhile. Raises SceneGenError where someone does."""
+    lock = path.parent / f".{path.name}.lock"
+    descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        if fcntl is not None:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise SceneGenError(path, "another run that makes it", "", "wait for it") from error
+            except OSError:  # a disk without locks
+                pass
+        yield
+        lock.unlink(missing_ok=True)
+    finally:
+        os.close(descriptor)

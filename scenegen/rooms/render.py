@@ -1,0 +1,154 @@
+"""Render scenes and pack their rows: proposing, rendering, checking and packing overlap.
+
+Each worker process takes its own block of scenes through all of these steps. Memory does not grow
+with the number of scenes.
+"""
+
+from collections.abc import Callable, Generator, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.common.hdf5.row_file import PackedRows, packing_threads
+from scenegen.common.worker_pool import in_processes, in_threads, processors
+from scenegen.description.scene_arrays import SceneArrays
+from scenegen.description.specs import DatasetSpec
+from scenegen.layout import columns
+from scenegen.objects.catalogue import Objects, objects_of
+from scenegen.objects.families.cache import MEMBERS_KEPT
+from scenegen.rendering.ground_truth import GroundTruth, visible_pixels
+from scenegen.rendering.packing import SceneBatch, pack_arrays
+from scenegen.rendering.renderer import launch, use_threads
+from scenegen.rooms.writer import RenderedScene, pack_rooms
+from scenegen.sampling.proposals import ProposalQueue
+
+Array = NDArray[Any]
+BLOCK = 512  # images that a worker process makes in one go
+PACKED = 16  # scenes that a thread packs in one go
+WINDOW = 8  # batches that may be begun while the oldest item is still being proposed again
+
+_Begun = tuple[SceneArrays, SceneBatch, Callable[[], GroundTruth]]  # a batch being rendered
+
+
+@dataclass(frozen=True, eq=False)
+class Work:
+    """What is done to scenes, here or in other processes.
+
+    Attributes:
+        spec, objects: what they show.
+        batch: images rendered at once.
+        workers: processes that render.
+        device, compression: as in `backend.DEVICES` and `row_file.COMPRESSIONS`.
+        cache_dir: where members of families are kept.
+    """
+
+    spec: DatasetSpec
+    batch: int
+    workers: int
+    device: str
+    objects: Objects
+    compression: str
+    cache_dir: Path | None
+
+    def rows(self, indices: range) -> Generator[PackedRows]:
+        """Render scenes in order, and meanwhile pack their rows in threads."""
+        fields = columns(self.spec)
+        pieces = (
+            items[first : first + PACKED]
+            for items in render_items(self.spec, indices, self.batch, self.device, self.objects)
+            for first in range(0, len(items), PACKED)
+        )
+
+        def packed(rooms: list[RenderedScene]) -> PackedRows:
+            return pack_rooms(rooms, fields, self.compression)
+
+        ahead = 2 * self.batch // PACKED
+        return in_threads(packed, pieces, packing_threads(self.workers), ahead)
+
+    def in_order(self, ranges: Iterable[range]) -> Generator[PackedRows]:
+        """Yield the rows of all scenes of these ranges, made here or by processes."""
+        if self.workers == 1:
+            for indices in ranges:
+                yield from self.rows(indices)
+            return
+        step = max(1, BLOCK // len(self.spec.views))
+        blocks = (
+            range(i, min(i + step, indices.stop))
+            for indices in ranges
+            for i in range(indices.start, indices.stop, step)
+        )
+        for rows, problems in in_processes(self.block, blocks, self.workers):
+            self.objects.problems.update(problems)
+            yield from rows
+
+    def block(self, indices: range) -> tuple[list[PackedRows], dict[str, str]]:
+        """Return the rows of scenes, and why models were refused; to be called by a worker."""
+        MEMBERS_KEPT.use(self.cache_dir)
+        use_threads(max(1, processors() // self.workers), self.device)
+        return list(self.rows(indices)), self.objects.problems
+
+
+def render_items(
+    spec: DatasetSpec,
+    indices: range,
+    batch: int,
+    device: str = "auto",
+    objects: Objects | None = None,
+) -> Iterator[list[RenderedScene]]:
+    """Yield the accepted items in order, a list of them whenever some are complete.
+
+    While a batch is rendered, the next one is proposed. An item whose objects do not all show
+    enough pixels is proposed again. No new item is begun while the oldest one that is incomplete is
+    more than WINDOW batches behind.
+    """
+    objects = objects or objects_of(spec)
+    views = range(len(spec.views))
+    batch = max(1, batch // len(views))  # scenes
+    proposals = ProposalQueue(spec, indices, objects)
+    finished: dict[int, RenderedScene] = {}
+    next_out = 0
+
+    def propose() -> tuple[SceneArrays, SceneBatch] | None:
+        last = min(len(indices), next_out + WINDOW * batch)
+        scenes = proposals.take(batch, indices.start + last)
+        return None if scenes is None else (scenes, pack_arrays(spec, scenes, views, objects))
+
+    def begin(proposed: tuple[SceneArrays, SceneBatch] | None) -> _Begun | None:
+        return None if proposed is None else (*proposed, launch(proposed[1], device))
+
+    begun: _Begun | None = None
+    while begun := begun or begin(propose()):
+        scenes, packed, fetch = begun
+        following = propose()
+        truth = fetch()
+        begun = begin(following)
+        for item, shown in zip(scenes.index.tolist(), _shown(scenes, packed, truth), strict=True):
+            if shown is None:
+                proposals.refuse(item)
+            else:
+                proposals.accept(item)
+                finished[item] = shown
+        ready = []
+        while next_out < len(indices) and indices[next_out] in finished:
+            ready.append(finished.pop(indices[next_out]))
+            next_out += 1
+        if ready:
+            yield ready
+
+
+def _shown(
+    scenes: SceneArrays, batch: SceneBatch, truth: GroundTruth
+) -> Iterator[RenderedScene | None]:
+    """Yield each scene with its pixels, or None where an object shows too few in some view."""
+    spec = batch.spec
+    visible = visible_pixels(truth.object_id, spec.object_slots)
+    missing: Array = np.arange(spec.object_slots) >= batch.object_count[:, None]
+    enough = np.asarray((missing | (visible >= spec.min_visible_pixels)).all(axis=1))
+    for row, first in enumerate(range(0, len(batch), len(spec.views))):
+        images = slice(first, first + len(spec.views))
+        pixels = {name: values[images] for name, values in vars(truth).items()}
+        shown = RenderedScene(scenes, row, batch, first, pixels, visible[images])
+        yield shown if enough[images].all() else None
