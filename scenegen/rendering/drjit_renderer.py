@@ -63,12 +63,12 @@ def launch_pixels(
 def upload_scenes(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
     """Return the scenes on the device, and the cameras, (B, 13): world_from_camera, pixel size."""
     spec, count = batch.spec, len(batch)
-    shapes = [batch.shape_of(name) for name in batch.names]
-    surfaces: list[Surface | None] = [shape.surface for shape in shapes]
+    surfaces: list[Surface | None] = [None]
     if spec.source == "shapes":
-        unit = unit_scene(variant, tuple(shapes))
-    else:
-        unit, surfaces = model_scene(variant, batch.shape_of, batch.names), [None]
+        shapes = [batch.shape_of(name) for name in batch.names]
+        unit, surfaces = unit_scene(variant, tuple(shapes)), [shape.surface for shape in shapes]
+    else:  # made by nobody where they are in the cache
+        unit = model_scene(variant, batch.shape_of, batch.names)
     mi.set_variant(variant)
     exact = upload_surfaces(surfaces)
     shape = np.maximum(batch.shape, 0)

@@ -30,7 +30,7 @@ SPACING = 2.25  # distance between the models' origins; their bounding radius is
 SIDE = 14  # of the lattice: coordinates stay below 16, where float32 resolves GRID
 MOST_MODELS = SIDE**3
 GRID = 2.0**-20
-MOST_FACES_KEPT = 3_000_000  # of all cached models; a face takes about 100 bytes
+MOST_FACES_KEPT = 300_000  # of all cached models; a face takes about 300 bytes
 
 
 @dataclass(frozen=True, eq=False)
