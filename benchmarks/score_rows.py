@@ -21,7 +21,8 @@ import numpy as np
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.scoring.rows import score_rows
 from metrics.submissions.reader import open_predictions
-from scenegen.common.hdf5.row_file import Table, new_file
+from scenegen.common.hdf5.row_file import new_file
+from scenegen.common.hdf5.table import Table
 from scenegen.description.specs import DatasetSpec
 from scenegen.layout import columns
 from scenegen.rooms.make import make_dataset

@@ -40,7 +40,7 @@ if kind == "packing":
     from scenegen.rooms import render
     hook(render, "pack_rooms")
 elif kind == "writing":
-    from scenegen.common.hdf5.row_file import Table
+    from scenegen.common.hdf5.table import Table
     hook(Table, "extend_packed")
 elif kind == "manifest":
     from scenegen.rooms import shards

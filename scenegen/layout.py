@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from scenegen.common.hdf5.content import CONTENT_DIGEST
-from scenegen.common.hdf5.row_file import COMPRESSIONS, Column
+from scenegen.common.hdf5.table import COMPRESSIONS, Column
 from scenegen.common.text_table import piped
 from scenegen.description.specs import DatasetSpec
 

@@ -15,7 +15,8 @@ from iqtt.questions.specs import SPLITS, SUITE, SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import DEFAULT_BATCH, Rendered, groups, render_questions
 from scenegen.common.hdf5.content import seal
-from scenegen.common.hdf5.row_file import new_file, packing_threads
+from scenegen.common.hdf5.row_file import new_file
+from scenegen.common.hdf5.table import packing_threads
 from scenegen.common.new_folder import check_folder, folder_written_beside
 from scenegen.common.records import check
 from scenegen.common.worker_pool import in_processes, in_threads, processors
@@ -48,7 +49,7 @@ def make_split(
     Args:
         batch: questions in one wavefront; bounds the memory, never changes a byte of the files.
         workers: processes that render, as in `rooms.make.make_dataset`.
-        device, compression: as in `backend.DEVICES` and `row_file.COMPRESSIONS`.
+        device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
         command: what to record as the command that made the files.
         secret: keep the seed out of the file of the test answers too.
         progress: is called with the number of questions that were written since the last call.

@@ -23,7 +23,7 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.render import Rendered
 from iqtt.shapes.polycube import canonical, canonical_class, set_ids
 from scenegen.common.hdf5.content import SHA256, joint_digest
-from scenegen.common.hdf5.row_file import Column, PackedRows, Table, pack_rows
+from scenegen.common.hdf5.table import Column, PackedRows, Table, pack_rows
 from scenegen.layout import TRUTH_DIGEST
 
 OF_QUESTION = (

@@ -95,7 +95,7 @@ from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_co
               help="Images that a process renders at once; more take more memory.")
 @WORKERS
 @click.option("--shard-size", type=int, default=10_000, show_default=True,
-              help="Most scenes of a file; more go to several files beside --out, which shows them as"
+              help="Most scenes of one file; more go to files beside --out, which shows them all as"
               " one.")
 @DEVICE
 @OVERWRITE

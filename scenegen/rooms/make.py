@@ -48,7 +48,7 @@ def make_dataset(
         shard_size: if there are more scenes, they go to shards of so many beside `path`, which then
             shows all of them as one (`shards.make_shards`). The same call goes on where an earlier
             one was killed.
-        device, compression: as in `backend.DEVICES` and `row_file.COMPRESSIONS`.
+        device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
         command: stored as the file's creation command.
         objects: what the scenes are made of; None for `objects_of(spec)`.
         progress: called now and then with the number of rows written since the last call.

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.hdf5.row_file import PackedRows, packing_threads
+from scenegen.common.hdf5.table import PackedRows, packing_threads
 from scenegen.common.worker_pool import in_processes, in_threads, processors
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec
@@ -41,7 +41,7 @@ class Work:
         spec, objects: what they show.
         batch: images rendered at once.
         workers: processes that render.
-        device, compression: as in `backend.DEVICES` and `row_file.COMPRESSIONS`.
+        device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
         cache_dir: where members of families are kept.
     """
 

@@ -11,14 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.hdf5.content import seal
-from scenegen.common.hdf5.row_file import (
-    Column,
-    PackedRows,
-    Table,
-    new_file,
-    pack_rows,
-    writer_name,
-)
+from scenegen.common.hdf5.row_file import new_file, writer_name
+from scenegen.common.hdf5.table import Column, PackedRows, Table, pack_rows
 from scenegen.common.records import check
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec, Fingerprint

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenegen.common.errors import SpecError
-from scenegen.common.hdf5.row_file import shuffle_bytes
+from scenegen.common.hdf5.table import shuffle_bytes
 from scenegen.description.specs import DatasetSpec
 from scenegen.rooms.render import render_items
 from scenegen.rooms.writer import create_rooms
