@@ -50,7 +50,7 @@ else:
 import cli
 cli.scenegen()
 """
-EVENTS = {"packing": 25, "writing": 25, "manifest": 10, "link": 1, "replace": 18, "unlink": 18}
+EVENTS = {"packing": 25, "writing": 25, "manifest": 10, "replace": 18, "unlink": 18}
 
 
 class Torture:
@@ -85,7 +85,10 @@ class Torture:
         return place
 
     def goes_on(self, where: Path) -> str:
-        """Run the same command again; return what is wrong then, or nothing."""
+        """Run the same command again, if it was not done; return what is wrong, or nothing."""
+        manifest = where / "rooms.manifest.json"
+        if manifest.exists() and '"complete": true' in manifest.read_text():
+            return "" if contents(where) == self.expected else "other bytes"
         again = self.command(where)
         said = again.communicate()[1]
         if again.returncode:

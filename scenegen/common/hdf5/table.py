@@ -5,6 +5,7 @@ own filter and any HDF5 library reads it.
 """
 
 import os
+import struct
 from collections import deque
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -25,7 +26,8 @@ from scenegen.common.worker_pool import processors
 
 Array = NDArray[Any]
 COMPRESSIONS = ("gzip", "lzf", "none")
-DEFLATE_LEVEL = 2  # at 1, one image in some 10,000 was packed otherwise in another run
+DEFLATE_LEVEL = 1
+STORED = 8  # bytes at the start of a chunk that are not compressed
 PACK_ROWS = 4  # whose images a thread compresses in one go
 MOST_PACKING = 128  # rows that may wait to be written; bounds the memory
 MOST_PACKERS = 8  # threads that compress
@@ -204,7 +206,7 @@ def pack_rows(rows: Rows, columns: Sequence[Column], compression: str) -> Packed
             packed: Any = raw  # for lzf, which h5py packs
             if compression == "gzip":
                 plain = shuffle_bytes(raw) if _is_shuffled(column) else raw
-                packed = isal_zlib.compress(plain, DEFLATE_LEVEL)
+                packed = deflated(plain)
             elif compression == "none":
                 packed = raw.tobytes()
             row.append((row_digest(raw), packed))
@@ -225,6 +227,21 @@ def packing_threads(workers: int = 1) -> int:
 def _threads(_pid: int) -> ThreadPoolExecutor:
     """Return this process's threads; those of a parent do not live on in a forked child."""
     return ThreadPoolExecutor(packing_threads(), thread_name_prefix="pack")
+
+
+def deflated(values: Array) -> bytes:
+    """Compress an array's bytes to a zlib stream, the same bytes in every process and thread.
+
+    ISA-L's `compress` hashes the address of its state where it begins without history (in python-isal
+    1.9.1, `write_first_byte` of `isal_deflate_icf_body_hash_hist_04`), so some 1 in 10,000 of its
+    outputs depends on where the stack lies. Here the first bytes are stored, and are the history.
+    """
+    data = np.ascontiguousarray(values).data.cast("B")
+    first = bytes(data[:STORED])
+    header = b"\x78\x01\x00" + struct.pack("<HH", len(first), 0xFFFF ^ len(first))
+    packer = isal_zlib.compressobj(DEFLATE_LEVEL, isal_zlib.DEFLATED, -15, zdict=first)
+    body = packer.compress(data[STORED:]) + packer.flush()
+    return header + first + body + struct.pack(">I", isal_zlib.adler32(data))
 
 
 def shuffle_bytes(values: Array) -> Array:

@@ -1,6 +1,8 @@
 """Nothing half-written ever carries the final name, whatever goes wrong."""
 
 import os
+import threading
+import zlib
 
 import h5py
 import numpy as np
@@ -9,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenegen.common.errors import SpecError
-from scenegen.common.hdf5.table import shuffle_bytes
+from scenegen.common.hdf5.table import deflated, shuffle_bytes
 from scenegen.description.specs import DatasetSpec
 from scenegen.rooms.render import render_items
 from scenegen.rooms.writer import create_rooms
@@ -91,6 +93,31 @@ def test_shuffle_is_that_of_hdf5(data, dtype):
         dataset = file.create_dataset("x", values.shape, dtype, chunks=values.shape, shuffle=True)
         dataset.id.write_direct_chunk((0,), shuffle_bytes(values).tobytes())
         assert dataset[...].tobytes() == values.tobytes()
+
+
+@given(st.binary(min_size=0, max_size=200), st.integers(1, 9))
+def test_deflated_is_a_zlib_stream(data, times):
+    values = np.frombuffer(data * times, np.uint8)
+    assert zlib.decompress(deflated(values)) == values.tobytes()
+
+
+def test_deflated_does_not_depend_on_where_the_stack_lies():
+    """ISA-L's own `compress` gives two outputs for some of these."""
+    rng = np.random.default_rng(0)
+    arrays = [np.frombuffer(rng.bytes(48) * 8, np.uint8) for _ in range(200)]
+    expected, wrong = [deflated(array) for array in arrays], []
+
+    def again():
+        ready.wait()  # all threads live at once, so that no two have one stack
+        wrong.extend(i for i, a in enumerate(arrays) if deflated(a) != expected[i])
+
+    ready = threading.Barrier(150)
+    threads = [threading.Thread(target=again) for _ in range(150)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert wrong == []
 
 
 def write_and_then(happens, path, rows, overwrite=False):
