@@ -70,7 +70,7 @@ results: $(VENV)/.model
 fuzz: $(VENV)/.test
 	$(BIN)/python -m fuzz --seconds 600 --corpus fuzz-corpus
 
-# Half an hour of runs that are killed, stopped or without room, and then go on.
+# Five minutes of runs that are killed, stopped or without room, and then go on.
 torture: $(VENV)/.test
 	$(BIN)/python -m benchmarks.torture
 
