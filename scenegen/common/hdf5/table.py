@@ -232,9 +232,9 @@ def _threads(_pid: int) -> ThreadPoolExecutor:
 def deflated(values: Array) -> bytes:
     """Compress an array's bytes to a zlib stream, the same bytes in every process and thread.
 
-    ISA-L's `compress` hashes the address of its state where it begins without history (in isal 1.9.1,
-    `write_first_byte` of `isal_deflate_icf_body_hash_hist_04`), so that some 1 in 10,000 of its
-    outputs depends on where the stack lies. Here the first bytes are stored, and are the history.
+    ISA-L's `compress` hashes the address of its state where it begins without history (in isal
+    1.9.1, `write_first_byte` of `isal_deflate_icf_body_hash_hist_04`), so that some 1 in 10,000 of
+    its outputs depends on where the stack lies. Here the first bytes are stored, and are history.
     """
     data = np.ascontiguousarray(values).data.cast("B")
     first = bytes(data[:STORED])
