@@ -23,7 +23,7 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.render import Rendered
 from iqtt.shapes.polycube import canonical, canonical_class, set_ids
 from scenegen.common.hdf5.content import SHA256, joint_digest
-from scenegen.common.hdf5.table import Column, PackedRows, Table, pack_rows
+from scenegen.common.hdf5.table import Column, PackedRows, Rows, Table, pack_rows
 from scenegen.layout import TRUTH_DIGEST
 
 OF_QUESTION = (
@@ -115,7 +115,8 @@ def pack_questions(
     """Pack questions, at least one, of the part of a split that `QuestionsWriter` tells of."""
     truth = _truth(spec, questions)
     answers = np.array([one.question.shapes.answer for one in questions], np.uint8)
-    rows = ({"questions": [one.images for one in questions]}, truth, {"answers": answers})
+    images: Rows = {"questions": [one.images for one in questions]}
+    rows: tuple[Rows, ...] = (images, truth, {"answers": answers})
     packed = tuple(
         pack_rows(values, columns, compression)
         for values, columns in zip(rows, _columns(spec, part), strict=True)

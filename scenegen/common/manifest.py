@@ -127,7 +127,7 @@ def manifests_in(folder: Path) -> list[tuple[Path, Manifest]]:
     places = sorted(folder.glob(f"*{ENDING}"))
     if not places:
         expected = f"one that ends in {ENDING}, as of a set of shards"
-        raise FileFormatError(folder, "no manifest in it", expected, "name a file instead")
+        raise FileFormatError(f"{folder}: is a folder", "no manifest", expected, "name a file")
     return [(place, read_manifest(place)) for place in places]
 
 

@@ -17,6 +17,7 @@ from scenegen.common.errors import SceneGenError
 
 T = TypeVar("T")
 Task = TypeVar("Task")
+PATIENCE = 5.0  # seconds, until a killed process is gone
 AHEAD = 2  # tasks for each process that are begun, or done and not yet taken
 
 
@@ -61,13 +62,19 @@ def worker_pool(
     The block waits for them at its end. Where it ends by an error, they are killed instead.
     """
     context = _Spawning()
-    with ProcessPoolExecutor(count, context, _begin, (function,)) as pool:
-        try:
-            yield pool
-        except BaseException:
-            for worker in context.started:
-                worker.kill()
-            raise  # and the pool, which finds them dead, waits for no task
+    pool = ProcessPoolExecutor(count, context, _begin, (function,))
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        # One that was being started when Ctrl-C came has no number; it ends by itself.
+        begun = [worker for worker in context.started if worker.pid is not None]
+        for worker in begun:
+            worker.kill()
+        for worker in begun:
+            worker.join(PATIENCE)
+        raise
+    pool.shutdown()
 
 
 def in_threads(

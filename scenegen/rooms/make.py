@@ -5,6 +5,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from scenegen.common.hdf5.shards import MOST_SHARDS
 from scenegen.common.new_file import check_writable
 from scenegen.common.records import check
 from scenegen.description.specs import DatasetSpec
@@ -62,7 +63,9 @@ def make_dataset(
     found = f"{batch}, with {len(spec.views)} views of a scene"
     enough = max(batch, len(spec.views)) <= most
     check(enough, "batch", found, f"at most {most} images of this size")
-    check(1 <= shard_size <= MAX_COUNT, "shard-size", shard_size, f"from 1 to {MAX_COUNT:,}")
+    least = max(1, -(-count // MOST_SHARDS))
+    check(1 <= count <= MAX_COUNT, "n", count, f"from 1 to {MAX_COUNT:,} scenes")
+    check(least <= shard_size, "shard-size", shard_size, f"at least {least} for so many scenes")
     variant = select_variant(device)
     objects = objects or objects_of(spec)
     workers = workers or useful_workers(count * len(spec.views), variant)

@@ -20,7 +20,7 @@ from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Views, mapped
 from baselines.pix2shape.network.surfels import Scene
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.hdf5.input_file import open_file
+from scenegen.common.hdf5.shards import open_with_shards
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsDataset, RoomsFile
@@ -55,7 +55,7 @@ def reduced(image: Array, size: int) -> Array:
 
 def is_question_file(path: str | Path) -> bool:
     """Return whether a file holds questions. Raises OSError, FileFormatError."""
-    with open_file(path, "rooms or question file") as file:
+    with open_with_shards(Path(path), "rooms or question file")[0] as file:
         return any(name in file for name in ("questions", "labeled", "unlabeled"))
 
 

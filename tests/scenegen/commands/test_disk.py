@@ -37,7 +37,7 @@ def test_a_folder_without_write_permission(tmp_path, check_refusal):
 
 
 def test_a_killed_render_leaves_nothing_under_the_final_name(tmp_path):
-    command = [sys.executable, "-c", "import cli; cli.scenegen()", *RENDER, "--n", "100000"]
+    command = [sys.executable, "-c", "import cli; cli.scenegen()", *RENDER, "--n", "10000"]
     process = subprocess.Popen([*command, "--out", "x.h5"], cwd=tmp_path, stderr=subprocess.DEVNULL)
     try:
         wait_until(lambda: any(p.stat().st_size > 100_000 for p in tmp_path.rglob("*.h5")), process)

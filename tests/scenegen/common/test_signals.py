@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-RENDER = ("render", "--size", "32", "--min-visible-pixels", "3", "--n", "100000", "--out", "x.h5")
+RENDER = ("render", "--size", "32", "--min-visible-pixels", "3", "--n", "10000", "--out", "x.h5")
 BLOCK = """
 import signal, sys, time
 from scenegen.common.signals import ended_by_signals
