@@ -120,13 +120,13 @@ def _begun(path: Path, asked: Manifest, names: Sequence[str], overwrite: bool) -
             place, "; ".join(differences), "the same request as that of the run that began it",
             "repeat its options to go on, or start anew with --overwrite",
         )  # fmt: skip
-    if found.complete:
-        check_writable(path, overwrite=False)
     kept = [
         record
         for record in found.shards
         if record.file in names and shard_problem(path.parent, record) is None
     ]
+    if found.complete and len(kept) == len(names):
+        check_writable(path, overwrite=False)
     return replace(found, shards=tuple(kept), complete=False)
 
 
