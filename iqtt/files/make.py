@@ -19,9 +19,9 @@ from scenegen.common.hdf5.row_file import new_file
 from scenegen.common.hdf5.table import packing_threads
 from scenegen.common.new_folder import check_folder, folder_written_beside
 from scenegen.common.records import check
-from scenegen.common.worker_pool import in_processes, in_threads, processors
+from scenegen.common.worker_pool import in_processes, in_threads
 from scenegen.rendering.backend import select_variant, versions
-from scenegen.rendering.renderer import use_threads, useful_workers
+from scenegen.rendering.renderer import share_processors, useful_workers
 
 FILES = ("iqtt-train.h5", "iqtt-val.h5", "iqtt-test.h5", "iqtt-test-answers.h5")
 BLOCK = 128  # questions that a worker process makes in one go
@@ -159,7 +159,7 @@ class _Work:
 
     def block(self, block: _Block) -> tuple[list[PackedQuestions], Tally]:
         """Return the questions of a block; to be called by a worker."""
-        use_threads(max(1, processors() // self.workers), self.device)
+        share_processors(self.workers, self.device)
         tally = Tally()
         return list(self.questions(block, tally)), tally
 

@@ -7,6 +7,7 @@ that was killed can go on, and anyone can check the files by their SHA-256.
 import hashlib
 import json
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -15,7 +16,7 @@ from typing import Any
 
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.common.new_file import written_beside
-from scenegen.common.records import LONGEST_JSON, from_json
+from scenegen.common.records import LONGEST_JSON, check, from_json
 
 try:
     import fcntl
@@ -50,6 +51,9 @@ class ShardRecord:
     content_digest: str
     seconds: float
 
+    def __post_init__(self) -> None:
+        _check_name(self.file)
+
 
 @dataclass(frozen=True)
 class Manifest:
@@ -76,6 +80,9 @@ class Manifest:
     complete: bool
     shards: tuple[ShardRecord, ...]
 
+    def __post_init__(self) -> None:
+        _check_name(self.file)
+
     def differences(self, other: "Manifest") -> list[str]:
         """Return what makes the bytes of another set other ones: `name here, name there`."""
         ours, theirs = self._request(), other._request()
@@ -92,6 +99,11 @@ class Manifest:
         """Return the manifest with one more shard."""
         shards = [one for one in self.shards if one.file != shard.file] + [shard]
         return replace(self, shards=tuple(sorted(shards, key=lambda one: one.first)))
+
+
+def _check_name(name: str) -> None:
+    plain = name not in ("", ".", "..") and not re.search(r"[/\\\0]", name)
+    check(plain, "file", repr(name), "the name of a file beside the manifest")
 
 
 def manifest_path(path: str | Path) -> Path:
@@ -158,10 +170,13 @@ def locked(path: Path) -> Iterator[None]:
         if fcntl is not None:
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise SceneGenError(path, "another run that makes it", "", "wait for it") from error
+                ours = lock.exists() and os.path.samestat(os.fstat(descriptor), lock.stat())
+            except BlockingIOError:
+                ours = False
             except OSError:  # a disk without locks
-                pass
+                ours = True
+            if not ours:  # or a run that has just ended removed the lock that was opened here
+                raise SceneGenError(path, "another run that makes it", "", "wait for it")
         yield
         lock.unlink(missing_ok=True)
     finally:

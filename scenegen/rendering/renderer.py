@@ -34,12 +34,15 @@ def useful_workers(images: int, variant: str) -> int:
     return max(1, min(most, images // WORTHWHILE))
 
 
-def use_threads(count: int, device: str = "auto") -> None:
-    """Let the CPU variant render with so many threads. Raises BackendError as `render`."""
+def share_processors(workers: int, device: str = "auto") -> None:
+    """Let the CPU variant use one of `workers` equal shares of the processors, at least one.
+
+    Raises BackendError as `render`.
+    """
     if select_variant(device) == "llvm_ad_rgb":
         import drjit
 
-        drjit.set_thread_count(count)
+        drjit.set_thread_count(max(1, processors() // workers))
 
 
 def render(batch: SceneBatch, device: str = "auto") -> GroundTruth:

@@ -30,7 +30,7 @@ def describe(path: str | Path) -> str:
         attributes = rooms.attributes
         lines = [
             f"{path}: {len(rooms)} images of {rooms.spec.height}x{rooms.spec.width},"
-            f" {Path(path).stat().st_size / 1e6:.1f} MB",
+            f" {sum(stored for stored, _ in rooms.stored_bytes().values()) / 1e6:.1f} MB",
             "",
             f"  format          {attributes['format']} {shown(attributes, 'format_version')}",
             f"  written by      {shown(attributes, 'writer')}, {shown(attributes, 'variant')}",

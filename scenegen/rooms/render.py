@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.hdf5.table import PackedRows, packing_threads
-from scenegen.common.worker_pool import in_processes, in_threads, processors
+from scenegen.common.worker_pool import in_processes, in_threads
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec
 from scenegen.layout import columns
@@ -21,7 +21,7 @@ from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.families.cache import MEMBERS_KEPT
 from scenegen.rendering.ground_truth import GroundTruth, visible_pixels
 from scenegen.rendering.packing import SceneBatch, pack_arrays
-from scenegen.rendering.renderer import launch, use_threads
+from scenegen.rendering.renderer import launch, share_processors
 from scenegen.rooms.writer import RenderedScene, pack_rooms
 from scenegen.sampling.proposals import ProposalQueue
 
@@ -87,7 +87,7 @@ class Work:
     def block(self, indices: range) -> tuple[list[PackedRows], dict[str, str]]:
         """Return the rows of scenes, and why models were refused; to be called by a worker."""
         MEMBERS_KEPT.use(self.cache_dir)
-        use_threads(max(1, processors() // self.workers), self.device)
+        share_processors(self.workers, self.device)
         return list(self.rows(indices)), self.objects.problems
 
 

@@ -36,7 +36,7 @@ from scenegen.common.hdf5.input_file import (
 Array = NDArray[Any]
 SHARDS = "shards"  # in the file of a set: a line of JSON for each shard
 ROW_DIGESTS = "row_sha256"  # in a shard: (rows, data sets, 32) bytes; its attribute has the names
-MOST_SHARDS = 100_000
+MOST_SHARDS = 10_000  # whose manifest is still read
 LONGEST_LINE = 1000  # characters
 MOST_OPEN = 32  # shards that a reader keeps open
 

@@ -31,7 +31,10 @@ def test_every_command_takes_a_set(make_rooms, tmp_path):
         told.append(call(cli.scenegen, "info", rooms))
     assert scores[0]["metrics"] == scores[1]["metrics"]
     assert scores[0]["meta"]["truth_digest"] == scores[1]["meta"]["truth_digest"]
-    assert "8 rows" in told[1] or "8" in told[1].splitlines()[0]
+    sizes = [sum(p.stat().st_size for p in (tmp_path / "set").glob("rooms-*.h5"))]
+    sizes.insert(0, (tmp_path / "one" / "rooms.h5").stat().st_size)
+    for text, size in zip(told, sizes, strict=True):
+        assert text.splitlines()[0].endswith(f"8 images of 32x32, {size / 1e6:.1f} MB")
     for file in ("sheet.png", "rooms-000007.ply"):
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "set" / file).read_bytes()
     verified = call(cli.scenegen, "verify", tmp_path / "set", "--items", 2)

@@ -200,6 +200,16 @@ def test_other_options_are_refused_by_name(copied, make_rooms):
     assert len(list(copied.parent.glob("rooms-*-of-00003.h5"))) == 3
 
 
+@pytest.mark.parametrize("name", ["../rooms.h5", "", "a/b", ".."])
+@pytest.mark.parametrize("which", ["set", "shard"])
+def test_a_manifest_names_only_files_beside_it(copied, name, which):
+    told = json.loads(manifest_path(copied).read_text())
+    (told if which == "set" else told["shards"][1])["file"] = name
+    manifest_path(copied).write_text(json.dumps(told))
+    with pytest.raises(FileFormatError):
+        verify_set(copied)
+
+
 def test_files_of_others_are_kept(tmp_path, make_rooms):
     (tmp_path / "rooms-00001-of-00003.h5").write_text("mine")
     with pytest.raises(FileExistsError):
