@@ -19,7 +19,7 @@ from scenegen.common.hdf5.row_file import new_file
 from scenegen.common.hdf5.table import packing_threads
 from scenegen.common.new_folder import check_folder, folder_written_beside
 from scenegen.common.records import check
-from scenegen.common.worker_pool import in_processes, in_threads
+from scenegen.common.workers.pool import in_processes, in_threads
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.renderer import share_processors, useful_workers
 

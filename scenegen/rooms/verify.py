@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.hdf5.content import ColumnDigest
-from scenegen.common.manifest import ShardRecord, manifest_path, read_manifest, shard_problem
-from scenegen.common.worker_pool import in_threads, processors
+from scenegen.common.sets.manifest import ShardRecord, manifest_path, read_manifest, shard_problem
+from scenegen.common.workers.pool import in_threads, processors
 from scenegen.description.specs import DatasetSpec, Fingerprint
 from scenegen.layout import FIELDS, FORMAT_VERSION, has_digests, has_old_draws
 from scenegen.objects.catalogue import Objects, objects_of
