@@ -13,7 +13,7 @@ import json
 import re
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager, nullcontext
 from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
@@ -41,6 +41,7 @@ ROW_DIGESTS = "row_sha256"  # in a shard: (rows, data sets, 32) bytes; its attri
 MOST_SHARDS = 10_000  # whose manifest is still read
 LONGEST_LINE = 1000  # characters
 PART = re.compile(r"\w{0,40}")
+SHARD_NAME = re.compile(r"(.+)-\d{5}-of-\d{5}(\.[^.]*|)", re.DOTALL)
 MOST_OPEN = 32  # shards that a reader keeps open
 
 
@@ -67,10 +68,10 @@ def shard_name(path: str | Path, number: int, count: int) -> str:
     return f"{path.stem}-{number:05d}-of-{count:05d}{path.suffix}"
 
 
-def is_shard_name(name: str, path: str | Path) -> bool:
-    """Return whether a name is that of a shard of the set at `path`."""
-    stem, suffix = re.escape(Path(path).stem), re.escape(Path(path).suffix)
-    return re.fullmatch(rf"{stem}-\d{{5}}-of-\d{{5}}{suffix}", name) is not None
+def set_name(name: str) -> str | None:
+    """Return the name of the set that a shard of this name belongs to; None if it is no shard's."""
+    found = SHARD_NAME.fullmatch(name)
+    return None if found is None else "".join(found.groups())
 
 
 def cut(count: int, size: int) -> list[range]:
@@ -181,6 +182,14 @@ def open_with_shards(path: Path, kind: str) -> tuple[h5py.File, "ShardFiles | No
         return file, ShardFiles(path, shards, kind)
 
 
+@contextmanager
+def opened_with_shards(path: Path, kind: str) -> Iterator[tuple[h5py.File, "ShardFiles | None"]]:
+    """Open a file as `open_with_shards`, and close all that was opened."""
+    file, shards = open_with_shards(path, kind)
+    with closing(shards) if shards else nullcontext(), file:
+        yield file, shards
+
+
 def _read_list(listed: h5py.Dataset, path: Path) -> list[Shard]:
     """Return the shards that the file of a set names, each beside it."""
     where = f"{path}: {SHARDS}"
@@ -193,7 +202,7 @@ def _read_list(listed: h5py.Dataset, path: Path) -> list[Shard]:
             shard = Shard(**json.loads(line[:LONGEST_LINE]))
             good = shard.rows > 0 and type(shard.rows) is int
             good &= re.fullmatch("[0-9a-f]{64}", shard.content_digest) is not None
-            good &= is_shard_name(shard.file, path) and PART.fullmatch(shard.part) is not None
+            good &= set_name(shard.file) == path.name and PART.fullmatch(shard.part) is not None
         except (TypeError, ValueError, RecursionError):
             good = False
         if not good:
@@ -308,3 +317,10 @@ class JoinedArray:
 
 
 Opened = Callable[[h5py.Dataset], StoredArray | JoinedArray]
+
+
+def stored_array(dataset: h5py.Dataset, shards: ShardFiles | None) -> StoredArray | JoinedArray:
+    """Return a data set of a file that `open_with_shards` opened, to be read."""
+    if shards is not None and dataset.is_virtual:
+        return JoinedArray(shards, dataset)
+    return StoredArray(dataset)

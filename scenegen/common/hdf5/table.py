@@ -66,6 +66,7 @@ class Table:
 
     Attributes:
         count, rows: numbers of rows, in all and written so far.
+        file: that holds them.
         columns, compression: as given.
         datasets: by name.
     """
@@ -92,6 +93,7 @@ class Table:
         self._images = [column for column in columns if column.own_chunk]
         self.datasets = {column.name: self._create(group, column) for column in columns}
         self._block: dict[str, list[Any]] = {c.name: [] for c in columns if not c.own_chunk}
+        self.file: h5py.File = group.file
         self._digests = {column.name: ColumnDigest(row_digests) for column in columns}
         self._packing: deque[Future[PackedRows]] = deque()
         if not count:
@@ -193,6 +195,26 @@ class PackedRows:
     count: int
     images: list[list[tuple[bytes, Any]]]
     others: Rows
+
+    def row(self, i: int) -> "PackedRows":
+        """Return one of the rows."""
+        others = {name: values[i : i + 1] for name, values in self.others.items()}
+        return PackedRows(1, self.images[i : i + 1], others)
+
+
+def extend_together(tables: Sequence[Table], rows: Sequence[PackedRows]) -> None:
+    """Write the next rows of several tables of one file.
+
+    HDF5 places what has a chunk of its own in the order of writing. So where several tables have
+    such columns, they are written row by row: the bytes do not depend on how many come at a time.
+    """
+    if sum(any(column.own_chunk for column in table.columns) for table in tables) < 2:
+        for table, some in zip(tables, rows, strict=True):
+            table.extend_packed(some)
+        return
+    for i in range(rows[0].count):
+        for table, some in zip(tables, rows, strict=True):
+            table.extend_packed(some.row(i))
 
 
 def pack_rows(rows: Rows, columns: Sequence[Column], compression: str) -> PackedRows:

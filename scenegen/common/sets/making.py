@@ -9,11 +9,11 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from scenegen.common.errors import SpecError
 from scenegen.common.hdf5.content import CONTENT_DIGEST
-from scenegen.common.hdf5.shards import is_shard_name, opened
+from scenegen.common.hdf5.shards import opened, set_name
 from scenegen.common.new_file import check_writable
 from scenegen.common.places import check_store, is_remote
 from scenegen.common.sets.manifest import (
@@ -44,18 +44,18 @@ class Task:
     items: int
 
 
-Make = Callable[[Manifest, Sequence[Task]], Generator[list[ShardRecord]]]
+T = TypeVar("T", bound=Task)
 
 
 def complete_set(
     place: Path,
     asked: Manifest,
-    tasks: Sequence[Task],
-    make: Make,
+    tasks: Sequence[T],
+    make: Callable[[Manifest, Sequence[T]], Generator[list[ShardRecord]]],
     join: Callable[[Manifest], None],
     *,
     overwrite: bool = False,
-    confirm: Callable[[Task], None] = lambda task: None,
+    confirm: Callable[[T], None] = lambda task: None,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> None:
     """Make the files of a set that earlier runs of the same request have not made.
@@ -146,7 +146,7 @@ def _remove(place: Path, asked: Manifest) -> None:
         place.with_name(name).unlink(missing_ok=True)
     place.unlink(missing_ok=True)
     for path in list(place.parent.iterdir()):
-        if any(is_shard_name(path.name, name) for name in asked.files):
+        if set_name(path.name) in asked.files:
             path.unlink(missing_ok=True)
 
 

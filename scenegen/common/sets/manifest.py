@@ -8,17 +8,18 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
-from scenegen.common.hdf5.shards import is_shard_name
+from scenegen.common.hdf5.shards import set_name
 from scenegen.common.new_file import written_beside
 from scenegen.common.places import as_place, is_remote
 from scenegen.common.records import LONGEST_JSON, check, from_json
+from scenegen.common.workers.pool import in_threads, processors
 
 try:
     import fcntl
@@ -107,7 +108,7 @@ class Manifest:
 
     def shards_of(self, file: str) -> list[ShardRecord]:
         """Return the complete shards of one of `files`, in order; itself if it has none."""
-        return [one for one in self.shards if one.file == file or is_shard_name(one.file, file)]
+        return [one for one in self.shards if file in (one.file, set_name(one.file))]
 
 
 def _check_name(name: str) -> None:
@@ -170,6 +171,25 @@ def shard_problem(folder: Path, shard: ShardRecord) -> str | None:
     return None
 
 
+def wrong_files(
+    folder: Path, manifest: Manifest, progress: Callable[[int], Any] = lambda done: None
+) -> list[str]:
+    """Return what is wrong with the files of a manifest, checked by all processors.
+
+    `progress` is called with the number of rows of each file that was read. Raises OSError.
+    """
+
+    def problem(record: ShardRecord) -> tuple[ShardRecord, str | None]:
+        return record, shard_problem(folder, record)
+
+    wrong = []
+    for record, found in in_threads(problem, manifest.shards, processors(), 2 * processors()):
+        if found:
+            wrong.append(f"{record.file} {found}")
+        progress(record.rows)
+    return wrong
+
+
 @contextmanager
 def locked(place: Path) -> Iterator[None]:
     """Let nobody else make the set of this manifest meanwhile.
@@ -192,7 +212,9 @@ def locked(place: Path) -> Iterator[None]:
                 ours = True
             if not ours:  # or a run that has just ended removed the lock that was opened here
                 raise SceneGenError(place, "another run that makes it", "", "wait for it")
-        yield
-        lock.unlink(missing_ok=True)
+        try:
+            yield
+        finally:
+            lock.unlink(missing_ok=True)
     finally:
         os.close(descriptor)
