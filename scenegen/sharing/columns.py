@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from scenegen.common.errors import FileFormatError
 from scenegen.common.hdf5.table import Column
 from scenegen.description.specs import DatasetSpec
 from scenegen.layout import columns
@@ -49,7 +50,10 @@ def read_rows(rooms: RoomsFile, rows: Sequence[int]) -> dict[str, Any]:
         else:
             values = [rooms.read(column.name, row) for row in rows]
         if column.dtype == "text":
-            found[column_name(column.name)] = [_decoded(value) for value in values]
+            place = f"{rooms.path}: {column.name}"
+            pairs = zip(rows, values, strict=True)
+            texts = [decoded(value, f"{place}, row {row}") for row, value in pairs]
+            found[column_name(column.name)] = texts
         else:
             found[column_name(column.name)] = np.asarray(values)
     return found
@@ -76,7 +80,14 @@ def meanings(spec: DatasetSpec) -> dict[str, Mapping[str, Any]]:
     }
 
 
-def _decoded(value: Any) -> Any:
-    if isinstance(value, bytes):
+def decoded(value: Any, place: str) -> Any:
+    """Return a stored text, or an array of them as a list, as `str`.
+
+    Raises FileFormatError, naming the place, where it is not UTF-8.
+    """
+    if not isinstance(value, bytes):
+        return [decoded(part, place) for part in value]
+    try:
         return value.decode()
-    return [_decoded(part) for part in value]
+    except UnicodeDecodeError as error:
+        raise FileFormatError(place, f"{value!r:.60}", "UTF-8") from error

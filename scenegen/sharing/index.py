@@ -15,6 +15,7 @@ from scenegen.common.hdf5.content import column_digest, row_digest
 from scenegen.common.hdf5.shards import cut
 from scenegen.rooms.reader import RoomsFile, RowBlock
 from scenegen.sharing.arrow import field as arrow_field
+from scenegen.sharing.columns import decoded
 from scenegen.sharing.description import IndexColumn
 
 DIGESTS = ("image", "depth", "normal", "object_id", "scene")  # data sets whose rows get a digest
@@ -152,7 +153,7 @@ def _lines(rooms: RoomsFile) -> Iterator[dict[str, Any]]:
                 "part_row": part_row,
                 "height": rooms.spec.height,
                 "width": rooms.spec.width,
-                **_described(block, row),
+                **_described(block, row, f"{rooms.path}: object/model"),
                 **{f"{name}_sha256": digest.hex() for name, digest in digests.items()},
             }
     for name, stored in rooms.stored_digests().items():
@@ -161,14 +162,14 @@ def _lines(rooms: RoomsFile) -> Iterator[dict[str, Any]]:
             raise FileFormatError(rooms.path, wrong, "", "scenegen verify tells which")
 
 
-def _described(block: RowBlock, row: int) -> dict[str, Any]:
+def _described(block: RowBlock, row: int, place: str) -> dict[str, Any]:
     """Return what a row's small data sets tell."""
 
     def value(name: str) -> Any:
         return np.asarray(block.read(name, row)).tolist()
 
     objects, lights = value("object/count"), value("light/count")
-    models = [text.decode() for text in block.read("object/model", row)[:objects]]
+    models = decoded(block.read("object/model", row)[:objects], f"{place}, row {row}")
     return {
         "scene_index": value("scene_index"),
         "view_index": value("view_index"),

@@ -24,6 +24,7 @@ from scenegen.sharing.description import (
 from scenegen.sharing.index import COLUMNS, Tally
 
 Facts = dict[str, list[tuple[str, ...]]]
+MOST_SHOWN = 200  # different values of a count
 KEYWORDS = (
     "synthetic", "3d", "depth-estimation", "surface-normals", "single-image-3d",
     "inverse-graphics", "ground-truth", "pix2shape-bench",
@@ -177,7 +178,9 @@ def _files_of(rooms: RoomsFile) -> list[SharedFile]:
 def _counts(tallies: Sequence[Tally]) -> list[tuple[str, ...]]:
     def joined(counters: Sequence[Counter[Any]]) -> str:
         total: Counter[Any] = sum(counters, Counter())
-        return ", ".join(f"{key}: {number}" for key, number in sorted(total.items())) or "none"
+        shown = [f"{key}: {number}" for key, number in sorted(total.items())]
+        more = [f"and {len(shown) - MOST_SHOWN} more"] if len(shown) > MOST_SHOWN else []
+        return ", ".join(shown[:MOST_SHOWN] + more) or "none"
 
     return [
         ("what", "how many"),

@@ -129,6 +129,18 @@ def test_a_damaged_row_leaves_nothing(form, damaged, tmp_path):
     export_rows(path, form, tmp_path / "out", rows=[0, 7])
 
 
+@pytest.mark.parametrize("form", FORMATS)
+def test_texts_that_are_none(form, damaged, tmp_path):
+    def spoil(file):
+        models = file["object/model"][:]
+        models[4, 0] = b"\xff"
+        file["object/model"][:] = models
+
+    with pytest.raises(FileFormatError) as error:
+        export_rows(damaged(spoil), form, tmp_path / "out")
+    assert "object/model, row 4" in error.value.where
+
+
 @pytest.mark.parametrize(
     ("how", "where"),
     [
