@@ -29,11 +29,15 @@ from scenegen.common.command_line import (
     Range,
     Size,
     creation_command,
+    needs,
     on_scheduler,
     print_line,
     progress_bar,
 )
 from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
+
+SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
+SHARED = ("parquet", "webdataset")  # and of files of many
 
 
 # fmt: off
@@ -302,23 +306,84 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     epilog=f"{EXAMPLE}scenegen export rooms.h5 --items 0,5-7 --format exr --out exported"
 )
 @click.argument("file", type=InputPath())
-@click.option("--items", type=Items(), required=True, help="Rows to export.")
+@click.option(
+    "--items", type=Items(), help="Rows to export; without it parquet and webdataset take all."
+)
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["exr", "png", "ply", "obj"]),
+    type=click.Choice([*SINGLE, *SHARED]),
     required=True,
-    help="exr has all channels; png 16 bits a channel; ply the surfels; obj the scene's mesh.",
+    help="exr has all channels; png 16 bits a channel; ply the surfels; obj the scene's mesh;"
+    " parquet and webdataset all values of many rows, for data loaders.",
 )
 @click.option(
-    "--out", type=OutputFolder(), default=".", show_default=True, help="Folder to write to."
+    "--out",
+    type=OutputFolder(),
+    help="Folder to write to; parquet and webdataset make it [., or rooms-parquet of rooms.h5].",
+)
+@click.option(
+    "--rows-per-file",
+    type=click.IntRange(1),
+    default=1000,
+    show_default=True,
+    help="Most rows of a file of parquet or webdataset.",
 )
 @OVERWRITE
 @MESHES
 def export(
-    file: str, items: list[int], form: str, out: str, overwrite: bool, **meshes: Any
+    file: str,
+    items: list[int] | None,
+    form: str,
+    out: str | None,
+    rows_per_file: int,
+    overwrite: bool,
+    **meshes: Any,
 ) -> None:
     """Write rows of a file in the formats of other tools."""
+    if form in SHARED:
+        folder = out or f"{Path(file).stem}-{form}"
+        _export_many(file, items, form, folder, rows_per_file, overwrite)
+    elif items is None:
+        raise click.UsageError(f"--items: found none, expected rows for --format {form}")
+    else:
+        _export_single(file, items, form, out or ".", overwrite, meshes)
+
+
+def _export_many(
+    file: str,
+    items: list[int] | None,
+    form: str,
+    out: str,
+    rows_per_file: int,
+    overwrite: bool,
+) -> None:
+    """Write rows, or all, to a folder of a few large files."""
+    if form == "parquet":
+        needs("scenegen export --format parquet", ("pyarrow",), "share")
+    from scenegen.rooms.reader import RoomsFile
+    from scenegen.sharing.export import export_rows
+
+    with RoomsFile(file) as rooms:
+        count = len(rooms if items is None else items)
+    with progress_bar(count, "image") as bar:
+        written = export_rows(
+            file,
+            form,
+            out,
+            items,
+            rows_per_file=rows_per_file,
+            overwrite=overwrite,
+            progress=bar.update,
+        )
+    megabytes = sum(path.stat().st_size for path in written) / 1e6
+    print_line(f"{out}: {count} images in {len(written) - 1} files, {megabytes:.1f} MB")
+
+
+def _export_single(
+    file: str, items: list[int], form: str, out: str, overwrite: bool, meshes: dict[str, Any]
+) -> None:
+    """Write each row to files of its own."""
     from scenegen.common.errors import SpecError
     from scenegen.common.new_file import check_writable
     from scenegen.objects.catalogue import changed_meshes

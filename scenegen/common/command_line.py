@@ -1,6 +1,6 @@
 """What all commands share: how errors are shown, types of options, and options by name."""
 
-import importlib
+import importlib.util
 import re
 import sys
 import warnings
@@ -229,6 +229,13 @@ class Color(_Parsed):
         if len(channels) not in (1, 3):
             raise ValueError(text)
         return channels if len(channels) == 3 else channels * 3
+
+
+def needs(who: str, packages: tuple[str, ...], extra: str) -> None:
+    """Raise UserError where a package of one of this project's optional extras is missing."""
+    missing = ", ".join(name for name in packages if importlib.util.find_spec(name) is None)
+    if missing:
+        raise UserError(f"{who} needs {missing}: pip install '.[{extra}]'")
 
 
 def print_line(text: str, err: bool = False) -> None:

@@ -114,6 +114,13 @@ class RoomsFile:
         else:
             yield from map(self._shards.file, range(len(self._shards.shards)))
 
+    @property
+    def parts(self) -> list[tuple[Path, int]]:
+        """Path and number of rows of each file that holds values: this one, or its shards."""
+        if self._shards is None:
+            return [(self.path, len(self))]
+        return [(self.path.parent / shard.file, shard.rows) for shard in self._shards.shards]
+
     def __len__(self) -> int:
         return self._count
 
