@@ -83,14 +83,17 @@ def make_split(
     variant = select_variant(device)
     workers = workers or useful_workers(count * (1 + spec.answers), variant)
     place, tally = as_place(folder), Tally()
+    tasks = file_tasks(spec, shard_size)
+    in_shards = bool(cluster) or is_remote(place) or any(task.is_shard for task in tasks)
+    if not is_remote(place):
+        _check_folder(place, overwrite, in_shards)
     renderer = {"variant": variant, **versions()}
     public = root_attributes(spec.public(), renderer, "")
     private = root_attributes(spec.public() if secret else spec, renderer, command)
     work = Work(spec, make_pools(spec), batch, workers, device, compression)
-    tasks = file_tasks(spec, shard_size)
-    if cluster or is_remote(place) or any(task.is_shard for task in tasks):
+    if in_shards:
         if not is_remote(place):
-            _begin_folder(place, overwrite)
+            place.mkdir(exist_ok=True)
         files = SplitFiles(place, work, public, private)
         complete_split(
             files, tasks, shard_size, tally,
@@ -107,15 +110,14 @@ def make_split(
     return tally
 
 
-def _begin_folder(folder: Path, overwrite: bool) -> None:
-    """Make the folder of a split in shards; an earlier run may have begun it.
+def _check_folder(folder: Path, overwrite: bool, in_shards: bool) -> None:
+    """Raise OSError where a split cannot be written to a folder.
 
-    Raises OSError where it holds anything else.
+    One in shards may have been begun by an earlier run.
     """
-    if folder.is_dir() and (not any(folder.iterdir()) or (folder / MANIFEST).exists()):
-        overwrite = True
-    check_folder(folder, _own_files(folder), overwrite)
-    folder.mkdir(exist_ok=True)
+    empty = folder.is_dir() and not any(folder.iterdir())
+    begun = in_shards and (empty or (folder / MANIFEST).exists())
+    check_folder(folder, _own_files(folder), overwrite or begun)
 
 
 def _own_files(folder: Path) -> list[str]:
