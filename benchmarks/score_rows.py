@@ -20,6 +20,7 @@ import numpy as np
 
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.scoring.rows import score_rows
+from metrics.scoring.runs import Settings
 from metrics.submissions.reader import open_predictions
 from scenegen.common.hdf5.row_file import new_file
 from scenegen.common.hdf5.table import Table
@@ -70,7 +71,7 @@ def main() -> None:
             rows = np.unique(np.linspace(0, count - 1, SCORED).astype(np.int64))
             with open_predictions(predictions) as file:
                 start, cpu = time.perf_counter(), time.process_time()
-                score_rows([file], truth, rows, "none", 1)
+                score_rows([file], truth, rows, "none", Settings(processes=1))
             spent = (time.perf_counter() - start, time.process_time() - cpu)
             wall, own = (1e3 * seconds / len(rows) for seconds in spent)
             print(f"{count:8d}  {wall:8.2f}  {own:17.2f}", flush=True)

@@ -265,6 +265,7 @@ def info(file: str) -> None:
     default=20_000,
     help="Largest number of questions that probes try to guess.",
 )
+@command_line.SCHEDULER
 @command_line.OVERWRITE
 @click.pass_context
 def audit(
@@ -273,6 +274,7 @@ def audit(
     json_path: str | None,
     markdown: bool,
     probed: int,
+    scheduler: str | None,
     overwrite: bool,
 ) -> None:
     """Prove that the questions of files or folders are right, and try to guess their answers.
@@ -288,13 +290,20 @@ def audit(
     from iqtt.audit.audit import audit as audit_files
     from iqtt.audit.audit import question_count, to_json
     from iqtt.audit.table import find_splits
+    from scenegen.common.hdf5.row_file import program_version
     from scenegen.common.new_file import check_writable, write_text
 
     if json_path:
         check_writable(Path(json_path), overwrite)
     groups = find_splits(splits)
-    with progress_bar(sum(map(question_count, groups)), "question") as bar:
-        found = [audit_files(group, probed=probed, progress=bar.update) for group in groups]
+    with (
+        command_line.on_scheduler(scheduler, 0, program_version) as cluster,
+        progress_bar(sum(map(question_count, groups)), "question") as bar,
+    ):
+        found = [
+            audit_files(group, probed=probed, progress=bar.update, cluster=cluster)
+            for group in groups
+        ]
     if json_path:
         write_text(json_path, to_json(found), overwrite)
     for group, one in zip(groups, found, strict=True):

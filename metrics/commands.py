@@ -13,6 +13,8 @@ from scenegen.common.command_line import (
     LARGEST,
     MOST_PROCESSES,
     OVERWRITE,
+    SCHEDULER,
+    on_scheduler,
     print_line,
     progress_bar,
 )
@@ -72,6 +74,7 @@ SEED = click.option(
     type=click.IntRange(1, MOST_PROCESSES),
     help="How many processes score [default: one a core].",
 )
+@SCHEDULER
 @OVERWRITE
 def score(
     submissions: tuple[str, ...],
@@ -80,6 +83,7 @@ def score(
     csv_path: str | None,
     html_path: str | None,
     markdown: bool,
+    scheduler: str | None,
     overwrite: bool,
     **settings: Any,
 ) -> None:
@@ -88,7 +92,7 @@ def score(
     from metrics.score_file import write_scores
     from metrics.scoring.evaluate import count_rows
     from metrics.scoring.evaluate import score as score_files
-    from metrics.scoring.runs import Settings
+    from metrics.scoring.runs import Settings, scorer_versions
     from metrics.submissions.reader import open_predictions
     from metrics.submissions.truths import find_truth
     from scenegen.common.new_file import check_writable, write_text
@@ -99,8 +103,13 @@ def score(
     for name in submissions if any(path.exists() for path in outputs) else ():
         with open_predictions(name) as predictions:
             refuse_inputs(outputs, [find_truth(predictions, truth).path])
-    with progress_bar(count_rows(submissions[0]), "image") as bar:
-        found = score_files(submissions, truth, Settings(**settings), bar.update)
+    workers = settings["processes"] or 0
+    with (
+        on_scheduler(scheduler, workers, scorer_versions) as cluster,
+        progress_bar(count_rows(submissions[0]), "image") as bar,
+    ):
+        chosen = Settings(**settings, cluster=cluster)
+        found = score_files(submissions, truth, chosen, bar.update)
     if json_path:
         write_scores(found, json_path, overwrite)
     if csv_path:

@@ -22,6 +22,7 @@ from iqtt.audit.proofs.shapes import Shapes
 from iqtt.audit.proofs.verdict import Proof
 from iqtt.audit.table import AuditTable, find_tables, lacking, read_table
 from scenegen.common.hdf5.row_file import writer_name
+from scenegen.common.workers.cluster import Cluster
 
 Array = NDArray[Any]
 FORMAT = {"format": "pix2shape-bench/iqtt-audit", "format_version": "2.0"}
@@ -112,6 +113,7 @@ def audit(
     *,
     probed: int = PROBED,
     progress: Callable[[int], Any] = lambda done: None,
+    cluster: Cluster | None = None,
 ) -> Audit:
     """Prove what can be proved of question files, and try to answer them without their shapes.
 
@@ -122,6 +124,7 @@ def audit(
             of splits, audit each that `find_splits` gives.
         probed: largest number of questions that probes look at, spread evenly.
         progress: is called with the number of questions that were read since the last call.
+        cluster: whose workers read the images, which takes most of the time of large splits.
 
     Raises:
         OSError: no such file or folder, or a folder without question files.
@@ -131,7 +134,8 @@ def audit(
     sources = find_tables(paths)
     measured = _spread([source.count if source.answered else 0 for source in sources], probed)
     tables = [
-        read_table(source, rows, progress) for source, rows in zip(sources, measured, strict=True)
+        read_table(source, rows, progress, cluster)
+        for source, rows in zip(sources, measured, strict=True)
     ]
     shapes = shape_proofs.compare_shapes(tables)
     right = [

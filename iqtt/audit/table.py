@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,14 +15,16 @@ from iqtt.files.layout import NO_CUBE, SCORED
 from iqtt.files.reader import QuestionsFile, answers_beside, parts
 from iqtt.questions.specs import SplitSpec
 from scenegen.common.hdf5 import trial
-from scenegen.common.hdf5.content import ColumnDigest, dataset_digest, joint_digest
+from scenegen.common.hdf5.content import ColumnDigest, column_digest, dataset_digest, joint_digest
 from scenegen.common.hdf5.row_file import digest_problems
 from scenegen.common.hdf5.shards import opened_with_shards, set_name, stored_array
 from scenegen.common.records import check
+from scenegen.common.workers.cluster import Cluster
 
 Array = NDArray[Any]
 ROLES = ("train", "val", "test", "test-answers")
 CHUNK_PIXELS = 2**20  # pixels of questions in memory at once
+CHUNKS = 8  # of them that a worker of a cluster reads in one go
 TRUTH = (
     *("cubes", "shape_id", "class_id", "world_from_shape"),
     *("distractor_kind", "angle_degrees", "visible_pixels", "camera_distance"),
@@ -48,6 +50,11 @@ class Source:
     answered: bool
     count: int
     images: int
+
+    def anywhere(self) -> "Source":
+        """Return the same source for processes that are in another folder."""
+        answers = None if self.answers is None else self.answers.absolute()
+        return replace(self, path=self.path.absolute(), answers=answers)
 
     def open(self) -> QuestionsFile:
         """Open the table. Raises as `QuestionsFile`."""
@@ -194,12 +201,16 @@ def _files(folder: Path) -> list[Path]:
 
 
 def read_table(
-    source: Source, measured: Array, progress: Callable[[int], Any] = lambda done: None
+    source: Source,
+    measured: Array,
+    progress: Callable[[int], Any] = lambda done: None,
+    cluster: Cluster | None = None,
 ) -> AuditTable:
     """Read a table.
 
     Args:
         measured: rows to take statistics of, in rising order.
+        cluster: whose workers read the images; None for this process.
         progress: is called with the number of questions that were read since the last call.
 
     Raises OSError and FileFormatError as `QuestionsFile` and its `read`.
@@ -211,20 +222,22 @@ def read_table(
         first = questions.read("questions", slice(0, min(chunk, source.count)))
         background = border_color(first)
         scans: list[tuple[Array, ...]] = []
-        images_digest = ColumnDigest()
-        for start in range(0, source.count, chunk):
-            rows = slice(start, min(start + chunk, source.count))
-            images = questions.read("questions", rows)
-            wanted = measured[(measured >= rows.start) & (measured < rows.stop)] - start
-            scans.append(_scan(images, background, wanted))
-            images_digest.update(images)
-            progress(len(images))
+        digests_of_images: list[bytes] = []
+        some = chunk if cluster is None else CHUNKS * chunk
+        tasks = [
+            range(start, min(start + some, source.count)) for start in range(0, source.count, some)
+        ]
+        scan = partial(_scan_images, source.anywhere(), chunk, background, measured)
+        for parts, digest in map(scan, tasks) if cluster is None else cluster.in_order(scan, tasks):
+            scans += parts
+            digests_of_images.append(digest)
+            progress(sum(len(part[0]) for part in parts))
         scans = scans or [_scan(first, background, measured)]
         truth = {name: questions.read(name, everything) for name in names}
         answers = questions.read("answers", everything) if questions.has_answers else None
         read = truth if answers is None else {"answers": answers, **truth}
         digests = {name: dataset_digest(values) for name, values in read.items()}
-        digests["questions"] = images_digest.hex
+        digests["questions"] = column_digest(digests_of_images)
         stored = questions.stored_bytes()  # files before format 2.0 hold no camera_distance
         contents = {questions.stored_at(n): digest for n, digest in digests.items() if n in stored}
         told = questions.stored_content_digest is not None
@@ -260,6 +273,21 @@ def content_problems(tables: Sequence[AuditTable]) -> list[str]:
             stored = partial(stored_array, shards=shards)
             problems += [f"{path.name}: {text}" for text in digest_problems(file, digests, stored)]
     return problems
+
+
+def _scan_images(
+    source: Source, chunk: int, background: Array, measured: Array, rows: range
+) -> tuple[list[tuple[Array, ...]], bytes]:
+    """Return what `_scan` finds in these rows, `chunk` at a time, and the digests of the rows."""
+    scans, digest = [], ColumnDigest(keep_rows=True)
+    with source.open() as questions:
+        for start in range(rows.start, rows.stop, chunk):
+            stop = min(start + chunk, rows.stop)
+            images = questions.read("questions", slice(start, stop))
+            wanted = measured[(measured >= start) & (measured < stop)] - start
+            scans.append(_scan(images, background, wanted))
+            digest.update(images)
+    return scans, bytes(digest.rows or b"")
 
 
 def _scan(images: Array, background: Array, wanted: Array) -> tuple[Array, ...]:

@@ -94,6 +94,8 @@ def make_split(
     if in_shards:
         if not is_remote(place):
             place.mkdir(exist_ok=True)
+        if cluster:
+            place = place.absolute()  # workers are in other folders
         files = SplitFiles(place, work, public, private)
         complete_split(
             files, tasks, shard_size, tally,

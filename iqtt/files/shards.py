@@ -34,7 +34,7 @@ from scenegen.common.hdf5.shards import (
     write_list,
     write_virtual,
 )
-from scenegen.common.sets.making import Task, complete_set, other_request, record_file
+from scenegen.common.sets.making import Task, check_shared, complete_set, other_request, record_file
 from scenegen.common.sets.manifest import FORMAT, Manifest, ShardRecord
 from scenegen.common.workers.cluster import Cluster
 
@@ -139,6 +139,7 @@ class SplitFiles:
 
     def elsewhere(self, task: FileTask) -> tuple[list[ShardRecord], Tally]:
         """Write the files of a task; to be called by a worker of a cluster."""
+        check_shared(self.folder / MANIFEST)
         self.work.prepare()
         tally = Tally()
         made = (some for block in task.blocks for some in self.work.questions(block, tally))

@@ -48,7 +48,7 @@ def score_rooms(
             told, expected = ("normals", "none") if file.has_normals else ("none", "normals")
             raise ScoringError(f"{file.path}: normal", told, f"{expected} as in {files[0].path}")
     alignment = files[0].alignment
-    scored = score_rows(files, found.path, rows, alignment, settings.processes, progress)
+    scored = score_rows(files, found.path, rows, alignment, settings, progress)
     scores, bad = scored.scores, scored.bad
     if bad and settings.non_finite == "error":
         first = next(iter(bad.values()))

@@ -22,11 +22,12 @@ from metrics.scoring.image_scores import (
     true_relief,
 )
 from metrics.scoring.metric_names import OBJECT_SCORES
-from metrics.scoring.runs import Progress, ScoringError
+from metrics.scoring.runs import Progress, ScoringError, Settings
 from metrics.scoring.truth_digests import RowDigests, view_digests
 from metrics.submissions.problems import PredictionError
-from metrics.submissions.reader import Identity, RoomPredictions, open_predictions
+from metrics.submissions.reader import Identity, RoomPredictions, on_any_machine, open_predictions
 from metrics.submissions.truths import read_true_view
+from scenegen.common.workers.cluster import Cluster
 from scenegen.common.workers.pool import worker_pool
 from scenegen.rooms.reader import RoomsFile
 
@@ -35,6 +36,7 @@ Array = NDArray[Any]
 # identities of the submissions, the path of the truth, and the alignments of scored depth.
 Job = tuple[tuple[tuple[Path, Identity], ...], Path, tuple[Alignment, ...]]
 CHUNK = 8  # rows scored between two reports of progress
+CHUNKS = 8  # of them that a worker of a cluster scores in one go
 FEW = 32  # rows that are not worth starting processes for
 
 
@@ -73,12 +75,13 @@ def score_rows(
     truth_path: Path,
     rows: Array,
     alignment: str,
-    processes: int | None = None,
+    settings: Settings,
     progress: Progress = lambda done: None,
 ) -> ScoredRows:
-    """Score these M rows in each of R submissions; the numbers do not depend on `processes`."""
+    """Score these M rows in each of R submissions, by the processes or cluster of the settings."""
     alignments = tuple(a for a in get_args(Alignment) if a in (*ALIGNMENTS, alignment))
-    job = tuple((file.path, file.identity) for file in files), truth_path, alignments
+    submissions = tuple((file.path.absolute(), file.identity) for file in files)
+    job = submissions, truth_path.absolute(), alignments
     with RoomsFile(truth_path) as truth:
         scene, view = (
             truth.read(name, slice(None))[rows] for name in ("scene_index", "view_index")
@@ -87,7 +90,11 @@ def score_rows(
     chunks = [pairs[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
     found, parts, done = ScoredRows(), list[dict[str, Array]](), 0
     # Each chunk goes into arrays as it comes: as objects, 140,000 rows take 2 GB.
-    for scored in _in_processes(job, chunks, processes):
+    if settings.cluster is None:
+        found_chunks = _in_processes(job, chunks, settings.processes)
+    else:
+        found_chunks = _on_cluster(job, chunks, settings.cluster)
+    for scored in found_chunks:
         here, first = slice(done, done + len(scored)), scored[0]
         done += len(scored)
         numbers = rows[here]
@@ -200,6 +207,21 @@ def _in_processes(job: Job, chunks: Sequence[Array], processes: int | None) -> I
     except BrokenProcessPool as error:
         hint = "memory may be short: take fewer --processes"
         raise ScoringError(job[0][0][0], "a process that scores was killed", "", hint) from error
+
+
+def _on_cluster(job: Job, chunks: Sequence[Array], cluster: Cluster) -> Iterator[Any]:
+    """Yield what `_RowScorer.score` gives for the chunks, in their order."""
+    submissions = tuple((path, on_any_machine(identity)) for path, identity in job[0])
+    job = submissions, *job[1:]
+    tasks = [chunks[i : i + CHUNKS] for i in range(0, len(chunks), CHUNKS)]
+    for scored in cluster.in_order(functools.partial(_score_apart, job), tasks):
+        yield from scored
+
+
+def _score_apart(job: Job, chunks: Sequence[Array]) -> list[Any]:
+    """Score chunks with files that are opened for them alone; a cluster's worker lives on."""
+    with closing(_RowScorer(*job)) as scorer:
+        return [scorer.score(chunk) for chunk in chunks]
 
 
 def _score_in_worker(job: Job, rows: Array) -> Any:

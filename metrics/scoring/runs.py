@@ -20,6 +20,7 @@ from metrics.submissions.reader import Predictions
 from metrics.submissions.truths import FoundTruth
 from scenegen.common.errors import SceneGenError
 from scenegen.common.hdf5.row_file import writer_name
+from scenegen.common.workers.cluster import Cluster
 
 Array = NDArray[Any]
 Progress = Callable[[int], Any]
@@ -41,6 +42,7 @@ class Settings:
         non_finite: "error", or "penalise" (see `image_scores.score_view`); where a value had to be
             penalised, the result is not comparable.
         processes: how many processes score rooms; None for one a core. Changes no number.
+        cluster: whose workers score rooms instead; they must see the files. Changes no number.
     """
 
     seed: int = 0
@@ -48,6 +50,16 @@ class Settings:
     allow_partial: bool = False
     non_finite: NonFinite = "error"
     processes: int | None = None
+    cluster: Cluster | None = None
+
+
+def scorer_versions() -> dict[str, str]:
+    """Return what scores depend on beside the files: the versions of this program and LIBRARIES."""
+    return {"writer": writer_name(), **_releases()}
+
+
+def _releases() -> dict[str, str]:
+    return {name: importlib.metadata.version(name) for name in LIBRARIES}
 
 
 def matched_rows(
@@ -138,7 +150,7 @@ def meta_of(
         truth_source=source_of(truth, digest),
         submissions=tuple(Submission(str(file.path), file.sha256, file.run) for file in files),
         writer=writer_name(),
-        versions={name: importlib.metadata.version(name) for name in LIBRARIES},
+        versions=_releases(),
         seed=settings.seed,
         resamples=settings.resamples if resampled else 0,
         confidence=CONFIDENCE,

@@ -296,7 +296,7 @@ WORKERS = click.option("--workers", type=click.IntRange(0, 256), default=0,
                        help="Processes that render; each takes about 0.4 GiB.")
 SCHEDULER = click.option("--scheduler", metavar="ADDRESS",
                          help="Spread the work over a Dask cluster, such as tcp://host:8786; local"
-                         " starts one here with --workers processes.")
+                         " starts one on this machine.")
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 DEVICE = click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
                       show_default=True,

@@ -40,3 +40,19 @@ def ended_by_signals() -> Iterator[None]:
             signal.signal(number, signal.SIG_DFL)
         if received:
             os._exit(128 + received[0])
+
+
+@contextmanager
+def without_interrupts() -> Iterator[None]:
+    """Let the processes and threads that the block starts never see Ctrl-C.
+
+    A terminal sends it to all processes, of which only the first one should answer.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

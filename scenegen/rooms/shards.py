@@ -12,7 +12,7 @@ from scenegen.common.hdf5.row_file import new_file, writer_name
 from scenegen.common.hdf5.shards import Shard, cut, opened, shard_name, write_list, write_virtual
 from scenegen.common.hdf5.table import PackedRows
 from scenegen.common.new_file import check_writable
-from scenegen.common.sets.making import Task, complete_set, record_file
+from scenegen.common.sets.making import Task, check_shared, complete_set, record_file
 from scenegen.common.sets.manifest import FORMAT, Manifest, ShardRecord, manifest_path
 from scenegen.common.workers.cluster import Cluster
 from scenegen.description.specs import Fingerprint
@@ -60,6 +60,7 @@ class _Shards:
 
     def elsewhere(self, task: Task) -> tuple[ShardRecord, dict[str, str]]:
         """Make a shard, and tell why models were refused; to be called by a worker of a cluster."""
+        check_shared(manifest_path(self.path))
         self.work.prepare()
         with closing(self.work.rows(_scenes(task))) as made:
             return self.write(task, made, lambda done: None), self.work.objects.problems
@@ -108,6 +109,7 @@ def make_shards(
     Raises as `complete_set`.
     """
     check_writable(path, overwrite=True)
+    path = path if cluster is None else path.absolute()  # workers are in other folders
     settings = {"compression": work.compression, "format_version": FORMAT_VERSION}
     settings |= {"writer": writer_name(), **attributes}
     command = settings.pop("creation_command")

@@ -150,6 +150,11 @@ def writer_name() -> str:
     return f"pix2shape-bench {importlib.metadata.version('pix2shape-bench')}"
 
 
+def program_version() -> dict[str, str]:
+    """Return name and version of this program, for workers of a cluster to be compared by."""
+    return {"writer": writer_name()}
+
+
 class RowDataset:
     """A map-style dataset (`__len__`, `__getitem__` -> dict of arrays) for any training loop.
 

@@ -4,6 +4,7 @@ Each file gets its name when it is complete, and holds the same bytes whoever ma
 was completed but is not in the manifest, as the run was killed right then, is made again.
 """
 
+import platform
 import time
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
@@ -11,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from scenegen.common.errors import SpecError
+from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.common.hdf5.content import CONTENT_DIGEST
 from scenegen.common.hdf5.shards import opened, set_name
 from scenegen.common.new_file import check_writable
@@ -101,6 +102,14 @@ def complete_set(
             write_manifest(place, manifest)
         join(manifest)
         write_manifest(place, replace(manifest, complete=True))
+
+
+def check_shared(place: Path) -> None:
+    """Raise SceneGenError on a worker that does not see the manifest of its set."""
+    if not place.exists():
+        worker = f"the worker on {platform.node()}"
+        expected = "a folder that all workers see, or a URL such as s3://bucket/rooms.h5"
+        raise SceneGenError(worker, f"no {place}", expected)
 
 
 def _begun(place: Path, asked: Manifest, tasks: Sequence[Task], overwrite: bool) -> Manifest:

@@ -14,10 +14,12 @@ from typing import Any, TypeVar
 
 from scenegen.common.errors import SceneGenError
 from scenegen.common.places import lacking
+from scenegen.common.signals import without_interrupts
 
 T = TypeVar("T")
 Task = TypeVar("Task")
 LOCAL = "local"
+QUIET = {"DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "critical"}
 AHEAD = 1000  # tasks that the scheduler knows, or whose results were not taken
 PATIENCE = 10  # seconds in which a scheduler must answer
 _one_at_a_time = threading.Lock()  # Mitsuba and HDF5 take one task in a process
@@ -133,12 +135,11 @@ def connected(
 @contextmanager
 def _client(distributed: Any, scheduler: str, workers: int) -> Iterator[Any]:
     if scheduler == LOCAL:
-        with (
-            distributed.LocalCluster(
-                n_workers=max(1, workers), threads_per_worker=1, dashboard_address=None
-            ) as cluster,
-            distributed.Client(cluster) as client,
-        ):
+        with without_interrupts():
+            cluster = distributed.LocalCluster(
+                n_workers=max(1, workers), threads_per_worker=1, dashboard_address=None, env=QUIET
+            )
+        with cluster, distributed.Client(cluster) as client:
             yield client
         return
     try:

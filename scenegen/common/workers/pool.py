@@ -2,7 +2,6 @@
 
 import multiprocessing
 import os
-import signal
 import threading
 import warnings
 from collections import deque
@@ -14,6 +13,7 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, TypeVar
 
 from scenegen.common.errors import SceneGenError
+from scenegen.common.signals import without_interrupts
 
 T = TypeVar("T")
 Task = TypeVar("Task")
@@ -31,14 +31,8 @@ def processors() -> int:
 class _Worker(SpawnProcess):
     def start(self) -> None:
         """Start a process that never sees Ctrl-C, which a terminal sends to all processes."""
-        if not hasattr(signal, "pthread_sigmask"):  # Windows
+        with without_interrupts():
             super().start()
-            return
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            super().start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class _Spawning(SpawnContext):

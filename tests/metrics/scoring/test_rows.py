@@ -10,7 +10,7 @@ from refusals import refused
 
 from baselines.trivial import write_room_baseline
 from metrics.scoring import rows as module
-from metrics.scoring.runs import ScoringError
+from metrics.scoring.runs import ScoringError, Settings
 from metrics.submissions.reader import open_predictions
 
 
@@ -26,4 +26,4 @@ def test_a_killed_worker_is_an_error_and_no_traceback(tmp_path, rooms_path, monk
         open_predictions(tmp_path / "oracle.h5") as file,
         refused(ScoringError, str(tmp_path / "oracle.h5"), hint="--processes"),
     ):
-        module.score_rows([file], rooms_path, np.arange(8), "none", 2)
+        module.score_rows([file], rooms_path, np.arange(8), "none", Settings(processes=2))
