@@ -5,11 +5,14 @@ only here.
 """
 
 import importlib
+import logging
+import os
 import sys
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
 from scenegen.common.errors import SceneGenError
@@ -19,7 +22,7 @@ from scenegen.common.signals import without_interrupts
 T = TypeVar("T")
 Task = TypeVar("Task")
 LOCAL = "local"
-QUIET = {"DASK_DISTRIBUTED__LOGGING__DISTRIBUTED": "critical"}
+LOGGING = "DASK_DISTRIBUTED__LOGGING__DISTRIBUTED"  # which Dask's processes read as they start
 AHEAD = 1000  # tasks that the scheduler knows, or whose results were not taken
 PATIENCE = 10  # seconds in which a scheduler must answer
 _one_at_a_time = threading.Lock()  # Mitsuba and HDF5 take one task in a process
@@ -135,9 +138,10 @@ def connected(
 @contextmanager
 def _client(distributed: Any, scheduler: str, workers: int) -> Iterator[Any]:
     if scheduler == LOCAL:
+        resource_tracker.ensure_running()  # else a worker starts it, which lets Ctrl-C through
         with without_interrupts():
             cluster = distributed.LocalCluster(
-                n_workers=max(1, workers), threads_per_worker=1, dashboard_address=None, env=QUIET
+                n_workers=max(1, workers), threads_per_worker=1, dashboard_address=None
             )
         with cluster, distributed.Client(cluster) as client:
             yield client
@@ -155,20 +159,18 @@ def _client(distributed: Any, scheduler: str, workers: int) -> Iterator[Any]:
 @contextmanager
 def _quiet() -> Iterator[None]:
     """Keep Dask's own lines from the terminal: lost workers are its business."""
-    import logging
-
-    import dask
-
-    with dask.config.set({"distributed.logging.distributed": "critical"}):
-        loggers = [logging.getLogger(name) for name in ("distributed", "tornado", "asyncio")]
-        before = [logger.level for logger in loggers]
-        for logger in loggers:
-            logger.setLevel(logging.CRITICAL)
-        try:
-            yield
-        finally:
-            for logger, level in zip(loggers, before, strict=True):
-                logger.setLevel(level)
+    loggers = [logging.getLogger(name) for name in ("distributed", "tornado", "asyncio")]
+    levels, told = [logger.level for logger in loggers], os.environ.get(LOGGING)
+    os.environ.setdefault(LOGGING, "critical")
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        if told is None:
+            del os.environ[LOGGING]
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 def _differences(found: dict[str, str], expected: dict[str, str]) -> list[str]:
