@@ -172,10 +172,10 @@ def render(
 def _set_bytes(out: str) -> int:
     """Return the size of a file of rooms and of its shards, if it has any."""
     from scenegen.common.hdf5.shards import set_name
-    from scenegen.common.places import as_place
+    from scenegen.common.places import as_place, listing
 
     place = as_place(out)
-    files = [one for one in place.parent.iterdir() if set_name(one.name) == place.name]
+    files = [one for one in listing(place.parent) if set_name(one.name) == place.name]
     return sum(file.stat().st_size for file in (place, *files))
 
 

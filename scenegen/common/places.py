@@ -45,6 +45,17 @@ def is_remote(path: str | Path) -> bool:
     return SEPARATOR in path if isinstance(path, str) else not isinstance(path, Path)
 
 
+def listing(folder: Path) -> list[Path]:
+    """Return what is in a folder; nothing for a folder of a store that has no file yet."""
+    if not is_remote(folder):
+        return list(folder.iterdir())
+    cast("Any", folder).fs.invalidate_cache()
+    try:
+        return list(folder.iterdir())
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+
+
 def upload(file: Path, place: Path) -> None:
     """Copy a complete file to a remote place. Raises OSError where the store refuses."""
     remote = cast("Any", place)
@@ -62,7 +73,6 @@ def check_store(place: Path) -> None:
     """
     remote = cast("Any", place.with_name(f".{place.name}-{secrets.token_hex(4)}"))
     try:
-        remote.fs.makedirs(cast("Any", place).parent.path, exist_ok=True)
         remote.fs.pipe_file(remote.path, b"\n")
         remote.fs.rm_file(remote.path)
     except ImportError as error:

@@ -16,7 +16,7 @@ from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.common.hdf5.content import CONTENT_DIGEST
 from scenegen.common.hdf5.shards import opened, set_name
 from scenegen.common.new_file import check_writable
-from scenegen.common.places import check_store, is_remote
+from scenegen.common.places import check_store, is_remote, listing
 from scenegen.common.sets.manifest import (
     Manifest,
     ShardRecord,
@@ -120,7 +120,7 @@ def _begun(place: Path, asked: Manifest, tasks: Sequence[Task], overwrite: bool)
     names = {name for task in tasks for name in task.names}
     begun = place.exists()
     if overwrite or not begun:
-        taken = [one for one in place.parent.iterdir() if one.name in names.union(asked.files)]
+        taken = [one for one in listing(place.parent) if one.name in names.union(asked.files)]
         for one in taken:
             check_writable(one, overwrite)
         if overwrite:
@@ -154,7 +154,7 @@ def _remove(place: Path, asked: Manifest) -> None:
     for name in asked.files:
         place.with_name(name).unlink(missing_ok=True)
     place.unlink(missing_ok=True)
-    for path in list(place.parent.iterdir()):
+    for path in listing(place.parent):
         if set_name(path.name) in asked.files:
             path.unlink(missing_ok=True)
 
