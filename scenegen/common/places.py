@@ -29,7 +29,8 @@ def as_place(path: str | Path) -> Path:
     except ImportError as error:
         raise lacking(path, "universal_pathlib") from error
     try:
-        return cast("Path", UPath(path))
+        place = UPath(path)
+        return Path(place.path) if place.protocol == "file" else cast("Path", place)
     except ValueError as error:
         raise OSError(errno.EINVAL, f"cannot be written: {error}", path) from error
 
