@@ -64,7 +64,7 @@ def workspace(parent: Path, path: Path) -> Iterator[Path]:
 
 
 def _remove_made(made: list[tuple[Path, int]]) -> None:
-    """Remove this run's workspaces, each of which comes with its lock, from the disk and the list."""
+    """Remove workspaces of this run, each with the descriptor of its lock, and forget them."""
     with held_back():
         while made:
             folder, lock = made.pop()

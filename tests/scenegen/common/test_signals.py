@@ -81,23 +81,31 @@ def test_a_signal_is_not_lost_where_python_ignores_what_is_raised(name, code):
 
 
 def test_signals_wait_until_the_block_has_ended():
-    done = []
-    with pytest.raises(KeyboardInterrupt), held_back():
-        signal.raise_signal(signal.SIGINT)
-        with held_back():  # the outer block has its way
+    def block():
+        with held_back():
             signal.raise_signal(signal.SIGINT)
-        done.append(1)
+            with held_back():  # the outer block decides
+                signal.raise_signal(signal.SIGINT)
+            done.append(1)
+
+    done = []
+    with pytest.raises(KeyboardInterrupt):
+        block()
     assert done == [1]
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_signals_that_wait_come_to_whoever_answers_them():
-    seen, before = [], signal.signal(signal.SIGTERM, lambda number, _: seen.append(number))
-    try:
-        with pytest.raises(OSError, match="as it is"), held_back():
+    def block():
+        with held_back():
             signal.raise_signal(signal.SIGTERM)
             assert seen == []
             raise OSError("as it is")
+
+    seen, before = [], signal.signal(signal.SIGTERM, lambda number, _: seen.append(number))
+    try:
+        with pytest.raises(OSError, match="as it is"):
+            block()
         assert seen == [signal.SIGTERM]
     finally:
         signal.signal(signal.SIGTERM, before)
