@@ -9,13 +9,14 @@ import threading
 from pathlib import Path
 
 import pytest
+from signals_at_lines import interrupted_at_each_line
 
+from scenegen.common import new_file, signals
 from scenegen.common import workspace as module
 from scenegen.common.new_file import write_text, written_beside
 from scenegen.common.workspace import NAME, remove_leftovers
 
 LINUX = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such locks")
-FILES = ("workspace", "new_file", "signals")
 KILLED = """
 import os, signal, sys
 from scenegen.common.new_file import written_beside
@@ -85,47 +86,16 @@ def test_what_another_machine_may_still_write_is_only_named(left, tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=str)
 def test_a_signal_leaves_nothing_whenever_it_comes(tmp_path, number):
     """Before each line of the code that makes a file, on the way in and on the way out."""
-    files = tuple(sys.modules[f"scenegen.common.{name}"].__file__ for name in FILES)
-
-    def signalled(at: int) -> int:
-        """Write a file with a signal before line `at` that runs; return how many lines ran."""
-        lines = 0
-
-        def trace(frame, event, _):
-            nonlocal lines
-            if frame.f_code.co_filename not in files:
-                return None
-            lines += event == "line"
-            if lines == at and event == "line":
-                signal.raise_signal(number)
-            return trace
-
-        before = sys.gettrace()
-        sys.settrace(trace)
-        try:
-            write_text(tmp_path / "a.txt", "whole")
-        finally:
-            sys.settrace(before)
-        return lines
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(number, interrupt)
-    try:
-        write_text(tmp_path / "b.txt", "the first in a folder, which is looked at")
-        (tmp_path / "b.txt").unlink()
-        lines = signalled(0)
-        assert lines > 100
-        for at in range(1, lines + 1):
-            (tmp_path / "a.txt").unlink(missing_ok=True)
-            with pytest.raises(KeyboardInterrupt):
-                signalled(at)
-            left = {path.name: path.read_text() for path in tmp_path.iterdir()}
-            assert left in ({}, {"a.txt": "whole"}), at
-    finally:
-        signal.signal(number, before)
-    assert signal.getsignal(number) is before
+    path = tmp_path / "a.txt"
+    write_text(path, "the first in a folder, which is looked at")
+    path.unlink()
+    for at in interrupted_at_each_line(
+        lambda: write_text(path, "whole"), (module, new_file, signals), number
+    ):
+        assert {p.name: p.read_text() for p in tmp_path.iterdir()} in ({}, {"a.txt": "whole"}), at
+        path.unlink(missing_ok=True)
+    assert at > 100
+    assert path.read_text() == "whole"
 
 
 @LINUX
