@@ -9,7 +9,7 @@ import json
 import os
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -177,7 +177,10 @@ def locked(path: Path) -> Iterator[None]:
                 ours = True
             if not ours:  # or a run that has just ended removed the lock that was opened here
                 raise SceneGenError(path, "another run that makes it", "", "wait for it")
-        yield
-        lock.unlink(missing_ok=True)
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                lock.unlink()
     finally:
         os.close(descriptor)
