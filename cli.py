@@ -4,8 +4,10 @@ import click
 
 from scenegen.common.command_line import PackageCommands
 
+ROOMS = tuple(f"scenegen.commands.{name}" for name in ("rooms", "sharing", "meshes"))
 
-@click.group(cls=PackageCommands, modules=("scenegen.commands.rooms", "scenegen.commands.meshes"))
+
+@click.group(cls=PackageCommands, modules=ROOMS)
 @click.version_option(package_name="pix2shape-bench")
 def scenegen() -> None:
     """Make rooms with objects, rendered with exact ground truth."""

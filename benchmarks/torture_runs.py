@@ -32,8 +32,8 @@ elif kind == "writing":
     from scenegen.common.hdf5.table import Table
     hook(Table, "extend_packed")
 elif kind == "manifest":
-    from scenegen.rooms import shards
-    hook(shards, "write_manifest")
+    from scenegen.common.sets import making
+    hook(making, "write_manifest")
 else:
     hook(os, kind)
 import cli

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-FORMATS = ("png", "ply", "exr", "obj")
+FORMATS = ("png", "ply", "exr", "obj", "parquet", "webdataset")
 OUTPUTS = ("--out", "--json", "--csv", "--html")  # options that name what is written
 
 
@@ -84,7 +84,9 @@ TARGETS = (
         ("scenegen info rooms.h5",
          "scenegen preview rooms.h5 --items 0-3 --out new.png",
          "scenegen verify rooms.h5 --items 0",
-         *(f"scenegen export rooms.h5 --items 0,2 --format {form} --out new" for form in FORMATS)),
+         "scenegen card rooms.h5 --creator A --date 2026-01-31 --out new",
+         *(f"scenegen export rooms.h5 --items 0,2 --format {form} --out new"
+           for form in FORMATS)),
         ("rooms.h5",),
         (1,),
     ),

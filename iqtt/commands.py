@@ -34,7 +34,12 @@ option = partial(click.option, show_default=True)
 @click.command(
     "make-split", epilog=f"{EXAMPLE}iqtt make-split --out iqtt-split --preset small --seed 1"
 )
-@option("--out", type=OutputFolder(), default="iqtt-split", help="Folder for the four files.")
+@option(
+    "--out",
+    type=OutputFolder(),
+    default="iqtt-split",
+    help="Folder for the four files, or a URL such as s3://bucket/iqtt.",
+)
 @option(
     "--preset",
     type=click.Choice(["small", "v2", "paper", "suite"]),
@@ -113,6 +118,13 @@ option = partial(click.option, show_default=True)
     help="Questions that a process renders at once.",
 )
 @command_line.WORKERS
+@option(
+    "--shard-size",
+    type=int,
+    default=10_000,
+    help="Most questions of one file; more go to files beside it, which it shows as one.",
+)
+@command_line.SCHEDULER
 @command_line.DEVICE
 @command_line.OVERWRITE
 def make_split(
@@ -121,6 +133,8 @@ def make_split(
     size: tuple[int, int],
     batch: int,
     workers: int,
+    shard_size: int,
+    scheduler: str | None,
     device: str,
     compression: str,
     overwrite: bool,
@@ -131,11 +145,14 @@ def make_split(
 
     A question has a reference and answers, one of which shows the same shape. Every cube of a shape
     shows in every picture. No shape, nor its mirror image, is in two of training, validation and
-    test, whatever the settings.
+    test, whatever the settings. Where a run with shards was ended, the same command goes on.
     """
     from iqtt.files import make
+    from iqtt.files.shards import ALL_FILES
     from iqtt.questions import specs
     from scenegen.common.errors import SpecError
+    from scenegen.common.places import as_place
+    from scenegen.rendering.sameness import renderer_identity
 
     suite, context = preset == "suite", click.get_current_context()
     given = click.core.ParameterSource.DEFAULT
@@ -143,7 +160,7 @@ def make_split(
         if context.get_parameter_source("seed") is not given:
             raise SpecError("--secret-seed", "--seed as well", "only one of the two")
         folders = [Path(out) / name for name in specs.SUITE] if suite else [Path(out)]
-        refuse_command_inputs(folder / name for folder in folders for name in make.FILES)
+        refuse_command_inputs(folder / name for folder in folders for name in ALL_FILES)
         settings["seed"] = specs.secret_seed(secret_seed)
     for name in ("distractors", "answers") if suite else ():
         if context.get_parameter_source(name) is not given:
@@ -153,12 +170,19 @@ def make_split(
     splits = len(specs.SUITE) if suite else 1
     count = splits * (spec.train + spec.val + spec.test)
     started = time.perf_counter()
-    with progress_bar(count, "question") as bar:
+    with (
+        command_line.on_scheduler(
+            scheduler, workers, partial(renderer_identity, device)
+        ) as cluster,
+        progress_bar(count, "question") as bar,
+    ):
         tally = (make.make_suite if suite else make.make_split)(
             out,
             spec,
             batch=batch,
             workers=workers,
+            shard_size=shard_size,
+            cluster=cluster,
             device=device,
             compression=compression,
             overwrite=overwrite,
@@ -167,7 +191,7 @@ def make_split(
             progress=bar.update,
         )
     seconds = time.perf_counter() - started
-    megabytes = sum(path.stat().st_size for path in Path(out).rglob("*.h5")) / 1e6
+    megabytes = sum(path.stat().st_size for path in as_place(out).rglob("*.h5")) / 1e6
     print_line(
         f"{out}: {f'{splits} splits of ' if suite else ''}{spec.train} + {spec.val} + {spec.test}"
         f" questions ({spec.labeled} of training labelled), {megabytes:.1f} MB,"
@@ -280,4 +304,56 @@ def audit(
     ctx.exit(0 if all(one.passed for one in found) else 1)
 
 
-COMMANDS = (make_split, show, info, audit)
+@click.command(epilog=f"{EXAMPLE}iqtt merge iqtt-split/iqtt-train.h5 --out iqtt-train.h5")
+@click.argument("file", type=QUESTIONS)
+@click.option("--out", type=OutputPath(), required=True, help="File to write.")
+@command_line.OVERWRITE
+def merge(file: str, out: str, overwrite: bool) -> None:
+    """Make one file of questions that were written to several."""
+    from iqtt.audit.table import find_tables
+    from iqtt.files.merge import merge_questions
+
+    with progress_bar(sum(one.count for one in find_tables([file])), "question") as bar:
+        count = merge_questions(file, out, overwrite, bar.update)
+    print_line(f"{out}: {count} questions, {Path(out).stat().st_size / 1e6:.1f} MB")
+
+
+@click.command(epilog=f"{EXAMPLE}iqtt verify iqtt-split --items 20")
+@click.argument("folder", type=InputPath(within=(".h5",)))
+@option(
+    "--items",
+    type=click.IntRange(0),
+    default=8,
+    help="Questions of each part to make again from the seed.",
+)
+@option(
+    "--secret-seed",
+    type=InputPath(),
+    metavar="FILE",
+    help="File whose content is the seed of a private test set, which the files do not tell.",
+)
+@command_line.DEVICE
+@click.pass_context
+def verify(
+    ctx: click.Context, folder: str, items: int, secret_seed: str | None, device: str
+) -> None:
+    """Check all files of a split in FOLDER, and make some questions again from the seed.
+
+    With a manifest the SHA-256 of every file is checked, and that every question is there once.
+    Exits with 1 if a check fails. `iqtt audit` proves that the answers are right.
+    """
+    from iqtt.audit.table import find_tables
+    from iqtt.files.verify import verify_split
+    from iqtt.questions.specs import secret_seed as read_seed
+
+    seed = None if secret_seed is None else read_seed(secret_seed)
+    with progress_bar(sum(one.count for one in find_tables([folder])), "question") as bar:
+        checks = verify_split(folder, items, device, seed, bar.update)
+    for check in checks:
+        print_line(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:26} {check.detail}")
+    failed = sum(not check.ok for check in checks)
+    print_line(f"{folder}: {f'{failed} of {len(checks)} checks failed' if failed else 'verified'}")
+    ctx.exit(1 if failed else 0)
+
+
+COMMANDS = (make_split, merge, show, info, verify, audit)

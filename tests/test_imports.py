@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 HEAVY = (
     "mitsuba", "drjit", "numpy", "h5py", "trimesh", "scipy", "PIL", "OpenEXR", "tqdm", "torch",
-    "lightning_fabric", "safetensors", "tensorboard",
+    "lightning_fabric", "safetensors", "tensorboard", "pyarrow",
 )  # fmt: skip
 PIX2SHAPE = ("train", "predict", "sample", "interpolate", "rotate")
 CHECK = f"""
@@ -53,6 +53,8 @@ def test_importing_a_package_loads_nothing_heavy(package, tmp_path):
         ("scenegen", ["--version"]),
         ("scenegen", ["render", "--help"]),
         ("scenegen", ["verify", "--help"]),
+        ("scenegen", ["export", "--help"]),
+        ("scenegen", ["card", "--help"]),
         ("scenegen", ["render", "--n", "x"]),
         ("iqtt", ["--help"]),
         ("bench", ["--help"]),

@@ -3,7 +3,6 @@
 Heavy imports happen inside the commands, so that `--help` is quick and works without torch.
 """
 
-import importlib.util
 from typing import Any
 
 import click
@@ -14,7 +13,7 @@ from scenegen.common.command_line import (
     MOST_PROCESSES,
     OVERWRITE,
     Items,
-    UserError,
+    needs,
     print_line,
     progress_bar,
 )
@@ -310,9 +309,7 @@ def _model_and_rooms(
 
 def needs_torch(who: str = "pix2shape", packages: tuple[str, ...] = PACKAGES) -> None:
     """Raise UserError where an optional package is missing."""
-    missing = ", ".join(name for name in packages if importlib.util.find_spec(name) is None)
-    if missing:
-        raise UserError(f"{who} needs {missing}: pip install '.[model]'")
+    needs(who, packages, "model")
 
 
 COMMANDS = (train, predict, sample, interpolate, rotate)

@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,8 @@ from iqtt.files.reader import QuestionsFile, answers_beside, parts
 from iqtt.questions.specs import SplitSpec
 from scenegen.common.hdf5 import trial
 from scenegen.common.hdf5.content import ColumnDigest, dataset_digest, joint_digest
-from scenegen.common.hdf5.input_file import open_file
 from scenegen.common.hdf5.row_file import digest_problems
+from scenegen.common.hdf5.shards import opened_with_shards, set_name, stored_array
 from scenegen.common.records import check
 
 Array = NDArray[Any]
@@ -186,8 +187,10 @@ def lacking(paths: Sequence[str | Path]) -> list[str]:
 
 
 def _files(folder: Path) -> list[Path]:
-    """Return a folder's question files by name; none if it is no folder."""
-    return sorted(folder.glob("iqtt-*.h5")) or sorted(folder.glob("*.h5"))
+    """Return a folder's question files by name, without shards; none if it is no folder."""
+    files = sorted(folder.glob("iqtt-*.h5")) or sorted(folder.glob("*.h5"))
+    names = {file.name for file in files}
+    return [file for file in files if set_name(file.name) not in names]
 
 
 def read_table(
@@ -253,8 +256,9 @@ def content_problems(tables: Sequence[AuditTable]) -> list[str]:
     known = {place: digest for table in tables for place, digest in table.contents.items()}
     for path in dict.fromkeys(path for path, _ in known):
         digests = {name: digest for (where, name), digest in known.items() if where == path}
-        with open_file(path, "question file") as file:
-            problems += [f"{path.name}: {text}" for text in digest_problems(file, digests)]
+        with opened_with_shards(path, "question file") as (file, shards):
+            stored = partial(stored_array, shards=shards)
+            problems += [f"{path.name}: {text}" for text in digest_problems(file, digests, stored)]
     return problems
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from iqtt.files.layout import truth_columns
 from iqtt.files.reader import AnswersFile, QuestionsFile, answers_beside, parts
 from iqtt.files.tables import NoImagesError, TableFile
+from scenegen.common.hdf5.shards import set_name
 from scenegen.common.text_table import printable
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.info import renderer_text, setting_lines, size_text
@@ -45,7 +46,7 @@ def _tables(path: str | Path) -> Iterator[TableFile]:
 def _header(path: Path, tables: Sequence[TableFile]) -> list[str]:
     total = sum(map(len, tables))
     lines = [
-        f"{path}: {total} questions, {size_text(path.stat().st_size)}",
+        f"{path}: {total} questions, {size_text(_size(path))}",
         "",
         f"  answers       {_answers_told(path, tables, total)}",
     ]
@@ -66,6 +67,12 @@ def _header(path: Path, tables: Sequence[TableFile]) -> list[str]:
         "  spec (* differs from the default)",
         *setting_lines(spec),
     ]
+
+
+def _size(path: Path) -> int:
+    """Return the size of a file and of its shards, if it has any."""
+    shards = [one for one in path.parent.iterdir() if set_name(one.name) == path.name]
+    return sum(file.stat().st_size for file in (path, *shards))
 
 
 def _answers_told(path: Path, tables: Sequence[TableFile], total: int) -> str:

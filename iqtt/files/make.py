@@ -1,31 +1,38 @@
-"""Make the files of a split: draw, render, pack and write questions, all at the same time."""
+"""Make the files of a split of questions, whole or in shards."""
 
-from collections.abc import Callable, Generator, Iterator
+import errno
+import os
+from collections.abc import Callable
 from contextlib import closing, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import h5py
-
 from iqtt.files.layout import root_attributes
-from iqtt.files.writer import PackedQuestions, QuestionsWriter, pack_questions
-from iqtt.questions.distractors import Pools, make_pools
-from iqtt.questions.specs import SPLITS, SUITE, SplitSpec
+from iqtt.files.shards import (
+    ALL_FILES,
+    MANIFEST,
+    SplitFiles,
+    complete_split,
+    file_tasks,
+    is_own,
+)
+from iqtt.files.work import Work
+from iqtt.questions.distractors import make_pools
+from iqtt.questions.specs import SUITE, SplitSpec
 from iqtt.questions.views import Tally
-from iqtt.render import DEFAULT_BATCH, Rendered, groups, render_questions
-from scenegen.common.hdf5.content import seal
-from scenegen.common.hdf5.row_file import new_file
-from scenegen.common.hdf5.table import packing_threads
+from iqtt.render import DEFAULT_BATCH
+from scenegen.common.hdf5.shards import MOST_SHARDS, opened
+from scenegen.common.new_file import EXISTS
 from scenegen.common.new_folder import check_folder, folder_written_beside
+from scenegen.common.places import as_place, is_remote
 from scenegen.common.records import check
-from scenegen.common.worker_pool import in_processes, in_threads
+from scenegen.common.sets.manifest import read_manifest
+from scenegen.common.workers.cluster import Cluster
 from scenegen.rendering.backend import select_variant, versions
-from scenegen.rendering.renderer import share_processors, useful_workers
+from scenegen.rendering.renderer import useful_workers
 
-FILES = ("iqtt-train.h5", "iqtt-val.h5", "iqtt-test.h5", "iqtt-test-answers.h5")
-BLOCK = 128  # questions that a worker process makes in one go
-PACKED = 8  # questions that a thread packs in one go
+SHARD_SIZE = 10_000  # questions
 
 
 def make_split(
@@ -34,14 +41,19 @@ def make_split(
     *,
     batch: int = DEFAULT_BATCH,
     workers: int = 1,
+    shard_size: int = SHARD_SIZE,
     device: str = "auto",
     overwrite: bool = False,
     compression: str = "gzip",
     command: str = "",
     secret: bool = False,
+    cluster: Cluster | None = None,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> Tally:
     """Write the files of a split to a folder; it appears when all of them are complete.
+
+    Where one of them has more than `shard_size` questions, the folder is there from the start, and
+    the same call goes on where an earlier one was killed.
 
     Seed and command would reveal the test answers, so only the file of the test answers has them.
     `new_folder.folder_written_beside` says how an older split is replaced.
@@ -49,9 +61,12 @@ def make_split(
     Args:
         batch: questions in one wavefront; bounds the memory, never changes a byte of the files.
         workers: processes that render, as in `rooms.make.make_dataset`.
+        shard_size: files with more questions are cut into shards of so many, which the file shows
+            as one.
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
         command: what to record as the command that made the files.
         secret: keep the seed out of the file of the test answers too.
+        cluster: whose workers make the files; all of them must see the folder, or it is a URL.
         progress: is called with the number of questions that were written since the last call.
 
     Returns how many views were proposed and refused.
@@ -63,105 +78,52 @@ def make_split(
     """
     count = spec.train + spec.val + spec.test
     check(count > 0, "train, val and test", count, "at least 1 question in all")
+    least = max(1, -(-count // MOST_SHARDS))
+    check(least <= shard_size, "shard-size", shard_size, f"at least {least} for so many questions")
     variant = select_variant(device)
     workers = workers or useful_workers(count * (1 + spec.answers), variant)
-    with folder_written_beside(folder, FILES, overwrite) as temporary:
-        renderer = {"variant": variant, **versions()}
-        tally = Tally()
-        public = root_attributes(spec.public(), renderer, "")
-        private = root_attributes(spec.public() if secret else spec, renderer, command)
-        work = _Work(spec, make_pools(spec), batch, workers, device, compression)
-        made = work.in_blocks(tally) if workers > 1 else work.here(tally)
-
-        def write(split: str, images_file: h5py.File, truth_file: h5py.File) -> None:
-            for part, (_, count) in groups(spec, split).items():
-                writer = QuestionsWriter(
-                    images_file, truth_file, spec, split, part, count, compression
-                )
-                while writer.rows < count:
-                    some = next(made)
-                    writer.extend(some)
-                    progress(some.count)
-                writer.close()
-            for file in {images_file, truth_file}:
-                seal(file)
-
-        with closing(made):
-            for split in ("train", "val"):
-                with new_file(temporary / f"iqtt-{split}.h5") as file:
-                    file.attrs.update({**public, "split": split})
-                    write(split, file, file)
-            with (
-                new_file(temporary / "iqtt-test.h5") as test,
-                new_file(temporary / "iqtt-test-answers.h5") as answers,
-            ):
-                test.attrs.update({**public, "split": "test"})
-                answers.attrs.update({**private, "split": "test"})
-                write("test", test, answers)
+    place, tally = as_place(folder), Tally()
+    tasks = file_tasks(spec, shard_size)
+    in_shards = bool(cluster) or is_remote(place) or any(task.is_shard for task in tasks)
+    if not is_remote(place):
+        _check_folder(place, overwrite, in_shards)
+    renderer = {"variant": variant, **versions()}
+    public = root_attributes(spec.public(), renderer, "")
+    private = root_attributes(spec.public() if secret else spec, renderer, command)
+    work = Work(spec, make_pools(spec), batch, workers, device, compression)
+    if in_shards:
+        if not is_remote(place):
+            place.mkdir(exist_ok=True)
+        files = SplitFiles(place, work, public, private)
+        complete_split(
+            files, tasks, shard_size, tally,
+            cluster=cluster, overwrite=overwrite, progress=progress,
+        )  # fmt: skip
+        return tally
+    with folder_written_beside(place, _own_files(place), overwrite) as temporary:
+        files = SplitFiles(temporary, work, public, private)
+        blocks = [block for task in tasks for block in task.blocks]
+        with closing(work.in_order(blocks, tally)) as made:
+            for task in tasks:
+                files.write(task, made, progress)
             next(made, None)  # there is none; so workers end by themselves
     return tally
 
 
-@dataclass(frozen=True)
-class _Block:
-    """Some rows of a part of a split, which begins with question `first` and has `count`."""
+def _check_folder(folder: Path, overwrite: bool, in_shards: bool) -> None:
+    """Raise OSError where a split cannot be written to a folder.
 
-    split: str
-    part: str
-    first: int
-    count: int
-    rows: range
+    One in shards may have been begun by an earlier run.
+    """
+    empty = folder.is_dir() and not any(folder.iterdir())
+    begun = in_shards and (empty or (folder / MANIFEST).exists())
+    check_folder(folder, _own_files(folder), overwrite or begun)
 
 
-@dataclass(frozen=True, eq=False)
-class _Work:
-    """What is done to questions, here or in another process."""
-
-    spec: SplitSpec
-    pools: Pools
-    batch: int
-    workers: int
-    device: str
-    compression: str
-
-    def blocks(self, size: int) -> Iterator[_Block]:
-        """Cut all parts of all splits into blocks of questions."""
-        for split in SPLITS:
-            for part, (first, count) in groups(self.spec, split).items():
-                for start in range(0, count, size):
-                    yield _Block(split, part, first, count, range(start, min(start + size, count)))
-
-    def questions(self, block: _Block, tally: Tally) -> Generator[PackedQuestions]:
-        """Render questions in order, and meanwhile pack them in threads."""
-        rendered = render_questions(
-            self.spec, self.pools, block.split, block.first, block.count,
-            rows=block.rows, batch=self.batch, device=self.device, tally=tally,
-        )  # fmt: skip
-        pieces = (some[i : i + PACKED] for some in rendered for i in range(0, len(some), PACKED))
-
-        def packed(questions: list[Rendered]) -> PackedQuestions:
-            return pack_questions(self.spec, block.part, questions, self.compression)
-
-        ahead = 2 * self.batch // PACKED
-        return in_threads(packed, pieces, packing_threads(self.workers), ahead)
-
-    def here(self, tally: Tally) -> Generator[PackedQuestions]:
-        """Yield all questions, made in this process."""
-        for block in self.blocks(self.spec.train + self.spec.val + self.spec.test):
-            yield from self.questions(block, tally)
-
-    def in_blocks(self, tally: Tally) -> Generator[PackedQuestions]:
-        """Yield all questions, made by processes a block at a time."""
-        for questions, found in in_processes(self.block, self.blocks(BLOCK), self.workers):
-            tally.proposed += found.proposed
-            tally.refused += found.refused
-            yield from questions
-
-    def block(self, block: _Block) -> tuple[list[PackedQuestions], Tally]:
-        """Return the questions of a block; to be called by a worker."""
-        share_processors(self.workers, self.device)
-        tally = Tally()
-        return list(self.questions(block, tally)), tally
+def _own_files(folder: Path) -> list[str]:
+    """Return the names that files of a split have in a folder."""
+    found = os.listdir(folder) if folder.is_dir() else []
+    return [*ALL_FILES, *(name for name in found if is_own(name))]
 
 
 def make_suite(
@@ -174,7 +136,7 @@ def make_suite(
     """Write a split of each kind of questions to a folder of its own in `folder`: see `SUITE`.
 
     Each split is complete when it appears, and what could stop one of them is checked before the
-    first one is made.
+    first one is made. Splits that an earlier run of the same request completed are kept.
 
     Args:
         spec: the settings of each split but its kind and number of answers.
@@ -186,20 +148,48 @@ def make_suite(
         name: replace(spec, distractors=kind, answers=answers)
         for name, (kind, answers) in SUITE.items()
     }
-    home = Path(folder)
-    if home.exists():
-        for name in specs:
-            check_folder(home / name, FILES, overwrite)
-    for own in specs.values():
+    home, device = as_place(folder), options.get("device", "auto")
+    waiting = {
+        name: own
+        for name, own in specs.items()
+        if overwrite or not _is_made(home / name, own, device)
+    }
+    if not waiting:
+        raise FileExistsError(errno.EEXIST, EXISTS, str(home))
+    if not is_remote(home):
+        for name in waiting if home.exists() else ():
+            begun = (home / name / MANIFEST).exists()
+            check_folder(home / name, _own_files(home / name), overwrite or begun)
+    for own in waiting.values():
         make_pools(own)
-    home.mkdir(exist_ok=True)
+    if not is_remote(home):
+        home.mkdir(exist_ok=True)
     total = Tally()
     try:
-        for name, own in specs.items():
-            tally = make_split(home / name, own, overwrite=overwrite, **options)
-            total.proposed += tally.proposed
-            total.refused += tally.refused
+        for name, own in waiting.items():
+            total.add(make_split(home / name, own, overwrite=overwrite, **options))
     finally:
-        with suppress(OSError):  # it stays if anything is in it
-            home.rmdir()
+        if not is_remote(home):
+            with suppress(OSError):  # it stays if anything is in it
+                home.rmdir()
     return total
+
+
+def _is_made(folder: Path, spec: SplitSpec, device: str) -> bool:
+    """Return whether an earlier run of the suite completed this split.
+
+    Raises SpecError where another seed made it.
+    """
+    manifest, files = folder / MANIFEST, [folder / name for name in ALL_FILES]
+    if manifest.exists() and not read_manifest(manifest).complete:
+        return False
+    if not all(file.is_file() for file in files):
+        return False
+    for path in files[:-1]:  # the last one may tell the seed
+        with opened(path) as file:
+            if file.attrs.get("spec") != spec.public().to_json():
+                return False
+    work = Work(spec, make_pools(spec), 1, 1, device, "gzip")
+    whole = file_tasks(spec, spec.train + spec.val + spec.test)
+    SplitFiles(folder, work, {}, {}).confirm(next(task for task in whole if task.items))
+    return True

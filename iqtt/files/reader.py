@@ -14,8 +14,9 @@ from iqtt.files.tables import TableFile, table_parts
 from iqtt.files.truth import QuestionTruth
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.hdf5 import trial
-from scenegen.common.hdf5.input_file import checking, open_file
+from scenegen.common.hdf5.input_file import checking
 from scenegen.common.hdf5.row_file import RowDataset
+from scenegen.common.hdf5.shards import opened_with_shards
 from scenegen.description.specs import IMAGE_DTYPES
 from scenegen.rendering.ground_truth import decode_image
 
@@ -58,7 +59,7 @@ def parts(path: str | Path) -> tuple[str, ...]:
 
     Raises OSError, FileFormatError as `QuestionsFile`.
     """
-    with open_file(path, "question file") as file, checking(file):
+    with opened_with_shards(Path(path), "question file") as (file, _), checking(file):
         read_root(file, Path(path))
         return table_parts(file, Path(path), QuestionsFile.CONTENT)
 

@@ -24,8 +24,9 @@ from iqtt.files.truth import QuestionTruth, question_truth
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.hdf5 import content
 from scenegen.common.hdf5.attributes import read_digest, read_names, read_text
-from scenegen.common.hdf5.input_file import StoredArray, checking, open_file, reading
+from scenegen.common.hdf5.input_file import StoredArray, checking, reading
 from scenegen.common.hdf5.row_file import and_more, column_problems
+from scenegen.common.hdf5.shards import JoinedArray, open_with_shards, stored_array
 from scenegen.common.records import LARGEST, check
 from scenegen.layout import TRUTH_DIGEST
 
@@ -64,7 +65,7 @@ class TableFile:
             SpecError: `part` is not given where there are two, or names none of them.
         """
         self.path = Path(path)
-        self._file = open_file(path, "question file")
+        self._file, self._shards = open_with_shards(self.path, "question file")
         with checking(self._file):
             self.attributes, self.spec, self.split = read_root(self._file, self.path)
             self.part = self._chosen(part)
@@ -131,7 +132,23 @@ class TableFile:
     def stored_bytes(self) -> dict[str, tuple[int, int]]:
         """Return for each dataset of this table its bytes on disk and in memory."""
         with reading(self.path):
-            return {n: (d.id.get_storage_size(), d.nbytes) for n, d in self._stored.items()}
+            return {n: (self._bytes_on_disk(d), d.nbytes) for n, d in self._stored.items()}
+
+    def _bytes_on_disk(self, dataset: h5py.Dataset) -> int:
+        if self._shards is not None and dataset.is_virtual:
+            return self._shards.stored_bytes(dataset)
+        return int(dataset.id.get_storage_size())
+
+    def compression(self) -> str:
+        """Return how large data sets are compressed: "gzip", "lzf" or "none"."""
+        with reading(self.path):
+            for data in self._stored.values():
+                real = data
+                if self._shards is not None and data.is_virtual:
+                    real = self._shards.file(self._shards.numbers(data)[0])[data.name]
+                if real.compression:
+                    return str(real.compression)
+            return "none"
 
     def stored_at(self, name: str) -> tuple[Path, str]:
         """Return the file that holds one dataset, and the name of the dataset there."""
@@ -156,6 +173,8 @@ class TableFile:
     def close(self) -> None:
         """Close the file; idempotent."""
         self._file.close()
+        if self._shards is not None:
+            self._shards.close()
 
     def __enter__(self) -> Self:
         return self
@@ -176,13 +195,13 @@ class TableFile:
         """Check and open questions and answers; return the number of questions."""
         raise NotImplementedError
 
-    def _dataset(self, name: str) -> StoredArray:
+    def _dataset(self, name: str) -> StoredArray | JoinedArray:
         """Return a dataset of this part, and note its size."""
         dataset = self._file[f"{self.part}/{name}"]
         if not isinstance(dataset, h5py.Dataset):
             raise FileFormatError(f"{self.path}: {name}", "a group", "a dataset")
         self._stored[name] = dataset
-        return StoredArray(dataset)
+        return stored_array(dataset, self._shards)
 
     def _take_answers(self, count: int | None = None) -> int:
         """Read all answers; return their number, which must be `count` where that is given."""
@@ -217,7 +236,7 @@ class TableFile:
             raise FileFormatError(f"{self.path}: {name}: {and_more(problems)}")
         for column in columns:
             dataset = self._stored[column.name] = group[column.name]
-            self._datasets[column.name] = StoredArray(dataset)
+            self._datasets[column.name] = stored_array(dataset, self._shards)
         if version < CAMERAS_SINCE:
             self._datasets["camera_distance"] = np.full(self._count, old_camera_distance(self.spec))
         place = f"{self.path}: {name}/distractor_kind"

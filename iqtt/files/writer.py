@@ -23,7 +23,8 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.render import Rendered
 from iqtt.shapes.polycube import canonical, canonical_class, set_ids
 from scenegen.common.hdf5.content import SHA256, joint_digest
-from scenegen.common.hdf5.table import Column, PackedRows, Rows, Table, pack_rows
+from scenegen.common.hdf5.shards import write_row_digests
+from scenegen.common.hdf5.table import Column, PackedRows, Rows, Table, extend_together, pack_rows
 from scenegen.layout import TRUTH_DIGEST
 
 OF_QUESTION = (
@@ -51,13 +52,16 @@ class QuestionsWriter:
         part: str,
         count: int,
         compression: str,
+        *,
+        is_shard: bool = False,
     ) -> None:
         """Create the datasets of a table with `count` questions.
 
         Args:
             part: "labeled" or "unlabeled" of a training file, else "".
+            is_shard: whether the digests of all rows are written too.
         """
-        self._spec, self._part = spec, part
+        self._part, self._is_shard = part, is_shard
         self._files = (images_file, truth_file)
         truth = truth_file.require_group(f"truth/{part}")
         truth.attrs.update(truth_attributes(spec))
@@ -67,10 +71,10 @@ class QuestionsWriter:
             truth_file.require_group(part or "/"),
         )
         self._tables = [
-            Table(group, columns, count, compression)
+            Table(group, columns, count, compression, is_shard)
             for group, columns in zip(groups, _columns(spec, part), strict=True)
         ]
-        self._digest = hashlib.sha256(f"{spec.public().to_json()} {split} {part}".encode())
+        self._mark = Fingerprint(spec, split, part)
 
     @property
     def rows(self) -> int:
@@ -79,19 +83,42 @@ class QuestionsWriter:
 
     def extend(self, questions: "PackedQuestions") -> None:
         """Write the next questions."""
-        self._digest.update(questions.fingerprinted)
-        for table, rows in zip(self._tables, questions.rows, strict=True):
-            table.extend_packed(rows)
+        self._mark.add(questions.fingerprinted)
+        extend_together(self._tables, questions.rows)
 
     def close(self) -> None:
         """Write the fingerprint, and beside answers the digest of what scores depend on."""
         images_file, truth_file = self._files
         for file in {images_file, truth_file}:
-            file.attrs[named("fingerprint", self._part)] = self._digest.hexdigest()
-        if self._part != "unlabeled":
-            places = (truth_file[self._part or "/"], truth_file[f"truth/{self._part}"])
-            scored = {n: place[n].attrs[SHA256] for place in places for n in SCORED if n in place}
-            truth_file.attrs[named(TRUTH_DIGEST, self._part)] = joint_digest(scored)
+            write_identity(file, self._part, self._mark, file == truth_file)
+            if self._is_shard:
+                tables = [table for table in self._tables if table.file == file]
+                write_row_digests(file, {k: v for t in tables for k, v in t.row_digests().items()})
+
+
+class Fingerprint:
+    """SHA-256 of the settings of a part of a split, and of shapes, views and answers in order."""
+
+    def __init__(self, spec: SplitSpec, split: str, part: str) -> None:
+        self._hash = hashlib.sha256(f"{spec.public().to_json()} {split} {part}".encode())
+
+    def add(self, questions: bytes) -> None:
+        """Add the next questions: the bytes of FINGERPRINTED, and of the answer, of each."""
+        self._hash.update(questions)
+
+    @property
+    def hex(self) -> str:
+        """The fingerprint of the questions so far."""
+        return self._hash.hexdigest()
+
+
+def write_identity(file: h5py.File, part: str, mark: Fingerprint, has_truth: bool) -> None:
+    """Write the fingerprint of a table, and beside answers the digest of what scores depend on."""
+    file.attrs[named("fingerprint", part)] = mark.hex
+    if has_truth and part != "unlabeled":
+        places = (file[part or "/"], file[f"truth/{part}"])
+        scored = {n: place[n].attrs[SHA256] for place in places for n in SCORED if n in place}
+        file.attrs[named(TRUTH_DIGEST, part)] = joint_digest(scored)
 
 
 @dataclass(frozen=True, eq=False)

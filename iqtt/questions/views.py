@@ -34,6 +34,11 @@ class Tally:
     proposed: int = 0
     refused: int = 0
 
+    def add(self, other: "Tally") -> None:
+        """Add the views that another process counted."""
+        self.proposed += other.proposed
+        self.refused += other.refused
+
 
 def sample_questions(
     spec: SplitSpec,

@@ -27,7 +27,7 @@ from metrics.scoring.truth_digests import RowDigests, view_digests
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import Identity, RoomPredictions, open_predictions
 from metrics.submissions.truths import read_true_view
-from scenegen.common.worker_pool import worker_pool
+from scenegen.common.workers.pool import worker_pool
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]

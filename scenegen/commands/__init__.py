@@ -1,4 +1,4 @@
-"""The `scenegen` commands: `rooms` has those on files of rooms, `meshes` the one on mesh folders.
+"""The `scenegen` commands: on files of rooms, on data cards (`sharing`), and on mesh folders.
 
 Only here and in `common.command_line` is click imported. A command parses its options, makes one
 library call and prints the result.

@@ -6,6 +6,7 @@ Each one parses its options, makes one library call, and prints. Heavy imports h
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from scenegen.common.command_line import (
     IMAGE_DTYPE,
     MESHES,
     OVERWRITE,
+    SCHEDULER,
     SEED,
     WORKERS,
     Color,
@@ -27,10 +29,15 @@ from scenegen.common.command_line import (
     Range,
     Size,
     creation_command,
+    needs,
+    on_scheduler,
     print_line,
     progress_bar,
 )
 from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
+
+SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
+SHARED = ("parquet", "webdataset")  # and of files of many
 
 
 # fmt: off
@@ -39,7 +46,7 @@ from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_co
 )
 @click.option("--n", "count", type=int, required=True, help="Number of scenes.")
 @click.option("--out", type=OutputPath(), default="rooms.h5", show_default=True,
-              help="File to write.")
+              help="File to write, or a URL such as s3://bucket/rooms.h5.")
 @click.option("--preset", default="shapes", show_default=True,
               help="Settings to start from, as `scenegen presets` lists them.")
 @SEED
@@ -97,6 +104,7 @@ from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_co
 @click.option("--shard-size", type=int, default=10_000, show_default=True,
               help="Most scenes of one file; more go to files beside --out, which shows them all as"
               " one.")
+@SCHEDULER
 @DEVICE
 @OVERWRITE
 def render(
@@ -107,6 +115,7 @@ def render(
     batch: int,
     workers: int,
     shard_size: int,
+    scheduler: str | None,
     device: str,
     compression: str,
     overwrite: bool,
@@ -120,6 +129,7 @@ def render(
     """
     from scenegen.description.presets import preset_spec
     from scenegen.objects.sources import object_source
+    from scenegen.rendering.sameness import renderer_identity
     from scenegen.rooms.make import make_dataset
 
     names = ("shapes", "classes", "object_split", "shapenet_root", "objects_root", "up")
@@ -131,7 +141,11 @@ def render(
     spec = preset_spec(preset, **chosen, **source.settings)
     images = count * len(spec.views)
     started = time.perf_counter()
-    with _told_how_to_go_on(out), progress_bar(images, "image") as bar:
+    with (
+        _told_how_to_go_on(out),
+        on_scheduler(scheduler, workers, partial(renderer_identity, device)) as cluster,
+        progress_bar(images, "image") as bar,
+    ):
         make_dataset(
             out,
             spec,
@@ -144,22 +158,32 @@ def render(
             overwrite=overwrite,
             command=creation_command("scenegen"),
             objects=source.objects,
+            cluster=cluster,
             progress=bar.update,
         )
     seconds = time.perf_counter() - started
-    files = [Path(out), *Path(out).parent.glob(f"{Path(out).stem}-?????-of-?????.h5")]
-    megabytes = sum(file.stat().st_size for file in files) / 1e6
+    megabytes = _set_bytes(out) / 1e6
     print_line(f"{out}: {images} images, {megabytes:.1f} MB, {images / seconds:.0f} images/s")
     for line in source.notes():
         print_line(line, err=True)
 
 
 # fmt: on
+def _set_bytes(out: str) -> int:
+    """Return the size of a file of rooms and of its shards, if it has any."""
+    from scenegen.common.hdf5.shards import set_name
+    from scenegen.common.places import as_place
+
+    place = as_place(out)
+    files = [one for one in place.parent.iterdir() if set_name(one.name) == place.name]
+    return sum(file.stat().st_size for file in (place, *files))
+
+
 @contextmanager
 def _told_how_to_go_on(out: str) -> Iterator[None]:
     """Say which shards are complete, and what to do, where the block is ended from outside."""
     from scenegen.common.errors import FileFormatError
-    from scenegen.common.manifest import manifest_path, read_manifest
+    from scenegen.common.sets.manifest import manifest_path, read_manifest
 
     try:
         yield
@@ -256,14 +280,14 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     Rows rendered again must agree bit for bit, or within a stated tolerance where the file was
     rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.
     """
-    from scenegen.common.manifest import manifests_in
+    from scenegen.common.sets.manifest import manifests_in
     from scenegen.objects.sources import file_objects
     from scenegen.rooms.reader import RoomsFile
     from scenegen.rooms.verify import verify_file, verify_set
 
     manifests = manifests_in(Path(file)) if Path(file).is_dir() else []
     checks = []
-    for path in [place.with_name(found.file) for place, found in manifests] or [Path(file)]:
+    for path in [place.with_name(found.files[0]) for place, found in manifests] or [Path(file)]:
         with RoomsFile(path) as rooms:
             count = len(rooms)
             objects = file_objects(rooms.spec, **meshes)
@@ -282,23 +306,84 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     epilog=f"{EXAMPLE}scenegen export rooms.h5 --items 0,5-7 --format exr --out exported"
 )
 @click.argument("file", type=InputPath())
-@click.option("--items", type=Items(), required=True, help="Rows to export.")
+@click.option(
+    "--items", type=Items(), help="Rows to export; without it parquet and webdataset take all."
+)
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["exr", "png", "ply", "obj"]),
+    type=click.Choice([*SINGLE, *SHARED]),
     required=True,
-    help="exr has all channels; png 16 bits a channel; ply the surfels; obj the scene's mesh.",
+    help="exr has all channels; png 16 bits a channel; ply the surfels; obj the scene's mesh;"
+    " parquet and webdataset all values of many rows, for data loaders.",
 )
 @click.option(
-    "--out", type=OutputFolder(), default=".", show_default=True, help="Folder to write to."
+    "--out",
+    type=OutputFolder(),
+    help="Folder to write to; parquet and webdataset make it [., or rooms-parquet of rooms.h5].",
+)
+@click.option(
+    "--rows-per-file",
+    type=click.IntRange(1),
+    default=1000,
+    show_default=True,
+    help="Most rows of a file of parquet or webdataset.",
 )
 @OVERWRITE
 @MESHES
 def export(
-    file: str, items: list[int], form: str, out: str, overwrite: bool, **meshes: Any
+    file: str,
+    items: list[int] | None,
+    form: str,
+    out: str | None,
+    rows_per_file: int,
+    overwrite: bool,
+    **meshes: Any,
 ) -> None:
     """Write rows of a file in the formats of other tools."""
+    if form in SHARED:
+        folder = out or f"{Path(file).stem}-{form}"
+        _export_many(file, items, form, folder, rows_per_file, overwrite)
+    elif items is None:
+        raise click.UsageError(f"--items: found none, expected rows for --format {form}")
+    else:
+        _export_single(file, items, form, out or ".", overwrite, meshes)
+
+
+def _export_many(
+    file: str,
+    items: list[int] | None,
+    form: str,
+    out: str,
+    rows_per_file: int,
+    overwrite: bool,
+) -> None:
+    """Write rows, or all, to a folder of a few large files."""
+    if form == "parquet":
+        needs("scenegen export --format parquet", ("pyarrow",), "share")
+    from scenegen.rooms.reader import RoomsFile
+    from scenegen.sharing.export import export_rows
+
+    with RoomsFile(file) as rooms:
+        count = len(rooms if items is None else items)
+    with progress_bar(count, "image") as bar:
+        written = export_rows(
+            file,
+            form,
+            out,
+            items,
+            rows_per_file=rows_per_file,
+            overwrite=overwrite,
+            progress=bar.update,
+        )
+    megabytes = sum(path.stat().st_size for path in written) / 1e6
+    print_line(f"{out}: {count} images in {len(written) - 1} files, {megabytes:.1f} MB")
+
+
+def _export_single(
+    file: str, items: list[int], form: str, out: str, overwrite: bool, meshes: dict[str, Any]
+) -> None:
+    """Write each row to files of its own."""
     from scenegen.common.errors import SpecError
     from scenegen.common.new_file import check_writable
     from scenegen.objects.catalogue import changed_meshes

@@ -1,12 +1,12 @@
 """What all commands share: how errors are shown, types of options, and options by name."""
 
-import importlib
+import importlib.util
 import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,6 +15,9 @@ from scenegen.common.signals import ended_by_signals
 from scenegen.common.streams import for_progress_bars, robust_streams
 from scenegen.common.text_table import printable
 
+if TYPE_CHECKING:
+    from scenegen.common.workers.cluster import Cluster, Versions
+
 # An `epilog` is this and a command line. A paragraph that begins with \b keeps its line breaks.
 EXAMPLE = "\b\nExample:\n  "
 MESH_FILES = (".glb", ".obj", ".off", ".ply", ".stl")
@@ -22,7 +25,7 @@ NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
 LONGEST_ERROR = 2000  # characters; what a file holds may be of any length
 LARGEST = 2**63 - 1  # whole number that files can hold
 MOST_PROCESSES = 1024
-WITHOUT_EFFECT = ("--batch", "--workers")  # options that change no byte of what is made
+WITHOUT_EFFECT = ("--batch", "--workers", "--scheduler")  # they change no byte of what is made
 MOST_ITEMS = 1_000_000  # numbers of a range; keeps 0-99999999999 from filling the memory
 
 
@@ -228,6 +231,13 @@ class Color(_Parsed):
         return channels if len(channels) == 3 else channels * 3
 
 
+def needs(who: str, packages: tuple[str, ...], extra: str) -> None:
+    """Raise UserError where a package of one of this project's optional extras is missing."""
+    missing = ", ".join(name for name in packages if importlib.util.find_spec(name) is None)
+    if missing:
+        raise UserError(f"{who} needs {missing}: pip install '.[{extra}]'")
+
+
 def print_line(text: str, err: bool = False) -> None:
     """Print one line, whatever names from files it holds."""
     click.echo(printable(text), err=err)
@@ -256,10 +266,37 @@ def progress_bar(count: int | None, unit: str) -> Any:
     return tqdm(total=count, file=for_progress_bars(), **look)
 
 
+@contextmanager
+def on_scheduler(
+    scheduler: str | None, workers: int, versions: "Versions"
+) -> Iterator["Cluster | None"]:
+    """Connect to the scheduler of an option; None where it was not given.
+
+    Args:
+        workers: processes of a local cluster; 0 for one a processor.
+        versions: tells what the results depend on.
+
+    Raises as `connected`.
+    """
+    if scheduler is None:
+        yield None
+        return
+    from scenegen.common.workers.cluster import connected
+    from scenegen.common.workers.pool import processors
+
+    with connected(
+        scheduler, workers or processors(), versions, lambda text: print_line(text, err=True)
+    ) as cluster:
+        yield cluster
+
+
 # fmt: off
 WORKERS = click.option("--workers", type=click.IntRange(0, 256), default=0,
                        show_default="one a processor, up to 8",
                        help="Processes that render; each takes about 0.4 GiB.")
+SCHEDULER = click.option("--scheduler", metavar="ADDRESS",
+                         help="Spread the work over a Dask cluster, such as tcp://host:8786; local"
+                         " starts one here with --workers processes.")
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 DEVICE = click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
                       show_default=True,

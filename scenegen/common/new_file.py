@@ -2,10 +2,12 @@
 
 import errno
 import os
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from scenegen.common.places import as_place, is_remote, upload
 from scenegen.common.workspace import workspace
 
 EXISTS = "exists already; say --overwrite to replace it"
@@ -15,17 +17,22 @@ EXISTS = "exists already; say --overwrite to replace it"
 def written_beside(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
     """Give a hidden path to write to; it is renamed to `path` when the block ends well.
 
+    For a URL it is in the folder for temporary files, and is uploaded then.
+
     Whatever goes wrong, nothing is left under either name that was not there before; what a killed
     process leaves, the next one removes that writes to the folder. Raises OSError as
     `check_writable` or as the disk does, with `path` in place of the hidden path.
     """
     check_writable(path, overwrite)
-    path = Path(path)
-    with workspace(path.parent, path) as folder:
+    path = as_place(path)
+    parent = Path(tempfile.gettempdir()) if is_remote(path) else path.parent
+    with workspace(parent, path) as folder:
         temporary = folder / f"file{path.suffix[:8]}"
         yield temporary
         check_writable(path, overwrite)
-        if overwrite:
+        if is_remote(path):
+            upload(temporary, path)
+        elif overwrite:
             os.replace(temporary, path)
         else:
             _take_name(temporary, path)
@@ -49,6 +56,10 @@ def write_text(path: str | Path, text: str, overwrite: bool = False) -> None:
 
 def check_writable(path: str | Path, overwrite: bool) -> None:
     """Raise an OSError where a file cannot be written, so that it is known before a long run."""
+    if is_remote(path):
+        if not overwrite and as_place(path).exists():
+            raise FileExistsError(errno.EEXIST, EXISTS, str(path))
+        return
     check_name(path)
     path = Path(path)
     problems = (

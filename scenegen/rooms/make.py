@@ -7,7 +7,9 @@ from typing import Any
 
 from scenegen.common.hdf5.shards import MOST_SHARDS
 from scenegen.common.new_file import check_writable
+from scenegen.common.places import as_place, check_store, is_remote
 from scenegen.common.records import check
+from scenegen.common.workers.cluster import Cluster
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.families.cache import MEMBERS_KEPT
@@ -37,11 +39,14 @@ def make_dataset(
     overwrite: bool = False,
     command: str = "",
     objects: Objects | None = None,
+    cluster: Cluster | None = None,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> None:
     """Render scenes 0 .. count - 1 of `spec` to a rooms file, each with a row for each view.
 
     Args:
+        path: a file, or a URL such as `s3://bucket/rooms.h5`: what goes there is written on this
+            machine, or on a worker of the cluster, and uploaded when it is complete.
         batch: images rendered at once; it bounds memory and changes no byte of the file.
         workers: processes that render; 0 for one a processor where that is worth while. They
             change no byte either. More than one need a script whose own work is inside
@@ -52,6 +57,8 @@ def make_dataset(
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
         command: stored as the file's creation command.
         objects: what the scenes are made of; None for `objects_of(spec)`.
+        cluster: whose workers make the shards; `path` must then be in a folder that all of them
+            see, or a URL.
         progress: called now and then with the number of rows written since the last call.
 
     Raises SpecError for a setting out of range, BackendError where the device cannot render here,
@@ -71,13 +78,19 @@ def make_dataset(
     workers = workers or useful_workers(count * len(spec.views), variant)
     attributes = {"creation_command": command, "variant": variant, **versions()}
     work = Work(spec, batch, workers, device, objects, compression, MEMBERS_KEPT.home)
-    if count > shard_size:
-        make_shards(path, work, count, shard_size, attributes, overwrite, progress)
+    place = as_place(path)
+    if count > shard_size or cluster:
+        make_shards(
+            place, work, count, shard_size, attributes,
+            cluster=cluster, overwrite=overwrite, progress=progress,
+        )  # fmt: skip
         return
-    check_writable(Path(path), overwrite)
+    if is_remote(place):
+        check_store(place)
+    check_writable(place, overwrite)
     with (
         create_rooms(
-            path, spec, count, compression=compression, overwrite=overwrite, attributes=attributes
+            place, spec, count, compression=compression, overwrite=overwrite, attributes=attributes
         ) as writer,
         closing(work.in_order([range(count)])) as made,
     ):

@@ -17,7 +17,7 @@ from scenegen.common.hdf5 import input_file, row_file
 from scenegen.common.hdf5.attributes import check_attribute, read_digest, read_text, read_texts
 from scenegen.common.hdf5.content import SHA256, joint_digest
 from scenegen.common.hdf5.input_file import StoredArray
-from scenegen.common.hdf5.shards import JoinedArray, open_with_shards
+from scenegen.common.hdf5.shards import JoinedArray, open_with_shards, stored_array
 from scenegen.common.records import check
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
@@ -105,9 +105,7 @@ class RoomsFile:
         self._count = len(self._datasets["image"])
 
     def _stored(self, dataset: h5py.Dataset) -> StoredArray | JoinedArray:
-        if self._shards is not None and dataset.is_virtual:
-            return JoinedArray(self._shards, dataset)
-        return StoredArray(dataset)
+        return stored_array(dataset, self._shards)
 
     def _parts(self) -> Iterator[h5py.File]:
         """Yield the files that hold the values: this one, or its shards."""
@@ -115,6 +113,13 @@ class RoomsFile:
             yield self._file
         else:
             yield from map(self._shards.file, range(len(self._shards.shards)))
+
+    @property
+    def parts(self) -> list[tuple[Path, int]]:
+        """Path and number of rows of each file that holds values: this one, or its shards."""
+        if self._shards is None:
+            return [(self.path, len(self))]
+        return [(self.path.parent / shard.file, shard.rows) for shard in self._shards.shards]
 
     def __len__(self) -> int:
         return self._count

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.hdf5.table import PackedRows, packing_threads
-from scenegen.common.worker_pool import in_processes, in_threads
+from scenegen.common.workers.pool import in_processes, in_threads
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec
 from scenegen.layout import columns
@@ -86,9 +86,13 @@ class Work:
 
     def block(self, indices: range) -> tuple[list[PackedRows], dict[str, str]]:
         """Return the rows of scenes, and why models were refused; to be called by a worker."""
+        self.prepare()
+        return list(self.rows(indices)), self.objects.problems
+
+    def prepare(self) -> None:
+        """Get a worker ready: it takes its share of the processors, and the cache."""
         MEMBERS_KEPT.use(self.cache_dir)
         share_processors(self.workers, self.device)
-        return list(self.rows(indices)), self.objects.problems
 
 
 def render_items(

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.hdf5.content import ColumnDigest
-from scenegen.common.manifest import ShardRecord, manifest_path, read_manifest, shard_problem
-from scenegen.common.worker_pool import in_threads, processors
+from scenegen.common.sets.manifest import manifest_path, read_manifest, wrong_files
 from scenegen.description.specs import DatasetSpec, Fingerprint
 from scenegen.layout import FIELDS, FORMAT_VERSION, has_digests, has_old_draws
 from scenegen.objects.catalogue import Objects, objects_of
@@ -94,10 +93,10 @@ def verify_file(
                     broken[name].append(f"row {i}: {problem}")
                 progress(1)
         layout = f"{len(rooms)} rows, format {rooms.attributes['format_version']}"
-        checks = [_check("layout", layout, rooms.problems())]
+        checks = [listed_check("layout", layout, rooms.problems())]
         checks.append(_content(rooms, {name: x.hex for name, x in digests.items()}))
         for name, rule in rules.items():
-            checks.append(_check(name, f"{rule} ({len(rooms)} rows)", broken[name]))
+            checks.append(listed_check(name, f"{rule} ({len(rooms)} rows)", broken[name]))
         same = fingerprint.hex == rooms.fingerprint
         checks.append(Check("fingerprint", same, rooms.fingerprint if same else "does not match"))
         return checks + _some_again(rooms, items, device, objects)
@@ -119,21 +118,16 @@ def verify_set(
     path = Path(path)
     manifest = read_manifest(manifest_path(path))
 
-    def problem(record: ShardRecord) -> tuple[ShardRecord, str | None]:
-        return record, shard_problem(path.parent, record)
-
-    wrong = []
-    for record, found in in_threads(problem, manifest.shards, processors(), 2 * processors()):
-        if found:
-            wrong.append(f"{record.file} {found}")
-        progress(record.rows)
+    wrong = wrong_files(path.parent, manifest, progress)
     told = "every shard and the set are complete"
-    checks = [_check("manifest", told, [] if manifest.complete else ["the set is not complete"])]
-    checks.append(_check("checksums", f"SHA-256 of {len(manifest.shards)} shards", wrong))
+    checks = [
+        listed_check("manifest", told, [] if manifest.complete else ["the set is not complete"])
+    ]
+    checks.append(listed_check("checksums", f"SHA-256 of {len(manifest.shards)} shards", wrong))
     if wrong:
         return checks
     with RoomsFile(path) as rooms:
-        checks.append(_check("layout", f"{len(rooms)} rows", rooms.problems()))
+        checks.append(listed_check("layout", f"{len(rooms)} rows", rooms.problems()))
         views = len(rooms.spec.views)
         scene, view = (rooms.read(n, slice(None)) for n in ("scene_index", "view_index"))
         every = np.arange(manifest.count * views)
@@ -141,7 +135,7 @@ def verify_set(
         if not missing:
             out = np.flatnonzero((scene != every // views) | (view != every % views))
             missing = [f"row {row}" for row in out[:SHOWN].tolist()]
-        checks.append(_check("rows", f"each of {len(every)} once, in order", missing))
+        checks.append(listed_check("rows", f"each of {len(every)} once, in order", missing))
         checks += _some_again(rooms, items, device, objects or objects_of(rooms.spec))
     return checks
 
@@ -154,7 +148,8 @@ def _some_again(rooms: RoomsFile, items: int, device: str, objects: Objects) -> 
     return [_sampled_again(rooms, rows, objects), _rendered_again(rooms, rows, device, objects)]
 
 
-def _check(name: str, detail: str, problems: Sequence[str]) -> Check:
+def listed_check(name: str, detail: str, problems: Sequence[str]) -> Check:
+    """Return the outcome of a check: what was checked, or the first problems."""
     if not problems:
         return Check(name, True, detail)
     more = f" and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
@@ -167,7 +162,7 @@ def _content(rooms: RoomsFile, digests: dict[str, str]) -> Check:
         version = rooms.attributes["format_version"]
         return Check("content", True, f"not checked: format {version} has no digests")
     problems = rooms.content_problems(digests)
-    return _check("content", "every value and attribute as written, by SHA-256", problems)
+    return listed_check("content", "every value and attribute as written, by SHA-256", problems)
 
 
 def _sampled_again(rooms: RoomsFile, rows: Array, objects: Objects) -> Check:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from scenegen.common.hdf5.content import seal
 from scenegen.common.hdf5.row_file import new_file, writer_name
+from scenegen.common.hdf5.shards import write_row_digests
 from scenegen.common.hdf5.table import Column, PackedRows, Table, pack_rows
 from scenegen.common.records import check
 from scenegen.description.scene_arrays import SceneArrays
@@ -171,6 +172,8 @@ def create_rooms(
         yield writer
         if writer.table.rows != rows:
             raise RuntimeError(f"{path}: got {writer.table.rows} of {rows} rows")
+        if is_shard:
+            write_row_digests(file, writer.table.row_digests())
         file.attrs["fingerprint"] = writer.fingerprint.hex
         file.attrs[TRUTH_DIGEST] = truth_digest(file)
         seal(file)

@@ -12,7 +12,8 @@ digests of the set follow from those of its shards, and a damaged row can be nam
 import json
 import re
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing, contextmanager, nullcontext
 from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
@@ -34,12 +35,15 @@ from scenegen.common.hdf5.input_file import (
     virtual_sources,
 )
 from scenegen.common.hdf5.trial import Trials, was_tried
+from scenegen.common.places import as_place, is_remote
 
 Array = NDArray[Any]
 SHARDS = "shards"  # in the file of a set: a line of JSON for each shard
 ROW_DIGESTS = "row_sha256"  # in a shard: (rows, data sets, 32) bytes; its attribute has the names
 MOST_SHARDS = 10_000  # whose manifest is still read
 LONGEST_LINE = 1000  # characters
+PART = re.compile(r"\w{0,40}")
+SHARD_NAME = re.compile(r"(.+)-\d{5}-of-\d{5}(\.[^.]*|)", re.DOTALL)
 MOST_OPEN = 32  # shards that a reader keeps open
 
 
@@ -51,17 +55,25 @@ class Shard:
         file: its name, without a folder.
         rows: their number.
         content_digest: the attribute of that name.
+        part: the group whose rows these are, where a set has several tables; else empty.
     """
 
     file: str
     rows: int
     content_digest: str
+    part: str = ""
 
 
 def shard_name(path: str | Path, number: int, count: int) -> str:
     """Return the name of a shard, such as `rooms-00003-of-00128.h5` of `rooms.h5`."""
-    path = Path(path)
+    path = as_place(path)
     return f"{path.stem}-{number:05d}-of-{count:05d}{path.suffix}"
+
+
+def set_name(name: str) -> str | None:
+    """Return the name of the set that a shard of this name belongs to; None if it is no shard's."""
+    found = SHARD_NAME.fullmatch(name)
+    return None if found is None else "".join(found.groups())
 
 
 def cut(count: int, size: int) -> list[range]:
@@ -70,7 +82,10 @@ def cut(count: int, size: int) -> list[range]:
 
 
 def write_row_digests(group: h5py.Group, digests: Mapping[str, bytes]) -> None:
-    """Write the digests of all rows, 32 bytes each in their order, by name of the data set."""
+    """Write the digests of all rows, 32 bytes each in their order, by name of the data set.
+
+    Names are as seen from `group`, the root of a shard.
+    """
     names = sorted(digests)
     rows = [np.frombuffer(digests[name], np.uint8).reshape(-1, 32) for name in names]
     values = np.stack(rows, axis=1)
@@ -83,16 +98,16 @@ def write_row_digests(group: h5py.Group, digests: Mapping[str, bytes]) -> None:
 def write_virtual(
     file: h5py.File, folder: Path, shards: Sequence[Shard], axes: Mapping[str, Any]
 ) -> None:
-    """Write what a file of a set holds: virtual data sets over the shards, and the list of these.
+    """Write virtual data sets over shards, at least one, of one part of a set.
 
     Data sets that count an axis are copied from the first shard.
 
     Args:
         folder: where the shards are now.
-        axes: names of the axes of a row, by name of the data set.
+        axes: names of the axes of a row, by name of the data set; None where they have no names.
     """
     rows = sum(shard.rows for shard in shards)
-    with h5py.File(folder / shards[0].file, "r") as first:
+    with opened(folder / shards[0].file) as first:
         for name, names in axes.items():
             model = first[name]
             layout = h5py.VirtualLayout((rows, *model.shape[1:]), model.dtype)
@@ -106,20 +121,33 @@ def write_virtual(
             dataset = file.create_virtual_dataset(name, layout, fillvalue=fill)
             own = ("DIMENSION_LABELS", "DIMENSION_LIST", SHA256)
             dataset.attrs.update({k: v for k, v in model.attrs.items() if k not in own})
-            name_axes(file, dataset, ("row", *names))
+            if names is not None:
+                name_axes(file, dataset, ("row", *names))
     for name, digest in _joint_digests(folder, shards).items():
         file[name].attrs[SHA256] = digest
+
+
+def write_list(file: h5py.File, shards: Sequence[Shard]) -> None:
+    """Write the list of all shards of a set, those of each part in their order."""
     lines = np.array([json.dumps(vars(shard)) for shard in shards], object)
     listed = file.create_dataset(SHARDS, data=lines, dtype=h5py.string_dtype())
     listed.attrs["meaning"] = "the files beside this one that hold the values, in their order"
     listed.attrs[SHA256] = dataset_digest(lines)
 
 
+@contextmanager
+def opened(place: Path) -> Iterator[h5py.File]:
+    """Open an HDF5 file that a run of ours has just made, also behind a URL."""
+    with ExitStack() as stack:
+        source = stack.enter_context(place.open("rb")) if is_remote(place) else place
+        yield stack.enter_context(h5py.File(source, "r"))
+
+
 def _joint_digests(folder: Path, shards: Iterable[Shard]) -> dict[str, str]:
     """Return the `column_digest` of each data set over all shards."""
     parts: dict[str, list[bytes]] = {}
     for shard in shards:
-        with h5py.File(folder / shard.file, "r") as file:
+        with opened(folder / shard.file) as file:
             digests = file[ROW_DIGESTS]
             values = digests[()]
             for i, name in enumerate(digests.attrs["names"]):
@@ -154,20 +182,27 @@ def open_with_shards(path: Path, kind: str) -> tuple[h5py.File, "ShardFiles | No
         return file, ShardFiles(path, shards, kind)
 
 
+@contextmanager
+def opened_with_shards(path: Path, kind: str) -> Iterator[tuple[h5py.File, "ShardFiles | None"]]:
+    """Open a file as `open_with_shards`, and close all that was opened."""
+    file, shards = open_with_shards(path, kind)
+    with closing(shards) if shards else nullcontext(), file:
+        yield file, shards
+
+
 def _read_list(listed: h5py.Dataset, path: Path) -> list[Shard]:
     """Return the shards that the file of a set names, each beside it."""
     where = f"{path}: {SHARDS}"
     text = h5py.check_string_dtype(listed.dtype) is not None
     if not text or listed.ndim != 1 or not 1 <= len(listed) <= MOST_SHARDS:
         raise FileFormatError(where, f"{listed.dtype} {listed.shape}", "a line for each shard")
-    name = re.compile(re.escape(path.stem) + r"-\d{5}-of-\d{5}" + re.escape(path.suffix))
     found = []
     for line in StoredArray(listed)[()]:
         try:
             shard = Shard(**json.loads(line[:LONGEST_LINE]))
             good = shard.rows > 0 and type(shard.rows) is int
             good &= re.fullmatch("[0-9a-f]{64}", shard.content_digest) is not None
-            good &= name.fullmatch(shard.file) is not None
+            good &= set_name(shard.file) == path.name and PART.fullmatch(shard.part) is not None
         except (TypeError, ValueError, RecursionError):
             good = False
         if not good:
@@ -186,7 +221,6 @@ class ShardFiles:
         """Keep where they are. Raises FileFormatError where one of them is missing."""
         self.path, self.shards, self._kind = path, shards, kind
         self._trials = Trials() if was_tried(path) else None  # a shard is tried where its set was
-        self.starts = [0, *accumulate(shard.rows for shard in shards)]
         self._open: OrderedDict[int, h5py.File] = OrderedDict()
         self._arrays: dict[tuple[int, str], StoredArray] = {}
         missing = [shard.file for shard in shards if not (path.parent / shard.file).is_file()]
@@ -229,6 +263,18 @@ class ShardFiles:
             self._arrays[number, name] = StoredArray(file[name])
         return self._arrays[number, name]
 
+    def numbers(self, dataset: h5py.Dataset) -> list[int]:
+        """Return which shards hold the rows of a virtual data set of the set."""
+        storage = dataset.id.get_create_plist()
+        first = storage.get_virtual_filename(0) if storage.get_virtual_count() else None
+        part = next((shard.part for shard in self.shards if shard.file == first), None)
+        return [i for i, shard in enumerate(self.shards) if shard.part == part]
+
+    def stored_bytes(self, dataset: h5py.Dataset) -> int:
+        """Return the bytes on disk of a virtual data set of the set, in all its shards."""
+        numbers = self.numbers(dataset)
+        return sum(int(self.file(i)[dataset.name].id.get_storage_size()) for i in numbers)
+
     def close(self) -> None:
         """Close all that is open."""
         if self._trials is not None:
@@ -242,7 +288,13 @@ class JoinedArray:
     """A data set of a set, read from the shards as `StoredArray` reads one of a file."""
 
     def __init__(self, files: ShardFiles, dataset: h5py.Dataset) -> None:
+        """Raise FileFormatError where the shards of its part have another number of rows."""
         self.dataset, self._files = dataset, files
+        self._numbers = files.numbers(dataset)
+        self._starts = [0, *accumulate(files.shards[i].rows for i in self._numbers)]
+        if self._starts[-1] != dataset.shape[0]:
+            where = f"{files.path}: {dataset.name}"
+            raise FileFormatError(where, f"{dataset.shape[0]} rows", f"{self._starts[-1]}")
         self.shape: tuple[int, ...] = dataset.shape
         self.dtype, self.attrs = dataset.dtype, dataset.attrs
 
@@ -256,11 +308,11 @@ class JoinedArray:
             return self[row : row + 1][0]
         chosen = np.arange(len(self))[slice(None) if isinstance(rows, tuple) else rows]
         values = np.empty((len(chosen), *self.shape[1:]), self.dtype)
-        shard = np.searchsorted(self._files.starts, chosen, side="right") - 1
+        shard = np.searchsorted(self._starts, chosen, side="right") - 1
         for number in np.unique(shard).tolist():
             places = np.flatnonzero(shard == number)
-            inside = chosen[places] - self._files.starts[number]
-            stored = self._files.array(number, self.dataset.name)
+            inside = chosen[places] - self._starts[number]
+            stored = self._files.array(self._numbers[number], self.dataset.name)
             if stored.shape[1:] != self.shape[1:] or stored.dtype != self.dtype:
                 found = f"{stored.dtype} {stored.shape}"
                 raise ValueError(f"{found} in a shard, not {self.dtype} {self.shape}")
@@ -273,3 +325,10 @@ class JoinedArray:
 
 
 Opened = Callable[[h5py.Dataset], StoredArray | JoinedArray]
+
+
+def stored_array(dataset: h5py.Dataset, shards: ShardFiles | None) -> StoredArray | JoinedArray:
+    """Return a data set of a file that `open_with_shards` opened, to be read."""
+    if shards is not None and dataset.is_virtual:
+        return JoinedArray(shards, dataset)
+    return StoredArray(dataset)

@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 from scenegen.common.errors import SpecError
 from scenegen.common.hdf5.axes import name_axes
 from scenegen.common.hdf5.content import SHA256, ColumnDigest, row_digest
-from scenegen.common.hdf5.shards import write_row_digests
-from scenegen.common.worker_pool import processors
+from scenegen.common.workers.pool import processors
 
 Array = NDArray[Any]
 COMPRESSIONS = ("gzip", "lzf", "none")
@@ -67,6 +66,7 @@ class Table:
 
     Attributes:
         count, rows: numbers of rows, in all and written so far.
+        file: that holds them.
         columns, compression: as given.
         datasets: by name.
     """
@@ -79,7 +79,7 @@ class Table:
         compression: str = "gzip",
         row_digests: bool = False,
     ) -> None:
-        """Create the datasets; with `row_digests` the last row adds those of a shard.
+        """Create the datasets; with `row_digests` those of all rows are kept in memory.
 
         Raises SpecError for an unknown compression or a negative count.
         """
@@ -93,8 +93,8 @@ class Table:
         self._images = [column for column in columns if column.own_chunk]
         self.datasets = {column.name: self._create(group, column) for column in columns}
         self._block: dict[str, list[Any]] = {c.name: [] for c in columns if not c.own_chunk}
+        self.file: h5py.File = group.file
         self._digests = {column.name: ColumnDigest(row_digests) for column in columns}
-        self._group, self._row_digests = group, row_digests
         self._packing: deque[Future[PackedRows]] = deque()
         if not count:
             self._write_digests()
@@ -147,10 +147,11 @@ class Table:
     def _write_digests(self) -> None:
         for name, digest in self._digests.items():
             self.datasets[name].attrs[SHA256] = digest.hex
-        if self._row_digests:
-            write_row_digests(
-                self._group, {n: bytes(x.rows or b"") for n, x in self._digests.items()}
-            )
+
+    def row_digests(self) -> dict[str, bytes]:
+        """Return the digests of all rows, 32 bytes each, by path of the data set in its file."""
+        kept = {self.datasets[name].name: digest.rows for name, digest in self._digests.items()}
+        return {name.lstrip("/"): bytes(rows or b"") for name, rows in kept.items()}
 
     def _create(self, group: h5py.Group, column: Column) -> h5py.Dataset:
         text = column.dtype == "text"
@@ -194,6 +195,26 @@ class PackedRows:
     count: int
     images: list[list[tuple[bytes, Any]]]
     others: Rows
+
+    def row(self, i: int) -> "PackedRows":
+        """Return one of the rows."""
+        others = {name: values[i : i + 1] for name, values in self.others.items()}
+        return PackedRows(1, self.images[i : i + 1], others)
+
+
+def extend_together(tables: Sequence[Table], rows: Sequence[PackedRows]) -> None:
+    """Write the next rows of several tables of one file.
+
+    HDF5 places what has a chunk of its own in the order of writing. So where several tables have
+    such columns, they are written row by row: the bytes do not depend on how many come at a time.
+    """
+    if sum(any(column.own_chunk for column in table.columns) for table in tables) < 2:
+        for table, some in zip(tables, rows, strict=True):
+            table.extend_packed(some)
+        return
+    for i in range(rows[0].count):
+        for table, some in zip(tables, rows, strict=True):
+            table.extend_packed(some.row(i))
 
 
 def pack_rows(rows: Rows, columns: Sequence[Column], compression: str) -> PackedRows:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from made_splits import TINY
 
-from iqtt.files import make
+from iqtt.files import work
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from scenegen.common.errors import SpecError
@@ -94,9 +94,16 @@ def test_the_same_request_gives_the_same_bytes(folder, tmp_path):
     assert os.listdir(tmp_path) == ["again"]
 
 
+def test_depth_is_laid_out_alike_in_batches_of_any_size(tmp_path):
+    spec = replace(SPEC, with_depth=True, test=0, train=0, labeled=0)
+    for batch in (2, 64):
+        make_split(tmp_path / f"{batch}", spec, batch=batch)
+    assert contents(tmp_path / "2") == contents(tmp_path / "64")
+
+
 def test_worker_processes_never_change_a_byte(folder, tmp_path, monkeypatch):
     """And all views that are proposed are counted."""
-    monkeypatch.setattr(make, "BLOCK", 2)
+    monkeypatch.setattr(work, "BLOCK", 2)
     tally = make_split(tmp_path / "again", SPEC, workers=2, command=COMMAND)
     assert contents(tmp_path / "again") == contents(folder)
     assert tally == make_split(tmp_path / "alone", SPEC, command=COMMAND)

@@ -11,7 +11,8 @@ import pytest
 from made_splits import TINY, StopError, listing
 
 from iqtt.files import make as module
-from iqtt.files.make import FILES, make_split
+from iqtt.files.make import make_split
+from iqtt.files.shards import ALL_FILES as FILES
 from iqtt.shapes.splits import TooFewShapesError
 from scenegen.common.errors import PlacementError, SpecError
 from scenegen.common.workspace import remove_leftovers

@@ -9,7 +9,8 @@ import pytest
 from polycubes import are_congruent
 
 from iqtt.files.layout import CONVENTIONS
-from iqtt.files.make import FILES, make_split
+from iqtt.files.make import make_split
+from iqtt.files.shards import ALL_FILES as FILES
 from iqtt.questions.distractors import make_pools
 from iqtt.questions.specs import SplitSpec
 from iqtt.render import Rendered, render_question

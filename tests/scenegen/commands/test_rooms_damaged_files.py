@@ -15,6 +15,7 @@ READERS = {
     "preview": ("--out", "sheet.png"),
     "verify": ("--items", "2"),
     "export": ("--items", "0", "--format", "exr"),
+    "card": ("--creator", "A", "--date", "2026-01-31", "--out", "card"),
 }
 
 

@@ -11,11 +11,11 @@ import warnings
 import pytest
 
 from scenegen.common.errors import SceneGenError
-from scenegen.common.worker_pool import in_processes, in_threads
+from scenegen.common.workers.pool import in_processes, in_threads
 
 BUSY = """
 import sys, time
-from scenegen.common.worker_pool import worker_pool
+from scenegen.common.workers.pool import worker_pool
 try:
     with worker_pool(2) as pool:
         tasks = [pool.submit(time.sleep, seconds) for seconds in (float(sys.argv[1]), 1)]

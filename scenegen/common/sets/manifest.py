@@ -1,22 +1,25 @@
-"""The manifest of a set of shards: what was asked for, and which shards are complete.
+"""The manifest of a set: what was asked for, and which of its files are complete.
 
-It is JSON beside the set, such as `rooms.manifest.json`, written anew after each shard. So a run
-that was killed can go on, and anyone can check the files by their SHA-256.
+It is JSON beside the files, such as `rooms.manifest.json`, written anew as they are completed. So a
+run that was killed can go on, and anyone can check the files by their SHA-256.
 """
 
 import hashlib
 import json
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
+from scenegen.common.hdf5.shards import set_name
 from scenegen.common.new_file import written_beside
+from scenegen.common.places import as_place, is_remote
 from scenegen.common.records import LONGEST_JSON, check, from_json
+from scenegen.common.workers.pool import in_threads, processors
 
 try:
     import fcntl
@@ -24,17 +27,17 @@ except ImportError:  # Windows has no such locks
     fcntl = None  # type: ignore[assignment]
 
 ENDING = ".manifest.json"
-FORMAT = "pix2shape-bench manifest 1"
+FORMAT = "pix2shape-bench manifest 2"
 MOST_BYTES = LONGEST_JSON
 
 
 @dataclass(frozen=True)
 class ShardRecord:
-    """A complete shard.
+    """A complete file: a shard, or a whole file of a set that has several.
 
     Attributes:
         file: its name, without a folder.
-        first, items: its first item, and their number.
+        first, items: number of its first item, and how many it has.
         rows: the number of its rows.
         bytes: its size.
         sha256: of the whole file.
@@ -57,21 +60,23 @@ class ShardRecord:
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a set of shards is, and how far it is made.
+    """What a set of files is, and how far it is made.
 
     Attributes:
         format: FORMAT.
-        file: name of the file that shows all shards as one.
+        kind: the attribute `format` of its HDF5 files.
+        files: names of the files that readers open; those with shards show them as one.
         spec: the request, as JSON.
         count, shard_size: numbers of items, in all and of a shard.
         settings: what else the bytes depend on: compression, variant, versions.
-        command: that made it.
-        complete: whether the file of the set is there.
-        shards: those that are complete, in their order.
+        command: that made it; empty where it must not be told.
+        complete: whether all files are there.
+        shards: the files with values that are complete, by their names.
     """
 
     format: str
-    file: str
+    kind: str
+    files: tuple[str, ...]
     spec: str
     count: int
     shard_size: int
@@ -81,7 +86,8 @@ class Manifest:
     shards: tuple[ShardRecord, ...]
 
     def __post_init__(self) -> None:
-        _check_name(self.file)
+        for name in self.files:
+            _check_name(name)
 
     def differences(self, other: "Manifest") -> list[str]:
         """Return what makes the bytes of another set other ones: `name here, name there`."""
@@ -95,10 +101,14 @@ class Manifest:
         spec = json.loads(self.spec)
         return {**spec, **dict(self.settings), "n": self.count, "shard-size": self.shard_size}
 
-    def with_shard(self, shard: ShardRecord) -> "Manifest":
-        """Return the manifest with one more shard."""
-        shards = [one for one in self.shards if one.file != shard.file] + [shard]
-        return replace(self, shards=tuple(sorted(shards, key=lambda one: one.first)))
+    def with_shards(self, shards: Iterable[ShardRecord]) -> "Manifest":
+        """Return the manifest with more shards."""
+        known = {one.file: one for one in (*self.shards, *shards)}
+        return replace(self, shards=tuple(known[name] for name in sorted(known)))
+
+    def shards_of(self, file: str) -> list[ShardRecord]:
+        """Return the complete shards of one of `files`, in order; itself if it has none."""
+        return [one for one in self.shards if file in (one.file, set_name(one.file))]
 
 
 def _check_name(name: str) -> None:
@@ -107,14 +117,14 @@ def _check_name(name: str) -> None:
 
 
 def manifest_path(path: str | Path) -> Path:
-    """Return where the manifest of a set is."""
-    return Path(path).with_suffix(ENDING)
+    """Return where the manifest of a set is whose one file is at `path`."""
+    return as_place(path).with_suffix(ENDING)
 
 
-def write_manifest(path: Path, manifest: Manifest) -> None:
-    """Write the manifest of the set at `path`, in one step."""
+def write_manifest(place: Path, manifest: Manifest) -> None:
+    """Write a manifest, in one step."""
     text = json.dumps(manifest, default=vars, indent=1)
-    with written_beside(manifest_path(path), overwrite=True) as temporary:
+    with written_beside(place, overwrite=True) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
@@ -161,10 +171,35 @@ def shard_problem(folder: Path, shard: ShardRecord) -> str | None:
     return None
 
 
+def wrong_files(
+    folder: Path, manifest: Manifest, progress: Callable[[int], Any] = lambda done: None
+) -> list[str]:
+    """Return what is wrong with the files of a manifest, checked by all processors.
+
+    `progress` is called with the number of rows of each file that was read. Raises OSError.
+    """
+
+    def problem(record: ShardRecord) -> tuple[ShardRecord, str | None]:
+        return record, shard_problem(folder, record)
+
+    wrong = []
+    for record, found in in_threads(problem, manifest.shards, processors(), 2 * processors()):
+        if found:
+            wrong.append(f"{record.file} {found}")
+        progress(record.rows)
+    return wrong
+
+
 @contextmanager
-def locked(path: Path) -> Iterator[None]:
-    """Let nobody else make the set at `path` meanwhile. Raises SceneGenError where someone does."""
-    lock = path.parent / f".{path.name}.lock"
+def locked(place: Path) -> Iterator[None]:
+    """Let nobody else make the set of this manifest meanwhile.
+
+    Raises SceneGenError where someone does. Stores behind URLs have no locks.
+    """
+    if is_remote(place):
+        yield
+        return
+    lock = place.parent / f".{place.name}.lock"
     descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         if fcntl is not None:
@@ -176,7 +211,7 @@ def locked(path: Path) -> Iterator[None]:
             except OSError:  # a disk without locks
                 ours = True
             if not ours:  # or a run that has just ended removed the lock that was opened here
-                raise SceneGenError(path, "another run that makes it", "", "wait for it")
+                raise SceneGenError(place, "another run that makes it", "", "wait for it")
         try:
             yield
         finally:

@@ -1,0 +1,159 @@
+"""Make the files of a set, and go on where an earlier run was killed.
+
+Each file gets its name when it is complete, and holds the same bytes whoever makes it. A file that
+was completed but is not in the manifest, as the run was killed right then, is made again.
+"""
+
+import time
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from scenegen.common.errors import SpecError
+from scenegen.common.hdf5.content import CONTENT_DIGEST
+from scenegen.common.hdf5.shards import opened, set_name
+from scenegen.common.new_file import check_writable
+from scenegen.common.places import check_store, is_remote
+from scenegen.common.sets.manifest import (
+    Manifest,
+    ShardRecord,
+    file_sha256,
+    locked,
+    read_manifest,
+    shard_problem,
+    write_manifest,
+)
+from scenegen.common.workers.pool import in_threads, processors
+
+SHARE = 0.05  # of the time that writing manifests may take; that of 10,000 shards has 3 MB
+
+
+@dataclass(frozen=True)
+class Task:
+    """Files that one worker makes together: a shard, or a shard of questions and their answers.
+
+    Attributes:
+        names: of the files, without a folder.
+        first, items: number of their first item, and how many they have.
+    """
+
+    names: tuple[str, ...]
+    first: int
+    items: int
+
+
+T = TypeVar("T", bound=Task)
+
+
+def complete_set(
+    place: Path,
+    asked: Manifest,
+    tasks: Sequence[T],
+    make: Callable[[Manifest, Sequence[T]], Generator[list[ShardRecord]]],
+    join: Callable[[Manifest], None],
+    *,
+    overwrite: bool = False,
+    confirm: Callable[[T], None] = lambda task: None,
+    progress: Callable[[int], Any] = lambda done: None,
+) -> None:
+    """Make the files of a set that earlier runs of the same request have not made.
+
+    Files that are there are kept if their checksums are right. With `overwrite` they are not.
+
+    Args:
+        place: where the manifest is; the files lie beside it.
+        asked: the manifest of the request, without shards.
+        make: makes the files of tasks, and yields the records of each task when it is done. It gets
+            the manifest of the run that began the set, whose command all files tell.
+        join: writes the files that show shards as one.
+        confirm: is called with one of the tasks whose files are kept, and raises SpecError where
+            these answer another request in a way that the manifest must not tell.
+        progress: is called with the number of rows that are there already.
+
+    Raises SpecError where what is there answers another request, SceneGenError while another run
+    makes this set, and OSError where something else has one of the names, or the disk refuses.
+    """
+    if is_remote(place):
+        check_store(place)
+    with locked(place):
+        manifest = _begun(place, asked, tasks, overwrite)
+        rows = {record.file: record.rows for record in manifest.shards}
+        kept = [task for task in tasks if rows.keys() >= set(task.names)]
+        if kept:
+            confirm(kept[0])
+        for task in kept:
+            progress(rows[task.names[0]])
+        records, due = list[ShardRecord](), 0.0
+        write_manifest(place, manifest)
+        missing = [task for task in tasks if not rows.keys() >= set(task.names)]
+        try:
+            with closing(make(manifest, missing)) as made:
+                for some in made:
+                    records += some
+                    begun = time.monotonic()
+                    if begun >= due:
+                        write_manifest(place, manifest.with_shards(records))
+                        due = time.monotonic() + (time.monotonic() - begun) / SHARE
+        finally:
+            manifest = manifest.with_shards(records)
+            write_manifest(place, manifest)
+        join(manifest)
+        write_manifest(place, replace(manifest, complete=True))
+
+
+def _begun(place: Path, asked: Manifest, tasks: Sequence[Task], overwrite: bool) -> Manifest:
+    """Return the manifest of what is there already, without files that cannot be kept.
+
+    Raises as `complete_set`.
+    """
+    names = {name for task in tasks for name in task.names}
+    begun = place.exists()
+    if overwrite or not begun:
+        taken = [one for one in place.parent.iterdir() if one.name in names.union(asked.files)]
+        for one in taken:
+            check_writable(one, overwrite)
+        if overwrite:
+            _remove(place, asked)
+        return asked
+    found = read_manifest(place)
+    differences = found.differences(asked)
+    if differences:
+        raise other_request(place, "; ".join(differences))
+    records = [record for record in found.shards if record.file in names]
+
+    def problem(record: ShardRecord) -> str | None:
+        return shard_problem(place.parent, record)
+
+    problems = list(in_threads(problem, records, processors(), 2 * processors()))
+    kept = tuple(one for one, wrong in zip(records, problems, strict=True) if wrong is None)
+    whole = all(place.with_name(name).exists() for name in found.files)
+    if found.complete and len(kept) == len(names) and whole:
+        check_writable(place.with_name(found.files[0]), overwrite=False)
+    return replace(found, shards=kept, complete=False)
+
+
+def other_request(where: object, found: str) -> SpecError:
+    """Return the error for files that answer another request."""
+    hint = "repeat its options to go on, or start anew with --overwrite"
+    return SpecError(where, found, "the same request as that of the run that began it", hint)
+
+
+def _remove(place: Path, asked: Manifest) -> None:
+    """Remove a set: the files that show it first, then its manifest, and its shards last."""
+    for name in asked.files:
+        place.with_name(name).unlink(missing_ok=True)
+    place.unlink(missing_ok=True)
+    for path in list(place.parent.iterdir()):
+        if set_name(path.name) in asked.files:
+            path.unlink(missing_ok=True)
+
+
+def record_file(file: Path, task: Task, rows: int, started: float) -> ShardRecord:
+    """Return the record of a file that is complete; `started` is a time of `time.monotonic`."""
+    with opened(file) as content:
+        digest = str(content.attrs[CONTENT_DIGEST])
+    seconds = round(time.monotonic() - started, 3)
+    size, checksum = file.stat().st_size, file_sha256(file)
+    return ShardRecord(file.name, task.first, task.items, rows, size, checksum, digest, seconds)

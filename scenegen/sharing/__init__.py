@@ -1,0 +1,10 @@
+"""What others need to use our files: rows in formats of machine learning, and data cards.
+
+`export` writes the rows of a file of rooms as Parquet or as WebDataset, each value as it is stored.
+`make` writes a data card: a page for people, Croissant metadata for programs, and a Parquet index
+of all rows. The page and the metadata are written from one `description`, which knows nothing of
+rooms; `rooms` fills it in.
+
+It may import everything in `scenegen` but the commands. Only here is pyarrow imported. Start with
+`columns` and `export`, then read `description` and `make`.
+"""

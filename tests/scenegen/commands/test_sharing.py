@@ -1,0 +1,74 @@
+"""`scenegen export` to formats of data loaders, and `scenegen card`, as a user types them."""
+
+import importlib.util
+import json
+
+import pytest
+
+WHO = ("--creator", "A. Person")
+
+
+@pytest.fixture
+def without_pyarrow(monkeypatch):
+    real = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "pyarrow" else real(name)
+    )
+
+
+def test_all_rows_go_to_a_folder_of_its_own(run, rooms_path, tmp_path):
+    told = run("export", rooms_path, "--format", "parquet", "--rows-per-file", 5)
+    assert told.exit_code == 0, told.output
+    assert told.stdout.startswith("rooms-parquet: 8 images in 2 files, ")
+    assert sorted(p.name for p in (tmp_path / "rooms-parquet").iterdir()) == [
+        "config.json", "rooms-00000-of-00002.parquet", "rooms-00001-of-00002.parquet"
+    ]  # fmt: skip
+
+
+def test_some_rows_and_overwrite(run, refuses, rooms_path, tmp_path):
+    export = ("export", rooms_path, "--format", "webdataset", "--items", "2,5-6", "--out", "out")
+    assert run(*export).exit_code == 0
+    before = (tmp_path / "out" / "rooms-00000-of-00001.tar").read_bytes()
+    refuses(*export, words=("out", "--overwrite"))
+    assert run(*export, "--overwrite").exit_code == 0
+    assert (tmp_path / "out" / "rooms-00000-of-00001.tar").read_bytes() == before
+
+
+def test_refused_exports(refuses, rooms_path):
+    refuses("export", rooms_path, "--format", "png", words=("--items",))
+    refuses("export", rooms_path, "--format", "parquet", "--items", 8, words=("--items", "0 to 7"))
+
+
+def test_card(run, monkeypatch, rooms_path, tmp_path):
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1767225600")
+    told = run("card", rooms_path, *WHO, "--out", "card")
+    assert told.stdout == "card: README.md, croissant.json, index.parquet of 8 images\n"
+    croissant = json.loads((tmp_path / "card" / "croissant.json").read_text())
+    assert croissant["datePublished"] == "2026-01-01"
+    assert croissant["license"] == "https://spdx.org/licenses/CC-BY-4.0.html"
+    assert croissant["name"] == "rooms"
+
+
+def test_refused_cards(run, refuses, meshes, monkeypatch, rooms_path, tmp_path):
+    monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
+    (tmp_path / "card").mkdir()
+    (tmp_path / "card" / "mine").write_text("mine")
+    card = ("card", rooms_path, *WHO, "--out", "card")
+    refuses(*card, words=("--date",))
+    date = ("--date", "2026-01-31")
+    refuses(*card, *date, "--overwrite", words=("mine",))
+    refuses(*card, *date, "--license", "my own", words=("--license",))
+    (meshes / "mug" / "broken.obj").unlink()
+    tiny = ("--n", 1, "--size", 16, "--out", "m.h5", "--objects-root", meshes, "--objects", 1)
+    assert run("render", *tiny).exit_code == 0
+    card = ("card", "m.h5", *WHO, *date, "--out", "new")
+    refuses(*card, words=("--license", "meshes"))
+    assert run(*card, "--license", "LicenseRef-theirs").exit_code == 0
+
+
+@pytest.mark.usefixtures("without_pyarrow")
+def test_without_the_extra(run, refuses, rooms_path):
+    words = ("pyarrow", "pip install '.[share]'")
+    refuses("export", rooms_path, "--format", "parquet", words=words)
+    refuses("card", rooms_path, *WHO, "--out", "card", words=words)
+    assert run("export", rooms_path, "--format", "webdataset").exit_code == 0

@@ -1,0 +1,169 @@
+"""Exported rows, read by the loaders that people use: nothing is lost, and nothing half done."""
+
+import io
+import json
+import re
+import tarfile
+
+import numpy as np
+import pytest
+
+from scenegen import open_rooms
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.layout import FIELDS
+from scenegen.sharing.export import ABOUT, FORMATS, export_rows
+
+
+@pytest.fixture(params=["8 bits", "floats"])
+def path(request, holey_set, float_path):
+    return holey_set if request.param == "8 bits" else float_path
+
+
+def as_stored(value, stored):
+    """A value of a loader in the type that the file of rooms has."""
+    if isinstance(stored, bytes):
+        return value.encode()
+    if np.asarray(stored).dtype.kind in "OS":
+        return [part.encode() for part in value]
+    return np.asarray(value).astype(stored.dtype)
+
+
+def check_rows(found, path, rows, column):
+    """Compare each value of each row; `column` gives that of a dataset from a loaded row."""
+    assert len(found) == len(rows)
+    with open_rooms(path) as rooms:
+        for place, row in enumerate(rows):
+            values = found[place]
+            for field in FIELDS:
+                stored = rooms.read(field.name, row)
+                value = column(values, field.name.replace("/", "_"))
+                np.testing.assert_array_equal(as_stored(value, stored), stored, field.name)
+        if path.name == "set.h5":
+            assert np.isnan(rooms.read("depth", 0)).any(), "or NaN is not tested"
+
+
+@pytest.mark.parametrize("how", ["files", "folder"])
+def test_parquet_in_datasets(how, path, load, tmp_path):
+    made = export_rows(path, "parquet", tmp_path / "out", rows_per_file=4)
+    if how == "files":
+        loaded = load("parquet", data_files=[str(p) for p in made if p.name != ABOUT])
+    else:
+        loaded = load(str(tmp_path / "out"))
+    rows = range(len(loaded))
+    check_rows(loaded, path, rows, lambda row, name: row[name])
+    assert loaded["row"] == list(rows)
+    assert loaded.features["depth"].shape == loaded.with_format("numpy")[0]["depth"].shape
+    picture = type(loaded.features["image"]).__name__
+    assert picture == ("Image" if path.name == "set.h5" else "Array3D")
+
+
+def test_webdataset_in_datasets(path, load, tmp_path):
+    made = export_rows(path, "webdataset", tmp_path / "out", rows_per_file=4)
+    loaded = load("webdataset", data_files=[str(p) for p in made if p.name != ABOUT])
+    check_rows(loaded, path, range(len(loaded)), of_archive)
+    assert loaded["__key__"] == [f"{row:09d}" for row in range(len(loaded))]
+
+
+def of_archive(row, name):
+    for ending in ("png", "npy"):
+        if f"{name}.{ending}" in row:
+            return row[f"{name}.{ending}"]
+    return row["json"][name]
+
+
+def test_archives_tell_nothing_of_their_maker(path, tmp_path):
+    made = export_rows(path, "webdataset", tmp_path / "out", rows=[3, 1], rows_per_file=9)
+    with tarfile.open(made[0]) as archive:
+        members = archive.getmembers()
+        depth = np.load(io.BytesIO(archive.extractfile("000000001.depth.npy").read()))
+    with open_rooms(path) as rooms:
+        np.testing.assert_array_equal(depth, rooms.read("depth", 1))
+    assert {(m.mtime, m.uid, m.gid, m.uname, m.gname, m.mode) for m in members} == {
+        (0, 0, 0, "", "", 0o644)
+    }
+    names = [m.name.partition(".")[0] for m in members]
+    assert names == ["000000003"] * 5 + ["000000001"] * 5
+    assert [m.name for m in members[:5]] == sorted(m.name for m in members[:5])
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_the_same_bytes_again_and_an_older_folder_is_replaced(form, path, tmp_path):
+    def contents():
+        return {p.name: p.read_bytes() for p in (tmp_path / "out").iterdir()}
+
+    export_rows(path, form, tmp_path / "out", rows_per_file=2)
+    many = contents()
+    made = export_rows(path, form, tmp_path / "out", rows_per_file=4, overwrite=True)
+    assert set(contents()) == {p.name for p in made}, "files of the older run are gone"
+    export_rows(path, form, tmp_path / "out", rows_per_file=2, overwrite=True)
+    assert contents() == many
+    (tmp_path / "out" / "mine.txt").write_text("mine")
+    with pytest.raises(FileExistsError):
+        export_rows(path, form, tmp_path / "out", overwrite=True)
+
+
+def test_what_files_do_not_tell_is_beside_them(holey_set, tmp_path):
+    made = export_rows(holey_set, "webdataset", tmp_path / "out", rows_per_file=9)
+    about = json.loads((tmp_path / "out" / ABOUT).read_text())
+    assert about["files"] == [p.name for p in made[:-1]] == [
+        "set-00000-of-00002.tar", "set-00001-of-00002.tar"
+    ]  # fmt: skip
+    with open_rooms(holey_set) as rooms:
+        assert about["attributes"] == {k: str(v) for k, v in rooms.attributes.items()}
+        assert about["columns"]["image"]["scale"] == 1 / 255
+        assert about["columns"]["object_shape"]["names"] == list(rooms.spec.shapes)
+    assert about["columns"]["depth"]["unit"] == "scene unit"
+    assert about["columns"]["depth"]["row_shape"] == [32, 32]
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_damaged_row_leaves_nothing(form, damaged, tmp_path):
+    def shorten(file):
+        file["depth"].id.write_direct_chunk((5, 0, 0), b"no deflate stream", 0)
+
+    path = damaged(shorten)
+    with pytest.raises(FileFormatError) as error:
+        export_rows(path, form, tmp_path / "out", rows_per_file=2)
+    assert "depth, row 5" in error.value.where
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    export_rows(path, form, tmp_path / "out", rows=[0, 7])
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_texts_that_are_none(form, damaged, tmp_path):
+    def spoil(file):
+        models = file["object/model"][:]
+        models[4, 0] = b"\xff"
+        file["object/model"][:] = models
+
+    with pytest.raises(FileFormatError) as error:
+        export_rows(damaged(spoil), form, tmp_path / "out")
+    assert "object/model, row 4" in error.value.where
+
+
+@pytest.mark.parametrize(
+    ("how", "where"),
+    [
+        ({"rows": [0, 0]}, "items"),
+        ({"rows": [99]}, "items"),
+        ({"rows": []}, "items"),
+        ({"rows_per_file": 0}, "rows per file"),
+    ],
+)
+def test_refused(how, where, rooms_path, tmp_path):
+    with pytest.raises(SpecError) as error:
+        export_rows(rooms_path, "parquet", tmp_path / "out", **how)
+    assert error.value.where == where
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_no_more_rows_are_in_memory_than_fit(rooms_path, tmp_path, monkeypatch):
+    monkeypatch.setattr("scenegen.sharing.export.BLOCK_BYTES", 3 * 32 * 32 * (3 + 4 + 12 + 1))
+    steps = []
+    made = export_rows(rooms_path, "parquet", tmp_path / "out", progress=steps.append)
+    import pyarrow.parquet as pq
+
+    file = pq.ParquetFile(made[0])
+    groups = [file.metadata.row_group(i).num_rows for i in range(file.num_row_groups)]
+    assert groups == steps == [3, 3, 2]
+    assert re.fullmatch(r"rooms-00000-of-00001\.parquet", made[0].name)
