@@ -70,7 +70,7 @@ results: $(VENV)/.model
 fuzz: $(VENV)/.test
 	$(BIN)/python -m fuzz --seconds 600 --corpus fuzz-corpus
 
-# Five minutes of runs that are killed, stopped or without room, and then go on.
+# Fifteen minutes of runs that meet kills, signals, full disks and more, and then go on.
 torture: $(VENV)/.test
 	$(BIN)/python -m benchmarks.torture
 

@@ -1,11 +1,11 @@
-"""Runs that are killed, stopped, or meet a broken disk, and then go on: one Markdown table.
+"""Runs that are killed, stopped, or meet trouble of many kinds, and then go on: one Markdown table.
 
-`python -m benchmarks.torture [--kills 50] [--parts kills,signals,disk]`, from the repository's
-root. Every run must end with the bytes of an unbroken run, and leave nothing else behind.
+`python -m benchmarks.torture [--kills 50] [--parts kills,signals,...]`, from the repository's root.
+Every run must end with the bytes of an unbroken run, and leave no temporary file. All is written
+below one temporary folder, some 1.5 GB.
 """
 
 import argparse
-import os
 import random
 import resource
 import shutil
@@ -18,90 +18,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-SCENES, SHARD = 400, 50
-WORDS = f"render --n {SCENES} --size 32 --min-visible-pixels 3 --shard-size {SHARD} --seed 3"
-# Run the command in a process that kills itself just before or after the k-th event of a kind.
-HOOKED = """
-import builtins, os, signal, sys
-kind, at, after = sys.argv[1], int(sys.argv[2]), sys.argv[3] == "after"
-del sys.argv[1:4]
-def hook(place, name):
-    real, seen = getattr(place, name), [0]
-    def hooked(*arguments, **named):
-        seen[0] += 1
-        if seen[0] == at and not after:
-            os.kill(os.getpid(), signal.SIGKILL)
-        result = real(*arguments, **named)
-        if seen[0] == at and after:
-            os.kill(os.getpid(), signal.SIGKILL)
-        return result
-    setattr(place, name, hooked)
-if kind == "packing":
-    from scenegen.rooms import render
-    hook(render, "pack_rooms")
-elif kind == "writing":
-    from scenegen.common.hdf5.table import Table
-    hook(Table, "extend_packed")
-elif kind == "manifest":
-    from scenegen.rooms import shards
-    hook(shards, "write_manifest")
-else:
-    hook(os, kind)
-import cli
-cli.scenegen()
-"""
-EVENTS = {"packing": 25, "writing": 25, "manifest": 10, "replace": 18, "unlink": 18}
-
-
-class Torture:
-    """A folder with an unbroken run to compare others with."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-        self.unbroken = folder / "unbroken"
-        self.unbroken.mkdir()
-        start = time.perf_counter()
-        self.command(self.unbroken, "1").wait()
-        self.seconds = time.perf_counter() - start
-        self.expected = contents(self.unbroken)
-
-    def command(
-        self, where: Path, workers: str = "1", hook: tuple[str, ...] = (), **options: object
-    ) -> "subprocess.Popen[str]":
-        """Start the command in a folder."""
-        code = HOOKED if hook else "import cli; cli.scenegen()"
-        words = [sys.executable, "-c", code, *hook, *WORDS.split(), "--workers", workers]
-        return subprocess.Popen(
-            words, cwd=where, env=self.environment, stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE, text=True, **options,  # type: ignore[call-overload]
-        )  # fmt: skip
-
-    def fresh(self, name: str) -> Path:
-        """Return an empty folder."""
-        place = self.folder / name
-        shutil.rmtree(place, ignore_errors=True)
-        place.mkdir()
-        return place
-
-    def goes_on(self, where: Path) -> str:
-        """Run the same command again, if it was not done; return what is wrong, or nothing."""
-        manifest = where / "rooms.manifest.json"
-        if manifest.exists() and '"complete": true' in manifest.read_text():
-            return "" if contents(where) == self.expected else "other bytes"
-        again = self.command(where)
-        said = again.communicate()[1]
-        if again.returncode:
-            return f"the second run failed: {said.strip()[-200:]}"
-        if contents(where) != self.expected:
-            return "other bytes"
-        hidden = [p.name for p in where.iterdir() if p.name.startswith(".")]
-        return f"left behind: {hidden}" if hidden else ""
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    """Return the bytes of each HDF5 file of a folder."""
-    return {path.name: path.read_bytes() for path in folder.glob("*.h5")}
+from benchmarks.torture_growth import growth
+from benchmarks.torture_runs import EVENTS, Torture, contents
+from benchmarks.torture_surroundings import clock, pipes, read_only
 
 
 def kills(torture: Torture, count: int) -> Iterator[tuple[str, str]]:
@@ -141,8 +60,7 @@ def signals(torture: Torture, count: int) -> Iterator[tuple[str, str]]:
         problem = "" if seconds < 2 else f"it took {seconds:.1f} s"
         if not (where / "rooms.h5").exists():  # else it was done before
             problem = problem or ("" if "goes on" in said else f"it said {said.strip()[-80:]!r}")
-            left = [p.name for p in where.iterdir() if p.name.endswith(".partial")]
-            problem = problem or (f"left behind: {left}" if left else torture.goes_on(where))
+            problem = problem or torture.left_behind() or torture.goes_on(where)
         yield f"{one.name}, ended within 2 s", problem
 
 
@@ -151,12 +69,7 @@ def disk(torture: Torture, _count: int) -> Iterator[tuple[str, str]]:
 
     def refused(name: str, where: Path, **options: object) -> tuple[str, str]:
         process = torture.command(where, **options)  # type: ignore[arg-type]
-        said = process.communicate()[1].strip()
-        lines = [line for line in said.splitlines() if "warning" not in line.lower()]
-        clear = process.returncode == 2 and len(lines) == 1 and "Traceback" not in said
-        whole = all(torture.expected.get(n) == data for n, data in contents(where).items())
-        problem = "" if clear else f"exit {process.returncode}: {said[-200:]!r}"
-        return name, problem or ("" if whole else "a file that is not whole")
+        return name, torture.ended(process, process.communicate()[1].strip())
 
     def limit() -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -181,21 +94,24 @@ def disk(torture: Torture, _count: int) -> Iterator[tuple[str, str]]:
     first = torture.command(where)
     while not list(where.glob("*.json")) and first.poll() is None:
         time.sleep(0.02)
-    yield refused("a second run of the same set", where)
+    second = refused("a second run of the same set", where)
     first.communicate()
+    yield second
     yield "the first of the two", "" if contents(where) == torture.expected else "other bytes"
     where = torture.fresh("vanishing")
     process = torture.command(where)
     while not list(where.glob("rooms-*")) and process.poll() is None:
         time.sleep(0.02)
     shutil.rmtree(where, ignore_errors=True)
-    said = process.communicate()[1]
-    clear = process.returncode == 2 and "Traceback" not in said
-    yield "a folder that vanishes", "" if clear else f"exit {process.returncode}: {said[-200:]!r}"
+    said = process.communicate()[1].strip()
+    yield "a folder that vanishes", torture.ended(process, said)
 
 
 PARTS: dict[str, Callable[[Torture, int], Iterator[tuple[str, str]]]]
-PARTS = {"kills": kills, "signals": signals, "disk": disk}
+PARTS = {
+    "kills": kills, "signals": signals, "disk": disk, "read_only": read_only, "pipes": pipes,
+    "clock": clock, "growth": growth,
+}  # fmt: skip
 
 
 def main() -> None:
@@ -208,7 +124,9 @@ def main() -> None:
     with tempfile.TemporaryDirectory(prefix="torture-") as name:
         torture = Torture(Path(name))
         for part in arguments.parts.split(","):
-            for what, problem in PARTS[part](torture, arguments.kills if part == "kills" else 9):
+            count = arguments.kills if part == "kills" else 9
+            for what, wrong in PARTS[part](torture, count):
+                problem = wrong or torture.left_behind()
                 tried[what] += 1
                 survived[what] += not problem
                 print(f"{what}: {problem or 'survived'}", file=sys.stderr, flush=True)

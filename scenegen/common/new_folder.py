@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from scenegen.common.new_file import EXISTS, check_name, check_writable
+from scenegen.common.signals import held_back
 from scenegen.common.workspace import remove_leftovers, workspace
 
 AT_FDCWD, RENAME_EXCHANGE = -100, 2  # of Linux
@@ -36,15 +37,16 @@ def folder_written_beside(
         new.mkdir()
         yield new
         check_folder(folder, names, overwrite, made.name)
-        if stays:
-            for name in names:
-                (folder / name).unlink(missing_ok=True)
-            for name in os.listdir(new):
-                os.replace(new / name, folder / name)
-        elif folder.is_dir():
-            _replace(folder, new, made / "old")
-        else:
-            os.rename(new, folder)
+        with held_back():  # else what is renamed by then might be removed with the hidden folder
+            if stays:
+                for name in names:
+                    (folder / name).unlink(missing_ok=True)
+                for name in os.listdir(new):
+                    os.replace(new / name, folder / name)
+            elif folder.is_dir():
+                _replace(folder, new, made / "old")
+            else:
+                os.rename(new, folder)
 
 
 def check_folder(path: str | Path, names: Collection[str], overwrite: bool, own: str = "") -> None:
@@ -74,7 +76,7 @@ def _can_be_renamed(folder: Path) -> bool:
     """Return whether a rename fails only because its target, made for this, is not empty."""
     if folder.samefile(os.curdir):
         return False
-    with suppress(OSError), workspace(folder.parent, folder) as made:
+    with suppress(OSError), workspace(folder.parent, folder) as made, held_back():
         (made / "full" / "folder").mkdir(parents=True)
         try:
             os.rename(folder, made / "full")

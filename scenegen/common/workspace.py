@@ -18,6 +18,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from scenegen.common.signals import held_back
+
 try:
     import fcntl
 except ImportError:  # Windows: nothing is locked there, and nothing that is left is removed
@@ -33,18 +35,22 @@ DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 def workspace(parent: Path, path: Path) -> Iterator[Path]:
     """Make a workspace in a folder; it is removed, with all it holds, when the block ends.
 
-    What killed runs left in the folder is removed when a process first comes to it. Errors of the
-    disk that concern the workspace's first file or folder are raised as OSErrors about `path`.
+    What killed runs left in the folder is removed when a process first comes to it. Signals wait
+    while the workspace is made, and while it is removed. Errors of the disk that concern the
+    workspace's first file or folder are raised as OSErrors about `path`.
     """
     try:
         _first_look(parent.absolute())
-        folder, lock = _made(parent)
+        made: list[tuple[Path, int]] = []
         try:
-            yield folder
-        finally:
-            _empty(folder)
-            os.close(lock)
-            _remove(folder)
+            try:
+                with held_back():
+                    made.append(_made(parent))
+                yield made[0][0]
+            finally:
+                _remove_made(made)
+        finally:  # again, as a signal may come just before that holds signals back
+            _remove_made(made)
     except BrokenPipeError:  # of a terminal
         raise
     except (OSError, RuntimeError) as error:
@@ -55,6 +61,16 @@ def workspace(parent: Path, path: Path) -> Iterator[Path]:
             raise
         where = str(path.joinpath(*inside))
         raise OSError(number, f"cannot be written: {os.strerror(number)}", where) from error
+
+
+def _remove_made(made: list[tuple[Path, int]]) -> None:
+    """Remove workspaces of this run, each with the descriptor of its lock, and forget them."""
+    with held_back():
+        while made:
+            folder, lock = made.pop()
+            _empty(folder)
+            os.close(lock)
+            _remove(folder)
 
 
 def remove_leftovers(parent: Path) -> None:

@@ -216,6 +216,13 @@ def _dataset_faults(name: str, dataset: Any) -> Iterator[Fault]:
         yield Fault(name, "written", found, "chunks of the size that their shape has")
 
 
+def virtual_sources(dataset: h5py.Dataset) -> set[tuple[str, str]]:
+    """Return the files, and the data sets in them, that a virtual data set shows."""
+    listed = dataset.id.get_create_plist()
+    places = range(listed.get_virtual_count())
+    return {(listed.get_virtual_filename(i), listed.get_virtual_dsetname(i)) for i in places}
+
+
 def stored_bytes(dataset: Any) -> int:
     """Return the bytes that an element of a low-level data set takes in a chunk."""
     of_any_length = h5py.check_vlen_dtype(dataset.dtype) is not None

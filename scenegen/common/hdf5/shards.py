@@ -32,7 +32,9 @@ from scenegen.common.hdf5.input_file import (
     faults,
     open_file,
     open_unchecked,
+    virtual_sources,
 )
+from scenegen.common.hdf5.trial import Trials, was_tried
 from scenegen.common.places import as_place, is_remote
 
 Array = NDArray[Any]
@@ -172,10 +174,8 @@ def open_with_shards(path: Path, kind: str) -> tuple[h5py.File, "ShardFiles | No
         shards = _read_list(file[SHARDS], path)
         names = {shard.file for shard in shards}
         for fault in virtual:
-            sources = file[fault.name].virtual_sources()
-            strange = {(one.file_name, one.dset_name) for one in sources} - {
-                (name, fault.name) for name in names
-            }
+            own = {(name, fault.name) for name in names}
+            strange = virtual_sources(file[fault.name]) - own
             if strange:
                 where = f"{path}: {fault.name}"
                 raise FileFormatError(where, f"values from {min(strange)}", "the set's own shards")
@@ -220,6 +220,7 @@ class ShardFiles:
     def __init__(self, path: Path, shards: Sequence[Shard], kind: str) -> None:
         """Keep where they are. Raises FileFormatError where one of them is missing."""
         self.path, self.shards, self._kind = path, shards, kind
+        self._trials = Trials() if was_tried(path) else None  # a shard is tried where its set was
         self._open: OrderedDict[int, h5py.File] = OrderedDict()
         self._arrays: dict[tuple[int, str], StoredArray] = {}
         missing = [shard.file for shard in shards if not (path.parent / shard.file).is_file()]
@@ -229,9 +230,14 @@ class ShardFiles:
             raise FileFormatError(path, f"no {missing[0]}{more} beside it", "all shards", hint)
 
     def file(self, number: int) -> h5py.File:
-        """Return an open shard. Raises FileFormatError where it is not the one that was made."""
+        """Return an open shard.
+
+        Raises FileFormatError where it is not the one that was made, and as `Trials.try_file`.
+        """
         if number not in self._open:
             shard = self.shards[number]
+            if self._trials is not None:
+                self._trials.try_file(self.path.parent / shard.file)
             file = open_file(self.path.parent / shard.file, self._kind)
             found = file.attrs.get(CONTENT_DIGEST)
             if found != shard.content_digest:
@@ -271,6 +277,8 @@ class ShardFiles:
 
     def close(self) -> None:
         """Close all that is open."""
+        if self._trials is not None:
+            self._trials.close()
         self._arrays.clear()
         while self._open:
             self._open.popitem()[1].close()

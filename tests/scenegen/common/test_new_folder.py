@@ -2,12 +2,15 @@
 
 import errno
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from signals_at_lines import interrupted_at_each_line
 
+from scenegen.common import new_folder
 from scenegen.common.new_folder import folder_written_beside
 
 NAMES = ("a", "b", "c")
@@ -80,6 +83,26 @@ def test_killed_at_every_step(tmp_path, exchanges, moves):
     else:
         pytest.fail("never came to its end")
     assert number > 3
+
+
+@LINUX
+@pytest.mark.parametrize("place", ["exchanged", "renamed", "filled"])
+def test_a_signal_never_takes_the_old_folder_without_the_new_one(tmp_path, monkeypatch, place):
+    """Before each line of the code that replaces it."""
+    folder = tmp_path / "split"
+    if place == "renamed":
+        monkeypatch.setattr(new_folder, "_exchanged", lambda one, other: False)
+    elif place == "filled":
+        monkeypatch.setattr(new_folder, "_can_be_renamed", lambda folder: False)
+    write(folder, "old")
+    run = lambda: write(folder, "new")  # noqa: E731
+    for at in interrupted_at_each_line(run, (new_folder,), signal.SIGINT):
+        assert texts(folder) in (whole("old"), whole("new")), at
+        assert os.listdir(tmp_path) == ["split"]
+        assert sorted(os.listdir(folder)) == list(NAMES)
+        write(folder, "old")
+    assert at > 20
+    assert texts(folder) == whole("new")
 
 
 @LINUX

@@ -2,13 +2,16 @@
 
 import errno
 import os
+import signal
 import subprocess
 import sys
 import threading
 from pathlib import Path
 
 import pytest
+from signals_at_lines import interrupted_at_each_line
 
+from scenegen.common import new_file, signals
 from scenegen.common import workspace as module
 from scenegen.common.new_file import write_text, written_beside
 from scenegen.common.workspace import NAME, remove_leftovers
@@ -78,6 +81,21 @@ def test_what_another_machine_may_still_write_is_only_named(left, tmp_path):
     other = left.rename(left.with_name(left.name.replace(left.name[17:25], "0123abcd")))
     assert str(other) in text_of(remove_leftovers, tmp_path)
     assert (other / "file.h5").stat().st_size == 2_000_000
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=str)
+def test_a_signal_leaves_nothing_whenever_it_comes(tmp_path, number):
+    """Before each line of the code that makes a file, on the way in and on the way out."""
+    path = tmp_path / "a.txt"
+    write_text(path, "the first in a folder, which is looked at")
+    path.unlink()
+    for at in interrupted_at_each_line(
+        lambda: write_text(path, "whole"), (module, new_file, signals), number
+    ):
+        assert {p.name: p.read_text() for p in tmp_path.iterdir()} in ({}, {"a.txt": "whole"}), at
+        path.unlink(missing_ok=True)
+    assert at > 100
+    assert path.read_text() == "whole"
 
 
 @LINUX

@@ -232,33 +232,40 @@ def test_two_runs_never_make_one_set(tmp_path, make_rooms):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
+RENDER = "render --n 400 --size 32 --min-visible-pixels 3 --shard-size 50 --seed 3 --out rooms.h5"
+COMMAND = [sys.executable, "-c", "import cli; cli.scenegen()", *RENDER.split(), "--workers"]
+ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1"}
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory):
+    """Return what a run makes that nothing stops, in one process."""
+    folder = tmp_path_factory.mktemp("unbroken")
+    subprocess.run([*COMMAND, "1"], cwd=folder, env=ENVIRONMENT, check=True)
+    return contents(folder)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
-def test_the_same_command_goes_on(tmp_path, number):
+def test_the_same_command_goes_on(tmp_path, number, unbroken):
     """After a kill at some moment; SIGTERM is answered with how to go on."""
-    words = "render --n 400 --size 32 --min-visible-pixels 3 --shard-size 50 --workers 2 --seed 3"
-    command = [sys.executable, "-c", "import cli; cli.scenegen()", *words.split(), "--out"]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     process = subprocess.Popen(
-        [*command, "rooms.h5"], cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True
+        [*COMMAND, "2"], cwd=tmp_path, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True
     )
     deadline = time.monotonic() + 60
     while not list(tmp_path.glob("rooms-*.h5")) and time.monotonic() < deadline:
-        time.sleep(0.05)
+        time.sleep(0.01)
     path = tmp_path / "rooms.h5"
     process.send_signal(number)
     _, said = process.communicate(timeout=10)
     if number == signal.SIGTERM:
         assert process.returncode == 128 + number
         assert "the same command goes on" in said
+        assert not list(tmp_path.glob(".*"))
     assert not (tmp_path / "rooms.h5").exists()
     done = {p: p.stat().st_mtime_ns for p in (tmp_path / one.file for one in known(path))}
     assert len(done) >= len(list(tmp_path.glob("rooms-*.h5"))) - (number == signal.SIGKILL)
-    again = subprocess.run([*command, "rooms.h5"], cwd=tmp_path, env=environment, check=True)
-    assert again.returncode == 0
+    subprocess.run([*COMMAND, "1"], cwd=tmp_path, env=ENVIRONMENT, check=True)
     assert {p: p.stat().st_mtime_ns for p in done} == done, "complete shards are kept"
     assert not [p for p in tmp_path.iterdir() if p.name.startswith(".")]
-    (tmp_path / "unbroken").mkdir()
-    subprocess.run([*command, "rooms.h5"], cwd=tmp_path / "unbroken", env=environment, check=True)
-    assert contents(tmp_path) == contents(tmp_path / "unbroken")
+    assert contents(tmp_path) == unbroken

@@ -1,7 +1,9 @@
 """Files on which HDF5 itself hangs or crashes, found by changing bytes of files that it wrote."""
 
 import shutil
+import signal
 import zlib
+from contextlib import closing
 from pathlib import Path
 
 import h5py
@@ -12,7 +14,7 @@ from click.testing import CliRunner
 import cli
 from scenegen.common.errors import FileFormatError
 from scenegen.common.hdf5 import trial
-from scenegen.common.hdf5.trial import try_file
+from scenegen.common.hdf5.trial import Trials, try_file, was_tried
 
 HOSTILE = Path(__file__).parents[3] / "support" / "hostile"
 
@@ -57,6 +59,62 @@ def test_files_that_another_process_can_read(rooms_path, tmp_path):
     (tmp_path / "text").write_text("no HDF5")
     for path in (rooms_path, tmp_path / "text", tmp_path / "nothing", tmp_path):
         try_file(path)
+
+
+def test_one_process_tries_many_files_and_another_follows_one_that_crashed(
+    broken, rooms_path, tmp_path
+):
+    copies = [tmp_path / f"{i}.h5" for i in range(3)]
+    for path in copies:
+        shutil.copy(rooms_path, path)
+    with closing(Trials()) as trials:
+        trials.try_file(copies[0])
+        first = trials._process
+        trials.try_file(copies[1])
+        assert trials._process is first
+        with pytest.raises(FileFormatError):
+            trials.try_file(broken("crashes"))
+        assert first.returncode == -signal.SIGSEGV
+        trials.try_file(copies[2])
+        assert was_tried(copies[2])
+        assert not was_tried(tmp_path / "crashes.h5")
+
+
+def test_a_file_that_is_still_not_read_when_its_time_is_over(rooms_path, monkeypatch):
+    monkeypatch.setattr(trial, "PATIENCE", 0)
+    monkeypatch.setattr(trial, "_ACCEPTED", set())
+    with pytest.raises(FileFormatError) as error:
+        try_file(rooms_path)
+    assert "had not read after 0 s" in error.value.found
+
+
+@pytest.mark.tried
+@pytest.mark.parametrize(
+    ("name", "command"),
+    [
+        ("hangs", "scenegen info rooms.h5"),
+        ("crashes", "bench baseline empty-room --data rooms.h5 --out empty.h5 --overwrite"),
+    ],
+)
+def test_each_shard_of_a_set_is_tried_first(
+    make_rooms, broken, tmp_path, monkeypatch, name, command
+):
+    """In one other process for all of them; the one that is broken is named."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(trial, "SECONDS", 1.9)
+    make_rooms(tmp_path / "rooms.h5", 6, {"shard_size": 2})
+    started, start = [], trial._started
+    monkeypatch.setattr(trial, "_started", lambda: started.append(start()) or started[-1])
+    program, *arguments = command.split()
+    done = CliRunner().invoke(getattr(cli, program), arguments)
+    assert done.exit_code == 0, done.output
+    assert len(started) <= 3, "one for the file of the set, one for its shards"
+    shutil.copy(broken(name), "rooms-00001-of-00003.h5")
+    done = CliRunner().invoke(getattr(cli, program), arguments)
+    assert done.exit_code == 2
+    assert "rooms-00001-of-00003.h5" in done.output
+    assert "on which HDF5 crashes" in done.output or "HDF5 had not read" in done.output
+    assert all(process.returncode is not None for process in started)
 
 
 @pytest.mark.tried
