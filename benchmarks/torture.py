@@ -18,6 +18,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from benchmarks.torture_cluster import cluster
 from benchmarks.torture_growth import growth
 from benchmarks.torture_runs import EVENTS, Torture, contents
 from benchmarks.torture_surroundings import clock, pipes, read_only
@@ -110,7 +111,7 @@ def disk(torture: Torture, _count: int) -> Iterator[tuple[str, str]]:
 PARTS: dict[str, Callable[[Torture, int], Iterator[tuple[str, str]]]]
 PARTS = {
     "kills": kills, "signals": signals, "disk": disk, "read_only": read_only, "pipes": pipes,
-    "clock": clock, "growth": growth,
+    "clock": clock, "cluster": cluster, "growth": growth,
 }  # fmt: skip
 
 

@@ -59,11 +59,16 @@ class Torture:
         self.expected = contents(self.unbroken)
 
     def command(
-        self, where: Path, workers: str = "1", hook: tuple[str, ...] = (), **options: object
+        self,
+        where: Path,
+        workers: str = "1",
+        hook: tuple[str, ...] = (),
+        more: tuple[str, ...] = (),
+        **options: object,
     ) -> "subprocess.Popen[str]":
-        """Start the command in a folder; `options` are those of Popen."""
+        """Start the command in a folder, with more words; `options` are those of Popen."""
         code = HOOKED if hook else "import cli; cli.scenegen()"
-        words = [sys.executable, "-c", code, *hook, *WORDS.split(), "--workers", workers]
+        words = [sys.executable, "-c", code, *hook, *WORDS.split(), "--workers", workers, *more]
         streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
         how = {"env": self.environment, **streams, **options}
         return subprocess.Popen(words, cwd=where, **how)  # type: ignore[call-overload]

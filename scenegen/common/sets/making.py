@@ -27,6 +27,7 @@ from scenegen.common.sets.manifest import (
     write_manifest,
 )
 from scenegen.common.workers.pool import in_threads, processors
+from scenegen.common.workspace import remove_leftovers
 
 SHARE = 0.05  # of the time that writing manifests may take; that of 10,000 shards has 3 MB
 
@@ -102,6 +103,8 @@ def complete_set(
             write_manifest(place, manifest)
         join(manifest)
         write_manifest(place, replace(manifest, complete=True))
+        if not is_remote(place):
+            remove_leftovers(place.parent)  # of workers that were killed
 
 
 def check_shared(place: Path) -> None:

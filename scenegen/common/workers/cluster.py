@@ -141,7 +141,7 @@ def _client(distributed: Any, scheduler: str, workers: int) -> Iterator[Any]:
         resource_tracker.ensure_running()  # else a worker starts it, which lets Ctrl-C through
         with without_interrupts():
             cluster = distributed.LocalCluster(
-                n_workers=max(1, workers), threads_per_worker=1, dashboard_address=None
+                n_workers=max(1, workers), threads_per_worker=1, dashboard_address="127.0.0.1:0"
             )
         with cluster, distributed.Client(cluster) as client:
             yield client
