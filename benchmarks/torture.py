@@ -20,6 +20,7 @@ from pathlib import Path
 
 from benchmarks.torture_cluster import cluster
 from benchmarks.torture_growth import growth
+from benchmarks.torture_questions import questions
 from benchmarks.torture_runs import EVENTS, Torture, contents
 from benchmarks.torture_surroundings import clock, pipes, read_only
 
@@ -111,7 +112,7 @@ def disk(torture: Torture, _count: int) -> Iterator[tuple[str, str]]:
 PARTS: dict[str, Callable[[Torture, int], Iterator[tuple[str, str]]]]
 PARTS = {
     "kills": kills, "signals": signals, "disk": disk, "read_only": read_only, "pipes": pipes,
-    "clock": clock, "cluster": cluster, "growth": growth,
+    "clock": clock, "cluster": cluster, "questions": questions, "growth": growth,
 }  # fmt: skip
 
 

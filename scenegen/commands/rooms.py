@@ -281,11 +281,12 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.
     """
     from scenegen.common.sets.manifest import manifests_in
+    from scenegen.layout import FORMAT_NAME
     from scenegen.objects.sources import file_objects
     from scenegen.rooms.reader import RoomsFile
     from scenegen.rooms.verify import verify_file, verify_set
 
-    manifests = manifests_in(Path(file)) if Path(file).is_dir() else []
+    manifests = manifests_in(Path(file), FORMAT_NAME) if Path(file).is_dir() else []
     checks = []
     for path in [place.with_name(found.files[0]) for place, found in manifests] or [Path(file)]:
         with RoomsFile(path) as rooms:

@@ -141,16 +141,19 @@ def read_manifest(place: Path) -> Manifest:
     return found
 
 
-def manifests_in(folder: Path) -> list[tuple[Path, Manifest]]:
-    """Return the manifests in a folder, at least one, in order of their names.
+def manifests_in(folder: Path, kind: str) -> list[tuple[Path, Manifest]]:
+    """Return the manifests of sets of a kind in a folder, at least one, in order of their names.
 
     Raises FileFormatError where there is none, and as `read_manifest`.
     """
-    places = sorted(folder.glob(f"*{ENDING}"))
-    if not places:
-        expected = f"one that ends in {ENDING}, as of a set of shards"
-        raise FileFormatError(f"{folder}: is a folder", "no manifest", expected, "name a file")
-    return [(place, read_manifest(place)) for place in places]
+    found = [(place, read_manifest(place)) for place in sorted(folder.glob(f"*{ENDING}"))]
+    chosen = [(place, one) for place, one in found if one.kind == kind]
+    if not chosen:
+        others = ", ".join(f"{place.name} of {one.kind}" for place, one in found)
+        expected = f"one that ends in {ENDING}, as of a set of {kind}"
+        where = f"{folder}: is a folder"
+        raise FileFormatError(where, others or "no manifest", expected, "name a file")
+    return chosen
 
 
 def file_sha256(path: Path) -> str:
