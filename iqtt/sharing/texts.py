@@ -68,7 +68,10 @@ RESPONSIBLE: dict[str, str | list[str]] = {
         "Each number of cubes is asked for equally often, though there are far more shapes of many"
         " cubes; shapes of few cubes recur, seen from other sides.",
     ],
-    "personalSensitiveInformation": ["None: no people, no places, no text in the images."],
+    "personalSensitiveInformation": [
+        "None: no people, no places, no text in the images. The recorded command, where the page"
+        " has it, holds names of files of those who made the data."
+    ],
     "dataSocialImpact": "None is expected: the images show no people, and nothing that exists.",
     "dataReleaseMaintenancePlan": "A file is not changed after it is published; a correction gets a"
     " new version and new SHA-256s.",
