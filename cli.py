@@ -5,6 +5,7 @@ import click
 from scenegen.common.command_line import PackageCommands
 
 ROOMS = tuple(f"scenegen.commands.{name}" for name in ("rooms", "sharing", "meshes"))
+QUESTIONS = tuple(f"iqtt.commands.{name}" for name in ("questions", "sharing"))
 
 
 @click.group(cls=PackageCommands, modules=ROOMS)
@@ -13,7 +14,7 @@ def scenegen() -> None:
     """Make rooms with objects, rendered with exact ground truth."""
 
 
-@click.group(cls=PackageCommands, modules=("iqtt.commands",))
+@click.group(cls=PackageCommands, modules=QUESTIONS)
 @click.version_option(package_name="pix2shape-bench")
 def iqtt() -> None:
     """Make 3D-IQTT mental-rotation questions that only the shapes can answer."""

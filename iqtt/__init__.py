@@ -5,8 +5,9 @@ Train on it:    `iqtt.QuestionsDataset("iqtt-split/iqtt-train.h5", "labeled")`
 Make a split:   `iqtt.make_split("iqtt-split", iqtt.preset_spec("small", seed=1))`
 
 A question passes through `shapes` (polycubes), `questions` (what it asks and shows), `render` (its
-images) and `files`; `audit` checks files. Each may import those before it, and `scenegen`. These
-names are loaded when they are first used, so that importing the package is fast.
+images) and `files`; `audit` checks files, and `sharing` hands them on. Each may import those
+before it, and `scenegen`. These names are loaded when they are first used, so that importing the
+package is fast.
 """
 
 from typing import TYPE_CHECKING

@@ -156,8 +156,13 @@ class TableFile:
         return Path(stored.file.filename), stored.name.lstrip("/")
 
     def stored_digest(self, name: str) -> str | None:
-        """Return what the file says of one dataset; None before format 1.2. Raises as `read`."""
+        """Return what the file says of one dataset; None before format 1.2. Raises as `read`.
+
+        A field that is no dataset, as `camera_distance` before format 2.0, has none either.
+        """
         place = f"{self.path}: {name}"
+        if name not in self._stored:
+            return None
         with reading(place):
             return read_digest(self._stored[name], content.SHA256, place)
 

@@ -2,13 +2,35 @@
 
 import datetime
 import os
+from collections.abc import Callable
+from functools import reduce
 from pathlib import Path
+from typing import Any
 
 import click
 
 from scenegen.common.command_line import EXAMPLE, OVERWRITE, needs, print_line, progress_bar
 from scenegen.common.errors import SpecError
 from scenegen.common.paths import InputPath, OutputFolder, refuse_command_inputs
+
+Command = Callable[..., Any]
+
+
+def publication_options(title: str, license_: str) -> Callable[[Command], Command]:
+    """Return options for what only the publisher knows; the texts name two of their defaults."""
+    options = (
+        click.option("--creator", "creators", multiple=True, required=True,
+                     help="Who made the data; may be said several times."),
+        click.option("--title", help=f"Name of the data [{title}]."),
+        click.option("--date",
+                     help="Day of publication, as 2026-01-31 [that of SOURCE_DATE_EPOCH]."),
+        click.option("--license", "license_",
+                     help=f"SPDX identifier of the data's licence, or its address [{license_}]."),
+        click.option("--data-version", default="1.0.0", show_default=True,
+                     help="Version of the data."),
+        click.option("--url", default="", help="Page where the data will be."),
+    )  # fmt: skip
+    return lambda command: reduce(lambda made, option: option(made), reversed(options), command)
 
 
 # fmt: off
@@ -17,16 +39,10 @@ from scenegen.common.paths import InputPath, OutputFolder, refuse_command_inputs
 )
 @click.argument("files", type=InputPath(), nargs=-1, required=True)
 @click.option("--out", type=OutputFolder(), required=True, help="Folder to make.")
-@click.option("--creator", "creators", multiple=True, required=True,
-              help="Who made the data; may be said several times.")
-@click.option("--title", help="Name of the data [that of the first file].")
-@click.option("--date",
-              help="Day of publication, as 2026-01-31 [that of SOURCE_DATE_EPOCH].")
-@click.option("--license", "license_",
-              help="SPDX identifier of the data's licence, or its address [CC-BY-4.0; none where"
-              " rooms show meshes from a folder].")
-@click.option("--data-version", default="1.0.0", show_default=True, help="Version of the data.")
-@click.option("--url", default="", help="Page where the data will be.")
+@publication_options(
+    title="that of the first file",
+    license_="CC-BY-4.0; none where rooms show meshes from a folder",
+)
 @OVERWRITE
 def card(
     files: tuple[str, ...],

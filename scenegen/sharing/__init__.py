@@ -2,9 +2,9 @@
 
 `export` writes the rows of a file of rooms as Parquet or as WebDataset, each value as it is stored.
 `make` writes a data card: a page for people, Croissant metadata for programs, and a Parquet index
-of all rows. The page and the metadata are written from one `description`, which knows nothing of
-rooms; `rooms` fills it in.
+of all rows. What is written to (`folder`, `index_file`) and the `description`, from which the page
+and the metadata are written, know nothing of rooms, so that `iqtt.sharing` uses them too.
 
 It may import everything in `scenegen` but the commands. Only here is pyarrow imported. Start with
-`columns` and `export`, then read `description` and `make`.
+`folder` and `export`, then read `description` and `make`.
 """

@@ -6,7 +6,7 @@ a block of lines with four spaces before them, in which nothing means anything.
 """
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from scenegen.common.text_table import markdown, piped, printable
 from scenegen.sharing.description import PAPER, DataDescription
@@ -32,10 +32,10 @@ RESPONSIBLE = {  # titles of sections, by the fields of Croissant's RAI vocabula
 def card_markdown(told: DataDescription) -> str:
     """Return the page of a data set."""
     publication = told.publication
-    sections: dict[str, Iterable[str]] = {
+    sections: dict[str, Sequence[str]] = {
         **{title: _table(rows) for title, rows in told.facts.items()},
         "Commands": _per_file(told.commands),
-        "Requests": ("All settings that decide what they show:", "", *_per_file(told.requests)),
+        "Requests": _requests(told),
         "Data sets of the files": (told.layout,),
         "Columns of the index": _index_lines(told),
         **{title: (text,) for title, text in told.notes.items()},
@@ -51,7 +51,8 @@ def card_markdown(told: DataDescription) -> str:
     }  # fmt: skip
     lines = [*_header(told), f"# {markdown(printable(publication.title))}", "", told.summary, ""]
     for title, text in sections.items():
-        lines += [f"## {title}", "", *text, ""]
+        if text:
+            lines += [f"## {title}", "", *text, ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -91,6 +92,11 @@ def _per_file(texts: dict[str, str]) -> list[str]:
     for name, text in texts.items():
         lines += [f"{markdown(printable(name))}:", *_block(text.replace("\n", "\\n"))]
     return lines
+
+
+def _requests(told: DataDescription) -> list[str]:
+    texts = _per_file(told.requests)
+    return ["All settings that decide what they show:", "", *texts] if texts else []
 
 
 def _paragraphs(text: str | list[str]) -> list[str]:

@@ -1,27 +1,16 @@
-"""Rows of a file of rooms as named columns: what every exported format holds."""
+"""Named columns of rows, whatever they are about: what every exported format holds."""
 
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from scenegen.common.errors import FileFormatError
 from scenegen.common.hdf5.table import Column
-from scenegen.description.specs import DatasetSpec
-from scenegen.layout import columns
-from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
-ROW = Column(
-    "row",
-    (),
-    "int64",
-    attributes={"unit": "1", "frame": "-", "meaning": "row of the file of rooms"},
-)
 PNG_LEVEL = 6  # of deflate
 
 
@@ -30,38 +19,14 @@ def column_name(dataset: str) -> str:
     return dataset.replace("/", "_")
 
 
-def exported_columns(spec: DatasetSpec) -> list[Column]:
-    """Return the columns of rows that answer a request: `row`, then a column for each dataset."""
-    return [ROW, *(replace(c, name=column_name(c.name)) for c in columns(spec))]
-
-
-def read_rows(rooms: RoomsFile, rows: Sequence[int]) -> dict[str, Any]:
-    """Read some rows; return their values by name of the column, in the order of `rows`.
-
-    Numbers are arrays (rows, ...) of the types that are stored, texts are `str`, or lists of them.
-
-    Raises IndexError, and FileFormatError where a row is damaged.
-    """
-    in_order = list(rows) == list(range(rows[0], rows[0] + len(rows)))
-    found: dict[str, Any] = {ROW.name: np.array(rows, np.int64)}
-    for column in columns(rooms.spec):
-        if in_order and not column.own_chunk:
-            values = rooms.read(column.name, slice(rows[0], rows[0] + len(rows)))
-        else:
-            values = [rooms.read(column.name, row) for row in rows]
-        if column.dtype == "text":
-            place = f"{rooms.path}: {column.name}"
-            pairs = zip(rows, values, strict=True)
-            texts = [decoded(value, f"{place}, row {row}") for row, value in pairs]
-            found[column_name(column.name)] = texts
-        else:
-            found[column_name(column.name)] = np.asarray(values)
-    return found
+def row_column(meaning: str) -> Column:
+    """Return the column `row`, which comes first, with the number of each row in its file."""
+    return Column("row", (), "int64", attributes={"unit": "1", "frame": "-", "meaning": meaning})
 
 
 def is_picture(column: Column) -> bool:
     """Return whether a column's values are stored as PNG files: images of 8 bits a channel."""
-    return column.name == "image" and column.dtype == "uint8"
+    return column.own_chunk and column.dtype == "uint8" and column.shape[2:] == (3,)
 
 
 def png_bytes(image: Array) -> bytes:
@@ -71,12 +36,12 @@ def png_bytes(image: Array) -> bytes:
     return file.getvalue()
 
 
-def meanings(spec: DatasetSpec) -> dict[str, Mapping[str, Any]]:
+def meanings(columns: Sequence[Column]) -> dict[str, Mapping[str, Any]]:
     """Return type, shape, unit, frame and meaning of each column, ready for JSON."""
     return {
         c.name: {"type": c.dtype, "row_shape": list(c.shape)}
         | {key: value for key, value in c.attributes.items() if key != "shape"}
-        for c in exported_columns(spec)
+        for c in columns
     }
 
 

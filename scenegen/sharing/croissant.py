@@ -63,7 +63,7 @@ def croissant_json(told: DataDescription) -> str:
                 "@id": RECORDS,
                 "name": RECORDS,
                 "description": "One record for each row of the files, without its pixels.",
-                "key": [{"@id": f"{RECORDS}/file"}, {"@id": f"{RECORDS}/row"}],
+                "key": [{"@id": f"{RECORDS}/{name}"} for name in told.key],
                 "field": [_field(column, told.index_file) for column in told.index],
             }
         ],

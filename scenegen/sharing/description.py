@@ -118,6 +118,7 @@ class DataDescription:
         layout: a Markdown table of ours: data sets of the HDF5 files, with units and frames.
         responsible: paragraphs of ours, by their names in Croissant's RAI vocabulary.
         notes: more sections of ours, by their titles.
+        key: names of the columns of the index that together name a row.
     """
 
     publication: Publication
@@ -133,6 +134,7 @@ class DataDescription:
     layout: str
     responsible: dict[str, str | list[str]]
     notes: dict[str, str] = field(default_factory=dict)
+    key: tuple[str, ...] = ("file", "row")
 
     @property
     def identifier(self) -> str:

@@ -1,25 +1,21 @@
 """Write rows of rooms to a folder of Parquet or WebDataset files, each value as it is stored."""
 
-import json
-import math
-import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scenegen.common.hdf5.shards import cut, shard_name
-from scenegen.common.new_folder import folder_written_beside
-from scenegen.common.records import check
+from scenegen.common.hdf5.table import Column
+from scenegen.description.specs import DatasetSpec
+from scenegen.layout import columns
 from scenegen.rooms.reader import RoomsFile
-from scenegen.sharing.columns import exported_columns, meanings, read_rows
+from scenegen.sharing.columns import column_name, decoded, row_column
+from scenegen.sharing.folder import ROWS_PER_FILE, ExportedTable, write_folder
 
-FORMATS = {"parquet": ".parquet", "webdataset": ".tar"}  # and how the names of their files end
-ROWS_PER_FILE = 1000
-MOST_FILES = 100_000  # as many as their numbers of five digits can tell apart
-BLOCK_BYTES = 2**25  # of rows that are in memory at once
-ABOUT = "config.json"  # a name that `datasets` never takes for data
+ROW = row_column("row of the file of rooms")
 
 
 def export_rows(
@@ -32,89 +28,57 @@ def export_rows(
     overwrite: bool = False,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> list[Path]:
-    """Write rows of a file of rooms, or of a set of shards, to a folder; return its files.
+    """Write rows of a file of rooms, or of a set of shards, as `write_folder`; return its files.
 
-    The folder appears when it is complete. Files are called `rooms-00000-of-00003.parquet` after
-    `rooms.h5`; ABOUT has the root attributes of the file, and what each column means. The same rows
-    give the same bytes with the same versions of Pillow and, for Parquet, pyarrow.
+    Files are called `rooms-00000-of-00003.parquet` after `rooms.h5`.
 
-    Args:
-        path: the file of rooms.
-        form: one of FORMATS.
-        folder: to make; with `overwrite`, an older one of such files is replaced.
-        rows: which to write, in this order; all by default.
-        rows_per_file: the most rows of one file.
-        progress: is told the number of rows that were written since the last call.
-
-    Raises:
-        OSError: as `folder_written_beside`, or there is no such file of rooms.
-        FileFormatError: the file is not one of rooms, or a row is damaged.
-        SpecError: rows out of range or twice; too many files.
+    Raises as `write_folder`; and OSError where there is no such file, FileFormatError where it is
+    not one of rooms, or a row is damaged.
     """
-    check(form in FORMATS, "format", repr(form), f"one of {', '.join(FORMATS)}")
-    check(rows_per_file >= 1, "rows per file", rows_per_file, "1 or more")
     with RoomsFile(path) as rooms:
-        chosen = list(range(len(rooms)) if rows is None else rows)
-        good = len(chosen) > 0 and min(chosen) >= 0 and max(chosen) < len(rooms)
-        check(good, "items", f"{len(chosen)} rows", f"some from 0 to {len(rooms) - 1}")
-        check(len(set(chosen)) == len(chosen), "items", "a row twice", "each row once")
-        parts = cut(len(chosen), rows_per_file)
-        check(len(parts) <= MOST_FILES, "rows per file", rows_per_file, "fewer files than 100,000")
-        stem, ending = Path(path).stem, FORMATS[form]
-        names = [shard_name(f"{stem}{ending}", i, len(parts)) for i in range(len(parts))]
-        known = {*names, ABOUT, *older_files(folder, stem, ending)}
-        columns = exported_columns(rooms.spec)
-        write = _writer(form)
-        with folder_written_beside(folder, known, overwrite) as made:
-            for name, part in zip(names, parts, strict=True):
-                these = [chosen[i] for i in part]
-                write(made / name, columns, _blocks(rooms, these, progress))
-            (made / ABOUT).write_text(_about(rooms, form, names), encoding="utf-8")
-    return [Path(folder) / name for name in (*names, ABOUT)]
+        table = ExportedTable(
+            stem=Path(path).stem,
+            what=f"rows of {rooms.path.name}, a file of rooms of pix2shape-bench",
+            columns=exported_columns(rooms.spec),
+            count=len(rooms),
+            read=partial(read_rows, rooms),
+            attributes=rooms.attributes,
+        )
+        return write_folder(
+            table,
+            form,
+            folder,
+            rows,
+            rows_per_file=rows_per_file,
+            overwrite=overwrite,
+            progress=progress,
+        )
 
 
-def older_files(folder: str | Path, stem: str, ending: str) -> list[str]:
-    """Return the names of files that an older export left in a folder, of however many files."""
-    pattern = re.compile(rf"{re.escape(stem)}-\d{{5}}-of-\d{{5}}{re.escape(ending)}")
-    if not Path(folder).is_dir():
-        return []
-    return [path.name for path in Path(folder).iterdir() if pattern.fullmatch(path.name)]
+def exported_columns(spec: DatasetSpec) -> list[Column]:
+    """Return the columns of rows that answer a request: `row`, then a column for each dataset."""
+    return [ROW, *(replace(c, name=column_name(c.name)) for c in columns(spec))]
 
 
-def _writer(form: str) -> Callable[..., None]:
-    """Return the writer of a format; only Parquet needs pyarrow."""
-    if form == "parquet":
-        from scenegen.sharing.parquet import write_parquet
+def read_rows(rooms: RoomsFile, rows: Sequence[int]) -> dict[str, Any]:
+    """Read some rows; return their values by name of the column, in the order of `rows`.
 
-        return write_parquet
-    from scenegen.sharing.webdataset import write_tar
+    Numbers are arrays (rows, ...) of the types that are stored, texts are `str`, or lists of them.
 
-    return write_tar
-
-
-def _blocks(
-    rooms: RoomsFile, rows: Sequence[int], progress: Callable[[int], Any]
-) -> Iterator[dict[str, Any]]:
-    """Yield the values of rows, so many at a time as fit into BLOCK_BYTES."""
-    pixels = (c for c in exported_columns(rooms.spec) if c.own_chunk)
-    size = sum(math.prod(c.shape) * np.dtype(c.dtype).itemsize for c in pixels)
-    for part in cut(len(rows), max(1, BLOCK_BYTES // size)):
-        yield read_rows(rooms, [rows[i] for i in part])
-        progress(len(part))
-
-
-def _about(rooms: RoomsFile, form: str, names: Sequence[str]) -> str:
-    """Return what the files do not tell themselves, as JSON."""
-    attributes = {key: str(value) for key, value in sorted(rooms.attributes.items())}
-    about = {
-        "what": f"rows of {rooms.path.name}, a file of rooms of pix2shape-bench, as {form}",
-        "files": list(names),
-        "columns": meanings(rooms.spec),
-        "attributes": attributes,
-    }
-    return json.dumps(about, indent=1, default=_number) + "\n"
-
-
-def _number(value: Any) -> Any:
-    """Return a NumPy value as one of Python's."""
-    return np.asarray(value).tolist()
+    Raises IndexError, and FileFormatError where a row is damaged.
+    """
+    in_order = list(rows) == list(range(rows[0], rows[0] + len(rows)))
+    found: dict[str, Any] = {ROW.name: np.array(rows, np.int64)}
+    for column in columns(rooms.spec):
+        if in_order and not column.own_chunk:
+            values = rooms.read(column.name, slice(rows[0], rows[0] + len(rows)))
+        else:
+            values = [rooms.read(column.name, row) for row in rows]
+        if column.dtype == "text":
+            place = f"{rooms.path}: {column.name}"
+            pairs = zip(rows, values, strict=True)
+            texts = [decoded(value, f"{place}, row {row}") for row, value in pairs]
+            found[column_name(column.name)] = texts
+        else:
+            found[column_name(column.name)] = np.asarray(values)
+    return found

@@ -7,19 +7,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from scenegen.common.errors import FileFormatError
 from scenegen.common.hdf5.content import column_digest, row_digest
 from scenegen.common.hdf5.shards import cut
 from scenegen.rooms.reader import RoomsFile, RowBlock
-from scenegen.sharing.arrow import field as arrow_field
 from scenegen.sharing.columns import decoded
 from scenegen.sharing.description import IndexColumn
+from scenegen.sharing.index_file import write_lines
 
 DIGESTS = ("image", "depth", "normal", "object_id", "scene")  # data sets whose rows get a digest
-GROUP_ROWS = 1000  # of a row group
 READ_ROWS = 16  # whose pixels are in memory at once
 
 # fmt: off
@@ -85,18 +82,6 @@ class Tally:
             self.digests.add(bytes.fromhex(line["scene_sha256"]))
 
 
-def index_schema() -> pa.Schema:
-    """Return the schema of the index: plain lists, as any reader of Parquet knows them."""
-    return pa.schema(
-        arrow_field(c.name, (-1,) * len(c.shape), _dtype(c), {"meaning": c.meaning})
-        for c in COLUMNS
-    )
-
-
-def _dtype(column: IndexColumn) -> str:
-    return "text" if column.kind == "Text" else column.kind.lower()
-
-
 def write_index(
     path: Path,
     files: Sequence[str | Path],
@@ -109,30 +94,22 @@ def write_index(
     Raises OSError and FileFormatError as `RoomsFile`, and FileFormatError where a row is damaged or
     values are not those that were written.
     """
-    tallies = []
-    schema = index_schema()
-    with pq.ParquetWriter(path, schema, compression="zstd") as writer:
-        for file in files:
-            tally = Tally()
-            with RoomsFile(file) as rooms:
-                for lines in _in_groups(_lines(rooms)):
-                    writer.write_table(pa.Table.from_pylist(lines, schema=schema))
-                    for line in lines:
-                        tally.add(line)
-                    progress(len(lines))
-            tallies.append(tally)
+    tallies: list[Tally] = []
+    write_lines(path, COLUMNS, _counted(files, tallies, progress))
     return tallies
 
 
-def _in_groups(lines: Iterator[dict[str, Any]]) -> Iterator[list[dict[str, Any]]]:
-    group: list[dict[str, Any]] = []
-    for line in lines:
-        group.append(line)
-        if len(group) == GROUP_ROWS:
-            yield group
-            group = []
-    if group:
-        yield group
+def _counted(
+    files: Sequence[str | Path], tallies: list[Tally], progress: Callable[[int], Any]
+) -> Iterator[dict[str, Any]]:
+    """Yield the lines of all files; append a tally of each file's lines."""
+    for file in files:
+        tallies.append(Tally())
+        with RoomsFile(file) as rooms:
+            for line in _lines(rooms):
+                tallies[-1].add(line)
+                progress(1)
+                yield line
 
 
 def _lines(rooms: RoomsFile) -> Iterator[dict[str, Any]]:

@@ -7,7 +7,7 @@ from typing import Any
 from scenegen.common.new_folder import folder_written_beside
 from scenegen.sharing.card import card_markdown
 from scenegen.sharing.croissant import croissant_json
-from scenegen.sharing.description import Publication
+from scenegen.sharing.description import DataDescription, Publication
 from scenegen.sharing.index import write_index
 from scenegen.sharing.rooms import check_names, describe_rooms
 
@@ -35,14 +35,31 @@ def make_rooms_card(
         progress: is told the number of rows that were read since the last call.
 
     Raises:
-        OSError: as `folder_written_beside`, or there is no such file of rooms.
+        OSError: as `write_card`, or there is no such file of rooms.
         FileFormatError: a file is not one of rooms, or is damaged.
         SpecError: two files have one name.
     """
     check_names(files, NAMES)
+
+    def describe(index: Path) -> DataDescription:
+        tallies = write_index(index, files, progress)
+        return describe_rooms(files, tallies, index, publication)
+
+    return write_card(folder, describe, overwrite)
+
+
+def write_card(
+    folder: str | Path, describe: Callable[[Path], DataDescription], overwrite: bool = False
+) -> list[Path]:
+    """Write a data card, whatever the data, to a folder that appears complete; return its files.
+
+    Args:
+        describe: writes the index to a path and returns what is to be told of the data.
+
+    Raises OSError as `folder_written_beside`, and whatever `describe` raises.
+    """
     with folder_written_beside(folder, NAMES, overwrite) as made:
-        tallies = write_index(made / INDEX, files, progress)
-        told = describe_rooms(files, tallies, made / INDEX, publication)
+        told = describe(made / INDEX)
         (made / CARD).write_text(card_markdown(told), encoding="utf-8")
         (made / CROISSANT).write_text(croissant_json(told), encoding="utf-8")
     return [Path(folder) / name for name in NAMES]

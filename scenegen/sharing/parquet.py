@@ -1,4 +1,4 @@
-"""Rows of rooms as Parquet files, which `datasets.load_dataset` gives back as images and arrays."""
+"""Rows as Parquet files, which `datasets.load_dataset` gives back as images and arrays."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -16,7 +16,7 @@ COMPRESSION = "zstd"
 
 
 def write_parquet(path: Path, columns: Sequence[Column], blocks: Iterable[dict[str, Any]]) -> None:
-    """Write blocks of rows, as `columns.read_rows` gives them, to one file.
+    """Write blocks of rows, as `ExportedTable.read` gives them, to one file.
 
     Each block becomes a row group, so that no more than one is in memory, here and at a reader.
     """

@@ -1,4 +1,4 @@
-"""Rows of rooms as WebDataset: tar archives in which the files of a row follow one another."""
+"""Rows as WebDataset: tar archives in which the files of a row follow one another."""
 
 import io
 import json
@@ -17,12 +17,12 @@ Array = NDArray[Any]
 
 
 def write_tar(path: Path, columns: Sequence[Column], blocks: Iterable[dict[str, Any]]) -> None:
-    """Write blocks of rows, as `columns.read_rows` gives them, to one archive.
+    """Write blocks of rows, as `ExportedTable.read` gives them, to one archive.
 
-    Row 12 becomes the files `000000012.depth.npy`, `.image.png` (or `.image.npy`, where images are
-    floating-point numbers), `.json`, `.normal.npy` and `.object_id.npy`, in this order. The JSON
-    has all other columns; numbers keep every bit, and the scene is the text that is stored. Nothing
-    in the archive tells when and by whom it was written.
+    Row 12 of rooms becomes the files `000000012.depth.npy`, `.image.png` (or `.image.npy`, where
+    images are floating-point numbers), `.json`, `.normal.npy` and `.object_id.npy`, in this order.
+    The JSON has all other columns; numbers keep every bit, and texts are as they are stored.
+    Nothing in the archive tells when and by whom it was written.
     """
     with tarfile.open(path, "w", format=tarfile.USTAR_FORMAT) as archive:
         for block in blocks:

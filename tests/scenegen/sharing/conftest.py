@@ -1,12 +1,11 @@
-"""Files of rooms that are shared, and loaders that may not reach for the network."""
+"""Files of rooms that are shared, and a loader."""
 
-import os
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-os.environ |= {"HF_HUB_OFFLINE": "1", "HF_DATASETS_OFFLINE": "1", "HF_HUB_DISABLE_TELEMETRY": "1"}
+from tests.support.loaders import loader
 
 
 @pytest.fixture(scope="session")
@@ -20,9 +19,4 @@ def holey_set(make_rooms: Any, tmp_path_factory: pytest.TempPathFactory) -> Path
 @pytest.fixture
 def load(tmp_path: Path) -> Any:
     """Return `datasets.load_dataset` with a cache of its own, for the split "train"."""
-    import datasets
-
-    datasets.disable_progress_bars()
-    return lambda *names, **how: datasets.load_dataset(
-        *names, cache_dir=str(tmp_path / "cache"), split="train", **how
-    )
+    return loader(tmp_path / "cache")

@@ -11,7 +11,8 @@ import pytest
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.layout import FIELDS
-from scenegen.sharing.export import ABOUT, FORMATS, export_rows
+from scenegen.sharing.export import export_rows
+from scenegen.sharing.folder import ABOUT, FORMATS
 
 
 @pytest.fixture(params=["8 bits", "floats"])
@@ -158,7 +159,7 @@ def test_refused(how, where, rooms_path, tmp_path):
 
 
 def test_no_more_rows_are_in_memory_than_fit(rooms_path, tmp_path, monkeypatch):
-    monkeypatch.setattr("scenegen.sharing.export.BLOCK_BYTES", 3 * 32 * 32 * (3 + 4 + 12 + 1))
+    monkeypatch.setattr("scenegen.sharing.folder.BLOCK_BYTES", 3 * 32 * 32 * (3 + 4 + 12 + 1))
     steps = []
     made = export_rows(rooms_path, "parquet", tmp_path / "out", progress=steps.append)
     import pyarrow.parquet as pq

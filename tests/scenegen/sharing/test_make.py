@@ -2,9 +2,6 @@
 
 import hashlib
 import json
-import subprocess
-import sys
-import warnings
 
 import h5py
 import numpy as np
@@ -18,6 +15,7 @@ from scenegen.common.hdf5.content import row_digest
 from scenegen.sharing.description import Publication
 from scenegen.sharing.index import COLUMNS
 from scenegen.sharing.make import NAMES, make_rooms_card
+from tests.support.loaders import faultless_croissant, validate
 
 TOLD = Publication("Two rooms", ("A. Person", "B. Person"), "2026-01-31", "CC-BY-4.0")
 WICKED = "</code><script>alert(1)</script> `x` | [a](javascript:1)\n# Title\n\n---\n![i](http://x)"
@@ -34,20 +32,7 @@ def made(holey_set, float_path, tmp_path_factory):
 @pytest.fixture(scope="module")
 def croissant(made):
     """Return the Croissant file as mlcroissant knows it; it may not find fault with it."""
-    import mlcroissant
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of the libraries that it uses
-        found = mlcroissant.Dataset(jsonld=made / "croissant.json")
-    issues = found.metadata.ctx.issues
-    assert (issues.errors, issues.warnings) == (set(), set())
-    return found
-
-
-def validate(path):
-    program = "import sys; from mlcroissant.scripts.cli import main; sys.exit(main())"
-    line = [sys.executable, "-c", program, "validate", "--jsonld", str(path)]
-    return subprocess.run(line, capture_output=True, text=True, check=False)
+    return faultless_croissant(made / "croissant.json")
 
 
 def test_the_validator_accepts_it(made, tmp_path):

@@ -1,4 +1,4 @@
-"""The `iqtt` commands: they parse options, call the library once, and print.
+"""Commands that make, merge, show, describe, verify and audit files of questions.
 
 Heavy modules are imported inside the commands, so that `--help` is fast.
 """

@@ -1,0 +1,105 @@
+"""The commands that hand on questions: a data card of a split, and files for data loaders."""
+
+from pathlib import Path
+
+import click
+
+from scenegen.commands.sharing import publication_options, source_date
+from scenegen.common.command_line import EXAMPLE, OVERWRITE, needs, print_line, progress_bar
+from scenegen.common.paths import InputPath, OutputFolder, refuse_command_inputs
+
+
+# fmt: off
+@click.command(
+    epilog=f"{EXAMPLE}iqtt card iqtt-split --creator 'A. Person' --date 2026-01-31 --out card"
+)
+@click.argument("folder", type=InputPath(within=(".h5",)))
+@click.option("--out", type=OutputFolder(), help="Folder to make [iqtt-split-card of iqtt-split].")
+@click.option("--with-answers", is_flag=True,
+              help="Hand out the answers of the test questions too, and the seed if their file"
+              " tells it.")
+@publication_options(title="that of the folder", license_="CC-BY-4.0")
+@OVERWRITE
+def card(
+    folder: str,
+    out: str | None,
+    with_answers: bool,
+    creators: tuple[str, ...],
+    title: str | None,
+    date: str | None,
+    license_: str | None,
+    data_version: str,
+    url: str,
+    overwrite: bool,
+) -> None:
+    """Write a data card of the split in FOLDER: a page, Croissant metadata and an index.
+
+    README.md is for people, croissant.json for programs, index.parquet has a line for each
+    question. Hand them on with the files that the card lists: those of the test answers are not
+    among them, and nothing in the card tells an answer of a test question. All values are read and
+    must be those that were written.
+    """
+    needs("iqtt card", ("pyarrow",), "share")
+    from iqtt.sharing.make import make_questions_card
+    from iqtt.sharing.published import published_split
+    from scenegen.sharing.description import Publication
+    from scenegen.sharing.make import NAMES
+
+    name = Path(folder).resolve().name
+    publication = Publication(
+        title=name if title is None else title,
+        creators=creators,
+        date=source_date() if date is None else date,
+        license="CC-BY-4.0" if license_ is None else license_,
+        version=data_version,
+        url=url,
+    )
+    made = f"{name}-card" if out is None else out
+    refuse_command_inputs(Path(made) / one for one in NAMES)
+    count = published_split(folder, with_answers).count
+    with progress_bar(count, "question") as bar:
+        make_questions_card(
+            folder, made, publication,
+            with_answers=with_answers, overwrite=overwrite, progress=bar.update,
+        )
+    print_line(f"{made}: {', '.join(NAMES)} of {count} questions")
+
+
+@click.command(epilog=f"{EXAMPLE}iqtt export iqtt-split/iqtt-val.h5 --format parquet")
+@click.argument("file", type=InputPath())
+@click.option("--format", "form", type=click.Choice(["parquet", "webdataset"]), required=True,
+              help="What to write; datasets.load_dataset reads both.")
+@click.option("--part", type=click.Choice(["labeled", "unlabeled"]),
+              help="Part of a training file.")
+@click.option("--out", type=OutputFolder(),
+              help="Folder to make [iqtt-val-parquet of iqtt-val.h5; iqtt-train-labeled-parquet].")
+@click.option("--rows-per-file", type=click.IntRange(1), default=1000, show_default=True,
+              help="Most questions of a file.")
+@OVERWRITE
+def export(
+    file: str, form: str, part: str | None, out: str | None, rows_per_file: int, overwrite: bool
+) -> None:
+    """Write all that FILE tells of its questions in a format of data loaders.
+
+    Images of 8 bits become PNG files. The answers to test questions are in another file, and are
+    not written.
+    """
+    if form == "parquet":
+        needs("iqtt export --format parquet", ("pyarrow",), "share")
+    from iqtt.files.reader import open_questions
+    from iqtt.sharing.export import export_questions
+
+    with open_questions(file, part) as questions:
+        count = len(questions)
+    folder = out or "-".join(filter(None, (Path(file).stem, part, form)))
+    with progress_bar(count, "question") as bar:
+        written = export_questions(
+            file, form, folder, part,
+            rows_per_file=rows_per_file, overwrite=overwrite, progress=bar.update,
+        )
+    megabytes = sum(path.stat().st_size for path in written) / 1e6
+    print_line(f"{folder}: {count} questions in {len(written) - 1} files, {megabytes:.1f} MB")
+
+
+# fmt: on
+COMMANDS = (card, export)

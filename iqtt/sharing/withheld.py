@@ -1,0 +1,53 @@
+"""Files that are handed out tell no answer of a test question: whatever else is in one is refused.
+
+A list says what such a file may hold, so that nothing slips through which nobody thought of.
+"""
+
+from pathlib import Path
+
+import h5py
+
+from iqtt.files.attributes import read_root
+from iqtt.files.layout import ROOT_TEXTS, named
+from scenegen.common.errors import SpecError
+from scenegen.common.hdf5.attributes import read_names
+from scenegen.common.hdf5.content import SHA256
+from scenegen.common.hdf5.input_file import checking
+from scenegen.common.hdf5.row_file import and_more
+from scenegen.common.hdf5.shards import ROW_DIGESTS, SHARDS, opened_with_shards
+
+COMMAND = "creation_command"  # which may name the seed
+DATA = {"questions", SHARDS, ROW_DIGESTS}  # of a file of test questions
+TOLD = {"unit", "shape", "frame", "meaning", "scale", "names", SHA256}  # of each of them
+ATTRIBUTES = {*ROOT_TEXTS, named("fingerprint", "")} - {COMMAND}
+
+
+def check_withheld(path: Path, is_test: bool) -> None:
+    """Refuse a file from which the answers of test questions could be learned.
+
+    No file may tell the seed, nor the command that made it, as all answers can be made again with
+    them. A file of test questions may hold nothing but images and what names them.
+
+    Raises SpecError; OSError and FileFormatError as `QuestionsFile`.
+    """
+    with opened_with_shards(path, "question file") as (file, _), checking(file):
+        _, spec, _ = read_root(file, path)
+        found = ["the seed"] if spec is not None and spec.seed is not None else []
+        found += ["the command that made it"] if COMMAND in file.attrs else []
+        found += _beside_images(file, path) if is_test else []
+    if found:
+        expected = "a file that does not tell the test answers, or --with-answers"
+        raise SpecError(path, and_more(found), expected)
+
+
+def _beside_images(file: h5py.File, path: Path) -> list[str]:
+    """Return the names of what a file of test questions must not hold."""
+    strange = [name for name in sorted(file) if name not in DATA]
+    strange += [f"attribute {name}" for name in sorted(file.attrs) if name not in ATTRIBUTES]
+    for name in sorted(DATA & set(file)):
+        strange += [f"{name}@{key}" for key in sorted(file[name].attrs) if key not in TOLD]
+    if isinstance(digests := file.get(ROW_DIGESTS), h5py.Dataset):
+        names = read_names(digests, "names", f"{path}: {ROW_DIGESTS}")
+        if names != ["questions"] or digests.shape[1:] != (1, 32):
+            strange.append(f"{ROW_DIGESTS} of more than the questions")
+    return strange

@@ -1,0 +1,140 @@
+"""Write the rows of a table to a folder of Parquet or WebDataset files, whatever they are about."""
+
+import json
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenegen.common.hdf5.shards import cut, shard_name
+from scenegen.common.hdf5.table import Column
+from scenegen.common.new_folder import folder_written_beside
+from scenegen.common.records import check
+from scenegen.sharing.columns import meanings
+
+FORMATS = {"parquet": ".parquet", "webdataset": ".tar"}  # and how the names of their files end
+ROWS_PER_FILE = 1000
+MOST_FILES = 100_000  # as many as their numbers of five digits can tell apart
+BLOCK_BYTES = 2**25  # of rows that are in memory at once
+ABOUT = "config.json"  # a name that `datasets` never takes for data
+
+
+@dataclass(frozen=True)
+class ExportedTable:
+    """Rows to write.
+
+    Attributes:
+        stem: how the names of the files begin.
+        what: what the rows are, in words of ours.
+        columns: of each row; the first is `columns.row_column`.
+        count: number of rows.
+        read: returns the values of some rows by name of the column, in the order that is asked for:
+            numbers as arrays (rows, ...) of the column's type, texts as `str` or lists of them.
+        attributes: root attributes of the file that the rows come from.
+    """
+
+    stem: str
+    what: str
+    columns: Sequence[Column]
+    count: int
+    read: Callable[[Sequence[int]], dict[str, Any]]
+    attributes: Mapping[str, Any]
+
+
+def write_folder(
+    table: ExportedTable,
+    form: str,
+    folder: str | Path,
+    rows: Sequence[int] | None = None,
+    *,
+    rows_per_file: int = ROWS_PER_FILE,
+    overwrite: bool = False,
+    progress: Callable[[int], Any] = lambda done: None,
+) -> list[Path]:
+    """Write rows of a table to a folder, which appears when it is complete; return its files.
+
+    Files are called `rooms-00000-of-00003.parquet` after the stem; ABOUT has the root attributes
+    of the file that the rows come from, and what each column means. The same rows give the same
+    bytes with the same versions of Pillow and, for Parquet, pyarrow.
+
+    Args:
+        form: one of FORMATS.
+        folder: to make; with `overwrite`, an older one of such files is replaced.
+        rows: which to write, in this order; all by default.
+        rows_per_file: the most rows of one file.
+        progress: is told the number of rows that were written since the last call.
+
+    Raises:
+        OSError: as `folder_written_beside`.
+        SpecError: no rows, rows out of range or twice; too many files.
+        Whatever `table.read` raises.
+    """
+    check(form in FORMATS, "format", repr(form), f"one of {', '.join(FORMATS)}")
+    check(rows_per_file >= 1, "rows per file", rows_per_file, "1 or more")
+    check(table.count > 0, table.what, "no rows", "at least one")
+    chosen = list(range(table.count) if rows is None else rows)
+    good = len(chosen) > 0 and min(chosen) >= 0 and max(chosen) < table.count
+    check(good, "items", f"{len(chosen)} rows", f"some from 0 to {table.count - 1}")
+    check(len(set(chosen)) == len(chosen), "items", "a row twice", "each row once")
+    parts = cut(len(chosen), rows_per_file)
+    check(len(parts) <= MOST_FILES, "rows per file", rows_per_file, "fewer files than 100,000")
+    ending = FORMATS[form]
+    names = [shard_name(f"{table.stem}{ending}", i, len(parts)) for i in range(len(parts))]
+    known = {*names, ABOUT, *_older_files(folder, table.stem, ending)}
+    write = _writer(form)
+    with folder_written_beside(folder, known, overwrite) as made:
+        for name, part in zip(names, parts, strict=True):
+            these = [chosen[i] for i in part]
+            write(made / name, table.columns, _blocks(table, these, progress))
+        (made / ABOUT).write_text(_about(table, form, names), encoding="utf-8")
+    return [Path(folder) / name for name in (*names, ABOUT)]
+
+
+def _older_files(folder: str | Path, stem: str, ending: str) -> list[str]:
+    """Return the names of files that an older export left in a folder, of however many files."""
+    pattern = re.compile(rf"{re.escape(stem)}-\d{{5}}-of-\d{{5}}{re.escape(ending)}")
+    if not Path(folder).is_dir():
+        return []
+    return [path.name for path in Path(folder).iterdir() if pattern.fullmatch(path.name)]
+
+
+def _writer(form: str) -> Callable[..., None]:
+    """Return the writer of a format; only Parquet needs pyarrow."""
+    if form == "parquet":
+        from scenegen.sharing.parquet import write_parquet
+
+        return write_parquet
+    from scenegen.sharing.webdataset import write_tar
+
+    return write_tar
+
+
+def _blocks(
+    table: ExportedTable, rows: Sequence[int], progress: Callable[[int], Any]
+) -> Iterator[dict[str, Any]]:
+    """Yield the values of rows, so many at a time as fit into BLOCK_BYTES."""
+    pixels = (c for c in table.columns if c.own_chunk)
+    size = sum(math.prod(c.shape) * np.dtype(c.dtype).itemsize for c in pixels)
+    for part in cut(len(rows), max(1, BLOCK_BYTES // size)):
+        yield table.read([rows[i] for i in part])
+        progress(len(part))
+
+
+def _about(table: ExportedTable, form: str, names: Sequence[str]) -> str:
+    """Return what the files do not tell themselves, as JSON."""
+    about = {
+        "what": f"{table.what}, as {form}",
+        "files": list(names),
+        "columns": meanings(table.columns),
+        "attributes": {key: str(value) for key, value in sorted(table.attributes.items())},
+    }
+    return json.dumps(about, indent=1, default=_number) + "\n"
+
+
+def _number(value: Any) -> Any:
+    """Return a NumPy value as one of Python's."""
+    return np.asarray(value).tolist()

@@ -1,0 +1,55 @@
+"""`iqtt card` and `iqtt export` as a user types them."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+import cli
+
+WHO = ("--creator", "A. Person", "--date", "2026-01-31")
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    """Run `iqtt ...` inside this process, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    return lambda *arguments: CliRunner().invoke(cli.iqtt, [str(a) for a in arguments])
+
+
+def test_card(run, refuses, split_folder, tmp_path):
+    told = run("card", split_folder, *WHO)
+    assert told.stdout == "split-card: README.md, croissant.json, index.parquet of 24 questions\n"
+    croissant = json.loads((tmp_path / "split-card" / "croissant.json").read_text())
+    assert (croissant["name"], croissant["datePublished"]) == ("split", "2026-01-31")
+    assert "iqtt-test-answers.h5" not in [file["name"] for file in croissant["distribution"]]
+    refuses("card", split_folder, *WHO, words=("split-card", "--overwrite"))
+    again = run("card", split_folder, *WHO, "--with-answers", "--title", "All", "--overwrite")
+    assert again.exit_code == 0, again.output
+    croissant = json.loads((tmp_path / "split-card" / "croissant.json").read_text())
+    assert croissant["name"] == "all"
+    assert "iqtt-test-answers.h5" in [file["name"] for file in croissant["distribution"]]
+
+
+def test_refused_cards(refuses, monkeypatch, split_folder, tmp_path):
+    monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
+    refuses("card", split_folder, "--creator", "A", words=("--date",))
+    refuses("card", split_folder, *WHO, "--license", "my own", words=("--license",))
+    refuses("card", tmp_path, *WHO, words=("no question files",))
+    refuses("card", split_folder, *WHO, "--out", split_folder, "--overwrite", words=("iqtt-",))
+
+
+@pytest.mark.parametrize("form", ["parquet", "webdataset"])
+def test_export(form, run, refuses, split_folder, tmp_path):
+    train, ending = (
+        split_folder / "iqtt-train.h5",
+        {"parquet": "parquet", "webdataset": "tar"}[form],
+    )
+    told = run("export", train, "--format", form, "--part", "labeled", "--rows-per-file", 4)
+    assert told.stdout.startswith(f"iqtt-train-labeled-{form}: 6 questions in 2 files, ")
+    assert sorted(path.name for path in (tmp_path / f"iqtt-train-labeled-{form}").iterdir()) == [
+        "config.json", *(f"iqtt-train-labeled-0000{i}-of-00002.{ending}" for i in (0, 1))
+    ]  # fmt: skip
+    refuses("export", train, "--format", form, words=("labeled or unlabeled",))
+    answers = split_folder / "iqtt-test-answers.h5"
+    refuses("export", answers, "--format", form, words=("answers but no images",))

@@ -1,0 +1,126 @@
+"""Exported questions, read by the loaders that people use: every pixel, answer and truth."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from iqtt import open_questions
+from iqtt.sharing.export import export_questions
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.sharing.folder import ABOUT, FORMATS
+
+TABLES = (("train", "labeled"), ("train", "unlabeled"), ("val", None), ("test", None))
+
+
+def of_parquet(row, name):
+    return row[name]
+
+
+def of_archive(row, name):
+    for ending in ("png", "npy"):
+        if f"{name}.{ending}" in row:
+            return row[f"{name}.{ending}"]
+    return row["json"][name]
+
+
+READERS = {"parquet": of_parquet, "webdataset": of_archive}
+
+
+def check_rows(found, questions, value):
+    """Compare all that the file tells with what was loaded."""
+    assert len(found) == len(questions) > 0
+    for row, values in enumerate(found):
+        images = ["reference", *(f"answer_{i}" for i in range(questions.answers))]
+        for name, stored in zip(images, questions.read("questions", row), strict=True):
+            read = np.asarray(value(values, name))
+            np.testing.assert_array_equal(read.astype(stored.dtype), stored)
+        for name in set(questions.fields) - {"questions"}:
+            stored = np.asarray(questions.read(name, row))
+            read = value(values, "answer" if name == "answers" else name)
+            np.testing.assert_array_equal(np.asarray(read).astype(stored.dtype), stored, name)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("kind", ["whole", "shards", "floats"])
+def test_everything_is_there(kind, form, splits, load, tmp_path):
+    for split, part in TABLES:
+        path = splits[kind] / f"iqtt-{split}.h5"
+        made = export_questions(path, form, tmp_path / f"{split}{part}", part, rows_per_file=4)
+        loaded = load(form, data_files=[str(p) for p in made if p.name != ABOUT])
+        with open_questions(path, part) as questions:
+            check_rows(loaded, questions, READERS[form])
+            told = {"answer", "angle_degrees"} & set(loaded.features if form == "parquet"
+                                                     else loaded[0]["json"])  # fmt: skip
+            assert ("answer" in told, "angle_degrees" in told) == (
+                split == "val" or part == "labeled", split != "test"
+            )  # fmt: skip
+        if form == "parquet":
+            picture = type(loaded.features["answer_1"]).__name__
+            assert picture == ("Array3D" if kind == "floats" else "Image")
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_released_files(form, released, load, tmp_path):
+    path = released(tables={"labeled": (3, [2, 0, 1]), "unlabeled": (2, None)})
+    for part in ("labeled", "unlabeled"):
+        made = export_questions(path, form, tmp_path / part, part)
+        loaded = load(form, data_files=[str(made[0])])
+        with open_questions(path, part) as questions:
+            check_rows(loaded, questions, READERS[form])
+
+
+def test_folders_are_known_by_their_split(splits, load, tmp_path):
+    for split, name in (("train", "train"), ("val", "validation"), ("test", "test")):
+        part = "labeled" if split == "train" else None
+        path = splits["shards"] / f"iqtt-{split}.h5"
+        made = export_questions(path, "parquet", tmp_path / f"folder-{split}", part)
+        stem = "iqtt-train-labeled" if split == "train" else f"iqtt-{split}"
+        assert made[0].name == f"{stem}-00000-of-00001.parquet"
+        assert len(load(str(tmp_path / f"folder-{split}"), split=name)) > 0
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_nothing_of_the_answers_beside_a_test_file_is_written(form, splits, tmp_path):
+    """An export is the same where the file of the answers is not there."""
+    (tmp_path / "alone").mkdir()
+    shutil.copy(splits["whole"] / "iqtt-test.h5", tmp_path / "alone")
+    for name, folder in (("beside", splits["whole"]), ("without", tmp_path / "alone")):
+        export_questions(folder / "iqtt-test.h5", form, tmp_path / name)
+    files = {p.name: p.read_bytes() for p in (tmp_path / "beside").iterdir()}
+    assert files == {p.name: p.read_bytes() for p in (tmp_path / "without").iterdir()}
+    columns = json.loads(files[ABOUT])["columns"]
+    assert list(columns) == ["row", "reference", "answer_0", "answer_1", "answer_2"]
+
+
+def test_what_files_do_not_tell_is_beside_them(splits, tmp_path):
+    path = splits["shards"] / "iqtt-train.h5"
+    export_questions(path, "webdataset", tmp_path / "out", "labeled")
+    about = json.loads((tmp_path / "out" / ABOUT).read_text())
+    assert "iqtt-train.h5, labeled" in about["what"]
+    assert about["columns"]["reference"]["scale"] == 1 / 255
+    assert about["columns"]["depth"]["unit"] == "cube edge"
+    with open_questions(path, "labeled") as questions:
+        assert about["columns"]["distractor_kind"]["names"] == questions.kind_names
+        assert about["attributes"] == questions.attributes
+
+
+def test_refused(splits, tmp_path, damaged, released):
+    with pytest.raises(SpecError) as error:
+        export_questions(splits["whole"] / "iqtt-train.h5", "parquet", tmp_path / "out")
+    assert "labeled or unlabeled" in error.value.expected
+    with pytest.raises(FileFormatError):
+        export_questions(splits["whole"] / "iqtt-test-answers.h5", "parquet", tmp_path / "out")
+    empty = released(tables={"": (0, None)}, dtype="uint8")
+    with pytest.raises(SpecError) as error:
+        export_questions(empty, "parquet", tmp_path / "out")
+    assert error.value.found == "no rows"
+
+    def shorten(file):
+        file["questions"].id.write_direct_chunk((4, 0, 0, 0, 0), b"no deflate stream", 0)
+
+    path = damaged(shorten, "iqtt-test.h5")
+    with pytest.raises(FileFormatError):
+        export_questions(path, "webdataset", tmp_path / "out", rows_per_file=2)
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,37 @@
+"""Files that are shared, as the programs of others read them: none may reach for the network."""
+
+import os
+import subprocess
+import sys
+import warnings
+
+os.environ |= {"HF_HUB_OFFLINE": "1", "HF_DATASETS_OFFLINE": "1", "HF_HUB_DISABLE_TELEMETRY": "1"}
+
+
+def loader(cache):
+    """Return `datasets.load_dataset` with a cache of its own, for the split "train" by default."""
+    import datasets
+
+    datasets.disable_progress_bars()
+    return lambda *names, **how: datasets.load_dataset(
+        *names, cache_dir=str(cache), **{"split": "train", **how}
+    )
+
+
+def faultless_croissant(path):
+    """Return a Croissant file as mlcroissant knows it; it may not find fault with it."""
+    import mlcroissant
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of the libraries that it uses
+        found = mlcroissant.Dataset(jsonld=path)
+    issues = found.metadata.ctx.issues
+    assert (issues.errors, issues.warnings) == (set(), set())
+    return found
+
+
+def validate(path):
+    """Run `mlcroissant validate`."""
+    program = "import sys; from mlcroissant.scripts.cli import main; sys.exit(main())"
+    line = [sys.executable, "-c", program, "validate", "--jsonld", str(path)]
+    return subprocess.run(line, capture_output=True, text=True, check=False)
