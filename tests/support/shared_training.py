@@ -2,10 +2,11 @@
 
 Its argument is a JSON file with a list of runs: folder, data, configuration (null to go on from the
 folder's checkpoint), labels and number of processes. The first process writes the losses of every
-iteration to `losses.json` in each folder.
+iteration to FOLDER/losses.json, and keeps the checkpoint of iteration 2 in FOLDER-half.
 """
 
 import json
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,14 +17,25 @@ from baselines.pix2shape.training.runs import train_run
 
 
 def train_all(runs: list[dict[str, Any]]) -> None:
-    """Train each run, and write its losses."""
+    """Train each run."""
     for run in runs:
-        found: list[dict[str, float]] = []
-        config = run["config"] and ModelConfig.from_json(run["config"])
-        machine = Machine("cpu", run["processes"], workers=0, every=2)
-        how = {"labels": run["labels"], "progress": lambda _, losses, to=found: to.append(losses)}
-        if train_run(run["folder"], run["data"], config, machine, **how) is not None:
-            (Path(run["folder"]) / "losses.json").write_text(json.dumps(found))
+        train(run, Path(run["folder"]))
+
+
+def train(run: dict[str, Any], folder: Path) -> None:
+    """Train a run of four iterations."""
+    found: list[dict[str, float]] = []
+
+    def progress(state: Any, losses: dict[str, float]) -> None:
+        found.append(losses)
+        if state.iteration == 3:  # the checkpoint is that of iteration 2
+            shutil.copytree(folder, f"{folder}-half", dirs_exist_ok=True)
+
+    config = run["config"] and ModelConfig.from_json(run["config"])
+    machine = Machine("cpu", run["processes"], workers=0, every=2)
+    how = {"labels": run["labels"], "progress": progress}
+    if train_run(folder, run["data"], config, machine, **how) is not None:
+        (folder / "losses.json").write_text(json.dumps(found))
 
 
 if __name__ == "__main__":
