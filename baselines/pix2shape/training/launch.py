@@ -79,7 +79,8 @@ def launched(machine: Machine) -> Fabric:
             strategy="ddp" if several or torchrun() else "auto",
             precision=machine.precision,  # type: ignore[arg-type]
         )
-        fabric.launch()
+        if "LT_CLI_USED" not in os.environ:  # under `fabric run` it did so when it was made
+            fabric.launch()
     except ValueError as error:
         found = f"{machine.devices} on each of {machine.nodes} machines"
         expected = "as many as torchrun or SLURM started"

@@ -56,8 +56,8 @@ def folder(
         json.dumps([run(kind, name) for name in ("2", "1 then 2") for kind in CONFIGS])
     )
     command = [sys.executable, "-W", "ignore", shared_training.__file__, top / "runs"]
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[4])}
-    subprocess.run(command, timeout=300, check=True, env=environment)
+    own = {"PYTHONPATH": str(Path(__file__).parents[4]), "OMP_NUM_THREADS": "1"}
+    subprocess.run(command, timeout=300, check=True, env={**os.environ, **own})
     shared_training.train_all([run(kind, "2 then 1") for kind in CONFIGS])
     return lambda kind, name: top / f"{kind} {name}"
 
