@@ -3,6 +3,7 @@
 Heavy imports happen inside the commands, so that `--help` is quick and works without torch.
 """
 
+import sys
 from typing import Any
 
 import click
@@ -17,6 +18,7 @@ from scenegen.common.command_line import (
     print_line,
     progress_bar,
 )
+from scenegen.common.errors import SceneGenError
 from scenegen.common.paths import InputPath, OutputFolder, OutputPath
 
 PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
@@ -102,7 +104,17 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
 @_number("--workers", least=0, most=MOST_PROCESSES, default=1, text="Processes that read the data.")
 @_number("--every", least=1, default=500, text="Iterations between checkpoints.")
 @DEVICE
-@_number("--devices", least=1, most=MOST_PROCESSES, default=1, text="Number of devices.")
+@click.option(
+    "--devices",
+    type=click.IntRange(1, MOST_PROCESSES),
+    help="Processes on each machine that share every batch: GPUs, or processes of the CPU  [1, or"
+    " as many as torchrun started].",
+)
+@click.option(
+    "--nodes",
+    type=click.IntRange(1, MOST_PROCESSES),
+    help="Machines that train together, see docs/pix2shape.md  [1, or as torchrun says].",
+)
 @click.option(
     "--precision",
     type=click.Choice(["32", "bf16"]),
@@ -122,7 +134,8 @@ def train(
     workers: int,
     every: int,
     device: str,
-    devices: int,
+    devices: int | None,
+    nodes: int | None,
     precision: str,
 ) -> None:
     """Train the model on rooms or questions; weights and checkpoint are written to a folder.
@@ -131,22 +144,27 @@ def train(
     """
     needs_torch()
     from baselines.pix2shape.network.config import model_config
-    from baselines.pix2shape.training.runs import Machine, train_run
+    from baselines.pix2shape.training import launch
+    from baselines.pix2shape.training.runs import train_run
     from baselines.pix2shape.use.predict import chosen_device
 
     chosen = dict(settings) | ({} if seed is None else {"seed": seed})
     if resume and (config or chosen or labels or conditional):
         own = "--config, --set, --seed, --labels and --conditional"
         raise click.UsageError(f"--resume goes on with the run's own {own}; leave them out")
+    here, machines = launch.started_elsewhere()
+    devices, nodes = devices or here, nodes or machines
     accelerator = "gpu" if chosen_device(device, devices).type == "cuda" else "cpu"
     numbers = {"32": "32-true", "bf16": "bf16-mixed"}[precision]
-    bar = progress_bar(None, "it")
+    bar: Any = None
 
     def show(state: Any, losses: dict[str, float]) -> None:
+        nonlocal bar
         last = state.model.config.iterations
         told = {name: f"{value:.3g}" for name, value in losses.items()}
-        if bar.total is None:  # the first iteration, of a resumed run too
-            bar.total, bar.initial, bar.n = last, state.iteration - 1, state.iteration - 1
+        if bar is None:  # the first iteration, of a resumed run too; only the first process shows
+            bar = progress_bar(last, "it")
+            bar.initial = bar.n = state.iteration - 1
         bar.set_postfix(told, refresh=False)
         bar.update(1)
         if bar.disable and state.iteration % every == 0:  # no terminal, but perhaps a log
@@ -158,17 +176,24 @@ def train(
             out,
             data,
             None if resume else model_config(config or "compact", **chosen),
-            Machine(accelerator, devices, numbers, workers, every),
+            launch.Machine(accelerator, devices, nodes, numbers, workers, every),
             labels=labels,
             conditional=conditional,
             progress=show,
         )
     except KeyboardInterrupt:
+        if not launch.is_first_here():
+            sys.exit(1)
         click.echo()
         print_line(f"Stopped; `--resume` goes on from {out}'s last checkpoint, if it got one.")
         raise
+    except (SceneGenError, OSError) as error:
+        if launch.is_told_elsewhere(error):
+            sys.exit(2)
+        raise
     finally:
-        bar.close()
+        if bar is not None:
+            bar.close()
     if weights is not None:  # None in all processes but the first
         print_line(f"{weights}: trained on {data}; now `pix2shape predict --weights {weights} ...`")
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor, nn
 
+from baselines.pix2shape.network.shared_batch import BatchNorm1d, BatchNorm2d
 from scenegen.common.records import check, normalise
 
 SIZES = (32, 64, 128, 256)  # pixels a side
@@ -86,7 +87,7 @@ class ConditionalNorm(nn.Module):
 
     def __init__(self, channels: int, condition: int, hidden: int = 64) -> None:
         super().__init__()
-        self.norm = nn.BatchNorm2d(channels, affine=condition == 0)
+        self.norm = BatchNorm2d(channels, affine=condition == 0)
         self.affine: nn.Module | None = None
         if condition:
             last = nn.Linear(hidden, 2 * channels)
@@ -123,7 +124,7 @@ class Encoder(nn.Module):
         self.layers = nn.ModuleList(nn.Conv2d(a, b, 4, 2, 1) for a, b in pairs)
         self.norms = nn.ModuleList(ConditionalNorm(b, spec.condition) for b in widths[:-1])
         self.last = nn.Conv2d(widths[-1], spec.z, 4)
-        self.standard = nn.BatchNorm1d(spec.z, affine=False) if spec.standardised else nn.Identity()
+        self.standard = BatchNorm1d(spec.z, affine=False) if spec.standardised else nn.Identity()
         self.activation = nn.LeakyReLU(SLOPE)
 
     def forward(self, image: Tensor, condition: Tensor) -> Tensor:

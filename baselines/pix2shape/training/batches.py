@@ -14,6 +14,7 @@ from torch.utils.data import DataLoader, Dataset, default_collate
 from baselines.pix2shape.data.questions import QuestionImages
 from baselines.pix2shape.data.rooms import Batch, Draws, RoomImages
 from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.network.shared_batch import share
 from baselines.pix2shape.training.state import State
 from scenegen.common.errors import SceneGenError
 
@@ -59,13 +60,23 @@ def _collated(items: list[Any]) -> Any:
 
 
 def _loaded(
-    source: Source, rows: int, size: int, first: int, seed: int, fabric: Fabric, workers: int
+    source: Source,
+    rows: int,
+    size: int,
+    own: slice,
+    first: int,
+    seed: int,
+    fabric: Fabric,
+    workers: int,
 ) -> Iterator[dict[str, Tensor]]:
-    """Yield this process's share of batch after batch without end, beginning with batch `first`."""
-    share = slice(fabric.global_rank, None, fabric.world_size)
+    """Yield batch after batch without end, beginning with batch `first`.
+
+    Args:
+        own: which rows of every batch are this process's.
+    """
     loader = DataLoader(
         _Told(source),
-        batch_sampler=Draws(rows, size, seed, first, share),
+        batch_sampler=Draws(rows, size, seed, first, own),
         num_workers=workers,
         collate_fn=_collated,
         pin_memory=fabric.device.type == "cuda",
@@ -81,7 +92,8 @@ def image_batches(source: Source, fabric: Fabric, state: State, workers: int) ->
     config = state.model.config
     size = batch_size(config, source)
     first = state.iteration * config.batches_per_iteration
-    for items in _loaded(source, len(source), size, first, config.seed, fabric, workers):
+    where = share(size), first, config.seed, fabric
+    for items in _loaded(source, len(source), size, *where, workers):
         yield source.as_batch(items).to(fabric.device)
 
 
@@ -93,18 +105,21 @@ def question_batches(
     state: State,
     workers: int,
 ) -> Iterator[tuple[Batch, Tensor]]:
-    """Yield the questions whose codes are compared, labelled ones first, and their answers.
+    """Yield the questions whose codes are compared, and their answers.
 
-    The answer is -1 for a question without a label.
+    The answer is -1 for a question without a label. Of each batch, labelled questions first, this
+    process gets its share, which may hold questions of one kind only.
     """
     config = state.model.config
     with_label, without = question_sizes(config, source, labels)
-    where = state.iteration, config.seed, fabric
+    own, where = share(with_label + without), (state.iteration, config.seed, fabric)
+    known = slice(min(own.start, with_label), min(own.stop, with_label))
+    others = slice(max(own.start - with_label, 0), max(own.stop - with_label, 0))
     streams = []
-    if labelled is not None and with_label:
-        streams.append(_loaded(labelled, labels, with_label, *where, 0))
-    if without:
-        unknown = _loaded(source, len(source), without, *where, workers)
+    if labelled is not None and known.start < known.stop:
+        streams.append(_loaded(labelled, labels, with_label, known, *where, 0))
+    if others.start < others.stop:
+        unknown = _loaded(source, len(source), without, others, *where, workers)
         streams.append(
             {**items, "answer": torch.full((len(items["image"]),), -1)} for items in unknown
         )

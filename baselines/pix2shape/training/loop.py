@@ -2,13 +2,13 @@
 
 For questions it follows Pix2Shape (IJCV 2020), Algorithm 1, with the losses that the configuration
 switches on; docs/pix2shape.md lists the differences. Everything random in iteration i derives from
-(seed, i), so training goes on after a kill as if it had never stopped.
+(seed, i), so training goes on after a kill as if it had never stopped. Where several processes
+train, they share each batch and learn what one process would, up to rounding.
 """
 
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import cast
 
 import torch
 from lightning_fabric import Fabric
@@ -18,6 +18,7 @@ from torch.optim import Adam
 from baselines.pix2shape.data.questions import QuestionImages
 from baselines.pix2shape.data.rooms import Batch
 from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.network.shared_batch import average, processes
 from baselines.pix2shape.training import batches
 from baselines.pix2shape.training.batches import Source
 from baselines.pix2shape.training.state import State
@@ -54,9 +55,10 @@ def train(
             the batch statistics are not: go on from a checkpoint.
         SpecError: no loss is switched on, there are fewer labels, or the processes cannot share a
             batch evenly.
+        LostProcessError: another process that trains with this one ended.
     """
     config, model = state.model.config, state.model
-    _check_request(config, source, labelled, labels, fabric.world_size)
+    check_request(config, source, labelled, labels, processes())
     fabric.to_device(model)
     for optimiser in (state.generator, state.critic):  # moves their moments to the model's device
         optimiser.load_state_dict(optimiser.state_dict())
@@ -70,7 +72,7 @@ def train(
         for turn in range(config.batches_per_iteration):
             batch = next(images)
             number = state.iteration * config.batches_per_iteration + turn
-            seed = item_seed(config.seed, number, Purpose.TRAINING, fabric.global_rank)
+            seed = item_seed(config.seed, number, Purpose.TRAINING)
             noise = draw(len(batch.image), config.networks.z, seed).to(fabric.device)
             if config.has_critic:
                 with fabric.autocast():
@@ -84,27 +86,28 @@ def train(
         yield losses, batch
 
 
-def _check_request(
+def check_request(
     config: ModelConfig,
     source: Source,
     labelled: QuestionImages | None,
     labels: int,
-    processes: int,
+    count: int,
 ) -> None:
+    """Raise SpecError where `train` cannot train so with a `count` of processes."""
     questions = isinstance(source, QuestionImages)
     if questions and config.consistency:
         expected = "0 for questions, whose cameras are not told"
         raise SpecError("consistency", config.consistency, expected)
-    sizes = batches.question_sizes(config, source, labels)
-    for size in (batches.batch_size(config, source), *(size for size in sizes if size)):
-        even = size % processes == 0 and size >= 2 * processes
-        what = f"a number that shares {size} items, 2 or more each"
-        check(processes == 1 or even, "devices", processes, what)
+    compared = sum(batches.question_sizes(config, source, labels))
+    for size in (batches.batch_size(config, source), compared):
+        items = "questions" if questions else "images"
+        expected = f"a number of processes that divides a batch of {size} {items}"
+        check(size % count == 0, "devices", count, expected)
     if labels:
         count = len(labelled) if labelled is not None and labelled.has_answers else 0
         check(labels <= count, "labels", labels, f"at most {count}, as many answers are told")
     weights = (config.adversarial, config.reconstruction, config.code_reconstruction)
-    if not any((*weights, config.consistency, config.depth, *sizes)):
+    if not any((*weights, config.consistency, config.depth, compared)):
         raise SpecError("losses", "every weight at 0", "one above 0")
 
 
@@ -128,17 +131,15 @@ def _update(
     numbers: dict[str, Tensor],
     losses: dict[str, float],
 ) -> None:
-    """Take one step, unless the loss or a gradient is not finite."""
+    """Take one step, unless the loss or a gradient is not finite; tell `losses`."""
     optimiser.zero_grad()
     fabric.backward(loss)
     parameters = optimiser.param_groups[0]["params"]
     gradients = [one.grad for one in parameters if one.grad is not None]
-    if fabric.world_size > 1:  # DDP allows neither several backward passes nor second gradients
-        for gradient in gradients:
-            gradient.copy_(cast(Tensor, fabric.all_reduce(gradient, reduce_op="mean")))
-    losses |= {name: float(value.detach()) for name, value in numbers.items()}
-    sound = torch.isfinite(loss.detach()) & torch.isfinite(torch.nn.utils.get_total_norm(gradients))
-    if cast(Tensor, fabric.all_reduce(sound.float(), reduce_op="mean")) != 1:
+    found = torch.stack([loss.detach(), *(value.detach() for value in numbers.values())])
+    average([found, *gradients])  # DDP allows neither several backward passes nor second gradients
+    losses |= dict(zip(numbers, found[1:].tolist(), strict=True))
+    if not (found[0].isfinite() and torch.nn.utils.get_total_norm(gradients).isfinite()):
         told = ", ".join(f"{name} {value:.3g}" for name, value in losses.items())
         raise TrainingError(
             f"iteration {state.iteration}",

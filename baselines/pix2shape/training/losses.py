@@ -3,6 +3,10 @@
 Most are the paper's: Pix2Shape (IJCV 2020), sections "Bi-Directional Adversarial Training",
 "Unsupervised Training" and "Semi-supervised Training for Classification". Three are our own,
 `absolute_loss`, `disagreement` and `contrast_loss`; docs/pix2shape.md says why.
+
+Where several processes share a batch, the average of what they return is the loss of the whole
+batch. Means over images are given each process's own images. `disagreement` asks the others itself,
+and `mutual_information`, `question_loss` and `contrast_loss` need the codes of the whole batch.
 """
 
 import math
@@ -12,6 +16,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from baselines.pix2shape.network.shared_batch import summed
 from baselines.pix2shape.network.surfels import back_project
 
 HIDDEN = 0.1  # scene units behind another surface at which a surfel counts as hidden by it
@@ -97,7 +102,7 @@ def disagreement(
     behind = its_depth - 1 / inverse[:, 0, 0]
     between_centres = (place.abs() < 1 - 1 / depth.shape[1]).all(dim=2)
     counted = between_centres & (its_depth > NEAR) & (behind < HIDDEN)
-    return (behind.abs() * counted).sum() / counted.sum().clamp(min=1)
+    return summed((behind.abs() * counted).sum()) / summed(counted.sum()).clamp(min=1)
 
 
 def mutual_information(

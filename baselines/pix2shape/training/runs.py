@@ -1,13 +1,12 @@
 """A training run and its folder: checkpoint, TensorBoard logs, a picture, and the weights."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from lightning_fabric import Fabric
 from torch.utils.data import DataLoader
 from torch.utils.tensorboard import SummaryWriter
 
@@ -16,9 +15,11 @@ from baselines.pix2shape.data.questions import QuestionImages, for_questions
 from baselines.pix2shape.data.rooms import Batch, RoomImages, is_question_file
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
+from baselines.pix2shape.network.shared_batch import summed
 from baselines.pix2shape.pictures import training_sheet
 from baselines.pix2shape.training.batches import Source
-from baselines.pix2shape.training.loop import train
+from baselines.pix2shape.training.launch import Machine, check_agreement, launched
+from baselines.pix2shape.training.loop import check_request, train
 from baselines.pix2shape.training.state import State, load_state, new_state, save_state
 from baselines.pix2shape.training.steps import draw
 from baselines.pix2shape.weights.storage import Card, save_weights
@@ -33,23 +34,6 @@ LOG_EVERY = 20  # iterations
 PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and batch size for that
 
 
-@dataclass(frozen=True)
-class Machine:
-    """Where and how training runs; none of this changes what is learned, up to rounding.
-
-    Attributes:
-        accelerator, devices, precision: as in Lightning Fabric.
-        workers: processes that read the data.
-        every: iterations between checkpoints, and between pictures.
-    """
-
-    accelerator: str = "auto"
-    devices: int = 1
-    precision: str = "32-true"
-    workers: int = 1
-    every: int = 500
-
-
 def train_run(
     folder: str | Path,
     data: str | Path,
@@ -62,7 +46,8 @@ def train_run(
 ) -> Path | None:
     """Train a model, from the start or from the folder's checkpoint.
 
-    Returns the path of the weights; None on all processes but the first.
+    Where several processes train, all but the first call this only to compute: the first alone
+    writes and reports progress. Returns the path of the weights; None in the others.
 
     Args:
         config: None goes on from the checkpoint, with its labels and classes.
@@ -70,7 +55,8 @@ def train_run(
         conditional: whether the networks are told the class of a room's only object.
 
     Raises SpecError where configuration and data do not fit; FileExistsError where a new run finds
-    a checkpoint; TrainingError; FileFormatError, OSError.
+    a checkpoint; TrainingError; LostProcessError where another process ended; FileFormatError,
+    OSError.
     """
     folder = Path(folder)
     if config is None:
@@ -90,15 +76,12 @@ def train_run(
             classes=source.classes if config.networks.classes else (),
         )
         state = new_state(config)
-    fabric = Fabric(
-        accelerator=machine.accelerator,
-        devices=machine.devices,
-        strategy="ddp" if machine.devices > 1 else "auto",
-        precision=machine.precision,  # type: ignore[arg-type]
-    )
-    fabric.launch()
-    folder.mkdir(parents=True, exist_ok=True)
+    check_request(card.config, source, labelled, labels, machine.devices * machine.nodes)
+    fabric = launched(machine)
+    check_agreement(fabric, "data, settings or checkpoint", (card, state.iteration))
     first, last = fabric.is_global_zero, card.config.iterations
+    if first:
+        folder.mkdir(parents=True, exist_ok=True)
     logs = SummaryWriter(str(folder / LOGS), purge_step=state.iteration + 1) if first else None
     try:
         for losses, batch in train(
@@ -121,7 +104,7 @@ def train_run(
             logs.close()
     if first and not (folder / WEIGHTS).exists():
         _save_weights(folder, state.model, card, source)
-    fabric.barrier()
+    summed(torch.zeros(1, device=fabric.device))  # wait for the first process, which writes
     return folder / WEIGHTS if first else None
 
 

@@ -3,6 +3,9 @@
 "Generator" means encoder and decoder together; they are trained against the critic. The losses
 follow Pix2Shape (IJCV 2020), Algorithm 1 and equations "rec_loss" and "app-loss". A loss whose
 weight is 0 is neither computed nor reported.
+
+Where several processes share a batch, each calls a step with its own images, and the average of
+what they return, and of its gradients, is that of one process with all images.
 """
 
 from dataclasses import dataclass
@@ -13,6 +16,7 @@ from torch import Tensor
 from baselines.pix2shape.data.rooms import Batch
 from baselines.pix2shape.network.architecture import CAMERA
 from baselines.pix2shape.network.model import Pix2Shape, mapped, shaded
+from baselines.pix2shape.network.shared_batch import gathered, processes, share, summed
 from baselines.pix2shape.training import losses
 
 Numbers = dict[str, Tensor]
@@ -20,12 +24,12 @@ Numbers = dict[str, Tensor]
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """The random numbers of one step on B images.
+    """The random numbers of one step on B images, of which this process has B / N.
 
     Attributes:
-        code: standard normal, (B, z).
-        share: uniform in 0..1, (B,); where the gradient penalty is taken.
-        order: a permutation of the batch, (B,).
+        code: standard normal, (B / N, z).
+        share: uniform in 0..1, (B / N,); where the gradient penalty is taken.
+        order: a permutation of the whole batch, (B,).
     """
 
     code: Tensor
@@ -37,12 +41,17 @@ class Noise:
         return mapped(self, lambda values: values.to(device))
 
 
-def draw(batch: int, z: int, seed: int) -> Noise:
-    """Return the noise of a seed, the same for every device."""
-    source = torch.Generator().manual_seed(seed)
+def draw(images: int, z: int, seed: int) -> Noise:
+    """Return the noise of a seed, the same for every device and however many processes share it.
+
+    Args:
+        images: how many images of the batch this process has.
+    """
+    source, batch = torch.Generator().manual_seed(seed), images * processes()
+    own = share(batch)
     return Noise(
-        torch.randn(batch, z, generator=source),
-        torch.rand(batch, generator=source),
+        torch.randn(batch, z, generator=source)[own],
+        torch.rand(batch, generator=source)[own],
         torch.randperm(batch, generator=source),
     )
 
@@ -93,7 +102,7 @@ def generator_step(
         if config.depth and batch.depth is not None:
             known = torch.isfinite(batch.depth)
             wrong = torch.where(known, depth - torch.where(known, batch.depth, 0), 0)
-            numbers["depth"] = (wrong**2).sum() / known.sum().clamp(min=1)
+            numbers["depth"] = summed((wrong**2).sum()) / summed(known.sum()).clamp(min=1)
     if config.adversarial or config.code_reconstruction:
         made = model.image(noise.code, views)
         if config.adversarial:
@@ -106,8 +115,9 @@ def generator_step(
     if config.consistency:
         pose, fov = views.world_from_camera, views.scene.fov_y_degrees
         assert pose is not None, "for_questions switches consistency off"
-        others = pose[noise.order]
-        camera, classes = views.condition[noise.order, :CAMERA], views.condition[:, CAMERA:]
+        theirs = noise.order[share(len(noise.order))]
+        others, camera = gathered(pose)[theirs], gathered(views.condition)[theirs, :CAMERA]
+        classes = views.condition[:, CAMERA:]
         elsewhere, _ = model.surfels(code, torch.cat([camera, classes], dim=1))
         numbers["consistency"] = (
             losses.disagreement(depth, elsewhere, torch.linalg.solve(others, pose), fov)
@@ -118,6 +128,7 @@ def generator_step(
     if asked is not None:
         images, answers = asked
         scene = model.encode(images.image, images.views)[:, : config.networks.z_scene]
+        scene, answers = gathered(scene), gathered(answers)
         codes, known = scene.view(len(answers), -1, scene.shape[1]), answers >= 0
         if config.questions and known.any():
             numbers["questions"] = losses.question_loss(codes[known], answers[known])
@@ -129,5 +140,5 @@ def generator_step(
 
 def _information(model: Pix2Shape, code: Tensor, noise: Noise) -> Tensor:
     """Return the mutual information of z_scene and z_view in codes."""
-    end = model.config.networks.z_scene
+    code, end = gathered(code), model.config.networks.z_scene
     return losses.mutual_information(model.statistics, code[:, :end], code[:, end:], noise.order)

@@ -2,7 +2,9 @@
 
 import importlib.util
 import json
+import os
 import shutil
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -88,6 +90,31 @@ def test_who_interrupts_is_told_how_to_go_on(folder, monkeypatch):
     assert "Aborted" in result.stderr
 
 
+def test_a_process_that_is_killed_ends_the_other_with_one_line(folder, check_refusal):
+    """Started as on two machines, of which both ends are here."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = str(probe.getsockname()[1])
+    meeting = {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": port, "OMP_NUM_THREADS": "1"}
+    line = f"train {LARGE} --device cpu --nodes 2 --every 1 --set networks.width=0.05"
+    command = [sys.executable, "-W", "ignore", "-c", "import cli; cli.pix2shape()", *line.split()]
+    first, second = (
+        subprocess.Popen(
+            command,
+            env={**os.environ, **meeting, "NODE_RANK": rank},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for rank in "01"
+    )
+    assert first.stdout.readline().startswith("1 of")
+    first.kill()
+    _, told = second.communicate(timeout=60)
+    first.communicate()
+    check_refusal(second.returncode, "", told.splitlines()[-1], ("process", "--resume"))
+
+
 def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
     from baselines.pix2shape.weights import bundled
 
@@ -118,6 +145,7 @@ MISTAKES = [
     (f"predict {WITH} {ROOMS} --out rooms.h5 --overwrite", ("rooms.h5", "not an input")),
     (f"predict {WITH} --data damaged.h5", ("damaged.h5", "image, row 5")),
     (f"train {ROOMS} --out run --devices {2**200}", ("--devices", "1<=x<=1024")),
+    (f"train {LARGE} --device cpu --devices 3", ("--devices", "16 images")),
     (f"sample {WITH} --class mug", ("class", "'mug'")),
     ("sample --weights classes.safetensors --class sofa", ("'sofa'", "mug, bowl")),
     ("sample --weights questions.safetensors", ("weights",)),

@@ -1,9 +1,6 @@
-"""Checkpoints refused when damaged; each step's own noise; several processes, one model."""
+"""Checkpoints refused when damaged; each step's own noise."""
 
-import os
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,28 +19,6 @@ from baselines.pix2shape.weights.storage import Card  # noqa: E402
 from baselines.tensor_files import load_tensors, save_tensors  # noqa: E402
 
 TINY = tiny(iterations=3)
-TWO = """
-import sys
-import torch
-from pathlib import Path
-from lightning_fabric import Fabric
-from baselines.pix2shape.network.config import ModelConfig
-from baselines.pix2shape.data.rooms import RoomImages
-from baselines.pix2shape.training.state import new_state, save_state
-from baselines.pix2shape.training.loop import train
-from baselines.pix2shape.weights.storage import Card
-
-torch.set_num_threads(1)
-fabric = Fabric(accelerator="cpu", devices=2, strategy="ddp")
-fabric.launch()
-config = ModelConfig.from_json(sys.argv[1])
-state = new_state(config)
-for losses, batch in train(state, RoomImages(sys.argv[2], config), fabric):
-    assert len(batch.image) == config.batch // 2
-folder = Path(sys.argv[3]) / str(fabric.global_rank)
-folder.mkdir()
-save_state(folder, state, Card(config, state.iteration))
-"""
 
 
 @pytest.fixture(scope="session")
@@ -116,26 +91,3 @@ def test_every_step_has_noise_of_its_own(rooms_path, fabric, monkeypatch):
             pass
     assert len(set(seeds[:4])) == 4
     assert seeds == [*seeds[:4], *seeds[:4], *seeds[2:4]]
-
-
-@pytest.mark.slow
-def test_two_processes_end_with_the_same_weights(rooms_path, tmp_path):
-    script = tmp_path / "two.py"
-    script.write_text(TWO)
-    config = replace(TINY, iterations=2)
-    command = [sys.executable, "-W", "ignore", script, config.to_json(), rooms_path, tmp_path]
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[4])}
-    subprocess.run(command, timeout=300, check=True, env=environment)
-    (one, card), (other, _) = load_state(tmp_path / "0"), load_state(tmp_path / "1")
-    assert (card.config, one.iteration, other.iteration) == (config, 2, 2)
-    start, theirs, moved = new_state(config).model, other.model, 0
-    for name, value in one.model.named_parameters():
-        assert torch.equal(value, theirs.get_parameter(name)), name
-        moved += not torch.equal(value, start.get_parameter(name))
-    assert moved > 20
-    for kind in ("generator", "critic"):
-        states = [getattr(state, kind).state_dict()["state"] for state in (one, other)]
-        for index, values in states[0].items():
-            assert all(torch.equal(values[name], states[1][index][name]) for name in values)
-    buffers = zip(one.model.buffers(), theirs.buffers(), strict=True)
-    assert not all(torch.equal(*pair) for pair in buffers), "each saw its own share"

@@ -1,0 +1,87 @@
+"""Two processes learn what one learns, also where a run goes on with another number of them."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pix2shape_models import tiny
+
+torch = pytest.importorskip("torch")
+import shared_training  # noqa: E402
+
+from baselines.pix2shape.training.state import KINDS, load_state, new_state  # noqa: E402
+
+# Seed 2 pairs no image with itself: `consistency` would then be 0, and its slope but rounding.
+ALL = {"seed": 2, "critic_steps": 2, "questions": 0.01, "contrast": 1.0, "question_batch": 8}
+CONFIGS = {"rooms": tiny(**ALL, consistency=1.0, depth=1.0), "questions": tiny(**ALL, batch=8)}
+LOSSES = {"distance", "penalty", "adversarial", "reconstruction", "code_reconstruction"}
+OWN = {
+    "rooms": {"consistency", "depth"},
+    "questions": {"mutual_information", "questions", "contrast"},
+}
+Folder = Callable[[str, str], Path]
+
+
+@pytest.fixture(scope="module")
+def folder(
+    rooms_path: Path, train_questions: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Folder:
+    """Return the folder of a run of four iterations, by its data and by its processes.
+
+    These are "1" or "2", or "1 then 2", where two made the last two iterations, or "2 then 1".
+    """
+    top = tmp_path_factory.mktemp("shared")
+    data = {"rooms": rooms_path, "questions": train_questions}
+
+    def run(kind: str, name: str) -> dict[str, Any]:
+        resumed = "then" in name
+        if resumed:
+            shutil.copytree(top / f"{kind} {name[0]}-half", top / f"{kind} {name}")
+        return {
+            "folder": str(top / f"{kind} {name}"),
+            "data": str(data[kind]),
+            "config": None if resumed else CONFIGS[kind].to_json(),
+            "labels": int(kind == "questions" and not resumed),  # of 8 places, in one process
+            "processes": int(name[-1]),
+        }
+
+    shared_training.train_all([run(kind, "1") for kind in CONFIGS])
+    (top / "runs").write_text(
+        json.dumps([run(kind, name) for name in ("2", "1 then 2") for kind in CONFIGS])
+    )
+    command = [sys.executable, "-W", "ignore", shared_training.__file__, top / "runs"]
+    own = {"PYTHONPATH": str(Path(__file__).parents[4]), "OMP_NUM_THREADS": "1"}
+    subprocess.run(command, timeout=300, check=True, env={**os.environ, **own})
+    shared_training.train_all([run(kind, "2 then 1") for kind in CONFIGS])
+    return lambda kind, name: top / f"{kind} {name}"
+
+
+@pytest.mark.parametrize("kind", CONFIGS)
+@pytest.mark.parametrize("name", ["2", "1 then 2", "2 then 1"])
+def test_several_processes_learn_what_one_learns(kind, name, folder):
+    """The losses of every iteration, the weights, batch statistics and moments at the end."""
+    one, several = (json.loads((folder(kind, n) / "losses.json").read_text()) for n in ("1", name))
+    assert all(losses.keys() == LOSSES | OWN[kind] for losses in one)
+    assert len(several) == (2 if "then" in name else 4)
+    for expected, found in zip(one[-len(several) :], several, strict=True):
+        assert found == pytest.approx(expected, rel=1e-4, abs=1e-5)
+    (expected, card), (found, _) = (load_state(folder(kind, n)) for n in ("1", name))
+    start, compared = new_state(card.config).model.state_dict(), 0
+    for part, value in expected.model.state_dict().items():
+        if not part.endswith("bias"):  # before a normalisation their slopes are but rounding
+            off = (found.model.state_dict()[part] - value).float().norm()
+            assert off <= 0.01 * (value - start[part]).float().norm(), part
+            compared += 1
+    assert compared > 30
+    for optimiser in KINDS:
+        states = [getattr(state, optimiser).state_dict()["state"] for state in (expected, found)]
+        for index, moments in states[0].items():
+            moment = moments["exp_avg"]
+            off = (states[1][index]["exp_avg"] - moment).norm()
+            assert off <= 0.01 * moment.norm() + 5e-5, (optimiser, index)
