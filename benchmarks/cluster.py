@@ -85,9 +85,6 @@ def main() -> None:
     idle = scheduling(given.empty, 2)
     cost = idle / given.empty
     print(f"\n{given.empty} empty shards, 2 workers: {idle:.1f} s, {1e3 * cost:.2f} ms a shard")
-    print(
-        f"{of_image:.0f} bytes an image; a processor renders {rates['cluster of 1']:.0f} a second"
-    )
     one = rates["cluster of 1"]
     print(f"{of_image:.0f} bytes an image; one worker renders {one:.0f} images/s")
     images, workers_of, sizes = MODELLED

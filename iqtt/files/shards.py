@@ -140,9 +140,9 @@ class SplitFiles:
     def elsewhere(self, task: FileTask) -> tuple[list[ShardRecord], Tally]:
         """Write the files of a task; to be called by a worker of a cluster."""
         check_shared(self.folder / MANIFEST)
-        self.work.prepare()
+        work = self.work.on_cluster()
         tally = Tally()
-        made = (some for block in task.blocks for some in self.work.questions(block, tally))
+        made = (some for block in task.blocks for some in work.questions(block, tally))
         return self.write(task, made), tally
 
     def join(self, manifest: Manifest) -> None:

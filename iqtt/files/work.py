@@ -9,7 +9,8 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import Rendered, groups, render_questions
 from scenegen.common.hdf5.table import packing_threads
-from scenegen.common.workers.pool import in_processes, in_threads
+from scenegen.common.workers.cluster import threads_of_worker
+from scenegen.common.workers.pool import in_processes, in_threads, processors
 from scenegen.rendering.renderer import share_processors
 
 BLOCK = 128  # questions that a worker process makes in one go
@@ -90,3 +91,9 @@ class Work:
     def prepare(self) -> None:
         """Get a worker ready: it takes its share of the processors."""
         share_processors(self.workers, self.device)
+
+    def on_cluster(self) -> "Work":
+        """Return the same work for the worker of a cluster that calls this, and get it ready."""
+        work = replace(self, workers=max(1, processors() // threads_of_worker()))
+        work.prepare()
+        return work

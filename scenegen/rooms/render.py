@@ -5,7 +5,7 @@ with the number of scenes.
 """
 
 from collections.abc import Callable, Generator, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.hdf5.table import PackedRows, packing_threads
-from scenegen.common.workers.pool import in_processes, in_threads
+from scenegen.common.workers.cluster import threads_of_worker
+from scenegen.common.workers.pool import in_processes, in_threads, processors
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec
 from scenegen.layout import columns
@@ -93,6 +94,12 @@ class Work:
         """Get a worker ready: it takes its share of the processors, and the cache."""
         MEMBERS_KEPT.use(self.cache_dir)
         share_processors(self.workers, self.device)
+
+    def on_cluster(self) -> "Work":
+        """Return the same work for the worker of a cluster that calls this, and get it ready."""
+        work = replace(self, workers=max(1, processors() // threads_of_worker()))
+        work.prepare()
+        return work
 
 
 def render_items(

@@ -61,8 +61,8 @@ class _Shards:
     def elsewhere(self, task: Task) -> tuple[ShardRecord, dict[str, str]]:
         """Make a shard, and tell why models were refused; to be called by a worker of a cluster."""
         check_shared(manifest_path(self.path))
-        self.work.prepare()
-        with closing(self.work.rows(_scenes(task))) as made:
+        work = self.work.on_cluster()
+        with closing(work.rows(_scenes(task))) as made:
             return self.write(task, made, lambda done: None), self.work.objects.problems
 
     def join(self, manifest: Manifest) -> None:

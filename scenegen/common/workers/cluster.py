@@ -5,6 +5,7 @@ only here.
 """
 
 import importlib
+import itertools
 import logging
 import os
 import sys
@@ -23,7 +24,8 @@ T = TypeVar("T")
 Task = TypeVar("Task")
 LOCAL = "local"
 LOGGING = "DASK_DISTRIBUTED__LOGGING__DISTRIBUTED"  # which Dask's processes read as they start
-AHEAD = 1000  # tasks that the scheduler knows, or whose results were not taken
+AHEAD = 2000  # tasks that the scheduler knows, or whose results were not taken
+BATCH = 200  # tasks that it is told of at once
 PATIENCE = 10  # seconds in which a scheduler must answer
 _one_at_a_time = threading.Lock()  # Mitsuba and HDF5 take one task in a process
 Versions = Callable[[], Mapping[str, str]]
@@ -69,16 +71,18 @@ class Cluster:
         # The function travels as the result of a task: workers pass it on to each other, and Dask
         # makes it again where all that had it are gone.
         work = self.client.submit(_as_is, (function, self.versions, dict(self.versions())))
-        numbers, running = dict[str, int](), as_completed()
+        numbers, running, numbered = dict[str, int](), as_completed(), enumerate(tasks)
         try:
-            for number, task in enumerate(tasks):
-                future = self.client.submit(_call, work, task, pure=False)
-                numbers[future.key] = number
-                running.add(future)
-                if len(numbers) >= AHEAD:
-                    done = next(running)
-                    yield numbers.pop(done.key), done.result()
-            for done in running:
+            while True:
+                if len(numbers) <= AHEAD - BATCH:  # many at once: each message costs milliseconds
+                    some = list(itertools.islice(numbered, BATCH))
+                    some_tasks = [task for _, task in some]
+                    futures = self.client.map(_call, some_tasks, work=work, pure=False)
+                    numbers.update({f.key: i for f, (i, _) in zip(futures, some, strict=True)})
+                    running.update(futures)
+                if not numbers:
+                    return
+                done = next(running)
                 yield numbers.pop(done.key), done.result()
         except KilledWorker as error:
             hint = "memory may be short there; see the workers' logs"
@@ -87,11 +91,18 @@ class Cluster:
             self.client.cancel([*running.futures, work])
 
 
+def threads_of_worker() -> int:
+    """Return how many threads the worker has that calls this, as it was started with."""
+    from distributed import get_worker
+
+    return int(get_worker().state.nthreads)
+
+
 def _as_is(work: T) -> T:
     return work
 
 
-def _call(work: tuple[Callable[[Task], T], Versions, dict[str, str]], task: Task) -> T:
+def _call(task: Task, work: tuple[Callable[[Task], T], Versions, dict[str, str]]) -> T:
     """Do a task on a worker, which may have joined after the others were asked for versions."""
     function, versions, expected = work
     with _one_at_a_time:
