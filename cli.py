@@ -4,8 +4,8 @@ import click
 
 from scenegen.common.command_line import PackageCommands
 
-ROOMS = tuple(f"scenegen.commands.{name}" for name in ("rooms", "sharing", "meshes"))
-QUESTIONS = tuple(f"iqtt.commands.{name}" for name in ("questions", "sharing"))
+ROOMS = tuple(f"scenegen.commands.{name}" for name in ("making", "rooms", "sharing", "meshes"))
+QUESTIONS = tuple(f"iqtt.commands.{name}" for name in ("making", "questions", "sharing"))
 
 
 @click.group(cls=PackageCommands, modules=ROOMS)

@@ -1,208 +1,22 @@
-"""Commands that make, merge, show, describe, verify and audit files of questions.
+"""Commands that show, describe, verify and audit files of questions.
 
 Heavy modules are imported inside the commands, so that `--help` is fast.
 """
 
-import time
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import click
 
+from iqtt.commands.making import QUESTIONS
 from scenegen.common import command_line
-from scenegen.common.command_line import EXAMPLE, Color, Items, Range, print_line, progress_bar
-from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
+from scenegen.common.command_line import EXAMPLE, Items, print_line, progress_bar
+from scenegen.common.paths import InputPath, OutputPath
 
-KNOWN_SEED = (
-    "note: anyone who knows the seed can recreate the test answers. For a private test set, run"
-    " `openssl rand -hex 32 > secret.txt` and pass --secret-seed secret.txt."
-)
 SHOWN = 8  # questions that `show` draws by default
 
 
-def _with_answers(path: Path) -> list[Path]:
-    """Return where the questions and the answers lie that belong to one file of either."""
-    questions = path.stem.removesuffix("-answers")
-    return [path.with_name(f"{stem}{path.suffix}") for stem in (questions, f"{questions}-answers")]
-
-
-QUESTIONS = InputPath(within=(".h5",), beside=_with_answers)
 option = partial(click.option, show_default=True)
-
-
-@click.command(
-    "make-split", epilog=f"{EXAMPLE}iqtt make-split --out iqtt-split --preset small --seed 1"
-)
-@option(
-    "--out",
-    type=OutputFolder(),
-    default="iqtt-split",
-    help="Folder for the four files, or a URL such as s3://bucket/iqtt.",
-)
-@option(
-    "--preset",
-    type=click.Choice(["small", "v2", "paper", "suite"]),
-    default="small",
-    help="Numbers of questions. small: 1,000 for training (100 with answers), 200 for validation,"
-    " 200 for testing; v2: as in the released data, in float32; paper: as in the paper; suite: a"
-    " folder for each kind of questions, 5,000 (1,000), 500 and 2,000 in each.",
-)
-@option("--train", type=int, help="Number of training questions, with and without answers.")
-@option(
-    "--labeled",
-    type=int,
-    help="How many training questions have answers [default: the preset's share].",
-)
-@option("--val", type=int, help="Number of validation questions.")
-@option("--test", type=int, help="Number of test questions; their answers are in a separate file.")
-@command_line.SEED
-@option(
-    "--secret-seed",
-    type=InputPath(),
-    metavar="FILE",
-    help="File whose content is the seed, for a private test set. No file that is written holds the"
-    " seed.",
-)
-@option("--cubes", type=Range(int), default="8-11", help="Number of cubes of a shape.")
-@option(
-    "--shapes",
-    type=click.Choice(["chain", "tree"]),
-    default="chain",
-    help="chain: self-avoiding chains of cubes; tree: shapes that may branch.",
-)
-@option(
-    "--distractors",
-    type=click.Choice(["other", "near", "mirror", "matched", "mirror-pair", "mixed"]),
-    default="mixed",
-    help="Wrong answers. other: different shapes; near: one cube moved; mirror: a mirror image and"
-    " a near shape; matched: different shapes with like outlines; mirror-pair: two views of the"
-    " mirror image; mixed: each question one of these.",
-)
-@option("--answers", type=int, default=3, help="Number of answers, 3 or 2; one of them is right.")
-@option(
-    "--min-angle",
-    "min_angle_degrees",
-    type=float,
-    default=30,
-    help="Smallest rotation between the reference's view and an answer's, and between two views of"
-    " one shape, in degrees.",
-)
-@option(
-    "--min-sight-angle",
-    "min_sight_angle_degrees",
-    type=float,
-    help="Smallest angle between the lines of sight of these views, in degrees: nearer views, and"
-    " views from behind, have outlines that are alike [default: 40; 0 with v2 and paper].",
-)
-@option(
-    "--min-cube-pixels",
-    type=int,
-    help="Smallest number of pixels that show a cube [default: 30 at 128x128 and radius 3.5].",
-)
-@option("--max-radius", type=float, help="Largest radius of a shape, in cube edges [default: 3.5].")
-@command_line.SIZE
-@option("--background", type=Color(), default="white", help="Background colour.")
-@option("--lights", type=Range(int), default="2", help="Number of lights.")
-@option(
-    "--image-dtype",
-    type=click.Choice(["uint8", "float16", "float32"]),
-    help="Type of stored radiance [default: uint8; float32 with --preset v2].",
-)
-@option("--with-depth", is_flag=True, help="Store planar depth as well.")
-@command_line.COMPRESSION
-@option(
-    "--batch",
-    type=click.IntRange(1, 4096),
-    default=64,
-    help="Questions that a process renders at once.",
-)
-@command_line.WORKERS
-@option(
-    "--shard-size",
-    type=int,
-    default=10_000,
-    help="Most questions of one file; more go to files beside it, which it shows as one.",
-)
-@command_line.SCHEDULER
-@command_line.DEVICE
-@command_line.OVERWRITE
-def make_split(
-    out: str,
-    preset: str,
-    size: tuple[int, int],
-    batch: int,
-    workers: int,
-    shard_size: int,
-    scheduler: str | None,
-    device: str,
-    compression: str,
-    overwrite: bool,
-    secret_seed: str | None,
-    **settings: Any,
-) -> None:
-    """Make a split of mental-rotation questions for training, validation and testing.
-
-    A question has a reference and answers, one of which shows the same shape. Every cube of a shape
-    shows in every picture. No shape, nor its mirror image, is in two of training, validation and
-    test, whatever the settings. Where a run with shards was ended, the same command goes on.
-    """
-    from iqtt.files import make
-    from iqtt.files.shards import ALL_FILES
-    from iqtt.questions import specs
-    from scenegen.common.errors import SpecError
-    from scenegen.common.places import as_place
-    from scenegen.rendering.sameness import renderer_identity
-
-    suite, context = preset == "suite", click.get_current_context()
-    given = click.core.ParameterSource.DEFAULT
-    if secret_seed is not None:
-        if context.get_parameter_source("seed") is not given:
-            raise SpecError("--secret-seed", "--seed as well", "only one of the two")
-        folders = [Path(out) / name for name in specs.SUITE] if suite else [Path(out)]
-        refuse_command_inputs(folder / name for folder in folders for name in ALL_FILES)
-        settings["seed"] = specs.secret_seed(secret_seed)
-    for name in ("distractors", "answers") if suite else ():
-        if context.get_parameter_source(name) is not given:
-            raise SpecError(f"--{name}", "--preset suite as well", "only one of the two")
-    chosen = {name: value for name, value in settings.items() if value is not None}
-    spec = specs.preset_spec(preset, height=size[0], width=size[1], **chosen)
-    splits = len(specs.SUITE) if suite else 1
-    count = splits * (spec.train + spec.val + spec.test)
-    started = time.perf_counter()
-    with (
-        command_line.on_scheduler(
-            scheduler, workers, partial(renderer_identity, device)
-        ) as cluster,
-        progress_bar(count, "question") as bar,
-    ):
-        tally = (make.make_suite if suite else make.make_split)(
-            out,
-            spec,
-            batch=batch,
-            workers=workers,
-            shard_size=shard_size,
-            cluster=cluster,
-            device=device,
-            compression=compression,
-            overwrite=overwrite,
-            command=command_line.creation_command("iqtt"),
-            secret=secret_seed is not None,
-            progress=bar.update,
-        )
-    seconds = time.perf_counter() - started
-    megabytes = sum(path.stat().st_size for path in as_place(out).rglob("*.h5")) / 1e6
-    print_line(
-        f"{out}: {f'{splits} splits of ' if suite else ''}{spec.train} + {spec.val} + {spec.test}"
-        f" questions ({spec.labeled} of training labelled), {megabytes:.1f} MB,"
-        f" {count / seconds:.0f} questions/s"
-    )
-    print_line(
-        f"{out}: {tally.refused / max(1, tally.proposed):.0%} of {tally.proposed} proposed views"
-        f" hid a cube and were refused"
-    )
-    if spec.test and secret_seed is None:
-        click.echo(KNOWN_SEED, err=True)
 
 
 @click.command(
@@ -313,20 +127,6 @@ def audit(
     ctx.exit(0 if all(one.passed for one in found) else 1)
 
 
-@click.command(epilog=f"{EXAMPLE}iqtt merge iqtt-split/iqtt-train.h5 --out iqtt-train.h5")
-@click.argument("file", type=QUESTIONS)
-@click.option("--out", type=OutputPath(), required=True, help="File to write.")
-@command_line.OVERWRITE
-def merge(file: str, out: str, overwrite: bool) -> None:
-    """Make one file of questions that were written to several."""
-    from iqtt.audit.table import find_tables
-    from iqtt.files.merge import merge_questions
-
-    with progress_bar(sum(one.count for one in find_tables([file])), "question") as bar:
-        count = merge_questions(file, out, overwrite, bar.update)
-    print_line(f"{out}: {count} questions, {Path(out).stat().st_size / 1e6:.1f} MB")
-
-
 @click.command(epilog=f"{EXAMPLE}iqtt verify iqtt-split --items 20")
 @click.argument("folder", type=InputPath(within=(".h5",)))
 @option(
@@ -365,4 +165,4 @@ def verify(
     ctx.exit(1 if failed else 0)
 
 
-COMMANDS = (make_split, merge, show, info, verify, audit)
+COMMANDS = (show, info, verify, audit)

@@ -1,36 +1,22 @@
-"""Commands that make, show, check and export files of rooms.
+"""Commands that show, check and export files of rooms.
 
 Each one parses its options, makes one library call, and prints. Heavy imports happen inside.
 """
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 from scenegen.common.command_line import (
-    COMPRESSION,
     DEVICE,
     EXAMPLE,
-    IMAGE_DTYPE,
     MESHES,
     OVERWRITE,
-    SCHEDULER,
-    SEED,
-    WORKERS,
-    Color,
     Items,
-    Names,
-    Numbers,
-    Range,
-    Size,
-    creation_command,
     needs,
-    on_scheduler,
     print_line,
     progress_bar,
 )
@@ -38,194 +24,6 @@ from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_co
 
 SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
 SHARED = ("parquet", "webdataset")  # and of files of many
-
-
-# fmt: off
-@click.command(
-    epilog=f"{EXAMPLE}scenegen render --n 1000 --preset shapenet --seed 1 --out rooms.h5"
-)
-@click.option("--n", "count", type=int, required=True, help="Number of scenes.")
-@click.option("--out", type=OutputPath(), default="rooms.h5", show_default=True,
-              help="File to write, or a URL such as s3://bucket/rooms.h5.")
-@click.option("--preset", default="shapes", show_default=True,
-              help="Settings to start from, as `scenegen presets` lists them.")
-@SEED
-@click.option("--size", type=Size(), help="Image size in pixels [128].")
-@click.option("--objects", type=Range(int), help="Number of objects in a scene [1-3].")
-@click.option("--shapes", type=Names(), help="Basic shapes to draw from, such as box,sphere [all].")
-@click.option("--classes", type=Names(), help="Object classes to draw from, such as mug,bowl.")
-@click.option("--object-split", type=click.Choice(["all", "train", "val", "test"]),
-              help="Which models of a class to draw from [all].")
-@MESHES
-@click.option("--object-radius", type=Range(float),
-              help="Bounding radius of objects in scene units; with several views the default is a"
-              " quarter smaller [0.11-0.22].")
-@click.option("--pose", type=click.Choice(["resting", "any"]),
-              help="Whether objects lie as they would stay, or are turned at random [resting].")
-@click.option("--views", type=Numbers(),
-              help="Views of each scene, in degrees about the vertical axis from the first view,"
-              " such as 0,5,35,55,80 [0].")
-@click.option("--min-visible-pixels", type=int,
-              help="Fewest pixels that show an object, in every view [0.3%].")
-@click.option("--allow-cropped", is_flag=True, default=None,
-              help="Let the image's border cut objects.")
-@click.option("--reflectance", type=Color(),
-              help="Reflectance of objects; also of the room, without --room-reflectance [0.8].")
-@click.option("--room-reflectance", type=Color(), help="Reflectance of floor and walls.")
-@click.option("--random-reflectance/--same-reflectance", default=None,
-              help="Whether each object gets a random colour or all the same [same].")
-@click.option("--specular", type=Range(float), help="Phong's coefficient k_s of objects [0].")
-@click.option("--shininess", type=Range(float), help="Phong's exponent of objects [1].")
-@click.option("--lights", type=Range(int), help="Number of lights in a scene [1-3].")
-@click.option("--light-saturation", type=float,
-              help="How coloured lights are, from 0 (white) to 1 [0.7].")
-@click.option("--light-level", type=float,
-              help="Radiance of a white surface at the target that faces all lights [0.95].")
-@click.option("--light-radius", type=float,
-              help="Distance of lights from the target, scene units [2.5].")
-@click.option("--ambient", type=Color(), help="Ambient light L_a [0.1].")
-@click.option("--attenuation", type=Numbers(),
-              help="k_l,k_q: how light falls off with distance and its square [0.5,0.5].")
-@click.option("--shading", type=click.Choice(["paper", "path"]),
-              help="The paper's shading equation, or path tracing, with shadows and indirect light;"
-              " slower [paper].")
-@click.option("--shadows/--no-shadows", default=None, help="Whether objects cast shadows [no].")
-@click.option("--spp", type=int,
-              help="Colour samples per pixel; with --shading path, 64 by default [1].")
-@click.option("--fov", "fov_degrees", type=float,
-              help="Field of view of a square image, degrees [28].")
-@click.option("--camera-radius", type=float,
-              help="Distance of cameras from the target, scene units [1.5].")
-@IMAGE_DTYPE
-@COMPRESSION
-@click.option("--batch", type=int, default=64, show_default=True,
-              help="Images that a process renders at once; more take more memory.")
-@WORKERS
-@click.option("--shard-size", type=int, default=10_000, show_default=True,
-              help="Most scenes of one file; more go to files beside --out, which shows them all as"
-              " one.")
-@SCHEDULER
-@DEVICE
-@OVERWRITE
-def render(
-    count: int,
-    out: str,
-    preset: str,
-    size: tuple[int, int] | None,
-    batch: int,
-    workers: int,
-    shard_size: int,
-    scheduler: str | None,
-    device: str,
-    compression: str,
-    overwrite: bool,
-    **settings: Any,
-) -> None:
-    """Render rooms with objects to an HDF5 file, with exact ground truth.
-
-    Every image comes with its depth, normals, object ids, camera, lights and scene description.
-    Square brackets hold the defaults, which presets may change. Where a run with several files was
-    ended, the same command goes on.
-    """
-    from scenegen.description.presets import preset_spec
-    from scenegen.objects.sources import object_source
-    from scenegen.rendering.sameness import renderer_identity
-    from scenegen.rooms.make import make_dataset
-
-    names = ("shapes", "classes", "object_split", "shapenet_root", "objects_root", "up")
-    objects = {name: settings.pop(name) for name in (*names, "cache_dir")}
-    chosen = {name: value for name, value in settings.items() if value is not None}
-    if size is not None:
-        chosen["height"], chosen["width"] = size
-    source = object_source(preset, **objects)
-    spec = preset_spec(preset, **chosen, **source.settings)
-    images = count * len(spec.views)
-    started = time.perf_counter()
-    with (
-        _told_how_to_go_on(out),
-        on_scheduler(scheduler, workers, partial(renderer_identity, device)) as cluster,
-        progress_bar(images, "image") as bar,
-    ):
-        make_dataset(
-            out,
-            spec,
-            count,
-            batch=batch,
-            workers=workers,
-            shard_size=shard_size,
-            device=device,
-            compression=compression,
-            overwrite=overwrite,
-            command=creation_command("scenegen"),
-            objects=source.objects,
-            cluster=cluster,
-            progress=bar.update,
-        )
-    seconds = time.perf_counter() - started
-    megabytes = _set_bytes(out) / 1e6
-    print_line(f"{out}: {images} images, {megabytes:.1f} MB, {images / seconds:.0f} images/s")
-    for line in source.notes():
-        print_line(line, err=True)
-
-
-# fmt: on
-def _set_bytes(out: str) -> int:
-    """Return the size of a file of rooms and of its shards, if it has any."""
-    from scenegen.common.hdf5.shards import set_name
-    from scenegen.common.places import as_place, listing
-
-    place = as_place(out)
-    files = [one for one in listing(place.parent) if set_name(one.name) == place.name]
-    return sum(file.stat().st_size for file in (place, *files))
-
-
-@contextmanager
-def _told_how_to_go_on(out: str) -> Iterator[None]:
-    """Say which shards are complete, and what to do, where the block is ended from outside."""
-    from scenegen.common.errors import FileFormatError
-    from scenegen.common.sets.manifest import manifest_path, read_manifest
-
-    try:
-        yield
-    except KeyboardInterrupt:
-        with suppress(OSError, FileFormatError):
-            found = read_manifest(manifest_path(out))
-            if not found.complete:
-                done, all_ = len(found.shards), -(-found.count // found.shard_size)
-                told = f"{done} of {all_} shards are complete; the same command goes on"
-                print_line(f"{out}: {told}", err=True)
-        raise
-
-
-@click.command(epilog=f"{EXAMPLE}scenegen merge rooms.h5 --out one.h5")
-@click.argument("file", type=InputPath())
-@click.option("--out", type=OutputPath(), required=True, help="File to write.")
-@OVERWRITE
-def merge(file: str, out: str, overwrite: bool) -> None:
-    """Make one file of rooms that were rendered to several."""
-    from scenegen.rooms.merge import merge_rooms
-    from scenegen.rooms.reader import RoomsFile
-
-    with RoomsFile(file) as rooms:
-        count = len(rooms)
-    with progress_bar(count, "image") as bar:
-        merge_rooms(file, out, overwrite, bar.update)
-    print_line(f"{out}: {count} images, {Path(out).stat().st_size / 1e6:.1f} MB")
-
-
-@click.command(epilog=f"{EXAMPLE}scenegen presets")
-def presets() -> None:
-    """List the presets of `render` with their settings: the paper's data sets."""
-    from scenegen.description.presets import PRESETS
-
-    def shown(value: Any) -> str:
-        return ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
-
-    width = max(map(len, PRESETS))
-    for name, preset in PRESETS.items():
-        print_line(f"{name:{width}}  {preset.meaning}")
-        options = (f"{key} {shown(value)}" for key, value in preset.settings.items())
-        print_line(f"{'':{width}}  {', '.join(options) or 'the defaults'}")
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen preview rooms.h5 --random 12 --out sheet.png")
@@ -430,4 +228,4 @@ def _folder_made(folder: Path) -> Iterator[None]:
         raise
 
 
-COMMANDS = (render, merge, presets, preview, info, verify, export)
+COMMANDS = (preview, info, verify, export)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from benchmarks.torture_runs import Torture
+from benchmarks.torture.runs import Torture
 
 MANY = "render --n 600 --size 32 --min-visible-pixels 3 --shard-size 2 --seed 3 --out rooms.h5"
 LONG = (

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from benchmarks.torture_runs import Torture, contents
+from benchmarks.torture.runs import Torture, contents
 
 # A clock that jumps 400 days ahead or back whenever it is read, as a library that is loaded first.
 # Time that only counts on, which Python takes to measure durations, is left as it is.

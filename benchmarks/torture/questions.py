@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from benchmarks.torture_runs import Torture, contents
+from benchmarks.torture.runs import Torture, contents
 
 WORDS = (
     "make-split --out split --train 120 --labeled 50 --val 30 --test 60 --shard-size 20 --seed 3"

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from distributed import LocalCluster
 
-from benchmarks.torture_runs import Torture, contents
+from benchmarks.torture.runs import Torture, contents
 
 ANY = "127.0.0.1:0"
 

@@ -18,11 +18,11 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from benchmarks.torture_cluster import cluster
-from benchmarks.torture_growth import growth
-from benchmarks.torture_questions import questions
-from benchmarks.torture_runs import EVENTS, Torture, contents
-from benchmarks.torture_surroundings import clock, pipes, read_only
+from benchmarks.torture.cluster import cluster
+from benchmarks.torture.growth import growth
+from benchmarks.torture.questions import questions
+from benchmarks.torture.runs import EVENTS, Torture, contents
+from benchmarks.torture.surroundings import clock, pipes, read_only
 
 
 def kills(torture: Torture, count: int) -> Iterator[tuple[str, str]]:
