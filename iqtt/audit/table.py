@@ -280,6 +280,8 @@ def _scan_images(
 ) -> tuple[list[tuple[Array, ...]], bytes]:
     """Return what `_scan` finds in these rows, `chunk` at a time, and the digests of the rows."""
     scans, digest = [], ColumnDigest(keep_rows=True)
+    for path in filter(None, (source.path, source.answers)):
+        trial.try_file(path)  # a worker of a cluster has not seen it
     with source.open() as questions:
         for start in range(rows.start, rows.stop, chunk):
             stop = min(start + chunk, rows.stop)

@@ -25,9 +25,8 @@ from iqtt.render import DEFAULT_BATCH
 from scenegen.common.hdf5.shards import MOST_SHARDS, opened
 from scenegen.common.new_file import EXISTS
 from scenegen.common.new_folder import check_folder, folder_written_beside
-from scenegen.common.places import as_place, is_remote
+from scenegen.common.places import as_place, check_store, is_remote
 from scenegen.common.records import check
-from scenegen.common.sets.manifest import read_manifest
 from scenegen.common.workers.cluster import Cluster
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.renderer import useful_workers
@@ -78,11 +77,12 @@ def make_split(
     """
     count = spec.train + spec.val + spec.test
     check(count > 0, "train, val and test", count, "at least 1 question in all")
-    least = max(1, -(-count // MOST_SHARDS))
-    check(least <= shard_size, "shard-size", shard_size, f"at least {least} for so many questions")
+    check(shard_size >= 1, "shard-size", shard_size, "at least 1")
     variant = select_variant(device)
     workers = workers or useful_workers(count * (1 + spec.answers), variant)
     place, tally = as_place(folder), Tally()
+    least = -(-max(spec.train, spec.test, spec.val) // (MOST_SHARDS - 1))  # two parts of training
+    check(least <= shard_size, "shard-size", shard_size, f"at least {least} for so many questions")
     tasks = file_tasks(spec, shard_size)
     in_shards = bool(cluster) or is_remote(place) or any(task.is_shard for task in tasks)
     if not is_remote(place):
@@ -96,14 +96,14 @@ def make_split(
             place.mkdir(exist_ok=True)
         if cluster:
             place = place.absolute()  # workers are in other folders
-        files = SplitFiles(place, work, public, private)
+        files = SplitFiles(place, work, public, private, shard_size)
         complete_split(
-            files, tasks, shard_size, tally,
+            files, tasks, tally,
             cluster=cluster, overwrite=overwrite, progress=progress,
         )  # fmt: skip
         return tally
     with folder_written_beside(place, _own_files(place), overwrite) as temporary:
-        files = SplitFiles(temporary, work, public, private)
+        files = SplitFiles(temporary, work, public, private, shard_size)
         blocks = [block for task in tasks for block in task.blocks]
         with closing(work.in_order(blocks, tally)) as made:
             for task in tasks:
@@ -151,47 +151,52 @@ def make_suite(
         for name, (kind, answers) in SUITE.items()
     }
     home, device = as_place(folder), options.get("device", "auto")
+    if is_remote(home):
+        check_store(home / MANIFEST)
     waiting = {
         name: own
         for name, own in specs.items()
         if overwrite or not _is_made(home / name, own, device)
     }
-    if not waiting:
-        raise FileExistsError(errno.EEXIST, EXISTS, str(home))
     if not is_remote(home):
         for name in waiting if home.exists() else ():
             begun = (home / name / MANIFEST).exists()
             check_folder(home / name, _own_files(home / name), overwrite or begun)
     for own in waiting.values():
         make_pools(own)
-    if not is_remote(home):
+    if waiting and not is_remote(home):
         home.mkdir(exist_ok=True)
-    total = Tally()
+    total, made = Tally(), 0
     try:
         for name, own in waiting.items():
-            total.add(make_split(home / name, own, overwrite=overwrite, **options))
+            try:
+                total.add(make_split(home / name, own, overwrite=overwrite, **options))
+                made += 1
+            except FileExistsError:  # in shards, and complete
+                if overwrite or not (home / name / MANIFEST).exists():
+                    raise
     finally:
         if not is_remote(home):
             with suppress(OSError):  # it stays if anything is in it
                 home.rmdir()
+    if not made:
+        raise FileExistsError(errno.EEXIST, EXISTS, str(home))
     return total
 
 
 def _is_made(folder: Path, spec: SplitSpec, device: str) -> bool:
-    """Return whether an earlier run of the suite completed this split.
+    """Return whether an earlier run of the suite completed this split, without shards.
 
     Raises SpecError where another seed made it.
     """
-    manifest, files = folder / MANIFEST, [folder / name for name in ALL_FILES]
-    if manifest.exists() and not read_manifest(manifest).complete:
-        return False
-    if not all(file.is_file() for file in files):
+    files = [folder / name for name in ALL_FILES]
+    if (folder / MANIFEST).exists() or not all(file.is_file() for file in files):
         return False
     for path in files[:-1]:  # the last one may tell the seed
         with opened(path) as file:
             if file.attrs.get("spec") != spec.public().to_json():
                 return False
     work = Work(spec, make_pools(spec), 1, 1, device, "gzip")
-    whole = file_tasks(spec, spec.train + spec.val + spec.test)
-    SplitFiles(folder, work, {}, {}).confirm(next(task for task in whole if task.items))
+    size = spec.train + spec.val + spec.test
+    SplitFiles(folder, work, {}, {}, size).confirm(file_tasks(spec, size))
     return True

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Generator, Sequence
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,7 @@ from scenegen.common.hdf5.shards import (
 from scenegen.common.sets.making import Task, check_shared, complete_set, other_request, record_file
 from scenegen.common.sets.manifest import FORMAT, Manifest, ShardRecord
 from scenegen.common.workers.cluster import Cluster
+from scenegen.rendering.backend import VERSION_ATTRIBUTES
 
 ANSWERS = "iqtt-test-answers.h5"
 FILES = {
@@ -99,12 +100,37 @@ class SplitFiles:
         folder: where they go.
         public, private: root attributes of files that are handed out, and of the file of the
             answers to the test.
+        size: largest number of questions in a file.
     """
 
     folder: Path
     work: Work
     public: dict[str, Any]
     private: dict[str, Any]
+    size: int
+
+    @property
+    def asked(self) -> Manifest:
+        """The manifest of the request, which tells no seed and no command."""
+        secret = "yes" if self.private["spec"] == self.public["spec"] else "no"
+        names = ("variant", *VERSION_ATTRIBUTES)
+        settings = {"compression": self.work.compression, "format_version": FORMAT_VERSION}
+        settings |= {"writer": writer_name(), "secret-seed": secret}
+        settings |= {name: self.public[name] for name in names}
+        spec, told = self.work.spec, tuple(sorted(settings.items()))
+        count = spec.train + spec.val + spec.test
+        return Manifest(
+            FORMAT, FORMAT_NAME, ALL_FILES, spec.public().to_json(), count, self.size, told, "",
+            False, (),
+        )  # fmt: skip
+
+    def of_run(self, manifest: Manifest) -> "SplitFiles":
+        """Return the same files with the command that complete files of answers tell, if any."""
+        for shard in manifest.shards_of(ANSWERS):
+            with opened(self.folder / shard.file) as file:
+                command = str(file.attrs.get("creation_command", ""))
+            return replace(self, private={**self.private, "creation_command": command})
+        return self
 
     def write(
         self,
@@ -139,7 +165,7 @@ class SplitFiles:
 
     def elsewhere(self, task: FileTask) -> tuple[list[ShardRecord], Tally]:
         """Write the files of a task; to be called by a worker of a cluster."""
-        check_shared(self.folder / MANIFEST)
+        check_shared(self.folder / MANIFEST, self.asked)
         work = self.work.on_cluster()
         tally = Tally()
         made = (some for block in task.blocks for some in work.questions(block, tally))
@@ -195,15 +221,21 @@ class SplitFiles:
     def _attributes(self, name: str, split: str) -> dict[str, Any]:
         return {**(self.private if name == ANSWERS else self.public), "split": split}
 
-    def confirm(self, task: FileTask) -> None:
-        """Make the first question of files that are kept again.
+    def confirm(self, kept: Sequence[FileTask]) -> None:
+        """Make one question of each split again, the first one of files that are kept.
 
         The seed is neither in the manifest nor in the file of the questions. Raises SpecError where
         another seed made them.
         """
-        block = next((block for block in task.blocks if block.rows), None)
-        if block is None:
-            return
+        first: dict[str, tuple[FileTask, Block]] = {}
+        for task in kept:
+            for block in task.blocks:
+                if block.rows:
+                    first.setdefault(block.split, (task, block))
+        for task, block in first.values():
+            self._confirm(task, block)
+
+    def _confirm(self, task: FileTask, block: Block) -> None:
         row = block.first + block.rows.start
         work = self.work
         question = render_question(work.spec, work.pools, block.split, row, work.device).question
@@ -229,7 +261,6 @@ def _add_stored(mark: Fingerprint, truth: h5py.Group) -> None:
 def complete_split(
     files: SplitFiles,
     tasks: Sequence[FileTask],
-    size: int,
     tally: Tally,
     *,
     cluster: Cluster | None,
@@ -239,36 +270,29 @@ def complete_split(
     """Make the files of a split that earlier runs of the same request have not made.
 
     Args:
-        size: largest number of questions in a file.
         tally: gets what is proposed now.
         cluster: whose workers make the files; None for processes of this machine.
 
     Raises as `complete_set`.
     """
     work = files.work
-    names = ("variant", "mitsuba_version", "drjit_version", "llvm_version")
-    settings = {"compression": work.compression, "format_version": FORMAT_VERSION}
-    settings |= {"writer": writer_name(), **{name: files.public[name] for name in names}}
-    count = sum(task.items for task in tasks)
-    asked = Manifest(
-        FORMAT, FORMAT_NAME, ALL_FILES, work.spec.public().to_json(), count, size,
-        tuple(sorted(settings.items())), "", False, (),
-    )  # fmt: skip
 
-    def make(_: Manifest, missing: Sequence[FileTask]) -> Generator[list[ShardRecord]]:
+    def make(manifest: Manifest, missing: Sequence[FileTask]) -> Generator[list[ShardRecord]]:
+        own = files.of_run(manifest)
         if cluster is None:
             blocks = [block for task in missing for block in task.blocks]
             with closing(work.in_order(blocks, tally)) as made:
                 for task in missing:
-                    yield files.write(task, made, progress)
+                    yield own.write(task, made, progress)
                 next(made, None)  # there is none; so workers end by themselves
             return
-        for records, found in cluster.in_any_order(files.elsewhere, missing):
+        for records, found in cluster.in_any_order(own.elsewhere, missing):
             tally.add(found)
             progress(records[0].rows)
             yield records
 
     complete_set(
-        files.folder / MANIFEST, asked, tasks, make, files.join,
+        files.folder / MANIFEST, files.asked, tasks, make,
+        lambda manifest: files.of_run(manifest).join(manifest),
         overwrite=overwrite, confirm=files.confirm, progress=progress,
     )  # fmt: skip

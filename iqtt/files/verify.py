@@ -10,11 +10,12 @@ import numpy as np
 
 from iqtt.files.layout import FORMAT_VERSION
 from iqtt.files.reader import AnswersFile, QuestionsFile, parts
-from iqtt.files.shards import ANSWERS, FILES, MANIFEST
+from iqtt.files.shards import ALL_FILES, ANSWERS, FILES, MANIFEST
 from iqtt.files.tables import TableFile
 from iqtt.questions.distractors import make_pools
 from iqtt.questions.specs import SPLITS, SplitSpec
 from iqtt.render import groups, render_question
+from scenegen.common.errors import FileFormatError
 from scenegen.common.hdf5.row_file import digest_problems
 from scenegen.common.hdf5.shards import opened_with_shards, stored_array
 from scenegen.common.sets.manifest import Manifest, read_manifest, wrong_files
@@ -58,6 +59,9 @@ def verify_split(
 def _against_manifest(
     folder: Path, manifest: Manifest, progress: Callable[[int], Any]
 ) -> list[Check]:
+    if set(manifest.files) != set(ALL_FILES):
+        found = ", ".join(manifest.files)
+        raise FileFormatError(folder / MANIFEST, found[:80], "the files of a split")
     told = "every file is complete"
     whole = [] if manifest.complete else ["the split is not complete"]
     wrong = wrong_files(folder, manifest, progress)

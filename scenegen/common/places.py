@@ -4,14 +4,18 @@ A URL is a `UPath`, which has the methods of a `Path` for any store that fsspec 
 """
 
 import errno
+import hashlib
 import os
+import re
 import secrets
+import time
 from pathlib import Path
 from typing import Any, cast
 
 from scenegen.common.errors import SceneGenError
 
 SEPARATOR = "://"
+TRIES = 3  # of an upload
 
 
 def as_place(path: str | Path) -> Path:
@@ -24,6 +28,9 @@ def as_place(path: str | Path) -> Path:
         return path
     if SEPARATOR not in path:
         return Path(path)
+    if re.match(r"[^/]+://[^/]*@", path):
+        kind, expected = path.partition(SEPARATOR)[0], "a URL without one: the store has variables"
+        raise SceneGenError(f"{kind}{SEPARATOR}...", "a user or a password", expected)
     try:
         from upath import UPath
     except ImportError as error:
@@ -58,12 +65,28 @@ def listing(folder: Path) -> list[Path]:
 
 
 def upload(file: Path, place: Path) -> None:
-    """Copy a complete file to a remote place. Raises OSError where the store refuses."""
-    remote = cast("Any", place)
-    try:
-        remote.fs.put_file(str(file), remote.path)
-    except Exception as error:  # each store has errors of its own
-        raise _refused(place, error) from error
+    """Copy a complete file to a remote place, and read it back.
+
+    Raises OSError where the store refuses TRIES times, or gives other bytes back.
+    """
+    remote, tries = cast("Any", place), 0
+    while True:
+        tries += 1
+        try:
+            remote.fs.put_file(str(file), remote.path)
+            with file.open("rb") as ours, place.open("rb") as theirs:
+                same = _digest(ours) == _digest(theirs)
+            break
+        except Exception as error:  # each store has errors of its own
+            if tries == TRIES:
+                raise _refused(place, error) from error
+            time.sleep(2.0**tries)
+    if not same:
+        raise OSError(errno.EIO, "the store gives other bytes back than it was sent", str(place))
+
+
+def _digest(file: Any) -> bytes:
+    return hashlib.file_digest(file, "sha256").digest()
 
 
 def check_store(place: Path) -> None:

@@ -39,11 +39,12 @@ _EXPECTED = {
 }
 
 
-def from_json(cls: type[T], text: str | bytes, what: str) -> T:
+def from_json(cls: type[T], text: str | bytes, what: str, most: int = LONGEST_JSON) -> T:
     """Build a dataclass, nested ones and tuples included, from what `to_json` wrote.
 
     Types must be exact, but a whole number may stand for a float. Floats are finite and of at
-    most `LARGEST`. Errors that belong to none of the fields name the record `what`.
+    most `LARGEST`. The text has at most `most` characters. Errors that belong to none of the
+    fields name the record `what`.
 
     Raises SpecError, naming the field, where the text is no JSON, where a field is missing,
     unknown or of another type, and where the dataclass itself refuses the values.
@@ -51,7 +52,7 @@ def from_json(cls: type[T], text: str | bytes, what: str) -> T:
     from pydantic_core import ValidationError
 
     # pydantic keeps an error for each unknown field, so the text is bounded, not only the fields.
-    check(len(text) <= LONGEST_JSON, what, f"{len(text):,} characters", f"at most {LONGEST_JSON:,}")
+    check(len(text) <= most, what, f"{len(text):,} characters", f"at most {most:,}")
     mark = "\ufeff" if isinstance(text, str) else b"\xef\xbb\xbf"
     try:
         record: T = _validator(typing.cast(Any, cls)).validate_json(text.removeprefix(mark))  # type: ignore[arg-type]

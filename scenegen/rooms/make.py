@@ -9,6 +9,8 @@ from scenegen.common.hdf5.shards import MOST_SHARDS
 from scenegen.common.new_file import check_writable
 from scenegen.common.places import as_place, check_store, is_remote
 from scenegen.common.records import check
+from scenegen.common.sets.making import refuse_other_set, remove_set
+from scenegen.common.sets.manifest import manifest_path
 from scenegen.common.workers.cluster import Cluster
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
@@ -88,12 +90,23 @@ def make_dataset(
     if is_remote(place):
         check_store(place)
     check_writable(place, overwrite)
+    manifest = manifest_path(place)
+    if overwrite:
+        refuse_other_set(manifest, (place.name,))
+    else:
+        check_writable(manifest, overwrite=False)  # of a set that was begun here
     with (
         create_rooms(
-            place, spec, count, compression=compression, overwrite=overwrite, attributes=attributes
+            place,
+            work.spec,
+            count,
+            compression=work.compression,
+            overwrite=overwrite,
+            attributes=attributes,
         ) as writer,
         closing(work.in_order([range(count)])) as made,
     ):
         for rows in made:
             writer.extend(rows)
             progress(rows.count)
+    remove_set(manifest, place.name)

@@ -17,7 +17,7 @@ from scenegen.common.hdf5 import input_file, row_file
 from scenegen.common.hdf5.attributes import check_attribute, read_digest, read_text, read_texts
 from scenegen.common.hdf5.content import SHA256, joint_digest
 from scenegen.common.hdf5.input_file import StoredArray
-from scenegen.common.hdf5.shards import JoinedArray, open_with_shards, stored_array
+from scenegen.common.hdf5.shards import JoinedArray, Shard, open_with_shards, stored_array
 from scenegen.common.records import check
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
@@ -120,6 +120,11 @@ class RoomsFile:
         if self._shards is None:
             return [(self.path, len(self))]
         return [(self.path.parent / shard.file, shard.rows) for shard in self._shards.shards]
+
+    @property
+    def shards(self) -> tuple[Shard, ...]:
+        """The shards of a set, in their order; none of a whole file."""
+        return () if self._shards is None else tuple(self._shards.shards)
 
     def __len__(self) -> int:
         return self._count

@@ -29,11 +29,13 @@ class _Shards:
     Attributes:
         path: the file that shows all of them.
         attributes: root attributes that are not of the request.
+        asked: the manifest of the request.
     """
 
     path: Path
     work: Work
     attributes: dict[str, str]
+    asked: Manifest
 
     def write(
         self, task: Task, made: Generator[PackedRows], progress: Callable[[int], Any]
@@ -60,7 +62,7 @@ class _Shards:
 
     def elsewhere(self, task: Task) -> tuple[ShardRecord, dict[str, str]]:
         """Make a shard, and tell why models were refused; to be called by a worker of a cluster."""
-        check_shared(manifest_path(self.path))
+        check_shared(manifest_path(self.path), self.asked)
         work = self.work.on_cluster()
         with closing(work.rows(_scenes(task))) as made:
             return self.write(task, made, lambda done: None), self.work.objects.problems
@@ -124,8 +126,12 @@ def make_shards(
         for name, some in zip(names if len(names) > 1 else [path.name], scenes, strict=True)
     ]
 
+    def of_run(manifest: Manifest) -> _Shards:
+        told = {**attributes, "creation_command": manifest.command}
+        return _Shards(path, work, told, asked)
+
     def make(manifest: Manifest, missing: Sequence[Task]) -> Generator[list[ShardRecord]]:
-        shards = _Shards(path, work, {**attributes, "creation_command": manifest.command})
+        shards = of_run(manifest)
         if cluster is None:
             with closing(shards.here(missing, progress)) as records:
                 yield from ([record] for record in records)
@@ -136,7 +142,9 @@ def make_shards(
             yield [record]
 
     def join(manifest: Manifest) -> None:
-        _Shards(path, work, {**attributes, "creation_command": manifest.command}).join(manifest)
+        _Shards(path, work, {**attributes, "creation_command": manifest.command}, asked).join(
+            manifest
+        )
 
     complete_set(
         manifest_path(path), asked, tasks, make, join, overwrite=overwrite, progress=progress

@@ -56,23 +56,28 @@ def card_markdown(told: DataDescription) -> str:
     return "\n".join(lines).rstrip() + "\n"
 
 
+def _quoted(value: object) -> str:
+    """Return JSON without pairs of surrogates, which YAML does not know."""
+    return json.dumps(value, ensure_ascii=False)
+
+
 def _header(told: DataDescription) -> list[str]:
     """Return the YAML that Hugging Face reads; JSON is YAML, and quotes what people wrote."""
     publication = told.publication
     short = publication.license.lower()
     known = short in HUGGING_FACE_LICENSES
-    other = [f"license_name: {json.dumps(publication.license)}",
-             f"license_link: {json.dumps(publication.license_address)}"]  # fmt: skip
+    other = [f"license_name: {_quoted(publication.license)}",
+             f"license_link: {_quoted(publication.license_address)}"]  # fmt: skip
     return [
         "---",
-        f"pretty_name: {json.dumps(printable(publication.title))}",
+        f"pretty_name: {_quoted(printable(publication.title))}",
         f"license: {short if known else 'other'}",
         *(() if known else other),
         f"size_categories: [{next((name for n, name in SIZES if told.rows < n), 'n>1M')}]",
-        f"tags: {json.dumps(list(told.keywords))}",
+        f"tags: {_quoted(list(told.keywords))}",
         "configs:",
         "- config_name: index",
-        f"  data_files: {json.dumps(told.index_file)}",
+        f"  data_files: {_quoted(told.index_file)}",
         "---",
         "",
     ]

@@ -11,6 +11,7 @@ import numpy as np
 from scenegen.common.errors import FileFormatError
 from scenegen.common.hdf5.content import column_digest, row_digest
 from scenegen.common.hdf5.shards import cut
+from scenegen.layout import FIELDS
 from scenegen.rooms.reader import RoomsFile, RowBlock
 from scenegen.sharing.columns import decoded
 from scenegen.sharing.description import IndexColumn
@@ -115,11 +116,11 @@ def _counted(
 def _lines(rooms: RoomsFile) -> Iterator[dict[str, Any]]:
     """Yield the lines of one file; check at the end that its digests are those that are stored."""
     places = ((path.name, row) for path, count in rooms.parts for row in range(count))
-    found = {name: bytearray() for name in DIGESTS}
+    found = {field.name: bytearray() for field in FIELDS}
     for some in cut(len(rooms), READ_ROWS):
         block = RowBlock(rooms, some)
         for row in some:
-            digests = {name: row_digest(block.read(name, row)) for name in DIGESTS}
+            digests = {name: row_digest(block.read(name, row)) for name in found}
             for name, digest in digests.items():
                 found[name] += digest
             part, part_row = next(places)
@@ -131,7 +132,7 @@ def _lines(rooms: RoomsFile) -> Iterator[dict[str, Any]]:
                 "height": rooms.spec.height,
                 "width": rooms.spec.width,
                 **_described(block, row, f"{rooms.path}: object/model"),
-                **{f"{name}_sha256": digest.hex() for name, digest in digests.items()},
+                **{f"{name}_sha256": digests[name].hex() for name in DIGESTS},
             }
     for name, stored in rooms.stored_digests().items():
         if name in found and column_digest([bytes(found[name])]) != stored:

@@ -216,11 +216,22 @@ def _dataset_faults(name: str, dataset: Any) -> Iterator[Fault]:
         yield Fault(name, "written", found, "chunks of the size that their shape has")
 
 
-def virtual_sources(dataset: h5py.Dataset) -> set[tuple[str, str]]:
-    """Return the files, and the data sets in them, that a virtual data set shows."""
-    listed = dataset.id.get_create_plist()
-    places = range(listed.get_virtual_count())
-    return {(listed.get_virtual_filename(i), listed.get_virtual_dsetname(i)) for i in places}
+def virtual_sources(dataset: h5py.Dataset) -> list[tuple[str, str, int, int]]:
+    """Return what a virtual data set shows: files, data sets in them, first row here, and rows.
+
+    A source of which not all rows are shown in their order has -1 rows.
+    """
+    listed, found = dataset.id.get_create_plist(), []
+    for i in range(listed.get_virtual_count()):
+        name = listed.get_virtual_filename(i), listed.get_virtual_dsetname(i)
+        here, there = listed.get_virtual_vspace(i), listed.get_virtual_srcspace(i)
+        (first, *low), (last, *high) = here.get_select_bounds()
+        rows, shape = last - first + 1, here.get_simple_extent_dims()[1:]
+        whole = not any(low) and tuple(high) == tuple(size - 1 for size in shape)
+        whole &= here.get_select_npoints() == rows * math.prod(shape)
+        whole &= there.get_select_type() == h5py.h5s.SEL_ALL
+        found.append((*name, first, rows if whole else -1))
+    return found
 
 
 def stored_bytes(dataset: Any) -> int:
@@ -313,11 +324,13 @@ class StoredArray:
 
 def _inflated(data: bytes, most: int) -> bytes:
     """Return what gzip's stream holds, a byte more than `most` at most."""
-    unpacker = isal_zlib.decompressobj()
+    unpacker, raw, said = isal_zlib.decompressobj(), b"", ""
     try:
-        raw: bytes = unpacker.decompress(data, most + 1)
+        raw = unpacker.decompress(data, most + 1)
     except isal_zlib.error as error:  # type: ignore[misc]
-        raise ValueError(f"a chunk that is not compressed by gzip: {error}") from error
+        said = str(error)
+    if said:  # without the error itself, which cannot be pickled
+        raise ValueError(f"a chunk that is not compressed by gzip: {said}")
     return raw if unpacker.eof else raw + b" "  # so that its length is wrong, too
 
 

@@ -9,6 +9,7 @@ Each shard has a data set `row_sha256` with the digest of every row of each data
 digests of the set follow from those of its shards, and a damaged row can be named.
 """
 
+import hashlib
 import json
 import re
 from collections import OrderedDict
@@ -25,7 +26,7 @@ from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError
 from scenegen.common.hdf5.axes import name_axes
-from scenegen.common.hdf5.content import CONTENT_DIGEST, SHA256, column_digest, dataset_digest
+from scenegen.common.hdf5.content import CONTENT_DIGEST, SHA256, dataset_digest
 from scenegen.common.hdf5.input_file import (
     StoredArray,
     checking,
@@ -124,7 +125,7 @@ def write_virtual(
             if names is not None:
                 name_axes(file, dataset, ("row", *names))
     for name, digest in _joint_digests(folder, shards).items():
-        file[name].attrs[SHA256] = digest
+        file[name].attrs[SHA256] = digest.hexdigest()
 
 
 def write_list(file: h5py.File, shards: Sequence[Shard]) -> None:
@@ -143,16 +144,22 @@ def opened(place: Path) -> Iterator[h5py.File]:
         yield stack.enter_context(h5py.File(source, "r"))
 
 
-def _joint_digests(folder: Path, shards: Iterable[Shard]) -> dict[str, str]:
-    """Return the `column_digest` of each data set over all shards."""
-    parts: dict[str, list[bytes]] = {}
+def _joint_digests(folder: Path, shards: Iterable[Shard]) -> "dict[str, hashlib._Hash]":
+    """Return the `column_digest` of each data set over all shards.
+
+    Raises FileFormatError where a shard is not the one that was recorded.
+    """
+    found: dict[str, hashlib._Hash] = {}
     for shard in shards:
         with opened(folder / shard.file) as file:
+            if file.attrs.get(CONTENT_DIGEST) != shard.content_digest:
+                hint = "another run has written it meanwhile; say the command again"
+                raise FileFormatError(folder / shard.file, "other content", "that was made", hint)
             digests = file[ROW_DIGESTS]
             values = digests[()]
             for i, name in enumerate(digests.attrs["names"]):
-                parts.setdefault(name, []).append(values[:, i].tobytes())
-    return {name: column_digest(some) for name, some in parts.items()}
+                found.setdefault(name, hashlib.sha256()).update(values[:, i].tobytes())
+    return found
 
 
 def open_with_shards(path: Path, kind: str) -> tuple[h5py.File, "ShardFiles | None"]:
@@ -172,13 +179,20 @@ def open_with_shards(path: Path, kind: str) -> tuple[h5py.File, "ShardFiles | No
         if not is_set:
             return file, None
         shards = _read_list(file[SHARDS], path)
-        names = {shard.file for shard in shards}
+        part_of = {shard.file: shard.part for shard in shards}
         for fault in virtual:
-            own = {(name, fault.name) for name in names}
-            strange = virtual_sources(file[fault.name]) - own
-            if strange:
-                where = f"{path}: {fault.name}"
-                raise FileFormatError(where, f"values from {min(strange)}", "the set's own shards")
+            sources = virtual_sources(file[fault.name])
+            part = part_of.get(sources[0][0]) if sources else None
+            own = [shard for shard in shards if shard.part == part]
+            starts = accumulate((shard.rows for shard in own), initial=0)
+            expected = [
+                (shard.file, fault.name, start, shard.rows)
+                for shard, start in zip(own, starts, strict=False)
+            ]
+            if sources != expected:
+                strange = [f"rows from {one}" for one in sources if one not in expected]
+                where, found_here = f"{path}: {fault.name}", [*strange, "rows in another order"][0]
+                raise FileFormatError(where, found_here, "all rows of its shards, in their order")
         return file, ShardFiles(path, shards, kind)
 
 
@@ -260,7 +274,11 @@ class ShardFiles:
         """Return a data set of a shard, which keeps what it knows of its chunks."""
         file = self.file(number)
         if (number, name) not in self._arrays:
-            self._arrays[number, name] = StoredArray(file[name])
+            stored, rows = StoredArray(file[name]), self.shards[number].rows
+            if len(stored) != rows:
+                where = f"{file.filename}: {name}"
+                raise FileFormatError(where, f"{len(stored)} rows", f"{rows}")
+            self._arrays[number, name] = stored
         return self._arrays[number, name]
 
     def numbers(self, dataset: h5py.Dataset) -> list[int]:

@@ -7,12 +7,12 @@ was completed but is not in the manifest, as the run was killed right then, is m
 import platform
 import time
 from collections.abc import Callable, Generator, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from scenegen.common.errors import SceneGenError, SpecError
+from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.common.hdf5.content import CONTENT_DIGEST
 from scenegen.common.hdf5.shards import opened, set_name
 from scenegen.common.new_file import check_writable
@@ -57,7 +57,7 @@ def complete_set(
     join: Callable[[Manifest], None],
     *,
     overwrite: bool = False,
-    confirm: Callable[[T], None] = lambda task: None,
+    confirm: Callable[[Sequence[T]], None] = lambda kept: None,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> None:
     """Make the files of a set that earlier runs of the same request have not made.
@@ -70,8 +70,8 @@ def complete_set(
         make: makes the files of tasks, and yields the records of each task when it is done. It gets
             the manifest of the run that began the set, whose command all files tell.
         join: writes the files that show shards as one.
-        confirm: is called with one of the tasks whose files are kept, and raises SpecError where
-            these answer another request in a way that the manifest must not tell.
+        confirm: is called with the tasks whose files are kept, and raises SpecError where these
+            answer another request in a way that the manifest does not tell.
         progress: is called with the number of rows that are there already.
 
     Raises SpecError where what is there answers another request, SceneGenError while another run
@@ -83,8 +83,11 @@ def complete_set(
         manifest = _begun(place, asked, tasks, overwrite)
         rows = {record.file: record.rows for record in manifest.shards}
         kept = [task for task in tasks if rows.keys() >= set(task.names)]
-        if kept:
-            confirm(kept[0])
+        confirm(kept)
+        whole = all(place.with_name(name).exists() for name in asked.files)
+        if manifest.complete and len(kept) == len(tasks) and whole:
+            check_writable(place.with_name(asked.files[0]), overwrite=False)
+        manifest = replace(manifest, complete=False)
         for task in kept:
             progress(rows[task.names[0]])
         records, due = list[ShardRecord](), 0.0
@@ -107,12 +110,38 @@ def complete_set(
             remove_leftovers(place.parent)  # of workers that were killed
 
 
-def check_shared(place: Path) -> None:
-    """Raise SceneGenError on a worker that does not see the manifest of its set."""
+def check_shared(place: Path, asked: Manifest) -> None:
+    """Raise SceneGenError on a worker that does not see the manifest of the set that it works on.
+
+    Another folder may have the same name there, or another run may have begun meanwhile.
+    """
+    worker = f"the worker on {platform.node()}"
     if not place.exists():
-        worker = f"the worker on {platform.node()}"
         expected = "a folder that all workers see, or a URL such as s3://bucket/rooms.h5"
         raise SceneGenError(worker, f"no {place}", expected)
+    differences = read_manifest(place).differences(asked)
+    if differences:
+        found = f"{place} of another run ({'; '.join(differences)})"
+        raise SceneGenError(worker, found, "a folder that all workers share, and one run in it")
+
+
+def remove_set(place: Path, file: str) -> None:
+    """Remove what is left of the set that one whole file has just replaced."""
+    place.unlink(missing_ok=True)
+    for path in listing(place.parent):
+        if set_name(path.name) == file:
+            path.unlink(missing_ok=True)
+
+
+def refuse_other_set(place: Path, files: Sequence[str]) -> None:
+    """Raise SpecError where a manifest has the name of ours, but is that of other files."""
+    if not place.exists():
+        return
+    with suppress(FileFormatError):  # a damaged one
+        found = read_manifest(place)
+        if set(found.files) != set(files):
+            told, expected = ", ".join(found.files), f"that of {', '.join(files)}"
+            raise SpecError(place, f"a manifest of {told}", expected, "choose another name")
 
 
 def _begun(place: Path, asked: Manifest, tasks: Sequence[Task], overwrite: bool) -> Manifest:
@@ -122,6 +151,8 @@ def _begun(place: Path, asked: Manifest, tasks: Sequence[Task], overwrite: bool)
     """
     names = {name for task in tasks for name in task.names}
     begun = place.exists()
+    if overwrite and begun:
+        refuse_other_set(place, asked.files)
     if overwrite or not begun:
         taken = [one for one in listing(place.parent) if one.name in names.union(asked.files)]
         for one in taken:
@@ -140,10 +171,7 @@ def _begun(place: Path, asked: Manifest, tasks: Sequence[Task], overwrite: bool)
 
     problems = list(in_threads(problem, records, processors(), 2 * processors()))
     kept = tuple(one for one, wrong in zip(records, problems, strict=True) if wrong is None)
-    whole = all(place.with_name(name).exists() for name in found.files)
-    if found.complete and len(kept) == len(names) and whole:
-        check_writable(place.with_name(found.files[0]), overwrite=False)
-    return replace(found, shards=kept, complete=False)
+    return replace(found, shards=kept)
 
 
 def other_request(where: object, found: str) -> SpecError:

@@ -18,7 +18,7 @@ from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.common.hdf5.shards import set_name
 from scenegen.common.new_file import written_beside
 from scenegen.common.places import as_place, is_remote
-from scenegen.common.records import LONGEST_JSON, check, from_json
+from scenegen.common.records import check, from_json
 from scenegen.common.workers.pool import in_threads, processors
 
 try:
@@ -28,7 +28,7 @@ except ImportError:  # Windows has no such locks
 
 ENDING = ".manifest.json"
 FORMAT = "pix2shape-bench manifest 2"
-MOST_BYTES = LONGEST_JSON
+MOST_BYTES = 20_000_000  # of 20,000 files with long names; read whole
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,16 @@ class Manifest:
     shards: tuple[ShardRecord, ...]
 
     def __post_init__(self) -> None:
+        check(len(self.files) > 0, "files", "none", "at least one")
         for name in self.files:
             _check_name(name)
+        try:
+            request = json.loads(self.spec)
+        except (ValueError, RecursionError):
+            request = None
+        check(isinstance(request, dict), "spec", f"{self.spec!r:.60}", "a JSON object")
+        check(self.count > 0, "count", self.count, "at least 1")
+        check(self.shard_size > 0, "shard_size", self.shard_size, "at least 1")
 
     def differences(self, other: "Manifest") -> list[str]:
         """Return what makes the bytes of another set other ones: `name here, name there`."""
@@ -99,7 +107,9 @@ class Manifest:
 
     def _request(self) -> dict[str, Any]:
         spec = json.loads(self.spec)
-        return {**spec, **dict(self.settings), "n": self.count, "shard-size": self.shard_size}
+        names = {"files": ", ".join(self.files), "kind": self.kind}
+        numbers = {"n": self.count, "shard-size": self.shard_size}
+        return {**spec, **dict(self.settings), **names, **numbers}
 
     def with_shards(self, shards: Iterable[ShardRecord]) -> "Manifest":
         """Return the manifest with more shards."""
@@ -130,15 +140,18 @@ def write_manifest(place: Path, manifest: Manifest) -> None:
 
 def read_manifest(place: Path) -> Manifest:
     """Read a manifest. Raises FileFormatError where it is not one, and OSError."""
+    if not place.is_file():
+        found = "no file" if not place.exists() else "something that is no regular file"
+        raise FileFormatError(place, found, "a manifest")
     with place.open("rb") as file:
         data = file.read(MOST_BYTES + 1)
     try:
-        found = from_json(Manifest, data, "manifest")
+        manifest = from_json(Manifest, data, "manifest", MOST_BYTES)
     except SpecError as error:
         raise FileFormatError(f"{place}: {error.where}", error.found, error.expected) from error
-    if found.format != FORMAT:
-        raise FileFormatError(place, f"format {found.format!r:.60}", FORMAT)
-    return found
+    if manifest.format != FORMAT:
+        raise FileFormatError(place, f"format {manifest.format!r:.60}", FORMAT)
+    return manifest
 
 
 def manifests_in(folder: Path, kind: str) -> list[tuple[Path, Manifest]]:

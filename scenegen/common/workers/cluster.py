@@ -10,8 +10,10 @@ import logging
 import os
 import sys
 import threading
+import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from typing import Any, TypeVar
@@ -26,7 +28,8 @@ LOCAL = "local"
 LOGGING = "DASK_DISTRIBUTED__LOGGING__DISTRIBUTED"  # which Dask's processes read as they start
 AHEAD = 2000  # tasks that the scheduler knows, or whose results were not taken
 BATCH = 200  # tasks that it is told of at once
-PATIENCE = 10  # seconds in which a scheduler must answer
+PATIENCE = 10  # seconds in which a scheduler must answer, or that pass without a worker
+MOMENT = 0.002  # seconds
 _one_at_a_time = threading.Lock()  # Mitsuba and HDF5 take one task in a process
 Versions = Callable[[], Mapping[str, str]]
 
@@ -38,10 +41,12 @@ class Cluster:
     Attributes:
         client: of Dask.
         versions: tells what the results of a process depend on; each worker must say the same.
+        told: is called with a line where there are no workers.
     """
 
     client: Any
     versions: Versions
+    told: Callable[[str], Any]
 
     def in_any_order(self, function: Callable[[Task], T], tasks: Iterable[Task]) -> Generator[T]:
         """Call a function for each task on the workers; yield results as they come.
@@ -51,22 +56,24 @@ class Cluster:
         Raises what the function raises, and SceneGenError where a task has ended several workers,
         or where a worker has other versions.
         """
-        for _, result in self._done(function, tasks):
+        for _, result in self._done(function, tasks, {}):
             yield result
 
     def in_order(self, function: Callable[[Task], T], tasks: Iterable[Task]) -> Generator[T]:
         """Call a function for each task as `in_any_order`, but yield results in order."""
         waiting, following = dict[int, T](), 0
-        for number, result in self._done(function, tasks):
+        for number, result in self._done(function, tasks, waiting):
             waiting[number] = result
             while following in waiting:
                 yield waiting.pop(following)
                 following += 1
 
     def _done(
-        self, function: Callable[[Task], T], tasks: Iterable[Task]
+        self, function: Callable[[Task], T], tasks: Iterable[Task], waiting: Mapping[int, T]
     ) -> Generator[tuple[int, T]]:
+        """Yield results with the numbers of their tasks; `waiting` are those not taken yet."""
         from distributed import KilledWorker, as_completed
+        from distributed.comm import CommClosedError
 
         # The function travels as the result of a task: workers pass it on to each other, and Dask
         # makes it again where all that had it are gone.
@@ -74,21 +81,38 @@ class Cluster:
         numbers, running, numbered = dict[str, int](), as_completed(), enumerate(tasks)
         try:
             while True:
-                if len(numbers) <= AHEAD - BATCH:  # many at once: each message costs milliseconds
-                    some = list(itertools.islice(numbered, BATCH))
+                room = len(numbers) + len(waiting) <= AHEAD - BATCH
+                # Many at once: each message costs milliseconds.
+                if room and (some := list(itertools.islice(numbered, BATCH))):
                     some_tasks = [task for _, task in some]
                     futures = self.client.map(_call, some_tasks, work=work, pure=False)
                     numbers.update({f.key: i for f, (i, _) in zip(futures, some, strict=True)})
                     running.update(futures)
                 if not numbers:
                     return
+                self._wait_for(running)
                 done = next(running)
                 yield numbers.pop(done.key), done.result()
         except KilledWorker as error:
             hint = "memory may be short there; see the workers' logs"
             raise SceneGenError("cluster", "a task that ended several workers", "", hint) from error
+        except (CancelledError, CommClosedError) as error:
+            hint = "the same command goes on, with another one or without"
+            raise SceneGenError("scheduler", "none any more", "", hint) from error
         finally:
-            self.client.cancel([*running.futures, work])
+            with suppress(Exception):  # the scheduler may be gone; nothing depends on it
+                self.client.cancel([*running.futures, work])
+
+    def _wait_for(self, running: Any) -> None:
+        """Wait for a result; say so where there has been no worker for a while."""
+        begun, alone = time.monotonic(), False
+        while not running.has_ready():
+            time.sleep(MOMENT)
+            if not alone and time.monotonic() - begun > PATIENCE:
+                begun = time.monotonic()
+                alone = not self.client.scheduler_info(n_workers=-1)["workers"]
+                if alone:
+                    self.told("the cluster has no workers any more; waiting for one")
 
 
 def threads_of_worker() -> int:
@@ -143,7 +167,7 @@ def connected(
                 differ = _differences(dict(found), expected)
             if differ:
                 raise _refused(f"worker {name}", differ)
-        yield Cluster(client, versions)
+        yield Cluster(client, versions, told)
 
 
 @contextmanager

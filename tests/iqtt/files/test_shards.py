@@ -124,6 +124,21 @@ def test_a_run_goes_on_and_only_with_its_seed(made, tmp_path, left):
         make_split(folder, spec, **options)
 
 
+def test_another_seed_is_refused_without_training(tmp_path):
+    spec = replace(SPEC, train=0, labeled=0, val=0)
+
+    def stop(_rows):
+        if len(list(tmp_path.glob("split/*-answers-*"))) > 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        make_split(tmp_path / "split", spec, shard_size=SIZE, batch=2, progress=stop)
+    with pytest.raises(SpecError):
+        make_split(tmp_path / "split", replace(spec, seed=1), shard_size=SIZE)
+    with pytest.raises(SpecError):
+        make_split(tmp_path / "split", spec, shard_size=SIZE, secret=True)
+
+
 def test_a_damaged_shard_is_named_and_made_again(made, tmp_path):
     folder = tmp_path / "split"
     make_split(folder, made[0], shard_size=SIZE, command=COMMAND)

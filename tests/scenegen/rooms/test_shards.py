@@ -218,6 +218,61 @@ def test_a_manifest_names_only_files_beside_it(copied, name, which):
         verify_set(copied)
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"files": []}, {"spec": "[]"}, {"spec": "{"}, {"count": 0}, {"count": 10**30},
+        {"count": 4 * 10**9}, {"shards": []}, {"shard_size": -1}, {"format": "2"},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_no_manifest_is_believed(copied, wrong):
+    told = json.loads(manifest_path(copied).read_text())
+    manifest_path(copied).write_text(json.dumps(told | wrong))
+    try:
+        checks = verify_set(copied, 0)
+    except FileFormatError:
+        return
+    assert not all(check.ok for check in checks)
+
+
+@pytest.mark.parametrize("order", [[1, 0, 2], [0, 0, 2]], ids=str)
+def test_rows_are_shown_in_their_order_or_not_at_all(copied, order):
+    """Plain h5py would read other rows than our readers."""
+    with h5py.File(copied, "r+") as file:
+        old = file["depth"].virtual_sources()
+        shape, layout = file["depth"].shape, h5py.VirtualLayout(file["depth"].shape, "f4")
+        place = 0
+        for number in order:
+            first, last = (bounds[0] for bounds in old[number].vspace.get_select_bounds())
+            rows = min(last - first + 1, shape[0] - place)
+            layout[place : place + rows] = h5py.VirtualSource(
+                old[number].file_name, "depth", (rows, *shape[1:])
+            )
+            place += rows
+        del file["depth"]
+        file.create_virtual_dataset("depth", layout)
+    with pytest.raises(FileFormatError):
+        RoomsFile(copied)
+
+
+def test_a_whole_file_and_a_set_replace_each_other_only_when_told(copied, make_rooms):
+    with RoomsFile(copied) as rooms:
+        how = {"views": rooms.spec.views}
+    copied.unlink()  # as if the run had been killed
+    with pytest.raises(FileExistsError):
+        make_rooms(copied, 2, **how)
+    make_rooms(copied, 2, {"overwrite": True}, **how)
+    assert [path.name for path in copied.parent.iterdir()] == ["rooms.h5"]
+    with pytest.raises(FileExistsError):
+        make_rooms(copied, SCENES, {"shard_size": SIZE}, **how)
+    make_rooms(copied, SCENES, {"shard_size": SIZE, "overwrite": True}, **how)
+    for overwrite in (False, True):
+        other = {"shard_size": SIZE, "overwrite": overwrite}
+        with pytest.raises(SpecError):
+            make_rooms(copied.with_suffix(".hdf5"), SCENES, other, **how)
+
+
 def test_files_of_others_are_kept(tmp_path, make_rooms):
     (tmp_path / "rooms-00001-of-00003.h5").write_text("mine")
     with pytest.raises(FileExistsError):

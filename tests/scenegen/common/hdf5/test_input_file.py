@@ -1,6 +1,7 @@
 """Files that lead elsewhere, or take more than they say, are refused before anything is read."""
 
 import os
+import pickle
 import tracemalloc
 import zlib
 
@@ -217,3 +218,16 @@ def test_one_value_without_rows(path):
         file["count"] = 3
     with open_file(path, "file") as file:
         assert StoredArray(file["count"])[()] == 3
+
+
+def test_what_is_said_of_a_damaged_chunk_can_be_sent_to_another_process(path):
+    """With its causes: libraries may pickle these too."""
+    with h5py.File(path, "w") as file:
+        chunks = file.create_dataset("x", data=VALUES, chunks=(1, 5, 4), compression="gzip")
+        chunks.id.write_direct_chunk((2, 0, 0), b"not compressed")
+    with open_file(path, "file") as file, pytest.raises(FileFormatError) as error, reading("x"):
+        StoredArray(file["x"])[2]
+    link = error.value
+    while link is not None:
+        pickle.dumps(type(link))
+        link = link.__cause__ or link.__context__

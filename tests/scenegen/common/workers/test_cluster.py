@@ -14,7 +14,10 @@ import cli
 from iqtt.audit.audit import audit
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
+from metrics.scoring.runs import scorer_versions
 from scenegen.common.errors import SceneGenError
+from scenegen.common.sets.making import check_shared
+from scenegen.common.sets.manifest import FORMAT, Manifest, write_manifest
 from scenegen.common.workers.cluster import LOCAL, connected
 from scenegen.rendering.sameness import renderer_identity
 
@@ -109,12 +112,32 @@ def test_workers_with_other_versions_are_refused(cluster):
     assert "3.8.0" in refused.value.found
 
 
-def test_a_folder_that_workers_do_not_see_is_named(cluster, tmp_path):
-    from scenegen.common.sets.making import check_shared
+def shared(task):
+    check_shared(*task)
 
+
+def test_a_folder_that_workers_do_not_see_is_named(cluster, tmp_path):
+    """Or one in which another run has begun."""
+    place = tmp_path / "rooms.manifest.json"
+    asked = Manifest(FORMAT, "", ("rooms.h5",), "{}", 1, 1, (), "", False, ())
     with pytest.raises(SceneGenError) as refused:
-        list(cluster.in_any_order(check_shared, [tmp_path / "none.manifest.json"]))
-    assert "none.manifest.json" in refused.value.found
+        list(cluster.in_any_order(shared, [(place, asked)]))
+    assert str(place) in refused.value.found
+    write_manifest(place, asked)
+    list(cluster.in_any_order(shared, [(place, asked)]))
+    with pytest.raises(SceneGenError) as refused:
+        list(cluster.in_any_order(shared, [(place, replace(asked, count=2))]))
+    assert "n 1, not 2" in refused.value.found
+
+
+def test_a_scheduler_that_goes_away_is_one_line(tmp_path):
+    with connected(LOCAL, 1, scorer_versions) as found:
+        results = found.in_order(partial(slow_square, tmp_path), range(50))
+        next(results)
+        found.client.cluster.close()
+        with pytest.raises(SceneGenError) as lost:
+            list(results)
+    assert lost.value.where == "scheduler"
 
 
 def test_no_scheduler_is_one_line(tmp_path):
