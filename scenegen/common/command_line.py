@@ -247,6 +247,8 @@ def creation_command(program: str) -> str:
     """Return the command line for a file to record, without options that change no byte."""
     words, recorded = iter(sys.argv[1:]), [program]
     for word in words:
+        if word == "--overwrite":
+            continue
         if word in WITHOUT_EFFECT:
             next(words, None)
         elif word.partition("=")[0] not in WITHOUT_EFFECT:

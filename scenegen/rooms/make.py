@@ -1,7 +1,7 @@
 """Render a data set to a file of rooms, or to a set of shards that can be read as one file."""
 
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -90,11 +90,13 @@ def make_dataset(
     if is_remote(place):
         check_store(place)
     check_writable(place, overwrite)
-    manifest = manifest_path(place)
-    if overwrite:
+    manifest, begun = manifest_path(place), False
+    with suppress(OSError):  # a name that is too long; then there is no set
+        begun = manifest.exists()
+    if begun and overwrite:
         refuse_other_set(manifest, (place.name,))
-    else:
-        check_writable(manifest, overwrite=False)  # of a set that was begun here
+    elif begun:
+        check_writable(manifest, overwrite=False)
     with (
         create_rooms(
             place,
@@ -109,4 +111,5 @@ def make_dataset(
         for rows in made:
             writer.extend(rows)
             progress(rows.count)
-    remove_set(manifest, place.name)
+    if begun:
+        remove_set(manifest, place.name)

@@ -33,7 +33,7 @@ BY_OTHERS = {"height", "width", "source", "listing"}  # --size; --shapes, --clas
 FIXED = {"camera_target"}
 NOT_SETTINGS = {
     "count", "out", "preset", "size", "classes", "shapenet_root", "objects_root", "up", "cache_dir",
-    "compression", "batch", "workers", "shard_size", "device", "overwrite",
+    "compression", "batch", "workers", "shard_size", "scheduler", "device", "overwrite",
 }  # fmt: skip
 
 

@@ -319,7 +319,7 @@ def test_the_same_command_goes_on(tmp_path, number, unbroken):
         assert not list(tmp_path.glob(".*"))
     assert not (tmp_path / "rooms.h5").exists()
     done = {p: p.stat().st_mtime_ns for p in (tmp_path / one.file for one in known(path))}
-    assert len(done) >= len(list(tmp_path.glob("rooms-*.h5"))) - (number == signal.SIGKILL)
+    assert len(done) >= len(list(tmp_path.glob("rooms-*.h5"))) - 1  # of that moment
     subprocess.run([*COMMAND, "1"], cwd=tmp_path, env=ENVIRONMENT, check=True)
     assert {p: p.stat().st_mtime_ns for p in done} == done, "complete shards are kept"
     assert not [p for p in tmp_path.iterdir() if p.name.startswith(".")]
