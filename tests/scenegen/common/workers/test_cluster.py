@@ -140,7 +140,8 @@ def test_a_scheduler_that_goes_away_is_one_line(tmp_path):
     assert lost.value.where == "scheduler"
 
 
-def test_no_scheduler_is_one_line(tmp_path):
+def test_no_scheduler_is_one_line(monkeypatch):
+    monkeypatch.setattr("scenegen.common.workers.cluster.PATIENCE", 1)
     words = ["render", "--n", "1", "--scheduler", "tcp://127.0.0.1:9", "--out", "rooms.h5"]
     result = CliRunner().invoke(cli.scenegen, words)
     assert result.exit_code == 2
