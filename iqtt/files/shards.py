@@ -31,9 +31,8 @@ from scenegen.common.hdf5.shards import (
     opened,
     set_name,
     shard_name,
-    write_list,
-    write_virtual,
 )
+from scenegen.common.hdf5.virtual import write_list, write_virtual
 from scenegen.common.sets.making import Task, check_shared, complete_set, other_request, record_file
 from scenegen.common.sets.manifest import FORMAT, Manifest, ShardRecord
 from scenegen.common.workers.cluster import Cluster

@@ -9,8 +9,9 @@ from typing import Any
 
 from scenegen.common.hdf5.content import seal
 from scenegen.common.hdf5.row_file import new_file, writer_name
-from scenegen.common.hdf5.shards import Shard, cut, opened, shard_name, write_list, write_virtual
+from scenegen.common.hdf5.shards import Shard, cut, opened, shard_name
 from scenegen.common.hdf5.table import PackedRows
+from scenegen.common.hdf5.virtual import write_list, write_virtual
 from scenegen.common.new_file import check_writable
 from scenegen.common.sets.making import Task, check_shared, complete_set, record_file
 from scenegen.common.sets.manifest import FORMAT, Manifest, ShardRecord, manifest_path

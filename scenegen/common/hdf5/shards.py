@@ -9,11 +9,10 @@ Each shard has a data set `row_sha256` with the digest of every row of each data
 digests of the set follow from those of its shards, and a damaged row can be named.
 """
 
-import hashlib
 import json
 import re
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager, nullcontext
 from dataclasses import dataclass
 from itertools import accumulate
@@ -25,7 +24,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError
-from scenegen.common.hdf5.axes import name_axes
 from scenegen.common.hdf5.content import CONTENT_DIGEST, SHA256, dataset_digest
 from scenegen.common.hdf5.input_file import (
     StoredArray,
@@ -96,70 +94,12 @@ def write_row_digests(group: h5py.Group, digests: Mapping[str, bytes]) -> None:
     dataset.attrs[SHA256] = dataset_digest(values)
 
 
-def write_virtual(
-    file: h5py.File, folder: Path, shards: Sequence[Shard], axes: Mapping[str, Any]
-) -> None:
-    """Write virtual data sets over shards, at least one, of one part of a set.
-
-    Data sets that count an axis are copied from the first shard.
-
-    Args:
-        folder: where the shards are now.
-        axes: names of the axes of a row, by name of the data set; None where they have no names.
-    """
-    rows = sum(shard.rows for shard in shards)
-    with opened(folder / shards[0].file) as first:
-        for name, names in axes.items():
-            model = first[name]
-            layout = h5py.VirtualLayout((rows, *model.shape[1:]), model.dtype)
-            layout.dcpl.set_obj_track_times(False)  # the same bytes at any time
-            start = 0
-            for shard in shards:
-                shape = (shard.rows, *model.shape[1:])
-                layout[start : start + shard.rows] = h5py.VirtualSource(shard.file, name, shape)
-                start += shard.rows
-            fill = np.nan if model.dtype.kind == "f" else None
-            dataset = file.create_virtual_dataset(name, layout, fillvalue=fill)
-            own = ("DIMENSION_LABELS", "DIMENSION_LIST", SHA256)
-            dataset.attrs.update({k: v for k, v in model.attrs.items() if k not in own})
-            if names is not None:
-                name_axes(file, dataset, ("row", *names))
-    for name, digest in _joint_digests(folder, shards).items():
-        file[name].attrs[SHA256] = digest.hexdigest()
-
-
-def write_list(file: h5py.File, shards: Sequence[Shard]) -> None:
-    """Write the list of all shards of a set, those of each part in their order."""
-    lines = np.array([json.dumps(vars(shard)) for shard in shards], object)
-    listed = file.create_dataset(SHARDS, data=lines, dtype=h5py.string_dtype())
-    listed.attrs["meaning"] = "the files beside this one that hold the values, in their order"
-    listed.attrs[SHA256] = dataset_digest(lines)
-
-
 @contextmanager
 def opened(place: Path) -> Iterator[h5py.File]:
     """Open an HDF5 file that a run of ours has just made, also behind a URL."""
     with ExitStack() as stack:
         source = stack.enter_context(place.open("rb")) if is_remote(place) else place
         yield stack.enter_context(h5py.File(source, "r"))
-
-
-def _joint_digests(folder: Path, shards: Iterable[Shard]) -> "dict[str, hashlib._Hash]":
-    """Return the `column_digest` of each data set over all shards.
-
-    Raises FileFormatError where a shard is not the one that was recorded.
-    """
-    found: dict[str, hashlib._Hash] = {}
-    for shard in shards:
-        with opened(folder / shard.file) as file:
-            if file.attrs.get(CONTENT_DIGEST) != shard.content_digest:
-                hint = "another run has written it meanwhile; say the command again"
-                raise FileFormatError(folder / shard.file, "other content", "that was made", hint)
-            digests = file[ROW_DIGESTS]
-            values = digests[()]
-            for i, name in enumerate(digests.attrs["names"]):
-                found.setdefault(name, hashlib.sha256()).update(values[:, i].tobytes())
-    return found
 
 
 def open_with_shards(path: Path, kind: str) -> tuple[h5py.File, "ShardFiles | None"]:
