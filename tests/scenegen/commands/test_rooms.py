@@ -51,7 +51,8 @@ def test_every_option_is_recorded(run, monkeypatch, tmp_path):
         assert set(file["object/count"][:]) <= {1, 2}
         assert list(file["object/shape"].attrs["names"]) == ["box", "teapot"]
         assert set(file["light/count"][:]) == {2}
-    assert root["creation_command"] == "scenegen " + EVERYTHING.replace(" --batch 2", "")
+    without_effect = EVERYTHING.replace(" --batch 2", "").replace(" --overwrite", "")
+    assert root["creation_command"] == f"scenegen {without_effect}"
     assert root["variant"] == "llvm_ad_rgb"
     assert root["compression"] == "lzf"
     spec = json.loads(root["spec"])
