@@ -5,7 +5,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
 
@@ -44,6 +44,9 @@ def ended_by_signals() -> Iterator[None]:
         for number in before:
             signal.signal(number, signal.SIG_DFL)
         if received:
+            for stream in (sys.stdout, sys.stderr):  # as what they hold would be lost
+                with suppress(OSError, ValueError, AttributeError):  # full, closed or none
+                    stream.flush()
             os._exit(128 + received[0])
 
 
