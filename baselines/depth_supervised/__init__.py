@@ -1,11 +1,9 @@
 """Depth from one image of a room by a network that was trained with true depth: the ceiling.
 
-    empty_rooms.py  what is known before an image is seen
-    network.py      two networks: with skip connections, and through the reference model's code
-    rooms.py        a training file in memory
-    card.py         the card of weights: how they were made
-    training.py     `train`, and the iterations that `view_pairs` shares
-    predict.py      `write_submission`
+    network.py   two networks: with skip connections, and through the reference model's code
+    card.py      the card of weights: how they were made
+    training.py  `train`, and the iterations that `view_pairs` shares
+    predict.py   `write_submission`
 
 docs/baselines.md says what it reaches and what it is told.
 """

@@ -12,17 +12,14 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from baselines.depth_supervised.empty_rooms import empty_rooms
-from baselines.pix2shape.network.architecture import Decoder, Encoder, NetworkSpec
+from baselines.pix2shape.network.architecture import Decoder, Encoder, NetworkSpec, contrast
+from baselines.pix2shape.network.empty_rooms import FLAT, Cameras, empty_rooms, planes_of
 from scenegen.common.records import check, normalise
 
 KINDS = ("unet", "code")
 SIZES = (32, 64, 128, 256)  # pixels a side
 LEVELS = (32, 64, 96, 128)  # channels at 1/2, 1/4, 1/8 and 1/16 of the image size
 FINE = 16  # channels at full size
-WINDOW = 9  # pixels a side, of the mean that is taken from an image to show faint differences
-CONTRAST = 8.0  # multiplies these differences
-FLAT = 0.02  # scene units; what stands out less is said to be floor or wall
 
 
 @dataclass(frozen=True)
@@ -48,14 +45,6 @@ class ReliefSpec:
         check(0.05 <= self.width <= 4, "width", self.width, "from 0.05 to 4")
 
 
-@dataclass(frozen=True, eq=False)
-class Cameras:
-    """The cameras of B images, all of one field of view: world_from_camera (B, 4, 4)."""
-
-    world_from_camera: Tensor
-    fov_y_degrees: float
-
-
 def relief_network(spec: ReliefSpec) -> nn.Module:
     """Return an untrained network: (image (B, 3, S, S), its `Cameras`, `Cameras` asked for).
 
@@ -69,21 +58,6 @@ def predicted_depth(network: nn.Module, image: Tensor, own: Cameras, asked: Came
     relief = network(image, own, asked)
     walls, entry, _ = empty_rooms(asked.world_from_camera, asked.fov_y_degrees, image.shape[-1])
     return torch.maximum(walls - torch.where(relief > FLAT, relief, 0), entry)
-
-
-def planes_of(cameras: Cameras, size: int) -> Tensor:
-    """Return what a network is told of each pixel's ray: where it meets floor or wall, and how far.
-
-    (B, 4, S, S), of values about -1 to 1.
-    """
-    depth, _, points = empty_rooms(cameras.world_from_camera, cameras.fov_y_degrees, size)
-    return torch.cat([2 * points - 0.5, 2 * depth[:, None] - 3], dim=1)
-
-
-def contrast(image: Tensor) -> Tensor:
-    """Return how an image differs from its mean over a window: (B, C, S, S) -> (B, C, S, S)."""
-    border = functional.pad(image, (WINDOW // 2,) * 4, mode="replicate")
-    return CONTRAST * (image - functional.avg_pool2d(border, WINDOW, 1))
 
 
 class Residual(nn.Module):

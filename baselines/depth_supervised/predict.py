@@ -12,8 +12,9 @@ from torch import Tensor, nn
 
 from baselines.checkpoints import load_weights
 from baselines.depth_supervised.card import recipe
-from baselines.depth_supervised.network import Cameras, predicted_depth
+from baselines.depth_supervised.network import predicted_depth
 from baselines.pix2shape.data.rooms import camera_poses, channels_first, check_reducible
+from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.use.predict import enlarged, input_views
 from metrics.prediction_writer import RoomPredictionWriter
 from scenegen.common.new_file import check_writable

@@ -16,10 +16,10 @@ from torch import Tensor
 
 from baselines import checkpoints
 from baselines.depth_supervised.card import Card, State, recipe
-from baselines.depth_supervised.empty_rooms import empty_rooms
-from baselines.depth_supervised.network import Cameras, ReliefSpec
-from baselines.depth_supervised.rooms import Rooms, read_rooms
+from baselines.depth_supervised.network import ReliefSpec
+from baselines.pix2shape.data.in_memory import Rooms, read_rooms
 from baselines.pix2shape.data.rooms import Draws
+from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms
 from scenegen.common.errors import SceneGenError
 from scenegen.common.random.seeding import Purpose, item_rng
 

@@ -8,7 +8,7 @@ from torch import Tensor
 from baselines.depth_supervised.card import Card
 from baselines.depth_supervised.network import ReliefSpec
 from baselines.depth_supervised.training import Progress, Target, begun, fit
-from baselines.view_pairs.labels import labels
+from baselines.pix2shape.matching.labels import labels
 
 METHOD = "view-pairs"
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from baselines.pix2shape.network.shared_batch import BatchNorm1d, BatchNorm2d
 from scenegen.common.records import check, normalise
@@ -20,6 +21,8 @@ ENCODER_CHANNELS = (85, 170, 340, 680, 1360)  # of 64, 32, 16, 8, 4 pixels, at 1
 DECODER_CHANNELS = (1344, 627, 336, 168, 84)  # of 4, 8, 16, 32, 64 pixels, at 128x128
 STATISTICS_CHANNELS = (256, 512)
 FLAT = 0.1  # scales the decoder's last weights: first surfaces are smooth, as noise hides shading
+WINDOW = 9  # pixels a side, of the mean that is taken from an image to show faint differences
+CONTRAST = 8.0  # multiplies these differences
 CAMERA = 3  # numbers of the condition that are the camera's position
 
 
@@ -76,6 +79,12 @@ class NetworkSpec:
         found = found[len(found) - layers :]
         wide = [max(4, round(self.width * channels)) for channels in found]
         return wide[::-1] if falling else wide
+
+
+def contrast(image: Tensor) -> Tensor:
+    """Return how an image differs from its mean over a window: (B, C, S, S) -> (B, C, S, S)."""
+    border = functional.pad(image, (WINDOW // 2,) * 4, mode="replicate")
+    return CONTRAST * (image - functional.avg_pool2d(border, WINDOW, 1))
 
 
 class ConditionalNorm(nn.Module):

@@ -5,7 +5,6 @@ import pytest
 from scenegen.common.errors import SpecError
 
 torch = pytest.importorskip("torch")
-from baselines.depth_supervised.empty_rooms import empty_rooms  # noqa: E402
 from baselines.depth_supervised.network import (  # noqa: E402
     Cameras,
     ReliefSpec,
@@ -13,6 +12,7 @@ from baselines.depth_supervised.network import (  # noqa: E402
     predicted_depth,
     relief_network,
 )
+from baselines.pix2shape.network.empty_rooms import empty_rooms  # noqa: E402
 
 
 def cameras(*positions: tuple[float, float, float]) -> Cameras:

@@ -15,15 +15,15 @@ torch = pytest.importorskip("torch")
 from baselines.checkpoints import CHECKPOINT, load_checkpoint, load_weights  # noqa: E402
 from baselines.depth_supervised import training  # noqa: E402
 from baselines.depth_supervised.card import Card, recipe  # noqa: E402
-from baselines.depth_supervised.empty_rooms import empty_rooms  # noqa: E402
 from baselines.depth_supervised.network import predicted_depth  # noqa: E402
-from baselines.depth_supervised.rooms import read_rooms  # noqa: E402
 from baselines.depth_supervised.training import (  # noqa: E402
     METHOD,
     learning_rate,
     train,
     views_of_scenes,
 )
+from baselines.pix2shape.data.in_memory import read_rooms  # noqa: E402
+from baselines.pix2shape.network.empty_rooms import empty_rooms  # noqa: E402
 from baselines.tensor_files import load_tensors  # noqa: E402
 
 UNET = {"network": "unet", "size": 32, "width": 0.25}

@@ -12,9 +12,9 @@ torch = pytest.importorskip("torch")
 from baselines.checkpoints import load_weights  # noqa: E402
 from baselines.depth_supervised import training as shared  # noqa: E402
 from baselines.depth_supervised.card import recipe  # noqa: E402
+from baselines.pix2shape.matching.labels import FOLDER  # noqa: E402
 from baselines.tensor_files import load_tensors  # noqa: E402
 from baselines.view_pairs import train, write_submission  # noqa: E402
-from baselines.view_pairs.labels import FOLDER  # noqa: E402
 
 TOLD = {"size": 32, "width": 0.25, "iterations": 4, "batch": 4, "seed": 5}
 UNSEEN = (

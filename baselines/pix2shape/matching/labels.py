@@ -11,9 +11,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from baselines.depth_supervised.rooms import Rooms
-from baselines.tensor_files import check_tensors, load_tensors, save_tensors
-from baselines.view_pairs.matching import (
+from baselines.pix2shape.data.in_memory import Rooms
+from baselines.pix2shape.matching.search import (
     NOISE,
     ROUNDED_NOISE,
     best_relief,
@@ -21,6 +20,7 @@ from baselines.view_pairs.matching import (
     matching_cost,
     semi_global,
 )
+from baselines.tensor_files import check_tensors, load_tensors, save_tensors
 from scenegen.common.errors import FileFormatError, SpecError
 
 WIDEST = 20.0  # degrees between two views that are matched

@@ -10,9 +10,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from baselines.depth_supervised.empty_rooms import empty_rooms
-from baselines.depth_supervised.network import Cameras
-from baselines.view_pairs.reprojection import reprojected
+from baselines.pix2shape.matching.reprojection import reprojected
+from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms
 
 STEPS, STEP = 32, 0.02  # reliefs that are tried: 0, STEP, ..., scene units
 NOISE, ROUNDED_NOISE = 0.001, 0.003  # radiance; differences expected everywhere; of 8 bits

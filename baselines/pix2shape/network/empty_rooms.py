@@ -1,12 +1,23 @@
 """What is known of every room before an image is seen: where rays enter and leave the unit box."""
 
+from dataclasses import dataclass
+
 import torch
 from torch import Tensor
 
 from baselines.pix2shape.network.surfels import pixel_rays
 
 NEAREST = 0.4  # scene units; no ray is said to enter the room nearer to its camera
+FLAT = 0.02  # scene units; what stands out less is said to be floor or wall
 DEEPEST = 0.95  # of a ray's depth in the empty room; it enters the room before that
+
+
+@dataclass(frozen=True, eq=False)
+class Cameras:
+    """The cameras of B images, all of one field of view: world_from_camera (B, 4, 4)."""
+
+    world_from_camera: Tensor
+    fov_y_degrees: float
 
 
 def rays(size: int, fov_y_degrees: float, like: Tensor) -> Tensor:
@@ -44,3 +55,12 @@ def empty_rooms(
     points = origin + toward * depth[:, None]
     shape = (len(depth), size, size)
     return depth.view(shape), entry.view(shape), points.view(-1, 3, size, size)
+
+
+def planes_of(cameras: Cameras, size: int) -> Tensor:
+    """Return what a network is told of each pixel's ray: where it meets floor or wall, and how far.
+
+    (B, 4, S, S), of values about -1 to 1.
+    """
+    depth, _, points = empty_rooms(cameras.world_from_camera, cameras.fov_y_degrees, size)
+    return torch.cat([2 * points - 0.5, 2 * depth[:, None] - 3], dim=1)

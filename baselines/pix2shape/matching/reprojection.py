@@ -11,8 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from baselines.depth_supervised.empty_rooms import rays
-from baselines.depth_supervised.network import Cameras
+from baselines.pix2shape.network.empty_rooms import Cameras, rays
 
 NEAR = 0.05  # scene units; points nearer to the other camera than this, or behind it, are not seen
 

@@ -7,8 +7,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from baselines.depth_supervised.network import Cameras
 from baselines.pix2shape.data.rooms import camera_poses, channels_first, check_reducible, reduced
+from baselines.pix2shape.network.empty_rooms import Cameras
 from scenegen.common.errors import FileFormatError
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile

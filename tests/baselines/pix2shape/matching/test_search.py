@@ -9,10 +9,9 @@ import pytest
 from scenegen.rooms.reader import RoomsFile
 
 torch = pytest.importorskip("torch")
-from baselines.depth_supervised.empty_rooms import empty_rooms  # noqa: E402
-from baselines.depth_supervised.rooms import read_rooms  # noqa: E402
-from baselines.view_pairs.labels import matched_relief, pairs_of  # noqa: E402
-from baselines.view_pairs.matching import (  # noqa: E402
+from baselines.pix2shape.data.in_memory import read_rooms  # noqa: E402
+from baselines.pix2shape.matching.labels import matched_relief, pairs_of  # noqa: E402
+from baselines.pix2shape.matching.search import (  # noqa: E402
     LARGE,
     SMALL,
     STEP,
@@ -23,6 +22,7 @@ from baselines.view_pairs.matching import (  # noqa: E402
     matching_cost,
     semi_global,
 )
+from baselines.pix2shape.network.empty_rooms import empty_rooms  # noqa: E402
 
 
 @pytest.mark.parametrize("bits", [16, 8])

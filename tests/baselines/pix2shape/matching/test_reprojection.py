@@ -8,8 +8,8 @@ import pytest
 from scenegen.camera import Camera, pixel_directions
 
 torch = pytest.importorskip("torch")
-from baselines.depth_supervised.network import Cameras  # noqa: E402
-from baselines.view_pairs.reprojection import reprojected  # noqa: E402
+from baselines.pix2shape.matching.reprojection import reprojected  # noqa: E402
+from baselines.pix2shape.network.empty_rooms import Cameras  # noqa: E402
 
 FOV, SIZE = 30.0, 64
 POSES = [
