@@ -21,7 +21,9 @@ def tiny(size: int = SIZE, **settings: Any) -> Any:
     from baselines.pix2shape.network.config import ModelConfig
 
     own = {
-        name: settings.pop(name) for name in ("classes", "camera", "z_scene") if name in settings
+        name: settings.pop(name)
+        for name in ("classes", "camera", "z_scene", "rays")
+        if name in settings
     }
     networks = NetworkSpec(size=size, width=0.05, **own)
     plain = {"iterations": 4, "batch": 4, "critic_steps": 1}

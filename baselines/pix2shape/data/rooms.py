@@ -29,6 +29,19 @@ Array = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)
+class Relief:
+    """What matching found in V views of each image's scene.
+
+    Attributes:
+        found: how far surfaces lie before the empty room, scene units, (B, V, S, S).
+        world_from_camera: of these views, (B, V, 4, 4).
+    """
+
+    found: Tensor
+    world_from_camera: Tensor
+
+
+@dataclass(frozen=True, eq=False)
 class Batch:
     """Images and what the model is told about them.
 
@@ -36,11 +49,13 @@ class Batch:
         image: linear radiance, (B, 3, S, S).
         depth: planar, scene units, (B, S, S), NaN where there is no surface; None unless depth
             supervision is on.
+        relief: None unless training learns from matching.
     """
 
     image: Tensor
     views: Views
     depth: Tensor | None = None
+    relief: Relief | None = None
 
     def to(self, device: torch.device) -> "Batch":
         """Return the batch on another device."""
@@ -101,12 +116,16 @@ class RoomImages(Dataset[dict[str, Any]]):
             self._told["reflectance"] = self._uniform_reflectance(path, rooms)
             self.classes: tuple[str, ...] = tuple(rooms.spec.shapes)
             self.label = rooms.read("object/shape", slice(None))[:, 0]
+            self._scene = rooms.read("scene_index", slice(None))
         if spec.classes and spec.classes != len(self.classes):
             expected = f"{spec.classes}, as the networks were made for"
             raise SpecError(path, f"{len(self.classes)} classes", expected)
         if spec.classes and self.spec.objects != (1, 1):
             raise SpecError(path, "rooms of several objects", "one object, whose class is told")
         wanted = ("image", "depth") if config.depth else ("image",)
+        self.path = Path(path)
+        self._relief: Array | None = None
+        self._views_of = np.empty((0, 0), int)  # rows of the scene that were matched, for each row
         self._images = RoomsDataset(path, wanted)
         self.fingerprint = self._images.fingerprint
         self._networks = spec
@@ -133,7 +152,29 @@ class RoomImages(Dataset[dict[str, Any]]):
         item |= self.view(row)
         if "depth" in stored:
             item["depth"] = reduced(stored["depth"], self._networks.size).astype(np.float32)
+        if self._relief is not None:
+            rows = self._views_of[row]
+            item["relief"] = self._relief[rows]
+            item["relief_cameras"] = self.world_from_camera[rows].astype(np.float32)
         return item
+
+    def learn_from(self, relief: Array, matched: Array) -> None:
+        """Add to each item the relief that matching found in the views of its scene.
+
+        Args:
+            relief: of all rows, (N, S, S), scene units.
+            matched: the rows whose relief was found, (M,), as they have a partner.
+
+        Raises SpecError unless as many views of every scene were matched.
+        """
+        order = matched[np.argsort(self._scene[matched], kind="stable")]
+        numbers, counts = np.unique(self._scene[order], return_counts=True)
+        if (counts != counts[0]).any() or len(numbers) < len(np.unique(self._scene)):
+            expected = "as many views in each scene that have a neighbour to be matched with"
+            raise SpecError(self.path, "more in some scenes than in others", expected)
+        place = np.searchsorted(numbers, self._scene)
+        self._views_of = order.reshape(-1, counts[0])[place]
+        self._relief = relief
 
     def as_batch(self, items: dict[str, Tensor]) -> Batch:
         """Return the batch of collated items."""
@@ -159,7 +200,8 @@ def channels_first(radiance: Array, size: int) -> Array:
 
 def as_batch(items: dict[str, Tensor], fov_y_degrees: float) -> Batch:
     """Return the batch of the collated fields of items."""
-    return Batch(items["image"], as_views(items, fov_y_degrees), items.get("depth"))
+    relief = Relief(items["relief"], items["relief_cameras"]) if "relief" in items else None
+    return Batch(items["image"], as_views(items, fov_y_degrees), items.get("depth"), relief)
 
 
 def as_views(items: dict[str, Tensor], fov_y_degrees: float) -> Views:

@@ -23,6 +23,7 @@ STATISTICS_CHANNELS = (256, 512)
 FLAT = 0.1  # scales the decoder's last weights: first surfaces are smooth, as noise hides shading
 WINDOW = 9  # pixels a side, of the mean that is taken from an image to show faint differences
 CONTRAST = 8.0  # multiplies these differences
+RAY_PLANES = 4  # where a ray meets floor or wall, and at which depth
 CAMERA = 3  # numbers of the condition that are the camera's position
 
 
@@ -37,6 +38,9 @@ class NetworkSpec:
         camera: whether the networks are told the camera's position.
         classes: number of object classes the networks are told, one-hot; 0 for none.
         standardised: whether batch normalisation gives codes mean 0 and variance 1.
+        rays: whether the networks are told the empty room. The encoder then sees, beside the
+            image, its faint differences and where the ray of each pixel meets floor or walls, and
+            the decoder gives relief: how far surfaces lie before these, scene units.
     """
 
     size: int = 128
@@ -46,6 +50,7 @@ class NetworkSpec:
     camera: bool = True
     classes: int = 0
     standardised: bool = False
+    rays: bool = False
 
     def __post_init__(self) -> None:
         normalise(self)
@@ -54,6 +59,8 @@ class NetworkSpec:
         check(1 <= self.z_scene <= MOST, "z scene", self.z_scene, f"1 to {MOST}")
         check(0 <= self.z_view <= MOST, "z view", self.z_view, f"0 to {MOST}")
         check(0 <= self.classes <= MOST, "classes", self.classes, f"0 to {MOST}")
+        if self.rays:
+            check(self.camera, "camera", self.camera, "true, as rays are those of a known camera")
 
     @property
     def z(self) -> int:
@@ -64,6 +71,11 @@ class NetworkSpec:
     def condition(self) -> int:
         """Length of the condition: camera position and one-hot class."""
         return CAMERA * self.camera + self.classes
+
+    @property
+    def planes(self) -> int:
+        """Channels of what the encoder sees beside an image and its condition."""
+        return (3 + RAY_PLANES) * self.rays
 
     def channels(self, table: tuple[int, ...]) -> list[int]:
         """Return a table's channels for this size and width, in the table's order.
@@ -129,16 +141,17 @@ class Encoder(nn.Module):
     def __init__(self, spec: NetworkSpec) -> None:
         super().__init__()
         widths = spec.channels(ENCODER_CHANNELS)
-        pairs = itertools.pairwise([3 + spec.condition, *widths])
+        pairs = itertools.pairwise([3 + spec.planes + spec.condition, *widths])
         self.layers = nn.ModuleList(nn.Conv2d(a, b, 4, 2, 1) for a, b in pairs)
         self.norms = nn.ModuleList(ConditionalNorm(b, spec.condition) for b in widths[:-1])
         self.last = nn.Conv2d(widths[-1], spec.z, 4)
         self.standard = BatchNorm1d(spec.z, affine=False) if spec.standardised else nn.Identity()
         self.activation = nn.LeakyReLU(SLOPE)
 
-    def forward(self, image: Tensor, condition: Tensor) -> Tensor:
-        """(B, 3, S, S), (B, D) -> (B, z)."""
-        values = torch.cat([image, _planes(condition, image)], dim=1)
+    def forward(self, image: Tensor, condition: Tensor, rays: Tensor | None = None) -> Tensor:
+        """(B, 3, S, S), (B, D), and (B, RAY_PLANES, S, S) if it is told rays -> (B, z)."""
+        beside = [] if rays is None else [contrast(image), rays]
+        values = torch.cat([image, *beside, _planes(condition, image)], dim=1)
         for i, layer in enumerate(self.layers):
             values = layer(values)
             if i < len(self.norms):

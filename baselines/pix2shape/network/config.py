@@ -27,10 +27,23 @@ CONFIGS: dict[str, dict[str, Any]] = {
         "contrast": 10.0,
         "question_batch": 32,
     },
+    "rays": {
+        "networks": NetworkSpec(size=64, width=0.125, rays=True),
+        "batch": 32,
+        "iterations": 16_000,
+        "learning_rate": 3e-3,
+        "betas": (0.9, 0.99),
+        "decay": True,
+        "critic_steps": 1,
+        "adversarial": 0.0,
+        "reconstruction": 0.0,
+        "code_reconstruction": 0.0,
+        "matching": 1.0,
+    },
 }
 LOSSES = (
     "adversarial", "reconstruction", "code_reconstruction", "consistency", "mutual_information",
-    "questions", "contrast", "depth",
+    "questions", "contrast", "depth", "matching",
 )  # fmt: skip
 
 
@@ -51,9 +64,10 @@ class ModelConfig:
         absolute_differences: whether images are compared by absolute differences, not by the
             paper's norm.
         adversarial, reconstruction, code_reconstruction, consistency, mutual_information,
-        questions, contrast, depth:
+        questions, contrast, depth, matching:
             weights of the losses of `training/losses.py`; 0 switches one off. `questions` is the
-            paper's L_theta, `depth` the supervision of its ablation.
+            paper's L_theta, `depth` the supervision of its ablation, and `matching` compares with
+            the relief that a search finds from several images of a scene (networks of rays only).
         seed: of the first weights and of every random choice of training.
     """
 
@@ -77,6 +91,7 @@ class ModelConfig:
     questions: float = 1.0
     contrast: float = 0.0
     depth: float = 0.0
+    matching: float = 0.0
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -94,6 +109,8 @@ class ModelConfig:
         in_range = len(self.betas) == 2 and all(0 <= beta < 1 for beta in self.betas)
         check(in_range, "betas", self.betas, "two numbers from 0 to below 1")
         check(self.seed >= 0, "seed", self.seed, "0 or more")
+        if self.matching:
+            check(self.networks.rays, "matching", self.matching, "0 for networks without rays")
         for name in LOSSES:
             weight = getattr(self, name)
             check(0 <= weight < LARGEST, name.replace("_", " "), weight, "0 or a positive number")
@@ -132,8 +149,9 @@ def model_config(name: str, /, **settings: Any) -> ModelConfig:
     """Return a named configuration, with some settings changed.
 
     Args:
-        name: "paper" (128 pixels, full width, all losses of the paper) or "compact" (64 pixels, an
-            eighth of the width, no adversarial loss).
+        name: "paper" (128 pixels, full width, all losses of the paper), "compact" (64 pixels, an
+            eighth of the width, no adversarial loss) or "rays" (the same size; told the empty room,
+            and trained on what matching finds in several images of a scene).
         settings: values as in JSON by name; a setting of the networks as "networks.width".
 
     Raises SpecError for unknown names and impossible values.

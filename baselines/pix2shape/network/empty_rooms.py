@@ -60,7 +60,7 @@ def empty_rooms(
 def planes_of(cameras: Cameras, size: int) -> Tensor:
     """Return what a network is told of each pixel's ray: where it meets floor or wall, and how far.
 
-    (B, 4, S, S), of values about -1 to 1.
+    (B, RAY_PLANES, S, S), of values about -1 to 1.
     """
     depth, _, points = empty_rooms(cameras.world_from_camera, cameras.fov_y_degrees, size)
     return torch.cat([2 * points - 0.5, 2 * depth[:, None] - 3], dim=1)

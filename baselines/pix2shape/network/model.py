@@ -9,6 +9,7 @@ from torch import Tensor, nn
 
 from baselines.pix2shape.network.architecture import Critic, Decoder, Encoder, Statistics
 from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.network.empty_rooms import FLAT, Cameras, empty_rooms, planes_of
 from baselines.pix2shape.network.surfels import Scene, render
 
 T = TypeVar("T")
@@ -41,6 +42,13 @@ class Views:
     scene: Scene
     background: Tensor | None = None
     world_from_camera: Tensor | None = None
+
+    @property
+    def cameras(self) -> Cameras | None:
+        """The cameras; None for questions."""
+        if self.world_from_camera is None:
+            return None
+        return Cameras(self.world_from_camera, self.scene.fov_y_degrees)
 
 
 class Prior(nn.Module):
@@ -88,20 +96,51 @@ class Pix2Shape(nn.Module):
 
     def encode(self, image: Tensor, views: Views) -> Tensor:
         """Return the codes of images of linear radiance: (B, 3, S, S) -> (B, z)."""
-        return self.encoder(image, views.condition)
+        return self.codes(image, views.condition, views.cameras)
 
-    def surfels(self, code: Tensor, condition: Tensor) -> tuple[Tensor, Tensor | None]:
+    def codes(self, image: Tensor, condition: Tensor, cameras: Cameras | None = None) -> Tensor:
+        """Return the codes of images whose lights need not be known: (B, 3, S, S) -> (B, z).
+
+        Args:
+            condition: (B, D).
+            cameras: those of the images; only used, and then needed, by a network of `rays`.
+        """
+        if not self.config.networks.rays:
+            return self.encoder(image, condition)
+        assert cameras is not None, "networks of rays are told the camera"
+        return self.encoder(image, condition, planes_of(cameras, image.shape[-1]))
+
+    def relief(self, code: Tensor, condition: Tensor) -> Tensor:
+        """Return how far surfaces lie before the empty room, scene units: (B, z) -> (B, S, S).
+
+        For networks of `rays`. What is below 0 means floor or wall.
+        """
+        return self.decoder(code, condition)[:, 0].float()
+
+    def surfels(
+        self, code: Tensor, condition: Tensor, cameras: Cameras | None = None
+    ) -> tuple[Tensor, Tensor | None]:
         """Return planar depth, scene units, and opacity, 0 to 1: (B, z) -> (B, S, S) each.
 
         The opacity is None for a model of closed rooms, where every ray meets a surface.
+
+        Args:
+            condition: (B, D).
+            cameras: those that are asked for; only used, and then needed, by networks of `rays`.
         """
+        if self.config.networks.rays:
+            assert cameras is not None, "networks of rays are told the camera"
+            relief = self.relief(code, condition)
+            pose, fov = cameras.world_from_camera, cameras.fov_y_degrees
+            walls, entry, _ = empty_rooms(pose, fov, relief.shape[-1])
+            return torch.maximum(walls - torch.where(relief > FLAT, relief, 0), entry), None
         raw = self.decoder(code, condition).float()
         depth = self.config.depth_middle * (1 + self.config.depth_reach * torch.tanh(raw[:, 0]))
         return depth, torch.sigmoid(raw[:, 1]) if self.config.opacity else None
 
     def image(self, code: Tensor, views: Views) -> Tensor:
         """Return the rendered images of codes: (B, z) -> (B, 3, S, S)."""
-        return shaded(*self.surfels(code, views.condition), views)
+        return shaded(*self.surfels(code, views.condition, views.cameras), views)
 
 
 def shaded(depth: Tensor, opacity: Tensor | None, views: Views) -> Tensor:

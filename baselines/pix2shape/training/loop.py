@@ -107,7 +107,7 @@ def check_request(
         count = len(labelled) if labelled is not None and labelled.has_answers else 0
         check(labels <= count, "labels", labels, f"at most {count}, as many answers are told")
     weights = (config.adversarial, config.reconstruction, config.code_reconstruction)
-    if not any((*weights, config.consistency, config.depth, compared)):
+    if not any((*weights, config.consistency, config.depth, config.matching, compared)):
         raise SpecError("losses", "every weight at 0", "one above 0")
 
 

@@ -7,12 +7,15 @@ from typing import Any
 
 import numpy as np
 import torch
+from lightning_fabric import Fabric
 from torch.utils.data import DataLoader
 from torch.utils.tensorboard import SummaryWriter
 
 from baselines.checkpoints import WEIGHTS, check_data, check_new
+from baselines.pix2shape.data.in_memory import read_rooms
 from baselines.pix2shape.data.questions import QuestionImages, for_questions
 from baselines.pix2shape.data.rooms import Batch, RoomImages, is_question_file
+from baselines.pix2shape.matching.labels import labels as labels_of
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.network.shared_batch import summed
@@ -82,6 +85,9 @@ def train_run(
     first, last = fabric.is_global_zero, card.config.iterations
     if first:
         folder.mkdir(parents=True, exist_ok=True)
+
+    if isinstance(source, RoomImages) and card.config.matching:
+        _match(source, folder, card.config, fabric, lambda losses: progress(state, losses))
     logs = SummaryWriter(str(folder / LOGS), purge_step=state.iteration + 1) if first else None
     try:
         for losses, batch in train(
@@ -106,6 +112,24 @@ def train_run(
         _save_weights(folder, state.model, card, source)
     summed(torch.zeros(1, device=fabric.device))  # wait for the first process, which writes
     return folder / WEIGHTS if first else None
+
+
+def _match(
+    source: RoomImages,
+    folder: Path,
+    config: ModelConfig,
+    fabric: Fabric,
+    progress: Callable[[dict[str, float]], Any],
+) -> None:
+    """Let training learn from relief that is found by matching, or read from the run's folder."""
+    rooms = read_rooms(source.path, config.networks.size)
+    for turn in (True, False):  # the first process finds what the others then read
+        if turn is fabric.is_global_zero:
+            relief, matched = labels_of(
+                rooms, folder, lambda done, n: progress({"share of images matched": done / n})
+            )
+        summed(torch.zeros(1, device=fabric.device))
+    source.learn_from(relief.numpy(), matched.numpy())
 
 
 def _save_weights(folder: Path, model: Pix2Shape, card: Card, source: Source) -> None:

@@ -15,6 +15,7 @@ from torch import Tensor
 
 from baselines.pix2shape.data.rooms import Batch
 from baselines.pix2shape.network.architecture import CAMERA
+from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.network.model import Pix2Shape, mapped, shaded
 from baselines.pix2shape.network.shared_batch import gathered, processes, share, summed
 from baselines.pix2shape.training import losses
@@ -93,7 +94,7 @@ def generator_step(
     code = model.encode(batch.image, views)
     numbers: Numbers = {}
     if config.reconstruction or config.depth or config.consistency:
-        depth, opacity = model.surfels(code, views.condition)
+        depth, opacity = model.surfels(code, views.condition, views.cameras)
         if config.reconstruction:
             again = shaded(depth, opacity, views)
             absolute = config.absolute_differences
@@ -118,11 +119,16 @@ def generator_step(
         theirs = noise.order[share(len(noise.order))]
         others, camera = gathered(pose)[theirs], gathered(views.condition)[theirs, :CAMERA]
         classes = views.condition[:, CAMERA:]
-        elsewhere, _ = model.surfels(code, torch.cat([camera, classes], dim=1))
+        elsewhere, _ = model.surfels(
+            code, torch.cat([camera, classes], dim=1), Cameras(others, fov)
+        )
         numbers["consistency"] = (
             losses.disagreement(depth, elsewhere, torch.linalg.solve(others, pose), fov)
             + losses.disagreement(elsewhere, depth, torch.linalg.solve(pose, others), fov)
         ) / 2
+    if config.matching:
+        assert batch.relief is not None, "runs.py had it found"
+        numbers["matching"] = _matching(model, batch, code, noise)
     if config.disentangles:
         numbers["mutual_information"] = _information(model, code, noise)
     if asked is not None:
@@ -136,6 +142,22 @@ def generator_step(
             numbers["contrast"] = losses.contrast_loss(codes, answers)
     weighted = (getattr(config, name) * loss for name, loss in numbers.items())
     return sum(weighted, code.new_zeros(())), numbers
+
+
+def _matching(model: Pix2Shape, batch: Batch, code: Tensor, noise: Noise) -> Tensor:
+    """Return the mean absolute difference of relief in one view of each scene, drawn by the noise.
+
+    Absolute differences let a pixel be either floor or object, rather than something between.
+    """
+    relief = batch.relief
+    assert relief is not None
+    views = len(relief.found[0])
+    drawn = (noise.share * views).long().clamp(max=views - 1)
+    each = torch.arange(len(drawn), device=drawn.device)
+    positions = relief.world_from_camera[each, drawn, :3, 3]
+    classes = batch.views.condition[:, CAMERA:]
+    asked = model.relief(code, torch.cat([positions, classes], dim=1))
+    return (asked - relief.found[each, drawn].float()).abs().mean()
 
 
 def _information(model: Pix2Shape, code: Tensor, noise: Noise) -> Tensor:

@@ -130,9 +130,9 @@ def known_views(
     condition = np.concatenate([positions, one_hot], axis=1)
     same = (spec.ambient, spec.attenuation, spec.room_reflectance)
     each = (np.tile(one, (len(positions), 1)) for one in same)
-    known = (condition, lights, light_color, *each)
-    told, *scene = (torch.from_numpy(np.float32(values)) for values in known)
-    return Views(told, Scene(spec.fov_y_degrees, *scene))
+    known = (condition, poses, lights, light_color, *each)
+    told, pose, *scene = (torch.from_numpy(np.float32(values)) for values in known)
+    return Views(told, Scene(spec.fov_y_degrees, *scene), world_from_camera=pose)
 
 
 def _check_camera(config: ModelConfig) -> None:

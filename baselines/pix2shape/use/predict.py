@@ -17,6 +17,7 @@ from baselines.pix2shape.data.rooms import (
     check_reducible,
     is_question_file,
 )
+from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.network.surfels import extrapolated, normals_from_depth
 from baselines.pix2shape.training.losses import squared_distances
@@ -32,6 +33,7 @@ from scenegen.rooms.reader import RoomsFile
 Array = NDArray[Any]
 BATCH = 64  # images at a time
 METHOD = "pix2shape"
+TOLD = "told: one image of each scene, the cameras, and where the empty room's floor and walls are"
 Progress = Callable[[int, int], Any]  # rows done, rows in all
 
 
@@ -97,18 +99,23 @@ def predict_rooms(
     with RoomsFile(data) as rooms:
         size = rooms.spec.height
         check_reducible(data, size, rooms.spec.width, spec.size)
-        positions = camera_poses(rooms)[:, :3, 3].astype(np.float32)
-        condition = torch.from_numpy(positions).to(device)
+        poses = torch.from_numpy(camera_poses(rooms).astype(np.float32)).to(device)
+        condition, fov = poses[:, :3, 3], rooms.spec.fov_y_degrees
         inputs, own = input_views(rooms)
         found = []
         for chosen in _batches(len(inputs)):
             images = [decode_image(rooms.read("image", int(row))) for row in inputs[chosen]]
-            found.append(model.encoder(_stacked(images, model), condition[inputs[chosen]]))
+            told = condition[inputs[chosen]], Cameras(poses[inputs[chosen]], fov)
+            found.append(model.codes(_stacked(images, model), *told))
         codes = torch.cat(found)
-        with RoomPredictionWriter(out, data, method=METHOD, run=run, overwrite=overwrite) as file:
+        how: dict[str, Any] = {"method": METHOD, "run": run, "overwrite": overwrite}
+        if spec.rays:
+            how |= {"method": f"{METHOD}-rays", "notes": TOLD}
+        with RoomPredictionWriter(out, data, **how) as file:
             for rows in _batches(len(rooms)):
-                depth, _ = model.surfels(codes[own[rows]], condition[rows])
-                depth, normal = enlarged(depth, rooms.spec.fov_y_degrees, size)
+                asked = condition[rows], Cameras(poses[rows], fov)
+                depth, _ = model.surfels(codes[own[rows]], *asked)
+                depth, normal = enlarged(depth, fov, size)
                 for row, z, n in zip(rows, depth.cpu(), normal.cpu(), strict=True):
                     file.add(int(row), z.numpy(), np.moveaxis(n.numpy(), 0, -1))
                 progress(len(rows), len(rooms))
@@ -142,7 +149,7 @@ def answer_file(
         for rows in _batches(len(questions), images):
             stored = [questions.read("questions", int(row)) for row in rows]
             image = _stacked(np.concatenate([decode_image(one) for one in stored]), model)
-            codes = model.encoder(image, image.new_empty(len(image), 0))[:, : spec.z_scene]
+            codes = model.codes(image, image.new_empty(len(image), 0))[:, : spec.z_scene]
             distance = squared_distances(codes.view(len(rows), images, -1)).sqrt()
             scores.append(-distance.cpu().double().numpy())
             progress(len(rows), len(questions))

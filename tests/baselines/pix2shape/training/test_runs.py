@@ -12,7 +12,7 @@ from h5_edits import attribute
 from PIL import Image
 from pix2shape_models import edited, tiny
 
-from scenegen.common.errors import SceneGenError
+from scenegen.common.errors import SceneGenError, SpecError
 
 torch = pytest.importorskip("torch")
 from safetensors.torch import load_file  # noqa: E402
@@ -20,6 +20,7 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 from torch.utils.data import default_collate  # noqa: E402
 
 from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
+from baselines.pix2shape.network.config import LOSSES  # noqa: E402
 from baselines.pix2shape.training import runs  # noqa: E402
 from baselines.pix2shape.training.runs import Machine, train_run  # noqa: E402
 from baselines.pix2shape.training.state import load_state  # noqa: E402
@@ -206,3 +207,40 @@ def test_a_picture_that_cannot_be_written_leaves_the_checkpoint(rooms_path, fold
     assert load_state(folder)[0].iteration == 2
     card = train_run(folder, rooms_path, None, HERE).with_suffix(".json")
     assert isinstance(load_card(card), Card)
+
+
+OFF = dict.fromkeys(LOSSES, 0.0)
+RAYS = tiny(64, rays=True, **{"iterations": 3, **OFF, "matching": 1.0})
+
+
+def test_a_run_of_rays_learns_from_matching_alone(near_path, folder, tmp_path):
+    """It reads no depth, no lights and no ids, and its matching is not done twice."""
+    blind = tmp_path / "blind.h5"
+    shutil.copy(near_path, blind)
+    with h5py.File(blind, "r+") as file:
+        file["depth"][...] = 7.0
+        file["normal"][...] = 0.0
+        file["object_id"][...] = 0
+    done: list[dict[str, float]] = []
+    train_run(folder, near_path, RAYS, HERE, progress=lambda state, losses: done.append(losses))
+    assert [set(losses) for losses in done[-3:]] == [{"matching"}] * 3
+    assert done[0].keys() == {"share of images matched"}
+    other = tmp_path / "other"
+    train_run(other, blind, RAYS, HERE)
+    assert same(folder / "weights.safetensors", other / "weights.safetensors")
+
+
+def test_a_killed_run_of_rays_goes_on_with_the_labels_it_has(near_path, folder, tmp_path):
+    train_run(tmp_path / "whole", near_path, RAYS, HERE)
+    with pytest.raises(Killed):
+        train_run(folder, near_path, RAYS, HERE, progress=killed_at(3))
+    before = (folder / "labels" / "00000.safetensors").stat().st_mtime_ns
+    train_run(folder, near_path, None, HERE)
+    assert (folder / "labels" / "00000.safetensors").stat().st_mtime_ns == before
+    assert same(folder / "weights.safetensors", tmp_path / "whole" / "weights.safetensors")
+
+
+def test_rays_need_neighbouring_views(several_path, folder):
+    with pytest.raises(SpecError) as error:
+        train_run(folder, several_path, RAYS, HERE)
+    assert (error.value.where, error.value.found) == ("rooms", "no such views")

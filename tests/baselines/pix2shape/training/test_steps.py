@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 torch = pytest.importorskip("torch")
-from baselines.pix2shape.data.rooms import Batch  # noqa: E402
+from baselines.pix2shape.data.rooms import Batch, Relief  # noqa: E402
 from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.config import LOSSES, ModelConfig  # noqa: E402
 from baselines.pix2shape.network.model import Pix2Shape, Views  # noqa: E402
@@ -16,6 +16,7 @@ from baselines.pix2shape.training import losses as functions  # noqa: E402
 from baselines.pix2shape.training.steps import critic_step, draw, generator_step  # noqa: E402
 
 NETWORKS = NetworkSpec(size=32, width=0.05, z_scene=6, z_view=2)
+EACH = tuple(name for name in LOSSES if name != "matching")  # which needs other networks
 NEEDED = {"adversarial": {"critic"}, "mutual_information": {"statistics"}}
 
 
@@ -48,7 +49,7 @@ def step(config: ModelConfig, batch: Batch | None = None) -> tuple[Any, dict[str
     return generator_step(model_of(config), batch or some_batch(), draw(8, 8, 3), labelled())
 
 
-@pytest.mark.parametrize("name", LOSSES)
+@pytest.mark.parametrize("name", EACH)
 def test_one_loss_is_computed_alone(name):
     """With the networks that it needs, and no other."""
     model = model_of(only(**{name: 0.5}))
@@ -62,9 +63,9 @@ def test_one_loss_is_computed_alone(name):
 
 def test_the_total_is_the_weighted_sum():
     """Whichever are on: each has the value that it has alone."""
-    weights = {name: 0.3 + 0.1 * place for place, name in enumerate(LOSSES)}
-    alone = {name: step(only(**{name: 1.0}))[1][name].item() for name in LOSSES}
-    for chosen in ((), LOSSES[::2], LOSSES[1::2], LOSSES[:4], LOSSES):
+    weights = {name: 0.3 + 0.1 * place for place, name in enumerate(EACH)}
+    alone = {name: step(only(**{name: 1.0}))[1][name].item() for name in EACH}
+    for chosen in ((), EACH[::2], EACH[1::2], EACH[:4], EACH):
         total, losses = step(only(**{name: weights[name] for name in chosen}))
         assert set(losses) == set(chosen)
         found = {name: value.item() for name, value in losses.items()}
@@ -164,7 +165,7 @@ class Sphere(Pix2Shape):
 
     radius = 2.0
 
-    def surfels(self, code: Any, condition: Any) -> Any:
+    def surfels(self, code: Any, condition: Any, cameras: Any = None) -> Any:
         self.seen = [*getattr(self, "seen", []), condition]
         turn = facing_the_origin(condition)[:, :3, :3]
         rays = back_project(torch.ones(1, 32, 32), 28.0)[0]
@@ -216,8 +217,8 @@ def test_consistency_teaches_both_depths_with_the_codes_own_class():
     views = replace(batch.views, condition=condition, world_from_camera=facing_the_origin(place))
     made, surfels = [], model.surfels
 
-    def spy(code: Any, condition: Any) -> Any:
-        depth, opacity = surfels(code, condition)
+    def spy(code: Any, condition: Any, cameras: Any) -> Any:
+        depth, opacity = surfels(code, condition, cameras)
         depth.retain_grad()
         made.append((condition, depth))
         return depth, opacity
@@ -228,6 +229,28 @@ def test_consistency_teaches_both_depths_with_the_codes_own_class():
     assert torch.equal(elsewhere, torch.cat([place[noise.order], classes], dim=1))
     assert own.grad.any()
     assert other.grad.any()
+
+
+def test_matching_compares_relief_in_one_view_of_each_scene():
+    networks = NetworkSpec(size=32, width=0.05, z_scene=3, rays=True)
+    model = model_of(replace(only(), networks=networks, matching=1.0))
+    batch, noise = some_batch(), draw(8, 3, 3)
+    place = 0.5 + batch.views.condition
+    poses = facing_the_origin(place)[:, None].repeat(1, 2, 1, 1)
+    poses[:, 1, 0, 3] += 0.1
+    found = torch.rand(8, 2, 32, 32)
+    views = replace(batch.views, world_from_camera=poses[:, 0])
+    batch = replace(batch, views=views, relief=Relief(found, poses))
+    total, losses = generator_step(model, batch, noise)
+    drawn = (noise.share >= 0.5).long()
+    assert 0 < drawn.sum() < 8, "either view is drawn for some"
+    code = model.encode(batch.image, views)
+    each = torch.arange(8)
+    said = model.relief(code, poses[each, drawn, :3, 3])
+    expected = (said - found[each, drawn]).abs().mean()
+    assert losses["matching"].item() == pytest.approx(expected.item(), rel=1e-5)
+    total.backward()
+    assert model.encoder.layers[0].weight.grad.any()
 
 
 @pytest.mark.parametrize(

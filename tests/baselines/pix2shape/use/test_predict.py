@@ -24,6 +24,7 @@ torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
 from baselines.pix2shape.data.rooms import RoomImages, channels_first  # noqa: E402
+from baselines.pix2shape.network.empty_rooms import empty_rooms  # noqa: E402
 from baselines.pix2shape.use import predict  # noqa: E402
 from baselines.pix2shape.use.predict import answer_file, enlarged, predict_file, predict_rooms  # noqa: E402
 
@@ -56,6 +57,20 @@ def decoded(model: Any, path: Path, source: int, row: int) -> tuple[np.ndarray, 
             model.surfels(code, pair.views.condition[1:])[0], rooms.spec.fov_y_degrees, 64
         )
     return depth[0].numpy(), normal[0].permute(1, 2, 0).numpy()
+
+
+def test_a_model_of_rays_is_another_method_and_says_what_it_is_told(several_path, tmp_path):
+    model = made(tiny(64, rays=True))
+    predict_rooms(model, several_path, tmp_path / "p.h5")
+    with open_predictions(tmp_path / "p.h5") as predictions:
+        assert predictions.method == "pix2shape-rays"
+    with h5py.File(tmp_path / "p.h5") as file, RoomsFile(several_path) as rooms:
+        assert "floor and walls" in file.attrs["notes"]
+        poses = torch.from_numpy(rooms.read("camera/world_from_camera", slice(None))).float()
+        walls, _, _ = empty_rooms(poses, rooms.spec.fov_y_degrees, 64)
+        depth = torch.from_numpy(file["depth"][()])
+        assert (depth <= walls + 2e-3).all()
+        assert (depth < walls - 0.02).any()
 
 
 def predicted(model: Any, path: Path, out: Path) -> Fields:

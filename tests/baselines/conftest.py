@@ -1,4 +1,4 @@
-"""One thread a test process; rooms seen from neighbouring views, large enough to be matched."""
+"""One thread a test process; rooms seen from neighbouring views."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,9 +6,12 @@ from typing import Any
 
 import pytest
 
-torch = pytest.importorskip("torch")
-torch.set_num_threads(1)
-
+try:
+    import torch
+except ImportError:  # most baselines need none
+    pass
+else:
+    torch.set_num_threads(1)
 
 NEAR: dict[str, Any] = {
     "height": 64, "width": 64, "min_visible_pixels": 12, "image_dtype": "float16",
@@ -28,7 +31,14 @@ def many_near_path(
 ) -> Path:
     """Return 12 rooms as in `near_path`, whose errors depend little on the seed.
 
-    With two rooms at 8 bits, the bounds of test_matching.py fail for five of seeds 0 to 7; with
+    With two rooms at 8 bits, the bounds of test_search.py fail for five of seeds 0 to 7; with
     twelve they hold for each of seeds 0 to 3.
     """
     return make_rooms(tmp_path_factory.mktemp("near") / "many.h5", 12, **NEAR)
+
+
+@pytest.fixture(scope="session")
+def turned_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a file of 3 rooms seen from 0, 10 and 80 degrees, 32x32."""
+    path = tmp_path_factory.mktemp("turned") / "turned.h5"
+    return make_rooms(path, 3, views=(0.0, 10.0, 80.0), min_visible_pixels=2)
