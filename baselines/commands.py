@@ -29,7 +29,9 @@ UNTRAINED = {
     "outline": "questions: the nearest outline, without labels or 3D",
     "outline-trees": "questions: trees on outline features, learned from --train",
     "pix2shape": "the reference model, which `pix2shape train` trains",
+    "pix2shape-rays": "rooms: the same, told floor and walls; learned from several views",
 }
+REFERENCE = ("pix2shape", "pix2shape-rays")
 # Packages `baselines.<name>`, - written as _, whose functions `train` and `write_submission` make
 # a baseline that is trained with `bench train NAME`. A new one is a line here.
 TRAINED = {
@@ -90,18 +92,20 @@ def baseline(
     overwrite: bool,
 ) -> None:
     """Write the submission of a baseline for rooms or questions."""
-    if weights is not None and name not in ("pix2shape", *TRAINED):
+    if weights is not None and name not in (*REFERENCE, *TRAINED):
         raise click.UsageError(f"--weights: {name} has none")
-    if train is not None and name in ("pix2shape", *TRAINED):
-        command = "pix2shape train" if name == "pix2shape" else f"bench train {name}"
+    if train is not None and name in (*REFERENCE, *TRAINED):
+        command = "pix2shape train" if name in REFERENCE else f"bench train {name}"
         raise click.UsageError(f"--train: {name} is trained already; see {command}")
     if labels is not None and name != "outline-trees":
         raise click.UsageError(f"--labels: {name} learns from none")
     method = name
     if name in ("outline", "outline-trees"):
         _answer_by_outline(name, data, out, train, labels, overwrite)
-    elif name == "pix2shape":
-        method += f", weights {predict_to(out, weights, data, overwrite=overwrite)},"
+    elif name in REFERENCE:
+        rays = name == "pix2shape-rays"
+        used = predict_to(out, weights, data, rays=rays, overwrite=overwrite)
+        method += f", weights {used},"
     elif name in TRAINED:
         with progress_bar(None, "row") as bar:
 

@@ -218,13 +218,17 @@ def predict(
     print_line(f"{out}: {weights} on {data}; score it with `bench score {out} --truth {data}`")
 
 
-def predict_to(out: str, weights: str | None, data: str, **how: Any) -> str:
-    """Write a submission with `predict_file`, and a progress bar; return the weights used."""
+def predict_to(out: str, weights: str | None, data: str, *, rays: bool = False, **how: Any) -> str:
+    """Write a submission with `predict_file`, and a progress bar; return the weights used.
+
+    Args:
+        weights: None for the bundled ones that suit the data, those of `rays` or the others.
+    """
     needs_torch()
     from baselines.pix2shape.use.predict import predict_file
     from baselines.pix2shape.weights.bundled import suited
 
-    weights = weights or suited(data)
+    weights = weights or suited(data, rays)
     with progress_bar(None, "row") as bar:
 
         def show(done: int, total: int) -> None:

@@ -56,6 +56,7 @@ METHODS = (
     Method("oracle"),
     Method("depth-supervised"),
     Method("view-pairs"),
+    Method("pix2shape-rays", presets=("shapes", "shapenet")),
     Method("pix2shape"),
     Method("ptn"),
     Method("empty-room"),

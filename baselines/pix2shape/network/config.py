@@ -30,7 +30,7 @@ CONFIGS: dict[str, dict[str, Any]] = {
     "rays": {
         "networks": NetworkSpec(size=64, width=0.125, rays=True),
         "batch": 32,
-        "iterations": 16_000,
+        "iterations": 10_000,
         "learning_rate": 3e-3,
         "betas": (0.9, 0.99),
         "decay": True,

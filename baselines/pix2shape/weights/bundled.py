@@ -16,17 +16,21 @@ def names() -> list[str]:
     return sorted(path.stem for path in FOLDER.glob("*.safetensors"))
 
 
-def suited(data: str | Path) -> str:
+def suited(data: str | Path, rays: bool = False) -> str:
     """Return the name of the bundled weights that were trained on the most similar data.
+
+    Args:
+        rays: whether they shall be of the configuration "rays", which there is for rooms alone.
 
     Raises as `RoomsFile`, and SpecError where this installation has no such weights.
     """
     if is_question_file(data):
-        name = "iqtt"
+        name = "iqtt-rays" if rays else "iqtt"
     else:
         with RoomsFile(data) as rooms:
-            single = "-single" if rooms.spec.objects[1] == 1 else ""
+            single = "-single" if rooms.spec.objects[1] == 1 and not rays else ""
             name = f"shapes{single}" if rooms.spec.source == "shapes" else "shapenet"
+            name += "-rays" * rays
     if name not in names():
         hint = "train some with `pix2shape train`"
         raise SpecError("weights", "none bundled", f"some that suit {data}", hint)
