@@ -4,6 +4,17 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 WORKERS ?= 2
 
+# Tests of pages need Chromium. It is installed where that can be done, and they are skipped where not.
+define FIND_BROWSER
+@for name in chromium chromium-browser google-chrome google-chrome-stable; do \
+  command -v $$name > /dev/null && exit 0; \
+done; \
+if [ "$$(id -u)" = 0 ] && command -v apt-get > /dev/null; then \
+  { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends chromium; } > /dev/null 2>&1; \
+fi; \
+command -v chromium > /dev/null || echo "No Chromium: tests of pages are skipped, or fail with CI=true."
+endef
+
 .PHONY: demo demo-model test test-all check bench bench-gpu results fuzz torture clean
 
 demo: $(VENV)/.runtime
@@ -90,9 +101,11 @@ $(VENV)/.model: $(BIN)/python pyproject.toml constraints.txt
 	touch $@ $(VENV)/.runtime
 
 $(VENV)/.test: $(BIN)/python pyproject.toml constraints.txt
+	$(FIND_BROWSER)
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[test]'
 	touch $@ $(VENV)/.runtime $(VENV)/.model
 
 $(VENV)/.dev: $(BIN)/python pyproject.toml constraints.txt
+	$(FIND_BROWSER)
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	touch $@ $(VENV)/.runtime $(VENV)/.model $(VENV)/.test

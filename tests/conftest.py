@@ -1,4 +1,4 @@
-"""Shared fixtures: tiny files, damaged copies, folders of meshes, and the commands as users see."""
+"""Shared fixtures: tiny files, damaged copies, folders of meshes, the commands, a browser."""
 
 import re
 import shutil
@@ -193,3 +193,21 @@ def pix2shape_files(truths: Any, make_rooms: Any, tmp_path_factory: pytest.TempP
 
     folder = tmp_path_factory.mktemp("pix2shape")
     return prepare(folder, Path(truths.rooms), Path(truths.iqtt), make_rooms)
+
+
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Return the address that controls the session's Chromium."""
+    import browser
+
+    with browser.started(tmp_path_factory.mktemp("chromium")) as control:
+        yield control
+
+
+@pytest.fixture
+def visit(chromium: str) -> Any:
+    """Open an address in Chromium, as `browser.connected` says; return a `browser.Seen`."""
+    import browser
+
+    with browser.connected(chromium) as open_page:
+        yield open_page
