@@ -4,12 +4,12 @@ import argparse
 import sys
 from pathlib import Path
 
-from benchmarks.results import questions, rooms
+from benchmarks.results import questions, rooms, studies
 from benchmarks.results.markdown import put
 from benchmarks.results.steps import ROOT
 
 PAGE = ROOT / "docs" / "results.md"
-TABLES = ("questions", "rooms")
+TABLES = ("questions", "rooms", "studies")
 
 
 def main() -> None:
@@ -17,8 +17,12 @@ def main() -> None:
     known = [method.name for method in (*questions.METHODS, *rooms.METHODS)]
     parser = argparse.ArgumentParser(prog="python -m benchmarks.results", description=__doc__)
     parser.add_argument("--folder", type=Path, default=Path("results"), help="where all is kept")
-    parser.add_argument("--only", choices=TABLES, help="one of the two tables")
+    parser.add_argument("--only", choices=TABLES, help="one part of the page")
     parser.add_argument("--methods", nargs="+", choices=known, default=[], metavar="NAME")
+    parser.add_argument(
+        "--studies", nargs="+", choices=studies.STUDIES, default=[], metavar="NAME",
+        help="which of the ablations  [all]",
+    )  # fmt: skip
     parser.add_argument("--seeds", type=int, default=3, help="training runs of each method [3]")
     parser.add_argument("--page", type=Path, default=PAGE, help="the page to write to")
     parser.add_argument("--print", action="store_true", help="print what is there; run nothing")
@@ -31,9 +35,11 @@ def main() -> None:
         if not given.print:
             if name == "questions":
                 failed += questions.run(given.folder, given.methods, given.seeds)
-            else:
+            elif name == "rooms":
                 failed += rooms.run(given.folder, given.methods)
-        text = (questions if name == "questions" else rooms).page(given.folder)
+            else:
+                failed += studies.run(given.folder, given.studies, given.seeds)
+        text = {"questions": questions, "rooms": rooms, "studies": studies}[name].page(given.folder)
         if given.print:
             print(text, end="\n\n")
         else:

@@ -1,0 +1,69 @@
+"""The ablations: every row is trained with every seed, and its cells are means over the runs."""
+
+import json
+
+import pytest
+
+from benchmarks.results import studies
+from benchmarks.results.steps import StepError
+
+
+@pytest.fixture
+def ran(monkeypatch):
+    """Replace the running of commands; the score is 0.25 for seed 0 and 0.75 for the others."""
+    commands = []
+
+    def run(folder, command):
+        commands.append(command)
+        words = command.split()
+        made = folder / words[words.index("--json" if "--json" in words else "--out") + 1]
+        if words[0] == "iqtt":
+            for name in ("train", "test", "test-answers"):
+                (made / f"iqtt-{name}.h5").parent.mkdir(parents=True, exist_ok=True)
+                (made / f"iqtt-{name}.h5").write_text(name)
+            return
+        if "adversarial=1" in words and words[1] == "train":
+            raise StepError("none of these")
+        path = made / "weights.safetensors" if words[1] == "train" else made
+        path.parent.mkdir(parents=True, exist_ok=True)
+        score = {"value": 0.25 if "-0/" in command else 0.75, "low": None, "high": None}
+        scores = {"metrics": {"iqtt_accuracy": score}, "by_view_angle": {"35": {"chamfer": score}}}
+        path.write_text(json.dumps(scores) if "--json" in words else command)
+
+    class NoData:
+        def __init__(self, path):
+            self.attrs = {}
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *error):
+            pass
+
+    monkeypatch.setattr("benchmarks.results.steps.run_command", run)
+    monkeypatch.setattr("benchmarks.results.steps.h5py.File", NoData)
+    return commands
+
+
+def test_every_row_is_trained_with_every_seed_once(ran, tmp_path):
+    assert studies.run(tmp_path, ["information-200"], 2) == []
+    trained = [command for command in ran if command.startswith("pix2shape train")]
+    weights = (0.1, 0.4, 0.6, 0.8, 1.0)
+    assert [c.count("--labels 200") for c in trained] == [1] * 10
+    for place, command in enumerate(trained):
+        weight, seed = weights[place // 2], place % 2
+        assert f"--set mutual_information={weight} --set seed={seed} --out" in command
+    studies.run(tmp_path, ["information-200"], 3)
+    assert len([command for command in ran if command.startswith("pix2shape train")]) == 15
+    page = studies.page(tmp_path)
+    assert "| 0.4 | 3 | 0.583 ± 0.289 |" in page
+    assert page.count("###") == 1, "what was not run has no table"
+
+
+def test_a_run_that_fails_is_told_and_leaves_the_others(ran, tmp_path):
+    failed = studies.run(tmp_path, ["losses"], 1)
+    assert failed == ["losses, adversarial, seed 0", "losses, adversarial, reconstruction, seed 0"]
+    head, _, *rows = studies.page(tmp_path).split("\n\n")[1].splitlines()
+    cells = dict(zip(head.split(" | "), rows[0].split(" | "), strict=True))
+    assert [row.split(" | ")[:2] for row in rows] == [["| reconstruction", "1"]]
+    assert (cells["CD, 35°"], cells["CD, 0°"]) == ("0.250", "–")
