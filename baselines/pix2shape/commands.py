@@ -218,11 +218,14 @@ def predict(
     print_line(f"{out}: {weights} on {data}; score it with `bench score {out} --truth {data}`")
 
 
-def predict_to(out: str, weights: str | None, data: str, *, rays: bool = False, **how: Any) -> str:
+def predict_to(
+    out: str, weights: str | None, data: str, *, rays: bool | None = None, **how: Any
+) -> str:
     """Write a submission with `predict_file`, and a progress bar; return the weights used.
 
     Args:
-        weights: None for the bundled ones that suit the data, those of `rays` or the others.
+        weights: None for the bundled ones that suit the data.
+        rays: as `bundled.suited`.
     """
     needs_torch()
     from baselines.pix2shape.use.predict import predict_file
@@ -239,9 +242,9 @@ def predict_to(out: str, weights: str | None, data: str, *, rays: bool = False, 
     return weights
 
 
-@click.command(epilog=f"{EXAMPLE}pix2shape sample --weights shapes --out samples.png")
+@click.command(epilog=f"{EXAMPLE}pix2shape sample --weights shapes-rays --out samples.png")
 @click.option(
-    "--weights", type=WEIGHTS_PATH, default="shapes", show_default=True, help=f"{A_MODEL}."
+    "--weights", type=WEIGHTS_PATH, default="shapes-rays", show_default=True, help=f"{A_MODEL}."
 )
 @_picture("samples.png")
 @_number("--n", "count", least=1, most=256, default=16, text="Number of samples.")

@@ -16,18 +16,22 @@ def names() -> list[str]:
     return sorted(path.stem for path in FOLDER.glob("*.safetensors"))
 
 
-def suited(data: str | Path, rays: bool = False) -> str:
+def suited(data: str | Path, rays: bool | None = None) -> str:
     """Return the name of the bundled weights that were trained on the most similar data.
 
     Args:
-        rays: whether they shall be of the configuration "rays", which there is for rooms alone.
+        rays: whether they shall be of the configuration "rays", which there is for rooms alone;
+            None for whichever is better.
 
     Raises as `RoomsFile`, and SpecError where this installation has no such weights.
     """
     if is_question_file(data):
-        name = "iqtt-rays" if rays else "iqtt"
+        if rays:
+            raise SpecError(data, "questions", "rooms, which the configuration rays is for")
+        name = "iqtt"
     else:
         with RoomsFile(data) as rooms:
+            rays = rays is not False
             single = "-single" if rooms.spec.objects[1] == 1 and not rays else ""
             name = f"shapes{single}" if rooms.spec.source == "shapes" else "shapenet"
             name += "-rays" * rays

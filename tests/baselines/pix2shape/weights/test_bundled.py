@@ -13,6 +13,7 @@ from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.measures.empty_room import empty_room
 from metrics.submissions.reader import open_predictions
+from scenegen.common.errors import SpecError
 from scenegen.description.presets import preset_spec
 from scenegen.rooms.make import make_dataset
 from scenegen.rooms.reader import RoomsFile
@@ -34,6 +35,7 @@ def test_they_predict_rooms(name: str, tmp_path: Path) -> None:
     rays, preset = name.endswith("-rays"), name.removesuffix("-rays")
     make_dataset(data, preset_spec(preset, seed=77, views=(0.0, 55.0)), 4)
     assert suited(data, rays) == name
+    assert suited(data) == f"{preset.removesuffix('-single')}-rays"
     predict_rooms(open_weights(name)[0], data, out)
     with RoomsFile(data) as rooms, open_predictions(out) as predictions:
         truth = rooms.read("depth", slice(None))
@@ -53,6 +55,8 @@ def test_they_answer_questions(tmp_path: Path) -> None:
     make_split(tmp_path / "split", spec)
     data, out = tmp_path / "split" / "iqtt-test.h5", tmp_path / "predictions.h5"
     assert suited(data) == "iqtt"
+    with pytest.raises(SpecError):
+        suited(data, rays=True)
     answer_file(open_weights("iqtt")[0], data, out)
     with h5py.File(tmp_path / "split" / "iqtt-test-answers.h5") as truth, h5py.File(out) as file:
         right = file["scores"][:].argmax(axis=1) == truth["answers"][:]
