@@ -13,7 +13,7 @@ import asyncio
 import re
 import sqlite3
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -33,6 +33,7 @@ from iqtt.quiz.study import Question, Study
 from scenegen.common.errors import SceneGenError
 
 COOKIE_SECONDS = 30 * 24 * 3600
+MOST_ASKED = 4096  # sessions whose state is remembered
 MILLISECONDS = re.compile(r"[0-9]{1,9}(\.[0-9]{1,6})?")
 Compare = Callable[[Sequence[tuple[Question, bool]]], Sequence[Bar]]
 
@@ -49,6 +50,7 @@ class Quiz:
         contact: who answers for the study; may be empty.
         most: how many participants there may be.
         tell: prints a line for whoever runs the server.
+        asked: what sessions were asked last, so that their images need no look at the disk.
     """
 
     study: Study
@@ -58,6 +60,7 @@ class Quiz:
     tell: Callable[[str], None]
     contact: str = ""
     most: int = sessions.MOST_PARTICIPANTS
+    asked: dict[str, State] = field(default_factory=dict)
 
     @property
     def cookie(self) -> str:
@@ -120,7 +123,8 @@ async def _quiz(quiz: Quiz, request: Request) -> Response:
     if found.question is None:
         right = sum(good for _, good in found.results)
         return HTMLResponse(result_page(right, len(found.results), quiz.compare(found.results)))
-    names = sessions.image_names(quiz.key, found.number, found.position, _images(quiz))
+    names = _image_names(quiz, found)
+    _remember(quiz, _token(quiz, request), found)
     values = {
         "reference": names[0],
         "answers": names[1:],
@@ -140,7 +144,7 @@ async def _quiz(quiz: Quiz, request: Request) -> Response:
 
 async def _answer(quiz: Quiz, request: Request) -> Response:
     form = await read_form(request, ("form", "answer", "ms"))
-    if form["answer"] not in [str(k) for k in range(1, _images(quiz))]:
+    if form["answer"] not in [str(k) for k in range(1, 1 + quiz.study.settings.answers)]:
         raise RefusedError(422, "There is no such answer.")
     if form["ms"] and not MILLISECONDS.fullmatch(form["ms"]):
         raise RefusedError(422, "This is no time.")
@@ -149,6 +153,7 @@ async def _answer(quiz: Quiz, request: Request) -> Response:
         token=_token(quiz, request), form=form["form"], choice=int(form["answer"]) - 1,
         client_ms=float(form["ms"]) if form["ms"] else None, key=quiz.key,
     )  # fmt: skip
+    quiz.asked.pop(_token(quiz, request), None)
     return _see("/quiz")
 
 
@@ -157,6 +162,7 @@ async def _next(quiz: Quiz, request: Request) -> Response:
     await _run(
         quiz, sessions.go_on, token=_token(quiz, request), form=form["form"], key=quiz.key
     )  # fmt: skip
+    quiz.asked.pop(_token(quiz, request), None)
     return _see("/quiz")
 
 
@@ -171,22 +177,25 @@ async def _leave(quiz: Quiz, request: Request) -> Response:
 
 
 async def _image(quiz: Quiz, request: Request) -> Response:
-    found = await _state(quiz, request)
-    names = []
-    if found is not None and found.question is not None:
-        names = sessions.image_names(quiz.key, found.number, found.position, _images(quiz))
-    if found is None or found.question is None or request.path_params["name"] not in names:
+    name: str = request.path_params["name"]
+    found = quiz.asked.get(_token(quiz, request))
+    if name not in _image_names(quiz, found):
+        found = await _state(quiz, request)
+    names = _image_names(quiz, found)
+    if found is None or found.question is None or name not in names:
         raise RefusedError(404, "There is no such image.")
-    asked = found.question
-    images = await asyncio.to_thread(quiz.study.images, asked.row, asked.calibration)
-    return Response(images[names.index(request.path_params["name"])], media_type="image/png")
+    row, calibration = found.question.row, found.question.calibration
+    images = quiz.study.kept_images(row, calibration)
+    if images is None:
+        images = await asyncio.to_thread(quiz.study.images, row, calibration)
+    return Response(images[names.index(name)], media_type="image/png")
 
 
 async def _static(_quiz: Quiz, request: Request) -> Response:
     found = static_files().get(request.path_params["name"])
     if found is None:
         raise RefusedError(404, "There is no such page.")
-    return Response(found[0], media_type=found[1])
+    return Response(found[0], media_type=found[1], headers={"Cache-Control": "max-age=600"})
 
 
 async def _refused(_request: Request, error: Exception) -> Response:
@@ -221,8 +230,19 @@ def _consent(quiz: Quiz, status: int = 200) -> Response:
     return HTMLResponse(text, status)
 
 
-def _images(quiz: Quiz) -> int:
-    return 1 + quiz.study.settings.answers
+def _image_names(quiz: Quiz, found: State | None) -> list[str]:
+    """Return the names of the images of the question that is asked; none at the end."""
+    if found is None or found.question is None:
+        return []
+    count = 1 + quiz.study.settings.answers
+    return sessions.image_names(quiz.key, found.number, found.position, count)
+
+
+def _remember(quiz: Quiz, token: str, found: State) -> None:
+    """Keep what a session is asked, and forget the session that was remembered first."""
+    quiz.asked[token] = found
+    if len(quiz.asked) > MOST_ASKED:
+        del quiz.asked[next(iter(quiz.asked))]
 
 
 def _token(quiz: Quiz, request: Request) -> str:

@@ -63,7 +63,10 @@ class Hosts:
 
 
 class Guard:
-    """ASGI middleware: refuses requests of other sites, and adds `HEADERS` to every response."""
+    """ASGI middleware: refuses requests of other sites, and adds `HEADERS` to every response.
+
+    A response may have its own `Cache-Control`.
+    """
 
     def __init__(self, app: ASGIApp, hosts: Hosts, refuse: ASGIApp) -> None:
         """Guard an app; `refuse` answers requests whose scope has a `RefusedError`, "refused"."""
@@ -74,7 +77,9 @@ class Guard:
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                MutableHeaders(scope=message).update(HEADERS)
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers.setdefault(name, value)
             await send(message)
 
         try:

@@ -14,6 +14,7 @@ _PAGES = Environment(
     loader=FileSystemLoader(FOLDER / "templates", encoding="utf-8"),
     autoescape=True,
     undefined=StrictUndefined,
+    auto_reload=False,
     trim_blocks=True,
     lstrip_blocks=True,
 )

@@ -57,7 +57,7 @@ TABLES = {
 }
 SECRET = "secret"
 LONGEST_VALUE = 100_000  # bytes
-MOST_STEPS = 20_000  # of a thousand instructions each: what checking and reading a file may take
+MOST_STEPS = 1_000_000  # of a thousand instructions each, that checking a file may take
 SETTINGS_HINT = "repeat the settings that it was begun with, or name another --db"
 
 

@@ -6,6 +6,8 @@ import logging
 import resource
 import signal
 import socket
+import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -57,7 +59,10 @@ class QuietServer(uvicorn.Server):
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Answer signals while the server runs."""
+        """Answer signals while the server runs; only the main thread hears any."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
         loop = asyncio.get_running_loop()
         numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
         heard = [n for n in numbers if signal.getsignal(n) is not signal.SIG_IGN]
@@ -83,12 +88,13 @@ def listen(host: str, port: int, public: bool) -> socket.socket:
         raise SpecError("--host", host or "nothing", "localhost", hint)
     name = "127.0.0.1" if host.lower() in LOCAL_NAMES else host
     try:
-        family, kind, _, _, address = socket.getaddrinfo(
+        family, kind, protocol, _, address = socket.getaddrinfo(
             name, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )[0]
     except (OSError, UnicodeError) as error:
         raise SpecError("--host", host, "a name or an address of this machine") from error
-    listening = socket.socket(family, kind)
+    # asyncio sends small packets at once only where it is told that the protocol is TCP.
+    listening = socket.socket(family, kind, protocol)
     try:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listening.bind(address)
@@ -121,6 +127,15 @@ def address_of(listening: socket.socket, host: str) -> str:
 
 def serve(app: ASGIApp, listening: socket.socket, ready: Callable[[], Any]) -> None:
     """Answer requests until a signal comes; call `ready` before the first one."""
+    # The threads hand over to each other often: the default of 5 ms would be felt in every answer.
+    sys.setswitchinterval(0.0005)
+    server = server_of(app)
+    ready()
+    server.run(sockets=[listening])
+
+
+def server_of(app: ASGIApp) -> QuietServer:
+    """Return a server that does not run yet."""
     config = uvicorn.Config(
         app,
         http=ImpatientProtocol,
@@ -137,8 +152,7 @@ def serve(app: ASGIApp, listening: socket.socket, ready: Callable[[], Any]) -> N
     )
     # What clients do wrong is none of the terminal's business.
     logging.getLogger("uvicorn.error").setLevel(logging.ERROR)
-    ready()
-    QuietServer(config).run(sockets=[listening])
+    return QuietServer(config)
 
 
 def _connections() -> int:

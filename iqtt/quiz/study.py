@@ -121,12 +121,16 @@ class Pool:
             calibration, row, self.kinds[at], self.angles[at], self.right[at], self.shapes[at]
         )
 
+    def kept_images(self, row: int) -> Sequence[bytes] | None:
+        """Return the images of a row if they are at hand."""
+        return self._pictures.get(row)
+
     def images(self, row: int) -> Sequence[bytes]:
         """Return the reference and the answers of a row as PNG files; for any number of threads.
 
         Raises FileFormatError where the row is damaged.
         """
-        found = self._pictures.get(row)
+        found = self.kept_images(row)
         if found is None:
             with self._lock:
                 record = self.file[row]
@@ -201,6 +205,10 @@ class Study:
     def images(self, row: int, calibration: bool) -> Sequence[bytes]:
         """Return the images of a question, as `Pool.images`."""
         return (self.calibration if calibration else self.pool).images(row)
+
+    def kept_images(self, row: int, calibration: bool) -> Sequence[bytes] | None:
+        """Return as `images`, at once; None where the file would have to be read."""
+        return (self.calibration if calibration else self.pool).kept_images(row)
 
     def close(self) -> None:
         """Close the files; idempotent."""
