@@ -115,13 +115,15 @@ def is_local(host: str) -> bool:
 
 def hosts_of(host: str, public: bool, names: tuple[str, ...]) -> Hosts:
     """Return the hosts that requests may name: where the server listens, and `names`."""
-    own = {host, *names, *((socket.gethostname(), socket.getfqdn()) if public else ())}
+    own = {host, *names, *([socket.gethostname()] if public else [])}
     return Hosts(frozenset(map(str.lower, (*LOCAL_NAMES, *own))), numbers=public)
 
 
 def address_of(listening: socket.socket, host: str) -> str:
     """Return what people type in to come to the first page."""
     port = listening.getsockname()[1]
+    if host in ("0.0.0.0", "::"):  # all addresses of this machine
+        host = socket.gethostname()
     return f"http://{f'[{host}]' if ':' in host else host}:{port}/"
 
 

@@ -35,7 +35,7 @@ def _sections(figures: Figures) -> Iterator[Section]:
 
 def _by_kind(figures: Figures) -> Iterator[Svg]:
     shares = {one.name: 100 * one.accuracy.value for one in figures.by_kind}
-    yield bars(shares, "Right answers by kind", "percent")
+    yield bars(shares, "Right answers by kind (percent)", "kind")
 
 
 def _by_angle(figures: Figures) -> Iterator[Svg]:

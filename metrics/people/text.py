@@ -41,11 +41,14 @@ def head(figures: Figures) -> str:
 def summary_tables(figures: Figures) -> Iterator[Table]:
     """Yield accuracy, what stands beside it, the tests, and the line of response times."""
     both = (
-        ("participants are the sample", figures.accuracy),
-        ("participants and questions are", figures.crossed),
+        ("of participants", figures.accuracy),
+        ("of participants and questions", figures.crossed),
     )
-    rows = [("accuracy in percent", "mean", "95% interval")]
-    yield "Accuracy", rows + [(name, percent(one.value), ends(one)) for name, one in both]
+    rows = [("accuracy in percent", "value", "95% interval")]
+    rows += [(f"mean, sample {name}", percent(one.value), ends(one)) for name, one in both]
+    if figures.deviation is not None:
+        rows.append(("standard deviation of participants", percent(figures.deviation), ""))
+    yield "Accuracy", rows
     yield (
         "Beside it",
         [
