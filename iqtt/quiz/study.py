@@ -160,8 +160,8 @@ class Study:
         self.path = Path(path)
         self.pool = self.calibration = Pool(path, part)
         try:
-            beside = self._validation(Path(path))
-            if calibrations and beside is not None:
+            beside = self._validation(Path(path), calibrations)
+            if beside is not None:
                 self.calibration = Pool(beside)
             self._share(questions, calibrations, seed)
         except BaseException:
@@ -176,17 +176,13 @@ class Study:
         )
         other: Sequence[int] = range(len(kept.file))
         rows: Sequence[int] = range(len(pool.file))
+        needed = questions + (calibrations if kept is pool else 0)
+        if len(rows) < needed:
+            raise SpecError(f"{self.path}: questions", len(rows), f"at least {needed}")
         if kept is pool:
-            needed = questions + calibrations
-            if len(rows) < needed:
-                raise SpecError(f"{self.path}: questions", len(rows), f"at least {needed}")
             everything = cells_of(pool.kinds, pool.right, rows)
             other = draw_rows(everything, calibrations, seed, 0, attempt=1)
             rows = sorted(set(rows) - set(other))
-        elif len(rows) < questions or len(other) < calibrations:
-            told = f"{len(rows)}, and {len(other)} in {kept.file.path} for the calibration"
-            expected = f"at least {questions}, and {calibrations}"
-            raise SpecError(f"{self.path}: questions", told, expected)
         self._cells, self._calibration_cells = (
             _cells(p, r) for p, r in ((pool, rows), (kept, other))
         )
@@ -222,8 +218,8 @@ class Study:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _validation(self, path: Path) -> Path | None:
-        """Return the validation file of the same split beside a test file, if it is there."""
+    def _validation(self, path: Path, calibrations: int) -> Path | None:
+        """Return the validation file of the same split beside a test file, if it has enough."""
         beside = path.with_name(path.name.replace(FROM_TEST, FROM_VALIDATION))
         spec = self.pool.file.spec
         if beside == path or not beside.is_file() or spec is None:
@@ -233,7 +229,8 @@ class Study:
         trial.try_file(beside)
         with QuestionsFile(beside) as file:
             same = file.spec is not None and file.spec.public() == spec.public()
-            return beside if same and file.has_answers and len(file) else None
+            enough = file.has_answers and len(file) >= calibrations > 0
+            return beside if same and enough else None
 
 
 def _cells(pool: Pool, rows: Sequence[int]) -> dict[Cell, list[int]]:
