@@ -29,6 +29,8 @@ def test_every_question_is_drawn_by_somebody_and_no_order_is_fixed():
     first = Counter(KINDS[rows[0]] for rows in draws)
     assert len(first) == 5
     assert max(first.values()) < 70
+    # Who is balanced one after the other could guess: three in a row would have three places.
+    assert any(len({PLACES[row] for row in rows[:3]}) == 1 for rows in draws)
     places = Counter((i, PLACES[rows[i]]) for rows in draws for i in range(20))
     assert max(places.values()) < 100, "a place is more likely at some position"
 

@@ -120,6 +120,10 @@ def test_damage_is_told(path):
         except (FileFormatError, AnswersError):
             told += 1
     assert told
+    path.write_bytes(whole[:39] + b"\x05" + whole[40:])  # the number of unused pages
+    with pytest.raises(FileFormatError) as error:
+        read_answers(path)
+    assert error.value.found.startswith("damage: ")
     path.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(FileFormatError):
         read_answers(path)

@@ -35,7 +35,7 @@ def people(quiz_split, tmp_path_factory):
 
 def test_one_of_those_who_were_asked(people, quiz_split, tmp_path):
     split, truth = quiz_split / "iqtt-test.h5", quiz_split / "iqtt-test-answers.h5"
-    given = {}
+    given, different = {}, set()
     for one in counted(people):
         given.setdefault(one.question, set()).add(one.answer)
     found = []
@@ -45,12 +45,14 @@ def test_one_of_those_who_were_asked(people, quiz_split, tmp_path):
         with open_predictions(path) as predictions:
             rows, answers = predictions.rows.tolist(), predictions.answers.tolist()
         assert rows == sorted(given)
+        different.add(tuple(answers))
         assert all(answer in given[row] for row, answer in zip(rows, answers, strict=True))
         scores = score([path], truth, Settings(allow_partial=True, processes=1))
         found.append(scores.metrics["iqtt_accuracy"].value)
         assert scores.metrics["iqtt_accuracy"].n == count
     shares = [mean(one.correct for one in counted(people) if one.question == row) for row in given]
     assert mean(found) == pytest.approx(mean(shares), abs=0.04)
+    assert len(different) == 30
     assert write_submission(people, split, tmp_path / "again.h5", "one", 3) == count
     assert (tmp_path / "again.h5").read_bytes() == (tmp_path / "3.h5").read_bytes()
 
