@@ -69,6 +69,7 @@ bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.nearest
 	$(BIN)/python -m benchmarks.surfels
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.score_rows
+	$(BIN)/python -m benchmarks.quiz
 
 # Needs an NVIDIA GPU; writes docs/gpu.md.
 bench-gpu: $(VENV)/.test

@@ -5,7 +5,10 @@ import click
 from scenegen.common.command_line import PackageCommands
 
 ROOMS = tuple(f"scenegen.commands.{name}" for name in ("making", "rooms", "sharing", "meshes"))
-QUESTIONS = tuple(f"iqtt.commands.{name}" for name in ("making", "questions", "sharing"))
+QUESTIONS = (
+    *(f"iqtt.commands.{name}" for name in ("making", "questions", "sharing")),
+    "metrics.people.commands",
+)
 
 
 @click.group(cls=PackageCommands, modules=ROOMS)

@@ -44,8 +44,38 @@ def make(folder: Path, weights: bool) -> None:
     with h5py.File("released.h5", "w") as file:  # nothing but images and answers
         file["questions"] = np.random.default_rng(3).random((4, 4, 16, 16, 3)).astype("f4")
         file["answers"] = np.arange(4) % 3
+    _people(Path("people.db"))
     if weights:
         _weights(Path("weights.safetensors"))
+
+
+def _people(path: Path) -> None:
+    """Write the answers of three people, of whom one did not finish, with the same bytes always."""
+    from iqtt.quiz import sessions
+    from iqtt.quiz.schema import open_answers
+    from iqtt.quiz.study import Study
+
+    key = b"key"
+    with Study("iqtt/iqtt-test.h5", questions=4, calibrations=1) as study:
+        db = open_answers(path, study.settings)
+        for number, count in enumerate((5, 5, 2)):
+            token = sessions.begin(db, study.draw, 3)
+            for position in range(count):
+                form = sessions.form_name(key, number, position)
+                sessions.show(db, token)
+                sessions.answer(db, token, form, position % 3, 0.0, key)
+                if position == 0:
+                    sessions.go_on(db, token, form, key)
+    for change in (
+        "UPDATE participant SET name = printf('%016x', number), started_ms = 1000 * number,"
+        " token_sha256 = printf('token %d', number)",
+        "UPDATE question SET shown_ms = 1000 * position WHERE times_shown",
+        "UPDATE answer SET answered_ms = 1000 * position + 500, response_ms = 400.0 + position",
+        "UPDATE study SET value = printf('%064x', 1) WHERE name = 'secret'",
+        "PRAGMA journal_mode = DELETE",
+    ):
+        db.execute(change)
+    db.close()
 
 
 def _run(step: str) -> None:

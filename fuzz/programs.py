@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 FORMATS = ("png", "ply", "exr", "obj", "parquet", "webdataset")
-OUTPUTS = ("--out", "--json", "--csv", "--html")  # options that name what is written
+# Options that name what is written.
+OUTPUTS = ("--out", "--json", "--csv", "--html", "--export", "--submission")
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,14 @@ TARGETS = (
          "iqtt audit released.h5"),
         (*SPLIT, "released.h5"),
         (1,),
+    ),
+    Target(
+        "people",
+        ("iqtt quiz-report people.db --json new.json --html new.html",
+         "iqtt quiz-report people.db --model named.json",
+         "iqtt quiz --db people.db --export new.csv",
+         "iqtt quiz iqtt/iqtt-test.h5 --db people.db --submission new.h5 --whose majority"),
+        ("people.db", "named.json", *SPLIT[2:]),
     ),
     Target(
         "weights",

@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 HEAVY = (
     "mitsuba", "drjit", "numpy", "h5py", "trimesh", "scipy", "PIL", "OpenEXR", "tqdm", "torch",
-    "lightning_fabric", "safetensors", "tensorboard", "pyarrow",
+    "lightning_fabric", "safetensors", "tensorboard", "pyarrow", "starlette", "uvicorn",
 )  # fmt: skip
 PIX2SHAPE = ("train", "predict", "sample", "interpolate", "rotate")
 CHECK = f"""
@@ -57,6 +57,7 @@ def test_importing_a_package_loads_nothing_heavy(package, tmp_path):
         ("scenegen", ["card", "--help"]),
         ("scenegen", ["render", "--n", "x"]),
         ("iqtt", ["--help"]),
+        ("iqtt", ["quiz", "--help"]),
         ("bench", ["--help"]),
         ("bench", ["baseline", "--help"]),
         ("bench", ["train", "--help"]),

@@ -1,6 +1,6 @@
 """Small charts as SVG, for pages that load nothing."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -42,12 +42,41 @@ def histogram(values: Array, title: str, unit: str) -> Svg:
     return _chart(title, bars + marks + axes)
 
 
-def intervals(points: Sequence[tuple[float, float, float, float]], title: str, unit: str) -> Svg:
+def bars(counts: Mapping[str, float], title: str, unit: str) -> Svg:
+    """Return a chart with a bar for each name; `unit` says what the names are.
+
+    What is above each bar is its number, so that the chart needs no other axis.
+    """
+    if not counts:
+        return Svg()
+    width = (WIDTH - LEFT - RIGHT) / len(counts)
+    y = _scale(0, max(*counts.values(), 1e-300), HEIGHT - BOTTOM, TOP + 12)
+    shown: list[str] = []
+    for i, (name, value) in enumerate(counts.items()):
+        left, above = LEFT + i * width, f"{value:.3g}" if value else ""
+        place = f'x="{left + 1:.1f}" y="{y(value):.1f}" width="{max(width - 2, 1):.1f}"'
+        shown += (
+            f'<rect class="bar" {place} height="{y(0) - y(value):.1f}">'
+            f"<title>{escape(name)}: {value:.4g}</title></rect>",
+            _text(left + width / 2, HEIGHT - BOTTOM + 14, name, "middle"),
+            _text(left + width / 2, y(value) - 3, above, "middle"),
+        )
+    shown.append(_text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 4, unit, "middle"))
+    return _chart(title, "".join(shown))
+
+
+def intervals(
+    points: Sequence[tuple[float, float, float, float]],
+    title: str,
+    unit: str,
+    line: tuple[float, float] | None = None,
+) -> Svg:
     """Return a chart of values and their intervals over an angle.
 
     Args:
         points: degrees, value, low and high end of each; the ends are NaN where there is none.
         title, unit: of the values.
+        line: intercept and slope per degree of a line to draw through them.
     """
     if not points:
         return Svg()
@@ -64,6 +93,10 @@ def intervals(points: Sequence[tuple[float, float, float, float]], title: str, u
             f'<circle class="dot" cx="{x(degree):.1f}" cy="{y(value):.1f}" r="4">'
             f"<title>{degree:g} degrees: {value:.4g} [{low:.4g}, {high:.4g}]</title></circle>"
         )
+    if line is not None:
+        first, last = min(degrees), max(degrees)
+        ends = [line[0] + line[1] * degree for degree in (first, last)]
+        shown.append(_line("median", x(first), y(ends[0]), x(last), y(ends[1]), "fitted line"))
     axes = _axes(x, degrees, "degrees", y, top, f"{top:.3g}")
     if bottom < 0:
         axes += _line("axis", LEFT, y(0), WIDTH - RIGHT, y(0)) + _text(

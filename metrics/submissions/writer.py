@@ -5,7 +5,7 @@ checked before anything is written.
 """
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any, Self
@@ -160,11 +160,12 @@ def write_answers(
     method: str,
     answer: ArrayLike | None = None,
     scores: ArrayLike | None = None,
+    rows: Sequence[int] | None = None,
     run: str = "",
     notes: str = "",
     overwrite: bool = False,
 ) -> None:
-    """Write answers to all questions of a file, in its order.
+    """Write answers to the questions of a file, all of them in its order unless `rows` is given.
 
     Args:
         questions_file: such as iqtt-test.h5, recorded as given.
@@ -172,6 +173,8 @@ def write_answers(
         answer: (Q,) integers from 0, or -1 to abstain, which counts as wrong.
         scores: (Q, A) floats for A answers, 2 or 3 as the file offers: the highest wins, a tie for
             it abstains. Either or both; both must say the same.
+        rows: (Q,) the questions that are answered, each once; scores of such a file are not
+            comparable unless these are all.
 
     Raises:
         PredictionError: naming the questions, what was found and what was expected.
@@ -184,18 +187,32 @@ def write_answers(
     count, candidates, fingerprint = _questions(questions_file)
     if count == 0:
         raise PredictionError(questions_file, "no questions", "at least one")
-    values = _checked_answers(answer, scores, (count, candidates), f"{path}")
+    ids = np.arange(count) if rows is None else _checked_rows(rows, count, f"{path}")
+    values = _checked_answers(answer, scores, ids, candidates, f"{path}")
     with new_file(path, overwrite) as file:
         file.attrs.update({**texts, "truth_fingerprint": fingerprint})
-        _write_columns(file, "iqtt", {layout.ID_NAMES["iqtt"]: np.arange(count), **values})
+        _write_columns(file, "iqtt", {layout.ID_NAMES["iqtt"]: ids, **values})
+
+
+def _checked_rows(rows: Sequence[int], count: int, where: str) -> rules.Array:
+    """Return rows of a file of `count` as an array. Raises PredictionError."""
+    found = np.asarray(rows)
+    good = found.ndim == 1 and len(found) > 0 and found.dtype.kind in "iu"
+    if not good or len(np.unique(found)) < len(found) or found.min() < 0 or found.max() >= count:
+        expected = f"different rows of the file, from 0 to {count - 1}, at least one"
+        raise PredictionError(f"{where}: rows", f"{found.tolist()!r:.60}", expected)
+    return found
 
 
 def _checked_answers(
-    answer: ArrayLike | None, scores: ArrayLike | None, shape: tuple[int, int], where: str
+    answer: ArrayLike | None,
+    scores: ArrayLike | None,
+    ids: rules.Array,
+    candidates: int,
+    where: str,
 ) -> dict[str, rules.Array]:
-    """Return the datasets to write, for scores of this shape. Raises PredictionError."""
-    count, candidates = shape
-    ids = np.arange(count)
+    """Return the datasets to write, for scores of these questions. Raises PredictionError."""
+    count, shape = len(ids), (len(ids), candidates)
     values: dict[str, rules.Array] = {}
     problems = []
     if scores is not None:

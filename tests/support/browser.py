@@ -27,7 +27,7 @@ NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"
 FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-sync",
     "--disable-quic", "--disable-background-networking", "--disable-component-update",
-    "--disable-default-apps", "--no-default-browser-check", "--no-first-run",
+    "--disable-default-apps", "--no-default-browser-check", "--no-first-run", "--hide-scrollbars",
     "--remote-debugging-port=0",
 )  # fmt: skip
 # A name would leave the machine even where the request is refused later.

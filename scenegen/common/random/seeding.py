@@ -34,6 +34,7 @@ class Purpose(IntEnum):
     TRAINING = 14
     WEIGHTS = 15
     PICTURES = 16
+    QUIZ = 17
 
 
 def item_rng(seed: int, index: int, purpose: Purpose, attempt: int = 0) -> np.random.Generator:

@@ -1,0 +1,168 @@
+"""The server: one process that answers over HTTP until it is told to stop."""
+
+import asyncio
+import ipaddress
+import logging
+import resource
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import uvicorn
+from starlette.types import ASGIApp
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from iqtt.quiz.guards import LOCAL_NAMES, Hosts
+from scenegen.common.errors import SpecError
+
+EXCHANGE_SECONDS = 30  # for a request and its response; who is slower is cut off
+IDLE_SECONDS = 5
+FAREWELL_SECONDS = 3
+MOST_HEADER_BYTES = 16 * 1024
+MOST_CONNECTIONS = 8192
+SPARE_FILES = 64  # of those that the process may open, for other things than connections
+
+
+class ImpatientProtocol(H11Protocol):
+    """HTTP/1.1 that cuts off clients that take too long to send a request or read a response."""
+
+    _end: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Begin to wait."""
+        super().connection_made(transport)
+        self._wait()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Wait no longer."""
+        if self._end is not None:
+            self._end.cancel()
+        super().connection_lost(exc)
+
+    def on_response_complete(self) -> None:
+        """Begin to wait for the next request."""
+        super().on_response_complete()
+        self._wait()
+
+    def _wait(self) -> None:
+        if self._end is not None:
+            self._end.cancel()
+        self._end = self.loop.call_later(EXCHANGE_SECONDS, self.transport.abort)
+
+
+class QuietServer(uvicorn.Server):
+    """A server that stops at SIGINT, SIGTERM or SIGHUP, once answers under way are given."""
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Answer signals while the server runs; only the main thread hears any."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        loop = asyncio.get_running_loop()
+        numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        heard = [n for n in numbers if signal.getsignal(n) is not signal.SIG_IGN]
+        before = {number: signal.getsignal(number) for number in heard}
+        for number in heard:
+            loop.add_signal_handler(number, self.handle_exit, number, None)
+        try:
+            yield
+        finally:
+            for number in heard:
+                loop.remove_signal_handler(number)
+                signal.signal(number, before[number])
+
+
+def listen(host: str, port: int, public: bool) -> socket.socket:
+    """Return a socket that listens; port 0 takes any free one.
+
+    Raises SpecError for a host that others can reach without `public`, and for one that is not
+    here; OSError where the port is taken.
+    """
+    if not public and not is_local(host):
+        hint = "say --public if people on the network shall reach the quiz"
+        raise SpecError("--host", host or "nothing", "localhost", hint)
+    name = "127.0.0.1" if host.lower() in LOCAL_NAMES else host
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            name, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+    except (OSError, UnicodeError) as error:
+        raise SpecError("--host", host, "a name or an address of this machine") from error
+    # asyncio sends small packets at once only where it is told that the protocol is TCP.
+    listening = socket.socket(family, kind, protocol)
+    try:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(address)
+        listening.listen(1024)
+    except OSError as error:
+        listening.close()
+        raise OSError(error.errno, f"port {port}: {error.strerror}; name another", host) from error
+    return listening
+
+
+def is_local(host: str) -> bool:
+    """Return whether only this machine reaches a server at a host."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host.lower() in LOCAL_NAMES
+
+
+def hosts_of(host: str, public: bool, names: tuple[str, ...]) -> Hosts:
+    """Return the hosts that requests may name: where the server listens, and `names`."""
+    own = {host, *names, *([socket.gethostname()] if public else [])}
+    return Hosts(frozenset(map(str.lower, (*LOCAL_NAMES, *own))), numbers=public)
+
+
+def address_of(listening: socket.socket, host: str) -> str:
+    """Return what people type in to come to the first page."""
+    port = listening.getsockname()[1]
+    if host in ("0.0.0.0", "::"):  # all addresses of this machine
+        host = socket.gethostname()
+    return f"http://{f'[{host}]' if ':' in host else host}:{port}/"
+
+
+def serve(app: ASGIApp, listening: socket.socket, ready: Callable[[], Any]) -> None:
+    """Answer requests until a signal comes; call `ready` before the first one."""
+    # The threads hand over to each other often: the default of 5 ms would be felt in every answer.
+    sys.setswitchinterval(0.0005)
+    server = server_of(app)
+    ready()
+    server.run(sockets=[listening])
+
+
+def server_of(app: ASGIApp) -> QuietServer:
+    """Return a server that does not run yet."""
+    config = uvicorn.Config(
+        app,
+        http=ImpatientProtocol,
+        ws="none",
+        lifespan="off",
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        proxy_headers=False,
+        timeout_keep_alive=IDLE_SECONDS,
+        timeout_graceful_shutdown=FAREWELL_SECONDS,
+        h11_max_incomplete_event_size=MOST_HEADER_BYTES,
+        limit_concurrency=_connections(),
+    )
+    # What clients do wrong is none of the terminal's business.
+    logging.getLogger("uvicorn.error").setLevel(logging.ERROR)
+    return QuietServer(config)
+
+
+def _connections() -> int:
+    """Let the process open as many files as it may; return how many may be connections."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = MOST_CONNECTIONS + SPARE_FILES
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        soft = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    limit = wanted if soft == resource.RLIM_INFINITY else min(soft, wanted)
+    return max(16, limit - SPARE_FILES)

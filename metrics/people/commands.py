@@ -1,0 +1,176 @@
+"""`iqtt quiz` and `iqtt quiz-report`: questions for people, and what their answers tell.
+
+They parse options, make one call and print; what is heavy is imported inside.
+"""
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+
+from scenegen.common.command_line import EXAMPLE, LARGEST, OVERWRITE, needs, print_line
+from scenegen.common.paths import InputPath, OutputPath, refuse_inputs
+
+option = partial(click.option, show_default=True)
+
+
+# fmt: off
+@click.command(epilog=f"{EXAMPLE}iqtt quiz iqtt-split/iqtt-test.h5 --db answers.db")
+@click.argument("file", type=InputPath(), required=False, metavar="[SPLIT.h5]")
+@option("--db", type=InputPath(), default="answers.db",
+        help="SQLite file that keeps the answers; it is made, or taken up again.")
+@option("--host", default="localhost", help="Where to listen; others than this machine need"
+        " --public.")
+@option("--port", type=click.IntRange(0, 65535), default=8000, help="Port; 0 takes a free one.")
+@option("--public", is_flag=True, help="Let others on the network reach the quiz; the connection is"
+        " not encrypted.")
+@click.option("--name", "names", multiple=True, metavar="HOST",
+              help="Another name under which browsers reach the quiz; may be repeated.")
+@option("--questions", type=int, default=20, help="Questions that count, of each participant.")
+@option("--calibration", "calibrations", type=int, default=2,
+        help="Questions before them whose right answers are told. The paper had 1.")
+@option("--participants", type=click.IntRange(1, 1_000_000), default=10_000,
+        help="Most participants.")
+@option("--seed", type=click.IntRange(0, LARGEST), default=0, help="Seed of the draws.")
+@click.option("--part", type=click.Choice(["labeled"]), help="Part of a training file.")
+@option("--contact", default="", help="Who runs the study; the first page shows it.")
+@click.option("--export", "csv_path", type=OutputPath(),
+              help="Write all answers to this CSV file instead.")
+@click.option("--submission", type=OutputPath(),
+              help="Write people's answers to SPLIT as a file for `bench score` instead.")
+@option("--whose", type=click.Choice(["one", "majority"]), default="one",
+        help="Of --submission: of each question the answer of one participant, drawn with --seed,"
+        " or what most answered.")
+@OVERWRITE
+def quiz(
+    file: str | None, db: str, csv_path: str | None, submission: str | None, **settings: Any
+) -> None:
+    """Ask people the questions of SPLIT on web pages that this machine serves.
+
+    Each participant answers a few questions for practice, and then 20 that are drawn for them, as
+    in the paper. Every answer is on the disk before the next question shows. The answers to SPLIT
+    are in SPLIT, or in a file such as iqtt-test-answers.h5 beside it. Ctrl-C ends the quiz; the
+    same command goes on with it. With --export or --submission nothing is served.
+    """
+    refuse_inputs([db], [file] if file else [])
+    if csv_path is None and submission is None:
+        if file is None:
+            raise click.UsageError("Missing argument 'SPLIT.h5'.")
+        _serve(file, db, **settings)
+    if csv_path is not None:
+        _export(db, file, csv_path, settings["overwrite"])
+    if submission is not None:
+        if file is None:
+            raise click.UsageError("--submission needs the argument 'SPLIT.h5'.")
+        _submit(db, file, submission, settings)
+
+
+def _serve(
+    file: str, db: str, host: str, port: int, public: bool, names: tuple[str, ...],
+    questions: int, calibrations: int, participants: int, seed: int, part: str | None,
+    contact: str, **_: Any,
+) -> None:
+    needs("iqtt quiz", ("starlette", "uvicorn"), "quiz")
+    from iqtt.quiz.app import Quiz, make_app
+    from iqtt.quiz.commits import Commits
+    from iqtt.quiz.schema import SECRET, open_answers, stored_values
+    from iqtt.quiz.serve import address_of, hosts_of, listen, serve
+    from iqtt.quiz.study import Study
+    from metrics.people.references import compare
+
+    with (
+        Study(file, part, questions, calibrations, seed) as study,
+        listen(host, port, public) as listening,
+    ):
+        connection = open_answers(db, study.settings)
+        key = bytes.fromhex(stored_values(connection)[SECRET])
+        with Commits(connection) as commits:
+            shown = partial(compare, study.settings.answers)
+            tell = partial(print_line, err=True)
+            made = Quiz(study, commits, key, shown, tell, contact, participants)
+            ready = f"{address_of(listening, host)} asks {file}; answers go to {db}; Ctrl-C ends it"
+            app = make_app(made, hosts_of(host, public, names))
+            serve(app, listening, lambda: print_line(ready))
+    print_line(f"{db}: {_tally(db)}")
+
+
+def _tally(db: str) -> str:
+    from iqtt.quiz.answers import read_answers
+
+    found = read_answers(db)
+    finished = len({one.participant for one in found.answers if one.finished})
+    return f"{found.participants} participants, {finished} finished, {len(found.answers)} answers"
+
+
+def _export(db: str, file: str | None, path: str, overwrite: bool) -> None:
+    from iqtt.quiz.answers import read_answers, to_csv
+    from scenegen.common.new_file import write_text
+
+    refuse_inputs([path], [db])
+    found = read_answers(db)
+    if file is not None:
+        _require_split(found, file)
+    write_text(path, to_csv(found), overwrite)
+    print_line(f"{path}: {len(found.answers)} answers of {found.participants} participants")
+
+
+def _submit(db: str, file: str, path: str, settings: dict[str, Any]) -> None:
+    from iqtt.quiz.answers import read_answers
+    from metrics.people.submission import write_submission
+
+    found = read_answers(db)
+    total = _require_split(found, file)
+    overwrite = settings["overwrite"]
+    count = write_submission(found, file, path, settings["whose"], settings["seed"], overwrite)
+    left = "" if count == total else "; score it with bench score --allow-partial"
+    print_line(f"{path}: answers to {count} of {total} questions{left}")
+
+
+def _require_split(found: Any, file: str) -> int:
+    """Return how many questions a file has. Raises SpecError where `found` belongs to another."""
+    from iqtt.quiz.study import Pool
+    from scenegen.common.errors import SpecError
+
+    pool = Pool(file)
+    pool.file.close()
+    own = found.settings.fingerprint
+    if pool.fingerprint != own:
+        told = f"answers to the split of fingerprint {own:.12}"
+        raise SpecError(found.path, told, f"{pool.fingerprint:.12}, that of {file}")
+    return len(pool.right)
+
+
+@click.command("quiz-report", epilog=f"{EXAMPLE}iqtt quiz-report answers.db --html people.html")
+@click.argument("answers", type=InputPath(), metavar="ANSWERS.db")
+@click.option("--model", type=InputPath(), metavar="PREDICTIONS",
+              help="A submission of a model to the same split, to be compared with people.")
+@click.option("--json", "json_path", type=OutputPath(), help="Write all figures here.")
+@click.option("--html", "html_path", type=OutputPath(), help="Write a page with charts.")
+@OVERWRITE
+def quiz_report(
+    answers: str, model: str | None, json_path: str | None, html_path: str | None, overwrite: bool
+) -> None:
+    """Print what people answered in `iqtt quiz`: accuracy, times, tests as in the paper.
+
+    Participants are the sample. Only those who finished count.
+    """
+    from iqtt.quiz.answers import read_answers
+    from metrics.people.figures import compute
+    from metrics.people.text import text_report, to_json
+    from scenegen.common.new_file import check_writable, write_text
+
+    for path in filter(None, (json_path, html_path)):
+        check_writable(Path(path), overwrite)
+    figures = compute(read_answers(answers), model)
+    if json_path:
+        write_text(json_path, to_json(figures), overwrite)
+    if html_path:
+        from metrics.people.page import html_report
+
+        write_text(html_path, html_report(figures), overwrite)
+    click.echo(text_report(figures))
+
+
+# fmt: on
+COMMANDS = (quiz, quiz_report)

@@ -1,0 +1,329 @@
+"""The quiz over HTTP: an honest participant's way, and everything else refused."""
+
+import re
+import socket
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from quizzes import form_of, images_of, served
+
+from iqtt.quiz import guards, serve
+from iqtt.quiz.answers import read_answers
+
+
+def finish(site, cookie, choices=(1,) * 6):
+    assert site.answer(cookie, choices[0]) == 303
+    assert site.go_on(cookie) == 303
+    assert [site.answer(cookie, choice) for choice in choices[1:]] == [303] * 5
+
+
+def test_the_honest_way(site, study):
+    cookie = site.begin()
+    right = [q.right for q in study.draw(0)]
+    wrong = [(place + 1) % 3 for place in right]
+    choices = [place + 1 for place in right[:4] + wrong[4:]]
+    pages = [site.page(cookie)]
+    assert site.answer(cookie, choices[0]) == 303
+    assert "Right: it is answer" in site.page(cookie)
+    assert site.go_on(cookie) == 303
+    for choice in choices[1:]:
+        pages.append(site.page(cookie))
+        assert site.answer(cookie, choice, ms="250.5") == 303
+    end = site.page(cookie)
+    assert "You answered 3 of 5" in end
+    assert ">73%<" in end, "the paper's people are beside it"
+    assert "1 of 1" in pages[0]
+    assert "Question 5 of 5" in pages[5]
+    found = read_answers(site.db)
+    assert [one.answer + 1 for one in found.answers] == choices
+    assert [one.correct for one in found.answers] == [True] * 4 + [False] * 2
+    assert all(one.response_seconds == 0.2505 for one in found.answers[1:])
+    # The same browser is still at its end; handing over forgets it.
+    assert site.ask("GET", "/", cookie=cookie)[1]["location"] == "/quiz"
+    status, headers, _ = site.ask("POST", "/leave", {"leave": "yes"}, cookie)
+    assert (status, headers["set-cookie"].partition(";")[0].partition("=")[2]) == (303, '""')
+
+
+def test_pages_and_images_tell_no_answer(site, study):
+    one, other = site.begin(), site.begin()
+    seen = []
+    for cookie in (one, other):
+        site.answer(cookie)
+        site.go_on(cookie)
+        page = site.page(cookie)
+        names = images_of(page)
+        assert len(set(names)) == 4
+        assert all(re.fullmatch("/image/[0-9a-f]{32}", name) for name in names)
+        seen += names
+        for word in ("right", "mirror", "matched", "near", "other", "kind", "row", "correct"):
+            assert word not in page.replace("aria-", ""), word
+        for name in names:
+            status, headers, body = site.ask("GET", name, cookie=cookie)
+            assert (status, headers["content-type"]) == (200, "image/png")
+            assert b"tEXt" not in body
+    assert len(set(seen)) == 8
+    # Names are good for one session and one question.
+    assert site.ask("GET", seen[0], cookie=other)[0] == 404
+    assert site.ask("GET", seen[0])[0] == 404
+    site.answer(one)
+    assert site.ask("GET", seen[0], cookie=one)[0] == 404
+
+
+def test_answers_out_of_turn(site):
+    cookie = site.begin()
+    first = form_of(site.page(cookie))
+    assert site.answer(cookie, form=first) == 303
+    assert site.answer(cookie, form=first) == 409, "twice"
+    assert site.ask("POST", "/next", {"form": first[::-1]}, cookie)[0] == 409
+    assert site.go_on(cookie) == 303
+    assert site.ask("POST", "/next", {"form": first}, cookie)[0] == 409
+    second = form_of(site.page(cookie))
+    assert site.answer(cookie, form=first) == 409, "an earlier question"
+    assert site.answer(site.begin(), form=second) == 409, "another session's form"
+    assert site.answer("quiz_0=x", form=second) == 403
+    for choice in ("0", "4", "1.0", "", "-1", "٣"):
+        assert site.answer(cookie, choice, form=second) == 422
+    for ms in ("-1", "nan", "1e9", "1" * 20):
+        assert site.answer(cookie, 1, ms, form=second) == 422
+    assert len(read_answers(site.db).answers) == 1
+    assert site.ask("POST", "/leave", {"leave": "yes"}, cookie)[0] == 409
+
+
+def test_a_question_must_have_been_shown(site):
+    cookie = site.begin()
+    from iqtt.quiz.sessions import form_name
+
+    assert site.answer(cookie, form=form_name(site.quiz.key, 0, 0)) == 409
+
+
+def test_times_that_cannot_be_are_not_kept(site):
+    cookie = site.begin()
+    assert site.answer(cookie, ms="999999") == 303
+    assert site.go_on(cookie) == 303
+    assert site.answer(cookie, ms="") == 303
+    assert [one.response_seconds for one in read_answers(site.db).answers] == [None, None]
+
+
+def test_one_of_many_equal_posts_counts(site):
+    cookie = site.begin()
+    form = form_of(site.page(cookie))
+    with ThreadPoolExecutor(16) as pool:
+        found = list(pool.map(lambda k: site.answer(cookie, k % 3 + 1, form=form), range(16)))
+    assert sorted(found) == [303] + [409] * 15
+    assert len(read_answers(site.db).answers) == 1
+
+
+def test_many_at_once_lose_nothing(site):
+    def participate(_):
+        cookie = site.begin()
+        finish(site, cookie)
+        return cookie
+
+    with ThreadPoolExecutor(12) as pool:
+        assert len(set(pool.map(participate, range(24)))) == 24
+    found = read_answers(site.db)
+    assert (found.participants, len(found.answers)) == (24, 24 * 6)
+    assert sorted(one.order for one in found.answers) == list(range(1, 24 * 6 + 1))
+
+
+@pytest.mark.parametrize("path", ["/", "/quiz", "/static/quiz.css", "/nowhere", "/image/x"])
+def test_headers(lasting, path):
+    _, headers, _ = lasting.ask("GET", path)
+    policy = dict(part.split(" ", 1) for part in headers["content-security-policy"].split("; "))
+    assert policy["default-src"] == policy["frame-ancestors"] == policy["base-uri"] == "'none'"
+    assert {policy[f"{what}-src"] for what in ("script", "style", "img")} == {"'self'"}
+    assert headers["x-content-type-options"] == "nosniff"
+    assert headers["referrer-policy"] == "same-origin"
+    assert "server" not in headers
+    assert headers["cache-control"] == ("max-age=600" if "static" in path else "no-store")
+
+
+def test_the_cookie(lasting):
+    header = lasting.ask("POST", "/start", {"consent": "yes"})[1]["set-cookie"]
+    assert len(re.match("quiz_[0-9a-f]{8}=([^;]+)", header)[1]) >= 43
+    assert {"HttpOnly", "SameSite=lax", "Path=/"} <= set(header.split("; "))
+    token = header.partition("=")[2].partition(";")[0]
+    assert token.encode() not in lasting.db.read_bytes()
+
+
+def test_consent_is_needed_and_names_are_escaped(site):
+    status, _, page = site.ask("POST", "/start", {"other": "yes"})
+    assert status == 422
+    assert b'role="alert"' in page
+    assert site.ask("POST", "/start", {"consent": "no"})[0] == 422
+    assert b"A &lt;b&gt;lab" in page
+    assert read_answers(site.db).participants == 0
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"Host": "evil.example"}, 421),
+        ({"Host": "localhost.evil.example"}, 421),
+        ({"Host": "10.0.0.1"}, 421),
+        ({"Host": "localhost@evil.example"}, 421),
+        ({"Host": "LOCALHOST:99"}, 303),
+        ({"Host": "[::1]:99"}, 303),
+        ({"Origin": "http://evil.example"}, 403),
+        ({"Origin": "null"}, 403),
+        ({"Origin": "http://localhost:1"}, 403),
+        ({"Referer": "http://evil.example/localhost"}, 403),
+        ({"Sec_Fetch_Site": "cross-site"}, 403),
+        ({"Sec_Fetch_Site": "same-origin"}, 303),
+        ({"Content_Type": "text/plain"}, 415),
+        ({"Content_Type": "application/json"}, 415),
+    ],
+)
+def test_requests_of_other_sites(lasting, headers, status):
+    before = read_answers(lasting.db).participants
+    assert lasting.ask("POST", "/start", {"consent": "yes"}, **headers)[0] == status
+    assert read_answers(lasting.db).participants == before + (status == 303)
+
+
+def test_the_own_origin_is_taken(lasting):
+    origin = f"http://localhost:{lasting.port}"
+    assert lasting.ask("POST", "/start", {"consent": "yes"}, Origin=origin)[0] == 303
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        (b"x" * 5000, 413),
+        (b"consent=yes&consent=yes", 422),
+        (b"consent=yes&more=1", 422),
+        (b"&".join([b"consent=yes"] * 99), 422),
+        (b"consent=%ff", 422),
+        (b"consent=\xff", 422),
+        (b"", 422),
+        (iter([b"x" * 3000] * 3), 413),
+    ],
+)  # fmt: skip
+def test_bodies(lasting, body, status):
+    headers = {"Content_Type": guards.FORM_TYPE}
+    assert lasting.ask("POST", "/start", body=body, **headers)[0] == status
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/static/../app.py", "/static/%2e%2e/app.py", "/static/..%2fapp.py", "//etc/passwd",
+        "/static/%00", "/static/", "/image/../quiz", "/quiz/", "/static/../../../../etc/passwd",
+    ],
+)  # fmt: skip
+def test_no_path_leads_out(lasting, path):
+    status, _, body = lasting.ask("GET", path)
+    assert status == 404
+    assert b"There is no such" in body
+
+
+def test_other_methods(lasting):
+    for method, path in (
+        ("PUT", "/quiz"),
+        ("GET", "/start"),
+        ("POST", "/"),
+        ("DELETE", "/image/x"),
+    ):
+        assert lasting.ask(method, path)[0] == 405
+    assert lasting.ask("HEAD", "/")[0] == 200
+
+
+def test_nonsense_instead_of_http(lasting):
+    host = b" HTTP/1.1\r\nHost: localhost\r\n"
+    for sent in (
+        b"\x16\x03\x01\x00",
+        b"GET / HTTP/1.1\r\n\r\n",
+        b"GET /" + host + b"Host: localhost\r\n\r\n",
+        b"GET /" + b"a" * 70000 + host + b"\r\n",
+        b"GET http://evil.example/" + host + b"\r\n",
+    ):
+        with socket.create_connection(("127.0.0.1", lasting.port), timeout=5) as connection:
+            connection.sendall(sent)
+            connection.shutdown(socket.SHUT_WR)
+            assert connection.recv(100)[:12] in (b"", b"HTTP/1.1 400", b"HTTP/1.1 404")
+    assert lasting.ask("GET", "/")[0] == 200
+
+
+def test_slow_clients_are_cut_off(site, monkeypatch):
+    monkeypatch.setattr(serve, "EXCHANGE_SECONDS", 0.3)
+    began = time.monotonic()
+    with socket.create_connection(("127.0.0.1", site.port), timeout=10) as connection:
+        connection.sendall(b"GET / HTTP/1.1\r\nHo")
+        stop = threading.Event()
+
+        def drip():
+            while not stop.wait(0.05):
+                try:
+                    connection.send(b"x")
+                except OSError:
+                    return
+
+        thread = threading.Thread(target=drip)
+        thread.start()
+        try:
+            assert connection.recv(1) == b""
+        except ConnectionResetError:
+            pass
+        finally:
+            stop.set()
+            thread.join()
+    assert time.monotonic() - began < 5
+
+
+def test_slow_bodies_are_refused(lasting, monkeypatch):
+    monkeypatch.setattr(guards, "BODY_SECONDS", 0.1)
+    with socket.create_connection(("127.0.0.1", lasting.port), timeout=10) as connection:
+        head = f"POST /start HTTP/1.1\r\nHost: localhost\r\nContent-Type: {guards.FORM_TYPE}\r\n"
+        connection.sendall(f"{head}Content-Length: 11\r\n\r\nconsent".encode())
+        assert connection.recv(100).startswith(b"HTTP/1.1 408")
+
+
+def test_a_full_disk_is_told_and_later_all_goes_on(site):
+    cookie = site.begin()
+    form = form_of(site.page(cookie))
+
+    def limit(pages):
+        return site.quiz.commits.run(
+            lambda db: db.execute(f"PRAGMA max_page_count = {pages}").fetchone()
+        ).result()
+
+    site.quiz.commits.run(lambda db: db.execute("PRAGMA page_count").fetchone())
+    (before,) = limit(1)
+    statuses = set()
+    for _ in range(60):  # until the pages that there are have been filled
+        status, _, body = site.ask("POST", "/start", {"consent": "yes"})
+        statuses.add(status)
+    assert statuses == {303, 503}
+    assert b"could not be saved" in body
+    assert any("full" in line for line in site.told)
+    limit(10**6)
+    assert before < 10**6
+    assert site.answer(cookie, form=form) == 303
+
+
+def test_no_more_participants_than_there_may_be(study, tmp_path):
+    with served(study, tmp_path / "answers.db", most=1) as site:
+        cookie = site.begin()
+        assert site.ask("POST", "/start", {"consent": "yes"})[0] == 503
+        assert site.ask("POST", "/start", {"consent": "yes"}, cookie)[0] == 303, "takes it up"
+
+
+def test_a_session_outlives_the_server(study, tmp_path):
+    path = tmp_path / "answers.db"
+    with served(study, path) as site:
+        cookie = site.begin()
+        site.answer(cookie)
+        site.go_on(cookie)
+        before = site.page(cookie)
+    with served(study, path) as site:
+        assert site.page(cookie) == before
+        finish_rest = [site.answer(cookie) for _ in range(5)]
+        assert finish_rest == [303] * 5
+        assert "You answered" in site.page(cookie)
+
+
+def test_a_public_quiz_takes_numbers_and_its_names_only(study, tmp_path):
+    with served(study, tmp_path / "answers.db", public=True, names=("Quiz.example",)) as site:
+        hosts = ("10.1.2.3:8000", "[fe80::1]", "quiz.example", "localhost", "evil.example")
+        assert [site.ask("GET", "/", Host=host)[0] for host in hosts] == [200] * 4 + [421]
