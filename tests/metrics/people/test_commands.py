@@ -154,6 +154,10 @@ def test_two_answers_fit_a_phone(visit, tmp_path):
         sizes = [image.bounding_box()["width"] for image in seen.page.locator("img").all()]
         assert max(sizes) - min(sizes) < 8, "size must not tell shapes apart"
         assert seen.violations() == []
+        seen.page.goto(f"http://localhost:{site.port}/nowhere")
+        assert seen.violations() == []
+        assert len(seen.errors) == 1, "the browser logs that the page is not there"
+        seen.errors.clear()
 
 
 def test_a_kill_loses_no_answer_that_was_acknowledged(quiz_split, tmp_path):
