@@ -22,6 +22,7 @@ from baselines.pix2shape.training.launch import Machine, check_agreement, launch
 from baselines.pix2shape.training.loop import check_request, train
 from baselines.pix2shape.training.state import State, load_state, new_state, save_state
 from baselines.pix2shape.training.steps import draw
+from baselines.pix2shape.weights.bundled import open_weights
 from baselines.pix2shape.weights.storage import Card, save_weights
 from iqtt.files.reader import open_questions
 from scenegen.common.errors import SpecError
@@ -42,6 +43,7 @@ def train_run(
     *,
     labels: int = 0,
     conditional: bool = False,
+    start: str | Path | None = None,
     progress: Callable[[State, dict[str, float]], Any] = lambda state, losses: None,
 ) -> Path | None:
     """Train a model, from the start or from the folder's checkpoint.
@@ -53,6 +55,7 @@ def train_run(
         config: None goes on from the checkpoint, with its labels and classes.
         labels: number of answers that training on questions may use.
         conditional: whether the networks are told the class of a room's only object.
+        start: weights of an earlier run with the same networks, to begin a new run from.
 
     Raises SpecError where configuration and data do not fit; FileExistsError where a new run finds
     a checkpoint; TrainingError; LostProcessError where another process ended; FileFormatError,
@@ -76,6 +79,8 @@ def train_run(
             classes=source.classes if config.networks.classes else (),
         )
         state = new_state(config)
+        if start is not None:
+            _begin_from(start, state.model)
     check_request(card.config, source, labelled, labels, machine.devices * machine.nodes)
     fabric = launched(machine)
     check_agreement(fabric, "data, settings or checkpoint", (card, state.iteration))
@@ -141,6 +146,15 @@ def _sources(
         return RoomImages(data, config), None
     labelled = QuestionImages(data, "labeled", config) if labels else None
     return QuestionImages(data, "unlabeled", config), labelled
+
+
+def _begin_from(start: str | Path, model: Pix2Shape) -> None:
+    """Give a model the encoder and decoder of weights. Raises SpecError, and as `open_weights`."""
+    earlier, card = open_weights(start)
+    same = card.config.networks == model.config.networks
+    check(same, "start", start, "weights of the same networks as this run's")
+    for name in ("encoder", "decoder"):
+        getattr(model, name).load_state_dict(getattr(earlier, name).state_dict())
 
 
 def _fingerprint(source: Source, labelled: QuestionImages | None) -> str:
