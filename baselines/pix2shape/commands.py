@@ -81,10 +81,11 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
 @click.option("--out", type=OutputFolder(), required=True, help="Folder of the run.")
 @click.option(
     "--config",
-    type=click.Choice(["compact", "rays", "paper"]),
+    type=click.Choice(["compact", "rays", "views", "paper"]),
     help="compact trains rooms in 40 minutes on a CPU: 64 pixels, an eighth of the paper's width,"
     " no adversarial loss. rays is as small; it is told floor and walls and learns from rooms of"
-    " several views. paper has the paper's size and losses and needs a GPU  [compact].",
+    " several views. views is for questions alone: an encoder of its own, and codes that are"
+    " compared. paper has the paper's size and losses and needs a GPU  [compact].",
 )
 @click.option(
     "--set",
@@ -100,6 +101,11 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
     "--conditional",
     is_flag=True,
     help="Tell the networks the class of the object, in rooms of one object each.",
+)
+@click.option(
+    "--start",
+    type=WEIGHTS_PATH,
+    help="Weights of an earlier run of the same networks to begin from.",
 )
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint of --out.")
 @_number("--workers", least=0, most=MOST_PROCESSES, default=1, text="Processes that read the data.")
@@ -131,6 +137,7 @@ def train(
     seed: int | None,
     labels: int,
     conditional: bool,
+    start: str | None,
     resume: bool,
     workers: int,
     every: int,
@@ -150,8 +157,8 @@ def train(
     from baselines.pix2shape.use.predict import chosen_device
 
     chosen = dict(settings) | ({} if seed is None else {"seed": seed})
-    if resume and (config or chosen or labels or conditional):
-        own = "--config, --set, --seed, --labels and --conditional"
+    if resume and (config or chosen or labels or conditional or start):
+        own = "--config, --set, --seed, --labels, --conditional and --start"
         raise click.UsageError(f"--resume goes on with the run's own {own}; leave them out")
     here, machines = launch.started_elsewhere()
     devices, nodes = devices or here, nodes or machines
@@ -181,6 +188,7 @@ def train(
             launch.Machine(accelerator, devices, nodes, numbers, workers, every),
             labels=labels,
             conditional=conditional,
+            start=start,
             progress=show,
         )
     except KeyboardInterrupt:

@@ -46,7 +46,6 @@ from scenegen.common.text_table import by_number, distinct, plain
 
 Paper = Literal["all", "task", "none"]
 WIDEST = 6  # columns of scores in one table
-ABLATIONS = 4  # the table of the paper on parts of its model, which only stands by itself
 PAPER_KINDS = {"other"}  # of the paper's questions; its figures stand beside no other kind
 ANGLES = "Angle between each view and its scene's first one."
 KINDS = 'Kinds of wrong answers; "-2" ends those of questions with two answers.'
@@ -93,7 +92,7 @@ def leaderboard(
             figure
             for table in TABLES
             for figure in table.figures
-            if paper != "none" and figure.table != ABLATIONS and figure.metric in columns
+            if paper != "none" and not table.ablation and figure.metric in columns
         ]
         if any(set(file.by_distractor) - PAPER_KINDS for file in members):
             figures = []
@@ -330,7 +329,7 @@ def _paper_table(table: PaperTable) -> Table:
     keys = tuple(dict.fromkeys(map(key, table.figures)))
     rows = _by_row(table.figures, lambda figure: f"{figure.method}, {figure.data}", key)
     return Table(
-        f"{SOURCE}, Table {table.number}: {REPORTED}. {table.caption}",
+        f"{SOURCE}, {table.kind} {table.number}: {REPORTED}. {table.caption}",
         keys,
         reported_rows(rows, keys),
         (f"{REPORTED_MARK} {REPORTED}. Unit: {table.unit}.", table.remark),

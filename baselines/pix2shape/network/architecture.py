@@ -5,6 +5,7 @@ Where a table is incomplete or contradicts the text, docs/pix2shape.md says what
 """
 
 import itertools
+import math
 from dataclasses import dataclass
 
 import torch
@@ -15,6 +16,7 @@ from baselines.pix2shape.network.shared_batch import BatchNorm1d, BatchNorm2d
 from scenegen.common.records import check, normalise
 
 SIZES = (32, 64, 128, 256)  # pixels a side
+ENCODERS = ("paper", "polar")
 MOST = 4096  # dimensions of a code, and classes
 SLOPE = 0.2  # of the leaky ReLUs below 0
 ENCODER_CHANNELS = (85, 170, 340, 680, 1360)  # of 64, 32, 16, 8, 4 pixels, at 128x128
@@ -41,6 +43,9 @@ class NetworkSpec:
         rays: whether the networks are told the empty room. The encoder then sees, beside the
             image, its faint differences and where the ray of each pixel meets floor or walls, and
             the decoder gives relief: how far surfaces lie before these, scene units.
+        spherical: whether z_scene is then scaled to the length sqrt(z_scene), so that distances
+            are bounded.
+        encoder: "paper", or "polar" for questions (`network/polar.py`).
     """
 
     size: int = 128
@@ -51,6 +56,8 @@ class NetworkSpec:
     classes: int = 0
     standardised: bool = False
     rays: bool = False
+    spherical: bool = False
+    encoder: str = "paper"
 
     def __post_init__(self) -> None:
         normalise(self)
@@ -61,6 +68,9 @@ class NetworkSpec:
         check(0 <= self.classes <= MOST, "classes", self.classes, f"0 to {MOST}")
         if self.rays:
             check(self.camera, "camera", self.camera, "true, as rays are those of a known camera")
+        check(self.encoder in ENCODERS, "encoder", self.encoder, f"one of {', '.join(ENCODERS)}")
+        polar, expected = self.encoder == "polar", "no camera and no classes for the polar encoder"
+        check(not (polar and self.condition), "condition", self.condition, expected)
 
     @property
     def z(self) -> int:
@@ -135,11 +145,21 @@ def _full(values: Tensor) -> Tensor:
     return values.float() if values.dtype == torch.bfloat16 else values
 
 
+def finished(code: Tensor, standard: nn.Module, spec: NetworkSpec) -> Tensor:
+    """Return the code, (B, z), of what an encoder's last layer gives: standardised and scaled."""
+    code = standard(_full(code))
+    if not spec.spherical:
+        return code
+    scene = math.sqrt(spec.z_scene) * functional.normalize(code[:, : spec.z_scene], dim=1)
+    return torch.cat([scene, code[:, spec.z_scene :]], dim=1)
+
+
 class Encoder(nn.Module):
     """Image and camera -> latent code. Table "Pix2Shape encoder architecture"."""
 
     def __init__(self, spec: NetworkSpec) -> None:
         super().__init__()
+        self.spec = spec
         widths = spec.channels(ENCODER_CHANNELS)
         pairs = itertools.pairwise([3 + spec.planes + spec.condition, *widths])
         self.layers = nn.ModuleList(nn.Conv2d(a, b, 4, 2, 1) for a, b in pairs)
@@ -157,7 +177,7 @@ class Encoder(nn.Module):
             if i < len(self.norms):
                 values = self.norms[i](values, condition)
             values = self.activation(values)
-        return self.standard(_full(self.last(values).flatten(1)))
+        return finished(self.last(values).flatten(1), self.standard, self.spec)
 
 
 class Decoder(nn.Module):

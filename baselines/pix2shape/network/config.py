@@ -41,9 +41,25 @@ CONFIGS: dict[str, dict[str, Any]] = {
         "matching": 1.0,
     },
 }
+CONFIGS["views"] = {
+    **CONFIGS["compact"],
+    "networks": NetworkSpec(size=64, width=0.0625, camera=False, spherical=True, encoder="polar"),
+    "iterations": 3000,
+    "learning_rate": 4e-3,
+    "reconstruction": 0.0,
+    "mutual_information": 0.0,
+    "questions": 0.0,
+    "contrast": 1.0,
+    "temperature": 0.6,
+    "hard_negatives": 1.0,
+    "turned": True,
+    "question_batch": 64,
+    "labelled_batch": 32,
+    "batch": 4,
+}
 LOSSES = (
     "adversarial", "reconstruction", "code_reconstruction", "consistency", "mutual_information",
-    "questions", "contrast", "depth", "matching",
+    "questions", "contrast", "depth", "matching", "swap",
 )  # fmt: skip
 
 
@@ -58,16 +74,27 @@ class ModelConfig:
         opacity: whether the decoder also says which rays meet a surface.
         iterations, batch: length of training, and images in each batch.
         question_batch: questions whose codes L_theta and `contrast` compare in each iteration.
+        labelled_batch: labelled questions that are compared besides; 0 lets some of
+            `question_batch` be labelled ones.
+        turned: whether the images of compared questions are turned about the viewing axis, each by
+            an angle of its own, and half of the questions mirrored.
+        temperature: of `contrast`; divides mean squared differences of codes, about 2 at first.
+        hard_negatives: weight in `contrast` of the pairs among a question's own answers, which
+            show different shapes of as many cubes.
+        compared_information: whether mutual information is taken over the codes of the compared
+            questions, four each, and not over those of a batch of images.
         learning_rate, betas: of Adam.
         decay: whether the learning rate falls linearly to 0 over the second half of training.
         critic_steps: steps of the critic for each step of encoder and decoder.
         absolute_differences: whether images are compared by absolute differences, not by the
             paper's norm.
         adversarial, reconstruction, code_reconstruction, consistency, mutual_information,
-        questions, contrast, depth, matching:
+        questions, contrast, depth, matching, swap:
             weights of the losses of `training/losses.py`; 0 switches one off. `questions` is the
-            paper's L_theta, `depth` the supervision of its ablation, and `matching` compares with
-            the relief that a search finds from several images of a scene (networks of rays only).
+            paper's L_theta, `depth` the supervision of its ablation, `matching` compares with the
+            relief that a search finds from several images of a scene (networks of rays only), and
+            `swap` is the reconstruction of a reference from the right answer's z_scene and its own
+            z_view.
         seed: of the first weights and of every random choice of training.
     """
 
@@ -78,6 +105,11 @@ class ModelConfig:
     iterations: int = 60_000
     batch: int = 6
     question_batch: int = 2
+    labelled_batch: int = 0
+    turned: bool = False
+    temperature: float = 0.2
+    hard_negatives: float = 0.0
+    compared_information: bool = False
     learning_rate: float = 1e-4
     betas: tuple[float, float] = (0.5, 0.9)
     decay: bool = False
@@ -92,6 +124,7 @@ class ModelConfig:
     contrast: float = 0.0
     depth: float = 0.0
     matching: float = 0.0
+    swap: float = 0.0
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -104,6 +137,9 @@ class ModelConfig:
         asked = self.question_batch
         needed = f"{least} or more" + (", as contrast is on" if self.contrast else "")
         check(asked >= least, "question batch", asked, needed)
+        check(self.labelled_batch >= 0, "labelled batch", self.labelled_batch, "0 or more")
+        check(self.temperature > 0, "temperature", self.temperature, "a positive number")
+        check(self.hard_negatives >= 0, "hard negatives", self.hard_negatives, "0 or more")
         check(self.critic_steps >= 1, "critic steps", self.critic_steps, "1 or more")
         check(self.learning_rate > 0, "learning rate", self.learning_rate, "a positive number")
         in_range = len(self.betas) == 2 and all(0 <= beta < 1 for beta in self.betas)
@@ -119,6 +155,13 @@ class ModelConfig:
     def has_critic(self) -> bool:
         """Whether the critic or the statistics network is trained."""
         return bool(self.adversarial or self.disentangles)
+
+    @property
+    def uses_images(self) -> bool:
+        """Whether any loss is of a batch of images, not of questions that are compared."""
+        image = (self.adversarial, self.reconstruction, self.code_reconstruction)
+        information = self.disentangles and not self.compared_information
+        return bool(any((*image, self.consistency, self.depth, self.matching)) or information)
 
     @property
     def disentangles(self) -> bool:
@@ -150,8 +193,9 @@ def model_config(name: str, /, **settings: Any) -> ModelConfig:
 
     Args:
         name: "paper" (128 pixels, full width, all losses of the paper), "compact" (64 pixels, an
-            eighth of the width, no adversarial loss) or "rays" (the same size; told the empty room,
-            and trained on what matching finds in several images of a scene).
+            eighth of the width, no adversarial loss), "rays" (the same size; told the empty room,
+            and trained on what matching finds in several images of a scene) or "views" (questions
+            alone: the polar encoder and `contrast`).
         settings: values as in JSON by name; a setting of the networks as "networks.width".
 
     Raises SpecError for unknown names and impossible values.

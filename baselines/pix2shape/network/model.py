@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from baselines.pix2shape.network.architecture import Critic, Decoder, Encoder, Statistics
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.empty_rooms import FLAT, Cameras, empty_rooms, planes_of
+from baselines.pix2shape.network.polar import PolarEncoder
 from baselines.pix2shape.network.surfels import Scene, render
 
 T = TypeVar("T")
@@ -88,7 +89,7 @@ class Pix2Shape(nn.Module):
         super().__init__()
         self.config = config
         spec = config.networks
-        self.encoder = Encoder(spec)
+        self.encoder = (PolarEncoder if spec.encoder == "polar" else Encoder)(spec)
         self.decoder = Decoder(spec, outputs=2 if config.opacity else 1)
         self.critic = Critic(spec)
         self.statistics = Statistics(spec)

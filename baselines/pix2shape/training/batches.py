@@ -29,8 +29,12 @@ def batch_size(config: ModelConfig, source: Source) -> int:
 
 def question_sizes(config: ModelConfig, source: Source, labels: int) -> tuple[int, int]:
     """Return how many questions with and without a label are compared in each iteration."""
-    if not isinstance(source, QuestionImages) or not (config.contrast or config.questions):
+    compared = config.contrast or config.questions or config.swap
+    if not isinstance(source, QuestionImages) or not compared:
         return 0, 0
+    if config.labelled_batch:
+        labelled = config.labelled_batch if labels else 0
+        return labelled, config.question_batch if config.contrast else 0
     if not config.contrast:
         return (config.question_batch if labels else 0), 0
     few = -(-labels // LABELS_PER_PLACE)  # more would repeat few labels too often
@@ -117,7 +121,8 @@ def question_batches(
     others = slice(max(own.start - with_label, 0), max(own.stop - with_label, 0))
     streams = []
     if labelled is not None and known.start < known.stop:
-        streams.append(_loaded(labelled, labels, with_label, known, *where, 0))
+        several = workers if config.labelled_batch else 0
+        streams.append(_loaded(labelled, labels, with_label, known, *where, several))
     if others.start < others.stop:
         unknown = _loaded(source, len(source), without, others, *where, workers)
         streams.append(

@@ -22,7 +22,8 @@ from baselines.pix2shape.network.shared_batch import average, processes
 from baselines.pix2shape.training import batches
 from baselines.pix2shape.training.batches import Source
 from baselines.pix2shape.training.state import State
-from baselines.pix2shape.training.steps import critic_step, draw, generator_step
+from baselines.pix2shape.training.steps import Asked, critic_step, draw, generator_step
+from baselines.pix2shape.training.turning import turned
 from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.common.random.seeding import Purpose, item_seed
 from scenegen.common.records import check
@@ -73,17 +74,31 @@ def train(
             batch = next(images)
             number = state.iteration * config.batches_per_iteration + turn
             seed = item_seed(config.seed, number, Purpose.TRAINING)
-            noise = draw(len(batch.image), config.networks.z, seed).to(fabric.device)
+            if not turn:
+                questions = next(asked, None)
+            count, each = _sizes(questions)
+            noise = draw(len(batch.image), config.networks.z, seed, count, each).to(fabric.device)
+            seen = questions
+            if config.turned and questions is not None:
+                seen = turned(questions[0], noise.turn, noise.mirror), questions[1]
             if config.has_critic:
                 with fabric.autocast():
-                    loss, numbers = critic_step(model, batch, noise)
+                    loss, numbers = critic_step(model, batch, noise, seen)
                 _update(fabric, state, state.critic, loss, numbers, losses)
         with fabric.autocast(), _frozen(model.critic, model.statistics):
-            loss, numbers = generator_step(model, batch, noise, next(asked, None))
+            loss, numbers = generator_step(model, batch, noise, seen)
         _update(fabric, state, state.generator, loss, numbers, losses)
         state.iteration += 1
         state.seconds = time.monotonic() - began
         yield losses, batch
+
+
+def _sizes(questions: Asked | None) -> tuple[int, int]:
+    """Return how many questions there are, and images in each."""
+    if questions is None:
+        return 0, 0
+    images, answers = len(questions[0].image), len(questions[1])
+    return answers, images // answers
 
 
 def check_request(
@@ -103,6 +118,9 @@ def check_request(
         items = "questions" if questions else "images"
         expected = f"a number of processes that divides a batch of {size} {items}"
         check(size % count == 0, "devices", count, expected)
+    if config.disentangles and config.compared_information and not compared:
+        expected = "questions that are compared, as contrast or labels ask for"
+        raise SpecError("compared information", "nothing that is compared", expected)
     if labels:
         count = len(labelled) if labelled is not None and labelled.has_answers else 0
         check(labels <= count, "labels", labels, f"at most {count}, as many answers are told")

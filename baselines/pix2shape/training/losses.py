@@ -21,7 +21,6 @@ from baselines.pix2shape.network.surfels import back_project
 
 HIDDEN = 0.1  # scene units behind another surface at which a surfel counts as hidden by it
 NEAR = 0.05  # scene units; surfels nearer to the other camera than this, or behind it, are left out
-TEMPERATURE = 0.2  # divides mean squared differences of standardised codes, which are about 2
 PENALTY = 10.0  # weight lambda of the gradient penalty
 
 
@@ -138,7 +137,9 @@ def question_loss(codes: Tensor, answers: Tensor) -> Tensor:
     return (0.5 * right - 0.5 * (squared.sum(dim=1) - right)).mean()
 
 
-def contrast_loss(codes: Tensor, answers: Tensor) -> Tensor:
+def contrast_loss(
+    codes: Tensor, answers: Tensor, temperature: float = 0.2, hard_negatives: float = 0.0
+) -> Tensor:
     """Return how badly a reference's code tells its own answers from other questions' ones, nats.
 
     One of a question's answers shows the reference's shape, and hardly any answer of another
@@ -146,18 +147,29 @@ def contrast_loss(codes: Tensor, answers: Tensor) -> Tensor:
     its own. That needs no label; where the right answer is told, it alone counts as own.
     This is MIL-NCE (Miech et al. 2020, "End-to-End Learning of Visual Representations").
 
+    A question's images share more than their shape: number of cubes and distance of the camera.
+    Two of its answers share all that, too, and yet show different shapes. As `hard_negatives`
+    these pairs count as further answers that the reference's own have to be nearer than.
+
     Args:
         codes: z_scene of reference and K answers, standardised, (Q, 1 + K, n).
         answers: which of them is right, (Q,) integers; -1 where that is not known.
+        temperature: divides mean squared differences, about 2 at first.
+        hard_negatives: weight of the pairs of a question's own answers; 0 leaves them out.
     """
     count, offered, n = len(codes), codes.shape[1] - 1, codes.shape[2]
     everyone = codes[:, 1:].reshape(-1, n)
     squared = (codes[:, 0, None] - everyone).square().mean(dim=2)
-    likeness = -squared / TEMPERATURE  # (Q, K Q)
+    likeness = -squared / temperature  # (Q, K Q)
     place = torch.arange(offered * count, device=codes.device)
     own = place // offered == torch.arange(count, device=codes.device)[:, None]
     own &= (answers[:, None] < 0) | (place % offered == answers[:, None])
     nearest = torch.logsumexp(likeness.masked_fill(~own, -torch.inf), dim=1)
+    if hard_negatives:
+        one, other = torch.triu_indices(offered, offered, 1, device=codes.device)
+        apart = (codes[:, 1 + one] - codes[:, 1 + other]).square().mean(dim=2)
+        pairs = math.log(hard_negatives) - apart / temperature
+        likeness = torch.cat([likeness, pairs], dim=1)
     return (torch.logsumexp(likeness, dim=1) - nearest).mean()
 
 

@@ -25,6 +25,7 @@ from baselines.pix2shape.training.launch import Machine, check_agreement, launch
 from baselines.pix2shape.training.loop import check_request, train
 from baselines.pix2shape.training.state import State, load_state, new_state, save_state
 from baselines.pix2shape.training.steps import draw
+from baselines.pix2shape.weights.bundled import open_weights
 from baselines.pix2shape.weights.storage import Card, save_weights
 from iqtt.files.reader import open_questions
 from scenegen.common.errors import SpecError
@@ -45,6 +46,7 @@ def train_run(
     *,
     labels: int = 0,
     conditional: bool = False,
+    start: str | Path | None = None,
     progress: Callable[[State, dict[str, float]], Any] = lambda state, losses: None,
 ) -> Path | None:
     """Train a model, from the start or from the folder's checkpoint.
@@ -56,36 +58,21 @@ def train_run(
         config: None goes on from the checkpoint, with its labels and classes.
         labels: number of answers that training on questions may use.
         conditional: whether the networks are told the class of a room's only object.
+        start: weights of an earlier run with the same networks, to begin a new run from.
 
     Raises SpecError where configuration and data do not fit; FileExistsError where a new run finds
     a checkpoint; TrainingError; LostProcessError where another process ended; FileFormatError,
     OSError.
     """
     folder = Path(folder)
-    if config is None:
-        state, card = load_state(folder)
-        labels = card.labels
-        source, labelled = _sources(data, card.config, labels)
-        check_data(data, _fingerprint(source, labelled), card.fingerprint)
-    else:
-        check_new(folder)
-        config = _suited(config, data, labels, conditional)
-        source, labelled = _sources(data, config, labels)
-        card = Card(
-            config,
-            data=source.spec.to_json(),
-            fingerprint=_fingerprint(source, labelled),
-            labels=labels,
-            classes=source.classes if config.networks.classes else (),
-        )
-        state = new_state(config)
+    state, card, source, labelled = _begun(folder, data, config, labels, conditional, start)
+    labels = card.labels
     check_request(card.config, source, labelled, labels, machine.devices * machine.nodes)
     fabric = launched(machine)
     check_agreement(fabric, "data, settings or checkpoint", (card, state.iteration))
     first, last = fabric.is_global_zero, card.config.iterations
     if first:
         folder.mkdir(parents=True, exist_ok=True)
-
     if isinstance(source, RoomImages) and card.config.matching:
         _match(source, folder, card.config, fabric, lambda losses: progress(state, losses))
     logs = SummaryWriter(str(folder / LOGS), purge_step=state.iteration + 1) if first else None
@@ -112,6 +99,36 @@ def train_run(
         _save_weights(folder, state.model, card, source)
     summed(torch.zeros(1, device=fabric.device))  # wait for the first process, which writes
     return folder / WEIGHTS if first else None
+
+
+def _begun(
+    folder: Path,
+    data: str | Path,
+    config: ModelConfig | None,
+    labels: int,
+    conditional: bool,
+    start: str | Path | None,
+) -> tuple[State, Card, Source, QuestionImages | None]:
+    """Return a new run's state, or that of the folder's checkpoint, with its card and its data."""
+    if config is None:
+        state, card = load_state(folder)
+        source, labelled = _sources(data, card.config, card.labels)
+        check_data(data, _fingerprint(source, labelled), card.fingerprint)
+        return state, card, source, labelled
+    check_new(folder)
+    config = _suited(config, data, labels, conditional)
+    source, labelled = _sources(data, config, labels)
+    card = Card(
+        config,
+        data=source.spec.to_json(),
+        fingerprint=_fingerprint(source, labelled),
+        labels=labels,
+        classes=source.classes if config.networks.classes else (),
+    )
+    state = new_state(config)
+    if start is not None:
+        _begin_from(start, state.model)
+    return state, card, source, labelled
 
 
 def _match(
@@ -165,6 +182,15 @@ def _sources(
         return RoomImages(data, config), None
     labelled = QuestionImages(data, "labeled", config) if labels else None
     return QuestionImages(data, "unlabeled", config), labelled
+
+
+def _begin_from(start: str | Path, model: Pix2Shape) -> None:
+    """Give a model the encoder and decoder of weights. Raises SpecError, and as `open_weights`."""
+    earlier, card = open_weights(start)
+    same = card.config.networks == model.config.networks
+    check(same, "start", start, "weights of the same networks as this run's")
+    for name in ("encoder", "decoder"):
+        getattr(model, name).load_state_dict(getattr(earlier, name).state_dict())
 
 
 def _fingerprint(source: Source, labelled: QuestionImages | None) -> str:

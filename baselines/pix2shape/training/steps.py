@@ -15,12 +15,14 @@ from torch import Tensor
 
 from baselines.pix2shape.data.rooms import Batch
 from baselines.pix2shape.network.architecture import CAMERA
+from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.network.model import Pix2Shape, mapped, shaded
 from baselines.pix2shape.network.shared_batch import gathered, processes, share, summed
 from baselines.pix2shape.training import losses
 
 Numbers = dict[str, Tensor]
+Asked = tuple[Batch, Tensor]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,39 +33,58 @@ class Noise:
         code: standard normal, (B / N, z).
         share: uniform in 0..1, (B / N,); where the gradient penalty is taken.
         order: a permutation of the whole batch, (B,).
+        turn: of the compared questions' images, of which there are C, the angles by which they are
+            turned, radians, (C / N,).
+        mirror: which of them are mirrored first, (C / N,), all of a question or none.
+        compared_order: a permutation of the compared images, (C,).
     """
 
     code: Tensor
     share: Tensor
     order: Tensor
+    turn: Tensor
+    mirror: Tensor
+    compared_order: Tensor
 
     def to(self, device: torch.device) -> "Noise":
         """Return the noise on another device."""
         return mapped(self, lambda values: values.to(device))
 
 
-def draw(images: int, z: int, seed: int) -> Noise:
+def draw(images: int, z: int, seed: int, questions: int = 0, each: int = 0) -> Noise:
     """Return the noise of a seed, the same for every device and however many processes share it.
 
     Args:
         images: how many images of the batch this process has.
+        questions, each: how many compared questions this process has, and images in each.
     """
     source, batch = torch.Generator().manual_seed(seed), images * processes()
-    own = share(batch)
+    questions *= processes()
+    own, asked = share(batch), share(questions * each)
     return Noise(
         torch.randn(batch, z, generator=source)[own],
         torch.rand(batch, generator=source)[own],
         torch.randperm(batch, generator=source),
+        2 * torch.pi * torch.rand(questions * each, generator=source)[asked],
+        (torch.rand(questions, generator=source) < 0.5).repeat_interleave(each)[asked],
+        torch.randperm(questions * each, generator=source),
     )
 
 
-def critic_step(model: Pix2Shape, batch: Batch, noise: Noise) -> tuple[Tensor, Numbers]:
-    """Return what critic and statistics network minimise, and the parts to report by name."""
+def critic_step(
+    model: Pix2Shape, batch: Batch, noise: Noise, asked: Asked | None = None
+) -> tuple[Tensor, Numbers]:
+    """Return what critic and statistics network minimise, and the parts to report by name.
+
+    Args:
+        asked: as for `generator_step`.
+    """
     config, views = model.config, batch.views
     numbers: Numbers = {}
-    with torch.no_grad():
-        code = model.encode(batch.image, views)
-    total = code.new_zeros(())
+    total = batch.image.new_zeros(())
+    if config.adversarial or not config.compared_information:
+        with torch.no_grad():
+            code = model.encode(batch.image, views)
     if config.adversarial:
         with torch.no_grad():
             made = model.image(noise.code, views)
@@ -77,12 +98,17 @@ def critic_step(model: Pix2Shape, batch: Batch, noise: Noise) -> tuple[Tensor, N
         numbers["distance"], numbers["penalty"] = -loss, penalty
         total = total + loss + penalty
     if config.disentangles:
-        total = total - _information(model, code, noise)
+        order = noise.order
+        if config.compared_information:
+            assert asked is not None, "check_request sees to it"
+            with torch.no_grad():
+                code, order = model.encode(asked[0].image, asked[0].views), noise.compared_order
+        total = total - _information(model, code, order)
     return total, numbers
 
 
 def generator_step(
-    model: Pix2Shape, batch: Batch, noise: Noise, asked: tuple[Batch, Tensor] | None = None
+    model: Pix2Shape, batch: Batch, noise: Noise, asked: Asked | None = None
 ) -> tuple[Tensor, Numbers]:
     """Return what encoder and decoder minimise, and the losses by name.
 
@@ -91,15 +117,15 @@ def generator_step(
             -1 for a question without a label.
     """
     config, views = model.config, batch.views
-    code = model.encode(batch.image, views)
     numbers: Numbers = {}
+    if config.uses_images:
+        code = model.encode(batch.image, views)
     if config.reconstruction or config.depth or config.consistency:
         depth, opacity = model.surfels(code, views.condition, views.cameras)
         if config.reconstruction:
-            again = shaded(depth, opacity, views)
-            absolute = config.absolute_differences
-            compared = losses.absolute_loss if absolute else losses.reconstruction_loss
-            numbers["reconstruction"] = compared(batch.image, again)
+            numbers["reconstruction"] = _compared(
+                config, batch.image, shaded(depth, opacity, views)
+            )
         if config.depth and batch.depth is not None:
             known = torch.isfinite(batch.depth)
             wrong = torch.where(known, depth - torch.where(known, batch.depth, 0), 0)
@@ -129,19 +155,12 @@ def generator_step(
     if config.matching:
         assert batch.relief is not None, "runs.py had it found"
         numbers["matching"] = _matching(model, batch, code, noise)
-    if config.disentangles:
-        numbers["mutual_information"] = _information(model, code, noise)
+    if config.disentangles and not config.compared_information:
+        numbers["mutual_information"] = _information(model, code, noise.order)
     if asked is not None:
-        images, answers = asked
-        scene = model.encode(images.image, images.views)[:, : config.networks.z_scene]
-        scene, answers = gathered(scene), gathered(answers)
-        codes, known = scene.view(len(answers), -1, scene.shape[1]), answers >= 0
-        if config.questions and known.any():
-            numbers["questions"] = losses.question_loss(codes[known], answers[known])
-        if config.contrast:
-            numbers["contrast"] = losses.contrast_loss(codes, answers)
+        numbers |= _question_losses(model, *asked, noise)
     weighted = (getattr(config, name) * loss for name, loss in numbers.items())
-    return sum(weighted, code.new_zeros(())), numbers
+    return sum(weighted, batch.image.new_zeros(())), numbers
 
 
 def _matching(model: Pix2Shape, batch: Batch, code: Tensor, noise: Noise) -> Tensor:
@@ -160,7 +179,51 @@ def _matching(model: Pix2Shape, batch: Batch, code: Tensor, noise: Noise) -> Ten
     return (asked - relief.found[each, drawn].float()).abs().mean()
 
 
-def _information(model: Pix2Shape, code: Tensor, noise: Noise) -> Tensor:
+def _question_losses(model: Pix2Shape, images: Batch, answers: Tensor, noise: Noise) -> Numbers:
+    """Return the losses that compare the images of questions, by name."""
+    config, numbers = model.config, Numbers()
+    own = model.encode(images.image, images.views)
+    if config.disentangles and config.compared_information:
+        numbers["mutual_information"] = _information(model, own, noise.compared_order)
+    scene, whole = gathered(own[:, : config.networks.z_scene]), gathered(answers)
+    codes, known = scene.view(len(whole), -1, scene.shape[1]), whole >= 0
+    if config.questions and known.any():
+        numbers["questions"] = losses.question_loss(codes[known], whole[known])
+    if config.contrast:
+        numbers["contrast"] = losses.contrast_loss(
+            codes, whole, config.temperature, config.hard_negatives
+        )
+    if config.swap and known.any():
+        numbers["swap"] = _swapped(model, images, own, answers)
+    return numbers
+
+
+def _compared(config: ModelConfig, image: Tensor, again: Tensor) -> Tensor:
+    """Return how much images, (B, 3, S, S), differ."""
+    absolute = config.absolute_differences
+    return (losses.absolute_loss if absolute else losses.reconstruction_loss)(image, again)
+
+
+def _swapped(model: Pix2Shape, images: Batch, code: Tensor, answers: Tensor) -> Tensor:
+    """Return how well labelled references come from the right answer's scene and their own view.
+
+    Every reference is decoded, so that batch normalisation sees as many images in each process;
+    where no answer is told, its own scene is taken and it counts nothing.
+    """
+    known, each = answers >= 0, len(code) // len(answers)
+    first = torch.arange(0, len(code), each, device=code.device)
+    scene = code[first + torch.where(known, 1 + answers, 0), : model.config.networks.z_scene]
+    swapped = torch.cat([scene, code[first, model.config.networks.z_scene :]], dim=1)
+    views = mapped(images.views, lambda values: values[first])
+    again = model.image(swapped, views)
+    count = known.sum()
+    loss = again.sum() * 0
+    if count:
+        loss = count * _compared(model.config, images.image[first][known], again[known])
+    return summed(loss) / summed(count)
+
+
+def _information(model: Pix2Shape, code: Tensor, order: Tensor) -> Tensor:
     """Return the mutual information of z_scene and z_view in codes."""
     code, end = gathered(code), model.config.networks.z_scene
-    return losses.mutual_information(model.statistics, code[:, :end], code[:, end:], noise.order)
+    return losses.mutual_information(model.statistics, code[:, :end], code[:, end:], order)

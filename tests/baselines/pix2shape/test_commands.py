@@ -121,7 +121,7 @@ def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
     monkeypatch.setattr(bundled, "FOLDER", folder / "none")
     assert bundled.names() == []
     result = pix2shape("sample")
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("'shapes'",))
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("'shapes-rays'",))
     result = bench("baseline", "pix2shape", "--data", "rooms.h5")
     check_refusal(result.exit_code, result.stdout, result.stderr, ("rooms.h5", "pix2shape train"))
     (folder / "none").mkdir()

@@ -32,6 +32,15 @@ TABLE_4 = r"""
          & \checkmark   &  \checkmark& - & -&-&-&0.4943&0.6272 \\
         \checkmark & \checkmark   &  \checkmark& - & -&-&-&0.5526&0.7020 \\\bottomrule
 """
+TABLE_9 = r"""
+  Hausdorff-F & 0.093 & 0.088 & 0.085 & 0.096 & 0.173 & 0.218 & 0.194 & 0.201 \\
+  Hausdorff-R & 0.081 & 0.100 & 0.108 & 0.112 & 0.221 & 0.243 & 0.238 & 0.254 \\
+  MSE-depth   & 0.004 & 0.004 & 0.005 & 0.007 & 0.009 & 0.008 & 0.008 & 0.009 \\
+"""
+FIGURE_17 = """
+(0.1,0.4075) (0.4, 0.4566) (0.6,0.4853) (0.8,0.5130) (1.0,0.5519)
+(0.1,0.4823) (0.4,0.5427) (0.6,0.5854) (0.8,0.6001) (1.0,0.6312)
+"""
 SHAPES, SHAPENET, MULTIPLE = "Shape scenes", "ShapeNet scenes", "Multiple-shape scenes"
 IQTT = "3D-IQTT"
 METHODS = ["CNN", "Siamese CNN", "Human Evaluation", "Persp. Transf. Nets", "Rezende et al."]
@@ -69,6 +78,13 @@ KEYS_4 = [
         *((IQTT, "iqtt_accuracy", None, labels) for labels in (0, 1000)),
     )
 ]
+KEYS_9 = [
+    ("Pix2Shape, depth supervision", data, score, angle, None)
+    for score in ("hausdorff_forward", "hausdorff_reverse", "mse_depth")
+    for data in (SHAPES, MULTIPLE)
+    for angle in (5, 35, 55, 80)
+]
+TABLE = {table.number: table for table in TABLES}
 
 
 @pytest.mark.parametrize(
@@ -78,6 +94,7 @@ KEYS_4 = [
         (2, TABLE_2, 2, KEYS_2, 40),
         (3, TABLE_3, 1, KEYS_3, 16),
         (4, TABLE_4, 3, KEYS_4, 22),
+        (9, TABLE_9, 1, KEYS_9, 24),
     ],
 )
 def test_every_figure_is_kept_as_printed(number, source, skipped, keys, count):
@@ -87,7 +104,7 @@ def test_every_figure_is_kept_as_printed(number, source, skipped, keys, count):
             printed = re.sub(r"\\textbf\{(.*)\}", r"\1", cell.strip())
             cells.append(tuple(re.split(r" \$\\pm\$ |$", printed, maxsplit=1)))
     expected = {k: cell for k, cell in zip(keys, cells, strict=True) if cell[0] != "-"}
-    table = TABLES[number - 1]
+    table = TABLE[number]
     kept = {
         (f.method, f.data, f.metric, f.view_angle, f.labels): (f.text, f.spread)
         for f in table.figures
@@ -95,5 +112,21 @@ def test_every_figure_is_kept_as_printed(number, source, skipped, keys, count):
     }
     assert kept == expected
     assert len(table.figures) == len(kept) == count
-    assert table.number == number
-    assert (table.unit == "not stated") == (number in (1, 2))  # the paper names no unit of length
+    assert table.ablation == (number in (4, 9))
+    assert (table.unit == "not stated") == (
+        number in (1, 2, 9)
+    )  # the paper names no unit of length
+
+
+def test_the_points_on_the_weight_of_mutual_information_are_kept():
+    lines = FIGURE_17.strip().splitlines()
+    expected = {
+        (f"Pix2Shape, mutual information weighted {weight}", labels): text
+        for labels, line in zip((0, 200), lines, strict=True)
+        for weight, text in re.findall(r"\(([\d.]+), ?([\d.]+)\)", line)
+    }
+    figure = TABLE[17]
+    kept = {(f.method, f.labels): f.text for f in figure.figures if f.metric == "iqtt_accuracy"}
+    assert kept == expected
+    assert len(figure.figures) == len(kept) == 10
+    assert (figure.kind, figure.ablation) == ("Figure", True)

@@ -313,7 +313,7 @@ def test_figures_of_other_scores_or_angles_do_not_slip_into_a_ranking():
     for kinds in (other, {}):
         people = leaderboard([replace(iqtt_scores("a", [1]), by_distractor=kinds)])[0]
         assert sum(row.kind == "reported" for row in people.rows) == len(TABLES[2].figures)
-    mirror, alone, _ = leaderboard([iqtt_scores("a", [1])])  # of which the paper has no figures
+    mirror, alone, *_ = leaderboard([iqtt_scores("a", [1])])  # of which the paper has no figures
     assert {row.kind for row in mirror.rows} == {"ranked", "floor"}
     assert "Table 3" in alone.title
     cell = by_label(people)["Human Evaluation, 3D-IQTT, 0 labels (Table 3) †"].cells[0]

@@ -49,7 +49,8 @@ def test_nonsense_is_refused(change: dict[str, object], found: str) -> None:
 def test_an_unknown_configuration() -> None:
     with pytest.raises(SpecError) as error:
         model_config("huge")
-    assert (error.value.where, error.value.expected) == ("config", "one of paper, compact, rays")
+    expected = "one of paper, compact, rays, views"
+    assert (error.value.where, error.value.expected) == ("config", expected)
 
 
 def test_depth_stays_within_its_reach_whatever_the_code() -> None:

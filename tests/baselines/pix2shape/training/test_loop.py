@@ -25,6 +25,7 @@ from baselines.pix2shape.training import loop as training  # noqa: E402
 from baselines.pix2shape.training.batches import question_sizes  # noqa: E402
 from baselines.pix2shape.training.loop import TrainingError, train  # noqa: E402
 from baselines.pix2shape.training.state import State, load_state, new_state, save_state  # noqa: E402
+from baselines.pix2shape.training.turning import turned  # noqa: E402
 from baselines.pix2shape.weights.storage import Card  # noqa: E402
 
 TINY = tiny(mutual_information=0.0, questions=0.0)
@@ -156,6 +157,47 @@ def test_one_place_for_every_hundred_labels_up_to_a_quarter(labels, expected, tr
     assert question_sizes(config, source, labels) == (expected, 32 - expected)
     plain = replace(config, contrast=0.0)
     assert question_sizes(plain, source, labels) == (32 if labels else 0, 0)
+    own = replace(config, labelled_batch=5)
+    assert question_sizes(own, source, labels) == (5 if labels else 0, 32)
+    assert question_sizes(replace(own, contrast=0.0), source, labels) == (5 if labels else 0, 0)
+
+
+def test_compared_questions_are_turned_and_may_be_all_that_is_learned_from(
+    train_questions, fabric, monkeypatch
+):
+    """The critic sees the same pictures; the encoder sees no others."""
+    zero = dict.fromkeys(("adversarial", "reconstruction", "code_reconstruction"), 0.0)
+    on = dict.fromkeys(("contrast", "questions", "mutual_information"), 1.0)
+    own = {**zero, **on, "question_batch": 8, "labelled_batch": 2, "compared_information": True}
+    config = for_questions(replace(TINY, **own), train_questions, "labeled")
+    source = QuestionImages(train_questions, "unlabeled", config)
+    labelled = QuestionImages(train_questions, "labeled", config)
+    seen: list[Any] = []
+    step, critic = training.generator_step, training.critic_step
+
+    def spy(name: str, function: Any) -> Any:
+        def spied(model: Any, batch: Any, noise: Any, questions: Any) -> Any:
+            seen.append((name, questions, noise))
+            return function(model, batch, noise, questions)
+
+        return spied
+
+    monkeypatch.setattr(training, "generator_step", spy("generator", step))
+    monkeypatch.setattr(training, "critic_step", spy("critic", critic))
+    pictures = []
+    for turn in (False, True):
+        seen.clear()
+        state = new_state(replace(config, turned=turn))
+        losses = run(state, source, fabric, 2, labelled=labelled, labels=3)
+        assert set(losses[0]) == {"mutual_information", "questions", "contrast"}
+        assert [name for name, _, _ in seen] == ["critic", "generator"] * 2
+        assert seen[0][1] is seen[1][1]
+        assert (seen[0][1][1] >= 0).tolist() == [True] * 2 + [False] * 8
+        pictures.append(seen[0])
+    (_, (plain, _), _), (_, (found, _), noise) = pictures
+    expected = turned(plain, noise.turn, noise.mirror)
+    assert torch.equal(found.image, expected.image)
+    assert not torch.equal(found.image, plain.image)
 
 
 def test_views_of_questions_are_not_compared(train_questions, fabric):

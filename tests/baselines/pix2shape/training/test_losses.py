@@ -190,6 +190,20 @@ def test_contrast_of_one_answer_against_the_others() -> None:
         assert found == pytest.approx(-sum(map(math.log, shares)) / 2, rel=1e-5)
 
 
+def test_pairs_of_a_questions_own_answers_are_hard_negatives() -> None:
+    """Of both questions above, pairs of answers 0.2, 1, 2 and 0, 3, 1 apart; temperature 0.4."""
+    codes = torch.tensor([[0.0, 0.2, 1.0, 2.0], [1.0, 0.0, 3.0, 1.0]])[..., None]
+    terms = [[0.04, 1.0, 4.0, 0.0, 9.0, 1.0], [0.64, 0.0, 1.0, 1.0, 4.0, 0.0]]
+    apart = [[0.64, 3.24, 1.0], [9.0, 1.0, 4.0]]
+    own, every, pairs = (
+        [sum(math.exp(-term / 0.4) for term in row) for row in rows]
+        for rows in ((terms[0][:3], terms[1][3:]), terms, apart)
+    )
+    shares = [o / (e + 0.5 * p) for o, e, p in zip(own, every, pairs, strict=True)]
+    found = float(losses.contrast_loss(codes, torch.tensor([-1, -1]), 0.4, 0.5))
+    assert found == pytest.approx(-sum(map(math.log, shares)) / 2, rel=1e-5)
+
+
 def test_contrast_falls_to_nothing_where_one_own_answer_is_the_references_code() -> None:
     source = torch.Generator().manual_seed(0)
     codes = torch.randn(6, 4, 50, generator=source)

@@ -10,7 +10,7 @@ torch = pytest.importorskip("torch")
 from baselines.pix2shape.data.rooms import Batch, Relief  # noqa: E402
 from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.config import LOSSES, ModelConfig  # noqa: E402
-from baselines.pix2shape.network.model import Pix2Shape, Views  # noqa: E402
+from baselines.pix2shape.network.model import Pix2Shape, Views, mapped  # noqa: E402
 from baselines.pix2shape.network.surfels import Scene, back_project  # noqa: E402
 from baselines.pix2shape.training import losses as functions  # noqa: E402
 from baselines.pix2shape.training.steps import critic_step, draw, generator_step  # noqa: E402
@@ -55,7 +55,7 @@ def test_one_loss_is_computed_alone(name):
     model = model_of(only(**{name: 0.5}))
     for network in {"critic", "statistics"} - NEEDED.get(name, set()):
         getattr(model, network).register_forward_hook(lambda *_: pytest.fail("not needed"))
-    total, losses = generator_step(model, some_batch(), draw(8, 8, 3), labelled())
+    total, losses = generator_step(model, some_batch(), draw(8, 8, 3, 2, 4), labelled())
     assert set(losses) == {name}
     assert total.item() == pytest.approx(0.5 * losses[name].item())
     assert total.item() != 0
@@ -158,6 +158,45 @@ def test_questions_of_unknown_answers_are_contrasted_alone():
         if known.any():
             expected = functions.question_loss(codes[known], told[known]).item()
             assert losses["questions"].item() == pytest.approx(expected)
+
+
+def test_contrast_has_the_configurations_temperature_and_hard_negatives():
+    config = replace(only(contrast=1.0), temperature=0.7, hard_negatives=0.3)
+    model, (images, answers) = model_of(config), labelled()
+    codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
+    found = generator_step(model, some_batch(), draw(8, 8, 3), (images, answers))[1]["contrast"]
+    expected = functions.contrast_loss(codes, answers, 0.7, 0.3).item()
+    assert found.item() == pytest.approx(expected)
+    assert expected != pytest.approx(functions.contrast_loss(codes, answers).item(), rel=1e-2)
+
+
+def test_swap_reconstructs_references_from_the_right_answers_scene_and_their_own_view():
+    model, (images, _) = model_of(only(swap=1.0)).eval(), labelled()
+    code = model.encode(images.image, images.views)
+    rows = torch.tensor([0, 4])
+    views = mapped(images.views, lambda values: values[rows])
+    for answers, counted in (([2, 0], [0, 1]), ([-1, 1], [1])):
+        right = rows + 1 + torch.tensor(answers)
+        again = model.image(torch.cat([code[right, :6], code[rows, 6:]], dim=1), views)
+        asked = images, torch.tensor(answers)
+        found = generator_step(model, some_batch(), draw(8, 8, 3), asked)[1]["swap"]
+        expected = functions.reconstruction_loss(images.image[rows][counted], again[counted])
+        assert found.item() == pytest.approx(expected.item(), rel=1e-5)
+    asked = images, torch.tensor([-1, -1])
+    assert not generator_step(model, some_batch(), draw(8, 8, 3), asked)[1]
+
+
+def test_mutual_information_may_be_that_of_the_compared_codes():
+    config = replace(only(mutual_information=1.0), compared_information=True)
+    model, batch, noise = model_of(config), some_batch(), draw(8, 8, 3, 2, 4)
+    images, answers = labelled()
+    code = model.encode(images.image, images.views)
+    halves = code[:, :6], code[:, 6:]
+    expected = functions.mutual_information(model.statistics, *halves, noise.compared_order)
+    found = generator_step(model, batch, noise, (images, answers))[1]["mutual_information"]
+    assert found.item() == pytest.approx(expected.item(), rel=1e-5)
+    total, _ = critic_step(model, batch, noise, (images, answers))
+    assert total.item() == pytest.approx(-expected.item(), rel=1e-5)
 
 
 class Sphere(Pix2Shape):
@@ -266,11 +305,19 @@ def test_images_are_compared_by_the_norm_or_by_absolute_differences(absolute, lo
 
 def test_noise_is_the_seeds():
     state = torch.get_rng_state()
-    one, again, other = draw(9, 4, 7), draw(9, 4, 7), draw(9, 4, 8)
+    one, again, other = draw(9, 4, 7, 5, 3), draw(9, 4, 7, 5, 3), draw(9, 4, 8, 5, 3)
     assert torch.equal(torch.get_rng_state(), state), "no other random numbers are touched"
     assert (one.code.shape, one.share.shape) == ((9, 4), (9,))
     assert sorted(one.order.tolist()) == list(range(9))
     assert 0 <= one.share.min() <= one.share.max() <= 1
-    for name in ("code", "share", "order"):
+    assert 0 <= one.turn.min() < one.turn.max() <= 2 * math.pi
+    assert sorted(one.compared_order.tolist()) == list(range(15))
+    by_question = one.mirror.view(5, 3)
+    assert torch.equal(by_question.all(dim=1), by_question.any(dim=1)), "a question's, or none"
+    assert by_question.any()
+    assert not by_question.all()
+    for name in ("code", "share", "order"):  # the same, whatever is compared
+        assert torch.equal(getattr(one, name), getattr(draw(9, 4, 7), name))
+    for name in ("code", "share", "order", "turn", "mirror", "compared_order"):
         assert torch.equal(getattr(one, name), getattr(again, name))
         assert not torch.equal(getattr(one, name), getattr(other, name))

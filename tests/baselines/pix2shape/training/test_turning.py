@@ -1,0 +1,55 @@
+"""Turned pictures against pictures of turned surfaces under turned lights."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+torch = pytest.importorskip("torch")
+from baselines.pix2shape.data.rooms import Batch  # noqa: E402
+from baselines.pix2shape.network.model import Views, shaded  # noqa: E402
+from baselines.pix2shape.network.surfels import Scene  # noqa: E402
+from baselines.pix2shape.training.turning import turned  # noqa: E402
+
+
+def surface():
+    """Return the depth of a tilted, curved surface, and the image of it under two lights."""
+    source = torch.Generator().manual_seed(0)
+    rows, columns = torch.meshgrid(*[torch.linspace(-1, 1, 32)] * 2, indexing="ij")
+    depth = (3 + 0.2 * columns - 0.1 * rows + 0.1 * rows**2)[None]
+    position = torch.rand(1, 2, 3, generator=source) * 2 - 1
+    colour, ones = torch.rand(1, 2, 3, generator=source), torch.ones(1, 3)
+    attenuation = torch.tensor([[0.0, 1.0]])
+    scene = Scene(28.0, position, colour, 0.1 * ones, attenuation, 0.8 * ones)
+    views = Views(torch.empty(1, 0), scene, background=ones)
+    return depth, Batch(shaded(depth, None, views), views)
+
+
+@pytest.mark.parametrize("quarters", [0, 1, 2, 3])
+@pytest.mark.parametrize("mirror", [False, True])
+def test_a_turned_picture_is_that_of_the_turned_surface(quarters, mirror):
+    depth, batch = surface()
+    found = turned(batch, torch.tensor([quarters * math.pi / 2]), torch.tensor([mirror]))
+    there = (depth.flip(2) if mirror else depth).rot90(quarters, (1, 2))
+    expected = shaded(there, None, found.views)
+    assert torch.allclose(found.image, expected, atol=1e-4)
+    assert torch.allclose(shaded(depth, None, batch.views), batch.image, atol=1e-6)
+    if quarters or mirror:
+        wrong = replace(found.views, scene=batch.views.scene)
+        assert (shaded(there, None, wrong) - found.image).abs().max() > 1e-2
+
+
+def test_each_image_turns_by_its_own_angle():
+    _, batch = surface()
+    scene = replace(
+        batch.views.scene, light_position=batch.views.scene.light_position.repeat(2, 1, 1)
+    )
+    both = replace(
+        batch, image=batch.image.repeat(2, 1, 1, 1), views=replace(batch.views, scene=scene)
+    )
+    found = turned(both, torch.tensor([0.0, math.pi / 6]), torch.tensor([False, False]))
+    assert torch.allclose(found.image[0], both.image[0], atol=1e-5)
+    before, after = (one.views.scene.light_position[1] for one in (both, found))
+    angle = torch.atan2(after[:, 1], after[:, 0]) - torch.atan2(before[:, 1], before[:, 0])
+    assert (angle % (2 * math.pi)).tolist() == pytest.approx([math.pi / 6] * 2, abs=1e-5)
+    assert torch.equal(before[:, 2], after[:, 2])
