@@ -17,7 +17,16 @@ from scenegen.common.errors import SceneGenError
 
 BASELINES = (
     *("constant", "mean-depth", "empty-room", "oracle", "chance", "outline", "outline-trees"),
-    *("pix2shape", "cnn", "siamese", "ptn", "rezende", "depth-supervised", "view-pairs"),
+    *(
+        "pix2shape",
+        "pix2shape-rays",
+        "cnn",
+        "siamese",
+        "ptn",
+        "rezende",
+        "depth-supervised",
+        "view-pairs",
+    ),
 )
 RENAME = "rename the method and score it again"
 # Characters that show nothing although they count as letters, marks or symbols: joiners, fillers,

@@ -130,7 +130,7 @@ def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
             shutil.copy(f"rooms.{ending}", f"none/{name}.{ending}")
     made = bench("baseline", "pix2shape", "--data", "rooms.h5")
     assert "weights shapes, on rooms.h5" in made.stdout, made.output
-    assert pix2shape("sample", "--n", 1).exit_code == 0
+    assert pix2shape("sample", "--weights", "shapes", "--n", 1).exit_code == 0
     result = pix2shape("sample", "--weights", "chairs", "--overwrite")
     words = ("'chairs'", "shapes, shapes-single")
     check_refusal(result.exit_code, result.stdout, result.stderr, words)

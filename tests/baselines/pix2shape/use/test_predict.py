@@ -61,6 +61,8 @@ def decoded(model: Any, path: Path, source: int, row: int) -> tuple[np.ndarray, 
 
 def test_a_model_of_rays_is_another_method_and_says_what_it_is_told(several_path, tmp_path):
     model = made(tiny(64, rays=True))
+    with torch.no_grad():
+        model.decoder.last.bias.fill_(0.1)  # something stands out
     predict_rooms(model, several_path, tmp_path / "p.h5")
     with open_predictions(tmp_path / "p.h5") as predictions:
         assert predictions.method == "pix2shape-rays"
