@@ -52,6 +52,7 @@ CONFIGS["views"] = {
     "contrast": 1.0,
     "temperature": 0.6,
     "hard_negatives": 1.0,
+    "easy_negatives": 0.0,
     "turned": True,
     "question_batch": 64,
     "labelled_batch": 32,
@@ -81,6 +82,7 @@ class ModelConfig:
         temperature: of `contrast`; divides mean squared differences of codes, about 2 at first.
         hard_negatives: weight in `contrast` of the pairs among a question's own answers, which
             show different shapes of as many cubes.
+        easy_negatives: weight in `contrast` of the answers of other questions.
         compared_information: whether mutual information is taken over the codes of the compared
             questions, four each, and not over those of a batch of images.
         learning_rate, betas: of Adam.
@@ -109,6 +111,7 @@ class ModelConfig:
     turned: bool = False
     temperature: float = 0.2
     hard_negatives: float = 0.0
+    easy_negatives: float = 1.0
     compared_information: bool = False
     learning_rate: float = 1e-4
     betas: tuple[float, float] = (0.5, 0.9)
@@ -140,6 +143,7 @@ class ModelConfig:
         check(self.labelled_batch >= 0, "labelled batch", self.labelled_batch, "0 or more")
         check(self.temperature > 0, "temperature", self.temperature, "a positive number")
         check(self.hard_negatives >= 0, "hard negatives", self.hard_negatives, "0 or more")
+        check(self.easy_negatives >= 0, "easy negatives", self.easy_negatives, "0 or more")
         check(self.critic_steps >= 1, "critic steps", self.critic_steps, "1 or more")
         check(self.learning_rate > 0, "learning rate", self.learning_rate, "a positive number")
         in_range = len(self.betas) == 2 and all(0 <= beta < 1 for beta in self.betas)

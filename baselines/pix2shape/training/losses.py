@@ -138,7 +138,11 @@ def question_loss(codes: Tensor, answers: Tensor) -> Tensor:
 
 
 def contrast_loss(
-    codes: Tensor, answers: Tensor, temperature: float = 0.2, hard_negatives: float = 0.0
+    codes: Tensor,
+    answers: Tensor,
+    temperature: float = 0.2,
+    hard_negatives: float = 0.0,
+    easy_negatives: float = 1.0,
 ) -> Tensor:
     """Return how badly a reference's code tells its own answers from other questions' ones, nats.
 
@@ -156,6 +160,7 @@ def contrast_loss(
         answers: which of them is right, (Q,) integers; -1 where that is not known.
         temperature: divides mean squared differences, about 2 at first.
         hard_negatives: weight of the pairs of a question's own answers; 0 leaves them out.
+        easy_negatives: weight of the answers of other questions; 0 leaves them out.
     """
     count, offered, n = len(codes), codes.shape[1] - 1, codes.shape[2]
     everyone = codes[:, 1:].reshape(-1, n)
@@ -163,8 +168,12 @@ def contrast_loss(
     likeness = -squared / temperature  # (Q, K Q)
     place = torch.arange(offered * count, device=codes.device)
     own = place // offered == torch.arange(count, device=codes.device)[:, None]
+    easy = ~own
     own &= (answers[:, None] < 0) | (place % offered == answers[:, None])
     nearest = torch.logsumexp(likeness.masked_fill(~own, -torch.inf), dim=1)
+    if easy_negatives != 1:
+        weight = math.log(easy_negatives) if easy_negatives else -math.inf
+        likeness = torch.where(easy, likeness + weight, likeness)
     if hard_negatives:
         one, other = torch.triu_indices(offered, offered, 1, device=codes.device)
         apart = (codes[:, 1 + one] - codes[:, 1 + other]).square().mean(dim=2)

@@ -191,7 +191,7 @@ def _question_losses(model: Pix2Shape, images: Batch, answers: Tensor, noise: No
         numbers["questions"] = losses.question_loss(codes[known], whole[known])
     if config.contrast:
         numbers["contrast"] = losses.contrast_loss(
-            codes, whole, config.temperature, config.hard_negatives
+            codes, whole, config.temperature, config.hard_negatives, config.easy_negatives
         )
     if config.swap and known.any():
         numbers["swap"] = _swapped(model, images, own, answers)

@@ -199,9 +199,12 @@ def test_pairs_of_a_questions_own_answers_are_hard_negatives() -> None:
         [sum(math.exp(-term / 0.4) for term in row) for row in rows]
         for rows in ((terms[0][:3], terms[1][3:]), terms, apart)
     )
-    shares = [o / (e + 0.5 * p) for o, e, p in zip(own, every, pairs, strict=True)]
-    found = float(losses.contrast_loss(codes, torch.tensor([-1, -1]), 0.4, 0.5))
-    assert found == pytest.approx(-sum(map(math.log, shares)) / 2, rel=1e-5)
+    for easy in (1.0, 0.3, 0.0):
+        shares = [
+            o / (o + easy * (e - o) + 0.5 * p) for o, e, p in zip(own, every, pairs, strict=True)
+        ]
+        found = float(losses.contrast_loss(codes, torch.tensor([-1, -1]), 0.4, 0.5, easy))
+        assert found == pytest.approx(-sum(map(math.log, shares)) / 2, rel=1e-5)
 
 
 def test_contrast_falls_to_nothing_where_one_own_answer_is_the_references_code() -> None:

@@ -244,3 +244,25 @@ def test_rays_need_neighbouring_views(several_path, folder):
     with pytest.raises(SpecError) as error:
         train_run(folder, several_path, RAYS, HERE)
     assert (error.value.where, error.value.found) == ("rooms", "no such views")
+
+
+def test_a_run_begins_from_the_networks_of_another(rooms_path, unbroken, folder):
+    """And not from its optimiser, iteration or losses."""
+    start = unbroken / "weights.safetensors"
+    begun: list[dict[str, Any]] = []
+
+    def spy(state: Any, losses: dict[str, float]) -> None:
+        begun.append({name: value.clone() for name, value in state.model.state_dict().items()})
+
+    config = replace(CONFIG, iterations=1, learning_rate=1e-9)
+    train_run(folder, rooms_path, config, HERE, start=start, progress=spy)
+    stored = load_file(start)
+    parts = [name for name in begun[0] if name.startswith(("encoder", "decoder"))]
+    parts = [name for name in parts if name.endswith(("weight", "bias"))]
+    assert len(parts) > 20
+    for name in parts:
+        assert torch.allclose(begun[0][name], stored[name].float(), atol=1e-6), name
+    wider = replace(CONFIG, networks=replace(CONFIG.networks, width=0.06))
+    with pytest.raises(SceneGenError) as error:
+        train_run(folder.with_name("wider"), rooms_path, wider, HERE, start=start)
+    assert error.value.where == "start"

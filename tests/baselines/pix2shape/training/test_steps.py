@@ -160,12 +160,12 @@ def test_questions_of_unknown_answers_are_contrasted_alone():
             assert losses["questions"].item() == pytest.approx(expected)
 
 
-def test_contrast_has_the_configurations_temperature_and_hard_negatives():
-    config = replace(only(contrast=1.0), temperature=0.7, hard_negatives=0.3)
+def test_contrast_has_the_configurations_temperature_and_negatives():
+    config = replace(only(contrast=1.0), temperature=0.7, hard_negatives=0.3, easy_negatives=0.4)
     model, (images, answers) = model_of(config), labelled()
     codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
     found = generator_step(model, some_batch(), draw(8, 8, 3), (images, answers))[1]["contrast"]
-    expected = functions.contrast_loss(codes, answers, 0.7, 0.3).item()
+    expected = functions.contrast_loss(codes, answers, 0.7, 0.3, 0.4).item()
     assert found.item() == pytest.approx(expected)
     assert expected != pytest.approx(functions.contrast_loss(codes, answers).item(), rel=1e-2)
 
