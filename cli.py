@@ -29,7 +29,10 @@ def bench() -> None:
     """Score the predictions of any model, handed in as one file."""
 
 
-@click.group(cls=PackageCommands, modules=("baselines.pix2shape.commands",))
+@click.group(
+    cls=PackageCommands,
+    modules=("baselines.pix2shape.commands", "baselines.pix2shape.drawing_commands"),
+)
 @click.version_option(package_name="pix2shape-bench")
 def pix2shape() -> None:
     """Train the reference model, predict with it, and look at what it learned."""

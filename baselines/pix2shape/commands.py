@@ -1,4 +1,4 @@
-"""`pix2shape ...`: each command reads its options and makes one library call.
+"""`pix2shape train` and `predict`: each reads its options and makes one library call.
 
 Heavy imports happen inside the commands, so that `--help` is quick and works without torch.
 """
@@ -13,7 +13,6 @@ from scenegen.common.command_line import (
     LARGEST,
     MOST_PROCESSES,
     OVERWRITE,
-    Items,
     needs,
     print_line,
     progress_bar,
@@ -27,9 +26,6 @@ A_MODEL = "A .safetensors file with its .json beside it, or the name of bundled 
 WEIGHTS_PATH = InputPath(beside=lambda path: [path.with_suffix(".json")])
 WEIGHTS = click.option(
     "--weights", type=WEIGHTS_PATH, help=f"{A_MODEL}  [those that suit the data]."
-)
-ROOMS = click.option(
-    "--data", type=InputPath(), required=True, help="Rooms whose images are encoded."
 )
 SUBMISSION = click.option(
     "--out",
@@ -47,15 +43,10 @@ DEVICE = click.option(
 )
 
 
-def _number(*names: str, least: int, default: int, text: str, most: int = LARGEST) -> Any:
+def number(*names: str, least: int, default: int, text: str, most: int = LARGEST) -> Any:
     """Return an option that takes a whole number and shows its default."""
     kind = click.IntRange(least, most)
     return click.option(*names, type=kind, default=default, show_default=True, help=text)
-
-
-def _picture(name: str, text: str = "Picture to write.") -> Any:
-    """Return the option `--out` of a command that draws."""
-    return click.option("--out", type=OutputPath(), default=name, show_default=True, help=text)
 
 
 class Setting(click.ParamType):  # type: ignore[type-arg]
@@ -96,7 +87,7 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
     " weights.json of a run lists all settings.",
 )
 @click.option("--seed", type=click.IntRange(0, LARGEST), help="Seed of every random choice  [0].")
-@_number("--labels", least=0, default=0, text="Labelled questions whose answers may be used.")
+@number("--labels", least=0, default=0, text="Labelled questions whose answers may be used.")
 @click.option(
     "--conditional",
     is_flag=True,
@@ -108,8 +99,8 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
     help="Weights of an earlier run of the same networks to begin from.",
 )
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint of --out.")
-@_number("--workers", least=0, most=MOST_PROCESSES, default=1, text="Processes that read the data.")
-@_number("--every", least=1, default=500, text="Iterations between checkpoints.")
+@number("--workers", least=0, most=MOST_PROCESSES, default=1, text="Processes that read the data.")
+@number("--every", least=1, default=500, text="Iterations between checkpoints.")
 @DEVICE
 @click.option(
     "--devices",
@@ -250,108 +241,9 @@ def predict_to(
     return weights
 
 
-@click.command(epilog=f"{EXAMPLE}pix2shape sample --weights shapes-rays --out samples.png")
-@click.option(
-    "--weights", type=WEIGHTS_PATH, default="shapes-rays", show_default=True, help=f"{A_MODEL}."
-)
-@_picture("samples.png")
-@_number("--n", "count", least=1, most=256, default=16, text="Number of samples.")
-@click.option("--class", "label", help="Class that a conditional model samples  [each in turn].")
-@_number("--seed", least=0, default=0, text="Seed of codes, cameras and lights.")
-@OVERWRITE
-def sample(
-    weights: str, out: str, count: int, label: str | None, seed: int, overwrite: bool
-) -> None:
-    """Draw samples of the model's prior, as images, depths and normals."""
-    needs_torch()
-    from baselines.pix2shape.pictures import check_picture, save_pictures
-    from baselines.pix2shape.use.explore import sample_sheet
-    from baselines.pix2shape.weights.bundled import open_weights
-
-    check_picture(out, False, overwrite)
-    model, card = open_weights(weights)
-    save_pictures([sample_sheet(model, card, count, seed, label)], out, overwrite)
-    print_line(f"{out}: {count} samples")
-
-
-@click.command(
-    epilog=f"{EXAMPLE}pix2shape interpolate --data rooms.h5 --items 0,5 --out interpolation.png"
-)
-@WEIGHTS
-@ROOMS
-@click.option(
-    "--items", type=Items(), default="0,1", show_default=True, help="The two rows to go between."
-)
-@_number("--steps", least=2, most=64, default=8, text="Number of codes.")
-@_picture("interpolation.png")
-@OVERWRITE
-def interpolate(
-    weights: str | None, data: str, items: list[int], steps: int, out: str, overwrite: bool
-) -> None:
-    """Draw the way from one room's code to another's, seen from the first room's camera."""
-    if len(items) != 2:
-        raise click.UsageError(f"--items: found {len(items)} rows, expected two such as 0,1")
-    model, rooms, items = _model_and_rooms(weights, data, items, out, overwrite)
-    from baselines.pix2shape.pictures import save_pictures
-    from baselines.pix2shape.use.explore import interpolation_sheet
-
-    save_pictures([interpolation_sheet(model, rooms, items[0], items[1], steps)], out, overwrite)
-    print_line(f"{out}: from row {items[0]} to row {items[1]} of {data}")
-
-
-@click.command(epilog=f"{EXAMPLE}pix2shape rotate --data rooms.h5 --items 0-5 --out rotation.gif")
-@WEIGHTS
-@ROOMS
-@click.option(
-    "--items", type=Items(), default="0-5", show_default=True, help="Rows of the rooms to turn."
-)
-@_number("--degrees", least=0, most=90, default=80, text="Camera's turn about the vertical axis.")
-@_number("--frames", least=2, most=200, default=33, text="Number of pictures on the way there.")
-@_picture("rotation.gif", "GIF or WebP to write.")
-@OVERWRITE
-def rotate(
-    weights: str | None,
-    data: str,
-    items: list[int],
-    degrees: int,
-    frames: int,
-    out: str,
-    overwrite: bool,
-) -> None:
-    """Draw an animation in which the camera turns around rooms that the model saw in one image."""
-    model, rooms, items = _model_and_rooms(weights, data, items, out, overwrite, animated=True)
-    from baselines.pix2shape.pictures import save_pictures
-    from baselines.pix2shape.use.explore import rotation_frames
-
-    angles = [degrees * i / (frames - 1) for i in range(frames)]
-    save_pictures(rotation_frames(model, rooms, items, angles), out, overwrite)
-    print_line(f"{out}: {len(items)} scenes turned by {degrees} degrees")
-
-
-def _model_and_rooms(
-    weights: str | None,
-    data: str,
-    items: list[int],
-    out: str,
-    overwrite: bool,
-    animated: bool = False,
-) -> tuple[Any, Any, list[int]]:
-    """Check the picture's name; return model, rooms and the rows, which are checked, too."""
-    needs_torch()
-    from baselines.pix2shape.pictures import check_picture
-    from baselines.pix2shape.use.explore import known_rooms
-    from baselines.pix2shape.weights.bundled import open_weights, suited
-    from scenegen.rooms.preview import pick_rows
-
-    check_picture(out, animated, overwrite)
-    model, card = open_weights(weights or suited(data))
-    rooms = known_rooms(data, card)
-    return model, rooms, pick_rows(len(rooms), items)
-
-
 def needs_torch(who: str = "pix2shape", packages: tuple[str, ...] = PACKAGES) -> None:
     """Raise UserError where an optional package is missing."""
     needs(who, packages, "model")
 
 
-COMMANDS = (train, predict, sample, interpolate, rotate)
+COMMANDS = (train, predict)
