@@ -29,7 +29,7 @@ UNTRAINED = {
     "outline": "questions: the nearest outline, without labels or 3D",
     "outline-trees": "questions: trees on outline features, learned from --train",
     "pix2shape": "the reference model, which `pix2shape train` trains",
-    "pix2shape-rays": "rooms: the same, told floor and walls; learned from several views",
+    "pix2shape-rays": "rooms: the same, told walls; learned from several views",
 }
 REFERENCE = ("pix2shape", "pix2shape-rays")
 # Packages `baselines.<name>`, - written as _, whose functions `train` and `write_submission` make

