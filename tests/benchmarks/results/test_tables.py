@@ -17,11 +17,15 @@ def ran(monkeypatch):
     def run(folder, command):
         commands.append(command)
         words = command.split()
-        if words[:2] == ["pix2shape", "train"] or words[:3] == ["bench", "baseline", "ptn"]:
+        if (words[:2] == ["pix2shape", "train"] and "views" not in words) or words[:3] == [
+            "bench",
+            "baseline",
+            "ptn",
+        ]:
             raise StepError("none yet")
         if words[:2] == ["iqtt", "make-split"]:
             base = folder / words[-1]
-            parts = [base] if words[-1] == "mixed" else [base / kind for kind in questions.KINDS]
+            parts = [base] if words[-1] != "suite" else [base / kind for kind in questions.KINDS]
             for part in parts:
                 part.mkdir(parents=True)
                 for name in ("train", "test", "test-answers"):
@@ -30,6 +34,8 @@ def ran(monkeypatch):
         made = words[words.index("--json" if "--json" in words else "--out") + 1]
         path = folder / made
         if "train" in words[:2]:
+            if "--start" in words:
+                assert (folder / words[words.index("--start") + 1]).exists()
             path = path / "weights.safetensors"
         path.parent.mkdir(parents=True, exist_ok=True)
         score = {"value": 0.5, "low": 0.4, "high": 0.6, "std": None, "n": 9}
@@ -91,6 +97,17 @@ def test_labels_train_a_last_layer_on_the_run_without(ran, tmp_path):
     )
     start = """ --set 'start="rezende-0-0/weights.safetensors"'"""
     assert trained == [line.format(0), line.format(200) + start, line.format(1000) + start]
+
+
+def test_the_views_start_from_a_first_run_and_with_labels_from_the_run_without(ran, tmp_path):
+    assert questions.run(tmp_path, ["pix2shape-views"], 1) == []
+    trained = [shlex.split(c) for c in ran if c.startswith("pix2shape train")]
+    outs = [words[words.index("--out") + 1] for words in trained]
+    starts = [words[words.index("--start") + 1] for words in trained if "--start" in words]
+    assert outs == [f"pix2shape-views-{run}-0" for run in ("first", 0, 200, 1000)]
+    assert starts == [f"pix2shape-views-{run}-0/weights.safetensors" for run in ("first", 0, 0)]
+    assert {words[words.index("--data") + 1] for words in trained} == {"other/iqtt-train.h5"}
+    assert ["iterations=600" in words for words in trained] == [False, False, True, True]
 
 
 def test_table_3(ran, tmp_path):
@@ -158,7 +175,14 @@ def commands_of_all_entries():
         yield method.name, method.answer
         if method.train:
             yield method.name, f"{method.train} {method.start}"
-    for step in (questions.TRAINING, questions.SUITE, *rooms.data("shapenet").values()):
+        if method.first:
+            yield "data", method.first
+    for step in (
+        questions.TRAINING,
+        questions.OTHER,
+        questions.SUITE,
+        *rooms.data("shapenet").values(),
+    ):
         yield "data", step.command
     for method in rooms.METHODS:
         yield method.name, f"bench baseline {method.name} --data x --out y {method.options}"
@@ -169,7 +193,7 @@ def test_commands_have_the_options_that_are_named(name, command):
     import cli
     from baselines.commands import ALL
 
-    if name not in ALL and name != "data":
+    if name not in ALL and name not in ("data", "pix2shape-views"):
         pytest.skip("not there yet")
     program, verb, *words = shlex.split(command)
     known = {
