@@ -4,7 +4,7 @@ import http.client
 import re
 import threading
 import time
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from urllib.parse import urlencode
@@ -42,7 +42,8 @@ class Site:
             headers["Cookie"] = cookie
         with closing(connection):
             sent = body if fields is None else urlencode(fields)
-            connection.request(method, path, sent, headers)
+            with suppress(BrokenPipeError):  # the server may close before all has been sent
+                connection.request(method, path, sent, headers)
             answer = connection.getresponse()
             return answer.status, dict(answer.getheaders()), answer.read()
 

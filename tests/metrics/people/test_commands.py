@@ -133,7 +133,8 @@ def test_without_scripts_the_quiz_works(visit, quiz_split, tmp_path):
         page.check("#consent")
         page.click("text=Start")
         for _ in range(2):
-            page.click("text=Answer 2")
+            with page.expect_navigation():
+                page.click("text=Answer 2")
         assert page.title().startswith("Your score")
     assert {one.response_seconds for one in read_answers(tmp_path / "a.db").answers} == {None}
 
