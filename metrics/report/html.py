@@ -1,5 +1,7 @@
 """HTML pages from the templates of this folder; whatever a page shows is escaped."""
 
+import base64
+import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +9,8 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from scenegen.common.text_table import printable
+
+_TEMPLATES = Path(__file__).parent / "templates"
 
 
 def _shown(value: Any) -> Any:
@@ -16,7 +20,7 @@ def _shown(value: Any) -> Any:
 
 
 _PAGES = Environment(
-    loader=FileSystemLoader(Path(__file__).parent / "templates", encoding="utf-8"),
+    loader=FileSystemLoader(_TEMPLATES, encoding="utf-8"),
     autoescape=True,
     finalize=_shown,
     undefined=StrictUndefined,
@@ -29,7 +33,15 @@ _PAGES = Environment(
 def render(template: str, **values: Any) -> str:
     """Return a page that loads nothing: `templates/<template>`, filled with these values.
 
-    Texts are escaped unless they are `markupsafe.Markup`. A name that the template uses and
-    `values` lacks raises jinja2.UndefinedError.
+    Its Content-Security-Policy allows pictures that it holds itself and its one style sheet, by
+    SHA-256, and no script, style, frame, form or request. Texts are escaped unless they are
+    `markupsafe.Markup`. A name that the template uses and `values` lacks raises
+    jinja2.UndefinedError.
     """
-    return _PAGES.get_template(template).render(**values)
+    style = "\n" + (_TEMPLATES / "style.css").read_text(encoding="utf-8")
+    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
+    policy = (
+        f"default-src 'none'; style-src 'sha256-{digest}'; img-src data:;"
+        " base-uri 'none'; form-action 'none'"
+    )
+    return _PAGES.get_template(template).render(style=Markup(style), policy=policy, **values)
