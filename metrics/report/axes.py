@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 Scale = Callable[[float], float]
 MOST_TICKS = 6
-LETTER = 6.6  # width of a digit at most
+LETTER = 7.2  # width of a digit at most
 
 
 def span(values: Iterable[float], smallest: float = 0.0, largest: float = math.inf) -> list[float]:

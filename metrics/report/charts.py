@@ -173,7 +173,7 @@ class _Frame:
         if from_zero:  # angles as they are, at which the values stand
             self.labels = [f"{tick:g}" for tick in across]
         self.across, self.up, self.unit, self.unit_up = across, up, unit, unit_up
-        self.left = 10 + width(self.labels_up)
+        self.left = max(10 + width(self.labels_up), 4 + width(self.labels[:1]) / 2)
         right = RIGHT + width(self.labels[-1:]) / 2
         first = 0.0 if from_zero else across[0]
         margin = 8.0 if from_zero else 0.0  # for marks at the ends

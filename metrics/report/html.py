@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from scenegen.common.text_table import printable
 
+LONGEST_WORD = 24  # letters
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
@@ -17,6 +18,11 @@ def _shown(value: Any) -> Any:
     """Return what a template prints, control characters of texts as escapes; markup as it is."""
     plain = isinstance(value, str) and not isinstance(value, Markup)
     return printable(value, keep="\n\t") if plain else value
+
+
+def _has_long_word(text: str) -> bool:
+    """Return whether a text has a word so long that a table must be allowed to break it."""
+    return any(len(word) > LONGEST_WORD for word in text.split())
 
 
 _PAGES = Environment(
@@ -28,6 +34,7 @@ _PAGES = Environment(
     lstrip_blocks=True,
     keep_trailing_newline=True,
 )
+_PAGES.tests["unbroken"] = _has_long_word
 
 
 def render(template: str, **values: Any) -> str:

@@ -10,6 +10,8 @@ from pages import Page
 from metrics.report.axes import apart, span, tick_labels, width
 from metrics.report.charts import FLOOR, Point, Series, curves, histogram
 
+TEXT = r'<text x="([\d.]+)".*?anchor="(\w+)">([^<]*)<'
+
 
 @pytest.mark.parametrize("values", [[1.0], [2.0, 2.0], [0.0, 0.0], [1e-9, 1.0, np.nan], [-1, 1e7]])
 def test_histograms_of_hard_values_are_whole(values):
@@ -57,7 +59,8 @@ def test_an_axis_holds_its_values_from_zero_within_their_limits(values, limits, 
 
 def test_labels_are_neither_cut_off_nor_on_each_other():
     chart = curves([Series("s", [Point(d, 1e-5 * d) for d in range(81)], "s0")], "t", "u")
-    for x, anchor, text in re.findall(r'<text x="([\d.]+)".*?anchor="(\w+)">([^<]*)<', chart.svg):
+    narrow = histogram(np.array([1e-6, 3e-5]), "t", "u")
+    for x, anchor, text in re.findall(TEXT, chart.svg + narrow.svg):
         start = float(x) - width([text]) * {"end": 1.0, "middle": 0.5}[anchor]
         assert start >= 0, text
         assert start + width([text]) <= 340, text

@@ -29,7 +29,7 @@ def decoded(url):
 def test_pictures_show_depth_on_the_truths_scale_and_errors_in_red():
     true = np.array([[1.0, 2.0], [3.0, np.nan]])
     predicted = np.array([[1.0, 2.2], [0.0, 5.0]])
-    up = np.zeros((2, 2, 3)) + (0, 1, 0)
+    up = np.tile([0.0, 1.0, 0.0], (2, 2, 1))
     urls = view_pictures(np.zeros((2, 2, 3)), true, predicted, up, 50.0, 7 * up)
     shown = {name: decoded(url) for name, url in urls.items()}
     truth, depth, error = (shown[name] for name in (TRUE_DEPTH, DEPTH, ERROR))
