@@ -111,7 +111,13 @@ def score(
     outputs = [Path(path) for path in (json_path, csv_path, html_path) if path]
     for path in outputs:
         check_writable(path, overwrite)
-    others = _beside(beside, html_path, submissions[0]) if beside else []
+    others: list[Any] = []
+    if beside:
+        from metrics.report.page import read_beside
+
+        if html_path is None:
+            raise click.UsageError("--beside is for the page: give --html, too")
+        others = read_beside(beside, submissions[0])
     for name in submissions if any(path.exists() for path in outputs) else ():
         with open_predictions(name) as predictions:
             refuse_inputs(outputs, [find_truth(predictions, truth).path])
@@ -135,26 +141,6 @@ def score(
     if html_path and page:
         write_text(html_path, page, overwrite)
     click.echo(text_report(found, markdown))
-
-
-def _beside(paths: tuple[str, ...], html_path: str | None, submission: str) -> list[Any]:
-    """Read score files to show beside others; refuse at once what cannot be of the same truth."""
-    from metrics.report.page import BesideError
-    from metrics.score_file import read_scores
-    from metrics.submissions.reader import open_predictions
-
-    if html_path is None:
-        raise click.UsageError("--beside is for the page: give --html, too")
-    files = [read_scores(path) for path in paths]
-    with open_predictions(submission) as predictions:
-        told = predictions.truth_fingerprint
-        for file in files:
-            asked = file.meta.truth_fingerprint
-            if file.task != predictions.task or (told and told != asked):
-                found = f"scores of {file.task}, truth {asked[:12]}"
-                expected = f"{predictions.task}, {told or 'any'}"[:40]
-                raise BesideError(file.place, found, f"those of {submission}: {expected}")
-    return files
 
 
 @click.command(epilog=EXAMPLE + "bench validate predictions.h5 --truth rooms.h5")

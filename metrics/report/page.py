@@ -26,8 +26,10 @@ from metrics.report.text import (
     source_text,
     what_the_floor_is,
 )
+from metrics.score_file import read_scores
 from metrics.scoring.metric_names import HEADLINE, in_order, metric
 from metrics.scoring.records import GROUPINGS, ScoreFile
+from metrics.submissions.reader import open_predictions
 from scenegen.common.errors import SceneGenError
 
 
@@ -75,6 +77,24 @@ def html_report(
         definitions=[("score", "of one item"), *((n, metric(n).definition) for n in names)],
         source_text=source_text(scores.meta),
     )
+
+
+def read_beside(paths: Sequence[str | Path], submission: str | Path) -> list[ScoreFile]:
+    """Read score files to show beside those of a submission that is about to be scored.
+
+    Raises BesideError at once where one is of another task, or of a truth that the submission does
+    not name; else as `read_scores` and `open_predictions`.
+    """
+    files = [read_scores(path) for path in paths]
+    with open_predictions(submission) as predictions:
+        named = predictions.truth_fingerprint
+        for file in files:
+            asked = file.meta.truth_fingerprint
+            if file.task != predictions.task or (named and named != asked):
+                found = f"scores of {file.task}, truth {asked[:12]}"
+                expected = f"{predictions.task}, truth {(named or 'any')[:12]}, of {submission}"
+                raise BesideError(file.place, found, expected)
+    return files
 
 
 def require_same_truth(scores: ScoreFile, beside: Sequence[ScoreFile]) -> None:
