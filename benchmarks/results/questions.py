@@ -103,7 +103,8 @@ METHODS = (
         " --precision bf16 --start {start} --out {run}",
         start="--set iterations=600",
         first="pix2shape train --data {train} --seed {seed} --config views --precision bf16"
-        " --set easy_negatives=1 --set learning_rate=0.004 --set iterations=2000 --out {run}",
+        " --set easy_negatives=1 --set temperature=0.6 --set learning_rate=0.004"
+        " --set iterations=2000 --out {run}",
         data="other/iqtt-train.h5",
     ),
 )
