@@ -18,7 +18,7 @@ from scenegen.common.command_line import (
     print_line,
     progress_bar,
 )
-from scenegen.common.paths import InputPath, OutputPath, refuse_inputs
+from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_inputs
 
 TRUTH = click.option(
     "--truth",
@@ -48,7 +48,17 @@ SEED = click.option(
     "--csv", "csv_path", type=OutputPath(), help="Write a table of the scores of every item."
 )
 @click.option(
-    "--html", "html_path", type=OutputPath(), help="Write a page with distributions and pictures."
+    "--html",
+    "html_path",
+    type=OutputPath(),
+    help="Write a page: the headline, pictures of scenes or questions, curves, all numbers.",
+)
+@click.option(
+    "--beside",
+    multiple=True,
+    type=InputPath(),
+    metavar="SCORES.json",
+    help="Scores on the same truth to show beside these in the page; may be repeated.",
 )
 @MARKDOWN
 @SEED
@@ -82,6 +92,7 @@ def score(
     json_path: str | None,
     csv_path: str | None,
     html_path: str | None,
+    beside: tuple[str, ...],
     markdown: bool,
     scheduler: str | None,
     overwrite: bool,
@@ -100,6 +111,13 @@ def score(
     outputs = [Path(path) for path in (json_path, csv_path, html_path) if path]
     for path in outputs:
         check_writable(path, overwrite)
+    others: list[Any] = []
+    if beside:
+        from metrics.report.page import read_beside
+
+        if html_path is None:
+            raise click.UsageError("--beside is for the page: give --html, too")
+        others = read_beside(beside, submissions[0])
     for name in submissions if any(path.exists() for path in outputs) else ():
         with open_predictions(name) as predictions:
             refuse_inputs(outputs, [find_truth(predictions, truth).path])
@@ -110,14 +128,17 @@ def score(
     ):
         chosen = Settings(**settings, cluster=cluster)
         found = score_files(submissions, truth, chosen, bar.update)
+    page = None
+    if html_path:
+        from metrics.report.page import html_report
+
+        truth_path, runs = Path(found.meta.truth_path), [Path(path) for path in submissions]
+        page = html_report(found, truth_path, runs, others)
     if json_path:
         write_scores(found, json_path, overwrite)
     if csv_path:
         write_csv(found, csv_path, overwrite)
-    if html_path:
-        from metrics.report.page import html_report
-
-        page = html_report(found, Path(found.meta.truth_path), [Path(p) for p in submissions])
+    if html_path and page:
         write_text(html_path, page, overwrite)
     click.echo(text_report(found, markdown))
 
@@ -151,6 +172,26 @@ def validate(ctx: click.Context, submission: str, truth: str | None) -> None:
     help="A score to compare; may be repeated [default: the headline scores].",
 )  # fmt: skip
 @click.option("--json", "json_path", type=OutputPath(), help="Write the comparison here.")
+@click.option(
+    "--html",
+    "html_path",
+    type=OutputPath(),
+    help="Write a page: verdicts, headline, pictures of scenes, curves.",
+)
+@click.option(
+    "--truth",
+    type=InputPath(),
+    help="The truth, for the page's pictures [default: the file that was scored against, where it"
+    " still lies there].",
+)
+@click.option(
+    "--predictions",
+    multiple=True,
+    type=InputPath(),
+    metavar="PREDICTIONS",
+    help="A submission that was scored, for the page's pictures; may be repeated [default: those"
+    " that the score files name, where they still lie there].",
+)
 @MARKDOWN
 @SEED
 @click.option(
@@ -163,6 +204,9 @@ def compare(
     scores: tuple[str, ...],
     metrics: tuple[str, ...],
     json_path: str | None,
+    html_path: str | None,
+    truth: str | None,
+    predictions: tuple[str, ...],
     markdown: bool,
     overwrite: bool,
     **settings: Any,
@@ -177,11 +221,23 @@ def compare(
     from metrics.score_file import read_scores
     from scenegen.common.new_file import check_writable, write_text
 
-    if json_path:
-        check_writable(Path(json_path), overwrite)
-    found = compare_files([read_scores(path) for path in scores], metrics or None, **settings)
+    for path in (json_path, html_path):
+        if path:
+            check_writable(Path(path), overwrite)
+    if (truth or predictions) and html_path is None:
+        raise click.UsageError("--truth and --predictions are for the page: give --html, too")
+    files = [read_scores(path) for path in scores]
+    found = compare_files(files, metrics or None, **settings)
+    page = None
+    if html_path:
+        from metrics.comparison.page import html_comparison
+
+        given = Path(truth) if truth else None
+        page = html_comparison(found, files, given, [Path(path) for path in predictions])
     if json_path:
         write_text(json_path, to_json(found), overwrite)
+    if html_path and page:
+        write_text(html_path, page, overwrite)
     click.echo(text_report(found, markdown))
 
 
@@ -204,6 +260,14 @@ def compare(
 )
 @click.option("--out", type=OutputPath(), help="Write to this file instead of printing.")
 @click.option(
+    "--html",
+    "folder",
+    type=OutputFolder(),
+    metavar="DIR",
+    help="Write a static site to this folder, fit for GitHub Pages: the rankings with paired tests,"
+    " a gallery, and a report of each score file.",
+)
+@click.option(
     "--recheck",
     is_flag=True,
     help="Recompute all means and intervals from the scores of the items first, and refuse files"
@@ -223,6 +287,7 @@ def leaderboard(
     metrics: tuple[str, ...],
     form: str,
     out: str | None,
+    folder: str | None,
     recheck: bool,
     paper: Any,
     no_paper: bool,
@@ -246,7 +311,15 @@ def leaderboard(
         with progress_bar(sum(map(steps, files)), "group") as bar:
             for file in files:
                 recompute(file, bar.update)
-    tables = rank(files, metrics or None, paper="none" if no_paper else paper)
+    shown: Any = "none" if no_paper else paper
+    if folder is not None:
+        from metrics.leaderboard.site import write_site
+
+        write_site(files, folder, metrics or None, paper=shown, overwrite=overwrite)
+        print_line(f"{folder}: {len(scores)} score files; open {Path(folder) / 'index.html'}")
+        if out is None:
+            return
+    tables = rank(files, metrics or None, paper=shown)
     page: str = getattr(text, f"to_{form}")(tables)
     if out is None:
         click.echo(page)

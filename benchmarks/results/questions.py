@@ -14,7 +14,7 @@ from typing import Any
 
 from benchmarks.results.markdown import NOTHING, shown, table
 from benchmarks.results.steps import Step, bundled_mark, each, made, mark, record
-from metrics.leaderboard.paper_tables import TABLES
+from metrics.report.paper_tables import TABLES
 
 KINDS = ("matched", "mirror-pair", "mirror-pair-2", "other", "near", "mirror")
 TRAINING = Step(

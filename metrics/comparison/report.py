@@ -29,7 +29,7 @@ def text_report(comparison: Comparison, as_markdown: bool = False) -> str:
     lines = [_title(comparison, escape), *laid_out(_tables(comparison, escape), as_markdown)]
     notes = [f"- {markdown(n)}" if as_markdown else f"note: {n}" for n in comparison.notes]
     between = [""] if as_markdown and notes else []
-    return "\n".join(map(printable, [*lines, "", *_legend(comparison), *between, *notes]))
+    return "\n".join(map(printable, [*lines, "", *legend(comparison), *between, *notes]))
 
 
 def to_json(comparison: Comparison) -> str:
@@ -51,14 +51,19 @@ def to_json(comparison: Comparison) -> str:
 
 
 def _title(comparison: Comparison, escape: Callable[[str], str]) -> str:
-    if comparison.task == "rooms":
-        size = f"{comparison.items:,} images of {comparison.clusters:,} scenes"
-    else:
-        size = f"{comparison.items:,} questions"
     stamp = "" if comparison.comparable else " NOT COMPARABLE, compared all the same."
     known = known_test(comparison.truth_digest)
     truth = escape(known.name if known else comparison.truth_digest[:12])
-    return f"Against {escape(comparison.reference)}, over {size} (truth {truth}).{stamp}"
+    return (
+        f"Against {escape(comparison.reference)}, over {sized(comparison)} (truth {truth}).{stamp}"
+    )
+
+
+def sized(comparison: Comparison) -> str:
+    """Return over how many items methods are compared, in words."""
+    if comparison.task == "rooms":
+        return f"{comparison.items:,} images of {comparison.clusters:,} scenes"
+    return f"{comparison.items:,} questions"
 
 
 def _tables(
@@ -70,10 +75,16 @@ def _tables(
         reference = (escape(comparison.reference), number(found[0].reference_value))
         rows = [_HEAD, (*reference, *("" for _ in _HEAD[2:]))]
         title = f"{name} ({metric(name).unit}, {metric(name).direction})"
-        yield escape(title), rows + [_row(difference, escape) for difference in found]
+        yield escape(title), rows + [difference_cells(difference, escape) for difference in found]
 
 
-def _row(d: Difference, escape: Callable[[str], str]) -> tuple[str, ...]:
+def difference_head() -> tuple[str, ...]:
+    """Return the head of the columns of `difference_cells`."""
+    return _HEAD
+
+
+def difference_cells(d: Difference, escape: Callable[[str], str] = str) -> tuple[str, ...]:
+    """Return a difference as the cells of a row, from the method's name to the verdict."""
     interval = ""
     if d.low is not None and d.high is not None:
         like = d.difference or max(abs(d.low), abs(d.high))
@@ -99,7 +110,8 @@ def _probability(p: float) -> str:
     return f"{p:.4f}" if p >= 0.0001 else "<0.0001"
 
 
-def _legend(comparison: Comparison) -> list[str]:
+def legend(comparison: Comparison) -> list[str]:
+    """Return in sentences what the columns of a comparison say."""
     first = comparison.differences[0]
     rooms = comparison.task == "rooms"
     clusters, apart = ("scenes",) * 2 if rooms else ("questions", "shapes")

@@ -1,10 +1,11 @@
 """Score files side by side in ranked tables, with the figures that the paper reports.
 
-`paper_tables` holds the paper's figures, `ranking` decides which tables there are and in which
-order methods stand, `table` builds one of them, and `text` writes Markdown, HTML or LaTeX.
-`names` refuses names that could be taken for others, and `recheck` numbers that do not follow from
-the scores of the items.
+`ranking` decides which tables there are and in which order methods stand, `table` builds one of
+them, and `text` writes Markdown, HTML or LaTeX. `site` makes a folder of pages, with `paired_tests`
+against the first method and a `gallery`. `names` refuses names that could be taken for others, and
+`recheck` numbers that do not follow from the scores of the items.
 
-These modules import `metrics.scoring` for the scores and `metrics.report` for cells and pages.
+These modules import `metrics.scoring` for the scores, `metrics.comparison` for the tests, and
+`metrics.report` for cells, pages and the paper's figures.
 Start reading in `ranking`.
 """

@@ -2,10 +2,7 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from metrics.leaderboard.table import Cell, Row, Table
-from metrics.measures.statistics import cluster_means
 from metrics.report.text import FLOORS_OF_ROOMS, floor_text
 from metrics.scoring import floors
 from metrics.scoring.floors import floor_of_kind
@@ -56,19 +53,6 @@ def floor_rows(file: ScoreFile, names: Sequence[str]) -> FloorRows:
 def own_floors(file: ScoreFile) -> dict[str, float]:
     """Return the floors that belong to this file's predictions alone, by name of the score."""
     return {name: one.floor for name, one in file.skills.items() if not is_shared(name)}
-
-
-def angle_floors(file: ScoreFile, name: str) -> dict[str, float]:
-    """Return the mean of a score's floor by view angle, in whole degrees, from the items."""
-    angles, column = map(file.items.get, ("view_angle_degrees", SKILLED.get(name, "") + name))
-    if angles is None or column is None or name not in SKILLED:
-        return {}
-    found = {}
-    for degrees in file.by_view_angle:
-        chosen = (angles == int(degrees)) & np.isfinite(column)
-        if chosen.any():
-            found[degrees] = float(cluster_means(column[chosen], file.clusters[chosen]).mean())
-    return found
 
 
 def is_shared(name: str) -> bool:

@@ -10,8 +10,8 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 
 from metrics.leaderboard.floors import FLOOR, NOISE
-from metrics.leaderboard.paper_tables import TABLES
 from metrics.leaderboard.table import INCOMPARABLE_MARK, REPORTED_MARK
+from metrics.report.paper_tables import TABLES
 from metrics.scoring.records import ScoreFile
 from scenegen.common.errors import SceneGenError
 

@@ -15,7 +15,6 @@ from metrics.leaderboard.floors import (
     FLOOR,
     SKILL_OF,
     FloorRows,
-    angle_floors,
     floor_rows,
     floors_table,
     is_shared,
@@ -25,7 +24,6 @@ from metrics.leaderboard.floors import (
     skill_key,
 )
 from metrics.leaderboard.names import check_names
-from metrics.leaderboard.paper_tables import REPORTED, SOURCE, TABLES, Figure, PaperTable
 from metrics.leaderboard.table import (
     INCOMPARABLE_MARK,
     REPORTED_MARK,
@@ -37,6 +35,8 @@ from metrics.leaderboard.table import (
     score_column,
     skill_column,
 )
+from metrics.report.curves import angle_floors
+from metrics.report.paper_tables import REPORTED, SOURCE, TABLES, Figure, PaperTable
 from metrics.report.text import FLOORS_OF_ROOMS, SKILL, what_the_floor_is
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import EMPTY_ROOM, HEADLINE, metric
@@ -189,7 +189,7 @@ def _tables(
     first = ranked[0][1]  # comparable, if any is
     title, names = _title(first), [name for name in columns if not name.startswith(SKILL_OF)]
     notes = [*_notes([file for _, file in ranked]), *map(_same_request_note, same_request)]
-    shown = [(label, file.comparable, _shown(file), own_floors(file)) for label, file in ranked]
+    shown = [(label, file, _shown(file), own_floors(file)) for label, file in ranked]
     for i, part in enumerate(_parts(columns)):
         used = [f for f in figures if f.view_angle is None and f.metric in part]
         table = build_table(
@@ -209,7 +209,7 @@ def _tables(
             groups = file.by_view_angle if by_angle else file.by_distractor
             found = {key: scores[name] for key, scores in groups.items() if name in scores}
             own = {} if is_shared(name) else angle_floors(file, name)
-            entries.append((label, file.comparable, found, own))
+            entries.append((label, file, found, own))
         keys = by_number({key for _, _, scores, _ in entries for key in scores})
         if len(keys) < (1 if by_angle else 2):  # a single kind stands in the title
             continue

@@ -5,15 +5,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from metrics.leaderboard.paper_tables import REPORTED, SOURCE, Figure
+from metrics.report.paper_tables import REPORTED, SOURCE, Figure
 from metrics.report.text import as_shown, interval_cells
 from metrics.scoring.metric_names import metric
-from metrics.scoring.records import Score, Skill
+from metrics.scoring.records import Score, ScoreFile, Skill
 from scenegen.common.text_table import number
 
 Kind = Literal["ranked", "incomparable", "floor", "reported"]
 Scores = Mapping[str, Score | Skill]
-Entry = tuple[str, bool, Scores, Mapping[str, float]]
+Entry = tuple[str, ScoreFile, Scores, Mapping[str, float]]
 REPORTED_MARK, INCOMPARABLE_MARK = "†", "‡"
 
 
@@ -52,22 +52,30 @@ class Row:
         label: the method's name and what has to be known about it, in one line, not escaped.
         kind: only "ranked" rows have ranks and best cells; "floor" rows say what a method without
             sight, chance or noise gives.
+        file: whose scores they are; None for floors and the paper's figures.
+        link: address of the method's own page; or empty.
     """
 
     rank: str
     label: str
     kind: Kind
     cells: tuple[Cell, ...]
+    file: ScoreFile | None = None
+    link: str = ""
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows under the heads of their columns, with notes below. The texts are not escaped."""
+    """Rows under the heads of their columns, with notes below. The texts are not escaped.
+
+    `keys` has the key of each column: the name of a score, of a skill, or of a group.
+    """
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
     notes: tuple[str, ...] = ()
+    keys: tuple[str, ...] = ()
 
     @property
     def parts(self) -> list[tuple[Row, ...]]:
@@ -88,8 +96,8 @@ def build_table(
 
     Args:
         columns: the columns by their keys.
-        entries: for each method, best first: its label, whether it is comparable, its scores by
-            the columns' keys, and so those of their floors that other methods do not share.
+        entries: for each method, best first: its label, its score file, its scores by the
+            columns' keys, and so those of their floors that other methods do not share.
         floors: values by the label of their row, then by the columns' keys.
         figures: of the paper, by the label of their row, then by the columns' keys.
         notes: stand below the table, before those on marks that its rows bear.
@@ -99,7 +107,8 @@ def build_table(
     best = {key: _best(entries, key, column) for key, column in columns.items()}
     rows: list[Row] = []
     place, last = 0, ""
-    for label, comparable, scores, own in entries:
+    for label, file, scores, own in entries:
+        comparable = file.comparable
         cells = tuple(
             _cell(scores.get(key), comparable and best[key], own.get(key)) for key in columns
         )
@@ -107,12 +116,13 @@ def build_table(
         if ranked and comparable and first in scores:
             place = place if cells[0].value == last else len(rows) + 1
             rank, last = str(place), cells[0].value
-        rows.append(Row(rank, label, "ranked" if comparable else "incomparable", cells))
+        kind: Kind = "ranked" if comparable else "incomparable"
+        rows.append(Row(rank, label, kind, cells, file))
     for label, values in floors.items():
         texts = (number(values[key]) if key in values else "-" for key in columns)
         rows.append(Row("", label, "floor", tuple(map(Cell, texts))))
     told = list(notes)
-    if not all(comparable for _, comparable, *_ in entries):
+    if not all(file.comparable for _, file, *_ in entries):
         told.append(
             f"{INCOMPARABLE_MARK} not comparable, so not ranked: not all of the test set was"
             " scored, or values that are not finite were given the worst score, or only the"
@@ -125,7 +135,8 @@ def build_table(
         unit = "" if shares else "; it states no unit of length"
         told.append(f"{REPORTED_MARK} {SOURCE}, {REPORTED}, so not ranked{unit}.")
     rows += reported_rows(figures, tuple(columns))
-    return Table(title, tuple(c.head for c in columns.values()), tuple(rows), tuple(told))
+    heads = tuple(c.head for c in columns.values())
+    return Table(title, heads, tuple(rows), tuple(told), tuple(columns))
 
 
 def reported_rows(
@@ -153,7 +164,7 @@ def skill_column(name: str) -> Column:
 
 def _best(entries: Sequence[Entry], key: str, column: Column) -> str:
     """The best of the comparable scores of a column as it is shown; empty where there is none."""
-    found = [scores[key] for _, may, scores, _ in entries if may and key in scores]
+    found = [scores[key] for _, file, scores, _ in entries if file.comparable and key in scores]
     better = max if column.higher_is_better else min
     return interval_cells(better(found, key=lambda one: one.value))[0] if found else ""
 

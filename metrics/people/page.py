@@ -3,10 +3,10 @@
 import math
 from collections.abc import Iterator, Sequence
 
+from metrics.people.charts import Svg, bars, intervals
 from metrics.people.figures import Figures, Group
 from metrics.people.intervals import Estimate
 from metrics.people.text import group_tables, head, histogram_table, notes, summary_tables
-from metrics.report.charts import Svg, bars, intervals
 from metrics.report.html import render
 
 Section = tuple[str, Sequence[Svg], Sequence[Sequence[str]]]  # title, charts, rows of the table

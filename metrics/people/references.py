@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from iqtt.quiz.pages import Bar
 from iqtt.quiz.study import UNTOLD, Question
-from metrics.leaderboard.paper_tables import TABLES
 from metrics.measures.statistics import wilson_interval
+from metrics.report.paper_tables import TABLES
 from metrics.scoring.floors import floor_of_questions
 
 THREE = 3  # answers of each of the paper's questions

@@ -1,114 +1,141 @@
-"""Scores as one self-contained page: tables, distributions, and pictures of some items."""
+"""Scores as one self-contained page that answers first: headline, pictures, curves, all numbers."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from metrics.report.charts import Svg, histogram, intervals
+from metrics.report.charts import Chart, histogram
+from metrics.report.curves import view_curves
+from metrics.report.headline import (
+    Grid,
+    answer,
+    headline_table,
+    kinds_table,
+    labels_beside,
+    notes,
+)
 from metrics.report.html import render
-from metrics.report.pictures import view_pictures
+from metrics.report.questions import pictured_questions
+from metrics.report.scenes import Pictured, pictured_scenes, shown_score
 from metrics.report.text import (
-    GROUP_SCORES,
     GROUP_TITLES,
     SKILL,
     group_tables,
-    headline_rows,
     score_rows,
     source_text,
     what_the_floor_is,
 )
+from metrics.score_file import read_scores
 from metrics.scoring.metric_names import HEADLINE, in_order, metric
-from metrics.scoring.records import Groups, ScoreFile
-from metrics.submissions.reader import RoomPredictions, open_predictions
-from scenegen.common.text_table import number
-from scenegen.rendering.ground_truth import decode_image
-from scenegen.rooms.reader import RoomsFile
-
-SHOWN = 3  # pictures of so many items each: the best, the median and the worst ones
-COLUMNS = ("image", "true depth", "predicted depth", "error")
+from metrics.scoring.records import GROUPINGS, ScoreFile
+from metrics.submissions.reader import open_predictions
+from scenegen.common.errors import SceneGenError
 
 
-def html_report(scores: ScoreFile, truth_path: Path, submissions: Sequence[Path]) -> str:
+class BesideError(SceneGenError):
+    """A score file that cannot stand beside others."""
+
+
+def html_report(
+    scores: ScoreFile,
+    truth_path: Path,
+    submissions: Sequence[Path],
+    beside: Sequence[ScoreFile] = (),
+    home: str = "",
+) -> str:
     """Return the page as text; pictures come from the truth and the first run.
 
-    Raises FileFormatError where a picture's row cannot be read.
+    Args:
+        truth_path: of the truth that was scored against.
+        submissions: the files that were scored; without any there are no pictures.
+        beside: scores of other methods on the same truth, to be shown beside these.
+        home: address of the page that this one belongs to, such as "index.html".
+
+    Raises BesideError where a file of `beside` is of another truth, OSError and FileFormatError
+    where a picture's row cannot be read.
     """
+    require_same_truth(scores, beside)
     names = in_order(scores.metrics)
+    rooms = scores.task == "rooms"
+    labels = labels_beside(scores, beside)
+    pictures = list(_pictures(scores, truth_path, submissions)) if submissions else []
     return render(
         "report.html",
         scores=scores,
-        source_text=source_text(scores.meta),
-        headline_rows=headline_rows(scores),
+        home=home,
+        answer=answer(scores),
+        headline=headline_table(scores, beside),
+        notes=list(notes(scores)),
         skill_text=f"{SKILL} {what_the_floor_is(scores)}" if scores.skills else "",
-        score_rows=score_rows(scores),
-        groups=[
-            (GROUP_TITLES[grouping].capitalize(), rows, list(_over_angle(scores, grouping)))
-            for grouping, rows in group_tables(scores)
-        ],
+        kinds=[] if rooms else list(_kinds(scores, beside)),
+        pictures=pictures,
+        curves=list(view_curves([scores, *beside], labels)) if rooms else [],
+        groups=[(GROUP_TITLES[g].capitalize(), rows) for g, rows in group_tables(scores) if rooms],
         distributions=list(_distributions(scores)),
-        pictures=(
-            list(_pictures(scores, truth_path, submissions[0])) if scores.task == "rooms" else ()
-        ),
+        score_rows=score_rows(scores),
         definitions=[("score", "of one item"), *((n, metric(n).definition) for n in names)],
+        source_text=source_text(scores.meta),
     )
 
 
-def _over_angle(scores: ScoreFile, grouping: str) -> Iterator[Svg]:
-    """Yield a chart of each score over the angle, if that is what the groups are of."""
-    groups: Groups = getattr(scores, grouping)
-    for name in GROUP_SCORES[scores.task] if grouping.endswith("_angle") else ():
-        points = []
-        for key, found in groups.items():
-            if name in found:
-                score, degrees = found[name], np.mean([float(part) for part in key.split("-")])
-                low, high = (np.nan if end is None else end for end in (score.low, score.high))
-                points.append((float(degrees), score.value, low, high))
-        yield intervals(points, metric(name).title, metric(name).unit)
+def read_beside(paths: Sequence[str | Path], submission: str | Path) -> list[ScoreFile]:
+    """Read score files to show beside those of a submission that is about to be scored.
+
+    Raises BesideError at once where one is of another task, or of a truth that the submission does
+    not name; else as `read_scores` and `open_predictions`.
+    """
+    files = [read_scores(path) for path in paths]
+    with open_predictions(submission) as predictions:
+        named = predictions.truth_fingerprint
+        for file in files:
+            asked = file.meta.truth_fingerprint
+            if file.task != predictions.task or (named and named != asked):
+                found = f"scores of {file.task}, truth {asked[:12]}"
+                expected = f"{predictions.task}, truth {(named or 'any')[:12]}, of {submission}"
+                raise BesideError(file.place, found, expected)
+    return files
 
 
-def _distributions(scores: ScoreFile) -> Iterator[Svg]:
-    for name in (*HEADLINE["rooms"], "normal_mean_degrees", "derived_normal_mean_degrees"):
-        if name in scores.items:
-            values = np.asarray(scores.items[name], float)
-            yield histogram(values, metric(name).title, metric(name).unit)
+def require_same_truth(scores: ScoreFile, beside: Sequence[ScoreFile]) -> None:
+    """Raise BesideError unless all files are scores of one truth."""
+    for file in beside:
+        for what, found, expected in (
+            ("task", file.task, scores.task),
+            ("truth of digest", file.meta.truth_digest[:12], scores.meta.truth_digest[:12]),
+        ):
+            if found != expected:
+                raise BesideError(
+                    file.place,
+                    f"scores of {what} {found}",
+                    f"{expected}, as of {scores.method}",
+                    "score it again with the same --truth",
+                )
+
+
+def _kinds(scores: ScoreFile, beside: Sequence[ScoreFile]) -> Iterator[tuple[str, Grid]]:
+    """Yield title and table of each grouping of questions."""
+    for grouping in GROUPINGS["iqtt"]:
+        if getattr(scores, grouping):
+            yield f"Accuracy {GROUP_TITLES[grouping]}", kinds_table(scores, grouping, beside)
 
 
 def _pictures(
-    scores: ScoreFile, truth_path: Path, submission: Path
-) -> Iterator[tuple[str, list[tuple[int, str, list[tuple[str, str]]]]]]:
-    """Yield "Best by Relief IoU", "Median" and "Worst", each with its items.
+    scores: ScoreFile, truth_path: Path, submissions: Sequence[Path]
+) -> Iterator[tuple[str, list[Pictured]]]:
+    """Yield the title and the items of each list of scenes, or of questions."""
+    if scores.task == "iqtt":
+        yield from pictured_questions(scores, truth_path, submissions[0])
+        return
+    name = shown_score(scores)
+    if name:
+        yield from pictured_scenes(scores, truth_path, submissions[0], name)
 
-    Of an item these are its row, scores, titles and URLs. Images without such a score are left out.
-    """
-    first = next(name for name in HEADLINE["rooms"] if name in scores.items)
-    values = np.asarray(scores.items[first], float)
-    order = np.argsort(-values if metric(first).higher_is_better else values, kind="stable")
-    order = order[np.isfinite(values[order])]
-    shown = min(SHOWN, len(order))
-    middle = (len(order) - shown) // 2
-    with RoomsFile(truth_path) as truth, open_predictions(submission) as predictions:
-        assert isinstance(predictions, RoomPredictions)
-        place = dict(zip(predictions.rows.tolist(), range(len(predictions)), strict=True))
 
-        def item(entry: int) -> tuple[int, str, list[Any]]:
-            row = int(scores.items["row"][entry])
-            urls = view_pictures(
-                decode_image(truth.read("image", row)),
-                truth.read("depth", row),
-                predictions.depth(place[row]),
-            )
-            found = [
-                f"{name} {number(float(scores.items[name][entry]))}"
-                for name in HEADLINE["rooms"]
-                if name in scores.items
-            ]
-            return row, ", ".join(found), list(zip(COLUMNS, urls, strict=True))
-
-        for title, entries in (
-            ("Best", order[:shown]),
-            ("Median", order[middle : middle + shown]),
-            ("Worst", order[::-1][:shown]),
-        ):
-            yield f"{title} by {metric(first).title}", [item(entry) for entry in entries.tolist()]
+def _distributions(scores: ScoreFile) -> Iterator[Chart]:
+    for name in (*HEADLINE["rooms"], "normal_mean_degrees", "derived_normal_mean_degrees"):
+        if name in scores.items:
+            values = np.asarray(scores.items[name], float)
+            chart = histogram(values, metric(name).title, metric(name).unit)
+            if chart:
+                yield chart

@@ -64,6 +64,14 @@ def test_a_baseline_goes_all_the_way(truths, folder):
         assert "chamfer" in scored.stdout
         for ending in ("json", "csv", "html"):
             assert (folder / f"{name}.{ending}").stat().st_size > 1000
+    beside = ("--html", "both.html", "--beside", "empty-room.json")
+    assert bench("score", "oracle.h5", *truth, *beside).exit_code == 0
+    assert "empty-room" in (folder / "both.html").read_text()
+    pages = ("--html", "c.html", "--predictions", "oracle.h5", "--truth", truths.rooms)
+    assert bench("compare", "empty-room.json", "oracle.json", *pages).exit_code == 0
+    assert (folder / "c.html").read_text().count("data:image/webp") == 6 * 6
+    assert bench("leaderboard", "oracle.json", "--html", "site").exit_code == 0
+    assert (folder / "site" / "index.html").is_file()
     assert json.loads((folder / "oracle.json").read_text())["metrics"]["chamfer"]["value"] == 0
     compared = bench("compare", "empty-room.json", "oracle.json", "--json", "c.json")
     assert compared.exit_code == 0, compared.output
@@ -75,6 +83,16 @@ def test_a_baseline_goes_all_the_way(truths, folder):
         assert ranked.stdout.index("oracle") < ranked.stdout.index("empty-room")
         assert "as reported" in ranked.stdout
     assert "| " in bench("score", "oracle.h5", "--markdown").stdout
+
+
+def test_scores_of_another_truth_do_not_stand_beside(truths, folder, check_refusal):
+    bench("baseline", "chance", "--data", truths.iqtt, "--out", "chance.h5")
+    bench("baseline", "oracle", "--data", truths.rooms, "--out", "oracle.h5")
+    bench("score", "oracle.h5", "--json", "oracle.json")
+    for options, word in ((["--html", "x.html"], "iqtt"), ([], "--html")):
+        told = bench("score", "chance.h5", *options, "--beside", "oracle.json")
+        check_refusal(told.exit_code, told.stdout, told.stderr, (word,))
+    assert not (folder / "x.html").exists()
 
 
 def test_chance_goes_all_the_way(truths, folder):

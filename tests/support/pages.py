@@ -17,7 +17,7 @@ class Page(HTMLParser):
         self.tags.add(tag)
         self.attributes.update(name for name, _ in attrs)
         self.addresses += [value for name, value in attrs if name in ("src", "href")]
-        if tag not in ("meta", "img"):
+        if tag not in ("meta", "img"):  # others that have no end end with />
             self.open.append(tag)
         if tag == "tr":
             self.rows.append([])

@@ -9,8 +9,8 @@ from made_scores import DIGEST, iqtt_scores, rooms_scores
 from refusals import refused
 
 from metrics.leaderboard.floors import FloorError
-from metrics.leaderboard.paper_tables import TABLES
 from metrics.leaderboard.ranking import LeaderboardError, leaderboard
+from metrics.report.paper_tables import TABLES
 from metrics.score_file import Score, Skill
 from metrics.scoring.floors import Floor
 from metrics.scoring.known_tests import KnownTest

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from metrics.leaderboard.paper_tables import TABLES
+from metrics.report.paper_tables import TABLES
 from metrics.scoring.metric_names import metric
 
 # Rows of numbers, copied from the authors' source; what stands before the first & is dropped.
