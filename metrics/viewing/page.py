@@ -50,6 +50,9 @@ class PredictionPage:
         predictions: of the rows of `scores`, or more.
         scores: rows to show, and what to sort them by.
         shape_of: from `scenegen.viewing.geometry.shapes_of`.
+
+    Attributes:
+        page: it is drawn on.
     """
 
     def __init__(
@@ -67,24 +70,25 @@ class PredictionPage:
         gui = server.gui
         names = HEADLINE["rooms"]
         first = next((title for title, name in self._names.items() if name in names), None)
-        self._sort = gui.add_dropdown("Sort by", list(self._names), initial_value=first)
+        self._sort: Any = gui.add_dropdown("Sort by", list(self._names), initial_value=first)
         contents = Contents(
             self._order, view_label, self._clouds, self._about, self._start,
             "Scene, 0 is the worst", cameras=False,
         )  # fmt: skip
-        page = ScenePage(server, rooms, shape_of, contents)
+        self.page = ScenePage(server, rooms, shape_of, contents)
         with gui.add_folder("Predicted surfels"):
-            self._where = gui.add_dropdown("Place", (BESIDE, SAME, ALONE))
+            self._where = self.page.add("place", gui.add_dropdown("Place", (BESIDE, SAME, ALONE)))
             colorings = (ERROR, *([NORMAL] if predictions.has_normals else []), TRUTHS)
-            self._colored = gui.add_dropdown("Colour", colorings)
-            self._full = gui.add_number(
+            self._colored = self.page.add("error", gui.add_dropdown("Colour", colorings))
+            full = gui.add_number(
                 "Full colour at", 0.05, min=0.001, max=10.0, step=0.001,
                 hint="Error of depth, in scene units, that has the full colour.",
             )  # fmt: skip
+            self._full = self.page.add("full", full)
             self._legend = gui.add_html("")
-        self._sort.on_update(lambda _: page.restart())
-        page.watch(self._sort, self._where, self._colored, self._full)
-        page.show()
+        self._sort.on_update(lambda _: self.page.restart())
+        self.page.add("sort", self._sort)
+        self.page.show()
 
     def _order(self) -> list[tuple[int, ...]]:
         return worst_first(self._scores, self._names[self._sort.value], self._scenes)

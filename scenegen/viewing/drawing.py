@@ -31,7 +31,7 @@ def draw_surfels(
         name,
         surfels.points,
         colors,
-        point_size=max(surfels.spacing, 1e-6) * size,
+        point_size=max(surfels.spacing, 1e-6) * size / 2,  # viser takes half of the width
         point_shape="square",
         point_shading="flat",
         precision="float32",

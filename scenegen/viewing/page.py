@@ -37,6 +37,9 @@ class ScenePage:
         server: from `server.started`; the page is gone when it ends.
         rooms: whose scenes are shown.
         shape_of: from `geometry.shapes_of`.
+
+    Attributes:
+        controls: viser's handles by name; what they show is their `value`.
     """
 
     def __init__(
@@ -54,38 +57,46 @@ class ScenePage:
         self._meshes: list[Mesh] = []
         self._clouds: list[Cloud] = []
         self._state: list[Any] = []
-        self._missing = self._looked_from = ""
+        self._missing = ""
+        self._start = np.zeros((2, 3))  # where the page looked from last, and at what
         self._nodes: dict[str, Any] = {}
-        self._controls: list[Any] = []
+        self.controls: dict[str, Any] = {}
         self._add_controls()
         server.scene.on_click()(self._click)
 
     def _add_controls(self) -> None:
         gui = self._server.gui
         last = len(self._contents.scenes()) - 1
-        self._scene: Any = gui.add_slider(self._contents.scene_label, 0, last, 1, 0)
-        self._view: Any = gui.add_dropdown("View", [ALL_VIEWS])
+        self.add("scene", gui.add_slider(self._contents.scene_label, 0, last, 1, 0))
+        self.add("view", gui.add_dropdown("View", [ALL_VIEWS]))
         self._about = gui.add_html("")
         self._clicked = gui.add_html("")
         with gui.add_folder("What is drawn"):
-            self._coloring = gui.add_dropdown("Colour of surfels", COLORINGS)
-            self._size = gui.add_slider("Size of surfels", 0.1, 3.0, 0.1, 1.0)
-            self._surfels = gui.add_checkbox("Surfels", True)
-            self._mesh = gui.add_checkbox("Meshes of objects", True)
-            self._walls = gui.add_checkbox("Mesh of the room", False)
-            self._cameras = gui.add_checkbox("Cameras", self._contents.cameras)
-            self._lights = gui.add_checkbox("Lights", True)
+            self.add("colour", gui.add_dropdown("Colour of surfels", COLORINGS))
+            self.add("size", gui.add_slider("Size of surfels", 0.1, 4.0, 0.1, 1.2))
+            self.add("surfels", gui.add_checkbox("Surfels", True))
+            self.add("meshes", gui.add_checkbox("Meshes of objects", True))
+            self.add("room", gui.add_checkbox("Mesh of the room", False))
+            self.add("cameras", gui.add_checkbox("Cameras", self._contents.cameras))
+            self.add("lights", gui.add_checkbox("Lights", True))
         hint = "Moves you to the camera of a view when you choose one."
-        self._follow = gui.add_checkbox("Look from each new view", True, hint=hint)
+        self.add("follow", gui.add_checkbox("Look from each new view", True, hint=hint))
         gui.add_button("Look from this view").on_click(lambda _: self._look())
-        self.watch(
-            self._scene, self._view, self._coloring, self._size, self._surfels, self._mesh,
-            self._walls, self._cameras, self._lights,
-        )  # fmt: skip
+
+    def add(self, name: str, control: Any) -> Any:
+        """Draw anew whenever this control changes; return it."""
+        self.controls[name] = control
+        control.on_update(lambda _: self.show())
+        return control
+
+    @property
+    def told(self) -> str:
+        """What the page says of the scene, as HTML."""
+        return str(self._about.content)
 
     def restart(self) -> None:
         """Go to the first scene."""
-        self._scene.value = 0
+        self.controls["scene"].value = 0
 
     def watch(self, *controls: Any) -> None:
         """Draw anew whenever one of these controls changes."""
@@ -111,7 +122,7 @@ class ScenePage:
 
     def _update(self) -> None:
         scenes = self._contents.scenes()
-        rows = tuple(scenes[min(max(self._scene.value, 0), len(scenes) - 1)])
+        rows = tuple(scenes[min(max(self.controls["scene"].value, 0), len(scenes) - 1)])
         new_scene = rows != self._rows
         if new_scene:
             rooms = [self._rooms[row] for row in rows]
@@ -121,9 +132,9 @@ class ScenePage:
             self._meshes, missing = scene_meshes(rooms[0].scene, self._shape_of)
             self._missing = "".join(paragraph(f"No mesh: {text}.") for text in missing[:MOST_TOLD])
             names = list(self._views)
-            self._view.options = [*names, *([ALL_VIEWS] if len(names) > 1 else [])]
-            self._view.value = names[0]
-        state = [control.value for control in self._controls]
+            self.controls["view"].options = [*names, *([ALL_VIEWS] if len(names) > 1 else [])]
+            self.controls["view"].value = names[0]
+        state = [control.value for control in self.controls.values()]
         if not new_scene and state == self._state:  # a newer change was drawn meanwhile
             return
         self._state = state
@@ -132,29 +143,30 @@ class ScenePage:
         shown = self._shown()
         self._draw(shown)
         self._about.content = self._contents.about(shown) + self._missing
-        if self._follow.value and (new_scene or self._view.value != self._looked_from):
+        start = np.array(self._contents.start(shown[0]))
+        if self.controls["follow"].value and not np.array_equal(start, self._start):
             self._look()
 
     def _shown(self) -> list[Room]:
-        chosen = self._views.get(self._view.value)
+        chosen = self._views.get(self.controls["view"].value)
         return list(self._views.values()) if chosen is None else [chosen]
 
     def _draw(self, shown: Sequence[Room]) -> None:
         """Draw these views; remove what was drawn before."""
         before, self._nodes = self._nodes, {}
-        self._clouds = self._contents.clouds(shown, self._coloring.value)
-        for cloud in self._clouds if self._surfels.value else ():
+        self._clouds = self._contents.clouds(shown, self.controls["colour"].value)
+        for cloud in self._clouds if self.controls["surfels"].value else ():
             self._keep(drawing.draw_surfels(
-                self._server, cloud.name, cloud.surfels, cloud.colors, self._size.value
+                self._server, cloud.name, cloud.surfels, cloud.colors, self.controls["size"].value
             ))  # fmt: skip
         for mesh in self._meshes:
-            if self._mesh.value if mesh.object_id else self._walls.value:
+            if self.controls["meshes"].value if mesh.object_id else self.controls["room"].value:
                 name = f"/meshes/{mesh.object_id}"
                 self._keep(drawing.draw_mesh(self._server, name, mesh))
-        if self._cameras.value:
+        if self.controls["cameras"].value:
             for room in self._views.values():
                 self._keep(self._draw_camera(room, room in shown))
-        if self._lights.value:
+        if self.controls["lights"].value:
             for node in drawing.draw_lights(self._server, shown[0].scene):
                 self._keep(node)
         self._remove({name: before[name] for name in before.keys() - self._nodes.keys()})
@@ -170,15 +182,15 @@ class ScenePage:
 
     def _draw_camera(self, room: Room, shown: bool) -> Any:
         def choose() -> None:
-            self._view.value = self._contents.label(room)
+            self.controls["view"].value = self._contents.label(room)
             self._look()
 
         return drawing.draw_camera(self._server, f"/cameras/{room.index}", room, shown, choose)
 
     def _look(self) -> None:
         for room in self._shown()[:1]:
-            self._looked_from = self._view.value
-            drawing.look(self._server, *self._contents.start(room), room.fov_y_degrees)
+            self._start = np.array(self._contents.start(room))
+            drawing.look(self._server, *self._start, room.fov_y_degrees)
 
     def _click(self, event: "SceneClickEvent") -> None:
         """Mark the surfel that a click hits first, and say what is known of it."""
@@ -187,7 +199,7 @@ class ScenePage:
         origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
         with self._lock:
             found = []
-            for cloud in self._clouds if self._surfels.value else ():
+            for cloud in self._clouds if self.controls["surfels"].value else ():
                 hit = hit_by(cloud.surfels, origin, direction, angle)
                 if hit is not None:
                     found.append((hit[1], hit[0], cloud))

@@ -56,6 +56,8 @@ def started(title: str, host: str, port: int) -> Iterator["ViserServer"]:
             server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]
             server.gui.configure_theme(show_logo=False, show_share_button=False)
             server.scene.set_up_direction("+y")
+            # Shadows of lights that the scene has not would mislead, and cost most of a frame.
+            server.scene.configure_default_lights(cast_shadow=False)
             yield server
         finally:
             server.stop()
