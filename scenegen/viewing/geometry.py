@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -12,13 +13,15 @@ from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.description.scenes import PlacedObject, SceneSpec
 from scenegen.description.specs import BUILT_IN, DatasetSpec
 from scenegen.objects.scene_mesh import room_mesh, world_from_object
-from scenegen.objects.solids import UnitShape
 from scenegen.objects.sources import file_objects
 from scenegen.rooms.preview import depth_bytes, id_colors, normal_bytes, srgb_bytes
 from scenegen.rooms.reader import Room
 
 Array = NDArray[Any]
-ShapeOf = Callable[[PlacedObject], UnitShape]
+MOST_TRIANGLES = 10_000  # of a mesh that is drawn as it is
+CELLS = 40  # across a unit shape, of the grid that thins larger ones out
+MESHES_KEPT = 64
+ShapeOf = Callable[[PlacedObject], Array]  # triangles of its unit shape
 FARTHEST = 1000.0  # scene units; browsers draw nothing beyond
 RIGID_TOLERANCE = 1e-6  # by which R^T R may differ from the identity
 COLORINGS = ("Image", "Depth", "Normal", "Object id")
@@ -112,7 +115,7 @@ class Mesh:
 
 
 def shapes_of(spec: DatasetSpec, **folder: Any) -> ShapeOf:
-    """Return the function that finds the unit shape of an object of a data set.
+    """Return the function that finds the triangles, (F, 3, 3), of an object's unit shape.
 
     `folder` are the options of `file_objects`. Where the objects are meshes and no folder is told,
     the function raises SpecError, and so it does for a model whose file has changed; BadMeshError
@@ -123,19 +126,42 @@ def shapes_of(spec: DatasetSpec, **folder: Any) -> ShapeOf:
     told = any(folder.get(name) for name in ("shapenet_root", "objects_root"))
     if spec.source not in BUILT_IN and not told:
 
-        def untold(_item: PlacedObject) -> UnitShape:
+        def untold(_item: PlacedObject) -> Array:
             option = "--objects-root" if spec.source == "folder" else "--shapenet-root"
             raise SpecError("objects", f"meshes ({spec.source})", f"their folder, by {option}")
 
         return untold
     objects = file_objects(spec, **folder)
+    drawn = lru_cache(MESHES_KEPT)(lambda name: thinned(objects.shape(name).triangles))
 
-    def shape_of(item: PlacedObject) -> UnitShape:
+    def triangles_of(item: PlacedObject) -> Array:
         if objects.digest(item.shape) != item.mesh:
             raise SpecError(item.shape, "a file that has changed", "the one that was rendered")
-        return objects.shape(item.shape)
+        return np.asarray(drawn(item.shape))
 
-    return shape_of
+    return triangles_of
+
+
+def thinned(triangles: Array) -> Array:
+    """Return fewer triangles, (F, 3, 3), of a unit shape that has more than MOST_TRIANGLES.
+
+    Corners within one cell of a grid become their mean: they move by less than 0.09 of the shape's
+    radius, and mostly along its surface.
+    """
+    if len(triangles) <= MOST_TRIANGLES:
+        return triangles
+    corners = triangles.reshape(-1, 3)
+    # Corners that differ by rounding alone, as where a turned profile closes, are in one cell.
+    cell = np.floor(np.round((corners + 1.0) * (CELLS / 2), 6)).astype(np.int64)
+    number = (cell[:, 0] * 2 * CELLS + cell[:, 1]) * 2 * CELLS + cell[:, 2]
+    _, place, count = np.unique(number, return_inverse=True, return_counts=True)
+    sums = [np.bincount(place, weights=axis) for axis in corners.T]
+    means = np.stack(sums, axis=1) / count[:, None]
+    faces = place.reshape(-1, 3)
+    a, b, c = faces.T
+    faces = faces[(a != b) & (b != c) & (c != a)]
+    turned = np.take_along_axis(faces, (faces.argmin(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
+    return np.asarray(means[np.unique(turned, axis=0)])
 
 
 def scene_meshes(scene: SceneSpec, shape_of: ShapeOf) -> tuple[list[Mesh], list[str]]:
@@ -149,14 +175,14 @@ def scene_meshes(scene: SceneSpec, shape_of: ShapeOf) -> tuple[list[Mesh], list[
         meshes.append(Mesh("room", 0, np.asarray(room_mesh().triangles), color))
     for k, item in enumerate(scene.objects, start=1):
         try:
-            shape = shape_of(item)
+            triangles = shape_of(item)
         except SceneGenError as error:
             if str(error) not in missing:
                 missing.append(str(error))
             continue
         place = world_from_object(item.position, item.rotation, item.scale)
         color = srgb_bytes(np.array(item.reflectance))
-        meshes.append(Mesh(item.shape, k, transform_points(place, shape.triangles), color))
+        meshes.append(Mesh(item.shape, k, transform_points(place, triangles), color))
     return meshes, missing
 
 

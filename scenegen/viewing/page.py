@@ -73,10 +73,10 @@ class ScenePage:
         self._clicked = gui.add_html("")
         with gui.add_folder("What is drawn"):
             self.add("colour", gui.add_dropdown("Colour of surfels", COLORINGS))
-            self.add("size", gui.add_slider("Size of surfels", 0.1, 4.0, 0.1, 1.2))
+            self.add("size", gui.add_slider("Size of surfels", 0.1, 4.0, 0.1, 2.0))
             self.add("surfels", gui.add_checkbox("Surfels", True))
-            self.add("meshes", gui.add_checkbox("Meshes of objects", True))
-            self.add("room", gui.add_checkbox("Mesh of the room", False))
+            self.add("meshes", gui.add_checkbox("Object meshes", True))
+            self.add("room", gui.add_checkbox("Room mesh", False))
             self.add("cameras", gui.add_checkbox("Cameras", self._contents.cameras))
             self.add("lights", gui.add_checkbox("Lights", True))
         hint = "Moves you to the camera of a view when you choose one."
@@ -97,12 +97,6 @@ class ScenePage:
     def restart(self) -> None:
         """Go to the first scene."""
         self.controls["scene"].value = 0
-
-    def watch(self, *controls: Any) -> None:
-        """Draw anew whenever one of these controls changes."""
-        self._controls += controls
-        for control in controls:
-            control.on_update(lambda _: self.show())
 
     def show(self) -> None:
         """Draw what the controls say, unless it is drawn already."""
@@ -189,8 +183,9 @@ class ScenePage:
 
     def _look(self) -> None:
         for room in self._shown()[:1]:
-            self._start = np.array(self._contents.start(room))
-            drawing.look(self._server, *self._start, room.fov_y_degrees)
+            position, target = self._contents.start(room)
+            self._start = np.array([position, target])
+            drawing.look(self._server, position, target, room.fov_y_degrees)
 
     def _click(self, event: "SceneClickEvent") -> None:
         """Mark the surfel that a click hits first, and say what is known of it."""

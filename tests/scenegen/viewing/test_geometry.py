@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError, SceneGenError
+from scenegen.objects.catalogue import built_in_shape
 from scenegen.viewing.geometry import (
     FARTHEST,
     check_camera,
@@ -15,6 +17,7 @@ from scenegen.viewing.geometry import (
     scene_meshes,
     shapes_of,
     surfels_of,
+    thinned,
 )
 
 
@@ -76,12 +79,12 @@ def test_meshes_are_where_the_surfels_are(rooms):
         assert [mesh.object_id for mesh in meshes] == list(range(len(room.scene.objects) + 1))
         for mesh in meshes:
             seen = room.points_world[room.object_id == mesh.object_id][::29, None]
-            low, high = mesh.triangles.min(axis=1) - 1e-3, mesh.triangles.max(axis=1) + 1e-3
+            low, high = mesh.triangles.min(axis=1) - 0.01, mesh.triangles.max(axis=1) + 0.01
             a, b, c = mesh.triangles.swapaxes(0, 1)
             normal = np.cross(b - a, c - a)
             normal /= np.linalg.norm(normal, axis=1, keepdims=True)
             beside = np.abs(((seen - a) * normal).sum(axis=2))
-            near = ((seen >= low) & (seen <= high)).all(axis=2) & (beside < 2e-4)
+            near = ((seen >= low) & (seen <= high)).all(axis=2) & (beside < 0.005)
             assert near.any(axis=1).all()
 
 
@@ -100,6 +103,19 @@ def test_meshes_that_are_not_there_are_named_once(meshes, make_rooms, tmp_path):
         assert (len(found), missing) == (3, [])
         with pytest.raises(SceneGenError):
             shapes_of(rooms.spec, objects_root=str(tmp_path), cache_dir=told["cache_dir"])
+
+
+def test_large_meshes_are_thinned_out_on_their_surface():
+    box, sphere = (built_in_shape(name).triangles for name in ("box", "sphere"))
+    assert thinned(box) is box
+    fewer = thinned(sphere)
+    assert 1000 < len(fewer) < len(sphere) / 6
+    assert np.abs(np.linalg.norm(fewer, axis=2) - 1).max() < 2e-3
+    a, b, c = fewer.swapaxes(0, 1)
+    outwards = (np.cross(b - a, c - a) * (a + b + c)).sum(axis=1)
+    assert (outwards > 0).mean() > 0.99
+    mesh = trimesh.Trimesh(fewer.reshape(-1, 3), np.arange(3 * len(fewer)).reshape(-1, 3))
+    assert mesh.is_watertight, "no slit where the turned profile closes"
 
 
 @pytest.mark.parametrize(

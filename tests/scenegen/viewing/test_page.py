@@ -43,7 +43,7 @@ def test_coverage_clicks_and_the_slider(visit, rooms):
     first, turned, other = (objects(rooms[row]) for row in (0, 1, 2))
     with served(rooms) as (page, server):
         seen = visited(visit, server)
-        switch(page, meshes=False, cameras=False, lights=False, colour="Object id")
+        switch(page, meshes=False, cameras=False, lights=False, size=1.2, colour="Object id")
         eventually(lambda: overlap(saturated(picture(seen)), first), SAME)
         shown = saturated(picture(seen))
         # A wrong pose, or a mirrored axis, would not pass.
