@@ -4,7 +4,9 @@ import click
 
 from scenegen.common.command_line import PackageCommands
 
-ROOMS = tuple(f"scenegen.commands.{name}" for name in ("making", "rooms", "sharing", "meshes"))
+ROOMS = tuple(
+    f"scenegen.commands.{name}" for name in ("making", "rooms", "viewing", "sharing", "meshes")
+)
 QUESTIONS = (
     *(f"iqtt.commands.{name}" for name in ("making", "questions", "sharing")),
     "metrics.people.commands",

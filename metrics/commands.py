@@ -8,12 +8,16 @@ from typing import Any
 
 import click
 
+from scenegen.commands.viewing import page_options
 from scenegen.common.command_line import (
     EXAMPLE,
     LARGEST,
+    MESHES,
     MOST_PROCESSES,
     OVERWRITE,
     SCHEDULER,
+    Items,
+    needs,
     on_scheduler,
     print_line,
     progress_bar,
@@ -328,6 +332,60 @@ def leaderboard(
     print_line(f"{out}: {len(scores)} score files")
 
 
+@click.command(epilog=EXAMPLE + "bench view predictions.h5 --truth rooms.h5 --open")
+@click.argument("submission", type=InputPath(), metavar="PREDICTIONS")
+@TRUTH
+@click.option(
+    "--scores", "scores_path", type=InputPath(),
+    help="Score file of the submission, from `bench score --json` [default: the rows are scored].",
+)  # fmt: skip
+@click.option(
+    "--items", type=Items(),
+    help="Rows of the truth to show [default: all of --scores, or the first 100].",
+)  # fmt: skip
+@page_options
+@MESHES
+def view(
+    submission: str,
+    truth: str | None,
+    scores_path: str | None,
+    items: list[int] | None,
+    port: int,
+    host: str | None,
+    public: bool,
+    open_browser: bool,
+    **meshes: Any,
+) -> None:
+    """Show predictions of rooms in 3D, in the browser: the worst scenes first, by any score.
+
+    Predicted surfels are beside the true ones, coloured by the error of their depth; a click on one
+    tells both depths. The page asks for nothing outside this machine. Ctrl-C ends it.
+    """
+    needs("bench view", ("viser",), "view")
+    from metrics.submissions.reader import open_predictions
+    from metrics.submissions.truths import find_truth
+    from metrics.viewing.order import MOST_SCORED, require_rooms, shown_scores
+    from metrics.viewing.page import PredictionPage
+    from scenegen.rooms.reader import RoomsFile
+    from scenegen.viewing.geometry import shapes_of
+    from scenegen.viewing.server import listening_host, serve, started
+
+    where = listening_host(host, public), port
+    with open_predictions(submission) as opened:
+        predictions = require_rooms(opened)
+        with RoomsFile(find_truth(predictions, truth).path) as rooms:
+            shape_of = shapes_of(rooms.spec, **meshes)
+            if not items and not scores_path and len(predictions) > MOST_SCORED:
+                told = f"note: the first {MOST_SCORED} of {len(predictions)} rows are shown"
+                print_line(f"{told}; --items or --scores shows others", err=True)
+            count = len(items) if items else min(len(predictions), MOST_SCORED)
+            with progress_bar(count, "image") as bar:
+                scores = shown_scores(predictions, rooms, items, scores_path, bar.update)
+            with started(f"{predictions.method}: {submission}", *where) as server:
+                PredictionPage(server, rooms, predictions, scores, shape_of)
+                serve(server, print_line, open_browser, public)
+
+
 @click.command("describe-format", epilog=EXAMPLE + "bench describe-format")
 def describe_format() -> None:
     """Print the format of submissions, and how to write one."""
@@ -336,4 +394,4 @@ def describe_format() -> None:
     click.echo(text())
 
 
-COMMANDS = (score, validate, compare, leaderboard, describe_format)
+COMMANDS = (score, validate, view, compare, leaderboard, describe_format)

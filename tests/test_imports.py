@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 HEAVY = (
     "mitsuba", "drjit", "numpy", "h5py", "trimesh", "scipy", "PIL", "OpenEXR", "tqdm", "torch",
-    "lightning_fabric", "safetensors", "tensorboard", "pyarrow", "starlette", "uvicorn",
+    "lightning_fabric", "safetensors", "tensorboard", "pyarrow", "starlette", "uvicorn", "viser",
 )  # fmt: skip
 PIX2SHAPE = ("train", "predict", "sample", "interpolate", "rotate")
 CHECK = f"""
@@ -55,12 +55,14 @@ def test_importing_a_package_loads_nothing_heavy(package, tmp_path):
         ("scenegen", ["verify", "--help"]),
         ("scenegen", ["export", "--help"]),
         ("scenegen", ["card", "--help"]),
+        ("scenegen", ["view", "--help"]),
         ("scenegen", ["render", "--n", "x"]),
         ("iqtt", ["--help"]),
         ("iqtt", ["quiz", "--help"]),
         ("bench", ["--help"]),
         ("bench", ["baseline", "--help"]),
         ("bench", ["train", "--help"]),
+        ("bench", ["view", "--help"]),
         ("pix2shape", ["--help"]),
         ("pix2shape", ["--version"]),
         *(("pix2shape", [name, "--help"]) for name in PIX2SHAPE),

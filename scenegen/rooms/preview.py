@@ -59,12 +59,11 @@ def contact_sheet(rooms: Sequence[Room], columns: int = 2) -> Image.Image:
 def tiles(room: Room) -> list[NDArray[np.uint8]]:
     """Return the four pictures of a room, each (H, W, 3) uint8."""
     nothing = room.object_id < 0
-    ids = np.where(room.object_id > 0, (room.object_id - 1) % (len(PALETTE) - 1) + 1, 0)
     pictures = [
         srgb_bytes(room.radiance),
         depth_bytes(room.depth),
-        np.rint(np.clip(room.normal * 0.5 + 0.5, 0, 1) * 255).astype(np.uint8),
-        PALETTE[ids],
+        normal_bytes(room.normal),
+        id_colors(room.object_id),
     ]
     for picture in pictures:
         picture[nothing] = NOTHING
@@ -86,6 +85,17 @@ def depth_bytes(depth: Array) -> NDArray[np.uint8]:
     near, far = depth[known].min(), depth[known].max()
     scaled = (np.where(known, depth, near) - near) / max(far - near, 1e-12)
     return np.repeat(np.rint(scaled * 255).astype(np.uint8)[..., None], 3, axis=-1)
+
+
+def normal_bytes(normal: Array) -> NDArray[np.uint8]:
+    """Show unit normals as colours, (H, W, 3): x, y and z as red, green and blue; -1 is black."""
+    return np.asarray(np.rint(np.clip(normal * 0.5 + 0.5, 0, 1) * 255).astype(np.uint8))
+
+
+def id_colors(object_id: Array) -> NDArray[np.uint8]:
+    """Return a colour of PALETTE for each object id, (H, W) -> (H, W, 3); the room is grey."""
+    ids = object_id.astype(np.int64)
+    return PALETTE[np.where(ids > 0, (ids - 1) % (len(PALETTE) - 1) + 1, 0)]
 
 
 def _caption(room: Room) -> str:

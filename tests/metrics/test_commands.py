@@ -179,3 +179,23 @@ def test_scores_never_replace_the_truth_that_a_submission_names(
     result = bench("score", "p.h5", option, "rooms.h5", "--overwrite")
     check_refusal(result.exit_code, result.stdout, result.stderr, ("rooms.h5", "not an input"))
     assert (folder / "rooms.h5").read_bytes() == before
+
+
+def test_what_cannot_be_viewed(truths, folder, check_refusal):
+    """What can is in `tests/metrics/viewing`; here no page is ever served."""
+    pytest.importorskip("viser")
+    from submissions import good_answers, good_rooms
+
+    path = good_rooms(folder, truths.rooms)
+    (folder / "s.json").write_text("{}")
+    truth = ("--truth", truths.rooms)
+    for arguments, words in (
+        ((good_answers(folder, truths.iqtt),), ("answers to iqtt",)),
+        ((path, "--truth", "none.h5"), ("none.h5", "no file")),
+        ((path, "--truth", truths.iqtt), (truths.iqtt.name,)),
+        ((path, *truth, "--items", "2,9"), ("--items", "row 9")),
+        ((path, *truth, "--scores", "s.json"), ("s.json",)),
+        ((path, *truth, "--host", "192.0.2.1"), ("--host", "--public")),
+    ):
+        result = bench("view", *arguments)
+        check_refusal(result.exit_code, result.stdout, result.stderr, words)

@@ -12,6 +12,7 @@ Chromium; with CI=true it fails.
 """
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -25,7 +26,8 @@ import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-sync",
+    "--headless", "--no-sandbox", "--disable-dev-shm-usage", "--disable-sync",
+    "--use-angle=swiftshader", "--enable-unsafe-swiftshader",  # WebGL without a GPU
     "--disable-quic", "--disable-background-networking", "--disable-component-update",
     "--disable-default-apps", "--no-default-browser-check", "--no-first-run", "--hide-scrollbars",
     "--remote-debugging-port=0",
@@ -139,7 +141,8 @@ def watch(seen, address):
 
     def is_own(url):
         asked = urlsplit(url)
-        same = (asked.scheme, asked.netloc) == (own.scheme, own.netloc)
+        schemes = (own.scheme, own.scheme.replace("http", "ws"))
+        same = asked.scheme in schemes and asked.netloc == own.netloc
         return asked.scheme in INSIDE or (same and (own.scheme != "file" or asked.path == own.path))
 
     def answer(route):
@@ -150,6 +153,8 @@ def watch(seen, address):
             route.abort()
 
     page.route("**/*", answer)
-    page.route_web_socket("**/*", lambda socket: seen.outside.append(socket.url))
+    socket = re.compile(f"^(?!wss?://{re.escape(own.netloc)}/)") if own.netloc else "**/*"
+    page.route_web_socket(socket, lambda socket: seen.outside.append(socket.url))
+    page.on("websocket", lambda one: is_own(one.url) or seen.outside.append(one.url))  # of workers
     page.on("pageerror", lambda error: seen.errors.append(str(error)))
     page.on("console", lambda m: seen.errors.append(m.text) if m.type == "error" else None)

@@ -1,0 +1,65 @@
+"""The command that shows rooms in 3D, in the browser; `bench view` has the same options."""
+
+from collections.abc import Callable
+from functools import reduce
+from typing import Any
+
+import click
+
+from scenegen.common.command_line import EXAMPLE, MESHES, Items, needs, print_line
+from scenegen.common.paths import InputPath
+
+Command = Callable[..., Any]
+
+
+def page_options(command: Command) -> Command:
+    """Add the options that say where a page is served."""
+    options = (
+        click.option("--port", type=click.IntRange(0, 65535), default=8080, show_default=True,
+                     help="Port to listen at; 0 takes any that is free."),
+        click.option("--host", metavar="ADDRESS",
+                     help="Address to listen at [127.0.0.1, which only this machine reaches]."),
+        click.option("--public", is_flag=True,
+                     help="Let other machines in: everyone who reaches the address sees the data,"
+                     " without a password."),
+        click.option("--open/--no-open", "open_browser", default=False, show_default=True,
+                     help="Open the page in a browser."),
+    )  # fmt: skip
+    return reduce(lambda made, option: option(made), reversed(options), command)
+
+
+@click.command(epilog=f"{EXAMPLE}scenegen view rooms.h5 --open")
+@click.argument("file", type=InputPath())
+@click.option("--items", type=Items(), help="Rows to show [default: all].")
+@page_options
+@MESHES
+def view(
+    file: str,
+    items: list[int] | None,
+    port: int,
+    host: str | None,
+    public: bool,
+    open_browser: bool,
+    **meshes: Any,
+) -> None:
+    """Show the scenes of a file in 3D, in the browser.
+
+    The page has the true surfels of every view, the meshes of the objects, cameras and lights. It
+    asks for nothing outside this machine. Ctrl-C ends it.
+    """
+    needs("scenegen view", ("viser",), "view")
+    from scenegen.rooms.reader import RoomsFile
+    from scenegen.viewing.contents import rooms_contents
+    from scenegen.viewing.geometry import shapes_of
+    from scenegen.viewing.page import ScenePage
+    from scenegen.viewing.server import listening_host, serve, started
+
+    with RoomsFile(file) as rooms:
+        contents = rooms_contents(rooms, items)
+        shape_of = shapes_of(rooms.spec, **meshes)
+        with started(file, listening_host(host, public), port) as server:
+            ScenePage(server, rooms, shape_of, contents).show()
+            serve(server, print_line, open_browser, public)
+
+
+COMMANDS = (view,)

@@ -1,0 +1,207 @@
+"""What a scene looks like in 3D, as plain arrays: surfels, their colours, meshes, and clicks."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.camera import back_project, pixel_size, transform_points, transform_vectors
+from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
+from scenegen.description.scenes import PlacedObject, SceneSpec
+from scenegen.description.specs import BUILT_IN, DatasetSpec
+from scenegen.objects.scene_mesh import room_mesh, world_from_object
+from scenegen.objects.sources import file_objects
+from scenegen.rooms.preview import depth_bytes, id_colors, normal_bytes, srgb_bytes
+from scenegen.rooms.reader import Room
+
+Array = NDArray[Any]
+MOST_TRIANGLES = 10_000  # of a mesh that is drawn as it is
+CELLS = 40  # across a unit shape, of the grid that thins larger ones out
+MESHES_KEPT = 64
+ShapeOf = Callable[[PlacedObject], Array]  # triangles of its unit shape
+FARTHEST = 1000.0  # scene units; browsers draw nothing beyond
+RIGID_TOLERANCE = 1e-6  # by which R^T R may differ from the identity
+COLORINGS = ("Image", "Depth", "Normal", "Object id")
+
+
+@dataclass(frozen=True, eq=False)
+class Surfels:
+    """The surface points of one image: one for each of N pixels that has a depth.
+
+    Attributes:
+        points: (N, 3) float32, world frame, scene units.
+        pixels: (N, 2), row and column of each point's pixel.
+        spacing: side of a pixel at the median depth, scene units; 0 where there is no point.
+    """
+
+    points: Array
+    pixels: Array
+    spacing: float
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def of_pixels(self, values: Array) -> Array:
+        """Return the values, (H, W, ...), of the points' pixels, (N, ...)."""
+        return np.asarray(values[self.pixels[:, 0], self.pixels[:, 1]])
+
+    def moved(self, by: Array) -> "Surfels":
+        """Return the same surfels moved by a vector, (3,), world frame, scene units."""
+        return replace(self, points=(self.points + by).astype(np.float32))
+
+
+def has_surfel(depth: Array) -> Array:
+    """Return which pixels of a planar depth map, in scene units, have a surfel: (...) bool.
+
+    Their depth is finite, in front of the camera, and not beyond FARTHEST.
+    """
+    return np.asarray(np.isfinite(depth) & (depth > 0) & (depth <= FARTHEST))
+
+
+def surfels_of(depth: Array, fov_y_degrees: float, world_from_camera: Array) -> Surfels:
+    """Return the surfels of a planar depth map, (H, W), scene units."""
+    seen = has_surfel(depth)
+    points = transform_points(world_from_camera, back_project(depth, fov_y_degrees)[seen])
+    middle = float(np.median(depth[seen])) if len(points) else 0.0
+    spacing = pixel_size(len(depth), fov_y_degrees) * middle
+    return Surfels(points.astype(np.float32), np.argwhere(seen), spacing)
+
+
+def check_camera(room: Room) -> None:
+    """Raise FileFormatError unless a view's camera is a rotation and a shift, and has an angle."""
+    rotation, fov = room.world_from_camera[:3, :3], room.fov_y_degrees
+    rigid = np.isfinite(room.world_from_camera).all() and np.allclose(
+        rotation.T @ rotation, np.eye(3), atol=RIGID_TOLERANCE
+    )
+    if not rigid or np.linalg.det(rotation) < 0:
+        found = "a matrix that is no rotation and shift"
+        raise FileFormatError(f"row {room.index}: world_from_camera", found, "a rigid transform")
+    if not 0 < fov < 180:
+        raise FileFormatError(f"row {room.index}: fov_y_degrees", fov, "between 0 and 180")
+
+
+def pixel_colors(room: Room, coloring: str) -> Array:
+    """Return a colour for each pixel, (H, W, 3) uint8, sRGB; `coloring` is one of COLORINGS.
+
+    They are those of `scenegen preview`, but normals are in the world frame, so that a surface has
+    one colour in all views.
+    """
+    if coloring == "Depth":
+        return depth_bytes(room.depth)
+    if coloring == "Normal":
+        return normal_bytes(transform_vectors(room.world_from_camera, room.normal))
+    if coloring == "Object id":
+        return id_colors(room.object_id)
+    return srgb_bytes(room.radiance)
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles of one colour.
+
+    Attributes:
+        object_id: 0 for the room, k for the k-th object.
+        triangles: corners, (F, 3, 3), world frame, counter-clockwise seen from outside.
+        color: (3,) uint8, sRGB: its reflectance.
+    """
+
+    name: str
+    object_id: int
+    triangles: Array
+    color: Array
+
+
+def shapes_of(spec: DatasetSpec, **folder: Any) -> ShapeOf:
+    """Return the function that finds the triangles, (F, 3, 3), of an object's unit shape.
+
+    `folder` are the options of `file_objects`. Where the objects are meshes and no folder is told,
+    the function raises SpecError, and so it does for a model whose file has changed; BadMeshError
+    for one that cannot be used.
+
+    Raises as `file_objects` where a folder is told.
+    """
+    told = any(folder.get(name) for name in ("shapenet_root", "objects_root"))
+    if spec.source not in BUILT_IN and not told:
+
+        def untold(_item: PlacedObject) -> Array:
+            option = "--objects-root" if spec.source == "folder" else "--shapenet-root"
+            raise SpecError("objects", f"meshes ({spec.source})", f"their folder, by {option}")
+
+        return untold
+    objects = file_objects(spec, **folder)
+    drawn = lru_cache(MESHES_KEPT)(lambda name: thinned(objects.shape(name).triangles))
+
+    def triangles_of(item: PlacedObject) -> Array:
+        if objects.digest(item.shape) != item.mesh:
+            raise SpecError(item.shape, "a file that has changed", "the one that was rendered")
+        return np.asarray(drawn(item.shape))
+
+    return triangles_of
+
+
+def thinned(triangles: Array) -> Array:
+    """Return fewer triangles, (F, 3, 3), of a unit shape that has more than MOST_TRIANGLES.
+
+    Corners within one cell of a grid become their mean: they move by less than 0.09 of the shape's
+    radius, and mostly along its surface.
+    """
+    if len(triangles) <= MOST_TRIANGLES:
+        return triangles
+    corners = triangles.reshape(-1, 3)
+    # Corners that differ by rounding alone, as where a turned profile closes, are in one cell.
+    cell = np.floor(np.round((corners + 1.0) * (CELLS / 2), 6)).astype(np.int64)
+    number = (cell[:, 0] * 2 * CELLS + cell[:, 1]) * 2 * CELLS + cell[:, 2]
+    _, place, count = np.unique(number, return_inverse=True, return_counts=True)
+    sums = [np.bincount(place, weights=axis) for axis in corners.T]
+    means = np.stack(sums, axis=1) / count[:, None]
+    faces = place.reshape(-1, 3)
+    a, b, c = faces.T
+    faces = faces[(a != b) & (b != c) & (c != a)]
+    turned = np.take_along_axis(faces, (faces.argmin(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
+    return np.asarray(means[np.unique(turned, axis=0)])
+
+
+def scene_meshes(scene: SceneSpec, shape_of: ShapeOf) -> tuple[list[Mesh], list[str]]:
+    """Return the room, where there is one, and the objects; and why others are left out.
+
+    An object is left out where `shape_of` raises SceneGenError; each reason is told once.
+    """
+    meshes, missing = list[Mesh](), list[str]()
+    if scene.room_reflectance is not None:
+        color = srgb_bytes(np.array(scene.room_reflectance))
+        meshes.append(Mesh("room", 0, np.asarray(room_mesh().triangles), color))
+    for k, item in enumerate(scene.objects, start=1):
+        try:
+            triangles = shape_of(item)
+        except SceneGenError as error:
+            if str(error) not in missing:
+                missing.append(str(error))
+            continue
+        place = world_from_object(item.position, item.rotation, item.scale)
+        color = srgb_bytes(np.array(item.reflectance))
+        meshes.append(Mesh(item.shape, k, transform_points(place, triangles), color))
+    return meshes, missing
+
+
+def hit_by(
+    surfels: Surfels, origin: Array, direction: Array, angle: float = 0.0
+) -> tuple[int, float] | None:
+    """Return which surfel a ray from (3,) along the unit vector (3,) hits first, and how far off.
+
+    A surfel is hit where the ray passes it by less than the side of a pixel, or by less than
+    `angle` radians, seen from the ray's origin. None where no surfel is hit.
+    """
+    towards = surfels.points - origin
+    along = towards @ direction
+    beside = np.linalg.norm(towards - along[:, None] * direction, axis=1)
+    reach = np.maximum(surfels.spacing, angle * along)
+    near = np.flatnonzero((beside <= reach) & (along > 0))
+    if not near.size:
+        return None
+    front = along[near].min()
+    first = near[along[near] <= front + 2 * reach[near]]  # of one surface, the nearest to the ray
+    chosen = first[np.argmin(beside[first])]
+    return int(chosen), float(along[chosen])

@@ -1,0 +1,105 @@
+"""The web server of a 3D page: where it listens, what it never does, and how it ends."""
+
+import errno
+import ipaddress
+import socket
+import threading
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
+
+from scenegen.common.errors import SpecError
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+HERE = "127.0.0.1"
+EVERYWHERE = "0.0.0.0"
+
+
+def listening_host(host: str | None, public: bool) -> str:
+    """Return the address to listen at: by default this machine's own, or all where `public`.
+
+    Raises SpecError for an address that others can reach, unless `public`.
+    """
+    if host is None:
+        return EVERYWHERE if public else HERE
+    own = host == "localhost"
+    with suppress(ValueError):
+        own = ipaddress.ip_address(host).is_loopback
+    if not own and not public:
+        advice = "with --public, everyone who can reach the address sees the data"
+        raise SpecError("host", f"{host!r:.100}", "127.0.0.1, ::1 or localhost", advice)
+    return HERE if host == "localhost" else host
+
+
+@contextmanager
+def started(title: str, host: str, port: int) -> Iterator["ViserServer"]:
+    """Start a server for the block; port 0 takes any free one. `title` heads the controls.
+
+    Nothing is printed, and nobody can ask it to open a tunnel to the internet.
+
+    Raises SpecError for an address where it cannot listen.
+    """
+    _check_free(host, port)
+    import rich
+    import viser
+
+    console = rich.get_console()  # on which viser announces itself
+    quiet, console.quiet = console.quiet, True
+    try:
+        server = viser.ViserServer(host, port, label=title, verbose=False)
+        try:
+            if port not in (0, server.get_port()):  # taken meanwhile: viser goes on to the next
+                raise _in_use(port)
+            server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]
+            server.gui.configure_theme(show_logo=False, show_share_button=False)
+            server.scene.set_up_direction("+y")
+            # Shadows of lights that the scene has not would mislead, and cost most of a frame.
+            server.scene.configure_default_lights(cast_shadow=False)
+            yield server
+        finally:
+            server.stop()
+    finally:
+        console.quiet = quiet
+
+
+def address(server: "ViserServer") -> str:
+    """Return the address of the page for a browser on this machine."""
+    host = server.get_host()
+    host = HERE if host == EVERYWHERE else f"[{host}]" if ":" in host else host
+    return f"http://{host}:{server.get_port()}"
+
+
+def serve(
+    server: "ViserServer", tell: Callable[[str], None], open_browser: bool, public: bool
+) -> None:
+    """Tell the address in one line, open it in a browser if asked to, and wait for Ctrl-C."""
+    seen = f", for all who can reach {server.get_host()}" if public else ""
+    tell(f"{address(server)} (Ctrl-C ends{seen})")
+    if open_browser:
+        webbrowser.open(address(server))
+    with suppress(KeyboardInterrupt):
+        threading.Event().wait()
+
+
+def _check_free(host: str, port: int) -> None:
+    """Raise SpecError unless a server can listen there; viser would try other ports for ever."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+            probe.listen(1)
+        except OSError as error:
+            if error.errno == errno.EADDRINUSE:
+                raise _in_use(port) from error
+            if error.errno == errno.EACCES:
+                found = f"{port}, where only the system may listen"
+                raise SpecError("port", found, "1024 or more, or 0 for a free one") from error
+            raise SpecError("host", f"{host!r:.100}", "an address of this machine") from error
+
+
+def _in_use(port: int) -> SpecError:
+    return SpecError("port", f"{port}, which is in use", "a free port, or 0 for any")

@@ -1,0 +1,44 @@
+"""The server of a page: who reaches it, what it prints, and how it ends."""
+
+import socket
+import urllib.request
+
+import pytest
+
+pytest.importorskip("viser")
+
+from scenegen.common.errors import SpecError
+from scenegen.viewing.server import address, listening_host, started
+
+
+def test_only_this_machine_unless_public():
+    assert listening_host(None, False) == "127.0.0.1"
+    assert listening_host("localhost", False) == "127.0.0.1"
+    assert listening_host("::1", False) == "::1"
+    assert listening_host(None, True) == "0.0.0.0"
+    assert listening_host("192.0.2.1", True) == "192.0.2.1"
+    for host in ("0.0.0.0", "192.0.2.1", "::", "example.org", ""):
+        with pytest.raises(SpecError) as error:
+            listening_host(host, False)
+        assert error.value.where == "host"
+
+
+def test_a_page_is_served_quietly_and_ends(capfd):
+    with started("x", "127.0.0.1", 0) as server:
+        page = urllib.request.urlopen(address(server)).read()
+        assert page.startswith(b"<!doctype html>")
+        assert server.request_share_url() is None
+        port = server.get_port()
+        with pytest.raises(SpecError) as error, started("y", "127.0.0.1", port):
+            pass
+        assert (error.value.where, str(port) in error.value.found) == ("port", True)
+    assert capfd.readouterr() == ("", "")
+    with socket.socket() as again:
+        again.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        again.bind(("127.0.0.1", port))
+
+
+def test_an_address_of_another_machine():
+    with pytest.raises(SpecError) as error, started("x", "192.0.2.1", 0):
+        pass
+    assert error.value.where == "host"
