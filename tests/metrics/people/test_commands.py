@@ -77,8 +77,9 @@ def test_a_participant_in_a_browser(visit, quiz_split, tmp_path, iqtt):
         page, wrong = seen.page, []
 
         def ready(title):
-            words = "t => document.readyState == 'complete' && document.title.startsWith(t)"
-            page.wait_for_function(words, arg=title)
+            done = "document.readyState == 'complete' && document.title.startsWith(t)"
+            timed = "(typeof shown == 'undefined' || shown !== null)"  # of quiz.js
+            page.wait_for_function(f"t => {done} && {timed}", arg=title)
 
         def check():
             wrong.extend(seen.violations())
@@ -115,6 +116,7 @@ def test_a_participant_in_a_browser(visit, quiz_split, tmp_path, iqtt):
         page.go_back()
         ready("Your score: 13 of 20")
         assert wrong == []
+        page.close()  # before the server stops, so that it asks for nothing more
     found = read_answers(db).answers
     assert [one.answer for one in found] == given
     assert [one.times_shown for one in found] == [1] * 5 + [2] + [1] * 16
@@ -132,9 +134,10 @@ def test_without_scripts_the_quiz_works(visit, quiz_split, tmp_path):
         page = visit(f"http://localhost:{site.port}/", java_script_enabled=False).page
         page.check("#consent")
         for name in ("Start", "Answer 2", "Answer 2"):
-            with page.expect_navigation(wait_until="networkidle"):
+            with page.expect_navigation():
                 page.click(f"text={name}")
         assert page.title().startswith("Your score")
+        page.close()
     assert {one.response_seconds for one in read_answers(tmp_path / "a.db").answers} == {None}
 
 
@@ -158,6 +161,7 @@ def test_two_answers_fit_a_phone(visit, tmp_path):
         assert seen.violations() == []
         assert len(seen.errors) == 1, "the browser logs that the page is not there"
         seen.errors.clear()
+        seen.page.close()
 
 
 def test_a_kill_loses_no_answer_that_was_acknowledged(quiz_split, tmp_path):
