@@ -26,8 +26,9 @@ FRAME_MILLISECONDS = 80
 @torch.no_grad()
 def drawn(model: Pix2Shape, code: Tensor, views: Views) -> tuple[Tiles, Tiles, Tiles]:
     """Return tiles of images, depths (near is dark) and normals (xyz as rgb) of codes in views."""
-    depth, opacity = model.surfels(code, views.condition, views.cameras)
-    image = shaded(depth, opacity, views)
+    surfels = model.surfels(code, views.condition, views.cameras)
+    depth, opacity = surfels.depth, surfels.opacity
+    image = shaded(surfels, model.lit(code, views))
     normals = normals_from_depth(depth, views.scene.fov_y_degrees)
     if opacity is not None:
         depth = torch.where(opacity > 0.5, depth, torch.nan)

@@ -92,6 +92,8 @@ def for_questions(config: ModelConfig, path: str | Path, part: str | None) -> Mo
     """
     if len(parts(path)) < 2:
         raise SpecError(path, "no training questions", "a training file such as iqtt-train.h5")
+    check(not config.material, "material", config.material, "false for questions, which tell it")
+    check(not config.lights, "lights", config.lights, "0 for questions, which tell them")
     spec = config.networks
     check(spec.z > Z_VIEW, "z scene", spec.z, f"{Z_VIEW + 1} or more, for questions")
     with open_questions(path, part) as questions:

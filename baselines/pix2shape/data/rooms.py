@@ -22,6 +22,7 @@ from baselines.pix2shape.network.surfels import Scene
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.hdf5.shards import open_with_shards
 from scenegen.common.random.seeding import Purpose, item_rng
+from scenegen.common.records import check
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsDataset, RoomsFile
 
@@ -113,7 +114,14 @@ class RoomImages(Dataset[dict[str, Any]]):
                 name: rooms.read(f"light/{name.removeprefix('light_')}", slice(None))
                 for name in ("light_position", "light_color", "ambient", "attenuation")
             }
-            self._told["reflectance"] = self._uniform_reflectance(path, rooms)
+            if config.material:  # what is not told is NaN, so that nothing can use it
+                self._told["reflectance"] = np.full((len(rooms), 3), np.nan)
+            else:
+                self._told["reflectance"] = self._uniform_reflectance(path, rooms)
+            if config.lights:
+                slots = self._told["light_position"].shape[1]
+                check(config.lights == slots, "lights", config.lights, f"{slots}, as {path} has")
+                self._told["light_position"] = np.full((len(rooms), slots, 3), np.nan)
             self.classes: tuple[str, ...] = tuple(rooms.spec.shapes)
             self.label = rooms.read("object/shape", slice(None))[:, 0]
             self._scene = rooms.read("scene_index", slice(None))
@@ -138,7 +146,7 @@ class RoomImages(Dataset[dict[str, Any]]):
         shiny = rooms.read("material/specular", slice(None)).any()
         if shiny or ((every != every[:, :1]).any(axis=2) & used).any():
             expected = "one matte reflectance in each image"
-            why = "the model is told the material, and several would tell it the shapes"
+            why = "the model is told the material; --set material=true learns it instead"
             raise SpecError(path, "rooms of several materials", expected, why)
         return every[:, 0]
 

@@ -181,12 +181,13 @@ class Encoder(nn.Module):
 
 
 class Decoder(nn.Module):
-    """Latent code and camera -> one number per pixel. Table "Pix2Shape decoder architecture".
+    """Latent code and camera -> numbers per pixel. Table "Pix2Shape decoder architecture".
 
-    Every other normalisation is conditional, beginning with the first.
+    Every other normalisation is conditional, beginning with the first. The table has one number per
+    pixel. Where lights are inferred, a layer of its own finds their positions in the code.
     """
 
-    def __init__(self, spec: NetworkSpec, outputs: int = 1) -> None:
+    def __init__(self, spec: NetworkSpec, outputs: int = 1, lights: int = 0) -> None:
         super().__init__()
         widths = spec.channels(DECODER_CHANNELS)
         first = nn.ConvTranspose2d(spec.z + spec.condition, widths[0], 4)
@@ -199,6 +200,7 @@ class Decoder(nn.Module):
         with torch.no_grad():
             self.last.weight.mul_(FLAT)
         self.activation = nn.LeakyReLU(SLOPE)
+        self.lights = nn.Linear(spec.z, 3 * lights) if lights else None
 
     def forward(self, code: Tensor, condition: Tensor) -> Tensor:
         """(B, z), (B, D) -> (B, outputs, S, S)."""
@@ -207,6 +209,14 @@ class Decoder(nn.Module):
             values = self.activation(norm(layer(values), condition))
         with torch.autocast(values.device.type, enabled=False):  # bfloat16 is too coarse for depth
             return self.last(_full(values))
+
+    def light_positions(self, code: Tensor) -> Tensor:
+        """Return where lights are, world frame, scene units: (B, z) -> (B, lights, 3).
+
+        Untrained, they are near the corner of the room's open side.
+        """
+        assert self.lights is not None, "lights are told"
+        return 1 + _full(self.lights(code)).view(len(code), -1, 3)
 
 
 class Critic(nn.Module):

@@ -63,6 +63,8 @@ LOSSES = (
     "questions", "contrast", "depth", "matching", "swap",
 )  # fmt: skip
 
+MOST_LIGHTS = 64
+
 
 @dataclass(frozen=True)
 class ModelConfig:
@@ -73,6 +75,11 @@ class ModelConfig:
         depth_middle, depth_reach: the decoder gives depths of depth_middle * (1 +- depth_reach),
             scene units. Both follow from the camera's distance, not from depth maps.
         opacity: whether the decoder also says which rays meet a surface.
+        material: whether the decoder also says what each surfel is made of, albedo and Phong's
+            lobe, which training then is not told (the paper's appendix "Material, Lights, and
+            Camera Properties"); rooms only.
+        lights: how many lights, as many as rooms of the training file have at most, whose positions
+            are read from the code and not told; 0 tells them. Their colours are told.
         iterations, batch: length of training, and images in each batch.
         question_batch: questions whose codes L_theta and `contrast` compare in each iteration.
         labelled_batch: labelled questions that are compared besides; 0 lets some of
@@ -104,6 +111,8 @@ class ModelConfig:
     depth_middle: float = 1.5
     depth_reach: float = 0.4
     opacity: bool = False
+    material: bool = False
+    lights: int = 0
     iterations: int = 60_000
     batch: int = 6
     question_batch: int = 2
@@ -148,6 +157,7 @@ class ModelConfig:
         check(self.learning_rate > 0, "learning rate", self.learning_rate, "a positive number")
         in_range = len(self.betas) == 2 and all(0 <= beta < 1 for beta in self.betas)
         check(in_range, "betas", self.betas, "two numbers from 0 to below 1")
+        check(0 <= self.lights <= MOST_LIGHTS, "lights", self.lights, f"0 to {MOST_LIGHTS}")
         check(self.seed >= 0, "seed", self.seed, "0 or more")
         if self.matching:
             check(self.networks.rays, "matching", self.matching, "0 for networks without rays")

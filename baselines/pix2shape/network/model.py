@@ -14,6 +14,8 @@ from baselines.pix2shape.network.polar import PolarEncoder
 from baselines.pix2shape.network.surfels import Scene, render
 
 T = TypeVar("T")
+MATERIAL = 5  # numbers of a surfel's material: albedo, k_s, exponent
+SHINIEST = 128.0
 
 
 def mapped(record: T, function: Callable[[Tensor], Tensor]) -> T:
@@ -50,6 +52,35 @@ class Views:
         if self.world_from_camera is None:
             return None
         return Cameras(self.world_from_camera, self.scene.fov_y_degrees)
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """What surfels are made of, as a decoder gives it.
+
+    Attributes:
+        albedo: reflectance rho, 0 to 1, (B, 3, S, S).
+        specular, shininess: Phong's k_s, 0 to 1, and exponent, 1 to SHINIEST, (B, S, S).
+    """
+
+    albedo: Tensor
+    specular: Tensor
+    shininess: Tensor
+
+
+@dataclass(frozen=True, eq=False)
+class Surfels:
+    """One surfel for each pixel of B images, as a decoder gives them.
+
+    Attributes:
+        depth: planar, scene units, (B, S, S).
+        opacity: 0 to 1, (B, S, S); None for closed rooms, where every ray meets a surface.
+        material: None where the views tell it.
+    """
+
+    depth: Tensor
+    opacity: Tensor | None = None
+    material: Material | None = None
 
 
 class Prior(nn.Module):
@@ -90,7 +121,8 @@ class Pix2Shape(nn.Module):
         self.config = config
         spec = config.networks
         self.encoder = (PolarEncoder if spec.encoder == "polar" else Encoder)(spec)
-        self.decoder = Decoder(spec, outputs=2 if config.opacity else 1)
+        outputs = 1 + config.opacity + MATERIAL * config.material
+        self.decoder = Decoder(spec, outputs, config.lights)
         self.critic = Critic(spec)
         self.statistics = Statistics(spec)
         self.prior = Prior(spec.z)
@@ -118,36 +150,57 @@ class Pix2Shape(nn.Module):
         """
         return self.decoder(code, condition)[:, 0].float()
 
-    def surfels(
-        self, code: Tensor, condition: Tensor, cameras: Cameras | None = None
-    ) -> tuple[Tensor, Tensor | None]:
-        """Return planar depth, scene units, and opacity, 0 to 1: (B, z) -> (B, S, S) each.
-
-        The opacity is None for a model of closed rooms, where every ray meets a surface.
+    def surfels(self, code: Tensor, condition: Tensor, cameras: Cameras | None = None) -> Surfels:
+        """Return the surfels that a camera sees: (B, z) -> (B, S, S) of each number.
 
         Args:
             condition: (B, D).
             cameras: those that are asked for; only used, and then needed, by networks of `rays`.
         """
+        raw = self.decoder(code, condition).float()
         if self.config.networks.rays:
             assert cameras is not None, "networks of rays are told the camera"
-            relief = self.relief(code, condition)
+            relief = torch.where(raw[:, 0] > FLAT, raw[:, 0], 0)
             pose, fov = cameras.world_from_camera, cameras.fov_y_degrees
             walls, entry, _ = empty_rooms(pose, fov, relief.shape[-1])
-            return torch.maximum(walls - torch.where(relief > FLAT, relief, 0), entry), None
-        raw = self.decoder(code, condition).float()
-        depth = self.config.depth_middle * (1 + self.config.depth_reach * torch.tanh(raw[:, 0]))
-        return depth, torch.sigmoid(raw[:, 1]) if self.config.opacity else None
+            depth = torch.maximum(walls - relief, entry)
+        else:
+            depth = self.config.depth_middle * (1 + self.config.depth_reach * torch.tanh(raw[:, 0]))
+        opacity = torch.sigmoid(raw[:, 1]) if self.config.opacity else None
+        material = None
+        if self.config.material:
+            made_of = torch.sigmoid(raw[:, -MATERIAL:])
+            shininess = 1 + (SHINIEST - 1) * made_of[:, 4]
+            material = Material(made_of[:, :3], made_of[:, 3], shininess)
+        return Surfels(depth, opacity, material)
+
+    def lit(self, code: Tensor, views: Views) -> Views:
+        """Return the views with the lights where the code says; as they are where they are told."""
+        if not self.config.lights:
+            return views
+        pose = views.world_from_camera
+        assert pose is not None, "lights of questions are told"
+        positions = (self.decoder.light_positions(code) - pose[:, None, :3, 3]) @ pose[:, :3, :3]
+        return replace(views, scene=replace(views.scene, light_position=positions))
 
     def image(self, code: Tensor, views: Views) -> Tensor:
         """Return the rendered images of codes: (B, z) -> (B, 3, S, S)."""
-        return shaded(*self.surfels(code, views.condition, views.cameras), views)
+        surfels = self.surfels(code, views.condition, views.cameras)
+        return shaded(surfels, self.lit(code, views))
 
 
-def shaded(depth: Tensor, opacity: Tensor | None, views: Views) -> Tensor:
+def shaded(surfels: Surfels, views: Views) -> Tensor:
     """Return the images of surfels in front of the views' background: (B, 3, S, S)."""
-    with torch.autocast(depth.device.type, enabled=False):  # differences of near numbers
-        image = render(depth, views.scene)
+    scene, made_of, opacity = views.scene, surfels.material, surfels.opacity
+    if made_of is not None:
+        scene = replace(
+            scene,
+            reflectance=made_of.albedo,
+            specular=made_of.specular,
+            shininess=made_of.shininess,
+        )
+    with torch.autocast(surfels.depth.device.type, enabled=False):  # differences of near numbers
+        image = render(surfels.depth, scene)
     if opacity is None or views.background is None:
         return image
     behind = views.background[..., None, None]

@@ -121,11 +121,11 @@ def generator_step(
     if config.uses_images:
         code = model.encode(batch.image, views)
     if config.reconstruction or config.depth or config.consistency:
-        depth, opacity = model.surfels(code, views.condition, views.cameras)
+        surfels = model.surfels(code, views.condition, views.cameras)
+        depth = surfels.depth
         if config.reconstruction:
-            numbers["reconstruction"] = _compared(
-                config, batch.image, shaded(depth, opacity, views)
-            )
+            again = shaded(surfels, model.lit(code, views))
+            numbers["reconstruction"] = _compared(config, batch.image, again)
         if config.depth and batch.depth is not None:
             known = torch.isfinite(batch.depth)
             wrong = torch.where(known, depth - torch.where(known, batch.depth, 0), 0)
@@ -145,9 +145,8 @@ def generator_step(
         theirs = noise.order[share(len(noise.order))]
         others, camera = gathered(pose)[theirs], gathered(views.condition)[theirs, :CAMERA]
         classes = views.condition[:, CAMERA:]
-        elsewhere, _ = model.surfels(
-            code, torch.cat([camera, classes], dim=1), Cameras(others, fov)
-        )
+        asked_there = torch.cat([camera, classes], dim=1), Cameras(others, fov)
+        elsewhere = model.surfels(code, *asked_there).depth
         numbers["consistency"] = (
             losses.disagreement(depth, elsewhere, torch.linalg.solve(others, pose), fov)
             + losses.disagreement(elsewhere, depth, torch.linalg.solve(pose, others), fov)

@@ -114,7 +114,7 @@ def predict_rooms(
         with RoomPredictionWriter(out, data, **how) as file:
             for rows in _batches(len(rooms)):
                 asked = condition[rows], Cameras(poses[rows], fov)
-                depth, _ = model.surfels(codes[own[rows]], *asked)
+                depth = model.surfels(codes[own[rows]], *asked).depth
                 depth, normal = enlarged(depth, fov, size)
                 for row, z, n in zip(rows, depth.cpu(), normal.cpu(), strict=True):
                     file.add(int(row), z.numpy(), np.moveaxis(n.numpy(), 0, -1))

@@ -63,7 +63,7 @@ def test_images_depths_and_normals_of_codes(batch):
     code = torch.randn(5, 128, generator=torch.Generator().manual_seed(0))
     images, depths, normals = drawn(model, code, batch.views)
     with torch.no_grad():
-        depth, _ = model.surfels(code, batch.views.condition)
+        depth = model.surfels(code, batch.views.condition).depth
         radiance = model.image(code, batch.views)
     facing = normals_from_depth(depth, batch.views.scene.fov_y_degrees)
     for i in range(5):
@@ -83,7 +83,7 @@ def test_nothing_is_drawn_where_rays_meet_nothing(batch):
     with torch.no_grad():
         raw = model.decoder(code, batch.views.condition)[:, 1]
         model.decoder.last.bias[1] -= raw.median()
-        opacity = model.surfels(code, batch.views.condition)[1]
+        opacity = model.surfels(code, batch.views.condition).opacity
     away = (opacity < 0.5).numpy()
     assert 0.05 < away.mean() < 0.95
     _, depths, normals = drawn(model, code, batch.views)

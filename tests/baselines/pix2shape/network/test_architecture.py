@@ -8,7 +8,7 @@ from pix2shape_models import tiny
 torch = pytest.importorskip("torch")
 from baselines.pix2shape.network import architecture  # noqa: E402
 from baselines.pix2shape.network.architecture import Critic, Decoder, Encoder, NetworkSpec  # noqa: E402
-from baselines.pix2shape.network.model import Pix2Shape, Views, shaded  # noqa: E402
+from baselines.pix2shape.network.model import Pix2Shape, Surfels, Views, shaded  # noqa: E402
 from baselines.pix2shape.network.surfels import Scene  # noqa: E402
 
 SMALL = NetworkSpec(size=32, width=0.05)
@@ -116,9 +116,9 @@ def test_bfloat16_reaches_neither_renderer_nor_losses() -> None:
     scene = Scene(28.0, place, color, torch.rand(3, 3), torch.rand(3, 2) + 0.2, torch.rand(3, 3))
     views = Views(torch.rand(3, 3), scene)
     depth = 1.5 + 0.1 * torch.rand(3, 32, 32)
-    plain = shaded(depth, None, views)
+    plain = shaded(Surfels(depth), views)
     with torch.autocast("cpu", torch.bfloat16):
-        assert torch.equal(shaded(depth, None, views), plain)
+        assert torch.equal(shaded(Surfels(depth), views), plain)
         code = model.encode(plain, views)
         score = model.critic(plain, code, views.condition)
         assert {code.dtype, score.dtype, model.image(code, views).dtype} == {torch.float32}

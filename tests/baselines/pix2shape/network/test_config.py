@@ -57,7 +57,7 @@ def test_depth_stays_within_its_reach_whatever_the_code() -> None:
     torch.manual_seed(0)
     model = Pix2Shape(tiny(depth_middle=2.0, depth_reach=0.25))
     torch.nn.init.normal_(model.decoder.last.weight, std=9.0)
-    depth = model.surfels(9 * torch.randn(3, 128), torch.rand(3, 3))[0].detach()
+    depth = model.surfels(9 * torch.randn(3, 128), torch.rand(3, 3)).depth.detach()
     assert depth.shape == (3, 32, 32)
     assert 1.5 <= float(depth.min()) < 1.6
     assert 2.4 < float(depth.max()) <= 2.5

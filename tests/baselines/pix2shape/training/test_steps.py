@@ -10,7 +10,7 @@ torch = pytest.importorskip("torch")
 from baselines.pix2shape.data.rooms import Batch, Relief  # noqa: E402
 from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.config import LOSSES, ModelConfig  # noqa: E402
-from baselines.pix2shape.network.model import Pix2Shape, Views, mapped  # noqa: E402
+from baselines.pix2shape.network.model import Pix2Shape, Surfels, Views, mapped  # noqa: E402
 from baselines.pix2shape.network.surfels import Scene, back_project  # noqa: E402
 from baselines.pix2shape.training import losses as functions  # noqa: E402
 from baselines.pix2shape.training.steps import critic_step, draw, generator_step  # noqa: E402
@@ -115,7 +115,7 @@ def test_depth_supervision_ignores_what_is_not_known():
     batch.depth[0, :5] = math.nan
     batch.depth[3] = math.nan
     total, losses = generator_step(model, batch, draw(8, 8, 3))
-    found = model.surfels(model.encode(batch.image, batch.views), batch.views.condition)[0]
+    found = model.surfels(model.encode(batch.image, batch.views), batch.views.condition).depth
     expected = (found - batch.depth).square().nanmean()
     assert losses["depth"].item() == pytest.approx(expected.item(), rel=1e-5)
     total.backward()
@@ -214,7 +214,7 @@ class Sphere(Pix2Shape):
         along = torch.einsum("bij,jhw->bihw", turn, rays)
         b = torch.einsum("bihw,bi->bhw", along, condition)
         a, c = (along**2).sum(dim=1), (condition**2).sum(dim=1)[:, None, None] - self.radius**2
-        return (-b + torch.sqrt(b**2 - a * c)) / a, None
+        return Surfels((-b + torch.sqrt(b**2 - a * c)) / a)
 
 
 def facing_the_origin(place: Any) -> Any:
@@ -239,7 +239,7 @@ def test_consistency_loses_what_two_cameras_disagree_on():
     wrong = views.world_from_camera.clone()
     wrong[:, 2, 3] += torch.linspace(0, 0.1, 8)  # each camera elsewhere than the decoder thinks
     batch = replace(batch, views=replace(views, world_from_camera=wrong))
-    own, other = sphere.surfels(None, place)[0], sphere.surfels(None, place[noise.order])[0]
+    own, other = (sphere.surfels(None, p).depth for p in (place, place[noise.order]))
     moved = torch.linalg.inv(wrong[noise.order]) @ wrong
     there = functions.disagreement(own, other, moved, 28.0)
     back = functions.disagreement(other, own, torch.linalg.inv(moved), 28.0)
@@ -260,10 +260,10 @@ def test_consistency_teaches_both_depths_with_the_codes_own_class():
     made, surfels = [], model.surfels
 
     def spy(code: Any, condition: Any, cameras: Any) -> Any:
-        depth, opacity = surfels(code, condition, cameras)
-        depth.retain_grad()
-        made.append((condition, depth))
-        return depth, opacity
+        found = surfels(code, condition, cameras)
+        found.depth.retain_grad()
+        made.append((condition, found.depth))
+        return found
 
     model.surfels = spy
     generator_step(model, replace(batch, views=views), noise)[0].backward()

@@ -7,7 +7,7 @@ import pytest
 
 torch = pytest.importorskip("torch")
 from baselines.pix2shape.data.rooms import Batch  # noqa: E402
-from baselines.pix2shape.network.model import Views, shaded  # noqa: E402
+from baselines.pix2shape.network.model import Surfels, Views, shaded  # noqa: E402
 from baselines.pix2shape.network.surfels import Scene  # noqa: E402
 from baselines.pix2shape.training.turning import turned  # noqa: E402
 
@@ -22,7 +22,7 @@ def surface():
     attenuation = torch.tensor([[0.0, 1.0]])
     scene = Scene(28.0, position, colour, 0.1 * ones, attenuation, 0.8 * ones)
     views = Views(torch.empty(1, 0), scene, background=ones)
-    return depth, Batch(shaded(depth, None, views), views)
+    return depth, Batch(shaded(Surfels(depth), views), views)
 
 
 @pytest.mark.parametrize("quarters", [0, 1, 2, 3])
@@ -31,12 +31,12 @@ def test_a_turned_picture_is_that_of_the_turned_surface(quarters, mirror):
     depth, batch = surface()
     found = turned(batch, torch.tensor([quarters * math.pi / 2]), torch.tensor([mirror]))
     there = (depth.flip(2) if mirror else depth).rot90(quarters, (1, 2))
-    expected = shaded(there, None, found.views)
+    expected = shaded(Surfels(there), found.views)
     assert torch.allclose(found.image, expected, atol=1e-4)
-    assert torch.allclose(shaded(depth, None, batch.views), batch.image, atol=1e-6)
+    assert torch.allclose(shaded(Surfels(depth), batch.views), batch.image, atol=1e-6)
     if quarters or mirror:
         wrong = replace(found.views, scene=batch.views.scene)
-        assert (shaded(there, None, wrong) - found.image).abs().max() > 1e-2
+        assert (shaded(Surfels(there), wrong) - found.image).abs().max() > 1e-2
 
 
 def test_each_image_turns_by_its_own_angle():

@@ -54,7 +54,7 @@ def decoded(model: Any, path: Path, source: int, row: int) -> tuple[np.ndarray, 
     with torch.no_grad():
         code = model.encode(pair.image, pair.views)[:1]
         depth, normal = enlarged(
-            model.surfels(code, pair.views.condition[1:])[0], rooms.spec.fov_y_degrees, 64
+            model.surfels(code, pair.views.condition[1:]).depth, rooms.spec.fov_y_degrees, 64
         )
     return depth[0].numpy(), normal[0].permute(1, 2, 0).numpy()
 
