@@ -70,13 +70,13 @@ def _of_rooms(title: str, rows: dict[str, str]) -> Study:
         **_by_angle("mse_depth", "MSE-depth"),
     }
     data, (train, test) = (ROOMS_TRAIN, ROOMS_TEST), ("study-train.h5", "study-test.h5")
-    return Study(title, data, train, test, test, rows, "--set iterations=1500", scores)
+    return Study(title, data, train, test, test, rows, "--set iterations=1000", scores)
 
 
 def _of_questions(title: str, rows: dict[str, str], labels: int) -> Study:
     folder = "study-questions/iqtt-"
     files = (f"{folder}train.h5", f"{folder}test.h5", f"{folder}test-answers.h5")
-    options = f"--set iterations=1500 --labels {labels}"
+    options = f"--set iterations=1000 --labels {labels}"
     scores = {"accuracy": ("metrics", "iqtt_accuracy")}
     return Study(title, (QUESTIONS,), *files, rows, options, scores)
 
