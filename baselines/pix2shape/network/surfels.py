@@ -113,7 +113,8 @@ def shade(positions: Tensor, normals: Tensor, scene: Scene) -> Tensor:
         toward = torch.bmm(light, mirrored) - (p * mirrored).sum(dim=1, keepdim=True)
         gloss = (scene.specular, scene.shininess)
         specular, shininess = (v.expand(batch, height, width).flatten(1)[:, None] for v in gloss)
-        lobe = specular * (toward / distance).clamp(min=1e-6) ** shininess / falloff
+        # At most 1: rounding near a light would give powers without bounds, times a colour of 0.
+        lobe = specular * (toward / distance).clamp(1e-6, 1) ** shininess / falloff
         image = image + torch.bmm(color, torch.where(cosine > 0, lobe, 0))
     return image.view(batch, 3, height, width)
 
