@@ -166,7 +166,8 @@ def page(folder: Path) -> str:
 def _section(folder: Path, name: str) -> str:
     study, rows = STUDIES[name], []
     for row in study.rows:
-        paths = sorted((folder / "scores").glob(_place(folder, name, row, 0).name[:-6] + "*.json"))
+        first = _place(folder, name, row, 0).stem.removesuffix("0")
+        paths = sorted((folder / "scores").glob(f"{first}[0-9]*.json"))
         runs = [json.loads(path.read_text())["scores"] for path in paths]
         if runs:
             cells = (_mean([run[column] for run in runs]) for column in study.scores)

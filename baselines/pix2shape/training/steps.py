@@ -8,7 +8,7 @@ Where several processes share a batch, each calls a step with its own images, an
 what they return, and of its gradients, is that of one process with all images.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -124,7 +124,11 @@ def generator_step(
         surfels = model.surfels(code, views.condition, views.cameras)
         depth = surfels.depth
         if config.reconstruction:
-            again = shaded(surfels, model.lit(code, views))
+            # A material explains an image on flat surfaces, too: where matching finds the surfaces,
+            # images teach the material on them and no more.
+            given = config.material and config.matching
+            seen = replace(surfels, depth=depth.detach()) if given else surfels
+            again = shaded(seen, model.lit(code, views))
             numbers["reconstruction"] = _compared(config, batch.image, again)
         if config.depth and batch.depth is not None:
             known = torch.isfinite(batch.depth)

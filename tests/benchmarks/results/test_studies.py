@@ -67,3 +67,14 @@ def test_a_run_that_fails_is_told_and_leaves_the_others(ran, tmp_path):
     cells = dict(zip(head.split(" | "), rows[0].split(" | "), strict=True))
     assert [row.split(" | ")[:2] for row in rows] == [["| reconstruction", "1"]]
     assert (cells["CD, 35°"], cells["CD, 0°"]) == ("0.250", "–")
+
+
+def test_a_row_counts_its_own_runs_alone(tmp_path):
+    """The name of one row may begin with that of another."""
+    (tmp_path / "scores").mkdir()
+    columns = dict.fromkeys(studies.STUDIES["losses"].scores, 0.5)
+    for run in ("adversarial-0", "adversarial-12", "adversarial-reconstruction-0"):
+        path = tmp_path / "scores" / f"study-losses-{run}.json"
+        path.write_text(json.dumps({"scores": columns}))
+    rows = studies.page(tmp_path).splitlines()[4:]
+    assert [row.split(" | ")[1] for row in rows] == ["2", "1"]

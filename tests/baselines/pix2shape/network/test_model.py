@@ -8,7 +8,7 @@ from pix2shape_models import made, tiny
 torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
-from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
+from baselines.pix2shape.data.rooms import Relief, RoomImages  # noqa: E402
 from baselines.pix2shape.network.model import Material, Surfels, shaded  # noqa: E402
 from baselines.pix2shape.network.surfels import render  # noqa: E402
 from baselines.pix2shape.training.steps import draw, generator_step  # noqa: E402
@@ -71,3 +71,15 @@ def test_a_material_is_shaded_in_place_of_what_is_told(colourful):
         views.scene, reflectance=albedo, specular=k_s[:, 0], shininess=material.shininess
     )
     assert torch.equal(shaded(Surfels(depth, material=material), views), render(depth, shown))
+
+
+def test_where_matching_teaches_surfaces_images_do_not(colourful):
+    config = tiny(rays=True, matching=1.0, adversarial=0.0, code_reconstruction=0.0, **LEARNS)
+    batch, model = batch_of(colourful, config), made(config).train()
+    flat = torch.zeros(4, 1, 32, 32)
+    relief = Relief(flat, batch.views.world_from_camera[:, None])
+    noise = draw(4, config.networks.z, 0)
+    _, losses = generator_step(model, replace(batch, relief=relief), noise)
+    losses["reconstruction"].backward()
+    taught = model.decoder.last.weight.grad.abs().amax(dim=(0, 2, 3)) > 0
+    assert taught.tolist() == [False, True, True, True, True, True]
