@@ -84,30 +84,43 @@ class Surfels:
 
 
 class Prior(nn.Module):
-    """The normal distribution that codes are drawn from; standard normal until it is fitted."""
+    """The normal distribution that codes are drawn from; standard normal until it is fitted.
+
+    Each class has a mean of its own; the covariance is one for all.
+    """
 
     mean: Tensor
     factor: Tensor
 
-    def __init__(self, z: int) -> None:
+    def __init__(self, z: int, classes: int = 0) -> None:
         super().__init__()
-        self.register_buffer("mean", torch.zeros(z))
+        self.classes = classes
+        self.register_buffer("mean", torch.zeros(classes, z) if classes else torch.zeros(z))
         self.register_buffer("factor", torch.eye(z))
 
-    def forward(self, noise: Tensor) -> Tensor:
-        """Turn standard normal numbers into codes: (B, z) -> (B, z)."""
-        return self.mean + noise @ self.factor.T
+    def forward(self, noise: Tensor, condition: Tensor) -> Tensor:
+        """Turn standard normal numbers into codes: (B, z), and conditions (B, D) -> (B, z)."""
+        return self._means(condition) + noise @ self.factor.T
 
-    def fit(self, codes: Tensor) -> None:
-        """Take over mean and covariance of codes, (N, z).
+    def fit(self, codes: Tensor, condition: Tensor) -> None:
+        """Take over means and covariance of codes, (N, z), made under conditions (N, D).
 
         Models without an adversarial loss need this, as nothing else ties their codes to the prior
         (Ghosh et al. 2020, "From Variational to Deterministic Autoencoders").
         """
-        centred = (codes - codes.mean(dim=0)).double()
+        if self.classes:
+            told = condition[:, -self.classes :]
+            sums, counts = told.T @ codes, told.sum(dim=0)[:, None]
+            self.mean.copy_(torch.where(counts > 0, sums / counts.clamp(min=1), codes.mean(dim=0)))
+        else:
+            self.mean.copy_(codes.mean(dim=0))
+        centred = (codes - self._means(condition)).double()
         variance, axes = torch.linalg.eigh(centred.T @ centred / max(len(codes) - 1, 1))
-        self.mean.copy_(codes.mean(dim=0))
         self.factor.copy_(axes * variance.clamp(min=0).sqrt())
+
+    def _means(self, condition: Tensor) -> Tensor:
+        """Return the mean for each condition's class; the condition ends with it, one-hot."""
+        return condition[:, -self.classes :] @ self.mean if self.classes else self.mean
 
 
 class Pix2Shape(nn.Module):
@@ -125,7 +138,7 @@ class Pix2Shape(nn.Module):
         self.decoder = Decoder(spec, outputs, config.lights)
         self.critic = Critic(spec)
         self.statistics = Statistics(spec)
-        self.prior = Prior(spec.z)
+        self.prior = Prior(spec.z, spec.classes)
 
     def encode(self, image: Tensor, views: Views) -> Tensor:
         """Return the codes of images of linear radiance: (B, 3, S, S) -> (B, z)."""

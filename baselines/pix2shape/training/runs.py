@@ -163,7 +163,9 @@ def fit_prior(model: Pix2Shape, source: Source) -> None:
     learning = model.training
     model.eval()
     batches = (source.as_batch(items).to(device) for items in loader)
-    model.prior.fit(torch.cat([model.encode(batch.image, batch.views) for batch in batches]))
+    found = [(model.encode(one.image, one.views), one.views.condition) for one in batches]
+    codes, conditions = map(torch.cat, zip(*found, strict=True))
+    model.prior.fit(codes, conditions)
     model.train(learning)
 
 

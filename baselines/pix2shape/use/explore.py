@@ -64,7 +64,7 @@ def sample_sheet(
     views = known_views(spec, positions, *sample_lights(spec, items)[1:], one_hot)
     source = torch.Generator().manual_seed(item_seed(seed, 0, Purpose.PICTURES))
     noise = torch.randn(count, model.config.networks.z, generator=source)
-    tiles = drawn(model, model.prior(noise), views)
+    tiles = drawn(model, model.prior(noise, views.condition), views)
     lines = [line[i : i + ROW] for i in range(0, count, ROW) for line in tiles]
     return sheet(lines)
 

@@ -21,6 +21,7 @@ from torch.utils.data import default_collate  # noqa: E402
 
 from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
 from baselines.pix2shape.network.config import LOSSES  # noqa: E402
+from baselines.pix2shape.network.model import Prior  # noqa: E402
 from baselines.pix2shape.training import runs  # noqa: E402
 from baselines.pix2shape.training.runs import Machine, train_run  # noqa: E402
 from baselines.pix2shape.training.state import load_state  # noqa: E402
@@ -194,6 +195,20 @@ def test_the_prior_is_that_of_codes_where_no_critic_ties_them(rooms_path, folder
     spread, covariance = float(codes.std()), prior.factor @ prior.factor.T
     torch.testing.assert_close(prior.mean, codes.mean(dim=0), atol=0.02 * spread, rtol=0)
     torch.testing.assert_close(covariance, codes.T.cov(), atol=0.05 * spread**2, rtol=0)
+
+
+def test_each_class_has_the_mean_of_its_codes():
+    """Classes with other means, one covariance; a class that is not seen has the mean of all."""
+    number = torch.Generator().manual_seed(0)
+    codes, told = torch.randn(3000, 4, generator=number), torch.eye(3)[torch.arange(3000) % 2]
+    codes[::2] += 5
+    prior, condition = Prior(4, 3), torch.cat([torch.rand(3000, 3), told], dim=1)
+    prior.fit(codes, condition)
+    found = prior(torch.randn(3000, 4, generator=number), condition)
+    for one in (codes, found):
+        torch.testing.assert_close(one[::2].mean(dim=0), torch.full((4,), 5.0), atol=0.1, rtol=0)
+        torch.testing.assert_close(one[1::2].T.cov(), torch.eye(4), atol=0.15, rtol=0)
+    torch.testing.assert_close(prior.mean[2], codes.mean(dim=0))
 
 
 def test_a_picture_that_cannot_be_written_leaves_the_checkpoint(rooms_path, folder, monkeypatch):

@@ -31,7 +31,9 @@ def model() -> Pix2Shape:
     torch.manual_seed(0)
     model = Pix2Shape(CARD.config)
     model.decoder(torch.randn(4, 128), torch.rand(4, 5))
-    model.prior.fit(model.encoder(torch.rand(4, 3, 32, 32), torch.rand(4, 5)).detach())
+    model.prior.fit(
+        model.encoder(torch.rand(4, 3, 32, 32), torch.rand(4, 5)).detach(), torch.eye(5)[:4]
+    )
     return model
 
 
