@@ -26,11 +26,12 @@ from starlette.types import ASGIApp
 
 from iqtt.quiz import sessions
 from iqtt.quiz.commits import Commits
-from iqtt.quiz.guards import Guard, Hosts, read_form
+from iqtt.quiz.guards import Guard, read_form
 from iqtt.quiz.pages import Bar, page, result_page, static_files
 from iqtt.quiz.sessions import RefusedError, State
 from iqtt.quiz.study import Question, Study
 from scenegen.common.errors import SceneGenError
+from scenegen.common.web_hosts import Hosts
 
 COOKIE_SECONDS = 30 * 24 * 3600
 MOST_ASKED = 4096  # sessions whose state is remembered

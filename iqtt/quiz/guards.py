@@ -1,23 +1,20 @@
 """What every request must be, and what every answer says: hosts, origins, sizes, headers."""
 
 import asyncio
-import ipaddress
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass
-from urllib.parse import parse_qsl, urlsplit
+from urllib.parse import parse_qsl
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from iqtt.quiz.sessions import RefusedError
+from scenegen.common.web_hosts import Hosts, is_own_page
 
 MOST_BYTES = 4096  # of a request's body; honest ones have about 100
 MOST_FIELDS = 8
 BODY_SECONDS = 10
 FORM_TYPE = "application/x-www-form-urlencoded"
-LOCAL_NAMES = ("localhost",)
 POLICY = (
     "default-src 'none'; img-src 'self'; style-src 'self'; script-src 'self'; form-action 'self';"
     " base-uri 'none'; frame-ancestors 'none'"
@@ -32,34 +29,6 @@ HEADERS = {
     "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
     "Cache-Control": "no-store",
 }
-
-
-@dataclass(frozen=True)
-class Hosts:
-    """The names under which the server may be asked.
-
-    A page of another site can make its own name lead to this machine (DNS rebinding), and would
-    then be of one origin with the quiz. It cannot do so with a number or with `localhost`.
-
-    Attributes:
-        names: in lower case.
-        numbers: whether any IP address will do; otherwise only those of this machine itself.
-    """
-
-    names: frozenset[str] = frozenset(LOCAL_NAMES)
-    numbers: bool = False
-
-    def allow(self, host: str) -> bool:
-        """Return whether the header Host names this server; the port is free, as of a tunnel."""
-        match = re.fullmatch(r"(\[[0-9a-f:.]+\]|[a-z0-9._-]+)(?::[0-9]{1,5})?", host.lower())
-        if match is None:
-            return False
-        name = match[1].removesuffix(".")
-        try:
-            number = ipaddress.ip_address(name.strip("[]"))
-        except ValueError:
-            return name in self.names
-        return self.numbers or number.is_loopback
 
 
 class Guard:
@@ -98,21 +67,10 @@ class Guard:
         if method in ("GET", "HEAD"):
             return
         sender = headers.get("origin") or headers.get("referer")
-        if sender is not None:
-            told = _split(sender)
-            if told is None or told != hosts[0].lower():
-                raise RefusedError(403, "Answers are taken from the quiz's own pages only.")
+        if sender is not None and not is_own_page(sender, hosts[0]):
+            raise RefusedError(403, "Answers are taken from the quiz's own pages only.")
         if headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
             raise RefusedError(403, "Answers are taken from the quiz's own pages only.")
-
-
-def _split(address: str) -> str | None:
-    """Return host and port of an http address; None of anything else."""
-    try:
-        found = urlsplit(address)
-        return found.netloc.lower() if found.scheme in ("http", "https") else None
-    except ValueError:
-        return None
 
 
 async def read_form(request: Request, names: tuple[str, ...]) -> Mapping[str, str]:

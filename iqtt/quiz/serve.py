@@ -1,7 +1,6 @@
 """The server: one process that answers over HTTP until it is told to stop."""
 
 import asyncio
-import ipaddress
 import logging
 import resource
 import signal
@@ -16,8 +15,8 @@ import uvicorn
 from starlette.types import ASGIApp
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from iqtt.quiz.guards import LOCAL_NAMES, Hosts
 from scenegen.common.errors import SpecError
+from scenegen.common.web_hosts import LOCAL_NAMES, is_local
 
 EXCHANGE_SECONDS = 30  # for a request and its response; who is slower is cut off
 IDLE_SECONDS = 5
@@ -103,20 +102,6 @@ def listen(host: str, port: int, public: bool) -> socket.socket:
         listening.close()
         raise OSError(error.errno, f"port {port}: {error.strerror}; name another", host) from error
     return listening
-
-
-def is_local(host: str) -> bool:
-    """Return whether only this machine reaches a server at a host."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host.lower() in LOCAL_NAMES
-
-
-def hosts_of(host: str, public: bool, names: tuple[str, ...]) -> Hosts:
-    """Return the hosts that requests may name: where the server listens, and `names`."""
-    own = {host, *names, *([socket.gethostname()] if public else [])}
-    return Hosts(frozenset(map(str.lower, (*LOCAL_NAMES, *own))), numbers=public)
 
 
 def address_of(listening: socket.socket, host: str) -> str:

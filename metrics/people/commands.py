@@ -75,9 +75,10 @@ def _serve(
     from iqtt.quiz.app import Quiz, make_app
     from iqtt.quiz.commits import Commits
     from iqtt.quiz.schema import SECRET, open_answers, stored_values
-    from iqtt.quiz.serve import address_of, hosts_of, listen, serve
+    from iqtt.quiz.serve import address_of, listen, serve
     from iqtt.quiz.study import Study
     from metrics.people.references import compare
+    from scenegen.common.web_hosts import hosts_of
 
     with (
         Study(file, part, questions, calibrations, seed) as study,

@@ -1,15 +1,15 @@
 """The web server of a 3D page: where it listens, what it never does, and how it ends."""
 
 import errno
-import ipaddress
 import socket
 import threading
 import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from scenegen.common.errors import SpecError
+from scenegen.common.web_hosts import LOCAL_NAMES, Hosts, hosts_of, is_local, is_own_page
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -25,20 +25,18 @@ def listening_host(host: str | None, public: bool) -> str:
     """
     if host is None:
         return EVERYWHERE if public else HERE
-    own = host == "localhost"
-    with suppress(ValueError):
-        own = ipaddress.ip_address(host).is_loopback
-    if not own and not public:
+    if not is_local(host) and not public:
         advice = "with --public, everyone who can reach the address sees the data"
         raise SpecError("host", f"{host!r:.100}", "127.0.0.1, ::1 or localhost", advice)
-    return HERE if host == "localhost" else host
+    return HERE if host.lower() in LOCAL_NAMES else host
 
 
 @contextmanager
 def started(title: str, host: str, port: int) -> Iterator["ViserServer"]:
     """Start a server for the block; port 0 takes any free one. `title` heads the controls.
 
-    Nothing is printed, and nobody can ask it to open a tunnel to the internet.
+    Nothing is printed, nobody can ask it to open a tunnel to the internet, and other sites' pages
+    are refused.
 
     Raises SpecError for an address where it cannot listen.
     """
@@ -49,7 +47,8 @@ def started(title: str, host: str, port: int) -> Iterator["ViserServer"]:
     console = rich.get_console()  # on which viser announces itself
     quiet, console.quiet = console.quiet, True
     try:
-        server = viser.ViserServer(host, port, label=title, verbose=False)
+        with _refusing_others(hosts_of(host, public=not is_local(host))):
+            server = viser.ViserServer(host, port, label=title, verbose=False)
         try:
             if port not in (0, server.get_port()):  # taken meanwhile: viser goes on to the next
                 raise _in_use(port)
@@ -63,6 +62,33 @@ def started(title: str, host: str, port: int) -> Iterator["ViserServer"]:
             server.stop()
     finally:
         console.quiet = quiet
+
+
+@contextmanager
+def _refusing_others(hosts: Hosts) -> Iterator[None]:
+    """Give the server that viser starts in the block a look at who asks, which viser has not.
+
+    Browsers let pages of any site open a WebSocket to this machine; they tell its Origin.
+    """
+    from websockets.asyncio import server as sockets
+
+    serve = sockets.serve
+
+    def guarded(*given: Any, process_request: Any, **how: Any) -> Any:
+        def answer(connection: Any, request: Any) -> Any:
+            told, sender = request.headers.get_all("Host"), request.headers.get("Origin")
+            known = len(told) == 1 and hosts.allow(told[0])
+            if not known or not (sender is None or is_own_page(sender, told[0])):
+                return connection.respond(403, "This address is not one of the viewer.\n")
+            return process_request(connection, request)
+
+        return serve(*given, process_request=answer, **how)
+
+    sockets.serve = guarded  # type: ignore[assignment,misc]
+    try:
+        yield
+    finally:
+        sockets.serve = serve  # type: ignore[misc]
 
 
 def address(server: "ViserServer") -> str:

@@ -15,9 +15,10 @@ from iqtt.quiz import sessions
 from iqtt.quiz.app import Quiz, make_app
 from iqtt.quiz.commits import Commits
 from iqtt.quiz.schema import SECRET, open_answers, stored_values
-from iqtt.quiz.serve import hosts_of, listen, server_of
+from iqtt.quiz.serve import listen, server_of
 from iqtt.quiz.study import Question, Settings
 from metrics.people.references import compare
+from scenegen.common.web_hosts import hosts_of
 
 FORM = {"Content-Type": "application/x-www-form-urlencoded"}
 MADE = Settings("a" * 64, "b" * 64, 3, questions=6, calibrations=1)

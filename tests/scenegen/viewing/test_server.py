@@ -1,7 +1,9 @@
 """The server of a page: who reaches it, what it prints, and how it ends."""
 
+import http.client
 import socket
 import urllib.request
+from contextlib import closing
 
 import pytest
 
@@ -42,3 +44,28 @@ def test_an_address_of_another_machine():
     with pytest.raises(SpecError) as error, started("x", "192.0.2.1", 0):
         pass
     assert error.value.where == "host"
+
+
+@pytest.mark.parametrize(
+    ("headers", "taken"),
+    [
+        ({}, True),
+        ({"Origin": "http://{host}"}, True),
+        ({"Origin": "http://evil.example"}, False),
+        ({"Origin": "null"}, False),
+        ({"Origin": "http://127.0.0.1:1"}, False),  # another server of this machine
+        ({"Host": "evil.example"}, False),  # a name that leads here
+    ],
+)
+def test_pages_of_other_sites_get_neither_page_nor_socket(headers, taken):
+    with started("x", "127.0.0.1", 0) as server:
+        host = f"127.0.0.1:{server.get_port()}"
+        headers = {name: value.format(host=host) for name, value in headers.items()}
+        upgrade = {
+            "Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13",
+            "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==", "Sec-WebSocket-Protocol": "viser-v1",
+        }  # fmt: skip
+        for asked, expected in (({}, 200), (upgrade, 101)):
+            with closing(http.client.HTTPConnection(host, timeout=10)) as connection:
+                connection.request("GET", "/", headers={**asked, **headers})
+                assert connection.getresponse().status == (expected if taken else 403)
