@@ -16,6 +16,7 @@ from mkdocs.structure.pages import Page
 ROOT = Path(__file__).parents[2]
 FROM_ROOT = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
 LINK = re.compile(r"(?<=\]\()[^)\s#]+")
+EMPTY_HEADER = re.compile("<th( [^>]*)?></th>")
 FENCED = re.compile("(^```.*?^```$)", re.MULTILINE | re.DOTALL)
 NESTED = re.compile("^ +(?=- )|^  (?! )", re.MULTILINE)  # what is in a list; here 4 spaces, not 2
 
@@ -46,6 +47,11 @@ def on_page_markdown(markdown: str, page: Page, files: Files, **_: Any) -> str:
         NESTED.sub(lambda indent: 2 * indent[0], LINK.sub(moved, text)) for text in parts[::2]
     ]
     return "".join(parts)
+
+
+def on_page_content(html: str, **_: Any) -> str:
+    """Make cells of headers that name nothing plain cells."""
+    return EMPTY_HEADER.sub(r"<td\1></td>", html)
 
 
 def _origin(place: str) -> PurePosixPath:

@@ -42,13 +42,18 @@ def kitty(picture: Image.Image) -> str:
 
 def sixel(picture: Image.Image) -> str:
     """Return an RGB picture as sixels, in at most 256 colours that suit it."""
-    indexed = picture.quantize(COLORS)
+    indexed = quantized(picture)
     palette = np.rint(np.array(indexed.getpalette()).reshape(-1, 3) * PER_CENT).astype(int)
     pixels = np.asarray(indexed)
     colors = (f"#{i};2;{r};{g};{b}" for i, (r, g, b) in enumerate(palette.tolist()))
     bands = (_band(pixels[top : top + BAND]) for top in range(0, picture.height, BAND))
     size = f'"1;1;{picture.width};{picture.height}'
     return f"\x1bP0;1q{size}{''.join(colors)}{'-'.join(bands)}\x1b\\"
+
+
+def quantized(picture: Image.Image) -> Image.Image:
+    """Return an RGB picture in at most 256 colours, each near to what it stands for."""
+    return picture.quantize(COLORS, Image.Quantize.MAXCOVERAGE, kmeans=1)
 
 
 def _band(rows: np.ndarray[tuple[int, ...], np.dtype[np.uint8]]) -> str:

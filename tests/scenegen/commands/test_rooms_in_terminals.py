@@ -22,7 +22,7 @@ def test_a_terminal_with_sixels_shows_the_sheet(rooms_path, sheet, tmp_path):
     command = [*SCENEGEN, str(rooms_path), "--items", "0,1"]
     done = in_terminal(command, WITH_SIXEL, size=WIDE, cwd=tmp_path)
     drawn = sixel_pixels(done.shown).astype(int)
-    assert abs(drawn - sheet).mean() < 3
+    assert abs(drawn - sheet).max() < 40
     assert done.shown.endswith(f"shown (--out writes a file): 2 of {rooms_path}'s rooms\n")
     assert (done.restored, done.code, list(tmp_path.iterdir())) == (True, 0, [])
 

@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as arrays
 from PIL import Image
 from terminals import kitty_picture, sixel_pixels
 
-from scenegen.common.terminal.pictures import escapes, kitty, sixel
+from scenegen.common.terminal.pictures import escapes, kitty, quantized, sixel
 
 SHAPES = st.tuples(st.integers(1, 20), st.integers(1, 20))
 ROUNDING = 2  # sixels tell colours in per cent
@@ -35,7 +35,7 @@ def test_sixels_draw_pictures_of_few_colours(indices):
 def test_sixels_draw_every_pixel(pixels):
     picture = Image.fromarray(pixels)
     drawn = sixel_pixels(sixel(picture)).astype(int)
-    nearest = np.asarray(picture.quantize(256).convert("RGB")).astype(int)
+    nearest = np.asarray(quantized(picture).convert("RGB")).astype(int)
     assert abs(drawn - nearest).max() <= ROUNDING
 
 
@@ -49,7 +49,7 @@ def test_a_picture_of_many_colours_is_near_to_itself_and_soon_drawn():
     picture, start = photo(1000, 700), time.monotonic()
     drawn = sixel_pixels(sixel(picture)).astype(int)
     assert time.monotonic() - start < 10
-    assert abs(drawn - np.asarray(picture)).mean() < 6
+    assert abs(drawn - np.asarray(picture)).max() < 40
 
 
 def test_kitty_takes_a_png_in_chunks():
