@@ -8,6 +8,7 @@ import os
 import pty
 import re
 import select
+import signal
 import struct
 import subprocess
 import sys
@@ -19,6 +20,7 @@ import numpy as np
 from PIL import Image
 
 QUESTION = b"\x1b[c"
+LONGEST = 60  # seconds; then a program is killed
 WITH_SIXEL, WITHOUT_SIXEL = b"\x1b[?62;4;22c", b"\x1b[?1;2c"
 ONE_OF_OURS = "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
 EXEC = "os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
@@ -61,6 +63,8 @@ def in_terminal(arguments, answer=None, typed=b"", size=(24, 80, 0, 0), cwd=None
     )  # fmt: skip
     shown, questions = b"", 0
     while process.poll() is None or select.select([ours], [], [], 0)[0]:
+        if time.monotonic() - start > LONGEST:
+            os.killpg(process.pid, signal.SIGKILL)
         if not select.select([ours], [], [], 0.02)[0]:
             continue
         shown += os.read(ours, 65536)

@@ -67,6 +67,7 @@ def test_what_is_asked_for_goes_into_a_pipe_too(run, rooms_path, sheet, tmp_path
     assert np.array_equal(np.asarray(Image.open(tmp_path / "s.png")), sheet)
 
 
-def test_a_pipe_gets_nothing_else(run, rooms_path, tmp_path):
+def test_a_pipe_gets_nothing_else(run, rooms_path, tmp_path, monkeypatch):
+    monkeypatch.setenv("TERM", "xterm-kitty")
     assert run("preview", rooms_path).stdout == f"sheet.png: 8 of {rooms_path}'s rooms\n"
     assert (tmp_path / "sheet.png").exists()

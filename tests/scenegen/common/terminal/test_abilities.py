@@ -85,5 +85,6 @@ def test_the_width_is_in_pixels_where_the_terminal_tells():
     assert in_terminal(["-c", ASK], size=(24, 100, 0, 0)).shown.split()[-1] == "1000"
 
 
-def test_what_is_no_terminal_shows_nothing(capsys):
+def test_what_is_no_terminal_shows_nothing(monkeypatch, capsys):
+    monkeypatch.setenv("TERM", "xterm-kitty")
     assert (abilities.protocol(), abilities.width()) == (None, 800)
