@@ -5,6 +5,7 @@ follow them there. Dead links stay as they are, and end the build.
 """
 
 import re
+from collections.abc import Callable
 from pathlib import Path, PurePosixPath
 from posixpath import normpath, relpath
 from typing import Any
@@ -59,6 +60,6 @@ def _origin(place: str) -> PurePosixPath:
     return PurePosixPath(place if place in FROM_ROOT else f"docs/{place}")
 
 
-def _target(page: PurePosixPath):
+def _target(page: PurePosixPath) -> Callable[[str], str]:
     """Return a function from a link on a page to the path that it names in the repository."""
     return lambda link: normpath(page.parent / link)
