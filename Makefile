@@ -15,7 +15,7 @@ fi; \
 command -v chromium > /dev/null || echo "No Chromium: tests of pages are skipped, or fail with CI=true."
 endef
 
-.PHONY: demo demo-model test test-all check bench bench-gpu results fuzz torture clean
+.PHONY: demo demo-summary demo-model docs test test-all check bench bench-gpu results fuzz torture clean
 
 demo: $(VENV)/.runtime
 	mkdir -p demo
@@ -35,8 +35,35 @@ demo: $(VENV)/.runtime
 	for name in constant mean-depth; do $(BIN)/bench score demo/$$name.h5 --truth demo/rooms.h5 --json demo/$$name.json --overwrite > /dev/null || exit 1; done
 	$(BIN)/bench score demo/empty-room.h5 --truth demo/rooms.h5 --json demo/empty-room.json --html demo/report.html --overwrite
 	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/empty-room.json --no-paper
-	@echo
-	@echo "Look at $(CURDIR)/demo: rooms.png, objects.png, questions.png, report.html"
+	@$(MAKE) --no-print-directory demo-summary
+
+# What `make demo` leaves; it gets here only if all of it was made.
+define DEMO_SUMMARY
+
+In $(CURDIR)/demo:
+
+  file            items                what it is
+  report.html     1 page               scores of the baseline empty-room, with its best and worst rooms
+  rooms.png       12 rooms             image, depth, normals and object ids, of rooms.h5
+  objects.png     12 images            four scenes of everyday objects, each from three sides
+  questions.png   8 questions          mental rotation, with the right answers
+  rooms.h5        64 images            rooms with exact ground truth, to test on
+  train.h5        64 images            other rooms, to learn from
+  objects.h5      12 images            the everyday objects
+  iqtt            1,400 questions      1,000 for training, 200 for validation, 200 for test
+  audit.json      1 audit              what was proved and guessed of these questions
+  *.json, *.h5    3 of each            scores and predictions of constant, mean-depth and empty-room
+
+Open first:  $(CURDIR)/demo/report.html
+Then try:    source $(VENV)/bin/activate
+             scenegen preview demo/rooms.h5 --random 6
+             bench compare demo/mean-depth.json demo/empty-room.json
+Learn more:  $(CURDIR)/docs/tutorial.md, to scores of a model of your own in 15 minutes
+endef
+export DEMO_SUMMARY
+
+demo-summary:
+	@printf '%s\n' "$$DEMO_SUMMARY"
 
 demo-model: demo $(VENV)/.model
 	$(BIN)/bench baseline pix2shape --data demo/rooms.h5 --out demo/pix2shape.h5 --overwrite
@@ -48,6 +75,10 @@ demo-model: demo $(VENV)/.model
 	$(BIN)/pix2shape sample --out demo/samples.png --overwrite
 	@echo
 	@echo "Look at $(CURDIR)/demo: pix2shape.html, rotation.gif, samples.png"
+
+# Writes docs/ as a site to site/, which needs no server: open site/index.html.
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -q -n $(WORKERS) -m "not slow"
@@ -87,7 +118,7 @@ torture: $(VENV)/.test
 	$(BIN)/python -m benchmarks.torture
 
 clean:
-	rm -rf $(VENV) demo build dist *.egg-info
+	rm -rf $(VENV) demo site build dist *.egg-info
 
 $(BIN)/python:
 	$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if (3, 11) <= v <= (3, 13) else f"Python 3.11 to 3.13 is needed, {sys.executable} is {v[0]}.{v[1]}; say make PYTHON=...")'
@@ -97,6 +128,10 @@ $(VENV)/.runtime: $(BIN)/python pyproject.toml constraints.txt
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e .
 	touch $@
 
+$(VENV)/.docs: $(BIN)/python pyproject.toml constraints.txt
+	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	touch $@ $(VENV)/.runtime
+
 $(VENV)/.model: $(BIN)/python pyproject.toml constraints.txt
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[model]'
 	touch $@ $(VENV)/.runtime
@@ -104,9 +139,9 @@ $(VENV)/.model: $(BIN)/python pyproject.toml constraints.txt
 $(VENV)/.test: $(BIN)/python pyproject.toml constraints.txt
 	$(FIND_BROWSER)
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[test]'
-	touch $@ $(VENV)/.runtime $(VENV)/.model
+	touch $@ $(VENV)/.runtime $(VENV)/.model $(VENV)/.docs
 
 $(VENV)/.dev: $(BIN)/python pyproject.toml constraints.txt
 	$(FIND_BROWSER)
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[dev]'
-	touch $@ $(VENV)/.runtime $(VENV)/.model $(VENV)/.test
+	touch $@ $(VENV)/.runtime $(VENV)/.model $(VENV)/.docs $(VENV)/.test

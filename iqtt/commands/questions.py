@@ -26,9 +26,9 @@ option = partial(click.option, show_default=True)
 @option(
     "--out",
     type=OutputPath(),
-    default="questions.png",
-    help="Picture to write; its suffix names the format.",
+    help="Picture to write; its suffix names the format [questions.png where none can be shown].",
 )
+@command_line.SHOW
 @option("--items", type=Items(), help="Questions to show [default: the first 8].")
 @option("--part", type=click.Choice(["labeled", "unlabeled"]), help="Part of a training file.")
 @option(
@@ -37,17 +37,21 @@ option = partial(click.option, show_default=True)
 @command_line.OVERWRITE
 def show(
     file: str,
-    out: str,
+    out: str | None,
+    show: str,
     items: list[int] | None,
     part: str | None,
     answers: bool,
     overwrite: bool,
 ) -> None:
-    """Draw questions of FILE: the reference on the left, its answers beside it."""
-    from iqtt.files.preview import save_sheet
+    """Draw questions of FILE: the reference on the left, its answers beside it.
+
+    Terminals that can draw pictures show them; else they are written to a file.
+    """
+    from iqtt.files.preview import question_sheet
     from iqtt.files.reader import answers_beside, open_questions, parts
     from scenegen.common.errors import SpecError
-    from scenegen.rooms.preview import pick_rows
+    from scenegen.rooms.preview import pick_rows, save_picture
 
     chosen = part or parts(file)[0]
     beside = answers_beside(file) if answers else None
@@ -56,8 +60,11 @@ def show(
             raise SpecError(file, "no answers, and no file of answers beside it", "answers")
         rows = pick_rows(len(questions), items)[: None if items else SHOWN]
         task = questions.attributes.get("task", "")
-        save_sheet([questions[row] for row in rows], answers, out, overwrite, task)
-    print_line(f"{out}: {len(rows)} of {file}'s {len(questions)} questions")
+        sheet = question_sheet([questions[row] for row in rows], answers, task)
+        count = len(questions)
+    save = partial(save_picture, sheet, overwrite=overwrite)
+    done = command_line.show_or_save(sheet, show, out, "questions.png", save)
+    print_line(f"{done}: {len(rows)} of {file}'s {count} questions")
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt info iqtt-split/iqtt-val.h5")

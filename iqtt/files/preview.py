@@ -2,7 +2,6 @@
 
 import textwrap
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from iqtt.files.reader import QuestionRecord
-from scenegen.rooms.preview import BACKGROUND, FAINT, INK, save_picture, srgb_bytes
+from scenegen.rooms.preview import BACKGROUND, FAINT, INK, srgb_bytes
 
 Array = NDArray[Any]
 LABELS = ("", "A", "B", "C")
@@ -51,17 +50,6 @@ def question_sheet(
         corner = i % columns * wide + MARGIN, header + i // columns * cell[1] + MARGIN
         _draw_question(sheet, corner, record, tiles, show_answers)
     return sheet
-
-
-def save_sheet(
-    records: Sequence[QuestionRecord],
-    show_answers: bool,
-    path: str | Path,
-    overwrite: bool = False,
-    task: str = "",
-) -> None:
-    """Write a sheet; the suffix of `path` names the format. Raises as `save_picture`."""
-    save_picture(question_sheet(records, show_answers, task), path, overwrite)
 
 
 def _draw_question(

@@ -38,6 +38,13 @@ SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
 SHARED = ("parquet", "webdataset")  # and of files of many
 
 
+def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> list[str]:
+    """Return the presets that a shell may complete a name to."""
+    from scenegen.description.presets import PRESETS
+
+    return [name for name in PRESETS if name.startswith(incomplete)]
+
+
 # fmt: off
 @click.command(
     epilog=f"{EXAMPLE}scenegen render --n 1000 --preset shapenet --seed 1 --out rooms.h5"
@@ -45,7 +52,7 @@ SHARED = ("parquet", "webdataset")  # and of files of many
 @click.option("--n", "count", type=int, required=True, help="Number of scenes.")
 @click.option("--out", type=OutputPath(), default="rooms.h5", show_default=True,
               help="File to write, or a URL such as s3://bucket/rooms.h5.")
-@click.option("--preset", default="shapes", show_default=True,
+@click.option("--preset", default="shapes", show_default=True, shell_complete=_presets,
               help="Settings to start from, as `scenegen presets` lists them.")
 @SEED
 @click.option("--size", type=Size(), help="Image size in pixels [128].")

@@ -5,6 +5,7 @@ Each one parses its options, makes one library call, and prints. Heavy imports h
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,12 @@ from scenegen.common.command_line import (
     EXAMPLE,
     MESHES,
     OVERWRITE,
+    SHOW,
     Items,
     needs,
     print_line,
     progress_bar,
+    show_or_save,
 )
 from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
 
@@ -29,8 +32,9 @@ SHARED = ("parquet", "webdataset")  # and of files of many
 @click.command(epilog=f"{EXAMPLE}scenegen preview rooms.h5 --random 12 --out sheet.png")
 @click.argument("file", type=InputPath())
 @click.option(
-    "--out", type=OutputPath(), default="sheet.png", show_default=True, help="Picture to write."
+    "--out", type=OutputPath(), help="Picture to write [sheet.png where none can be shown]."
 )
+@SHOW
 @click.option("--items", type=Items(), help="Rows to show [default: the first 12].")
 @click.option(
     "--random", "number", type=click.IntRange(1, 400), help="Number of rows to pick at random."
@@ -38,16 +42,27 @@ SHARED = ("parquet", "webdataset")  # and of files of many
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of --random.")
 @OVERWRITE
 def preview(
-    file: str, out: str, items: list[int] | None, number: int | None, seed: int, overwrite: bool
+    file: str,
+    out: str | None,
+    show: str,
+    items: list[int] | None,
+    number: int | None,
+    seed: int,
+    overwrite: bool,
 ) -> None:
-    """Show some rooms of a file in one picture: image, depth, normals and object ids."""
+    """Show some rooms of a file in one picture: image, depth, normals and object ids.
+
+    Terminals that can draw pictures show it; else it is written to a file.
+    """
     from scenegen.rooms.preview import contact_sheet, pick_rows, save_picture
     from scenegen.rooms.reader import RoomsFile
 
     with RoomsFile(file) as rooms:
         rows = pick_rows(len(rooms), items, number, seed)
-        save_picture(contact_sheet([rooms[i] for i in rows]), out, overwrite)
-    print_line(f"{out}: {len(rows)} of {file}'s rooms")
+        sheet = contact_sheet([rooms[i] for i in rows])
+    save = partial(save_picture, sheet, overwrite=overwrite)
+    done = show_or_save(sheet, show, out, "sheet.png", save)
+    print_line(f"{done}: {len(rows)} of {file}'s rooms")
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen info rooms.h5")

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from scenegen.common.paths import InputPath, OutputFolder
+from scenegen.common.paths import InputPath, OutputFolder, refuse_command_inputs
 from scenegen.common.signals import ended_by_signals
-from scenegen.common.streams import for_progress_bars, robust_streams
+from scenegen.common.streams import for_pictures, for_progress_bars, robust_streams
 from scenegen.common.text_table import printable
 
 if TYPE_CHECKING:
+    from PIL.Image import Image
+
     from scenegen.common.workers.cluster import Cluster, Versions
 
 # An `epilog` is this and a command line. A paragraph that begins with \b keeps its line breaks.
@@ -243,6 +245,35 @@ def print_line(text: str, err: bool = False) -> None:
     click.echo(printable(text), err=err)
 
 
+def show_or_save(
+    picture: "Image", show: str, out: str | None, otherwise: str, save: Callable[[str], Any]
+) -> str:
+    """Show a picture in the terminal, write it, or both; return what to call it.
+
+    Args:
+        show: value of the option SHOW.
+        out: where to write it, as the user says.
+        otherwise: where to write it if it is not shown.
+        save: writes it.
+    """
+    from scenegen.common.terminal import abilities
+
+    protocol = abilities.protocol() if (show, out) == ("auto", None) else show
+    shown = protocol in abilities.PROTOCOLS
+    if show == "kitty" and sys.stdout.isatty() and abilities.within_another():
+        raise UserError("--show kitty: tmux, screen and zellij do not pass it on; use --out")
+    if not shown or out:
+        refuse_command_inputs([out or otherwise])
+        save(out or otherwise)
+    if shown:
+        from scenegen.common.terminal.pictures import escapes
+
+        stream = for_pictures()
+        stream.write(escapes(picture, str(protocol), abilities.width()) + "\n")
+        stream.flush()
+    return out or (otherwise if not shown else "shown (--out writes a file)")
+
+
 def creation_command(program: str) -> str:
     """Return the command line for a file to record, without options that change no byte."""
     words, recorded = iter(sys.argv[1:]), [program]
@@ -299,6 +330,10 @@ WORKERS = click.option("--workers", type=click.IntRange(0, 256), default=0,
 SCHEDULER = click.option("--scheduler", metavar="ADDRESS",
                          help="Spread the work over a Dask cluster, such as tcp://host:8786; local"
                          " starts one on this machine.")
+SHOW = click.option("--show", type=click.Choice(["auto", "kitty", "sixel", "no"]), default="auto",
+                    show_default=True,
+                    help="Draw the picture in the terminal, in this protocol; auto does so where"
+                    " there is no --out and the terminal says that it can.")
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 DEVICE = click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
                       show_default=True,

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import click
+from click.shell_completion import CompletionItem
 
 from scenegen.common.errors import SpecError
 
@@ -21,7 +22,19 @@ class CommandPaths:
     folders: list[Path] = field(default_factory=list)  # to write to
 
 
-class InputPath(click.ParamType):  # type: ignore[type-arg]
+class _Completed(click.ParamType):  # type: ignore[type-arg]
+    """A path that shells complete."""
+
+    completed = "file"
+
+    def shell_complete(
+        self, _ctx: click.Context, _param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Let the shell look for files, or folders."""
+        return [CompletionItem(incomplete, type=self.completed)]
+
+
+class InputPath(_Completed):
     """A file that is read, or a folder.
 
     Args:
@@ -44,6 +57,8 @@ class InputPath(click.ParamType):  # type: ignore[type-arg]
         What is HDF5 is tried in another process first.
         """
         paths = _command_paths(self, value, param, ctx)
+        if ctx is not None and ctx.resilient_parsing:  # a shell asks how a line may go on
+            return value
         read = [Path(value), *self.beside(Path(value))]
         paths.inputs += [(path, self.within) for path in read]
         refuse_inputs(paths.outputs, read, self.within)
@@ -53,13 +68,14 @@ class InputPath(click.ParamType):  # type: ignore[type-arg]
         return value
 
 
-class OutputFolder(click.ParamType):  # type: ignore[type-arg]
+class OutputFolder(_Completed):
     """A folder to write to.
 
     The command itself compares the files that it writes there with its inputs.
     """
 
     name = "path"
+    completed = "dir"
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Refuse an empty path, and one that is a file to be written."""
@@ -69,7 +85,7 @@ class OutputFolder(click.ParamType):  # type: ignore[type-arg]
         return value
 
 
-class OutputPath(click.ParamType):  # type: ignore[type-arg]
+class OutputPath(_Completed):
     """A file to write."""
 
     name = "path"
