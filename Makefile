@@ -101,6 +101,7 @@ bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.surfels
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.score_rows
 	$(BIN)/python -m benchmarks.quiz
+	$(BIN)/python -m benchmarks.viewing --browser
 
 # Needs an NVIDIA GPU; writes docs/gpu.md.
 bench-gpu: $(VENV)/.test
