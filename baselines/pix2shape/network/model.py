@@ -193,7 +193,9 @@ class Pix2Shape(nn.Module):
             return views
         pose = views.world_from_camera
         assert pose is not None, "lights of questions are told"
-        positions = (self.decoder.light_positions(code) - pose[:, None, :3, 3]) @ pose[:, :3, :3]
+        with torch.autocast(code.device.type, enabled=False):  # bfloat16 is too coarse for places
+            world = self.decoder.light_positions(code.float())
+            positions = (world - pose[:, None, :3, 3]) @ pose[:, :3, :3]
         return replace(views, scene=replace(views.scene, light_position=positions))
 
     def image(self, code: Tensor, views: Views) -> Tensor:

@@ -55,7 +55,9 @@ def test_images_and_losses_follow_from_what_the_model_says(colourful):
 def test_inferred_lights_are_one_place_in_all_cameras(colourful):
     batch, model = batch_of(colourful, tiny(**LEARNS)), made(tiny(**LEARNS))
     code = torch.randn(1, model.config.networks.z).expand(4, -1)
-    views = model.lit(code, batch.views)
+    with torch.autocast("cpu", torch.bfloat16):  # as in training with --precision bf16
+        views = model.lit(code, batch.views)
+        shaded(model.surfels(code, views.condition), views)
     pose = views.world_from_camera
     world = views.scene.light_position @ pose[:, :3, :3].mT + pose[:, None, :3, 3]
     assert not torch.allclose(views.scene.light_position[0], views.scene.light_position[1])
