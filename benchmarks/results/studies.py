@@ -44,7 +44,9 @@ class Study:
         train, test, truth: paths of these files, and of that with the answers.
         rows: what each row is called, and its settings as `--set` takes them.
         options: of `pix2shape train`, for all rows.
-        scores: names of the columns, and where their figures are in a file of scores.
+        scores: names of the columns, and where their figures are in a file of scores; a name like
+            "CD, 35°" is that of a column of its own table line for each view.
+        floors: rows that nothing is trained for, as in `bench baseline NAME`.
     """
 
     title: str
@@ -55,6 +57,7 @@ class Study:
     rows: dict[str, str]
     options: str
     scores: dict[str, tuple[str, ...]]
+    floors: tuple[str, ...]
 
 
 def _by_angle(metric: str, name: str) -> dict[str, tuple[str, ...]]:
@@ -70,15 +73,16 @@ def _of_rooms(title: str, rows: dict[str, str]) -> Study:
         **_by_angle("mse_depth", "MSE-depth"),
     }
     data, (train, test) = (ROOMS_TRAIN, ROOMS_TEST), ("study-train.h5", "study-test.h5")
-    return Study(title, data, train, test, test, rows, "--set iterations=1000", scores)
+    options, floors = "--set iterations=1000", ("empty-room",)
+    return Study(title, data, train, test, test, rows, options, scores, floors)
 
 
 def _of_questions(title: str, rows: dict[str, str], labels: int) -> Study:
     folder = "study-questions/iqtt-"
     files = (f"{folder}train.h5", f"{folder}test.h5", f"{folder}test-answers.h5")
     options = f"--set iterations=1000 --labels {labels}"
-    scores = {"accuracy": ("metrics", "iqtt_accuracy")}
-    return Study(title, (QUESTIONS,), *files, rows, options, scores)
+    scores: dict[str, tuple[str, ...]] = {"accuracy": ("metrics", "iqtt_accuracy")}
+    return Study(title, (QUESTIONS,), *files, rows, options, scores, ("chance", "outline"))
 
 
 BOTH = f"{NO_LOSS} adversarial=1 {RECONSTRUCTION}"
@@ -116,8 +120,8 @@ def run(folder: Path, names: Sequence[str], seeds: int) -> list[str]:
     return each(
         (f"{name}, {row}, seed {seed}", partial(_cell, folder, name, row, seed))
         for name in names or STUDIES
-        for row in STUDIES[name].rows
-        for seed in range(seeds)
+        for row in (*STUDIES[name].floors, *STUDIES[name].rows)
+        for seed in range(1 if row in STUDIES[name].floors else seeds)
     )
 
 
@@ -125,16 +129,21 @@ def _cell(folder: Path, name: str, row: str, seed: int) -> dict[str, Any]:
     """Return the columns of one training run."""
     study, run = STUDIES[name], _run(name, row, seed)
     weights, out, result = (f"{run}/{end}" for end in ("weights.safetensors", "out.h5", "s.json"))
-    changed = " ".join(f"--set {setting}" for setting in study.rows[row].split())
+    reads: tuple[str, ...] = (weights, study.test)
+    changed = " ".join(f"--set {setting}" for setting in study.rows.get(row, "").split())
     train = f"pix2shape train --data {study.train} {study.options} {changed} --set seed={seed}"
     train = " ".join(f"{train} --out {run}".split())
     predict = f"pix2shape predict --weights {weights} --data {study.test} --out {out}"
+    if row in study.floors:
+        train, predict = "", f"bench baseline {row} --data {study.test} --out {out}"
+        reads = (study.test,)
     score = f"bench score {out} --truth {study.truth} --json {result}"
     files = {path: mark(folder / path) for path in (study.train, study.test, study.truth)}
 
     def scored() -> dict[str, Any]:
-        made(folder, Step(train, weights, (study.train,), run=run))
-        made(folder, Step(predict, out, (weights, study.test)))
+        if train:
+            made(folder, Step(train, weights, (study.train,), run=run))
+        made(folder, Step(predict, out, reads))
         made(folder, Step(score, result, (out, study.truth)))
         scores = json.loads((folder / result).read_text())
         return {column: _found(scores, place) for column, place in study.scores.items()}
@@ -165,22 +174,33 @@ def page(folder: Path) -> str:
 
 def _section(folder: Path, name: str) -> str:
     study, rows = STUDIES[name], []
-    for row in study.rows:
-        first = _place(folder, name, row, 0).stem.removesuffix("0")
-        paths = sorted((folder / "scores").glob(f"{first}[0-9]*.json"))
-        runs = [json.loads(path.read_text())["scores"] for path in paths]
-        if runs:
-            cells = (_mean([run[column] for run in runs]) for column in study.scores)
-            rows.append([row, str(len(runs)), *cells])
-    if not rows:
+    views = dict.fromkeys(column.partition(", ")[2] for column in study.scores)
+    names = list(dict.fromkeys(column.partition(", ")[0] for column in study.scores))
+    found = {row: _runs(folder, name, row) for row in (*study.floors, *study.rows)}
+    for view in views:
+        for row, runs in found.items():
+            columns = [f"{score}, {view}" if view else score for score in names]
+            cells = (_mean([run[c] for run in runs], 4 if view else 3) for c in columns)
+            start = [view] if view else []
+            rows += [[*start, row, str(len(runs)), *cells]] if runs else []
+    if not any(found[row] for row in study.rows):
         return ""
-    return f"### {study.title}\n\n{table(['setting', 'runs', *study.scores], rows)}"
+    start = ["view"] if any(views) else []
+    head = [*start, "setting", "runs", *names]
+    return f"### {study.title}\n\n{table(head, rows, len(start) + 1)}"
 
 
-def _mean(values: list[float | None]) -> str:
+def _runs(folder: Path, name: str, row: str) -> list[dict[str, Any]]:
+    """Return the columns of all runs of a row that are scored."""
+    first = _place(folder, name, row, 0).stem.removesuffix("0")
+    paths = sorted((folder / "scores").glob(f"{first}[0-9]*.json"))
+    return [json.loads(path.read_text())["scores"] for path in paths]
+
+
+def _mean(values: list[float | None], digits: int) -> str:
     """Return the mean of runs, and after ± their standard deviation if there are several."""
     known = [value for value in values if value is not None]
     if len(known) < len(values) or not known:
         return NOTHING
-    spread = f" ± {statistics.stdev(known):.3f}" if len(known) > 1 else ""
-    return f"{statistics.mean(known):.3f}{spread}"
+    spread = f" ± {statistics.stdev(known):.{digits}f}" if len(known) > 1 else ""
+    return f"{statistics.mean(known):.{digits}f}{spread}"

@@ -55,53 +55,50 @@ def for_pictures() -> Any:
 
 
 class _Shown(io.TextIOWrapper):
-    """A stream of text that shows what a terminal would obey as escapes."""
+    """A stream of text that shows what a terminal would obey as escapes.
+
+    Failure is told at most once; all that is written later is dropped. A reader that has gone is no
+    failure of standard output. Nothing is one of standard error, whose `name` is empty.
+    """
 
     def __init__(self, descriptor: int, like: TextIO | None, name: str) -> None:
         encoding = like.encoding if like else "utf-8"
         if codecs.lookup(encoding).name == "ascii":
             encoding = "utf-8"  # as click takes it
-        raw = _Lossy(descriptor, name)
+        # Not a class of our own: Ctrl-C could come after it has written and before it says so, and
+        # the buffer would write the same a second time.
+        raw = io.FileIO(descriptor, "w", closefd=False)
         buffer = io.BufferedWriter(raw)
         super().__init__(buffer, encoding, "backslashreplace", line_buffering=raw.isatty())
+        self.called = name
 
     def write(self, text: str) -> int:
         # What is no text is left to the class above to refuse; click tries.
-        return super().write(printable(text, keep="\n\t") if isinstance(text, str) else text)
+        return self._write(printable(text, keep="\n\t") if isinstance(text, str) else text)
+
+    def flush(self) -> None:
+        """Write what is held. Raises OSError with the stream's name as its file."""
+        with self._told_once():
+            super().flush()
 
     def unfiltered(self) -> Any:
         """Return an object that writes to the same place, with control characters as they are."""
         same = {name: getattr(self, name) for name in ("flush", "isatty", "fileno", "encoding")}
-        return SimpleNamespace(write=super().write, **same)
+        return SimpleNamespace(write=self._write, **same)
 
+    def _write(self, text: str) -> int:
+        with self._told_once():
+            super().write(text)
+        return len(text)
 
-class _Lossy(io.RawIOBase):
-    """A descriptor whose failure is told at most once; all that is written later is dropped.
-
-    A reader that has gone is no failure of standard output. Nothing is one of standard error, whose
-    `name` is empty.
-    """
-
-    def __init__(self, descriptor: int, name: str) -> None:
-        self.descriptor, self.name, self.lost = descriptor, name, False
-
-    def writable(self) -> bool:
-        return True
-
-    def fileno(self) -> int:
-        return self.descriptor
-
-    def isatty(self) -> bool:
-        return os.isatty(self.descriptor)
-
-    def write(self, data: Any) -> int:
-        """Write what the descriptor takes. Raises OSError with `name` as its file."""
-        if not self.lost:
-            try:
-                return os.write(self.descriptor, data)
-            except OSError as error:
-                self.lost = True
-                if self.name and error.errno != errno.EPIPE:
-                    text = f"cannot be written: {error.strerror}"
-                    raise OSError(error.errno, text, self.name) from error
-        return len(data)
+    @contextmanager
+    def _told_once(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self.fileno())
+            os.close(nowhere)
+            if self.called and error.errno != errno.EPIPE:
+                text = f"cannot be written: {error.strerror}"
+                raise OSError(error.errno, text, self.called) from error

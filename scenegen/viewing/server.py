@@ -103,10 +103,10 @@ def serve(
 ) -> None:
     """Tell the address in one line, open it in a browser if asked to, and wait for Ctrl-C."""
     seen = f", for all who can reach {server.get_host()}" if public else ""
-    tell(f"{address(server)} (Ctrl-C ends{seen})")
-    if open_browser:
-        webbrowser.open(address(server))
-    with suppress(KeyboardInterrupt):
+    with suppress(KeyboardInterrupt):  # it may come as soon as the line is read
+        tell(f"{address(server)} (Ctrl-C ends{seen})")
+        if open_browser:
+            webbrowser.open(address(server))
         threading.Event().wait()
 
 

@@ -64,9 +64,13 @@ def test_a_run_that_fails_is_told_and_leaves_the_others(ran, tmp_path):
     failed = studies.run(tmp_path, ["losses"], 1)
     assert failed == ["losses, adversarial, seed 0", "losses, adversarial, reconstruction, seed 0"]
     head, _, *rows = studies.page(tmp_path).split("\n\n")[1].splitlines()
-    cells = dict(zip(head.split(" | "), rows[0].split(" | "), strict=True))
-    assert [row.split(" | ")[:2] for row in rows] == [["| reconstruction", "1"]]
-    assert (cells["CD, 35°"], cells["CD, 0°"]) == ("0.250", "–")
+    place = head.split(" | ").index("CD")
+    found = {tuple(row.split(" | ")[:3]): row.split(" | ")[place] for row in rows}
+    assert len(found) == 10, "a floor and a row in five views"
+    assert found["| 35°", "reconstruction", "1"] == "0.2500"
+    assert found["| 0°", "reconstruction", "1"] == "–"
+    assert found["| 35°", "empty-room", "1"] == "0.2500"
+    assert [c for c in ran if "bench baseline empty-room --data study-test.h5" in c]
 
 
 def test_a_row_counts_its_own_runs_alone(tmp_path):
@@ -76,5 +80,5 @@ def test_a_row_counts_its_own_runs_alone(tmp_path):
     for run in ("adversarial-0", "adversarial-12", "adversarial-reconstruction-0"):
         path = tmp_path / "scores" / f"study-losses-{run}.json"
         path.write_text(json.dumps({"scores": columns}))
-    rows = studies.page(tmp_path).splitlines()[4:]
-    assert [row.split(" | ")[1] for row in rows] == ["2", "1"]
+    rows = studies.page(tmp_path).splitlines()[4:6]
+    assert [row.split(" | ")[2] for row in rows] == ["2", "1"]

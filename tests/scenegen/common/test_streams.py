@@ -83,6 +83,31 @@ with robust_streams():
     assert done.stderr == "standard output\n"
 
 
+def test_ctrl_c_prints_nothing_twice():
+    """A signal comes a little later in each print than in the one before."""
+    program = """
+import signal
+from scenegen.common.streams import robust_streams
+
+def interrupt(*_):
+    raise KeyboardInterrupt
+
+signal.signal(signal.SIGALRM, interrupt)
+with robust_streams():
+    for i in range(3000):
+        try:
+            signal.setitimer(signal.ITIMER_REAL, 1e-6 * (1 + i % 100))
+            print(f"{i}.", end="", flush=True)
+            signal.setitimer(signal.ITIMER_REAL, 0)
+        except KeyboardInterrupt:
+            pass
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
+    told = done.stdout.split(b".")
+    assert len(told) > 1000
+    assert len(set(told)) == len(told)
+
+
 def test_a_terminal_obeys_progress_bars_alone(tmp_path):
     """Both streams are one terminal, as at a desk."""
     ours, theirs = pty.openpty()
