@@ -213,10 +213,13 @@ class Decoder(nn.Module):
     def light_positions(self, code: Tensor) -> Tensor:
         """Return where lights are, world frame, scene units: (B, z) -> (B, lights, 3).
 
-        Untrained, they are near the corner of the room's open side.
+        They stay above the floor and before both walls, as a room whose lights all lie behind what
+        they light is dark, and nothing would bring them back. Untrained, they are near (1, 1, 1).
         """
         assert self.lights is not None, "lights are told"
-        return 1 + _full(self.lights(code)).view(len(code), -1, 3)
+        # Adam moves all weights of a sum at once, which would throw the lights about.
+        place = _full(self.lights(code)).view(len(code), -1, 3) / math.sqrt(code.shape[1])
+        return functional.softplus(math.log(math.e - 1) + place)
 
 
 class Critic(nn.Module):

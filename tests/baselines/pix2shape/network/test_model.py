@@ -62,6 +62,7 @@ def test_inferred_lights_are_one_place_in_all_cameras(colourful):
     world = views.scene.light_position @ pose[:, :3, :3].mT + pose[:, None, :3, 3]
     assert not torch.allclose(views.scene.light_position[0], views.scene.light_position[1])
     torch.testing.assert_close(world, model.decoder.light_positions(code))
+    assert (model.decoder.light_positions(100 * code) >= 0).all(), "a light behind a wall"
 
 
 def test_a_material_is_shaded_in_place_of_what_is_told(colourful):
