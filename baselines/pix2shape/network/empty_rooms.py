@@ -43,7 +43,9 @@ def empty_rooms(
         points: where rays meet floor and walls, world frame, (B, 3, S, S).
     """
     origin = world_from_camera[:, :3, 3, None]  # (B, 3, 1)
-    toward = world_from_camera[:, :3, :3] @ rays(size, fov_y_degrees, world_from_camera).flatten(1)
+    ahead = rays(size, fov_y_degrees, world_from_camera).flatten(1)
+    with torch.autocast(ahead.device.type, enabled=False):  # bfloat16 moves walls by 0.01
+        toward = world_from_camera[:, :3, :3] @ ahead
     falling = toward < 0
     steps = torch.where(falling, toward, -1.0)
     leaving = torch.where(falling & (origin > 0), -origin / steps, torch.inf).amin(dim=1)
