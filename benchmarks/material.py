@@ -3,8 +3,9 @@
 A model of `--set material=true` gives each surfel an albedo and Phong's lobe, and one of
 `--set lights=L` says where the lights are. From the first view of each room these are compared with
 the truth, and the image that follows from them with the one that the model saw. Two floors stand
-beside them that know nothing of objects: the means over the test file itself, and, for albedo, the
-image divided by what a white empty room would look like under the true lights.
+beside them that see no object: the means over the test file itself, which for objects are the means
+over their own pixels, and, for albedo, the image divided by what a white empty room would look like
+under the true lights.
 """
 
 from collections import defaultdict
@@ -104,17 +105,21 @@ def errors(found: dict[str, Array]) -> dict[str, list[Array]]:
     """Return each error of each room, (N,), of the model and then of the floors."""
     true, on, k_s = found["true albedo"], found["object"], found["true k_s"]
     divided = np.clip(found["input"] / np.maximum(found["white room"], LEAST), 0, 1)
-    albedo = [
-        ((said - true) ** 2).mean(axis=3)
-        for said in (found["albedo"], true.mean(axis=(0, 1, 2)), divided)
+    middles = [
+        np.average(true, axis=(0, 1, 2), weights=np.broadcast_to(weight[..., None], true.shape))
+        for weight in (np.ones_like(on), on)
     ]
+    albedo, of_objects = (
+        [((said - true) ** 2).mean(axis=3) for said in (found["albedo"], middle, divided)]
+        for middle in middles
+    )
     lobes = [(said - k_s) ** 2 for said in (found["k_s"], (k_s * on).sum() / on.sum())]
     images = [
         (said - found["input"]) ** 2 for said in (found["image"], found["input"].mean(axis=0))
     ]
     rows = {
         "albedo, MSE": [one.mean(axis=(1, 2)) for one in albedo],
-        "albedo of objects, MSE": [_weighted(one, on) for one in albedo],
+        "albedo of objects, MSE": [_weighted(one, on) for one in of_objects],
         "k_s of objects, MSE": [_weighted(one, on) for one in lobes],
         "image, MSE": [one.mean(axis=(1, 2, 3)) for one in images],
     }

@@ -116,9 +116,8 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
 @click.option(
     "--precision",
     type=click.Choice(["32", "bf16"]),
-    default="32",
-    show_default=True,
-    help="Numbers of the networks; losses and the renderer always have 32 bits.",
+    help="Numbers of the networks; losses and the renderer always have 32 bits  [32, or that of the"
+    " run that --resume goes on with].",
 )
 def train(
     data: str,
@@ -135,7 +134,7 @@ def train(
     device: str,
     devices: int | None,
     nodes: int | None,
-    precision: str,
+    precision: str | None,
 ) -> None:
     """Train the model on rooms or questions; weights and checkpoint are written to a folder.
 
@@ -154,7 +153,6 @@ def train(
     here, machines = launch.started_elsewhere()
     devices, nodes = devices or here, nodes or machines
     accelerator = "gpu" if chosen_device(device, devices).type == "cuda" else "cpu"
-    numbers = {"32": "32-true", "bf16": "bf16-mixed"}[precision]
     bar: Any = None
 
     def show(state: Any, losses: dict[str, float]) -> None:
@@ -176,10 +174,11 @@ def train(
             out,
             data,
             None if resume else model_config(config or "compact", **chosen),
-            launch.Machine(accelerator, devices, nodes, numbers, workers, every),
+            launch.Machine(accelerator, devices, nodes, workers, every),
             labels=labels,
             conditional=conditional,
             start=start,
+            precision=precision,
             progress=show,
         )
     except KeyboardInterrupt:

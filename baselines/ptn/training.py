@@ -97,7 +97,7 @@ def train(
             state = checkpoints.load_weights(networks, RECIPE)
             check(not settings, "networks", networks, "no other settings: they have their own")
             _check_task(data, state.card.config)
-            state.card = replace(state.card, labels=labels)
+            state.card = replace(state.card, labels=labels, head=())
         else:
             config = _config(data, settings | {"seed": seed})
             state = checkpoints.new_state(RECIPE, Card(config, labels=labels))

@@ -87,6 +87,7 @@ def train(
         check(
             isinstance(start, str | Path) and not resume, "start", start, "weights, for a new run"
         )
+        checkpoints.check_new(folder)
         state = checkpoints.load_weights(start, RECIPE)
         state.card = replace(state.card, labels=labels)
     else:

@@ -97,7 +97,7 @@ WEIGHTS = {str(weight): f"mutual_information={weight}" for weight in INFORMATION
 STUDIES = {
     "losses": _of_rooms("What each loss brings to rooms (the paper's Table 4)", LOSSES),
     "losses-questions": _of_questions(
-        "What each loss brings to questions of the kind `other`, 200 labels (Table 4)",
+        "What each loss brings to questions of the kind `other`, 200 labels",
         ALL_LOSSES,
         200,
     ),

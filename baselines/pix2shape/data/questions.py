@@ -22,7 +22,8 @@ class QuestionImages(Dataset[dict[str, Any]]):
     """The images of each question, a map-style dataset.
 
     The model is told the lights, the reflectance and the background of each image, as in the
-    paper, and the answer where the file has one. Shapes, cameras and rotations are never read.
+    paper, and the answer where the file has one. Of the camera only its distance is read, in which
+    the places of lights are measured. Shapes, directions of cameras and rotations are never read.
     """
 
     classes: tuple[str, ...] = ()  # as RoomImages has; the networks are told none
@@ -95,6 +96,7 @@ def for_questions(config: ModelConfig, path: str | Path, part: str | None) -> Mo
     check(not config.material, "material", config.material, "false for questions, which tell it")
     check(not config.lights, "lights", config.lights, "0 for questions, which tell them")
     spec = config.networks
+    check(spec.z_view in (0, Z_VIEW), "z view", spec.z_view, f"{Z_VIEW}, for questions")
     check(spec.z > Z_VIEW, "z scene", spec.z, f"{Z_VIEW + 1} or more, for questions")
     with open_questions(path, part) as questions:
         if questions.spec is None:

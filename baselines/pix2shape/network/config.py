@@ -153,6 +153,10 @@ class ModelConfig:
         check(self.temperature > 0, "temperature", self.temperature, "a positive number")
         check(self.hard_negatives >= 0, "hard negatives", self.hard_negatives, "0 or more")
         check(self.easy_negatives >= 0, "easy negatives", self.easy_negatives, "0 or more")
+        negatives = self.hard_negatives + self.easy_negatives
+        check(
+            not self.contrast or negatives > 0, "negatives", negatives, "one above 0, for contrast"
+        )
         check(self.critic_steps >= 1, "critic steps", self.critic_steps, "1 or more")
         check(self.learning_rate > 0, "learning rate", self.learning_rate, "a positive number")
         in_range = len(self.betas) == 2 and all(0 <= beta < 1 for beta in self.betas)

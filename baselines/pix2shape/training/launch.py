@@ -12,6 +12,7 @@ from baselines.pix2shape.training.loop import TrainingError
 from scenegen.common.errors import SpecError
 
 T = TypeVar("T")
+NUMBERS = {"32": "32-true", "bf16": "bf16-mixed"}  # as Lightning Fabric calls them
 STARTED = "LOCAL_WORLD_SIZE"  # set by torchrun, and so by `fabric run`, which calls it
 
 
@@ -20,7 +21,7 @@ class Machine:
     """Where and how training runs; none of this changes what is learned, up to rounding.
 
     Attributes:
-        accelerator, precision: as in Lightning Fabric.
+        accelerator: as in Lightning Fabric.
         devices: processes on each machine, which share every batch; each GPU has its own.
         nodes: machines, on each of which somebody starts the training.
         workers: processes that read the data, for each process that trains.
@@ -30,7 +31,6 @@ class Machine:
     accelerator: str = "auto"
     devices: int = 1
     nodes: int = 1
-    precision: str = "32-true"
     workers: int = 1
     every: int = 500
 
@@ -60,11 +60,14 @@ def is_told_elsewhere(error: Exception) -> bool:
     return isinstance(error, TrainingError)
 
 
-def launched(machine: Machine) -> Fabric:
+def launched(machine: Machine, precision: str = "32") -> Fabric:
     """Return a Fabric whose processes run and have met.
 
     Without torchrun or SLURM, Fabric runs this program again for each further process on this
     machine; so everything before this call happens in each of them.
+
+    Args:
+        precision: of the networks, a key of NUMBERS.
 
     Raises:
         SpecError: torchrun or SLURM started another number of processes.
@@ -77,7 +80,7 @@ def launched(machine: Machine) -> Fabric:
             devices=machine.devices,
             num_nodes=machine.nodes,
             strategy="ddp" if several or torchrun() else "auto",
-            precision=machine.precision,  # type: ignore[arg-type]
+            precision=NUMBERS[precision],  # type: ignore[arg-type]
         )
         if "LT_CLI_USED" not in os.environ:  # under `fabric run` it did so when it was made
             fabric.launch()

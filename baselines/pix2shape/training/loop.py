@@ -54,8 +54,8 @@ def train(
     Raises:
         TrainingError: a loss or a gradient is not finite. The weights are as before the step, but
             the batch statistics are not: go on from a checkpoint.
-        SpecError: no loss is switched on, there are fewer labels, or the processes cannot share a
-            batch evenly.
+        SpecError: no loss is switched on, or none that teaches what the model shall learn; there
+            are fewer labels; or the processes cannot share a batch evenly.
         LostProcessError: another process that trains with this one ended.
     """
     config, model = state.model.config, state.model
@@ -127,6 +127,10 @@ def check_request(
     weights = (config.adversarial, config.reconstruction, config.code_reconstruction)
     if not any((*weights, config.consistency, config.depth, config.matching, compared)):
         raise SpecError("losses", "every weight at 0", "one above 0")
+    for name in ("material", "lights"):
+        if getattr(config, name) and not any(weights):
+            expected = "a loss of images, such as reconstruction, which alone teaches it"
+            raise SpecError(name, "every weight of such losses at 0", expected)
 
 
 @contextmanager

@@ -26,15 +26,17 @@ from baselines.pix2shape.training.loop import check_request, train
 from baselines.pix2shape.training.state import State, load_state, new_state, save_state
 from baselines.pix2shape.training.steps import draw
 from baselines.pix2shape.weights.bundled import open_weights
-from baselines.pix2shape.weights.storage import Card, save_weights
+from baselines.pix2shape.weights.storage import PRECISIONS, Card, load_card, save_weights
 from iqtt.files.reader import open_questions
-from scenegen.common.errors import SpecError
+from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.records import check
 from scenegen.rooms.preview import save_picture
 from scenegen.rooms.reader import RoomsFile
 
 PICTURE, LOGS = "pictures.png", "logs"
 LOG_EVERY = 20  # iterations
+OF_NETWORKS = ("networks", "opacity", "material", "lights", "depth_middle", "depth_reach")
+Begun = tuple[State, Card, Source, QuestionImages | None]
 PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and batch size for that
 
 
@@ -47,6 +49,7 @@ def train_run(
     labels: int = 0,
     conditional: bool = False,
     start: str | Path | None = None,
+    precision: str | None = None,
     progress: Callable[[State, dict[str, float]], Any] = lambda state, losses: None,
 ) -> Path | None:
     """Train a model, from the start or from the folder's checkpoint.
@@ -55,20 +58,25 @@ def train_run(
     writes and reports progress. Returns the path of the weights; None in the others.
 
     Args:
-        config: None goes on from the checkpoint, with its labels and classes.
+        config: None goes on from the checkpoint, with its labels, classes and precision.
         labels: number of answers that training on questions may use.
         conditional: whether the networks are told the class of a room's only object.
         start: weights of an earlier run with the same networks, to begin a new run from.
+        precision: of the networks, "32" or "bf16"; None for 32, or for that of the checkpoint.
 
     Raises SpecError where configuration and data do not fit; FileExistsError where a new run finds
     a checkpoint; TrainingError; LostProcessError where another process ended; FileFormatError,
     OSError.
     """
     folder = Path(folder)
-    state, card, source, labelled = _begun(folder, data, config, labels, conditional, start)
+    if config is None:
+        state, card, source, labelled = _resumed(folder, data, precision)
+    else:
+        how = labels, conditional, start, precision or PRECISIONS[0]
+        state, card, source, labelled = _begun(folder, data, config, *how)
     labels = card.labels
     check_request(card.config, source, labelled, labels, machine.devices * machine.nodes)
-    fabric = launched(machine)
+    fabric = launched(machine, card.precision)
     check_agreement(fabric, "data, settings or checkpoint", (card, state.iteration))
     first, last = fabric.is_global_zero, card.config.iterations
     if first:
@@ -95,26 +103,32 @@ def train_run(
     finally:
         if logs is not None:
             logs.close()
-    if first and not (folder / WEIGHTS).exists():
+    if first and not _complete(folder / WEIGHTS, last):
         _save_weights(folder, state.model, card, source)
     summed(torch.zeros(1, device=fabric.device))  # wait for the first process, which writes
     return folder / WEIGHTS if first else None
 
 
+def _resumed(folder: Path, data: str | Path, precision: str | None) -> Begun:
+    """Return the state of the folder's checkpoint, with its card and its data."""
+    state, card = load_state(folder)
+    expected = f"{card.precision}, as the run began with"
+    check(precision in (None, card.precision), "precision", precision, expected)
+    source, labelled = _sources(data, card.config, card.labels)
+    check_data(data, _fingerprint(source, labelled), card.fingerprint)
+    return state, card, source, labelled
+
+
 def _begun(
     folder: Path,
     data: str | Path,
-    config: ModelConfig | None,
+    config: ModelConfig,
     labels: int,
     conditional: bool,
     start: str | Path | None,
-) -> tuple[State, Card, Source, QuestionImages | None]:
-    """Return a new run's state, or that of the folder's checkpoint, with its card and its data."""
-    if config is None:
-        state, card = load_state(folder)
-        source, labelled = _sources(data, card.config, card.labels)
-        check_data(data, _fingerprint(source, labelled), card.fingerprint)
-        return state, card, source, labelled
+    precision: str,
+) -> Begun:
+    """Return a new run's state, with its card and its data."""
     check_new(folder)
     config = _suited(config, data, labels, conditional)
     source, labelled = _sources(data, config, labels)
@@ -123,11 +137,12 @@ def _begun(
         data=source.spec.to_json(),
         fingerprint=_fingerprint(source, labelled),
         labels=labels,
+        precision=precision,
         classes=source.classes if config.networks.classes else (),
     )
     state = new_state(config)
     if start is not None:
-        _begin_from(start, state.model)
+        card = _begin_from(start, state.model, card)
     return state, card, source, labelled
 
 
@@ -147,6 +162,14 @@ def _match(
             )
         summed(torch.zeros(1, device=fabric.device))
     source.learn_from(relief.numpy(), matched.numpy())
+
+
+def _complete(weights: Path, last: int) -> bool:
+    """Return whether the weights of the last iteration are there; the card is written last."""
+    try:
+        return weights.exists() and load_card(weights).iteration == last
+    except (OSError, FileFormatError):
+        return False
 
 
 def _save_weights(folder: Path, model: Pix2Shape, card: Card, source: Source) -> None:
@@ -186,13 +209,20 @@ def _sources(
     return QuestionImages(data, "unlabeled", config), labelled
 
 
-def _begin_from(start: str | Path, model: Pix2Shape) -> None:
-    """Give a model the encoder and decoder of weights. Raises SpecError, and as `open_weights`."""
-    earlier, card = open_weights(start)
-    same = card.config.networks == model.config.networks
-    check(same, "start", start, "weights of the same networks as this run's")
+def _begin_from(start: str | Path, model: Pix2Shape, card: Card) -> Card:
+    """Give a model the encoder and decoder of weights; return the card, which tells their labels.
+
+    Raises SpecError, and as `open_weights`.
+    """
+    earlier, its_card = open_weights(start)
+    for name in OF_NETWORKS:
+        its, own = getattr(its_card.config, name), getattr(card.config, name)
+        check(its == own, "start", start, f"weights of the same {name} as this run's, {own}")
+    same = its_card.classes == card.classes
+    check(same, "start", start, f"weights of the same classes as this run's, {card.classes}")
     for name in ("encoder", "decoder"):
         getattr(model, name).load_state_dict(getattr(earlier, name).state_dict())
+    return replace(card, earlier_labels=its_card.labels + its_card.earlier_labels)
 
 
 def _fingerprint(source: Source, labelled: QuestionImages | None) -> str:

@@ -34,6 +34,7 @@ Array = NDArray[Any]
 BATCH = 64  # images at a time
 METHOD = "pix2shape"
 TOLD = "told: one image of each scene, the cameras, and where the empty room's floor and walls are"
+TAUGHT = "told: in training, the lights of its images and the answers of {} questions"
 Progress = Callable[[int, int], Any]  # rows done, rows in all
 
 
@@ -56,11 +57,14 @@ def predict_file(
 
     Raises as `open_weights`, `predict_rooms` and `answer_file`.
     """
-    model, _ = open_weights(weights)
+    model, card = open_weights(weights)
     model.to(chosen_device(device))
     check_writable(Path(out), overwrite)
-    write = answer_file if is_question_file(data) else predict_rooms
-    write(model, data, out, run=run, overwrite=overwrite, progress=progress)
+    how: dict[str, Any] = {"run": run, "overwrite": overwrite, "progress": progress}
+    if is_question_file(data):
+        answer_file(model, data, out, labels=card.labels + card.earlier_labels, **how)
+    else:
+        predict_rooms(model, data, out, **how)
 
 
 def chosen_device(name: str, count: int = 1) -> torch.device:
@@ -127,6 +131,7 @@ def answer_file(
     data: str | Path,
     out: str | Path,
     *,
+    labels: int = 0,
     run: str = "",
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
@@ -134,6 +139,9 @@ def answer_file(
     """Write answers to the questions of a file, from images alone.
 
     An answer's score is minus the distance of its z_scene from the reference's, as in the paper.
+
+    Args:
+        labels: answers that training was given; the submission's notes tell this.
 
     Raises SpecError where the model does not suit questions; else as `iqtt.QuestionsFile`.
     """
@@ -154,7 +162,9 @@ def answer_file(
             scores.append(-distance.cpu().double().numpy())
             progress(len(rows), len(questions))
     found = np.concatenate(scores)
-    write_answers(out, data, method=METHOD, scores=found, run=run, overwrite=overwrite)
+    method = f"{METHOD}-views" if spec.encoder == "polar" else METHOD
+    how: dict[str, Any] = {"method": method, "run": run, "overwrite": overwrite}
+    write_answers(out, data, scores=found, notes=TAUGHT.format(labels), **how)
 
 
 def enlarged(depth: Tensor, fov_y_degrees: float, size: int) -> tuple[Tensor, Tensor]:

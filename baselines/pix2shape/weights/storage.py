@@ -23,6 +23,7 @@ FORMAT_VERSION = 1
 KEPT = ("encoder", "decoder", "prior")  # the networks that predicting and sampling need
 PARTS = (*KEPT, "critic", "statistics")
 LARGEST_JSON = 1_000_000  # bytes
+PRECISIONS = ("32", "bf16")
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,8 @@ class Card:
         data: spec of the training file, as JSON.
         fingerprint: that of the training file.
         labels: number of answers that training on questions was given.
+        earlier_labels: as many as the runs were given whose weights this one began from, added up.
+        precision: of the networks in training, one of PRECISIONS.
         classes: names of the object classes, in order, of a conditional model.
         seconds: duration of training.
     """
@@ -44,6 +47,8 @@ class Card:
     data: str = ""
     fingerprint: str = ""
     labels: int = 0
+    earlier_labels: int = 0
+    precision: str = "32"
     classes: tuple[str, ...] = ()
     seconds: float = 0.0
     format_version: int = FORMAT_VERSION
@@ -52,6 +57,8 @@ class Card:
         normalise(self)
         version, known = self.format_version, self.config.networks.classes
         check(version == FORMAT_VERSION, "format version", version, str(FORMAT_VERSION))
+        expected = f"one of {', '.join(PRECISIONS)}"
+        check(self.precision in PRECISIONS, "precision", self.precision, expected)
         told = len(self.classes)
         check(told == known, "classes", told, f"{known}, as the networks have")
 

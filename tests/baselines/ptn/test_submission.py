@@ -82,10 +82,12 @@ def test_answers_follow_labels_and_names(questions, tmp_path):
     train_file, test_file = (questions / f"iqtt-{name}.h5" for name in ("train", "test"))
     weights = train(train_file, tmp_path / "none", **TINY, iterations=2)
     told = train(train_file, tmp_path / "told", networks=weights, labels=4)
+    untold = train(train_file, tmp_path / "untold", networks=told)
     scores = {}
     for name, how in (
         ("volumes", {"weights": weights}),
         ("told", {"weights": told}),
+        ("untold", {"weights": untold}),
         ("codes", {"weights": told, "compare": "codes"}),
     ):
         write_submission(test_file, tmp_path / f"{name}.h5", **how)
@@ -93,6 +95,7 @@ def test_answers_follow_labels_and_names(questions, tmp_path):
             scores[name] = file["scores"][:]
     assert scores["codes"].max() <= 0
     assert not np.allclose(scores["volumes"], scores["told"])
+    assert np.array_equal(scores["volumes"], scores["untold"]), "its card says 0 labels"
     with pytest.raises(SpecError):
         train(train_file, tmp_path / "many", **TINY, labels=5)
 

@@ -138,6 +138,8 @@ def test_questions_are_trained_on_and_labels_change_the_head_alone(split, tmp_pa
     assert direct.read_bytes() != first.read_bytes()
     again = train(data, tmp_path / "c", resume=True)
     assert load_weights(again, RECIPE).card.labels == 4
+    with pytest.raises(FileExistsError):
+        train(data, tmp_path / "c", start=first)
 
 
 @pytest.mark.parametrize(

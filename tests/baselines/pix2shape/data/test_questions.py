@@ -182,5 +182,7 @@ def test_the_configuration_for_questions(train_path):
         depth = file["truth/unlabeled/depth"][:] * scales(file)[:, None, None, None]
         depth /= config.depth_middle
     assert 1 - config.depth_reach < np.nanmin(depth) < np.nanmax(depth) < 1 + config.depth_reach
-    with pytest.raises(SpecError, match="z scene"):
-        for_questions(tiny(z_scene=10), train_path, "labeled")
+    for change in ({"z_scene": 10}, {"z_view": 32}):
+        with pytest.raises(SpecError) as error:
+            for_questions(tiny(**change), train_path, "labeled")
+        assert error.value.where.replace(" ", "_") in change

@@ -38,6 +38,7 @@ def test_json_both_ways(name: str) -> None:
         ({"batch": 1}, "batch: found 1"),
         ({"critic_steps": 0}, "critic steps: found 0"),
         ({"learning_rate": 0.0}, "learning rate: found 0.0"),
+        ({"contrast": 1.0, "question_batch": 8, "easy_negatives": 0.0}, "negatives: found 0.0"),
         ({"layers": 3}, "unknown field 'layers'"),
     ],
 )

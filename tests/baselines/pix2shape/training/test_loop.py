@@ -207,6 +207,15 @@ def test_views_of_questions_are_not_compared(train_questions, fabric):
         run(new_state(config), source, fabric)
 
 
+@pytest.mark.parametrize("change", [{"material": True}, {"lights": 3}])
+def test_materials_and_lights_are_learned_from_images_alone(change, rooms_path, fabric):
+    blind = {"adversarial": 0.0, "code_reconstruction": 0.0, "reconstruction": 0.0}
+    config = replace(TINY, **blind, consistency=1.0, **change)
+    with pytest.raises(SpecError) as error:
+        run(new_state(config), RoomImages(rooms_path, config), fabric)
+    assert error.value.where in change
+
+
 def test_the_generators_step_leaves_the_critic_alone(rooms_path, fabric, monkeypatch):
     config = replace(TINY, mutual_information=0.1, networks=replace(TINY.networks, z_view=2))
     state, before = new_state(config), {}

@@ -121,6 +121,31 @@ def test_a_kill_before_the_first_checkpoint(rooms_path, folder, unbroken):
     assert same(folder / "weights.safetensors", unbroken / "weights.safetensors")
 
 
+def test_a_kill_between_the_last_checkpoint_and_its_weights(rooms_path, folder, unbroken):
+    with pytest.raises(Killed):
+        train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(3))
+    for end in ("safetensors", "json"):
+        shutil.copy(unbroken / f"checkpoint.{end}", folder)
+    assert load_card(folder / "weights.safetensors").iteration == 2
+    train_run(folder, rooms_path, None, HERE)
+    for end in ("safetensors", "json"):
+        name = f"weights.{end}"
+        assert (folder / name).read_bytes() == (unbroken / name).read_bytes(), name
+
+
+def test_a_run_goes_on_in_the_precision_that_it_began_with(rooms_path, folder, unbroken):
+    whole = train_run(folder.with_name("whole"), rooms_path, CONFIG, HERE, precision="bf16")
+    assert not same(whole, unbroken / "weights.safetensors")
+    how: dict[str, Any] = {"precision": "bf16", "progress": killed_at(3)}
+    with pytest.raises(Killed):
+        train_run(folder, rooms_path, CONFIG, HERE, **how)
+    with pytest.raises(SpecError) as error:
+        train_run(folder, rooms_path, None, HERE, precision="32")
+    assert (error.value.where, error.value.found) == ("precision", "32")
+    assert same(train_run(folder, rooms_path, None, HERE), whole)
+    assert load_card(whole).precision == "bf16"
+
+
 def test_a_finished_run_is_neither_trained_on_nor_replaced(rooms_path, folder, unbroken):
     shutil.copytree(unbroken, folder)
     (folder / "weights.safetensors").unlink()
@@ -277,7 +302,32 @@ def test_a_run_begins_from_the_networks_of_another(rooms_path, unbroken, folder)
     assert len(parts) > 20
     for name in parts:
         assert torch.allclose(begun[0][name], stored[name].float(), atol=1e-6), name
-    wider = replace(CONFIG, networks=replace(CONFIG.networks, width=0.06))
-    with pytest.raises(SceneGenError) as error:
-        train_run(folder.with_name("wider"), rooms_path, wider, HERE, start=start)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"networks": replace(CONFIG.networks, width=0.06)},
+        {"depth_reach": 0.3},
+        {"depth_middle": 1.6},
+        {"lights": 3},
+        {"material": True},
+    ],
+    ids="-".join,
+)
+def test_a_run_begins_from_models_of_its_own_kind_alone(change, rooms_path, unbroken, folder):
+    start = unbroken / "weights.safetensors"
+    with pytest.raises(SpecError) as error:
+        train_run(folder, rooms_path, replace(CONFIG, **change), HERE, start=start)
     assert error.value.where == "start"
+    assert not folder.exists()
+
+
+def test_labels_of_earlier_runs_are_not_forgotten(train_questions, tmp_path):
+    config, start = replace(CONFIG, iterations=1), None
+    for labels, earlier in ((2, 0), (1, 2), (0, 3)):
+        how: dict[str, Any] = {"labels": labels, "start": start}
+        folder = tmp_path / f"run-{labels}"
+        start = train_run(folder, train_questions, config, HERE, **how)
+        card = load_card(start)
+        assert (card.labels, card.earlier_labels) == (labels, earlier)

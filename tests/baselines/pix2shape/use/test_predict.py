@@ -205,6 +205,15 @@ def test_models_that_do_not_suit_are_refused(data, settings, words, truths, tmp_
     assert not (tmp_path / "p.h5").exists()
 
 
+def test_answers_say_what_training_was_told(truths, tmp_path):
+    config = tiny(encoder="polar", camera=False, spherical=True)
+    weights = written(tmp_path / "w.safetensors", config, labels=2, earlier_labels=3)
+    predict_file(weights, truths.iqtt, tmp_path / "p.h5")
+    with open_predictions(tmp_path / "p.h5") as found:
+        assert found.method == "pix2shape-views"
+        assert "answers of 5 questions" in found.notes
+
+
 def test_a_file_is_replaced_only_when_told(rooms_path, tmp_path, monkeypatch):
     weights, out = written(tmp_path / "w.safetensors", tiny(), **told(rooms_path)), tmp_path / "p"
     out.write_text("mine")
