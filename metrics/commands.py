@@ -132,19 +132,18 @@ def score(
     ):
         chosen = Settings(**settings, cluster=cluster)
         found = score_files(submissions, truth, chosen, bar.update)
-    page = None
-    if html_path:
-        from metrics.report.page import html_report
-
-        truth_path, runs = Path(found.meta.truth_path), [Path(path) for path in submissions]
-        page = html_report(found, truth_path, runs, others)
     if json_path:
         write_scores(found, json_path, overwrite)
     if csv_path:
         write_csv(found, csv_path, overwrite)
-    if html_path and page:
-        write_text(html_path, page, overwrite)
-    click.echo(text_report(found, markdown))
+    try:
+        if html_path:
+            from metrics.report.page import html_report
+
+            truth_path, runs = Path(found.meta.truth_path), [Path(path) for path in submissions]
+            write_text(html_path, html_report(found, truth_path, runs, others), overwrite)
+    finally:  # a page that cannot be made loses no score
+        click.echo(text_report(found, markdown))
 
 
 @click.command(epilog=EXAMPLE + "bench validate predictions.h5 --truth rooms.h5")
@@ -232,17 +231,17 @@ def compare(
         raise click.UsageError("--truth and --predictions are for the page: give --html, too")
     files = [read_scores(path) for path in scores]
     found = compare_files(files, metrics or None, **settings)
-    page = None
-    if html_path:
-        from metrics.comparison.page import html_comparison
-
-        given = Path(truth) if truth else None
-        page = html_comparison(found, files, given, [Path(path) for path in predictions])
     if json_path:
         write_text(json_path, to_json(found), overwrite)
-    if html_path and page:
-        write_text(html_path, page, overwrite)
-    click.echo(text_report(found, markdown))
+    try:
+        if html_path:
+            from metrics.comparison.page import html_comparison
+
+            given = Path(truth) if truth else None
+            page = html_comparison(found, files, given, [Path(path) for path in predictions])
+            write_text(html_path, page, overwrite)
+    finally:
+        click.echo(text_report(found, markdown))
 
 
 @click.command(
@@ -305,8 +304,10 @@ def leaderboard(
     from metrics.leaderboard import text
     from metrics.leaderboard.ranking import leaderboard as rank
     from metrics.score_file import read_scores
-    from scenegen.common.new_file import write_text
+    from scenegen.common.new_file import check_writable, write_text
 
+    if out is not None:
+        check_writable(Path(out), overwrite)
     files = [read_scores(path) for path in scores]
     if recheck:
         from metrics.leaderboard.recheck import recheck as recompute
@@ -353,6 +354,7 @@ def view(
     port: int,
     host: str | None,
     public: bool,
+    names: tuple[str, ...],
     open_browser: bool,
     **meshes: Any,
 ) -> None:
@@ -370,7 +372,7 @@ def view(
     from scenegen.viewing.geometry import shapes_of
     from scenegen.viewing.server import listening_host, serve, started
 
-    where = listening_host(host, public), port
+    where = listening_host(host, public), port, names
     with open_predictions(submission) as opened:
         predictions = require_rooms(opened)
         with RoomsFile(find_truth(predictions, truth).path) as rooms:

@@ -88,12 +88,14 @@ def check_picture(path: str | Path, animated: bool, overwrite: bool) -> None:
 def save_pictures(frames: Sequence[Image.Image], path: str | Path, overwrite: bool = False) -> None:
     """Write one picture, or several as an animation that plays forwards and backwards.
 
-    Raises SpecError for a file name with another ending, OSError for the path.
+    Raises SpecError for a file name with another ending, or of a format whose pictures cannot be so
+    large, and OSError for the path.
     """
     check_picture(path, len(frames) > 1, overwrite)
     if len(frames) == 1:
         preview.save_picture(frames[0], path, overwrite)
         return
     rest, pause = [*frames[1:], *frames[-2:0:-1]], FRAME_MILLISECONDS
+    preview.check_picture_size(frames[0], Path(path))
     with written_beside(path, overwrite) as temporary:
         frames[0].save(temporary, save_all=True, append_images=rest, duration=pause, loop=0)

@@ -30,7 +30,7 @@ _HEAD = (
     "least shown",
     "verdict",
 )
-_LISTS = {"best": "gain most", "median": "in the middle", "worst": "lose most"}
+_LISTS = {"best": "the best", "median": "in the middle", "worst": "the worst"}
 
 
 class AtHandError(SceneGenError):
@@ -137,7 +137,10 @@ def _pictures(
     truth: Path | None,
     submissions: Sequence[Path],
 ) -> Iterator[tuple[str, list[Pictured]]]:
-    """Yield the scenes in which the first method with a file at hand gains and loses most."""
+    """Yield the scenes in which the first method with a file at hand gains and loses most.
+
+    Raises OSError and FileFormatError where a file cannot be read or lacks a row.
+    """
     name = next((d.metric for d in comparison.differences), shown_score(files[0]))
     where, ours = truth_at_hand(files[0], truth), submission_at_hand(files[0], submissions)
     others = ((i, submission_at_hand(files[i], submissions)) for i in range(1, len(files)))
@@ -161,8 +164,10 @@ def _pictures(
             told = f"{metric(name).title} {apart[entry]:+.4g}"
             named = entry_name(reference, int(orders[0][entry]))
             items[i] = Pictured(named, told, items[i].pictures)
-        scores = f"{len(entries)} scenes by {metric(name).title}"
-        yield f"{scores}, {_LISTS[title]}: {label} against {comparison.reference}", items
+        scenes = f"{len(entries)} scenes" if len(entries) > 1 else "1 scene"
+        by = f"by the difference in {metric(name).title}"
+        against = f"{label} against {comparison.reference}"
+        yield f"{scenes} {by}, {_LISTS[title]}: {against}", items
 
 
 def _side_by_side(one: Pictured, two: Pictured, labels: tuple[str, str]) -> Pictured:

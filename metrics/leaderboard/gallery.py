@@ -36,7 +36,7 @@ def _pictures(truth: Path, at_hand: Sequence[tuple[ScoreFile, str, Path]]) -> li
     with ExitStack() as stack:
         rooms = stack.enter_context(RoomsFile(truth))
         opened = [stack.enter_context(open_predictions(path)) for *_, path in at_hand]
-        shared = set(opened[0].rows.tolist()).intersection(*(p.rows.tolist() for p in opened))
+        shared = set(range(len(rooms))).intersection(*(p.rows.tolist() for p in opened))
         first = at_hand[0][0]
         return [
             Pictured(entry_name(first, entry), "", _side_by_side(rooms, opened, at_hand, row))
@@ -61,10 +61,11 @@ def _side_by_side(
     at_hand: Sequence[tuple[ScoreFile, str, Path]],
     row: int,
 ) -> list[tuple[str, str]]:
-    shown: dict[str, str] = {}
+    shown: list[tuple[str, str]] = []
     for predictions, (_, label, _) in zip(opened, at_hand, strict=True):
         assert isinstance(predictions, RoomPredictions)
         place = int(np.flatnonzero(predictions.rows == row)[0])
         urls = dict(room_pictures(rooms, predictions, row, place))
-        shown = {IMAGE: urls[IMAGE], TRUE_DEPTH: urls[TRUE_DEPTH], **shown, label: urls[DEPTH]}
-    return list(shown.items())
+        shown = shown or [(name, urls[name]) for name in (IMAGE, TRUE_DEPTH)]
+        shown.append((f"depth of {label}", urls[DEPTH]))
+    return shown

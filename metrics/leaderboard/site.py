@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from metrics.comparison.report import difference_cells, difference_head
+from metrics.leaderboard.floors import SKILL_OF
 from metrics.leaderboard.gallery import gallery
 from metrics.leaderboard.paired_tests import compared_with_first, marked
 from metrics.leaderboard.ranking import Paper, leaderboard
@@ -40,7 +41,9 @@ class Section:
 
     Attributes:
         title: of the test set.
-        made: how its truth was made, and how it is called; may be empty.
+        made: how its truth was made, or how it is called; may be empty.
+        lead: what the first row is, such as "leads", and its first cell: value, what follows it,
+            and of what.
         rankings: tables that rank, or belong to one.
         groups: tables by view angle or kind of question.
         curves: by view angle, of the comparable methods.
@@ -51,6 +54,7 @@ class Section:
 
     title: str
     made: str
+    lead: tuple[str, str, str, str]
     rankings: Sequence[Table]
     groups: Sequence[Table]
     curves: Sequence[Chart]
@@ -134,6 +138,7 @@ def _sections(tables: Sequence[Table], links: Mapping[int, str]) -> Iterator[Sec
         yield Section(
             title=members[0].title,
             made=_how_made(files[0]),
+            lead=_lead(members[0]),
             rankings=rankings,
             groups=[table for table in linked if table not in rankings],
             curves=list(view_curves(ranked, named)) if ranked and ranked[0].task == "rooms" else (),
@@ -147,7 +152,6 @@ def _sections(tables: Sequence[Table], links: Mapping[int, str]) -> Iterator[Sec
 
 def _is_score(key: str) -> bool:
     """Return whether a column is of a score or its skill, and not of an angle or a kind."""
-    from metrics.leaderboard.floors import SKILL_OF
     from metrics.scoring.metric_names import UnknownMetricError
 
     try:
@@ -162,12 +166,33 @@ def _linked(table: Table, links: Mapping[int, str]) -> Table:
     return replace(table, rows=tuple(rows))
 
 
+def _lead(table: Table) -> tuple[str, str, str, str]:
+    """Return what the first row of a ranking is, and its first cell, as in `Section.lead`."""
+    row, cell = table.rows[0], table.rows[0].cells[0]
+    assert row.file is not None
+    firsts = sum(other.rank == "1" for other in table.rows)
+    if not row.rank:
+        what = "is not ranked"
+    elif firsts > 1:
+        what = f"is one of {firsts} in the first place"
+    else:
+        what = "leads" if len(_files(table)) > 1 else "alone"
+    value, _, told = answer(row.file)
+    known = table.keys[0].startswith(SKILL_OF) and value == cell.value
+    return what, cell.value, cell.rest.strip(), told if known else table.columns[0]
+
+
 def _how_made(file: ScoreFile) -> str:
-    """Return preset and command of a truth, as far as the benchmark or the truth itself tells."""
+    """Return preset and command of a test set of the benchmark, and of others the preset alone.
+
+    The command that a truth records may name the seed, from which anyone can make the right answers
+    and depths of a test set that is withheld.
+    """
     known = known_test(file.meta.truth_digest)
-    command = known.command if known else _recorded_command(file)
-    name = plain(Path(file.meta.truth_path).name)
-    return f"{preset_of(command)}; {printable(command)}" if command else name
+    if known:
+        return f"{preset_of(known.command)}; {printable(known.command)}"
+    command = _recorded_command(file)
+    return preset_of(command) if command else plain(Path(file.meta.truth_path).name)
 
 
 def preset_of(command: str) -> str:

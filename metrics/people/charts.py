@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from markupsafe import Markup, escape
 
-from metrics.report.axes import Scale, scale
+from metrics.report.axes import Scale, apart, scale
 
 Svg = Markup  # what a page shows without escaping it again
 WIDTH, HEIGHT = 360, 170
@@ -15,21 +15,27 @@ LEFT, RIGHT, TOP, BOTTOM = 46, 28, 24, 34
 def bars(counts: Mapping[str, float], title: str, unit: str) -> Svg:
     """Return a chart with a bar for each name; `unit` says what the names are.
 
-    What is above each bar is its number, so that the chart needs no other axis.
+    What is above each bar is its number, so that the chart needs no other axis. Names and numbers
+    that would touch each other are left out; the title of each bar has both.
     """
     if not counts:
         return Svg()
     width = (WIDTH - LEFT - RIGHT) / len(counts)
     y = scale(0, max(*counts.values(), 1e-300), HEIGHT - BOTTOM, TOP + 12)
+    numbers = [f"{v:,.0f}" if v >= 100 else f"{v:.3g}" for v in counts.values()]
+    middles = [LEFT + (i + 0.5) * width for i in range(len(counts))]
+    named, numbered = (set(apart(middles, words)) for words in (list(counts), numbers))
     shown: list[str] = []
     for i, (name, value) in enumerate(counts.items()):
-        left, above = LEFT + i * width, f"{value:.3g}" if value else ""
+        left = LEFT + i * width
         place = f'x="{left + 1:.1f}" y="{y(value):.1f}" width="{max(width - 2, 1):.1f}"'
         shown += (
             f'<rect class="bar" {place} height="{y(0) - y(value):.1f}">'
-            f"<title>{escape(name)}: {value:.4g}</title></rect>",
-            _text(left + width / 2, HEIGHT - BOTTOM + 14, name, "middle"),
-            _text(left + width / 2, y(value) - 3, above, "middle"),
+            f"<title>{escape(name)}: {numbers[i]}</title></rect>",
+            _text(middles[i], HEIGHT - BOTTOM + 14, name, "middle") if i in named else "",
+            _text(middles[i], y(value) - 3, numbers[i], "middle")
+            if value and i in numbered
+            else "",
         )
     shown.append(_text((LEFT + WIDTH - RIGHT) / 2, HEIGHT - 4, unit, "middle"))
     return _chart(title, "".join(shown))

@@ -20,8 +20,8 @@ option = partial(click.option, show_default=True)
 @click.argument("file", type=InputPath(), required=False, metavar="[SPLIT.h5]")
 @option("--db", type=InputPath(), default="answers.db",
         help="SQLite file that keeps the answers; it is made, or taken up again.")
-@option("--host", default="localhost", help="Where to listen; others than this machine need"
-        " --public.")
+@click.option("--host", help="Where to listen  [default: localhost, or with --public all addresses"
+              " of this machine].")
 @option("--port", type=click.IntRange(0, 65535), default=8000, help="Port; 0 takes a free one.")
 @option("--public", is_flag=True, help="Let others on the network reach the quiz; the connection is"
         " not encrypted.")
@@ -67,7 +67,7 @@ def quiz(
 
 
 def _serve(
-    file: str, db: str, host: str, port: int, public: bool, names: tuple[str, ...],
+    file: str, db: str, host: str | None, port: int, public: bool, names: tuple[str, ...],
     questions: int, calibrations: int, participants: int, seed: int, part: str | None,
     contact: str, **_: Any,
 ) -> None:
@@ -80,6 +80,7 @@ def _serve(
     from metrics.people.references import compare
     from scenegen.common.web_hosts import hosts_of
 
+    host = host or ("0.0.0.0" if public else "localhost")
     with (
         Study(file, part, questions, calibrations, seed) as study,
         listen(host, port, public) as listening,

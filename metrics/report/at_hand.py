@@ -5,6 +5,7 @@ only those of the recorded content: a submission of the same SHA-256, a truth of
 """
 
 import hashlib
+import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -22,7 +23,7 @@ def truth_at_hand(file: ScoreFile, given: Path | None = None) -> Path | None:
     """
     places = [given] if given is not None else _places(file, file.meta.truth_path)
     for path in places:
-        if path.is_file() and _truth_digest(file, path) == file.meta.truth_digest:
+        if os.path.isfile(path) and _truth_digest(file, path) == file.meta.truth_digest:
             return path
     return None
 
@@ -35,7 +36,7 @@ def submission_at_hand(file: ScoreFile, given: Sequence[Path] = ()) -> Path | No
     """
     first = file.meta.submissions[0]
     for path in (*given, *_places(file, first.path)):
-        if path.is_file() and _sha256(path) == first.sha256:
+        if os.path.isfile(path) and _sha256(path) == first.sha256:
             return path
     return None
 

@@ -174,7 +174,7 @@ def kinds_table(scores: ScoreFile, grouping: str, beside: Sequence[ScoreFile] = 
     That is chance; by kind of question also skill, the best floor without 3D, and people, whose
     questions were all of one kind.
     """
-    answers = scores.meta.counts.get("answers", 3)
+    answers = scores.meta.counts["answers"]
     by_kind = grouping == "by_distractor"
     own, *others = labels_beside(scores, beside)
     head = ["", own, "from 0 to 1", "questions", "chance"]

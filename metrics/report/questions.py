@@ -1,5 +1,6 @@
 """Questions of a report: some that were answered rightly, and some that were not, with pictures."""
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from metrics.report.pictures import data_url
 from metrics.report.scenes import SHOWN, Pictured
 from metrics.scoring.records import ScoreFile
 from metrics.submissions.reader import QuestionPredictions, open_predictions
+from scenegen.common.errors import SceneGenError
 from scenegen.rooms.preview import srgb_bytes
 
 LETTERS = "ABC"
@@ -25,7 +27,7 @@ def questions_beside(truth: Path) -> Path | None:
     where neither lies there.
     """
     beside = truth.with_name(truth.stem.removesuffix(ANSWERS_ENDING) + truth.suffix)
-    return next((path for path in (beside, truth) if path.is_file()), None)
+    return next((path for path in (beside, truth) if os.path.isfile(path)), None)
 
 
 def chosen_questions(right: NDArray[np.bool_], most: int = SHOWN) -> dict[str, list[int]]:
@@ -43,8 +45,8 @@ def pictured_questions(
 ) -> list[tuple[str, list[Pictured]]]:
     """Return questions that the first run answers rightly and wrongly, with titles and pictures.
 
-    Nothing is returned where no file beside the truth holds the pictures. Raises OSError and
-    FileFormatError where a file cannot be read.
+    Nothing is returned where no file beside the truth holds the pictures, or where the one of that
+    name is of another split. Raises OSError and FileFormatError where a file cannot be read.
     """
     from iqtt.files.reader import QuestionsFile
 
@@ -52,7 +54,13 @@ def pictured_questions(
     if images is None or not _has_images(images):
         return []
     joined = None if images.samefile(truth) else truth
-    with QuestionsFile(images, answers=joined) as questions, open_predictions(submission) as given:
+    try:
+        questions = QuestionsFile(images, answers=joined)
+    except SceneGenError:
+        if joined is None:
+            raise
+        return []
+    with questions, open_predictions(submission) as given:
         assert isinstance(given, QuestionPredictions)
         place = dict(zip(given.rows.tolist(), given.answers.tolist(), strict=True))
         ids = scores.ids.tolist()

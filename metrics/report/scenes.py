@@ -12,6 +12,7 @@ from metrics.report.pictures import view_pictures
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
 from metrics.submissions.reader import RoomPredictions, open_predictions
+from scenegen.common.errors import FileFormatError
 from scenegen.common.text_table import number
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
@@ -106,12 +107,18 @@ def _title(which: str, count: int, scenes: int, score: str) -> str:
 def pictured(
     scores: ScoreFile, truth: Path, submission: Path, entries: Sequence[int]
 ) -> Iterator[Pictured]:
-    """Yield entries of a score file with the pictures of `pictures.view_pictures`."""
+    """Yield entries of a score file with the pictures of `pictures.view_pictures`.
+
+    Raises OSError and FileFormatError where a file cannot be read or lacks an entry's row.
+    """
     with RoomsFile(truth) as rooms, open_predictions(submission) as predictions:
         assert isinstance(predictions, RoomPredictions)
         place = dict(zip(predictions.rows.tolist(), range(len(predictions)), strict=True))
         for entry in entries:
             row = int(scores.items["row"][entry])
+            if row not in place or row >= len(rooms):
+                expected = f"rows of {submission} and {truth}"
+                raise FileFormatError(scores.place, f"items.row: {row}", expected)
             found = room_pictures(rooms, predictions, row, place[row])
             yield Pictured(entry_name(scores, entry), entry_scores(scores, entry), found)
 

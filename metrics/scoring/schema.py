@@ -85,6 +85,8 @@ def parse_scores(content: Any) -> ScoreFile:
     _check_comparable(found)
     most = len(np.unique(found.clusters))
     for place, scores in all_scores(found):
+        if not scores:
+            raise refusal(place, "no score", "at least one")
         for name, score in scores.items():
             _check_score(f"{place}.{name}", name, score, found, most)
     for name, score in found.metrics.items():
@@ -107,6 +109,8 @@ def _check_counts(file: ScoreFile) -> None:
     scored, all_there = TOTALS[file.task]
     counts, ids = file.meta.counts, file.ids
     expected = {scored: len(ids), "runs": file.runs}
+    if file.task == "iqtt" and counts.get("answers") not in (2, 3):
+        raise _wrong_count(counts, "answers", "2 or 3, of each question")
     if file.task == "rooms":
         expected["scenes"] = len(np.unique(file.clusters))
     if file.objects:

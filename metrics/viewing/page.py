@@ -38,6 +38,14 @@ BESIDE, SAME, ALONE = "Beside the truth", "In the place of the truth", "Without 
 ERROR, NORMAL, TRUTHS = "Error of depth", "Predicted normal", "As the true surfels"
 SHOWN_SCORES = ("relief_iou", "chamfer", "hausdorff", "rmse", "normal_mean_degrees")
 GAP = 1.1  # between true and predicted surfels, in widths of the image
+UNITS = {  # as words behind a number; other units stand as they are
+    "fraction": "",
+    "correlation": "",
+    "ratio": "",
+    "degree": "degrees",
+    "scene unit": "scene units",
+    "scene unit squared": "scene units squared",
+}
 BACK = 2.2  # how many times farther than the view's camera both are looked at from
 
 
@@ -196,9 +204,7 @@ def _teller(room: Room, depth: Array, normal: Array | None, surfels: Surfels) ->
 
 
 def _score(name: str, value: float) -> str:
+    if not np.isfinite(value):
+        return "none"
     unit = metric(name).unit
-    return (
-        f"{value:.4g}" + ("" if unit == "fraction" else f" {unit}s")
-        if np.isfinite(value)
-        else "none"
-    )
+    return f"{value:.4g} {UNITS.get(unit, unit)}".rstrip()

@@ -22,6 +22,8 @@ def page_options(command: Command) -> Command:
         click.option("--public", is_flag=True,
                      help="Let other machines in: everyone who reaches the address sees the data,"
                      " without a password."),
+        click.option("--name", "names", multiple=True, metavar="HOST",
+                     help="Another name under which browsers reach the page; may be repeated."),
         click.option("--open/--no-open", "open_browser", default=False, show_default=True,
                      help="Open the page in a browser."),
     )  # fmt: skip
@@ -39,6 +41,7 @@ def view(
     port: int,
     host: str | None,
     public: bool,
+    names: tuple[str, ...],
     open_browser: bool,
     **meshes: Any,
 ) -> None:
@@ -57,7 +60,7 @@ def view(
     with RoomsFile(file) as rooms:
         contents = rooms_contents(rooms, items)
         shape_of = shapes_of(rooms.spec, **meshes)
-        with started(file, listening_host(host, public), port) as server:
+        with started(file, listening_host(host, public), port, names) as server:
             ScenePage(server, rooms, shape_of, contents).show()
             serve(server, print_line, open_browser, public)
 

@@ -17,6 +17,7 @@ from scenegen.rooms.reader import Room
 Array = NDArray[Any]
 DEFAULT_ROWS = 12
 MAX_ROWS = 400
+LARGEST_SIDE = {".webp": 16_383, ".jpg": 65_500, ".jpeg": 65_500, ".gif": 65_535}  # of the formats
 GAP = 6
 LABEL_HEIGHT = 18
 SMALLEST_TILE = 128  # pixels; narrower images are enlarged by a whole factor
@@ -141,12 +142,22 @@ def check_picture_name(path: Path) -> None:
     check(known, "out", repr(path.name), "a picture's name such as sheet.png")
 
 
+def check_picture_size(picture: Image.Image, path: Path) -> None:
+    """Raise SpecError where a picture is wider or higher than the format of its name can be."""
+    most = LARGEST_SIDE.get(path.suffix.lower())
+    found = "{} x {} pixels".format(*picture.size)
+    expected = f"at most {most} in each direction for {path.suffix}; fewer rows, or a .png"
+    check(most is None or max(picture.size) <= most, "out", found, expected)
+
+
 def save_picture(picture: Image.Image, path: str | Path, overwrite: bool = False) -> None:
     """Write a picture; the file appears, or is replaced, when it is complete.
 
-    Raises SpecError for an ending that names no picture format, OSError for the path.
+    Raises SpecError for an ending that names no picture format, or one whose pictures cannot be so
+    large, and OSError for the path.
     """
     path = Path(path)
     check_picture_name(path)
+    check_picture_size(picture, path)
     with written_beside(path, overwrite) as temporary:
         picture.save(temporary)

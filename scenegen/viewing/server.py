@@ -32,9 +32,12 @@ def listening_host(host: str | None, public: bool) -> str:
 
 
 @contextmanager
-def started(title: str, host: str, port: int) -> Iterator["ViserServer"]:
+def started(
+    title: str, host: str, port: int, names: tuple[str, ...] = ()
+) -> Iterator["ViserServer"]:
     """Start a server for the block; port 0 takes any free one. `title` heads the controls.
 
+    Browsers may call it by its address, this machine's name where others reach it, and `names`.
     Nothing is printed, nobody can ask it to open a tunnel to the internet, and other sites' pages
     are refused.
 
@@ -47,7 +50,7 @@ def started(title: str, host: str, port: int) -> Iterator["ViserServer"]:
     console = rich.get_console()  # on which viser announces itself
     quiet, console.quiet = console.quiet, True
     try:
-        with _refusing_others(hosts_of(host, public=not is_local(host))):
+        with _refusing_others(hosts_of(host, not is_local(host), names)):
             server = viser.ViserServer(host, port, label=title, verbose=False)
         try:
             if port not in (0, server.get_port()):  # taken meanwhile: viser goes on to the next
@@ -91,20 +94,25 @@ def _refusing_others(hosts: Hosts) -> Iterator[None]:
         sockets.serve = serve  # type: ignore[misc]
 
 
-def address(server: "ViserServer") -> str:
-    """Return the address of the page for a browser on this machine."""
+def address(server: "ViserServer", everywhere: str = HERE) -> str:
+    """Return the address of the page for a browser on this machine, or on others.
+
+    Args:
+        everywhere: what to call a server that listens at all addresses.
+    """
     host = server.get_host()
-    host = HERE if host == EVERYWHERE else f"[{host}]" if ":" in host else host
-    return f"http://{host}:{server.get_port()}"
+    host = everywhere if host in (EVERYWHERE, "::") else host
+    return f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
 
 
 def serve(
     server: "ViserServer", tell: Callable[[str], None], open_browser: bool, public: bool
 ) -> None:
     """Tell the address in one line, open it in a browser if asked to, and wait for Ctrl-C."""
-    seen = f", for all who can reach {server.get_host()}" if public else ""
+    seen = ", for all who can reach this machine" if public else ""
     with suppress(KeyboardInterrupt):  # it may come as soon as the line is read
-        tell(f"{address(server)} (Ctrl-C ends{seen})")
+        told = address(server, socket.gethostname()) if public else address(server)
+        tell(f"{told} (Ctrl-C ends{seen})")
         if open_browser:
             webbrowser.open(address(server))
         threading.Event().wait()

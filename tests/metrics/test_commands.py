@@ -95,6 +95,38 @@ def test_scores_of_another_truth_do_not_stand_beside(truths, folder, check_refus
     assert not (folder / "x.html").exists()
 
 
+def test_a_page_that_cannot_be_made_loses_no_score(truths, folder):
+    bench("baseline", "oracle", "--data", truths.rooms, "--out", "b.h5")
+    bench("score", "b.h5", "--json", "b.json")
+    other = (folder / "b.json").read_text()
+    digest = json.loads(other)["meta"]["truth_digest"]
+    (folder / "other.json").write_text(other.replace(digest, "0" * 64))
+    outs = ("--json", "b2.json", "--html", "b2.html")
+    told = bench("score", "b.h5", *outs, "--beside", "other.json")
+    assert told.exit_code == 2
+    assert (folder / "b2.json").exists()
+    assert "chamfer" in told.stdout
+    assert not (folder / "b2.html").exists()
+
+
+def test_an_output_that_is_there_is_refused_before_a_site_is_written(truths, folder):
+    bench("baseline", "oracle", "--data", truths.rooms, "--out", "oracle.h5")
+    bench("score", "oracle.h5", "--json", "oracle.json")
+    (folder / "board.md").write_text("mine")
+    given = ("--html", "site", "--out", "board.md")
+    assert bench("leaderboard", "oracle.json", *given).exit_code == 2
+    assert not (folder / "site").exists()
+
+
+def test_pictures_of_another_split_are_left_out(truths, folder):
+    bench("baseline", "chance", "--data", truths.iqtt, "--out", "chance.h5")
+    shutil.copy(truths.iqtt.with_name("iqtt-test-answers.h5"), folder / "q-test-answers.h5")
+    shutil.copy(truths.iqtt.with_name("iqtt-val.h5"), folder / "q-test.h5")
+    given = ("--truth", "q-test-answers.h5", "--html", "p.html")
+    assert bench("score", "chance.h5", *given).exit_code == 0
+    assert "data:image" not in (folder / "p.html").read_text()
+
+
 def test_chance_goes_all_the_way(truths, folder):
     made = bench("baseline", "chance", "--data", truths.iqtt, "--out", "chance.h5")
     assert made.exit_code == 0, made.output

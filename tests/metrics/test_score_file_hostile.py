@@ -184,6 +184,9 @@ WRONG += [
 WRONG_QUESTIONS = [
     ("metrics/iqtt_accuracy/std", 0.1, "", "0.1", "one run"),
     ("meta/resamples", 2000, "", "2000", "Wilson"),
+    ("meta/counts/answers", 0, "", "0", "2 or 3"),
+    ("meta/counts/answers", GONE, "", "no such key", "2 or 3"),
+    ("by_distractor", {"other": {}}, "by_distractor.other", "no score", "at least one"),
     ("meta/counts/questions", 3, "", "3", "4, as in items"),
     ("meta/counts/questions_in_truth", 5, "comparable", "true", "false, as 4 of 5 are scored"),
     ("items/iqtt_accuracy", [1, 0, 1, 0.5], "", "0.5", "0 or 1"),

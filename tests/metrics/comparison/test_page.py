@@ -1,5 +1,7 @@
 """The page of a comparison: verdicts first, and pictures of files that were scored alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_scores import iqtt_scores, rooms_scores
@@ -9,6 +11,7 @@ from metrics.comparison.compare import compare
 from metrics.comparison.page import AtHandError, html_comparison
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.scoring.evaluate import score
+from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
 HOSTILE = "</title><script>alert(1)</script>"
@@ -53,6 +56,10 @@ def test_pictures_need_the_files_that_were_scored(rooms_path, tmp_path):
     assert "data:image/webp" not in html_comparison(compared, files, rooms_path)
     text = html_comparison(compared, files, rooms_path, moved)
     assert text.count("data:image/webp") == 6 * 6
+    last = [replace(f, items={**f.items, "row": f.items["row"] + 1}) for f in files]
+    with pytest.raises(FileFormatError) as missing:
+        html_comparison(compared, last, rooms_path, moved)
+    assert missing.value.found.startswith("items.row")
     for truth, submissions in ((moved[0], moved), (rooms_path, [rooms_path])):
         with pytest.raises(AtHandError) as error:
             html_comparison(compared, files, truth, submissions)

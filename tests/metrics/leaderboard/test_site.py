@@ -8,10 +8,12 @@ import pytest
 from made_scores import iqtt_scores, rooms_scores
 from pages import Page
 
+from iqtt.files.make import make_split
+from iqtt.questions.specs import SplitSpec
 from metrics.leaderboard.gallery import spread_entries
 from metrics.leaderboard.paired_tests import ALIKE, compared_with_first
 from metrics.leaderboard.site import preset_of, report_names, write_site
-from metrics.prediction_writer import RoomPredictionWriter
+from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.score_file import read_scores, write_scores
 from metrics.scoring.evaluate import score
 from scenegen.rooms.reader import RoomsFile
@@ -43,6 +45,59 @@ def test_a_site_has_a_page_for_each_file_and_names_stay_text(files, tmp_path):
         assert {a for a in page.addresses if not a.startswith("data:")} <= set(found)
     assert set(report_names(files)) <= set(Page(found["index.html"]).addresses)
     assert HOSTILE in "".join(Page(found["index.html"]).words)
+
+
+def first_sentences(folder):
+    page = (folder / "index.html").read_text()
+    found = re.findall(r'<p class="answer">(.*?)</p>', page, re.DOTALL)
+    return [" ".join(re.sub(r"<[^>]*>", " ", text).split()) for text in found]
+
+
+def test_the_first_sentence_says_what_the_first_row_is(tmp_path):
+    two = [rooms("near", 0.0), rooms("far", 0.3)]
+    hidden = [replace(file, comparable=False) for file in two]
+    tied = [rooms("a", 0.0), rooms("b", 0.0)]
+    for i, (files, metrics, expected) in enumerate(
+        [
+            (two, None, f"near leads: {BASE.mean():.4g}"),
+            (two[:1], None, "near alone:"),
+            (hidden, None, "near is not ranked:"),
+            (tied, None, "a is one of 2 in the first place:"),
+            (
+                two,
+                ["hausdorff", "chamfer"],
+                f"near is one of 2 in the first place: {BASE.mean():.4g}",
+            ),
+        ]
+    ):
+        write_site(files, tmp_path / str(i), metrics)
+        (sentence,) = first_sentences(tmp_path / str(i))
+        assert sentence.startswith(expected)
+    assert "Hausdorff" in sentence
+
+
+def test_the_seed_of_a_withheld_truth_is_on_no_page(tmp_path):
+    spec = SplitSpec(seed=987654, train=1, labeled=0, val=0, test=4, distractors="other")
+    make_split(tmp_path / "split", spec, command="iqtt make-split --seed 987654")
+    truth = tmp_path / "split" / "iqtt-test-answers.h5"
+    write_answers(
+        tmp_path / "p.h5", tmp_path / "split" / "iqtt-test.h5", method="m", answer=np.zeros(4, int)
+    )
+    write_site([score([tmp_path / "p.h5"], truth)], tmp_path / "site")
+    pages = [path.read_text() for path in (tmp_path / "site").iterdir()]
+    assert any("preset small" in page for page in pages), "the truth was at hand"
+    assert not any("987654" in page for page in pages)
+
+
+def test_a_path_that_cannot_be_looked_at_only_leaves_pictures_out(tmp_path):
+    file = rooms("m", 0.0)
+    for path in ("x" * 300 + "/rooms.h5", "rooms.h5/y" * 600):
+        write_site(
+            [replace(file, meta=replace(file.meta, truth_path=path))],
+            tmp_path / "s",
+            overwrite=True,
+        )
+        assert first_sentences(tmp_path / "s")
 
 
 def test_scores_like_the_first_ones_are_marked(files, tmp_path):

@@ -163,6 +163,15 @@ def test_saving(tmp_path, name):
         assert np.abs(np.asarray(again)[5, 5].astype(int) - (200, 30, 30)).max() < 8
 
 
+def test_a_sheet_that_a_format_cannot_hold(tmp_path):
+    tall = Image.new("RGB", (8, 16_384))
+    with pytest.raises(SpecError) as error:
+        save_picture(tall, tmp_path / "s.webp")
+    assert (error.value.where, "16384" in error.value.found) == ("out", True)
+    save_picture(tall, tmp_path / "s.png")
+    assert [p.name for p in tmp_path.iterdir()] == ["s.png"]
+
+
 def test_the_command(run, rooms_path, rooms):
     result = run("preview", rooms_path, "--items", "6,1", "--out", "a.png")
     assert result.exit_code == 0

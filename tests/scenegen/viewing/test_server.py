@@ -2,6 +2,7 @@
 
 import http.client
 import socket
+import urllib.error
 import urllib.request
 from contextlib import closing
 
@@ -38,6 +39,20 @@ def test_a_page_is_served_quietly_and_ends(capfd):
     with socket.socket() as again:
         again.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         again.bind(("127.0.0.1", port))
+
+
+def test_others_are_told_this_machines_name_and_may_use_another_one():
+    with started("x", "0.0.0.0", 0, ("Lab.example.org",)) as server:
+        port = server.get_port()
+        assert address(server) == f"http://127.0.0.1:{port}"
+        assert address(server, "box") == f"http://box:{port}"
+        for name, code in (("lab.example.org", 200), ("evil.example", 403)):
+            request = urllib.request.Request(address(server), headers={"Host": f"{name}:{port}"})
+            try:
+                found = urllib.request.urlopen(request).status
+            except urllib.error.HTTPError as error:
+                found = error.code
+            assert found == code
 
 
 def test_an_address_of_another_machine():
