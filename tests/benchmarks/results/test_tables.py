@@ -99,15 +99,15 @@ def test_labels_train_a_last_layer_on_the_run_without(ran, tmp_path):
     assert trained == [line.format(0), line.format(200) + start, line.format(1000) + start]
 
 
-def test_the_views_start_from_a_first_run_and_with_labels_from_the_run_without(ran, tmp_path):
+def test_the_views_with_labels_start_from_the_run_without(ran, tmp_path):
     assert questions.run(tmp_path, ["pix2shape-views"], 1) == []
     trained = [shlex.split(c) for c in ran if c.startswith("pix2shape train")]
     outs = [words[words.index("--out") + 1] for words in trained]
     starts = [words[words.index("--start") + 1] for words in trained if "--start" in words]
-    assert outs == [f"pix2shape-views-{run}-0" for run in ("first", 0, 200, 1000)]
-    assert starts == [f"pix2shape-views-{run}-0/weights.safetensors" for run in ("first", 0, 0)]
+    assert outs == [f"pix2shape-views-{labels}-0" for labels in (0, 200, 1000)]
+    assert starts == ["pix2shape-views-0-0/weights.safetensors"] * 2
     assert {words[words.index("--data") + 1] for words in trained} == {"other/iqtt-train.h5"}
-    assert ["iterations=600" in words for words in trained] == [False, False, True, True]
+    assert ["iterations=1200" in words for words in trained] == [False, True, True]
 
 
 def test_table_3(ran, tmp_path):
@@ -175,8 +175,6 @@ def commands_of_all_entries():
         yield method.name, method.answer
         if method.train:
             yield method.name, f"{method.train} {method.start}"
-        if method.first:
-            yield "data", method.first
     for step in (
         questions.TRAINING,
         questions.OTHER,

@@ -1,6 +1,7 @@
 """Charts of people's answers: what they write touches nothing, and counts are whole numbers."""
 
 import re
+from itertools import pairwise
 
 import pytest
 
@@ -21,6 +22,6 @@ def test_names_and_numbers_of_bars_do_not_touch(count):
     for row in (names, numbers):
         assert all(
             x + LETTER * len(one) / 2 < next_x - LETTER * len(other) / 2
-            for (x, one), (next_x, other) in zip(row, row[1:], strict=False)
+            for (x, one), (next_x, other) in pairwise(row)
         )
     assert "<title>1: 1,235</title>" in chart
