@@ -44,18 +44,18 @@ CONFIGS: dict[str, dict[str, Any]] = {
 CONFIGS["views"] = {
     **CONFIGS["compact"],
     "networks": NetworkSpec(size=64, width=0.0625, camera=False, spherical=True, encoder="polar"),
-    "iterations": 1500,
-    "learning_rate": 2e-3,
+    "iterations": 26_000,
+    "learning_rate": 3e-3,
     "reconstruction": 0.0,
     "mutual_information": 0.0,
     "questions": 0.0,
     "contrast": 1.0,
-    "temperature": 0.7,
+    "temperature": 0.6,
     "hard_negatives": 1.0,
     "easy_negatives": 0.0,
     "turned": True,
     "question_batch": 64,
-    "labelled_batch": 32,
+    "labelled_batch": 8,
     "batch": 4,
 }
 LOSSES = (
