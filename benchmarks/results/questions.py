@@ -23,7 +23,7 @@ TRAINING = Step(
     "mixed",
 )
 OTHER = Step(
-    "iqtt make-split --distractors other --size 64 --compression none --train 41000 --labeled 1000"
+    "iqtt make-split --distractors other --size 64 --compression none --train 121000 --labeled 1000"
     " --val 2000 --test 0 --out other",
     "other",
 )
@@ -50,7 +50,6 @@ class Method:
         paper: its name in the paper's Table 3.
         answers: numbers of answers that it can choose from.
         data: the file that it learns from.
-        first: the command that trains in folder {run} what the run without labels starts from.
     """
 
     name: str
@@ -62,7 +61,6 @@ class Method:
     paper: str = ""
     answers: tuple[int, ...] = (2, 3)
     data: str = TRAIN
-    first: str = ""
 
 
 def _trained(name: str, labels: tuple[int, ...], **more: Any) -> Method:
@@ -100,11 +98,8 @@ METHODS = (
         LABELS,
         "bench baseline pix2shape --data {test} --weights {run}/weights.safetensors --out {out}",
         "pix2shape train --data {train} --labels {labels} --seed {seed} --config views"
-        " --precision bf16 --start {start} --out {run}",
-        start="--set iterations=600",
-        first="pix2shape train --data {train} --seed {seed} --config views --precision bf16"
-        " --set easy_negatives=1 --set temperature=0.6 --set learning_rate=0.004"
-        " --set iterations=2000 --out {run}",
+        " --precision bf16 --out {run}",
+        start="--start {start} --set iterations=1200 --set learning_rate=0.0005",
         data="other/iqtt-train.h5",
     ),
 )
@@ -173,25 +168,12 @@ def _run(method: Method, labels: int, seed: int) -> str:
 def _weights(folder: Path, method: Method, labels: int, seed: int) -> str:
     """Train a method, unless it is trained; return the path of its weights."""
     run, command, reads = _run(method, labels, seed), method.train, [method.data]
-    words, start = {"train": method.data, "labels": labels, "seed": seed, "run": run}, ""
+    words = {"train": method.data, "labels": labels, "seed": seed, "run": run}
     if labels and method.start:
-        start, command = _weights(folder, method, 0, seed), f"{command} {method.start}"
-    elif method.first:
-        start = _first(folder, method, seed)
-    if start:
-        words["start"] = start
-        reads.append(start)
+        words["start"], command = _weights(folder, method, 0, seed), f"{command} {method.start}"
+        reads.append(words["start"])
     weights = f"{run}/weights.safetensors"
     made(folder, Step(command.format(**words), weights, tuple(reads), run=run))
-    return weights
-
-
-def _first(folder: Path, method: Method, seed: int) -> str:
-    """Train what a method starts from, unless it is trained; return the path of its weights."""
-    run = f"{method.name}-first-{seed}"
-    weights = f"{run}/weights.safetensors"
-    command = method.first.format(train=method.data, seed=seed, run=run)
-    made(folder, Step(command, weights, (method.data,), run=run))
     return weights
 
 
