@@ -80,7 +80,8 @@ def _serve(
     from metrics.people.references import compare
     from scenegen.common.web_hosts import hosts_of
 
-    host = host or ("0.0.0.0" if public else "localhost")
+    if host is None:
+        host = "0.0.0.0" if public else "localhost"
     with (
         Study(file, part, questions, calibrations, seed) as study,
         listen(host, port, public) as listening,
