@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import signal
+import socket
 import sqlite3
 import subprocess
 import sys
@@ -189,6 +190,18 @@ def test_signals_end_it_well(quiz_split, tmp_path):
         assert (process.returncode, err) == (0, "")
         assert "0 finished" in out
     assert not (tmp_path / "answers.db-wal").exists()
+
+
+def test_public_means_all_addresses_of_this_machine(quiz_split, tmp_path):
+    """127.0.0.2 is one of them, at which a server at localhost does not listen."""
+    for options, reached in (([], False), (["--public"], True)):
+        with started(quiz_split, tmp_path / "answers.db", *options) as (_, site):
+            try:
+                socket.create_connection(("127.0.0.2", site.port), timeout=5).close()
+                found = True
+            except ConnectionRefusedError:
+                found = False
+        assert found == reached
 
 
 def test_export_and_submission(quiz_split, tmp_path, iqtt, refused):
