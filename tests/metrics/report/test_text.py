@@ -64,7 +64,7 @@ def test_the_headline_comes_first_with_skills_and_their_floors(monkeypatch):
 
 @pytest.mark.parametrize("form", ["text", "markdown", "html"])
 def test_groups_stand_in_the_order_of_their_numbers(form, tmp_path):
-    scores = iqtt_scores("a", [1, 0], counts={"questions": 2})
+    scores = iqtt_scores("a", [1, 0], counts={"questions": 2, "answers": 3})
     (group,) = scores.by_distractor.values()
     spans = ["120-150", "150-180", "30-60", "60-90", "90-120"]
     scores = replace(scores, by_rotation_angle=dict.fromkeys(spans, group))
