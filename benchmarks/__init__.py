@@ -1,6 +1,6 @@
 """Measurements of speed and of results. The packages import nothing of this.
 
-`make bench` runs the first seven, each of which prints one table:
+`make bench` runs the first nine, each of which prints one table:
 
     render      images of rooms a second, beside plain Mitsuba and the bare ray cast
     shapes      CPU time of each basic shape as an exact surface and as a mesh
@@ -9,6 +9,10 @@
     nearest     milliseconds of the scorer's nearest neighbours, beside other libraries
     surfels     milliseconds of the reference model's renderer, beside the plain way to write it
     score_rows  milliseconds of `bench score` for one row, in test sets of more and more rows
+    quiz        times of the answers of `iqtt quiz` with many participants at once
+    viewing     seconds from a move of the slider of a 3D page to the new scene
+    material    how well materials and lights are read from one image
+    pose        how well the angle between two views is read from their codes
     results     the tables of docs/results.md, from score files
     digests     what two checkouts of the code write, compared part by part
 

@@ -38,6 +38,7 @@ BESIDE, SAME, ALONE = "Beside the truth", "In the place of the truth", "Without 
 ERROR, NORMAL, TRUTHS = "Error of depth", "Predicted normal", "As the true surfels"
 SHOWN_SCORES = ("relief_iou", "chamfer", "hausdorff", "rmse", "normal_mean_degrees")
 GAP = 1.1  # between true and predicted surfels, in widths of the image
+BACK = 2.2  # how many times farther than the view's camera both are looked at from
 UNITS = {  # as words behind a number; other units stand as they are
     "fraction": "",
     "correlation": "",
@@ -46,7 +47,6 @@ UNITS = {  # as words behind a number; other units stand as they are
     "scene unit": "scene units",
     "scene unit squared": "scene units squared",
 }
-BACK = 2.2  # how many times farther than the view's camera both are looked at from
 
 
 class PredictionPage:

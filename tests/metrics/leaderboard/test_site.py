@@ -127,7 +127,7 @@ def test_pictures_come_from_unchanged_files_alone(rooms_path, tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     with (
         RoomsFile(rooms_path) as truth,
-        RoomPredictionWriter("p.h5", rooms_path, method="m") as out,
+        RoomPredictionWriter("p.h5", rooms_path, method="true depth") as out,
     ):
         for row in range(len(truth)):
             out.add(row, np.nan_to_num(truth.read("depth", row), nan=1.0) + 0.1)
