@@ -12,6 +12,8 @@ QUESTIONS = (
     "metrics.people.commands",
 )
 
+SCORES = ("metrics.commands.submissions", "metrics.commands.standings", "baselines.commands")
+
 
 @click.group(cls=PackageCommands, modules=ROOMS)
 @click.version_option(package_name="pix2shape-bench")
@@ -25,7 +27,7 @@ def iqtt() -> None:
     """Make 3D-IQTT mental-rotation questions that only the shapes can answer."""
 
 
-@click.group(cls=PackageCommands, modules=("metrics.commands", "baselines.commands"))
+@click.group(cls=PackageCommands, modules=SCORES)
 @click.version_option(package_name="pix2shape-bench")
 def bench() -> None:
     """Score the predictions of any model, handed in as one file."""

@@ -17,7 +17,8 @@ from baselines.pix2shape.commands import (
     needs_torch,
     predict_to,
 )
-from scenegen.common.command_line import EXAMPLE, LARGEST, OVERWRITE, print_line, progress_bar
+from scenegen.common.command_line import EXAMPLE, print_line, progress_bar
+from scenegen.common.options import LARGEST, OVERWRITE
 from scenegen.common.paths import InputPath, OutputFolder
 
 UNTRAINED = {

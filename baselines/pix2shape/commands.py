@@ -8,16 +8,9 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import (
-    EXAMPLE,
-    LARGEST,
-    MOST_PROCESSES,
-    OVERWRITE,
-    needs,
-    print_line,
-    progress_bar,
-)
+from scenegen.common.command_line import EXAMPLE, needs, print_line, progress_bar
 from scenegen.common.errors import SceneGenError
+from scenegen.common.options import LARGEST, MOST_PROCESSES, OVERWRITE
 from scenegen.common.paths import InputPath, OutputFolder, OutputPath
 
 PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")

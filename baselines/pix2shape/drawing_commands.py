@@ -8,7 +8,8 @@ from typing import Any
 import click
 
 from baselines.pix2shape.commands import A_MODEL, WEIGHTS, WEIGHTS_PATH, needs_torch, number
-from scenegen.common.command_line import EXAMPLE, OVERWRITE, Items, print_line
+from scenegen.common.command_line import EXAMPLE, print_line
+from scenegen.common.options import OVERWRITE, Items
 from scenegen.common.paths import InputPath, OutputPath
 
 ROOMS = click.option(

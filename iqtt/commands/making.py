@@ -10,8 +10,9 @@ from typing import Any
 
 import click
 
-from scenegen.common import command_line
-from scenegen.common.command_line import EXAMPLE, Color, Range, print_line, progress_bar
+from scenegen.common import command_line, options
+from scenegen.common.command_line import EXAMPLE, print_line, progress_bar
+from scenegen.common.options import Color, Range
 from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
 
 KNOWN_SEED = (
@@ -55,7 +56,7 @@ option = partial(click.option, show_default=True)
 )
 @option("--val", type=int, help="Number of validation questions.")
 @option("--test", type=int, help="Number of test questions; their answers are in a separate file.")
-@command_line.SEED
+@options.SEED
 @option(
     "--secret-seed",
     type=InputPath(),
@@ -100,7 +101,7 @@ option = partial(click.option, show_default=True)
     help="Smallest number of pixels that show a cube [default: 30 at 128x128 and radius 3.5].",
 )
 @option("--max-radius", type=float, help="Largest radius of a shape, in cube edges [default: 3.5].")
-@command_line.SIZE
+@options.SIZE
 @option("--background", type=Color(), default="white", help="Background colour.")
 @option("--lights", type=Range(int), default="2", help="Number of lights.")
 @option(
@@ -109,23 +110,23 @@ option = partial(click.option, show_default=True)
     help="Type of stored radiance [default: uint8; float32 with --preset v2].",
 )
 @option("--with-depth", is_flag=True, help="Store planar depth as well.")
-@command_line.COMPRESSION
+@options.COMPRESSION
 @option(
     "--batch",
     type=click.IntRange(1, 4096),
     default=64,
     help="Questions that a process renders at once.",
 )
-@command_line.WORKERS
+@options.WORKERS
 @option(
     "--shard-size",
     type=int,
     default=10_000,
     help="Most questions of one file; more go to files beside it, which it shows as one.",
 )
-@command_line.SCHEDULER
-@command_line.DEVICE
-@command_line.OVERWRITE
+@options.SCHEDULER
+@options.DEVICE
+@options.OVERWRITE
 def make_split(
     out: str,
     preset: str,
@@ -207,7 +208,7 @@ def make_split(
 @click.command(epilog=f"{EXAMPLE}iqtt merge iqtt-split/iqtt-train.h5 --out iqtt-train.h5")
 @click.argument("file", type=QUESTIONS)
 @click.option("--out", type=OutputPath(), required=True, help="File to write.")
-@command_line.OVERWRITE
+@options.OVERWRITE
 def merge(file: str, out: str, overwrite: bool) -> None:
     """Make one file of questions that were written to several."""
     from iqtt.audit.table import find_tables

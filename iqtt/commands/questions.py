@@ -9,8 +9,9 @@ from pathlib import Path
 import click
 
 from iqtt.commands.making import QUESTIONS
-from scenegen.common import command_line
-from scenegen.common.command_line import EXAMPLE, Items, print_line, progress_bar
+from scenegen.common import command_line, options
+from scenegen.common.command_line import EXAMPLE, print_line, progress_bar
+from scenegen.common.options import Items
 from scenegen.common.paths import InputPath, OutputPath
 
 SHOWN = 8  # questions that `show` draws by default
@@ -28,13 +29,13 @@ option = partial(click.option, show_default=True)
     type=OutputPath(),
     help="Picture to write; its suffix names the format [questions.png where none can be shown].",
 )
-@command_line.SHOW
+@options.SHOW
 @option("--items", type=Items(), help="Questions to show [default: the first 8].")
 @option("--part", type=click.Choice(["labeled", "unlabeled"]), help="Part of a training file.")
 @option(
     "--answers", is_flag=True, help="Mark the right answers, and name the kinds of the wrong ones."
 )
-@command_line.OVERWRITE
+@options.OVERWRITE
 def show(
     file: str,
     out: str | None,
@@ -86,8 +87,8 @@ def info(file: str) -> None:
     default=20_000,
     help="Largest number of questions that probes try to guess.",
 )
-@command_line.SCHEDULER
-@command_line.OVERWRITE
+@options.SCHEDULER
+@options.OVERWRITE
 @click.pass_context
 def audit(
     ctx: click.Context,
@@ -148,7 +149,7 @@ def audit(
     metavar="FILE",
     help="File whose content is the seed of a private test set, which the files do not tell.",
 )
-@command_line.DEVICE
+@options.DEVICE
 @click.pass_context
 def verify(
     ctx: click.Context, folder: str, items: int, secret_seed: str | None, device: str

@@ -5,7 +5,8 @@ from pathlib import Path
 import click
 
 from scenegen.commands.sharing import publication_options, source_date
-from scenegen.common.command_line import EXAMPLE, OVERWRITE, needs, print_line, progress_bar
+from scenegen.common.command_line import EXAMPLE, needs, print_line, progress_bar
+from scenegen.common.options import OVERWRITE
 from scenegen.common.paths import InputPath, OutputFolder, refuse_command_inputs
 
 

@@ -9,7 +9,8 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import EXAMPLE, LARGEST, OVERWRITE, needs, print_line
+from scenegen.common.command_line import EXAMPLE, needs, print_line
+from scenegen.common.options import LARGEST, OVERWRITE
 from scenegen.common.paths import InputPath, OutputPath, refuse_inputs
 
 option = partial(click.option, show_default=True)

@@ -13,9 +13,15 @@ from typing import Any
 import click
 
 from scenegen.common.command_line import (
+    EXAMPLE,
+    creation_command,
+    on_scheduler,
+    print_line,
+    progress_bar,
+)
+from scenegen.common.options import (
     COMPRESSION,
     DEVICE,
-    EXAMPLE,
     IMAGE_DTYPE,
     MESHES,
     OVERWRITE,
@@ -27,10 +33,6 @@ from scenegen.common.command_line import (
     Numbers,
     Range,
     Size,
-    creation_command,
-    on_scheduler,
-    print_line,
-    progress_bar,
 )
 from scenegen.common.paths import InputPath, OutputPath
 

@@ -7,17 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenegen.common.command_line import (
-    CACHE_DIR,
-    EXAMPLE,
-    MESH_FILES,
-    MOST_PROCESSES,
-    OVERWRITE,
-    UP,
-    Names,
-    print_line,
-    progress_bar,
-)
+from scenegen.common.command_line import EXAMPLE, print_line, progress_bar
+from scenegen.common.options import CACHE_DIR, MESH_FILES, MOST_PROCESSES, OVERWRITE, UP, Names
 from scenegen.common.paths import InputPath, OutputPath
 
 if TYPE_CHECKING:

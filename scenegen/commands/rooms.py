@@ -11,18 +11,8 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import (
-    DEVICE,
-    EXAMPLE,
-    MESHES,
-    OVERWRITE,
-    SHOW,
-    Items,
-    needs,
-    print_line,
-    progress_bar,
-    show_or_save,
-)
+from scenegen.common.command_line import EXAMPLE, needs, print_line, progress_bar, show_or_save
+from scenegen.common.options import DEVICE, MESHES, OVERWRITE, SHOW, Items
 from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
 
 SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row

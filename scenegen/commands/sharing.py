@@ -9,8 +9,9 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import EXAMPLE, OVERWRITE, needs, print_line, progress_bar
+from scenegen.common.command_line import EXAMPLE, needs, print_line, progress_bar
 from scenegen.common.errors import SpecError
+from scenegen.common.options import OVERWRITE
 from scenegen.common.paths import InputPath, OutputFolder, refuse_command_inputs
 
 Command = Callable[..., Any]

@@ -6,7 +6,8 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import EXAMPLE, MESHES, Items, needs, print_line
+from scenegen.common.command_line import EXAMPLE, needs, print_line
+from scenegen.common.options import MESHES, Items
 from scenegen.common.paths import InputPath
 
 Command = Callable[..., Any]

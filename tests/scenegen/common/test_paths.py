@@ -6,7 +6,8 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from scenegen.common.command_line import MESH_FILES, PackageCommands
+from scenegen.common.command_line import PackageCommands
+from scenegen.common.options import MESH_FILES
 from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
 from scenegen.objects.meshes.listing import SUFFIXES
 

@@ -1,42 +1,21 @@
-"""The `bench` commands that score: each parses its options, makes one library call, and prints.
-
-Heavy imports happen inside the commands, so that `--help` is fast.
-"""
+"""The `bench` commands on submissions: check, score and show them, and tell their format."""
 
 from pathlib import Path
 from typing import Any
 
 import click
 
+from metrics.commands.options import MARKDOWN, SEED
 from scenegen.commands.viewing import page_options
-from scenegen.common.command_line import (
-    EXAMPLE,
-    LARGEST,
-    MESHES,
-    MOST_PROCESSES,
-    OVERWRITE,
-    SCHEDULER,
-    Items,
-    needs,
-    on_scheduler,
-    print_line,
-    progress_bar,
-)
-from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_inputs
+from scenegen.common.command_line import EXAMPLE, needs, on_scheduler, print_line, progress_bar
+from scenegen.common.options import MESHES, MOST_PROCESSES, OVERWRITE, SCHEDULER, Items
+from scenegen.common.paths import InputPath, OutputPath, refuse_inputs
 
 TRUTH = click.option(
     "--truth",
     type=InputPath(),
     help="The rooms file or the file of answers to score against [default: the file that the"
     " submission names; scores are then comparable only if it is a known test set].",
-)
-MARKDOWN = click.option("--markdown", is_flag=True, help="Print Markdown instead of aligned text.")
-SEED = click.option(
-    "--seed",
-    type=click.IntRange(0, LARGEST),
-    default=0,
-    show_default=True,
-    help="Seed of the bootstrap.",
 )
 
 
@@ -166,173 +145,6 @@ def validate(ctx: click.Context, submission: str, truth: str | None) -> None:
     ctx.exit(2 if wrong else 0)
 
 
-@click.command(epilog=EXAMPLE + "bench compare baseline.json mine.json --metric chamfer")
-@click.argument(
-    "scores", nargs=-1, required=True, type=InputPath(), metavar="REFERENCE.json OTHER.json..."
-)
-@click.option(
-    "--metric", "metrics", multiple=True,
-    help="A score to compare; may be repeated [default: the headline scores].",
-)  # fmt: skip
-@click.option("--json", "json_path", type=OutputPath(), help="Write the comparison here.")
-@click.option(
-    "--html",
-    "html_path",
-    type=OutputPath(),
-    help="Write a page: verdicts, headline, pictures of scenes, curves.",
-)
-@click.option(
-    "--truth",
-    type=InputPath(),
-    help="The truth, for the page's pictures [default: the file that was scored against, where it"
-    " still lies there].",
-)
-@click.option(
-    "--predictions",
-    multiple=True,
-    type=InputPath(),
-    metavar="PREDICTIONS",
-    help="A submission that was scored, for the page's pictures; may be repeated [default: those"
-    " that the score files name, where they still lie there].",
-)
-@MARKDOWN
-@SEED
-@click.option(
-    "--allow-incomparable",
-    is_flag=True,
-    help="Compare files that say that they are not comparable, over the rows that all have.",
-)
-@OVERWRITE
-def compare(
-    scores: tuple[str, ...],
-    metrics: tuple[str, ...],
-    json_path: str | None,
-    html_path: str | None,
-    truth: str | None,
-    predictions: tuple[str, ...],
-    markdown: bool,
-    overwrite: bool,
-    **settings: Any,
-) -> None:
-    """Compare methods with the first one, item by item.
-
-    Prints the differences, their confidence intervals and significance tests, and the smallest
-    difference that the test set could show.
-    """
-    from metrics.comparison.compare import compare as compare_files
-    from metrics.comparison.report import text_report, to_json
-    from metrics.score_file import read_scores
-    from scenegen.common.new_file import check_writable, write_text
-
-    for path in (json_path, html_path):
-        if path:
-            check_writable(Path(path), overwrite)
-    if (truth or predictions) and html_path is None:
-        raise click.UsageError("--truth and --predictions are for the page: give --html, too")
-    files = [read_scores(path) for path in scores]
-    found = compare_files(files, metrics or None, **settings)
-    if json_path:
-        write_text(json_path, to_json(found), overwrite)
-    try:
-        if html_path:
-            from metrics.comparison.page import html_comparison
-
-            given = Path(truth) if truth else None
-            page = html_comparison(found, files, given, [Path(path) for path in predictions])
-            write_text(html_path, page, overwrite)
-    finally:
-        click.echo(text_report(found, markdown))
-
-
-@click.command(
-    epilog=EXAMPLE + "bench leaderboard baseline.json mine.json --format html --out b.html"
-)
-@click.argument("scores", nargs=-1, type=InputPath(), metavar="[SCORES.json]...")
-@click.option(
-    "--metric", "metrics", multiple=True,
-    help="A score to show; may be repeated, and the first one ranks [default: the headline"
-    " scores].",
-)  # fmt: skip
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["markdown", "html", "latex"]),
-    default="markdown",
-    show_default=True,
-    help="Format of the tables.",
-)
-@click.option("--out", type=OutputPath(), help="Write to this file instead of printing.")
-@click.option(
-    "--html",
-    "folder",
-    type=OutputFolder(),
-    metavar="DIR",
-    help="Write a static site to this folder, fit for GitHub Pages: the rankings with paired tests,"
-    " a gallery, and a report of each score file.",
-)
-@click.option(
-    "--recheck",
-    is_flag=True,
-    help="Recompute all means and intervals from the scores of the items first, and refuse files"
-    " where they differ. The standard deviations over runs cannot be recomputed.",
-)
-@click.option(
-    "--paper",
-    type=click.Choice(["task", "all", "none"]),
-    default="task",
-    show_default=True,
-    help="Which of the paper's own figures to show: those of the score files' tasks, all, or none.",
-)
-@click.option("--no-paper", is_flag=True, help="The same as --paper none.")
-@OVERWRITE
-def leaderboard(
-    scores: tuple[str, ...],
-    metrics: tuple[str, ...],
-    form: str,
-    out: str | None,
-    folder: str | None,
-    recheck: bool,
-    paper: Any,
-    no_paper: bool,
-    overwrite: bool,
-) -> None:
-    """Rank score files in one table for each test set.
-
-    The headline ranks: relief for rooms, skill for questions. Floors, and what the paper reported
-    on its own data, stand below the methods, without a rank.
-    """
-    from metrics.leaderboard import text
-    from metrics.leaderboard.ranking import leaderboard as rank
-    from metrics.score_file import read_scores
-    from scenegen.common.new_file import check_writable, write_text
-
-    if out is not None:
-        check_writable(Path(out), overwrite)
-    files = [read_scores(path) for path in scores]
-    if recheck:
-        from metrics.leaderboard.recheck import recheck as recompute
-        from metrics.leaderboard.recheck import steps
-
-        with progress_bar(sum(map(steps, files)), "group") as bar:
-            for file in files:
-                recompute(file, bar.update)
-    shown: Any = "none" if no_paper else paper
-    if folder is not None:
-        from metrics.leaderboard.site import write_site
-
-        write_site(files, folder, metrics or None, paper=shown, overwrite=overwrite)
-        print_line(f"{folder}: {len(scores)} score files; open {Path(folder) / 'index.html'}")
-        if out is None:
-            return
-    tables = rank(files, metrics or None, paper=shown)
-    page: str = getattr(text, f"to_{form}")(tables)
-    if out is None:
-        click.echo(page)
-        return
-    write_text(out, page, overwrite)
-    print_line(f"{out}: {len(scores)} score files")
-
-
 @click.command(epilog=EXAMPLE + "bench view predictions.h5 --truth rooms.h5 --open")
 @click.argument("submission", type=InputPath(), metavar="PREDICTIONS")
 @TRUTH
@@ -396,4 +208,4 @@ def describe_format() -> None:
     click.echo(text())
 
 
-COMMANDS = (score, validate, view, compare, leaderboard, describe_format)
+COMMANDS = (score, validate, view, describe_format)

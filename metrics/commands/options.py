@@ -1,0 +1,14 @@
+"""Options that commands on submissions and on score files have alike."""
+
+import click
+
+from scenegen.common.options import LARGEST
+
+MARKDOWN = click.option("--markdown", is_flag=True, help="Print Markdown instead of aligned text.")
+SEED = click.option(
+    "--seed",
+    type=click.IntRange(0, LARGEST),
+    default=0,
+    show_default=True,
+    help="Seed of the bootstrap.",
+)
