@@ -66,10 +66,10 @@ demo-summary:
 	@printf '%s\n' "$$DEMO_SUMMARY"
 
 demo-model: demo $(VENV)/.model
-	$(BIN)/bench baseline pix2shape --data demo/rooms.h5 --out demo/pix2shape.h5 --overwrite
+	$(BIN)/bench baseline pix2shape-rays --data demo/rooms.h5 --out demo/pix2shape.h5 --overwrite
 	$(BIN)/bench score demo/pix2shape.h5 --truth demo/rooms.h5 --json demo/pix2shape.json --html demo/pix2shape.html --overwrite
 	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/empty-room.json demo/pix2shape.json
-	$(BIN)/bench baseline pix2shape --data demo/iqtt/iqtt-test.h5 --out demo/answers.h5 --overwrite
+	$(BIN)/bench baseline pix2shape-views --data demo/iqtt/iqtt-test.h5 --out demo/answers.h5 --overwrite
 	$(BIN)/bench score demo/answers.h5 --truth demo/iqtt/iqtt-test-answers.h5
 	$(BIN)/pix2shape rotate --data demo/objects.h5 --items 0,3,6,9 --out demo/rotation.gif --overwrite
 	$(BIN)/pix2shape sample --out demo/samples.png --overwrite

@@ -29,10 +29,12 @@ UNTRAINED = {
     "chance": "random answers to questions",
     "outline": "questions: the nearest outline, without labels or 3D",
     "outline-trees": "questions: trees on outline features, learned from --train",
-    "pix2shape": "the reference model, which `pix2shape train` trains",
+    "pix2shape": "the reference model, trained by the paper's losses",
+    "pix2shape-compact": "the same without a critic, with losses of our own",
     "pix2shape-rays": "rooms: the same, told walls; learned from several views",
+    "pix2shape-views": "questions: the same, with an encoder of its own",
 }
-REFERENCE = ("pix2shape", "pix2shape-rays")
+REFERENCE = ("pix2shape", "pix2shape-compact", "pix2shape-rays", "pix2shape-views")
 # Packages `baselines.<name>`, - written as _, whose functions `train` and `write_submission` make
 # a baseline that is trained with `bench train NAME`. A new one is a line here.
 TRAINED = {
@@ -104,8 +106,7 @@ def baseline(
     if name in ("outline", "outline-trees"):
         _answer_by_outline(name, data, out, train, labels, overwrite)
     elif name in REFERENCE:
-        rays = name == "pix2shape-rays"
-        used = predict_to(out, weights, data, rays=rays, overwrite=overwrite)
+        used = predict_to(out, weights, data, method=name, overwrite=overwrite)
         method += f", weights {used},"
     elif name in TRAINED:
         with progress_bar(None, "row") as bar:

@@ -210,26 +210,26 @@ def predict(
 
 
 def predict_to(
-    out: str, weights: str | None, data: str, *, rays: bool | None = None, **how: Any
+    out: str, weights: str | None, data: str, *, method: str | None = None, **how: Any
 ) -> str:
     """Write a submission with `predict_file`, and a progress bar; return the weights used.
 
     Args:
         weights: None for the bundled ones that suit the data.
-        rays: as `bundled.suited`.
+        method: as `bundled.suited`; the name that the submission must have.
     """
     needs_torch()
     from baselines.pix2shape.use.predict import predict_file
     from baselines.pix2shape.weights.bundled import suited
 
-    weights = weights or suited(data, rays)
+    weights = weights or suited(data, method)
     with progress_bar(None, "row") as bar:
 
         def show(done: int, total: int) -> None:
             bar.total = total
             bar.update(done)
 
-        predict_file(weights, data, out, **how, progress=show)
+        predict_file(weights, data, out, **how, method=method, progress=show)
     return weights
 
 

@@ -86,9 +86,10 @@ METHODS = (
     _trained("ptn", LABELS, paper="Persp. Transf. Nets", start="""--set 'networks="{start}"'"""),
     _trained("rezende", LABELS, paper="Rezende et al.", start="""--set 'start="{start}"'"""),
     Method(
-        "pix2shape",
+        "pix2shape-compact",
         LABELS,
-        "bench baseline pix2shape --data {test} --weights {run}/weights.safetensors --out {out}",
+        "bench baseline pix2shape-compact --data {test} --weights {run}/weights.safetensors"
+        " --out {out}",
         "pix2shape train --data {train} --labels {labels} --seed {seed} --set iterations=1500"
         " --out {run}",
         paper="Pix2Shape",
@@ -96,7 +97,8 @@ METHODS = (
     Method(
         "pix2shape-views",
         LABELS,
-        "bench baseline pix2shape --data {test} --weights {run}/weights.safetensors --out {out}",
+        "bench baseline pix2shape-views --data {test} --weights {run}/weights.safetensors"
+        " --out {out}",
         "pix2shape train --data {train} --labels {labels} --seed {seed} --config views"
         " --precision bf16 --out {run}",
         start="--start {start} --set iterations=1200 --set learning_rate=0.0005",

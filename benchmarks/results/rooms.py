@@ -58,6 +58,7 @@ METHODS = (
     Method("view-pairs"),
     Method("pix2shape-rays", presets=("shapes", "shapenet")),
     Method("pix2shape"),
+    Method("pix2shape-compact"),
     Method("ptn"),
     Method("empty-room"),
     Method("mean-depth", "--train {train}"),

@@ -111,7 +111,8 @@ def mark(path: Path) -> str:
 
 def bundled_mark(method: str) -> str:
     """Return SHA-256 of the weights that come with a baseline; empty where none do."""
-    package = ROOT / "baselines" / method.removesuffix("-rays").replace("-", "_")
+    name = "pix2shape" if method.startswith("pix2shape") else method.replace("-", "_")
+    package = ROOT / "baselines" / name
     found = sorted(package.rglob("files/*.safetensors"))
     digests = "".join(mark(path) for path in found)
     return hashlib.sha256(digests.encode()).hexdigest() if found else ""

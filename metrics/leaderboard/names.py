@@ -19,7 +19,9 @@ BASELINES = (
     *("constant", "mean-depth", "empty-room", "oracle", "chance", "outline", "outline-trees"),
     *(
         "pix2shape",
+        "pix2shape-compact",
         "pix2shape-rays",
+        "pix2shape-views",
         "cnn",
         "siamese",
         "ptn",

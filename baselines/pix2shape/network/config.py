@@ -63,6 +63,7 @@ LOSSES = (
     "questions", "contrast", "depth", "matching", "swap",
 )  # fmt: skip
 
+METHOD = "pix2shape"
 MOST_LIGHTS = 64
 
 
@@ -168,6 +169,23 @@ class ModelConfig:
         for name in LOSSES:
             weight = getattr(self, name)
             check(0 <= weight < LARGEST, name.replace("_", " "), weight, "0 or a positive number")
+
+    @property
+    def method(self) -> str:
+        """The name of its submissions, which tells the paper's objective from what leaves it.
+
+        "pix2shape" has the adversarial loss and reconstructs images and codes by the paper's norm,
+        and has no loss that the paper lacks. "pix2shape-rays" is told the empty room,
+        "pix2shape-views" has the polar encoder, and all others are "pix2shape-compact".
+        """
+        if self.networks.encoder == "polar":
+            return f"{METHOD}-views"
+        if self.networks.rays:
+            return f"{METHOD}-rays"
+        both = self.reconstruction and self.code_reconstruction and not self.absolute_differences
+        ours = (self.consistency, self.contrast, self.depth, self.matching, self.swap)
+        faithful = self.adversarial and both and not any(ours)
+        return METHOD if faithful else f"{METHOD}-compact"
 
     @property
     def has_critic(self) -> bool:

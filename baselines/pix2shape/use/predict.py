@@ -32,7 +32,6 @@ from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 BATCH = 64  # images at a time
-METHOD = "pix2shape"
 TOLD = "told: one image of each scene, the cameras, and where the empty room's floor and walls are"
 TAUGHT = "told: in training, the lights of its images and the answers of {} questions"
 Progress = Callable[[int, int], Any]  # rows done, rows in all
@@ -45,6 +44,7 @@ def predict_file(
     *,
     device: str = "auto",
     run: str = "",
+    method: str | None = None,
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> None:
@@ -54,10 +54,16 @@ def predict_file(
         weights: a path, or the name of bundled weights.
         device: "auto", "cpu" or "cuda".
         run: name of this run among several of the method.
+        method: the name that the submission must have; None for whatever the weights' is.
 
-    Raises as `open_weights`, `predict_rooms` and `answer_file`.
+    Raises as `open_weights`, `predict_rooms` and `answer_file`, and SpecError for weights of
+    another method.
     """
     model, card = open_weights(weights)
+    own = model.config.method
+    if method not in (None, own):
+        hint = f"say `bench baseline {own}`: a name tells what a model was told and taught"
+        raise SpecError("weights", f"{weights}, whose method is {own}", method, hint)
     model.to(chosen_device(device))
     check_writable(Path(out), overwrite)
     how: dict[str, Any] = {"run": run, "overwrite": overwrite, "progress": progress}
@@ -112,9 +118,9 @@ def predict_rooms(
             told = condition[inputs[chosen]], Cameras(poses[inputs[chosen]], fov)
             found.append(model.codes(_stacked(images, model), *told))
         codes = torch.cat(found)
-        how: dict[str, Any] = {"method": METHOD, "run": run, "overwrite": overwrite}
+        how: dict[str, Any] = {"method": model.config.method, "run": run, "overwrite": overwrite}
         if spec.rays:
-            how |= {"method": f"{METHOD}-rays", "notes": TOLD}
+            how["notes"] = TOLD
         with RoomPredictionWriter(out, data, **how) as file:
             for rows in _batches(len(rooms)):
                 asked = condition[rows], Cameras(poses[rows], fov)
@@ -162,8 +168,7 @@ def answer_file(
             scores.append(-distance.cpu().double().numpy())
             progress(len(rows), len(questions))
     found = np.concatenate(scores)
-    method = f"{METHOD}-views" if spec.encoder == "polar" else METHOD
-    how: dict[str, Any] = {"method": method, "run": run, "overwrite": overwrite}
+    how: dict[str, Any] = {"method": model.config.method, "run": run, "overwrite": overwrite}
     write_answers(out, data, scores=found, notes=TAUGHT.format(labels), **how)
 
 

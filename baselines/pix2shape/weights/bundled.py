@@ -16,28 +16,33 @@ def names() -> list[str]:
     return sorted(path.stem for path in FOLDER.glob("*.safetensors"))
 
 
-def suited(data: str | Path, rays: bool | None = None) -> str:
+def suited(data: str | Path, method: str | None = None) -> str:
     """Return the name of the bundled weights that were trained on the most similar data.
 
     Args:
-        rays: whether they shall be of the configuration "rays", which there is for rooms alone;
-            None for whichever is better.
+        method: the name that their submissions shall have; None for the method that scores best.
 
     Raises as `RoomsFile`, and SpecError where this installation has no such weights.
     """
     if is_question_file(data):
-        if rays:
-            raise SpecError(data, "questions", "rooms, which the configuration rays is for")
-        name = "iqtt"
+        suiting = {"pix2shape-views": "iqtt"}
+        best = "pix2shape-views"
     else:
         with RoomsFile(data) as rooms:
-            rays = rays is not False
-            single = "-single" if rooms.spec.objects[1] == 1 and not rays else ""
-            name = f"shapes{single}" if rooms.spec.source == "shapes" else "shapenet"
-            name += "-rays" * rays
+            shapes, single = rooms.spec.source == "shapes", rooms.spec.objects[1] == 1
+        kind = "shapes" if shapes else "shapenet"
+        suiting = {
+            "pix2shape": "shapes-paper",
+            "pix2shape-compact": f"{kind}-single" if shapes and single else kind,
+            "pix2shape-rays": f"{kind}-rays",
+        }
+        best = "pix2shape-rays"
+    name = suiting.get(method or best)
     if name not in names():
         hint = "train some with `pix2shape train`"
-        raise SpecError("weights", "none bundled", f"some that suit {data}", hint)
+        if method is not None:
+            hint += f", or take {' or '.join(sorted(set(suiting) - {method}))}, which has some"
+        raise SpecError("weights", "none bundled", f"some of {method or best} for {data}", hint)
     return name
 
 

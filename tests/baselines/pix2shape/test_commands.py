@@ -44,7 +44,7 @@ def test_train_predict_score(folder):
     truth = ("--truth", "large.h5")
     assert bench("validate", "predictions.h5", *truth).stdout == "predictions.h5: valid\n"
     assert "chamfer" in bench("score", "predictions.h5").stdout
-    other = bench("baseline", "pix2shape", *on, "--out", "b.h5")
+    other = bench("baseline", "pix2shape-compact", *on, "--out", "b.h5")
     assert other.exit_code == 0, other.output
     with h5py.File("predictions.h5") as one, h5py.File("b.h5") as two:
         assert (one["depth"][()] == two["depth"][()]).all()
@@ -125,14 +125,17 @@ def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
     result = bench("baseline", "pix2shape", "--data", "rooms.h5")
     check_refusal(result.exit_code, result.stdout, result.stderr, ("rooms.h5", "pix2shape train"))
     (folder / "none").mkdir()
-    for name in ("shapes", "shapes-single"):
+    for name in ("shapes-paper", "shapes-single"):
         for ending in ("safetensors", "json"):
             shutil.copy(f"rooms.{ending}", f"none/{name}.{ending}")
     made = bench("baseline", "pix2shape", "--data", "rooms.h5")
-    assert "weights shapes, on rooms.h5" in made.stdout, made.output
-    assert pix2shape("sample", "--weights", "shapes", "--n", 1).exit_code == 0
+    assert "weights shapes-paper, on rooms.h5" in made.stdout, made.output
+    given = ("--data", "rooms.h5", "--weights", "shapes-paper", "--out", "other.h5")
+    result = bench("baseline", "pix2shape-compact", *given)
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("baseline pix2shape`",))
+    assert pix2shape("sample", "--weights", "shapes-single", "--n", 1).exit_code == 0
     result = pix2shape("sample", "--weights", "chairs", "--overwrite")
-    words = ("'chairs'", "shapes, shapes-single")
+    words = ("'chairs'", "shapes-paper, shapes-single")
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
 
 

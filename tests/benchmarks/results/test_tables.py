@@ -64,9 +64,9 @@ class NotData:
 
 
 def test_questions_are_trained_once_and_answered_by_kind(ran, tmp_path):
-    methods = ["chance", "cnn", "siamese", "pix2shape"]
+    methods = ["chance", "cnn", "siamese", "pix2shape-compact"]
     failed = questions.run(tmp_path, methods, 2)
-    assert len(failed) == 3 * len(questions.KINDS), "pix2shape at 0, 200 and 1,000 labels"
+    assert len(failed) == 3 * len(questions.KINDS), "pix2shape-compact at 0, 200 and 1,000 labels"
     trained = [c for c in ran if c.startswith("bench train")]
     expected = [
         f"bench train {name} --data mixed/iqtt-train.h5 --labels {labels} --seed {seed}"
@@ -191,7 +191,7 @@ def test_commands_have_the_options_that_are_named(name, command):
     import cli
     from baselines.commands import ALL
 
-    if name not in ALL and name not in ("data", "pix2shape-views"):
+    if name not in ALL and name != "data":
         pytest.skip("not there yet")
     program, verb, *words = shlex.split(command)
     known = {

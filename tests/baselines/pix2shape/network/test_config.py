@@ -62,3 +62,21 @@ def test_depth_stays_within_its_reach_whatever_the_code() -> None:
     assert depth.shape == (3, 32, 32)
     assert 1.5 <= float(depth.min()) < 1.6
     assert 2.4 < float(depth.max()) <= 2.5
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "method"),
+    [
+        ("paper", {"networks.size": 64, "networks.width": 0.125}, "pix2shape"),
+        ("paper", {"mutual_information": 0.0, "questions": 0.0}, "pix2shape"),  # as rooms have it
+        ("compact", {}, "pix2shape-compact"),
+        ("paper", {"code_reconstruction": 0.0}, "pix2shape-compact"),
+        ("paper", {"adversarial": 0.0}, "pix2shape-compact"),
+        ("paper", {"absolute_differences": True}, "pix2shape-compact"),
+        ("paper", {"depth": 1.0}, "pix2shape-compact"),
+        ("paper", {"networks.rays": True}, "pix2shape-rays"),
+        ("views", {}, "pix2shape-views"),
+    ],
+)
+def test_the_name_of_submissions_tells_the_papers_objective(name, settings, method) -> None:
+    assert model_config(name, **settings).method == method

@@ -40,11 +40,12 @@ CLASSES = "shapenet-single-classes"  # told what is there, so that it predicts n
 def test_they_predict_rooms(name: str, tmp_path: Path) -> None:
     """Better than one depth everywhere, and those that are told the empty room better than it."""
     data, out = tmp_path / "rooms.h5", tmp_path / "predictions.h5"
-    rays, preset = name.endswith("-rays"), name.removesuffix("-rays")
+    model, rays = open_weights(name)[0], name.endswith("-rays")
+    preset = name.removesuffix("-rays").removesuffix("-paper")
     make_dataset(data, preset_spec(preset, seed=77, views=(0.0, 55.0)), 4)
-    assert suited(data, rays) == name
+    assert suited(data, model.config.method) == name
     assert suited(data) == f"{preset.removesuffix('-single')}-rays"
-    predict_rooms(open_weights(name)[0], data, out)
+    predict_rooms(model, data, out)
     with RoomsFile(data) as rooms, open_predictions(out) as predictions:
         truth = rooms.read("depth", slice(None))
         depth = np.stack([predictions.depth(row) for row in range(len(rooms))])
@@ -83,9 +84,10 @@ def test_they_answer_questions(tmp_path: Path) -> None:
     spec = SplitSpec(seed=77, train=1, labeled=0, val=0, test=160, distractors="other")
     make_split(tmp_path / "split", spec)
     data, out = tmp_path / "split" / "iqtt-test.h5", tmp_path / "predictions.h5"
-    assert suited(data) == "iqtt"
-    with pytest.raises(SpecError):
-        suited(data, rays=True)
+    assert suited(data) == suited(data, "pix2shape-views") == "iqtt"
+    with pytest.raises(SpecError) as error:
+        suited(data, "pix2shape-rays")
+    assert "pix2shape-views" in error.value.hint
     answer_file(open_weights("iqtt")[0], data, out)
     with h5py.File(tmp_path / "split" / "iqtt-test-answers.h5") as truth, h5py.File(out) as file:
         right = file["scores"][:].argmax(axis=1) == truth["answers"][:]
