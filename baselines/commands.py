@@ -30,7 +30,7 @@ UNTRAINED = {
     "outline": "questions: the nearest outline, without labels or 3D",
     "outline-trees": "questions: trees on outline features, learned from --train",
     "pix2shape": "the reference model, trained by the paper's losses",
-    "pix2shape-compact": "the same without a critic, with losses of our own",
+    "pix2shape-compact": "the same, trained by other losses, without a critic",
     "pix2shape-rays": "rooms: the same, told walls; learned from several views",
     "pix2shape-views": "questions: the same, with an encoder of its own",
 }
@@ -80,8 +80,8 @@ def _listed(baselines: Mapping[str, str]) -> str:
 @click.option(
     "--weights",
     type=WEIGHTS_PATH,
-    help="Weights of a trained baseline: a .safetensors file; of pix2shape also a bundled name"
-    "  [the bundled ones that suit the data].",
+    help="Weights of a trained baseline: a .safetensors file, or for the reference model a bundled"
+    " name  [the bundled ones that suit the data].",
 )
 @OVERWRITE
 def baseline(

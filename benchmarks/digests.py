@@ -82,9 +82,10 @@ def commands(folder: Path) -> Iterator[str]:
     for name in ("constant", "mean-depth", "empty-room", "oracle"):
         train = "--train train.h5" if name in ("constant", "mean-depth") else ""
         yield f"bench baseline {name} --data truth.h5 {train} --out {name}.h5"
-    yield "bench baseline pix2shape --data truth.h5 --out pix2shape.h5"
+    yield "pix2shape predict --weights shapes --data truth.h5 --out pix2shape.h5"
     answers = "iqtt-mixed-chain/iqtt-test"
-    yield f"bench baseline pix2shape-views --data {answers}.h5 --out pix2shape-answers.h5"
+    told = f"--weights iqtt --data {answers}.h5"
+    yield f"pix2shape predict {told} --out pix2shape-answers.h5"
     yield f"bench baseline chance --data {answers}.h5 --out chance.h5"
     for name in ("constant", "mean-depth", "empty-room", "oracle", "pix2shape"):
         outputs = f"--json {name}.json --csv {name}.csv --markdown"

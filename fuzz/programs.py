@@ -131,8 +131,7 @@ TARGETS = (
          " --out new.png",
          "pix2shape rotate --weights weights.safetensors --data rooms.h5 --items 0 --frames 2"
          " --out new.gif",
-         "bench baseline pix2shape-compact --weights weights.safetensors --data rooms.h5"
-         " --out new.h5"),
+         "bench baseline pix2shape --weights weights.safetensors --data rooms.h5 --out new.h5"),
         ("weights.safetensors", "weights.json", "rooms.h5"),
         imports_torch=True,
     ),

@@ -57,7 +57,7 @@ METHODS = (
     Method("depth-supervised"),
     Method("view-pairs"),
     Method("pix2shape-rays", presets=("shapes", "shapenet")),
-    Method("pix2shape"),
+    Method("pix2shape", presets=("shapes-single", "shapes")),
     Method("pix2shape-compact"),
     Method("ptn"),
     Method("empty-room"),

@@ -174,9 +174,10 @@ class ModelConfig:
     def method(self) -> str:
         """The name of its submissions, which tells the paper's objective from what leaves it.
 
-        "pix2shape" has the adversarial loss and reconstructs images and codes by the paper's norm,
-        and has no loss that the paper lacks. "pix2shape-rays" is told the empty room,
-        "pix2shape-views" has the polar encoder, and all others are "pix2shape-compact".
+        "pix2shape" has the adversarial loss, reconstructs images and codes by the paper's norm, for
+        questions minimises mutual information, and has no loss that the paper lacks. Of other
+        settings any may differ: sizes, iterations, the optimiser's. "pix2shape-rays" is told the
+        empty room, "pix2shape-views" has the polar encoder, and all others are "pix2shape-compact".
         """
         if self.networks.encoder == "polar":
             return f"{METHOD}-views"
@@ -184,7 +185,9 @@ class ModelConfig:
             return f"{METHOD}-rays"
         both = self.reconstruction and self.code_reconstruction and not self.absolute_differences
         ours = (self.consistency, self.contrast, self.depth, self.matching, self.swap)
-        faithful = self.adversarial and both and not any(ours)
+        told = self.networks.camera or self.disentangles
+        others = self.networks.spherical or self.turned
+        faithful = self.adversarial and both and told and not (any(ours) or others)
         return METHOD if faithful else f"{METHOD}-compact"
 
     @property

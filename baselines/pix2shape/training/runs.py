@@ -16,7 +16,7 @@ from baselines.pix2shape.data.in_memory import read_rooms
 from baselines.pix2shape.data.questions import QuestionImages, for_questions
 from baselines.pix2shape.data.rooms import Batch, RoomImages, is_question_file
 from baselines.pix2shape.matching.labels import labels as labels_of
-from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.network.config import METHOD, ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.network.shared_batch import summed
 from baselines.pix2shape.pictures import training_sheet
@@ -218,6 +218,9 @@ def _begin_from(start: str | Path, model: Pix2Shape, card: Card) -> Card:
     for name in OF_NETWORKS:
         its, own = getattr(its_card.config, name), getattr(card.config, name)
         check(its == own, "start", start, f"weights of the same {name} as this run's, {own}")
+    if card.config.method == METHOD:
+        own = f"weights of {METHOD}, as other losses than the paper's would have trained this run's"
+        check(its_card.config.method == METHOD, "start", start, own)
     same = its_card.classes == card.classes
     check(same, "start", start, f"weights of the same classes as this run's, {card.classes}")
     for name in ("encoder", "decoder"):

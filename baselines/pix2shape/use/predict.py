@@ -33,6 +33,7 @@ from scenegen.rooms.reader import RoomsFile
 Array = NDArray[Any]
 BATCH = 64  # images at a time
 TOLD = "told: one image of each scene, the cameras, and where the empty room's floor and walls are"
+DEPTH = "told: in training, true depth maps"
 TAUGHT = "told: in training, the lights of its images and the answers of {} questions"
 Progress = Callable[[int, int], Any]  # rows done, rows in all
 
@@ -62,7 +63,7 @@ def predict_file(
     model, card = open_weights(weights)
     own = model.config.method
     if method not in (None, own):
-        hint = f"say `bench baseline {own}`: a name tells what a model was told and taught"
+        hint = "names tell what a model was told and taught; `pix2shape predict` takes any weights"
         raise SpecError("weights", f"{weights}, whose method is {own}", method, hint)
     model.to(chosen_device(device))
     check_writable(Path(out), overwrite)
@@ -119,8 +120,7 @@ def predict_rooms(
             found.append(model.codes(_stacked(images, model), *told))
         codes = torch.cat(found)
         how: dict[str, Any] = {"method": model.config.method, "run": run, "overwrite": overwrite}
-        if spec.rays:
-            how["notes"] = TOLD
+        how["notes"] = "; ".join([TOLD] * spec.rays + [DEPTH] * (model.config.depth > 0))
         with RoomPredictionWriter(out, data, **how) as file:
             for rows in _batches(len(rooms)):
                 asked = condition[rows], Cameras(poses[rows], fov)

@@ -26,24 +26,25 @@ def suited(data: str | Path, method: str | None = None) -> str:
     """
     if is_question_file(data):
         suiting = {"pix2shape-views": "iqtt"}
-        best = "pix2shape-views"
     else:
         with RoomsFile(data) as rooms:
             shapes, single = rooms.spec.source == "shapes", rooms.spec.objects[1] == 1
         kind = "shapes" if shapes else "shapenet"
         suiting = {
-            "pix2shape": "shapes-paper",
-            "pix2shape-compact": f"{kind}-single" if shapes and single else kind,
             "pix2shape-rays": f"{kind}-rays",
+            "pix2shape-compact": f"{kind}-single" if shapes and single else kind,
         }
-        best = "pix2shape-rays"
-    name = suiting.get(method or best)
-    if name not in names():
-        hint = "train some with `pix2shape train`"
-        if method is not None:
-            hint += f", or take {' or '.join(sorted(set(suiting) - {method}))}, which has some"
-        raise SpecError("weights", "none bundled", f"some of {method or best} for {data}", hint)
-    return name
+        if shapes:
+            suiting["pix2shape"] = "shapes-paper"
+    there = {one: name for one, name in suiting.items() if name in names()}
+    if method is None and there:
+        return next(iter(there.values()))
+    if method not in there:
+        expected = f"some{f' of {method}' if method else ''} that suit {data}"
+        others = f"; {', '.join(sorted(there))} has some that suit" if there else ""
+        hint = f"train some with `pix2shape train` and name them with --weights{others}"
+        raise SpecError("weights", "none bundled", expected, hint)
+    return there[method]
 
 
 def open_weights(weights: str | Path) -> tuple[Pix2Shape, Card]:

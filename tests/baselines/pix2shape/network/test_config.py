@@ -74,6 +74,8 @@ def test_depth_stays_within_its_reach_whatever_the_code() -> None:
         ("paper", {"adversarial": 0.0}, "pix2shape-compact"),
         ("paper", {"absolute_differences": True}, "pix2shape-compact"),
         ("paper", {"depth": 1.0}, "pix2shape-compact"),
+        ("paper", {"networks.camera": False, "networks.z_view": 10}, "pix2shape"),
+        ("paper", {"networks.camera": False, "mutual_information": 0.0}, "pix2shape-compact"),
         ("paper", {"networks.rays": True}, "pix2shape-rays"),
         ("views", {}, "pix2shape-views"),
     ],

@@ -323,6 +323,17 @@ def test_a_run_begins_from_models_of_its_own_kind_alone(change, rooms_path, unbr
     assert not folder.exists()
 
 
+def test_weights_of_other_losses_do_not_become_the_papers(rooms_path, tmp_path, folder):
+    """What other losses trained keeps its name: no short run gives it that of the objective."""
+    other = replace(CONFIG, iterations=1, adversarial=0.0)
+    start = train_run(tmp_path / "other", rooms_path, other, HERE)
+    assert (other.method, CONFIG.method) == ("pix2shape-compact", "pix2shape")
+    with pytest.raises(SpecError) as error:
+        train_run(folder, rooms_path, replace(CONFIG, iterations=1), HERE, start=start)
+    assert error.value.where == "start"
+    assert train_run(folder, rooms_path, other, HERE, start=start) is not None
+
+
 def test_labels_of_earlier_runs_are_not_forgotten(train_questions, tmp_path):
     config, start = replace(CONFIG, iterations=1), None
     for labels, earlier in ((2, 0), (1, 2), (0, 3)):

@@ -75,6 +75,13 @@ def test_a_model_of_rays_is_another_method_and_says_what_it_is_told(several_path
         assert (depth < walls - 0.02).any()
 
 
+def test_a_model_of_depth_maps_is_another_method_and_says_so(rooms_path, tmp_path):
+    predict_rooms(made(tiny(depth=1.0)), rooms_path, tmp_path / "p.h5")
+    with open_predictions(tmp_path / "p.h5") as predictions:
+        assert predictions.method == "pix2shape-compact"
+        assert "true depth maps" in predictions.notes
+
+
 def predicted(model: Any, path: Path, out: Path) -> Fields:
     predict_rooms(model, path, out, overwrite=True)
     with h5py.File(out) as file:
