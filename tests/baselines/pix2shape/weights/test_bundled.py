@@ -88,10 +88,6 @@ def test_they_answer_questions(tmp_path: Path) -> None:
     with pytest.raises(SpecError) as error:
         suited(data, "pix2shape-rays")
     assert "pix2shape-views has some" in error.value.hint
-    with pytest.raises(SpecError) as error, pytest.MonkeyPatch.context() as patch:
-        patch.setattr("baselines.pix2shape.weights.bundled.names", list)
-        suited(data)
-    assert "has some" not in error.value.hint
     answer_file(open_weights("iqtt")[0], data, out)
     with h5py.File(tmp_path / "split" / "iqtt-test-answers.h5") as truth, h5py.File(out) as file:
         right = file["scores"][:].argmax(axis=1) == truth["answers"][:]
