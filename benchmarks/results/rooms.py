@@ -10,7 +10,7 @@ from typing import Any
 from benchmarks.results.markdown import NOTHING, shown, table
 from benchmarks.results.steps import Step, bundled_mark, each, made, mark, record
 
-# Test files, each of 1,000 scenes in five views, and files that means are taken from.
+# Test files, each of 300 scenes in five views, and files that means are taken from.
 PRESETS = {
     "shapes-single": ("", "One basic shape"),
     "shapes": ("", "One to three basic shapes"),
@@ -69,13 +69,14 @@ METHODS = (
 def data(preset: str) -> dict[str, Step]:
     """Return how the files of a preset are made: "test" and "train"."""
     options, _ = PRESETS[preset]
-    render = "scenegen render --preset {preset} {options}--n {n} {views}--seed {seed} --out {out}"
-    sizes = {"test": (1_000, "--views 0,5,35,55,80 ", 1000), "train": (20_000, "", 1)}
+    told = "--preset {preset} {options}--n {n} {views}--seed {seed} --size 64 --out {out}"
+    sizes = {"test": (300, "--views 0,5,35,55,80 ", 1000), "train": (20_000, "", 1)}
     steps = {}
     for split, (count, views, seed) in sizes.items():
         out = f"{split}-{preset}.h5"
-        told = {"options": options.format(split=split), "n": count, "views": views, "seed": seed}
-        steps[split] = Step(render.format(preset=preset, out=out, **told), out)
+        kinds = {"options": options.format(split=split), "n": count, "views": views, "seed": seed}
+        command = f"scenegen render {told.format(preset=preset, out=out, **kinds)}"
+        steps[split] = Step(command, out)
     return steps
 
 

@@ -6,7 +6,7 @@ from collections import Counter, defaultdict, deque
 from scenegen.description.scene_arrays import SceneArrays, joined
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects
-from scenegen.sampling.scenes import MAX_ATTEMPTS, refusal, sample_scenes
+from scenegen.sampling.scenes import MAX_ATTEMPTS, MAX_RENDERED, refusal, sample_scenes
 
 AHEAD = 512  # proposals drawn at once: with few, arrays are slow; with many, retries wait
 RETRIES = 3  # least number of attempts that are drawn at once for an item that needs another
@@ -51,7 +51,12 @@ class ProposalQueue:
         del self._attempts[item], self._taken[item], self._scenes[item]
 
     def refuse(self, item: int) -> None:
-        """Propose an item again, whose last proposal shows too little of some object."""
+        """Propose an item again, whose last proposal shows too little of some object.
+
+        Raises PlacementError where MAX_RENDERED proposals of it did.
+        """
+        if self._taken[item] == MAX_RENDERED:
+            raise refusal(self._spec, item, self._taken[item], self._attempts[item])
         heapq.heappush(self._stock if self._scenes[item] else self._again, item)
 
     def _ready(self, end: int) -> bool:

@@ -33,7 +33,9 @@ from scenegen.sampling.placement import (
 from scenegen.sampling.poses import random_rotations
 
 Array = NDArray[Any]
-MAX_ATTEMPTS = 100  # scenes proposed for one item before the request is called impossible
+# Before a request is called impossible, so many scenes are proposed for an item, and so many of
+# these are rendered. In one of 20,000 rooms of built-in objects one proposal in forty finds room.
+MAX_ATTEMPTS, MAX_RENDERED = 1000, 100
 POSES_PER_OBJECT = 8  # sizes and orientations tried for one object of a proposal
 _TOGETHER = (0, 1, 3, POSES_PER_OBJECT)  # poses 0, 1 to 2, and 3 to 7 are tried at once
 _POSE_NUMBERS = 6  # size, rotation, heading, and one to spare: positions in a stream are even
@@ -98,20 +100,22 @@ def sample_scene(
     return scenes.scene(0) if len(scenes) else None
 
 
-def refusal(spec: DatasetSpec, index: int, placed_but_hidden: int) -> PlacementError:
+def refusal(
+    spec: DatasetSpec, index: int, placed_but_hidden: int, attempts: int = MAX_ATTEMPTS
+) -> PlacementError:
     """Return why item `index` got no scene, `placed_but_hidden` of its proposals being rendered."""
     wanted = int(sample_counts(spec, np.array([index]))[0])
     if placed_but_hidden:
         return PlacementError(
             f"item {index}",
-            f"{MAX_ATTEMPTS} proposals with {wanted} objects, {placed_but_hidden} of which were"
+            f"{attempts} proposals with {wanted} objects, {placed_but_hidden} of which were"
             " rendered, each with an object that shows too few pixels",
             f"{spec.min_visible_pixels} pixels or more of every object",
             "try fewer --objects, a larger --object-radius or fewer --min-visible-pixels",
         )
     return PlacementError(
         f"item {index}",
-        f"no room for its {wanted} objects in {MAX_ATTEMPTS} proposals",
+        f"no room for its {wanted} objects in {attempts} proposals",
         "room for all of them inside the walls and the image, touching nothing",
         "try fewer --objects, a smaller --object-radius or --allow-cropped",
     )

@@ -5,11 +5,12 @@ from typing import Any
 import pytest
 
 from scenegen.common.errors import PlacementError
+from scenegen.description.presets import preset_spec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import objects_of
 from scenegen.sampling import proposals
 from scenegen.sampling.proposals import ProposalQueue
-from scenegen.sampling.scenes import sample_scene
+from scenegen.sampling.scenes import MAX_RENDERED, sample_scene
 
 SPEC = DatasetSpec(objects=(2, 4), seed=9)
 ITEMS = range(100, 140)
@@ -64,18 +65,31 @@ def test_an_impossible_item_is_named_and_the_first_one() -> None:
     assert refused.value.where == "item 0"
 
 
+def test_a_rare_item_of_a_preset_finds_its_place_in_the_end() -> None:
+    """Of the first 20,000 rooms of this preset and seed the one that needs most proposals."""
+    spec = preset_spec("shapenet", seed=1, object_split="train")
+    queue = ProposalQueue(spec, range(16775, 16776), objects_of(spec))
+    scenes = queue.take(1, 16776)
+    assert scenes is not None
+    assert scenes.index.tolist() == [16775]
+
+
 def test_an_item_that_is_always_refused_ends_the_run() -> None:
     queue = ProposalQueue(SPEC, ITEMS, objects_of(SPEC))
+    refused_before = 0
 
     def refuse_the_first() -> None:
+        nonlocal refused_before
         for _ in range(200):
             scenes = queue.take(4, 104)
             for item in [] if scenes is None else scenes.index.tolist():
+                refused_before += item == 100
                 (queue.refuse if item == 100 else queue.accept)(item)
 
     with pytest.raises(PlacementError, match=r"of which were rendered") as refused:
         refuse_the_first()
     assert refused.value.where == "item 100"
+    assert refused_before == MAX_RENDERED
 
 
 def test_waiting_items_do_not_pile_up_proposals(monkeypatch: pytest.MonkeyPatch) -> None:
