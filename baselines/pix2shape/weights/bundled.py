@@ -41,7 +41,7 @@ def suited(data: str | Path, method: str | None = None) -> str:
         return next(iter(there.values()))
     if method not in there:
         expected = f"some{f' of {method}' if method else ''} that suit {data}"
-        others = f"; {', '.join(sorted(there))} has some that suit" if there else ""
+        others = f"; weights of {' and '.join(sorted(there))} are bundled" if there else ""
         hint = f"train some with `pix2shape train` and name them with --weights{others}"
         raise SpecError("weights", "none bundled", expected, hint)
     return there[method]
