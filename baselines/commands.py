@@ -28,7 +28,7 @@ UNTRAINED = {
     "oracle": "the truth itself, which must score perfectly",
     "chance": "random answers to questions",
     "outline": "questions: the nearest outline, without labels or 3D",
-    "outline-trees": "questions: trees on outline features, learned from --train",
+    "outline-trees": "questions: trees on outline features, from --train",
     "pix2shape": "the reference model, trained by the paper's losses",
     "pix2shape-compact": "the same, trained by other losses, without a critic",
     "pix2shape-rays": "rooms: the same, told walls; learned from several views",

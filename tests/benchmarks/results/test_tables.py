@@ -127,8 +127,8 @@ def test_rooms(ran, tmp_path):
     failed = rooms.run(tmp_path, ["mean-depth", "ptn", "oracle"])
     assert failed == [f"ptn, {preset}" for preset in rooms.PRESETS]
     assert (
-        "scenegen render --preset shapenet --object-split test --n 1000 --views 0,5,35,55,80"
-        " --seed 1000 --out test-shapenet.h5"
+        "scenegen render --preset shapenet --object-split test --n 300 --views 0,5,35,55,80"
+        " --seed 1000 --size 64 --out test-shapenet.h5"
     ) in ran
     assert (
         "bench baseline mean-depth --data test-shapes.h5 --train train-shapes.h5"
