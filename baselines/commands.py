@@ -30,7 +30,7 @@ UNTRAINED = {
     "outline": "questions: the nearest outline, without labels or 3D",
     "outline-trees": "questions: trees on outline features, from --train",
     "pix2shape": "the reference model, trained by the paper's losses",
-    "pix2shape-compact": "the same, trained by other losses, without a critic",
+    "pix2shape-compact": "the same, trained by other losses",
     "pix2shape-rays": "rooms: the same, told walls; learned from several views",
     "pix2shape-views": "questions: the same, with an encoder of its own",
 }

@@ -22,10 +22,12 @@ def suited(data: str | Path, method: str | None = None) -> str:
     Args:
         method: the name that their submissions shall have; None for the method that scores best.
 
-    Raises as `RoomsFile`, and SpecError where this installation has no such weights.
+    Raises as `RoomsFile`, and SpecError where this installation has no such weights, or the method
+    is not for such data.
     """
     if is_question_file(data):
         suiting = {"pix2shape-views": "iqtt"}
+        found, other, unfit = "questions", "rooms", "pix2shape-rays"
     else:
         with RoomsFile(data) as rooms:
             shapes, single = rooms.spec.source == "shapes", rooms.spec.objects[1] == 1
@@ -36,6 +38,9 @@ def suited(data: str | Path, method: str | None = None) -> str:
         }
         if shapes:
             suiting["pix2shape"] = "shapes-paper"
+        found, other, unfit = "rooms", "questions", "pix2shape-views"
+    if method == unfit:
+        raise SpecError(data, found, f"{other}, which {method} is for")
     there = {one: name for one, name in suiting.items() if name in names()}
     if method is None and there:
         return next(iter(there.values()))

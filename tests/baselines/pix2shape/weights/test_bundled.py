@@ -94,6 +94,9 @@ def test_they_answer_questions(tmp_path: Path) -> None:
     assert suited(data) == suited(data, "pix2shape-views") == "iqtt"
     with pytest.raises(SpecError) as error:
         suited(data, "pix2shape-rays")
+    assert (error.value.where, error.value.found) == (str(data), "questions")
+    with pytest.raises(SpecError) as error:
+        suited(data, "pix2shape-compact")
     assert "pix2shape-views are bundled" in error.value.hint
     answer_file(open_weights("iqtt")[0], data, out)
     with h5py.File(tmp_path / "split" / "iqtt-test-answers.h5") as truth, h5py.File(out) as file:
