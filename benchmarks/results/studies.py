@@ -15,14 +15,8 @@ from typing import Any
 from benchmarks.results.markdown import NOTHING, table
 from benchmarks.results.steps import Step, each, made, mark, record
 
-ROOMS = "scenegen render --preset shapenet --object-split {split} --size 64 --n {n} {views}"
-ROOMS_TRAIN = Step(
-    ROOMS.format(split="train", n=8000, views="--seed 1 --out study-train.h5"), "study-train.h5"
-)
-ROOMS_TEST = Step(
-    ROOMS.format(split="test", n=300, views="--views 0,5,35,55,80 --seed 1000 --out study-test.h5"),
-    "study-test.h5",
-)
+HOUSEHOLD = "--preset shapenet --object-split {split}"
+SHAPES = "--preset shapes"
 QUESTIONS = Step(
     "iqtt make-split --distractors other --train 12000 --labeled 1000 --val 0 --test 2000"
     " --out study-questions",
@@ -64,7 +58,13 @@ def _by_angle(metric: str, name: str) -> dict[str, tuple[str, ...]]:
     return {f"{name}, {angle}°": ("by_view_angle", angle, metric) for angle in ANGLES}
 
 
-def _of_rooms(title: str, rows: dict[str, str]) -> Study:
+def _of_rooms(
+    title: str,
+    rows: dict[str, str],
+    rooms: str = HOUSEHOLD,
+    files: str = "study",
+    options: str = "",
+) -> Study:
     scores = {
         **_by_angle("relief_iou", "relief IoU"),
         **_by_angle("chamfer", "CD"),
@@ -72,9 +72,16 @@ def _of_rooms(title: str, rows: dict[str, str]) -> Study:
         **_by_angle("hausdorff_reverse", "HD-R"),
         **_by_angle("mse_depth", "MSE-depth"),
     }
-    data, (train, test) = (ROOMS_TRAIN, ROOMS_TEST), ("study-train.h5", "study-test.h5")
-    options, floors = "--set iterations=1000", ("empty-room",)
-    return Study(title, data, train, test, test, rows, options, scores, floors)
+    train, test = f"{files}-train.h5", f"{files}-test.h5"
+    made = {
+        train: f"{rooms.format(split='train')} --size 64 --n 8000 --seed 1",
+        test: f"{rooms.format(split='test')} --size 64 --n 300 --views 0,5,35,55,80 --seed 1000",
+    }
+    data = tuple(
+        Step(f"scenegen render {words} --out {name}", name) for name, words in made.items()
+    )
+    options = options or "--set iterations=1000"
+    return Study(title, data, train, test, test, rows, options, scores, ("empty-room",))
 
 
 def _of_questions(title: str, rows: dict[str, str], labels: int) -> Study:
@@ -94,12 +101,27 @@ LOSSES = {
 ALL_LOSSES = {**LOSSES, "these and mutual information": f"{BOTH} mutual_information=1"}
 DEPTH = {"`compact`": "", "`compact` and depth supervision": "depth=300"}
 WEIGHTS = {str(weight): f"mutual_information={weight}" for weight in INFORMATION}
+SMALL = "--set networks.size=64 --set networks.width=0.125 --set learning_rate=0.0002"
+OBJECTIVE = {
+    "the paper's objective": "",
+    "one step of the critic": "critic_steps=1",
+    "no reconstruction of codes": "code_reconstruction=0",
+    "no reconstruction": "reconstruction=0 code_reconstruction=0",
+    "no critic": "adversarial=0",
+}
 STUDIES = {
     "losses": _of_rooms("What each loss brings to rooms (the paper's Table 4)", LOSSES),
     "losses-questions": _of_questions(
         "What each loss brings to questions of the kind `other`, 200 labels",
         ALL_LOSSES,
         200,
+    ),
+    "objective": _of_rooms(
+        "Which parts of the paper's objective matter, at the paper's schedule",
+        OBJECTIVE,
+        SHAPES,
+        "study-shapes",
+        f"--config paper {SMALL} --set iterations=3000 --workers 0",
     ),
     "depth": _of_rooms("Depth supervision (the paper's appendix)", DEPTH),
     "information-0": _of_questions("Weight of mutual information, no labels", WEIGHTS, 0),

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from baselines.pix2shape.network.config import model_config
 from benchmarks.results import studies
 from benchmarks.results.steps import StepError
 
@@ -82,3 +83,13 @@ def test_a_row_counts_its_own_runs_alone(tmp_path):
         path.write_text(json.dumps({"scores": columns}))
     rows = studies.page(tmp_path).splitlines()[4:6]
     assert [row.split(" | ")[2] for row in rows] == ["2", "1"]
+
+
+@pytest.mark.parametrize("study", studies.STUDIES.values(), ids=studies.STUDIES)
+def test_every_row_is_a_model_of_its_own(study):
+    config = "paper" if "--config paper" in study.options else "compact"
+    found = []
+    for settings in study.rows.values():
+        values = [setting.split("=") for setting in settings.split()]
+        found.append(model_config(config, **{name: json.loads(value) for name, value in values}))
+    assert len(set(found)) == len(found) > 1
