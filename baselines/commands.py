@@ -17,9 +17,10 @@ from baselines.pix2shape.commands import (
     needs_torch,
     predict_to,
 )
-from scenegen.common.command_line import EXAMPLE, print_line, progress_bar
-from scenegen.common.options import LARGEST, OVERWRITE
-from scenegen.common.paths import InputPath, OutputFolder
+from scenegen.common.command_line.groups import EXAMPLE
+from scenegen.common.command_line.options import LARGEST, OVERWRITE
+from scenegen.common.command_line.output import print_line, progress_bar
+from scenegen.common.command_line.paths import InputPath, OutputFolder
 
 UNTRAINED = {
     "constant": "one depth everywhere, the mean of the training rooms",

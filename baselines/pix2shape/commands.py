@@ -8,10 +8,11 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import EXAMPLE, needs, print_line, progress_bar
+from scenegen.common.command_line.groups import EXAMPLE, needs
+from scenegen.common.command_line.options import LARGEST, MOST_PROCESSES, OVERWRITE
+from scenegen.common.command_line.output import print_line, progress_bar
+from scenegen.common.command_line.paths import InputPath, OutputFolder, OutputPath
 from scenegen.common.errors import SceneGenError
-from scenegen.common.options import LARGEST, MOST_PROCESSES, OVERWRITE
-from scenegen.common.paths import InputPath, OutputFolder, OutputPath
 
 PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
 A_MODEL = "A .safetensors file with its .json beside it, or the name of bundled weights"

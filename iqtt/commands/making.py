@@ -10,10 +10,16 @@ from typing import Any
 
 import click
 
-from scenegen.common import command_line, options
-from scenegen.common.command_line import EXAMPLE, print_line, progress_bar
-from scenegen.common.options import Color, Range
-from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
+from scenegen.common.command_line import groups, options, output
+from scenegen.common.command_line.groups import EXAMPLE
+from scenegen.common.command_line.options import Color, Range
+from scenegen.common.command_line.output import print_line, progress_bar
+from scenegen.common.command_line.paths import (
+    InputPath,
+    OutputFolder,
+    OutputPath,
+    refuse_command_inputs,
+)
 
 KNOWN_SEED = (
     "note: anyone who knows the seed can recreate the test answers. For a private test set, run"
@@ -171,9 +177,7 @@ def make_split(
     count = splits * (spec.train + spec.val + spec.test)
     started = time.perf_counter()
     with (
-        command_line.on_scheduler(
-            scheduler, workers, partial(renderer_identity, device)
-        ) as cluster,
+        output.on_scheduler(scheduler, workers, partial(renderer_identity, device)) as cluster,
         progress_bar(count, "question") as bar,
     ):
         tally = (make.make_suite if suite else make.make_split)(
@@ -186,7 +190,7 @@ def make_split(
             device=device,
             compression=compression,
             overwrite=overwrite,
-            command=command_line.creation_command("iqtt"),
+            command=groups.creation_command("iqtt"),
             secret=secret_seed is not None,
             progress=bar.update,
         )

@@ -9,10 +9,11 @@ from pathlib import Path
 import click
 
 from iqtt.commands.making import QUESTIONS
-from scenegen.common import command_line, options
-from scenegen.common.command_line import EXAMPLE, print_line, progress_bar
-from scenegen.common.options import Items
-from scenegen.common.paths import InputPath, OutputPath
+from scenegen.common.command_line import options, output
+from scenegen.common.command_line.groups import EXAMPLE
+from scenegen.common.command_line.options import Items
+from scenegen.common.command_line.output import print_line, progress_bar
+from scenegen.common.command_line.paths import InputPath, OutputPath
 
 SHOWN = 8  # questions that `show` draws by default
 
@@ -64,7 +65,7 @@ def show(
         sheet = question_sheet([questions[row] for row in rows], answers, task)
         count = len(questions)
     save = partial(save_picture, sheet, overwrite=overwrite)
-    done = command_line.show_or_save(sheet, show, out, "questions.png", save)
+    done = output.show_or_save(sheet, show, out, "questions.png", save)
     print_line(f"{done}: {len(rows)} of {file}'s {count} questions")
 
 
@@ -119,7 +120,7 @@ def audit(
         check_writable(Path(json_path), overwrite)
     groups = find_splits(splits)
     with (
-        command_line.on_scheduler(scheduler, 0, program_version) as cluster,
+        output.on_scheduler(scheduler, 0, program_version) as cluster,
         progress_bar(sum(map(question_count, groups)), "question") as bar,
     ):
         found = [

@@ -6,9 +6,10 @@ from typing import Any
 import click
 
 from metrics.commands.options import MARKDOWN, SEED
-from scenegen.common.command_line import EXAMPLE, print_line, progress_bar
-from scenegen.common.options import OVERWRITE
-from scenegen.common.paths import InputPath, OutputFolder, OutputPath
+from scenegen.common.command_line.groups import EXAMPLE
+from scenegen.common.command_line.options import OVERWRITE
+from scenegen.common.command_line.output import print_line, progress_bar
+from scenegen.common.command_line.paths import InputPath, OutputFolder, OutputPath
 
 
 @click.command(epilog=EXAMPLE + "bench compare baseline.json mine.json --metric chamfer")

@@ -7,9 +7,10 @@ import click
 
 from metrics.commands.options import MARKDOWN, SEED
 from scenegen.commands.viewing import page_options
-from scenegen.common.command_line import EXAMPLE, needs, on_scheduler, print_line, progress_bar
-from scenegen.common.options import MESHES, MOST_PROCESSES, OVERWRITE, SCHEDULER, Items
-from scenegen.common.paths import InputPath, OutputPath, refuse_inputs
+from scenegen.common.command_line.groups import EXAMPLE, needs
+from scenegen.common.command_line.options import MESHES, MOST_PROCESSES, OVERWRITE, SCHEDULER, Items
+from scenegen.common.command_line.output import on_scheduler, print_line, progress_bar
+from scenegen.common.command_line.paths import InputPath, OutputPath, refuse_inputs
 
 TRUTH = click.option(
     "--truth",

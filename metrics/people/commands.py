@@ -9,9 +9,10 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import EXAMPLE, needs, print_line
-from scenegen.common.options import LARGEST, OVERWRITE
-from scenegen.common.paths import InputPath, OutputPath, refuse_inputs
+from scenegen.common.command_line.groups import EXAMPLE, needs
+from scenegen.common.command_line.options import LARGEST, OVERWRITE
+from scenegen.common.command_line.output import print_line
+from scenegen.common.command_line.paths import InputPath, OutputPath, refuse_inputs
 
 option = partial(click.option, show_default=True)
 

@@ -1,5 +1,5 @@
 """The `scenegen` commands: on files of rooms, on data cards (`sharing`), and on mesh folders.
 
-Only here, in `common.command_line` and in `common.options` is click imported. A command parses its
-options, makes one library call and prints the result.
+Only here and in `common.command_line` is click imported. A command parses its options, makes one
+library call and prints the result.
 """

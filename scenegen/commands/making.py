@@ -12,14 +12,8 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import (
-    EXAMPLE,
-    creation_command,
-    on_scheduler,
-    print_line,
-    progress_bar,
-)
-from scenegen.common.options import (
+from scenegen.common.command_line.groups import EXAMPLE, creation_command
+from scenegen.common.command_line.options import (
     COMPRESSION,
     DEVICE,
     IMAGE_DTYPE,
@@ -34,7 +28,8 @@ from scenegen.common.options import (
     Range,
     Size,
 )
-from scenegen.common.paths import InputPath, OutputPath
+from scenegen.common.command_line.output import on_scheduler, print_line, progress_bar
+from scenegen.common.command_line.paths import InputPath, OutputPath
 
 SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
 SHARED = ("parquet", "webdataset")  # and of files of many

@@ -7,9 +7,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenegen.common.command_line import EXAMPLE, print_line, progress_bar
-from scenegen.common.options import CACHE_DIR, MESH_FILES, MOST_PROCESSES, OVERWRITE, UP, Names
-from scenegen.common.paths import InputPath, OutputPath
+from scenegen.common.command_line.groups import EXAMPLE
+from scenegen.common.command_line.options import (
+    CACHE_DIR,
+    MESH_FILES,
+    MOST_PROCESSES,
+    OVERWRITE,
+    UP,
+    Names,
+)
+from scenegen.common.command_line.output import print_line, progress_bar
+from scenegen.common.command_line.paths import InputPath, OutputPath
 
 if TYPE_CHECKING:
     from scenegen.objects.meshes.check import ModelCheck

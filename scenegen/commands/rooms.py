@@ -11,9 +11,15 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import EXAMPLE, needs, print_line, progress_bar, show_or_save
-from scenegen.common.options import DEVICE, MESHES, OVERWRITE, SHOW, Items
-from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
+from scenegen.common.command_line.groups import EXAMPLE, needs
+from scenegen.common.command_line.options import DEVICE, MESHES, OVERWRITE, SHOW, Items
+from scenegen.common.command_line.output import print_line, progress_bar, show_or_save
+from scenegen.common.command_line.paths import (
+    InputPath,
+    OutputFolder,
+    OutputPath,
+    refuse_command_inputs,
+)
 
 SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
 SHARED = ("parquet", "webdataset")  # and of files of many

@@ -6,9 +6,10 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import EXAMPLE, needs, print_line
-from scenegen.common.options import MESHES, Items
-from scenegen.common.paths import InputPath
+from scenegen.common.command_line.groups import EXAMPLE, needs
+from scenegen.common.command_line.options import MESHES, Items
+from scenegen.common.command_line.output import print_line
+from scenegen.common.command_line.paths import InputPath
 
 Command = Callable[..., Any]
 

@@ -2,8 +2,7 @@
 
 Errors with fields (`errors`), records as JSON and back (`records`), random numbers (`random`),
 files and folders that appear only when complete (`new_file`, `new_folder`), HDF5 files of rows
-(`row_file`), error lines of commands (`command_line`) and their `options`, worker processes, text
-tables, and rotations.
+(`hdf5`), what commands share (`command_line`), worker processes, text tables, and rotations.
 
-It imports nothing else of this project. Start with `errors` and `row_file`.
+It imports nothing else of this project. Start with `errors` and `hdf5.row_file`.
 """

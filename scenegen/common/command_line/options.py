@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from scenegen.common.paths import InputPath, OutputFolder
+from scenegen.common.command_line.paths import InputPath, OutputFolder
 
 MESH_FILES = (".glb", ".obj", ".off", ".ply", ".stl")
 NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"

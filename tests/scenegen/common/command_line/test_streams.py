@@ -12,7 +12,8 @@ import pytest
 COMMAND = """
 import pathlib, sys, time
 import click
-from scenegen.common.command_line import PackageCommands, progress_bar
+from scenegen.common.command_line.groups import PackageCommands
+from scenegen.common.command_line.output import progress_bar
 
 @click.command()
 @click.pass_context
@@ -69,7 +70,7 @@ def test_help_for_a_full_disk_is_one_line(tmp_path):
 def test_a_full_disk_is_told_once():
     program = """
 import sys
-from scenegen.common.streams import robust_streams
+from scenegen.common.command_line.streams import robust_streams
 with robust_streams():
     for i in range(3):
         try:
@@ -87,7 +88,7 @@ def test_ctrl_c_prints_nothing_twice():
     """A signal comes a little later in each print than in the one before."""
     program = """
 import signal
-from scenegen.common.streams import robust_streams
+from scenegen.common.command_line.streams import robust_streams
 
 def interrupt(*_):
     raise KeyboardInterrupt

@@ -3,7 +3,15 @@
 import click
 import pytest
 
-from scenegen.common.options import MOST_ITEMS, Color, Items, Names, Numbers, Range, Size
+from scenegen.common.command_line.options import (
+    MOST_ITEMS,
+    Color,
+    Items,
+    Names,
+    Numbers,
+    Range,
+    Size,
+)
 
 READ = [
     (Range(int), "3", (3, 3)),

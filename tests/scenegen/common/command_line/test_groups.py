@@ -8,7 +8,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from scenegen.common.command_line import PackageCommands, creation_command
+from scenegen.common.command_line.groups import PackageCommands, creation_command
 
 
 def group_of(callback):

@@ -1,24 +1,19 @@
-"""What all commands share: how errors are shown, and how lines, pictures and progress are."""
+"""Groups of commands: what the user can mend is shown as one line, and ends with exit code 2."""
 
 import importlib.util
 import re
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from scenegen.common.paths import refuse_command_inputs
+from scenegen.common.command_line.output import print_line
+from scenegen.common.command_line.streams import robust_streams
 from scenegen.common.signals import ended_by_signals
-from scenegen.common.streams import for_pictures, for_progress_bars, robust_streams
 from scenegen.common.text_table import printable
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
-
-    from scenegen.common.workers.cluster import Cluster, Versions
 
 # An `epilog` is this and a command line. A paragraph that begins with \b keeps its line breaks.
 EXAMPLE = "\b\nExample:\n  "
@@ -27,10 +22,7 @@ WITHOUT_EFFECT = ("--batch", "--workers", "--scheduler")  # they change no byte 
 
 
 class PackageCommands(click.Group):
-    """A group of the `COMMANDS` of some modules, which are imported when a command is asked for.
-
-    A mistake that the user can mend is shown as one line, and ends with exit code 2.
-    """
+    """A group of the `COMMANDS` of some modules, which are imported when a command is asked for."""
 
     def __init__(self, *arguments: Any, modules: tuple[str, ...], **attributes: Any) -> None:
         super().__init__(*arguments, **attributes)
@@ -135,40 +127,6 @@ def needs(who: str, packages: tuple[str, ...], extra: str) -> None:
         raise UserError(f"{who} needs {missing}: pip install '.[{extra}]'")
 
 
-def print_line(text: str, err: bool = False) -> None:
-    """Print one line, whatever names from files it holds."""
-    click.echo(printable(text), err=err)
-
-
-def show_or_save(
-    picture: "Image", show: str, out: str | None, otherwise: str, save: Callable[[str], Any]
-) -> str:
-    """Show a picture in the terminal, write it, or both; return what to call it.
-
-    Args:
-        show: value of the option SHOW.
-        out: where to write it, as the user says.
-        otherwise: where to write it if it is not shown.
-        save: writes it.
-    """
-    from scenegen.common.terminal import abilities
-
-    protocol = abilities.protocol() if (show, out) == ("auto", None) else show
-    shown = protocol in abilities.PROTOCOLS
-    if show == "kitty" and sys.stdout.isatty() and abilities.within_another():
-        raise UserError("--show kitty: tmux, screen and zellij do not pass it on; use --out")
-    if not shown or out:
-        refuse_command_inputs([out or otherwise])
-        save(out or otherwise)
-    if shown:
-        from scenegen.common.terminal.pictures import escapes
-
-        stream = for_pictures()
-        stream.write(escapes(picture, str(protocol), abilities.width()) + "\n")
-        stream.flush()
-    return out or (otherwise if not shown else "shown (--out writes a file)")
-
-
 def creation_command(program: str) -> str:
     """Return the command line for a file to record, without options that change no byte."""
     words, recorded = iter(sys.argv[1:]), [program]
@@ -180,39 +138,3 @@ def creation_command(program: str) -> str:
         elif word.partition("=")[0] not in WITHOUT_EFFECT:
             recorded.append(word)
     return " ".join(recorded)
-
-
-def progress_bar(count: int | None, unit: str) -> Any:
-    """Return a progress bar with rate and time left, to be used in a `with`.
-
-    It is shown on standard error where that is a terminal. Its `update` takes the number of items
-    done since the last call.
-    """
-    from tqdm import tqdm
-
-    look = {"unit": unit, "disable": None, "leave": False, "smoothing": 0.1, "dynamic_ncols": True}
-    return tqdm(total=count, file=for_progress_bars(), **look)
-
-
-@contextmanager
-def on_scheduler(
-    scheduler: str | None, workers: int, versions: "Versions"
-) -> Iterator["Cluster | None"]:
-    """Connect to the scheduler of an option; None where it was not given.
-
-    Args:
-        workers: processes of a local cluster; 0 for one a processor.
-        versions: tells what the results depend on.
-
-    Raises as `connected`.
-    """
-    if scheduler is None:
-        yield None
-        return
-    from scenegen.common.workers.cluster import connected
-    from scenegen.common.workers.pool import processors
-
-    with connected(
-        scheduler, workers or processors(), versions, lambda text: print_line(text, err=True)
-    ) as cluster:
-        yield cluster

@@ -6,9 +6,14 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from scenegen.common.command_line import PackageCommands
-from scenegen.common.options import MESH_FILES
-from scenegen.common.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
+from scenegen.common.command_line.groups import PackageCommands
+from scenegen.common.command_line.options import MESH_FILES
+from scenegen.common.command_line.paths import (
+    InputPath,
+    OutputFolder,
+    OutputPath,
+    refuse_command_inputs,
+)
 from scenegen.objects.meshes.listing import SUFFIXES
 
 
