@@ -11,8 +11,7 @@
     score_rows  milliseconds of `bench score` for one row, in test sets of more and more rows
     quiz        times of the answers of `iqtt quiz` with many participants at once
     viewing     seconds from a move of the slider of a 3D page to the new scene
-    material    how well materials and lights are read from one image
-    pose        how well the angle between two views is read from their codes
+    experiments what trained models know: materials, angles between views, kinds of shapes
     results     the tables of docs/results.md, from score files
     digests     what two checkouts of the code write, compared part by part
 

@@ -1,6 +1,6 @@
 """Where `rezende` works and where it fails: four sets of single shapes, one training run each.
 
-    python -m benchmarks.rezende_primitives --runs runs/rezende --picture reconstructions.png
+    python -m benchmarks.experiments.rezende_primitives --runs runs --picture pictures.png
 
 prints a table of errors on images that no run saw, and draws inputs, reconstructions, and the
 meshes from the side. A run that was stopped goes on.

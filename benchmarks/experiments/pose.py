@@ -1,4 +1,6 @@
-"""How well the angle between two views is read from z_view: python -m benchmarks.pose --help
+"""How well the angle between two views is read from z_view.
+
+    python -m benchmarks.experiments.pose --help
 
 A code has numbers for the scene and numbers for the view. If the split means what its name says,
 the angle between the views of a question's reference and right answer, which show one shape, can

@@ -1,4 +1,6 @@
-"""How well materials and lights are read from one image: python -m benchmarks.material --help
+"""How well materials and lights are read from one image.
+
+    python -m benchmarks.experiments.material --help
 
 A model of `--set material=true` gives each surfel an albedo and Phong's lobe, and one of
 `--set lights=L` says where the lights are. From the first view of each room these are compared with
