@@ -63,7 +63,7 @@ def _of_rooms(
     rows: dict[str, str],
     rooms: str = HOUSEHOLD,
     files: str = "study",
-    options: str = "",
+    options: str = "--set iterations=1000",
 ) -> Study:
     scores = {
         **_by_angle("relief_iou", "relief IoU"),
@@ -80,7 +80,6 @@ def _of_rooms(
     data = tuple(
         Step(f"scenegen render {words} --out {name}", name) for name, words in made.items()
     )
-    options = options or "--set iterations=1000"
     return Study(title, data, train, test, test, rows, options, scores, ("empty-room",))
 
 
