@@ -16,7 +16,6 @@ from starlette.types import ASGIApp
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from scenegen.common.errors import SpecError
-from scenegen.common.web_hosts import LOCAL_NAMES, is_local
 
 EXCHANGE_SECONDS = 30  # for a request and its response; who is slower is cut off
 IDLE_SECONDS = 5
@@ -76,22 +75,17 @@ class QuietServer(uvicorn.Server):
                 signal.signal(number, before[number])
 
 
-def listen(host: str, port: int, public: bool) -> socket.socket:
+def listen(host: str, port: int) -> socket.socket:
     """Return a socket that listens; port 0 takes any free one.
 
-    Raises SpecError for a host that others can reach without `public`, and for one that is not
-    here; OSError where the port is taken.
+    Raises SpecError for a host that is not here; OSError where the port is taken.
     """
-    if not public and not is_local(host):
-        hint = "say --public if people on the network shall reach the quiz"
-        raise SpecError("--host", host or "nothing", "localhost", hint)
-    name = "127.0.0.1" if host.lower() in LOCAL_NAMES else host
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(
-            name, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )[0]
     except (OSError, UnicodeError) as error:
-        raise SpecError("--host", host, "a name or an address of this machine") from error
+        raise SpecError("host", host, "a name or an address of this machine") from error
     # asyncio sends small packets at once only where it is told that the protocol is TCP.
     listening = socket.socket(family, kind, protocol)
     try:

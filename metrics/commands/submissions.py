@@ -181,9 +181,10 @@ def view(
     from metrics.submissions.truths import find_truth
     from metrics.viewing.order import MOST_SCORED, require_rooms, shown_scores
     from metrics.viewing.page import PredictionPage
+    from scenegen.common.web_hosts import listening_host
     from scenegen.rooms.reader import RoomsFile
     from scenegen.viewing.geometry import shapes_of
-    from scenegen.viewing.server import listening_host, serve, started
+    from scenegen.viewing.server import serve, started
 
     where = listening_host(host, public), port, names
     with open_predictions(submission) as opened:

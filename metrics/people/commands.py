@@ -22,7 +22,7 @@ option = partial(click.option, show_default=True)
 @click.argument("file", type=InputPath(), required=False, metavar="[SPLIT.h5]")
 @option("--db", type=InputPath(), default="answers.db",
         help="SQLite file that keeps the answers; it is made, or taken up again.")
-@click.option("--host", help="Where to listen  [default: localhost, or with --public all addresses"
+@click.option("--host", help="Where to listen  [default: 127.0.0.1, or with --public all addresses"
               " of this machine].")
 @option("--port", type=click.IntRange(0, 65535), default=8000, help="Port; 0 takes a free one.")
 @option("--public", is_flag=True, help="Let others on the network reach the quiz; the connection is"
@@ -80,13 +80,12 @@ def _serve(
     from iqtt.quiz.serve import address_of, listen, serve
     from iqtt.quiz.study import Study
     from metrics.people.references import compare
-    from scenegen.common.web_hosts import hosts_of
+    from scenegen.common.web_hosts import hosts_of, listening_host
 
-    if host is None:
-        host = "0.0.0.0" if public else "localhost"
+    host = listening_host(host, public)
     with (
         Study(file, part, questions, calibrations, seed) as study,
-        listen(host, port, public) as listening,
+        listen(host, port) as listening,
     ):
         connection = open_answers(db, study.settings)
         key = bytes.fromhex(stored_values(connection)[SECRET])

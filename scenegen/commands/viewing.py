@@ -53,11 +53,12 @@ def view(
     asks for nothing outside this machine. Ctrl-C ends it.
     """
     needs("scenegen view", ("viser",), "view")
+    from scenegen.common.web_hosts import listening_host
     from scenegen.rooms.reader import RoomsFile
     from scenegen.viewing.contents import rooms_contents
     from scenegen.viewing.geometry import shapes_of
     from scenegen.viewing.page import ScenePage
-    from scenegen.viewing.server import listening_host, serve, started
+    from scenegen.viewing.server import serve, started
 
     with RoomsFile(file) as rooms:
         contents = rooms_contents(rooms, items)

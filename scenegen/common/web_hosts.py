@@ -1,4 +1,4 @@
-"""Who may ask a server on this machine: the names it has, and the pages that are its own.
+"""Where a server on this machine listens, and who may ask it: its names, and its own pages.
 
 A page of another site, open in a browser here, can send requests to this machine. It can even make
 its own name lead here (DNS rebinding), and would then be of one origin with our pages. So servers
@@ -11,6 +11,10 @@ import socket
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
+from scenegen.common.errors import SpecError
+
+HERE = "127.0.0.1"
+EVERYWHERE = "0.0.0.0"
 LOCAL_NAMES = ("localhost",)
 
 
@@ -39,6 +43,19 @@ class Hosts:
         except ValueError:
             return name in self.names
         return self.numbers or number.is_loopback
+
+
+def listening_host(host: str | None, public: bool) -> str:
+    """Return the address to listen at: by default this machine's own, or all where `public`.
+
+    Raises SpecError for an address that others can reach, unless `public`.
+    """
+    if host is None:
+        return EVERYWHERE if public else HERE
+    if not is_local(host) and not public:
+        advice = "with --public, everyone who can reach the address sees the pages"
+        raise SpecError("host", f"{host!r:.100}", "127.0.0.1, ::1 or localhost", advice)
+    return HERE if host.lower() in LOCAL_NAMES else host
 
 
 def hosts_of(host: str, public: bool, names: tuple[str, ...] = ()) -> Hosts:

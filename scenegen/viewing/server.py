@@ -9,26 +9,10 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from scenegen.common.errors import SpecError
-from scenegen.common.web_hosts import LOCAL_NAMES, Hosts, hosts_of, is_local, is_own_page
+from scenegen.common.web_hosts import EVERYWHERE, HERE, Hosts, hosts_of, is_local, is_own_page
 
 if TYPE_CHECKING:
     from viser import ViserServer
-
-HERE = "127.0.0.1"
-EVERYWHERE = "0.0.0.0"
-
-
-def listening_host(host: str | None, public: bool) -> str:
-    """Return the address to listen at: by default this machine's own, or all where `public`.
-
-    Raises SpecError for an address that others can reach, unless `public`.
-    """
-    if host is None:
-        return EVERYWHERE if public else HERE
-    if not is_local(host) and not public:
-        advice = "with --public, everyone who can reach the address sees the data"
-        raise SpecError("host", f"{host!r:.100}", "127.0.0.1, ::1 or localhost", advice)
-    return HERE if host.lower() in LOCAL_NAMES else host
 
 
 @contextmanager

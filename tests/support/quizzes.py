@@ -86,7 +86,7 @@ def served(study, path, most=100, public=False, names=()):
     """Serve a study from a thread."""
     db = open_answers(path, study.settings)
     key, told = bytes.fromhex(stored_values(db)[SECRET]), []
-    with listen("localhost", 0, False) as listening, Commits(db) as commits:
+    with listen("127.0.0.1", 0) as listening, Commits(db) as commits:
         shown = partial(compare, study.settings.answers)
         quiz = Quiz(study, commits, key, shown, told.append, "A <b>lab</b>", most)
         server = server_of(make_app(quiz, hosts_of("localhost", public, names)))
