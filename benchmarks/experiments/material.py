@@ -45,6 +45,11 @@ def main(weights: str, data: Path, picture: Path | None) -> None:
     """Print errors of albedo, k_s, image and lights: means and 95% intervals over rooms."""
     torch.set_num_threads(1)
     model, _ = open_weights(weights)
+    if not model.config.material:
+        raise click.UsageError(
+            f"--weights {weights}: expected a model that learned materials, as"
+            " `pix2shape train --set material=true` trains"
+        )
     found = read(model, data)
     rows = [[name, *map(_interval, columns)] for name, columns in errors(found).items()]
     head = ["error", "model", "mean of the file", "image / white empty room"]
@@ -69,7 +74,7 @@ def read(model: Pix2Shape, data: Path) -> dict[str, Array]:
             batch = source.as_batch(default_collate([source[row]]))
             code = model.encode(batch.image, batch.views)
             surfels = model.surfels(code, batch.views.condition, batch.views.cameras)
-            assert surfels.material is not None, "--weights: of a model that is told the material"
+            assert surfels.material is not None, "main sees to it"
             ids, position = rooms.read("object_id", row), rooms.read("light/position", row)
             maps = {
                 name: reduced(rooms.read(f"material/{stored}", row)[ids].astype(float), size)

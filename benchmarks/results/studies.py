@@ -150,15 +150,8 @@ def _cell(folder: Path, name: str, row: str, seed: int) -> dict[str, Any]:
     """Return the columns of one training run."""
     study, run = STUDIES[name], _run(name, row, seed)
     weights, out, result = (f"{run}/{end}" for end in ("weights.safetensors", "out.h5", "s.json"))
-    reads: tuple[str, ...] = (weights, study.test)
-    changed = " ".join(f"--set {setting}" for setting in study.rows.get(row, "").split())
-    train = f"pix2shape train --data {study.train} {study.options} {changed} --set seed={seed}"
-    train = " ".join(f"{train} --out {run}".split())
-    predict = f"pix2shape predict --weights {weights} --data {study.test} --out {out}"
-    if row in study.floors:
-        train, predict = "", f"bench baseline {row} --data {study.test} --out {out}"
-        reads = (study.test,)
-    score = f"bench score {out} --truth {study.truth} --json {result}"
+    reads = (study.test,) if row in study.floors else (weights, study.test)
+    train, predict, score = commands = commands_of(name, row, seed)
     files = {path: mark(folder / path) for path in (study.train, study.test, study.truth)}
 
     def scored() -> dict[str, Any]:
@@ -169,8 +162,21 @@ def _cell(folder: Path, name: str, row: str, seed: int) -> dict[str, Any]:
         scores = json.loads((folder / result).read_text())
         return {column: _found(scores, place) for column, place in study.scores.items()}
 
-    settings = {"commands": [train, predict, score], "files": files}
+    settings = {"commands": commands, "files": files}
     return record(_place(folder, name, row, seed), settings, scored)
+
+
+def commands_of(name: str, row: str, seed: int) -> list[str]:
+    """Return what trains one run, predicts and scores; a floor is not trained: "" in its place."""
+    study, run = STUDIES[name], _run(name, row, seed)
+    changed = " ".join(f"--set {setting}" for setting in study.rows.get(row, "").split())
+    train = f"pix2shape train --data {study.train} {study.options} {changed} --set seed={seed}"
+    train = " ".join(f"{train} --out {run}".split())
+    weights, out = f"{run}/weights.safetensors", f"{run}/out.h5"
+    predict = f"pix2shape predict --weights {weights} --data {study.test} --out {out}"
+    if row in study.floors:
+        train, predict = "", f"bench baseline {row} --data {study.test} --out {out}"
+    return [train, predict, f"bench score {out} --truth {study.truth} --json {run}/s.json"]
 
 
 def _found(scores: dict[str, Any], place: tuple[str, ...]) -> float | None:
@@ -212,10 +218,14 @@ def _section(folder: Path, name: str) -> str:
 
 
 def _runs(folder: Path, name: str, row: str) -> list[dict[str, Any]]:
-    """Return the columns of all runs of a row that are scored."""
+    """Return the columns of all runs of a row that are scored, of today's commands alone."""
     first = _place(folder, name, row, 0).stem.removesuffix("0")
-    paths = sorted((folder / "scores").glob(f"{first}[0-9]*.json"))
-    return [json.loads(path.read_text())["scores"] for path in paths]
+    found = []
+    for path in sorted((folder / "scores").glob(f"{first}[0-9]*.json")):
+        stored, seed = json.loads(path.read_text()), int(path.stem.removeprefix(first))
+        if stored["settings"]["commands"] == commands_of(name, row, seed):
+            found.append(stored["scores"])
+    return found
 
 
 def _mean(values: list[float | None], digits: int) -> str:

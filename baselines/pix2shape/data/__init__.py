@@ -1,5 +1,6 @@
-"""Rooms and question files as batches of tensors: images, cameras and lights, no ground truth.
+"""Rooms and question files as batches of tensors: images, cameras, lights, and what losses ask.
 
-Start reading in `rooms.py`, whose `Batch` both files make; `questions.py` adds the answers that
-training may be told. Imports `network/`, and the readers of scenegen and iqtt.
+Start reading in `rooms.py`, whose `Batch` both files make, and which reads depth maps and classes
+only where a loss or a network is told them; `questions.py` adds the answers that training may be
+told. Imports `network/`, and the readers of scenegen and iqtt.
 """

@@ -10,7 +10,9 @@ from torch.utils.data import Dataset
 
 from baselines.pix2shape.data.rooms import Batch, as_batch, channels_first, check_reducible
 from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.network.polar import BRIGHT
 from iqtt.files.reader import QuestionsDataset, open_questions, parts
+from iqtt.questions.specs import SplitSpec
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check
 from scenegen.rendering.ground_truth import decode_image
@@ -82,6 +84,13 @@ class QuestionImages(Dataset[dict[str, Any]]):
         return as_batch(flat, self.fov_y_degrees)
 
 
+def check_background(where: object, spec: SplitSpec | None, config: ModelConfig) -> None:
+    """Raise SpecError where the polar encoder would take a background for part of the shape."""
+    if config.networks.encoder == "polar" and spec is not None and min(spec.background) < BRIGHT:
+        expected = "white, by which the polar encoder tells shape from background"
+        raise SpecError(where, f"a background of {spec.background}", expected)
+
+
 def for_questions(config: ModelConfig, path: str | Path, part: str | None) -> ModelConfig:
     """Return a configuration for the images of a question file.
 
@@ -101,6 +110,7 @@ def for_questions(config: ModelConfig, path: str | Path, part: str | None) -> Mo
     with open_questions(path, part) as questions:
         if questions.spec is None:
             raise SpecError(path, "a released file", "one that `iqtt make-split` wrote")
+        check_background(path, questions.spec, config)
         distance = questions.spec.camera_distance
         radius = questions.spec.max_radius
     spec = replace(spec, camera=False, classes=0, standardised=True)

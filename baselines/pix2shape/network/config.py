@@ -49,6 +49,7 @@ CONFIGS["views"] = {
     "reconstruction": 0.0,
     "mutual_information": 0.0,
     "questions": 0.0,
+    "consistency": 0.0,
     "contrast": 1.0,
     "temperature": 0.6,
     "hard_negatives": 1.0,
@@ -64,6 +65,7 @@ LOSSES = (
 )  # fmt: skip
 
 METHOD = "pix2shape"
+TAUGHT_DEPTH = f"{METHOD}-depth"
 MOST_LIGHTS = 64
 
 
@@ -86,7 +88,7 @@ class ModelConfig:
         labelled_batch: labelled questions that are compared besides; 0 lets some of
             `question_batch` be labelled ones.
         turned: whether the images of compared questions are turned about the viewing axis, each by
-            an angle of its own, and half of the questions mirrored.
+            an angle of its own, and each question mirrored with probability 1/2.
         temperature: of `contrast`; divides mean squared differences of codes, about 2 at first.
         hard_negatives: weight in `contrast` of the pairs among a question's own answers, which
             show different shapes of as many cubes.
@@ -176,15 +178,18 @@ class ModelConfig:
 
         "pix2shape" has the adversarial loss, reconstructs images and codes by the paper's norm, for
         questions minimises mutual information, and has no loss that the paper lacks. Of other
-        settings any may differ: sizes, iterations, the optimiser's. "pix2shape-rays" is told the
-        empty room, "pix2shape-views" has the polar encoder, and all others are "pix2shape-compact".
+        settings any may differ: sizes, iterations, the optimiser's. "pix2shape-depth" learns from
+        true depth maps, "pix2shape-rays" is told the empty room, "pix2shape-views" has the polar
+        encoder, and all others are "pix2shape-compact".
         """
+        if self.depth:
+            return TAUGHT_DEPTH
         if self.networks.encoder == "polar":
             return f"{METHOD}-views"
         if self.networks.rays:
             return f"{METHOD}-rays"
         both = self.reconstruction and self.code_reconstruction and not self.absolute_differences
-        ours = (self.consistency, self.contrast, self.depth, self.matching, self.swap)
+        ours = (self.consistency, self.contrast, self.matching, self.swap)
         told = self.networks.camera or self.disentangles
         others = self.networks.spherical or self.turned
         faithful = self.adversarial and both and told and not (any(ours) or others)

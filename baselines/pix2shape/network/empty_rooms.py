@@ -34,6 +34,8 @@ def empty_rooms(
 
     Args:
         world_from_camera: (B, 4, 4).
+        fov_y_degrees: vertical angle of view of all cameras.
+        size: S, pixels a side.
 
     Returns:
         depth: planar, scene units, (B, S, S), of the nearest of floor and two walls. The planes

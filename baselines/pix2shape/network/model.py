@@ -159,7 +159,7 @@ class Pix2Shape(nn.Module):
     def relief(self, code: Tensor, condition: Tensor) -> Tensor:
         """Return how far surfaces lie before the empty room, scene units: (B, z) -> (B, S, S).
 
-        For networks of `rays`. What is below 0 means floor or wall.
+        For networks of `rays`. What is below FLAT means floor or wall.
         """
         return self.decoder(code, condition)[:, 0].float()
 

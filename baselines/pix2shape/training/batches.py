@@ -92,11 +92,15 @@ def _loaded(
 
 
 def image_batches(source: Source, fabric: Fabric, state: State, workers: int) -> Iterator[Batch]:
-    """Yield batches of images without end, beginning with the state's iteration."""
+    """Yield batches of images without end, beginning with the state's iteration.
+
+    Where no loss is of them, they are for pictures, and every process gets them whole.
+    """
     config = state.model.config
     size = batch_size(config, source)
     first = state.iteration * config.batches_per_iteration
-    where = share(size), first, config.seed, fabric
+    own = share(size) if config.uses_images else slice(None)
+    where = own, first, config.seed, fabric
     for items in _loaded(source, len(source), size, *where, workers):
         yield source.as_batch(items).to(fabric.device)
 

@@ -77,7 +77,8 @@ def train(
             if not turn:
                 questions = next(asked, None)
             count, each = _sizes(questions)
-            noise = draw(len(batch.image), config.networks.z, seed, count, each).to(fabric.device)
+            whole = len(batch.image) * (processes() if config.uses_images else 1)
+            noise = draw(whole, config.networks.z, seed, count, each).to(fabric.device)
             seen = questions
             if config.turned and questions is not None:
                 seen = turned(questions[0], noise.turn, noise.mirror), questions[1]
@@ -94,11 +95,11 @@ def train(
 
 
 def _sizes(questions: Asked | None) -> tuple[int, int]:
-    """Return how many questions there are, and images in each."""
+    """Return how many questions all processes compare, and images in each."""
     if questions is None:
         return 0, 0
     images, answers = len(questions[0].image), len(questions[1])
-    return answers, images // answers
+    return answers * processes(), images // answers
 
 
 def check_request(
@@ -114,7 +115,8 @@ def check_request(
         expected = "0 for questions, whose cameras are not told"
         raise SpecError("consistency", config.consistency, expected)
     compared = sum(batches.question_sizes(config, source, labels))
-    for size in (batches.batch_size(config, source), compared):
+    images = batches.batch_size(config, source) if config.uses_images else 0
+    for size in (images, compared):
         items = "questions" if questions else "images"
         expected = f"a number of processes that divides a batch of {size} {items}"
         check(size % count == 0, "devices", count, expected)

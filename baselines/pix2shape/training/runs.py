@@ -16,7 +16,7 @@ from baselines.pix2shape.data.in_memory import read_rooms
 from baselines.pix2shape.data.questions import QuestionImages, for_questions
 from baselines.pix2shape.data.rooms import Batch, RoomImages, is_question_file
 from baselines.pix2shape.matching.labels import labels as labels_of
-from baselines.pix2shape.network.config import METHOD, ModelConfig
+from baselines.pix2shape.network.config import METHOD, TAUGHT_DEPTH, ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.network.shared_batch import summed
 from baselines.pix2shape.pictures import training_sheet
@@ -24,7 +24,6 @@ from baselines.pix2shape.training.batches import Source
 from baselines.pix2shape.training.launch import Machine, check_agreement, launched
 from baselines.pix2shape.training.loop import check_request, train
 from baselines.pix2shape.training.state import State, load_state, new_state, save_state
-from baselines.pix2shape.training.steps import draw
 from baselines.pix2shape.weights.bundled import open_weights
 from baselines.pix2shape.weights.storage import PRECISIONS, Card, load_card, save_weights
 from iqtt.files.reader import open_questions
@@ -193,8 +192,9 @@ def fit_prior(model: Pix2Shape, source: Source) -> None:
 
 
 def _picture(folder: Path, logs: SummaryWriter, state: State, batch: Batch) -> None:
-    noise = draw(len(batch.image), state.model.config.networks.z, 0).to(batch.image.device)
-    picture = training_sheet(state.model, batch, noise.code)
+    numbers = torch.Generator().manual_seed(0)
+    noise = torch.randn(len(batch.image), state.model.config.networks.z, generator=numbers)
+    picture = training_sheet(state.model, batch, noise.to(batch.image.device))
     save_picture(picture, folder / PICTURE, overwrite=True)
     logs.add_image("pictures", np.asarray(picture), state.iteration, dataformats="HWC")
 
@@ -210,7 +210,7 @@ def _sources(
 
 
 def _begin_from(start: str | Path, model: Pix2Shape, card: Card) -> Card:
-    """Give a model the encoder and decoder of weights; return the card, which tells their labels.
+    """Give a model encoder and decoder of weights; return the card, which says what taught them.
 
     Raises SpecError, and as `open_weights`.
     """
@@ -218,14 +218,18 @@ def _begin_from(start: str | Path, model: Pix2Shape, card: Card) -> Card:
     for name in OF_NETWORKS:
         its, own = getattr(its_card.config, name), getattr(card.config, name)
         check(its == own, "start", start, f"weights of the same {name} as this run's, {own}")
-    if card.config.method == METHOD:
+    if card.method == METHOD:
         own = f"weights of {METHOD}, as other losses than the paper's would have trained this run's"
-        check(its_card.config.method == METHOD, "start", start, own)
+        check(its_card.method == METHOD, "start", start, own)
     same = its_card.classes == card.classes
     check(same, "start", start, f"weights of the same classes as this run's, {card.classes}")
     for name in ("encoder", "decoder"):
         getattr(model, name).load_state_dict(getattr(earlier, name).state_dict())
-    return replace(card, earlier_labels=its_card.labels + its_card.earlier_labels)
+    return replace(
+        card,
+        earlier_labels=its_card.labels + its_card.earlier_labels,
+        earlier_depth=its_card.method == TAUGHT_DEPTH,
+    )
 
 
 def _fingerprint(source: Source, labelled: QuestionImages | None) -> str:
@@ -252,4 +256,5 @@ def _suited(config: ModelConfig, data: str | Path, labels: int, conditional: boo
             counts, shapes = rooms.spec.objects, rooms.spec.shapes
         check(counts == (1, 1), "conditional", f"objects {counts}", "one object in every room")
         networks = replace(networks, classes=len(shapes))
-    return replace(config, networks=networks, mutual_information=0.0, questions=0.0, contrast=0.0)
+    config = replace(config, mutual_information=0.0, questions=0.0, contrast=0.0, swap=0.0)
+    return replace(config, networks=networks)

@@ -51,7 +51,8 @@ def _with_optimisers(model: Pix2Shape) -> State:
 
 def save_state(folder: Path, state: State, card: Card) -> None:
     """Write the folder's checkpoint; the old one stays until this one is complete."""
-    tensors = {f"model.{name}": value for name, value in state.model.state_dict().items()}
+    own = state.model.state_dict().items()
+    tensors = {f"model.{k}": value for k, value in own if k.split(".")[0] in storage.LEARNED}
     notes = {"iteration": str(state.iteration), "seconds": f"{state.seconds:.3f}"}
     for kind in KINDS:
         moments, notes[kind] = moments_of(getattr(state, kind))
@@ -68,7 +69,7 @@ def load_state(folder: Path) -> tuple[State, Card]:
     card = storage.load_card(path)
     tensors, notes = load_tensors(path)
     own = {k.removeprefix("model."): v for k, v in tensors.items() if k.startswith("model.")}
-    state = _with_optimisers(storage.load_into(card, own, path))
+    state = _with_optimisers(storage.load_into(card, own, path, storage.LEARNED))
     try:
         state.iteration, state.seconds = int(notes["iteration"]), float(notes["seconds"])
         _check(0 <= state.iteration <= card.config.iterations, f"iteration {state.iteration}")

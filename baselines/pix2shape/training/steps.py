@@ -18,7 +18,7 @@ from baselines.pix2shape.network.architecture import CAMERA
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.network.model import Pix2Shape, mapped, shaded
-from baselines.pix2shape.network.shared_batch import gathered, processes, share, summed
+from baselines.pix2shape.network.shared_batch import gathered, share, summed
 from baselines.pix2shape.training import losses
 
 Numbers = dict[str, Tensor]
@@ -55,16 +55,17 @@ def draw(images: int, z: int, seed: int, questions: int = 0, each: int = 0) -> N
     """Return the noise of a seed, the same for every device and however many processes share it.
 
     Args:
-        images: how many images of the batch this process has.
-        questions, each: how many compared questions this process has, and images in each.
+        images: how many images the whole batch has.
+        z: length of a code.
+        seed: of all numbers.
+        questions, each: how many questions are compared in all, and images in each.
     """
-    source, batch = torch.Generator().manual_seed(seed), images * processes()
-    questions *= processes()
-    own, asked = share(batch), share(questions * each)
+    source = torch.Generator().manual_seed(seed)
+    own, asked = share(images), share(questions * each)
     return Noise(
-        torch.randn(batch, z, generator=source)[own],
-        torch.rand(batch, generator=source)[own],
-        torch.randperm(batch, generator=source),
+        torch.randn(images, z, generator=source)[own],
+        torch.rand(images, generator=source)[own],
+        torch.randperm(images, generator=source),
         2 * torch.pi * torch.rand(questions * each, generator=source)[asked],
         (torch.rand(questions, generator=source) < 0.5).repeat_interleave(each)[asked],
         torch.randperm(questions * each, generator=source),

@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
+from baselines.pix2shape.data.questions import check_background
 from baselines.pix2shape.data.rooms import (
     camera_poses,
     channels_first,
     check_reducible,
     is_question_file,
 )
+from baselines.pix2shape.network.config import TAUGHT_DEPTH
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.network.surfels import extrapolated, normals_from_depth
@@ -61,7 +63,7 @@ def predict_file(
     another method.
     """
     model, card = open_weights(weights)
-    own = model.config.method
+    own = card.method
     if method not in (None, own):
         hint = "names tell what a model was told and taught; `pix2shape predict` takes any weights"
         raise SpecError("weights", f"{weights}, whose method is {own}", method, hint)
@@ -71,7 +73,7 @@ def predict_file(
     if is_question_file(data):
         answer_file(model, data, out, labels=card.labels + card.earlier_labels, **how)
     else:
-        predict_rooms(model, data, out, **how)
+        predict_rooms(model, data, out, earlier_depth=card.earlier_depth, **how)
 
 
 def chosen_device(name: str, count: int = 1) -> torch.device:
@@ -90,6 +92,7 @@ def predict_rooms(
     data: str | Path,
     out: str | Path,
     *,
+    earlier_depth: bool = False,
     run: str = "",
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
@@ -98,6 +101,10 @@ def predict_rooms(
 
     That image is the scene's view 0, or the first of its views that the file holds, which is
     warned about. The encoder sees it once; the decoder is asked for each view of the scene.
+
+    Args:
+        earlier_depth: whether true depth maps taught weights from which the model's training
+            began; the submission's name and notes tell this.
 
     Raises SpecError where the model does not suit rooms; FileFormatError where a camera is not
     known or the file is damaged; OSError.
@@ -119,8 +126,9 @@ def predict_rooms(
             told = condition[inputs[chosen]], Cameras(poses[inputs[chosen]], fov)
             found.append(model.codes(_stacked(images, model), *told))
         codes = torch.cat(found)
-        how: dict[str, Any] = {"method": model.config.method, "run": run, "overwrite": overwrite}
-        how["notes"] = "; ".join([TOLD] * spec.rays + [DEPTH] * (model.config.depth > 0))
+        method = TAUGHT_DEPTH if earlier_depth else model.config.method
+        how: dict[str, Any] = {"method": method, "run": run, "overwrite": overwrite}
+        how["notes"] = "; ".join([TOLD] * spec.rays + [DEPTH] * (method == TAUGHT_DEPTH))
         with RoomPredictionWriter(out, data, **how) as file:
             for rows in _batches(len(rooms)):
                 asked = condition[rows], Cameras(poses[rows], fov)
@@ -158,6 +166,7 @@ def answer_file(
         raise SpecError(data, "training questions", "questions to answer, such as iqtt-test.h5")
     with open_questions(data) as questions:
         check_reducible(data, questions.height, questions.width, spec.size)
+        check_background(data, questions.spec, model.config)
         scores = []
         images = 1 + questions.answers
         for rows in _batches(len(questions), images):

@@ -12,7 +12,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.network.config import TAUGHT_DEPTH, ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.tensor_files import check_tensors, load_tensors, save_tensors, shortened
 from scenegen.common.errors import FileFormatError, SpecError
@@ -21,7 +21,7 @@ from scenegen.common.records import check, from_json, normalise
 
 FORMAT_VERSION = 1
 KEPT = ("encoder", "decoder", "prior")  # the networks that predicting and sampling need
-PARTS = (*KEPT, "critic", "statistics")
+LEARNED = ("encoder", "decoder", "critic", "statistics")  # those of a checkpoint
 LARGEST_JSON = 1_000_000  # bytes
 PRECISIONS = ("32", "bf16")
 
@@ -37,6 +37,7 @@ class Card:
         fingerprint: that of the training file.
         labels: number of answers that training on questions was given.
         earlier_labels: as many as the runs were given whose weights this one began from, added up.
+        earlier_depth: whether any of those runs learned from true depth maps.
         precision: of the networks in training, one of PRECISIONS.
         classes: names of the object classes, in order, of a conditional model.
         seconds: duration of training.
@@ -48,6 +49,7 @@ class Card:
     fingerprint: str = ""
     labels: int = 0
     earlier_labels: int = 0
+    earlier_depth: bool = False
     precision: str = "32"
     classes: tuple[str, ...] = ()
     seconds: float = 0.0
@@ -61,6 +63,11 @@ class Card:
         check(self.precision in PRECISIONS, "precision", self.precision, expected)
         told = len(self.classes)
         check(told == known, "classes", told, f"{known}, as the networks have")
+
+    @property
+    def method(self) -> str:
+        """The name of its submissions: that of the configuration, unless depth taught it before."""
+        return TAUGHT_DEPTH if self.earlier_depth else self.config.method
 
 
 def save_weights(
@@ -122,7 +129,7 @@ def load_model(path: str | Path) -> tuple[Pix2Shape, Card]:
 
 
 def load_into(
-    card: Card, tensors: Mapping[str, Tensor], path: str | Path, parts: tuple[str, ...] = PARTS
+    card: Card, tensors: Mapping[str, Tensor], path: str | Path, parts: tuple[str, ...]
 ) -> Pix2Shape:
     """Return the card's model with stored tensors in some of its networks, `parts`.
 

@@ -1,6 +1,7 @@
 """The ablations: every row is trained with every seed, and its cells are means over the runs."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -80,9 +81,24 @@ def test_a_row_counts_its_own_runs_alone(tmp_path):
     columns = dict.fromkeys(studies.STUDIES["losses"].scores, 0.5)
     for run in ("adversarial-0", "adversarial-12", "adversarial-reconstruction-0"):
         path = tmp_path / "scores" / f"study-losses-{run}.json"
-        path.write_text(json.dumps({"scores": columns}))
+        row, _, seed = run.rpartition("-")
+        row = {"adversarial": row}.get(row, "adversarial, reconstruction")
+        commands = studies.commands_of("losses", row, int(seed))
+        settings = {"commands": commands, "files": {}}
+        path.write_text(json.dumps({"scores": columns, "settings": settings}))
     rows = studies.page(tmp_path).splitlines()[4:6]
     assert [row.split(" | ")[2] for row in rows] == ["2", "1"]
+
+
+def test_runs_of_other_settings_are_not_averaged_with_todays(ran, tmp_path, monkeypatch):
+    studies.run(tmp_path, ["information-200"], 2)
+    study = studies.STUDIES["information-200"]
+    changed = replace(study, rows={**study.rows, "0.4": "mutual_information=0.4 batch=8"})
+    monkeypatch.setitem(studies.STUDIES, "information-200", changed)
+    assert "| 0.1 | 2 |" in studies.page(tmp_path)
+    assert "| 0.4 |" not in studies.page(tmp_path)
+    studies.run(tmp_path, ["information-200"], 1)
+    assert "| 0.4 | 1 |" in studies.page(tmp_path)
 
 
 @pytest.mark.parametrize("study", studies.STUDIES.values(), ids=studies.STUDIES)

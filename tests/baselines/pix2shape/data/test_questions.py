@@ -168,6 +168,13 @@ def test_no_questions_and_odd_sizes_are_refused(tmp_path):
         assert (error.value.where, error.value.found) == (str(path), found)
 
 
+def test_the_polar_encoder_needs_a_white_background(train_path):
+    """By which it tells shape from background; otherwise all pixels would count as shape."""
+    with pytest.raises(SpecError) as error:
+        for_questions(tiny(camera=False, encoder="polar"), train_path, "unlabeled")
+    assert error.value.where == str(train_path)
+
+
 def test_the_configuration_for_questions(train_path):
     plain = tiny(classes=7, camera=False, batch=12, seed=9)
     config = for_questions(plain, train_path, "unlabeled")

@@ -334,6 +334,24 @@ def test_weights_of_other_losses_do_not_become_the_papers(rooms_path, tmp_path, 
     assert train_run(folder, rooms_path, other, HERE, start=start) is not None
 
 
+def test_depth_maps_of_earlier_runs_are_not_forgotten(rooms_path, tmp_path):
+    start, compact = None, replace(CONFIG, iterations=1, adversarial=0.0)
+    for number, (depth, earlier) in enumerate(((1.0, False), (0.0, True), (0.0, True))):
+        config, folder = replace(compact, depth=depth), tmp_path / f"run-{number}"
+        start = train_run(folder, rooms_path, config, HERE, start=start)
+        card = load_card(start)
+        assert (card.earlier_depth, card.method) == (earlier, "pix2shape-depth")
+    with pytest.raises(SpecError) as error:
+        train_run(tmp_path / "papers", rooms_path, CONFIG, HERE, start=start)
+    assert error.value.where == "start"
+
+
+def test_losses_of_questions_are_off_for_rooms(rooms_path, tmp_path):
+    config = replace(CONFIG, iterations=1, swap=1.0, contrast=1.0, question_batch=8)
+    card = load_card(train_run(tmp_path / "run", rooms_path, config, HERE))
+    assert (card.config.swap, card.config.contrast, card.method) == (0, 0, "pix2shape")
+
+
 def test_labels_of_earlier_runs_are_not_forgotten(train_questions, tmp_path):
     config, start = replace(CONFIG, iterations=1), None
     for labels, earlier in ((2, 0), (1, 2), (0, 3)):

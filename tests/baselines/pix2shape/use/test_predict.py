@@ -77,9 +77,12 @@ def test_a_model_of_rays_is_another_method_and_says_what_it_is_told(several_path
 
 def test_a_model_of_depth_maps_is_another_method_and_says_so(rooms_path, tmp_path):
     predict_rooms(made(tiny(depth=1.0)), rooms_path, tmp_path / "p.h5")
-    with open_predictions(tmp_path / "p.h5") as predictions:
-        assert predictions.method == "pix2shape-compact"
-        assert "true depth maps" in predictions.notes
+    written(tmp_path / "w.safetensors", tiny(), earlier_depth=True)
+    predict_file(tmp_path / "w.safetensors", rooms_path, tmp_path / "earlier.h5", device="cpu")
+    for name in ("p.h5", "earlier.h5"):
+        with open_predictions(tmp_path / name) as predictions:
+            assert predictions.method == "pix2shape-depth"
+            assert "true depth maps" in predictions.notes
 
 
 def predicted(model: Any, path: Path, out: Path) -> Fields:
