@@ -33,6 +33,8 @@ def shortened(
 def load_tensors(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     """Read tensors and notes. Raises OSError, FileFormatError."""
     path = Path(path)
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise FileFormatError(path, "a pipe or a device", "a safetensors file")
     with path.open("rb"):  # raises Python's own errors for a missing file or a folder
         pass
     try:

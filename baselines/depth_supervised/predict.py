@@ -98,8 +98,13 @@ def predicted(
 
 def stacked(rooms: RoomsFile, rows: NDArray[np.int64], size: int) -> Tensor:
     """Return the images of rows as networks take them, (B, 3, S, S), linear radiance."""
-    images = [decode_image(rooms.read("image", int(row))) for row in rows]
-    return torch.from_numpy(np.stack([channels_first(image, size) for image in images]))
+    images = [
+        channels_first(
+            decode_image(rooms.read("image", int(row))), size, f"{rooms.path}: image, row {row}"
+        )
+        for row in rows
+    ]
+    return torch.from_numpy(np.stack(images))
 
 
 def batches(count: int) -> Iterator[NDArray[np.int64]]:

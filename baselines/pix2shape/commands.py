@@ -55,8 +55,8 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
         name, _, text = str(value).partition("=")
         try:
             return name.strip(), json.loads(text)
-        except ValueError:
-            self.fail(f"found {value!r}, expected a number, such as batch=8", param, ctx)
+        except (ValueError, RecursionError):
+            self.fail(f"found {value!r:.100}, expected a number, such as batch=8", param, ctx)
 
 
 @click.command(epilog=f"{EXAMPLE}pix2shape train --data rooms.h5 --out run")

@@ -61,7 +61,8 @@ class RoomImages:
 
     def image(self, row: int) -> Array:
         """Return an image as the encoder takes it, (3, S, S), mirrored if its row is."""
-        small = channels_first(decode_image(self.rooms.read("image", row)), self._size)
+        radiance = decode_image(self.rooms.read("image", row))
+        small = channels_first(radiance, self._size, f"{self.rooms.path}: image, row {row}")
         return small[..., ::-1].copy() if self.mirrored[row] else small
 
     def camera(self, row: int) -> Array:

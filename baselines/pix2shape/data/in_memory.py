@@ -49,8 +49,8 @@ class Rooms:
 def read_rooms(path: str | Path, size: int, *, depth: bool = False) -> Rooms:
     """Read a file of rooms, its images reduced to size x size pixels.
 
-    Raises OSError, FileFormatError as `RoomsFile` and where a camera or, if it is asked for, every
-    depth of an image is not known; SpecError where images cannot be reduced.
+    Raises OSError, FileFormatError as `RoomsFile` and where a camera, an image or, if depth is
+    asked for, all of an image's is not known; SpecError where images cannot be reduced.
     """
     with RoomsFile(path) as rooms:
         check_reducible(path, rooms.spec.height, rooms.spec.width, size)
@@ -58,7 +58,8 @@ def read_rooms(path: str | Path, size: int, *, depth: bool = False) -> Rooms:
         images = np.empty((len(rooms), 3, size, size), np.float16)
         depths = np.empty((len(rooms), size, size), np.float32) if depth else None
         for row in range(len(rooms)):
-            images[row] = channels_first(decode_image(rooms.read("image", row)), size)
+            radiance = decode_image(rooms.read("image", row))
+            images[row] = channels_first(radiance, size, f"{path}: image, row {row}")
             if depths is not None:
                 depths[row] = reduced(rooms.read("depth", row), size)
                 if not np.isfinite(depths[row]).any():

@@ -13,7 +13,7 @@ from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.polar import BRIGHT
 from iqtt.files.reader import QuestionsDataset, open_questions, parts
 from iqtt.questions.specs import SplitSpec
-from scenegen.common.errors import SpecError
+from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.records import check
 from scenegen.rendering.ground_truth import decode_image
 
@@ -32,7 +32,7 @@ class QuestionImages(Dataset[dict[str, Any]]):
 
     def __init__(self, path: str | Path, part: str | None, config: ModelConfig) -> None:
         """Check the file. Raises as `QuestionsFile`, and SpecError where it tells no lights."""
-        self._size = config.networks.size
+        self._path, self._size = path, config.networks.size
         if config.networks.condition:
             raise SpecError("networks", "a camera or class to be told", "neither, for questions")
         with open_questions(path, part) as questions:
@@ -59,13 +59,13 @@ class QuestionImages(Dataset[dict[str, Any]]):
     def __getitem__(self, row: int) -> dict[str, Any]:
         """Return a question: float32 arrays with a row an image, and the answer if there is one."""
         stored = self._rows[row]
-        images = decode_image(stored["questions"])
+        images, where = decode_image(stored["questions"]), f"{self._path}: row {row}"
         # All lengths are scaled to one distance of the camera; no image changes by that, as the
         # lights are made brighter by the square of the scale.
         scale = self.spec.camera_distance / stored["camera_distance"]
         place = (0.0, 0.0, self.spec.camera_distance)
         known = {
-            "image": np.stack([channels_first(image, self._size) for image in images]),
+            "image": np.stack([channels_first(image, self._size, where) for image in images]),
             "condition": np.empty((len(images), 0)),
             "light_position": scale * stored["light_position"] - place,
             "light_color": scale**2 * stored["light_color"],
@@ -74,6 +74,9 @@ class QuestionImages(Dataset[dict[str, Any]]):
         for name in ("ambient", "reflectance", "background"):
             known[name] = np.tile(getattr(self.spec, name), (len(images), 1))
         item: dict[str, Any] = {name: np.float32(value) for name, value in known.items()}
+        for name, value in item.items():
+            if not np.isfinite(value).all():
+                raise FileFormatError(where, f"{name} that is not finite", "finite numbers")
         if self.has_answers:
             item["answer"] = int(stored["answers"])
         return item

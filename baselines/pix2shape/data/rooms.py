@@ -27,6 +27,10 @@ from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsDataset, RoomsFile
 
 Array = NDArray[Any]
+BRIGHTEST = 65504.0  # radiance; the largest finite number of float16, in which images may be stored
+FARTHEST = 1e4  # scene units from the room, where the networks' numbers are still exact enough
+LARGEST_LIGHT = 1e6  # of colours, places and falloff
+UPRIGHT = 1e-3  # of products of a pose's axes, by which they may differ from those of a rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,17 +87,36 @@ def check_reducible(where: object, height: int, width: int, size: int) -> None:
 
 
 def camera_poses(rooms: RoomsFile) -> Array:
-    """Return world_from_camera of all rows, (N, 4, 4). Raises FileFormatError if one is unknown."""
-    poses: Array = rooms.read("camera/world_from_camera", slice(None))
-    unknown = np.flatnonzero(~np.isfinite(poses).all(axis=(1, 2)))
-    if len(unknown):
-        raise FileFormatError(
-            f"{rooms.path}: camera/world_from_camera, row {unknown[0]}",
-            "numbers that are not finite",
-            "the camera's pose, which the networks have to be told",
-            "render the file anew with `scenegen render`, or leave this row out",
-        )
+    """Return world_from_camera of all rows, (N, 4, 4).
+
+    Raises FileFormatError where one is unknown, far away or no rotation and place.
+    """
+    name = "camera/world_from_camera"
+    poses = _bounded(rooms, name, FARTHEST)
+    turns = poses[:, :3, :3].astype(float)
+    off: Array = np.abs(turns.transpose(0, 2, 1) @ turns - np.eye(3)).max(axis=(1, 2))
+    mirrored, last = np.linalg.det(turns) < 0, (poses[:, 3] != (0, 0, 0, 1)).any(axis=1)
+    wrong: Array = (off > UPRIGHT) | mirrored | last
+    if wrong.any():
+        _refuse(rooms, name, wrong, "no rotation and place", "the pose of a camera")
     return poses
+
+
+def _bounded(rooms: RoomsFile, name: str, most: float) -> Array:
+    """Return what the networks are told of all rows. Raises FileFormatError beyond +-`most`."""
+    values: Array = rooms.read(name, slice(None))
+    fine = np.abs(values.reshape(len(values), -1)) <= most  # NaN is not
+    if not fine.all():
+        expected = f"finite numbers of at most {most:g}, as the networks are told them"
+        _refuse(rooms, name, ~fine.all(axis=1), "numbers that are not finite, or huge", expected)
+    return values
+
+
+def _refuse(rooms: RoomsFile, name: str, wrong: Any, found: str, expected: str) -> None:
+    """Raise FileFormatError for the first of the rows that are wrong, (N,)."""
+    where = f"{rooms.path}: {name}, row {np.flatnonzero(wrong)[0]}"
+    hint = "render the file anew with `scenegen render`, or leave this row out"
+    raise FileFormatError(where, found, expected, hint)
 
 
 class RoomImages(Dataset[dict[str, Any]]):
@@ -109,11 +132,16 @@ class RoomImages(Dataset[dict[str, Any]]):
         with RoomsFile(path) as rooms:
             check_reducible(path, rooms.spec.height, rooms.spec.width, spec.size)
             self.spec = rooms.spec
-            self.world_from_camera = rooms.read("camera/world_from_camera", slice(None))
+            self.world_from_camera = camera_poses(rooms)
             self._told = {
-                name: rooms.read(f"light/{name.removeprefix('light_')}", slice(None))
+                name: _bounded(rooms, f"light/{name.removeprefix('light_')}", LARGEST_LIGHT)
                 for name in ("light_position", "light_color", "ambient", "attenuation")
             }
+            falloff = self._told["attenuation"]
+            wrong: Array = (falloff < 0).any(axis=1) | (falloff.max(axis=1) <= 0)
+            if wrong.any():
+                expected = "numbers from 0, one of them above 0"
+                _refuse(rooms, "light/attenuation", wrong, "light without a falloff", expected)
             if config.material:  # what is not told is NaN, so that nothing can use it
                 self._told["reflectance"] = np.full((len(rooms), 3), np.nan)
             else:
@@ -156,7 +184,9 @@ class RoomImages(Dataset[dict[str, Any]]):
     def __getitem__(self, row: int) -> dict[str, Any]:
         """Return one image and what the model is told about it, as float32 arrays."""
         stored = self._images[row]
-        item = {"image": channels_first(decode_image(stored["image"]), self._networks.size)}
+        where = f"{self.path}: image, row {row}"
+        radiance = decode_image(stored["image"])
+        item = {"image": channels_first(radiance, self._networks.size, where)}
         item |= self.view(row)
         if "depth" in stored:
             item["depth"] = reduced(stored["depth"], self._networks.size).astype(np.float32)
@@ -201,9 +231,17 @@ class RoomImages(Dataset[dict[str, Any]]):
         return {name: np.float32(value) for name, value in known.items()}
 
 
-def channels_first(radiance: Array, size: int) -> Array:
-    """Return an image as the networks take it, float32: (H, W, 3) -> (3, S, S)."""
-    return np.ascontiguousarray(np.moveaxis(reduced(radiance, size), -1, 0), dtype=np.float32)
+def channels_first(radiance: Array, size: int, where: object = "image") -> Array:
+    """Return an image as the networks take it, float32: (H, W, 3) -> (3, S, S).
+
+    Raises FileFormatError, which names `where`, unless all radiance is finite and not huge: what is
+    not would crash networks, or come out as a depth that looks like any other.
+    """
+    small = reduced(radiance, size)
+    if not max(abs(small.min()), abs(small.max())) <= BRIGHTEST:  # NaN is not
+        expected = f"finite numbers of at most {BRIGHTEST:g}"
+        raise FileFormatError(where, "radiance that is not finite, or huge", expected)
+    return np.ascontiguousarray(np.moveaxis(small, -1, 0), dtype=np.float32)
 
 
 def as_batch(items: dict[str, Tensor], fov_y_degrees: float) -> Batch:

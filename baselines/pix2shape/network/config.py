@@ -67,6 +67,7 @@ LOSSES = (
 METHOD = "pix2shape"
 TAUGHT_DEPTH = f"{METHOD}-depth"
 MOST_LIGHTS = 64
+MOST_ITEMS = 1_000_000  # images or questions in a batch
 
 
 @dataclass(frozen=True)
@@ -146,13 +147,16 @@ class ModelConfig:
         normalise(self)
         check(0 < self.depth_reach < 1, "depth reach", self.depth_reach, "between 0 and 1")
         check(self.depth_middle > 0, "depth middle", self.depth_middle, "a positive number")
-        check(self.iterations >= 1, "iterations", self.iterations, "1 or more")
-        check(self.batch >= 2, "batch", self.batch, "2 or more")
+        iterations = self.iterations
+        check(1 <= iterations <= LARGEST, "iterations", iterations, f"1 to {LARGEST:g}")
+        check(2 <= self.batch <= MOST_ITEMS, "batch", self.batch, f"2 to {MOST_ITEMS}")
         least = 8 if self.contrast else 2  # a quarter of them may be labelled
         asked = self.question_batch
         needed = f"{least} or more" + (", as contrast is on" if self.contrast else "")
         check(asked >= least, "question batch", asked, needed)
-        check(self.labelled_batch >= 0, "labelled batch", self.labelled_batch, "0 or more")
+        check(asked <= MOST_ITEMS, "question batch", asked, f"at most {MOST_ITEMS}")
+        labelled = self.labelled_batch
+        check(0 <= labelled <= MOST_ITEMS, "labelled batch", labelled, f"0 to {MOST_ITEMS}")
         check(self.temperature > 0, "temperature", self.temperature, "a positive number")
         check(self.hard_negatives >= 0, "hard negatives", self.hard_negatives, "0 or more")
         check(self.easy_negatives >= 0, "easy negatives", self.easy_negatives, "0 or more")
@@ -160,7 +164,8 @@ class ModelConfig:
         check(
             not self.contrast or negatives > 0, "negatives", negatives, "one above 0, for contrast"
         )
-        check(self.critic_steps >= 1, "critic steps", self.critic_steps, "1 or more")
+        steps = self.critic_steps
+        check(1 <= steps <= MOST_ITEMS, "critic steps", steps, f"1 to {MOST_ITEMS}")
         check(self.learning_rate > 0, "learning rate", self.learning_rate, "a positive number")
         in_range = len(self.betas) == 2 and all(0 <= beta < 1 for beta in self.betas)
         check(in_range, "betas", self.betas, "two numbers from 0 to below 1")

@@ -122,7 +122,10 @@ def predict_rooms(
         inputs, own = input_views(rooms)
         found = []
         for chosen in _batches(len(inputs)):
-            images = [decode_image(rooms.read("image", int(row))) for row in inputs[chosen]]
+            images = (
+                (f"{data}: image, row {row}", rooms.read("image", int(row)))
+                for row in inputs[chosen]
+            )
             told = condition[inputs[chosen]], Cameras(poses[inputs[chosen]], fov)
             found.append(model.codes(_stacked(images, model), *told))
         codes = torch.cat(found)
@@ -170,8 +173,12 @@ def answer_file(
         scores = []
         images = 1 + questions.answers
         for rows in _batches(len(questions), images):
-            stored = [questions.read("questions", int(row)) for row in rows]
-            image = _stacked(np.concatenate([decode_image(one) for one in stored]), model)
+            shown = (
+                (f"{data}: row {row}", image)
+                for row in rows
+                for image in questions.read("questions", int(row))
+            )
+            image = _stacked(shown, model)
             codes = model.codes(image, image.new_empty(len(image), 0))[:, : spec.z_scene]
             distance = squared_distances(codes.view(len(rows), images, -1)).sqrt()
             scores.append(-distance.cpu().double().numpy())
@@ -216,9 +223,13 @@ def input_views(rooms: RoomsFile) -> tuple[Array, Array]:
     return inputs, np.searchsorted(inputs, [first[int(number)] for number in scene])
 
 
-def _stacked(images: Iterable[Array], model: Pix2Shape) -> Tensor:
-    """Return images of linear radiance, (H, W, 3), as the model takes them, (B, 3, S, S)."""
-    small = [channels_first(image, model.config.networks.size) for image in images]
+def _stacked(images: Iterable[tuple[str, Array]], model: Pix2Shape) -> Tensor:
+    """Return stored images, (H, W, 3), each with its place, as the model takes them: (B, 3, S, S).
+
+    Raises FileFormatError for radiance that is not finite.
+    """
+    size = model.config.networks.size
+    small = [channels_first(decode_image(image), size, where) for where, image in images]
     return torch.from_numpy(np.stack(small)).to(next(model.parameters()).device)
 
 

@@ -165,6 +165,8 @@ MISTAKES = [
     (f"rotate {WITH} {ROOMS} --frames 2 --out x.png", ("out", "'x.png'")),
     ("train --data rooms.h5 --out run", ("rooms.h5", "32x32", "64")),
     (f"train {LARGE} --set batch=many", ("--set", "'batch=many'", "batch=8")),
+    (f"train {LARGE} --set batch={'[' * 100_000}", ("--set", "batch=8")),
+    (f"train {LARGE} --set batch=1000000000", ("batch", "1000000000")),
     (f"train {LARGE} --set networks.sise=32", ("sise",)),
     (f"train {LARGE} --set networks.classes=3", ("classes", "--conditional")),
     (f"train {LARGE} --set networks.camera=false", ("camera",)),

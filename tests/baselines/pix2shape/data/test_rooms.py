@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pix2shape_models import edited, tiny
 
-from scenegen.common.errors import SpecError
+from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.presets import VESSELS
 from scenegen.rooms.reader import RoomsFile
 
@@ -105,6 +105,30 @@ def test_the_class_is_one_hot_behind_the_camera(vessels_path, camera):
             np.testing.assert_allclose(condition[:3], places[row], rtol=1e-6)
         assert sorted(condition[-7:]) == [0] * 6 + [1]
         assert VESSELS[int(condition[-7:].argmax())] == model.split("/")[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "value"),
+    [
+        ("camera/world_from_camera", (2, 1, 3), np.nan),
+        ("camera/world_from_camera", (2, 1, 3), 1e30),
+        ("camera/world_from_camera", 2, np.zeros((4, 4))),
+        ("camera/world_from_camera", 2, np.diag([1, 1, -1, 1])),
+        ("camera/world_from_camera", (2, 3, 0), 1),
+        ("light/position", (2, 0, 0), np.inf),
+        ("light/color", (2, 0, 0), np.nan),
+        ("light/attenuation", 2, 0),
+        ("image", (2, 5, 5, 0), np.nan),
+        ("image", (2, 5, 5, 0), 1e30),
+    ],
+)
+def test_what_networks_cannot_be_told_is_refused(name, place, value, make_rooms, tmp_path):
+    """Not finite or absurd: it would crash training, or look like any other number."""
+    path = make_rooms(tmp_path / "rooms.h5", 4, image_dtype="float32")
+    path = edited(path, tmp_path / "bad.h5", put(name, place, value))
+    with pytest.raises(FileFormatError) as error:
+        RoomImages(path, tiny())[2]
+    assert error.value.where == f"{path}: {name}, row 2"
 
 
 def test_depth_is_read_only_for_supervision(views_path, tmp_path):

@@ -2,16 +2,13 @@
 
 import math
 import re
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import islice
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from h5_edits import put
-from pix2shape_models import edited, tiny
+from pix2shape_models import tiny
 
 from scenegen.common.errors import SpecError
 
@@ -258,11 +255,16 @@ def test_the_learning_rate(rooms_path, fabric, decay):
     assert rates[::2] == rates[1::2]
 
 
-@pytest.fixture
-def poisoned(make_rooms: Callable[..., Path], tmp_path: Path) -> Callable[[float], Path]:
-    """Return a function that writes 8 rooms, whose row 5 has one impossible pixel."""
-    path = make_rooms(tmp_path / "rooms.h5", 8, image_dtype="float32")
-    return lambda value: edited(path, tmp_path / "bad.h5", put("image", (5, 4, 4), value))
+class Poisoned(RoomImages):
+    """Rooms whose row 5 has one impossible pixel, as no file can have that is read."""
+
+    value = math.nan
+
+    def __getitem__(self, row: int) -> dict[str, Any]:
+        item = super().__getitem__(row)
+        if row == 5:
+            item["image"][:, 4, 4] = self.value
+        return item
 
 
 def stopped(state: State, source: Any, fabric: Fabric) -> tuple[TrainingError, dict[str, Any]]:
@@ -275,9 +277,9 @@ def stopped(state: State, source: Any, fabric: Fabric) -> tuple[TrainingError, d
 
 
 @pytest.mark.parametrize("config", [TINY, PLAIN], ids=["all", "plain"])
-def test_an_image_that_is_not_finite_stops_it(poisoned, fabric, config):
+def test_an_image_that_is_not_finite_stops_it(rooms_path, fabric, config):
     state = new_state(replace(config, batch=2))
-    error, last = stopped(state, RoomImages(poisoned(math.nan), config), fabric)
+    error, last = stopped(state, Poisoned(rooms_path, config), fabric)
     assert 0 < state.iteration < 4
     assert error.where == f"iteration {state.iteration}"
     assert "nan" in error.found
@@ -286,10 +288,11 @@ def test_an_image_that_is_not_finite_stops_it(poisoned, fabric, config):
     assert_same({name: now[name] for name in kept}, {name: last[name] for name in kept})
 
 
-def test_a_loss_that_is_not_finite_stops_it_though_its_gradient_is(poisoned, fabric):
-    path = poisoned(1e30)  # its square is infinite, its slope 0
+def test_a_loss_that_is_not_finite_stops_it_though_its_gradient_is(rooms_path, fabric):
+    source = Poisoned(rooms_path, PLAIN)
+    source.value = 1e30  # its square is infinite, its slope 0
     state = new_state(replace(PLAIN, batch=8))
-    assert "reconstruction inf" in stopped(state, RoomImages(path, PLAIN), fabric)[0].found
+    assert "reconstruction inf" in stopped(state, source, fabric)[0].found
 
 
 def test_a_gradient_that_is_not_finite_stops_it_though_the_loss_is(rooms_path, fabric):

@@ -140,8 +140,16 @@ def test_a_camera_that_is_not_known_is_refused(model, several_path, tmp_path):
     with pytest.raises(FileFormatError) as error:
         predict_rooms(model, path, tmp_path / "p.h5")
     assert error.value.where == f"{path}: camera/world_from_camera, row 4"
-    assert error.value.found == "numbers that are not finite"
     assert error.value.hint
+    assert not (tmp_path / "p.h5").exists()
+
+
+def test_an_image_that_is_not_finite_is_refused(model, make_rooms, tmp_path):
+    path = make_rooms(tmp_path / "rooms.h5", 2, image_dtype="float32")
+    path = edited(path, tmp_path / "bad.h5", put("image", (1, 4, 4), np.inf))
+    with pytest.raises(FileFormatError) as error:
+        predict_rooms(model, path, tmp_path / "p.h5")
+    assert error.value.where == f"{path}: image, row 1"
     assert not (tmp_path / "p.h5").exists()
 
 
