@@ -20,7 +20,6 @@ BASELINES = (
     *(
         "pix2shape",
         "pix2shape-compact",
-        "pix2shape-depth",
         "pix2shape-rays",
         "pix2shape-views",
         "cnn",
