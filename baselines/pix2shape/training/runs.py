@@ -1,15 +1,14 @@
 """A training run and its folder: checkpoint, TensorBoard logs, a picture, and the weights."""
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
 from lightning_fabric import Fabric
 from torch.utils.data import DataLoader
-from torch.utils.tensorboard import SummaryWriter
 
 from baselines.checkpoints import WEIGHTS, check_data, check_new
 from baselines.pix2shape.data.in_memory import read_rooms
@@ -22,6 +21,7 @@ from baselines.pix2shape.network.shared_batch import summed
 from baselines.pix2shape.pictures import training_sheet
 from baselines.pix2shape.training.batches import Source
 from baselines.pix2shape.training.launch import Machine, check_agreement, launched
+from baselines.pix2shape.training.logs import Logs, opened_logs
 from baselines.pix2shape.training.loop import check_request, train
 from baselines.pix2shape.training.state import State, load_state, new_state, save_state
 from baselines.pix2shape.weights.bundled import open_weights
@@ -82,8 +82,8 @@ def train_run(
         folder.mkdir(parents=True, exist_ok=True)
     if isinstance(source, RoomImages) and card.config.matching:
         _match(source, folder, card.config, fabric, lambda losses: progress(state, losses))
-    logs = SummaryWriter(str(folder / LOGS), purge_step=state.iteration + 1) if first else None
-    try:
+    opened = opened_logs(folder / LOGS, state.iteration + 1) if first else nullcontext()
+    with opened as logs:
         for losses, batch in train(
             state, source, fabric, labelled=labelled, labels=labels, workers=machine.workers
         ):
@@ -92,16 +92,12 @@ def train_run(
             progress(state, losses)
             done = state.iteration == last
             if state.iteration % LOG_EVERY == 0 or done:
-                for name, value in losses.items():
-                    logs.add_scalar(name, value, state.iteration)
+                logs.numbers(losses, state.iteration)
             if state.iteration % machine.every == 0 or done:
                 card = replace(card, iteration=state.iteration, seconds=round(state.seconds, 1))
                 save_state(folder, state, card)
                 _picture(folder, logs, state, batch)
                 _save_weights(folder, state.model, card, source)
-    finally:
-        if logs is not None:
-            logs.close()
     if first and not _complete(folder / WEIGHTS, last):
         _save_weights(folder, state.model, card, source)
     summed(torch.zeros(1, device=fabric.device))  # wait for the first process, which writes
@@ -191,12 +187,12 @@ def fit_prior(model: Pix2Shape, source: Source) -> None:
     model.train(learning)
 
 
-def _picture(folder: Path, logs: SummaryWriter, state: State, batch: Batch) -> None:
+def _picture(folder: Path, logs: Logs, state: State, batch: Batch) -> None:
     numbers = torch.Generator().manual_seed(0)
     noise = torch.randn(len(batch.image), state.model.config.networks.z, generator=numbers)
     picture = training_sheet(state.model, batch, noise.to(batch.image.device))
     save_picture(picture, folder / PICTURE, overwrite=True)
-    logs.add_image("pictures", np.asarray(picture), state.iteration, dataformats="HWC")
+    logs.picture(picture, state.iteration)
 
 
 def _sources(

@@ -59,6 +59,9 @@ class Card:
         normalise(self)
         version, known = self.format_version, self.config.networks.classes
         check(version == FORMAT_VERSION, "format version", version, str(FORMAT_VERSION))
+        for name in ("iteration", "labels", "earlier_labels", "seconds"):
+            count = getattr(self, name)
+            check(count >= 0, name.replace("_", " "), count, "0 or more")
         expected = f"one of {', '.join(PRECISIONS)}"
         check(self.precision in PRECISIONS, "precision", self.precision, expected)
         told = len(self.classes)

@@ -119,6 +119,7 @@ def change_card(path: Path, change: dict[str, Any]) -> Path:
     [
         {"format_version": 2},
         {"iteration": "70"},
+        {"earlier_labels": -1},
         {"classes": "mug"},
         {"classes": ["mug", "bowl", "hat", "lamp"]},
         {"config": {"networks": {"size": 48}}},
