@@ -22,7 +22,8 @@ def moments_of(optimiser: Adam) -> tuple[dict[str, Tensor], str]:
 def load_moments(optimiser: Adam, tensors: Mapping[str, Tensor], count: int) -> None:
     """Set the moments of an optimiser, of which `count` parameters have some.
 
-    Raises KeyError, ValueError where moments are missing, unknown, of another shape, not finite.
+    Raises KeyError, ValueError where moments are missing, unknown, of another shape, not finite
+    or, where they cannot be, below 0.
     """
     parameters = optimiser.param_groups[0]["params"]
     moments: dict[int, dict[str, Tensor]] = {}
@@ -35,6 +36,7 @@ def load_moments(optimiser: Adam, tensors: Mapping[str, Tensor], count: int) -> 
             found = f"{index}.{field}: {value.dtype}, shape {tuple(value.shape)}"
             ok = tuple(value.shape) == shape and value.dtype.is_floating_point
             _check(ok and bool(torch.isfinite(value).all()), f"{found}, not as its weights are")
+            _check(field == "exp_avg" or bool((value >= 0).all()), f"{index}.{field} below 0")
     _check(len(moments) == count, f"moments of {len(moments)} parameters, expected {count}")
     _check(len(tensors) == count * len(MOMENTS), f"{len(tensors)} moments, not expected")
     groups = optimiser.state_dict()["param_groups"]

@@ -153,6 +153,10 @@ class RoomImages(Dataset[dict[str, Any]]):
             self.classes: tuple[str, ...] = tuple(rooms.spec.shapes)
             self.label = rooms.read("object/shape", slice(None))[:, 0]
             self._scene = rooms.read("scene_index", slice(None))
+            unknown = (self.label < 0) | (self.label >= len(self.classes))
+            if spec.classes and unknown.any():
+                expected = f"a class of 0 to {len(self.classes) - 1}"
+                _refuse(rooms, "object/shape", unknown, "another number", expected)
         if spec.classes and spec.classes != len(self.classes):
             expected = f"{spec.classes}, as the networks were made for"
             raise SpecError(path, f"{len(self.classes)} classes", expected)

@@ -28,6 +28,8 @@ from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.common.random.seeding import Purpose, item_seed
 from scenegen.common.records import check
 
+DIVERGED = "begin again with a smaller learning rate or other weights of the losses"
+
 
 class TrainingError(SceneGenError):
     """Training cannot go on, as a loss or a gradient is not finite."""
@@ -157,20 +159,36 @@ def _update(
 ) -> None:
     """Take one step, unless the loss or a gradient is not finite; tell `losses`."""
     optimiser.zero_grad()
+    found = torch.stack([loss.detach(), *(value.detach() for value in numbers.values())])
+    average([found])
+    losses |= dict(zip(numbers, found[1:].tolist(), strict=True))
+    wrong = f"a loss or gradient that is not finite ({_told(losses)})"
+    if not found[0].isfinite():  # known before torch computes slopes, which can crash on such
+        raise TrainingError(f"iteration {state.iteration}", wrong, hint=DIVERGED)
     fabric.backward(loss)
     parameters = optimiser.param_groups[0]["params"]
     gradients = [one.grad for one in parameters if one.grad is not None]
-    found = torch.stack([loss.detach(), *(value.detach() for value in numbers.values())])
-    average([found, *gradients])  # DDP allows neither several backward passes nor second gradients
-    losses |= dict(zip(numbers, found[1:].tolist(), strict=True))
-    if not (found[0].isfinite() and torch.nn.utils.get_total_norm(gradients).isfinite()):
-        told = ", ".join(f"{name} {value:.3g}" for name, value in losses.items())
-        raise TrainingError(
-            f"iteration {state.iteration}",
-            f"a loss or gradient that is not finite ({told})",
-            hint="begin again with a smaller learning rate or other weights of the losses",
-        )
+    average(gradients)  # DDP allows neither several backward passes nor second gradients
+    if not torch.nn.utils.get_total_norm(gradients).isfinite():
+        raise TrainingError(f"iteration {state.iteration}", wrong, hint=DIVERGED)
     optimiser.step()
+
+
+def _told(losses: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.3g}" for name, value in losses.items())
+
+
+def require_finite(state: State) -> None:
+    """Raise TrainingError where a weight, a statistic or a moment is not finite.
+
+    The losses of an iteration are those before its step, which may have been the one too far.
+    """
+    tensors = list(state.model.state_dict().values())
+    for optimiser in (state.generator, state.critic):
+        tensors += [one for moments in optimiser.state.values() for one in moments.values()]
+    if not all(bool(one.isfinite().all()) for one in tensors):
+        found = "weights that are not finite after the last step"
+        raise TrainingError(f"iteration {state.iteration}", found, hint=DIVERGED)
 
 
 def _set_rate(state: State) -> None:

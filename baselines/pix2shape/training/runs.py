@@ -22,7 +22,7 @@ from baselines.pix2shape.pictures import training_sheet
 from baselines.pix2shape.training.batches import Source
 from baselines.pix2shape.training.launch import Machine, check_agreement, launched
 from baselines.pix2shape.training.logs import Logs, opened_logs
-from baselines.pix2shape.training.loop import check_request, train
+from baselines.pix2shape.training.loop import check_request, require_finite, train
 from baselines.pix2shape.training.state import State, load_state, new_state, save_state
 from baselines.pix2shape.weights.bundled import open_weights
 from baselines.pix2shape.weights.storage import PRECISIONS, Card, load_card, save_weights
@@ -95,11 +95,13 @@ def train_run(
                 logs.numbers(losses, state.iteration)
             if state.iteration % machine.every == 0 or done:
                 card = replace(card, iteration=state.iteration, seconds=round(state.seconds, 1))
+                _fit_prior(state, source)
                 save_state(folder, state, card)
                 _picture(folder, logs, state, batch)
-                _save_weights(folder, state.model, card, source)
+                save_weights(folder / WEIGHTS, state.model, card)
     if first and not _complete(folder / WEIGHTS, last):
-        _save_weights(folder, state.model, card, source)
+        _fit_prior(state, source)
+        save_weights(folder / WEIGHTS, state.model, card)
     summed(torch.zeros(1, device=fabric.device))  # wait for the first process, which writes
     return folder / WEIGHTS if first else None
 
@@ -167,10 +169,12 @@ def _complete(weights: Path, last: int) -> bool:
         return False
 
 
-def _save_weights(folder: Path, model: Pix2Shape, card: Card, source: Source) -> None:
-    if not card.config.adversarial:
-        fit_prior(model, source)
-    save_weights(folder / WEIGHTS, model, card)
+def _fit_prior(state: State, source: Source) -> None:
+    """Fit the prior, unless a critic ties codes to it. Raises TrainingError before all is lost."""
+    require_finite(state)
+    if not state.model.config.adversarial:
+        fit_prior(state.model, source)
+    require_finite(state)
 
 
 @torch.no_grad()

@@ -1,6 +1,7 @@
 """The state of training and its checkpoint: weights, optimisers, number of the iteration."""
 
 import errno
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -73,8 +74,10 @@ def load_state(folder: Path) -> tuple[State, Card]:
     try:
         state.iteration, state.seconds = int(notes["iteration"]), float(notes["seconds"])
         _check(0 <= state.iteration <= card.config.iterations, f"iteration {state.iteration}")
+        _check(0 <= state.seconds < math.inf, f"seconds {state.seconds}")
         for kind in KINDS:
-            own = {k.removeprefix(f"{kind}."): v for k, v in tensors.items() if k.startswith(kind)}
+            start = f"{kind}."
+            own = {k.removeprefix(start): v for k, v in tensors.items() if k.startswith(start)}
             load_moments(getattr(state, kind), own, int(notes[kind]))
         strange = [name for name in tensors if name.split(".")[0] not in ("model", *KINDS)]
         _check(not strange, f"{', '.join(strange)} not expected")

@@ -170,6 +170,8 @@ def answer_file(
     with open_questions(data) as questions:
         check_reducible(data, questions.height, questions.width, spec.size)
         check_background(data, questions.spec, model.config)
+        if not len(questions):
+            raise SpecError(data, "no questions", "one or more to answer")
         scores = []
         images = 1 + questions.answers
         for rows in _batches(len(questions), images):

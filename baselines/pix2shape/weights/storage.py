@@ -96,6 +96,8 @@ def save_card(path: str | Path, card: Card) -> None:
 def load_card(path: str | Path) -> Card:
     """Read the JSON beside weights. Raises OSError, FileFormatError."""
     beside = Path(path).with_suffix(".json")
+    if beside.exists() and not beside.is_file() and not beside.is_dir():
+        raise FileFormatError(beside, "a pipe or a device", "a card of weights")
     if beside.stat().st_size > LARGEST_JSON:
         raise FileFormatError(beside, f"over {LARGEST_JSON} bytes", "a card of weights")
     text = beside.read_bytes()

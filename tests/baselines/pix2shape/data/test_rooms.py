@@ -131,6 +131,14 @@ def test_what_networks_cannot_be_told_is_refused(name, place, value, make_rooms,
     assert error.value.where == f"{path}: {name}, row 2"
 
 
+@pytest.mark.parametrize("number", [-1, 99])
+def test_a_class_that_is_none_is_refused(number, vessels_path, tmp_path):
+    path = edited(vessels_path, tmp_path / "bad.h5", put("object/shape", (2, 0), number))
+    with pytest.raises(FileFormatError) as error:
+        RoomImages(path, tiny(classes=len(VESSELS)))
+    assert error.value.where == f"{path}: object/shape, row 2"
+
+
 def test_depth_is_read_only_for_supervision(views_path, tmp_path):
     item = RoomImages(views_path, tiny())[0]
     assert set(item) == KNOWN | {"image", "condition", "world_from_camera"}

@@ -23,8 +23,9 @@ from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
 from baselines.pix2shape.network.config import LOSSES  # noqa: E402
 from baselines.pix2shape.network.model import Prior  # noqa: E402
 from baselines.pix2shape.training import runs  # noqa: E402
+from baselines.pix2shape.training.loop import TrainingError  # noqa: E402
 from baselines.pix2shape.training.runs import Machine, train_run  # noqa: E402
-from baselines.pix2shape.training.state import load_state  # noqa: E402
+from baselines.pix2shape.training.state import State, load_state  # noqa: E402
 from baselines.pix2shape.weights.storage import Card, load_card, load_model  # noqa: E402
 
 HERE = Machine("cpu", workers=0, every=2)
@@ -332,6 +333,23 @@ def test_weights_of_other_losses_do_not_become_the_papers(rooms_path, tmp_path, 
         train_run(folder, rooms_path, replace(CONFIG, iterations=1), HERE, start=start)
     assert error.value.where == "start"
     assert train_run(folder, rooms_path, other, HERE, start=start) is not None
+
+
+def test_weights_that_are_not_finite_replace_no_checkpoint(rooms_path, folder):
+    """The last step's losses are finite; what it made is not, and the earlier files stay."""
+    config = replace(CONFIG, adversarial=0.0, iterations=2)
+    stored: dict[str, bytes] = {}
+
+    def spoil(state: State, _losses: dict[str, float]) -> None:
+        if state.iteration == 2:
+            stored.update({path.name: path.read_bytes() for path in folder.glob("*.safetensors")})
+            state.model.decoder.last.bias.data.fill_(torch.inf)
+
+    with pytest.raises(TrainingError) as error:
+        train_run(folder, rooms_path, config, replace(HERE, every=1), progress=spoil)
+    assert error.value.where == "iteration 2"
+    assert len(stored) == 2
+    assert {name: (folder / name).read_bytes() for name in stored} == stored
 
 
 def test_depth_maps_of_earlier_runs_are_not_forgotten(rooms_path, tmp_path):

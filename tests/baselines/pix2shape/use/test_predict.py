@@ -144,6 +144,18 @@ def test_a_camera_that_is_not_known_is_refused(model, several_path, tmp_path):
     assert not (tmp_path / "p.h5").exists()
 
 
+def test_no_questions_are_refused(train_questions, tmp_path):
+    path = released(tmp_path / "none.h5", [0])
+    with h5py.File(path, "r+") as file:
+        for name in list(file):
+            kept = file[name][:0]
+            del file[name]
+            file[name] = kept
+    with pytest.raises(SceneGenError) as error:
+        answer_file(made(of_questions(train_questions)), path, tmp_path / "a.h5")
+    assert error.value.where == str(path)
+
+
 def test_an_image_that_is_not_finite_is_refused(model, make_rooms, tmp_path):
     path = make_rooms(tmp_path / "rooms.h5", 2, image_dtype="float32")
     path = edited(path, tmp_path / "bad.h5", put("image", (1, 4, 4), np.inf))
