@@ -43,6 +43,8 @@ class NetworkSpec:
         rays: whether the networks are told the empty room. The encoder then sees, beside the
             image, its faint differences and where the ray of each pixel meets floor or walls, and
             the decoder gives relief: how far surfaces lie before these, scene units.
+        bounded: whether relief is between 0 and `model.HIGHEST`, and has a slope also where it
+            means floor or wall, so that losses of images can raise it again; for `rays` alone.
         spherical: whether z_scene is then scaled to the length sqrt(z_scene), so that distances
             are bounded.
         encoder: "paper", or "polar" for questions (`network/polar.py`).
@@ -56,6 +58,7 @@ class NetworkSpec:
     classes: int = 0
     standardised: bool = False
     rays: bool = False
+    bounded: bool = False
     spherical: bool = False
     encoder: str = "paper"
 
@@ -68,6 +71,8 @@ class NetworkSpec:
         check(0 <= self.classes <= MOST, "classes", self.classes, f"0 to {MOST}")
         if self.rays:
             check(self.camera, "camera", self.camera, "true, as rays are those of a known camera")
+        expected = "false for networks without rays, which give no relief"
+        check(self.rays or not self.bounded, "bounded", self.bounded, expected)
         check(self.encoder in ENCODERS, "encoder", self.encoder, f"one of {', '.join(ENCODERS)}")
         polar, expected = self.encoder == "polar", "no camera and no classes for the polar encoder"
         check(not (polar and self.condition), "condition", self.condition, expected)

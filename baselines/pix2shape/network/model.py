@@ -16,6 +16,10 @@ from baselines.pix2shape.network.surfels import Scene, render
 T = TypeVar("T")
 MATERIAL = 5  # numbers of a surfel's material: albedo, k_s, exponent
 SHINIEST = 128.0
+HIGHEST = (
+    0.6  # scene units, of a bounded relief; 0.6% of object pixels in rooms of one view exceed it
+)
+LOW = -3.0  # added to the decoder's numbers, so that a bounded relief begins near FLAT
 
 
 def mapped(record: T, function: Callable[[Tensor], Tensor]) -> T:
@@ -161,7 +165,11 @@ class Pix2Shape(nn.Module):
 
         For networks of `rays`. What is below FLAT means floor or wall.
         """
-        return self.decoder(code, condition)[:, 0].float()
+        return self._relief(self.decoder(code, condition)[:, 0].float())
+
+    def _relief(self, raw: Tensor) -> Tensor:
+        """Return relief from the decoder's numbers, (B, S, S)."""
+        return HIGHEST * torch.sigmoid(raw + LOW) if self.config.networks.bounded else raw
 
     def surfels(self, code: Tensor, condition: Tensor, cameras: Cameras | None = None) -> Surfels:
         """Return the surfels that a camera sees: (B, z) -> (B, S, S) of each number.
@@ -173,7 +181,10 @@ class Pix2Shape(nn.Module):
         raw = self.decoder(code, condition).float()
         if self.config.networks.rays:
             assert cameras is not None, "networks of rays are told the camera"
-            relief = torch.where(raw[:, 0] > FLAT, raw[:, 0], 0)
+            found = self._relief(raw[:, 0])
+            relief = torch.where(found > FLAT, found, 0)
+            if self.config.networks.bounded:  # the same numbers, with the slopes of `found`
+                relief = found + (relief - found).detach()
             pose, fov = cameras.world_from_camera, cameras.fov_y_degrees
             walls, entry, _ = empty_rooms(pose, fov, relief.shape[-1])
             depth = torch.maximum(walls - relief, entry)

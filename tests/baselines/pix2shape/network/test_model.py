@@ -9,6 +9,7 @@ torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
 from baselines.pix2shape.data.rooms import Relief, RoomImages  # noqa: E402
+from baselines.pix2shape.network.empty_rooms import empty_rooms  # noqa: E402
 from baselines.pix2shape.network.model import Material, Surfels, shaded  # noqa: E402
 from baselines.pix2shape.network.surfels import render  # noqa: E402
 from baselines.pix2shape.training.steps import draw, generator_step  # noqa: E402
@@ -86,3 +87,23 @@ def test_where_matching_teaches_surfaces_images_do_not(colourful):
     losses["reconstruction"].backward()
     taught = model.decoder.last.weight.grad.abs().amax(dim=(0, 2, 3)) > 0
     assert taught.tolist() == [False, True, True, True, True, True]
+
+
+def test_a_bounded_relief_can_rise_again(rooms_path):
+    """Where it means floor or wall the depth is exactly that, and has a slope all the same."""
+    config = tiny(rays=True, bounded=True)
+    batch, model = batch_of(rooms_path, config), made(config)
+    cameras, size = batch.views.cameras, config.networks.size
+    walls, _, _ = empty_rooms(cameras.world_from_camera, cameras.fov_y_degrees, size)
+    for bias, low, high in ((-20.0, 0, 0), (0.0, 0.02, 0.6), (20.0, 0.5, 0.6)):
+        torch.nn.init.zeros_(model.decoder.last.weight)
+        torch.nn.init.constant_(model.decoder.last.bias, bias)
+        code = torch.zeros(len(walls), config.networks.z)
+        depth = model.surfels(code, batch.views.condition, cameras).depth
+        relief = (walls - depth).detach()
+        assert low <= float(relief.min()) <= float(relief.max()) <= high + 1e-6
+        model.decoder.last.bias.grad = None
+        depth.sum().backward()
+        assert bias == 20 or float(model.decoder.last.bias.grad) < 0, "higher is nearer"
+    with pytest.raises(SpecError):
+        tiny(bounded=True)
