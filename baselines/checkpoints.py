@@ -117,10 +117,13 @@ def load_checkpoint(folder: Path, recipe: Recipe[CardT, NetworkT]) -> State[Card
 
 
 def check_new(folder: Path) -> None:
-    """Raise FileExistsError where a new run would replace a checkpoint."""
+    """Raise FileExistsError where a new run would replace a checkpoint or weights."""
     if (folder / CHECKPOINT).exists():
         what = "holds a checkpoint; say --resume, or name another folder"
         raise FileExistsError(errno.EEXIST, what, str(folder))
+    if (folder / WEIGHTS).exists():
+        what = "is there, and a new run would replace it; name another folder"
+        raise FileExistsError(errno.EEXIST, what, str(folder / WEIGHTS))
 
 
 def check_data(where: object, found: str, trained: str) -> None:

@@ -188,6 +188,10 @@ def test_a_new_run_leaves_an_old_one_alone_and_an_old_one_needs_its_checkpoint(s
         check_new(tmp_path)
     assert there.value.filename == str(tmp_path)
     check_new(tmp_path / "new")
+    (tmp_path / CHECKPOINT).rename(tmp_path / WEIGHTS)
+    with pytest.raises(FileExistsError) as error:
+        check_new(tmp_path)
+    assert error.value.filename == str(tmp_path / WEIGHTS)
     with pytest.raises(FileNotFoundError) as none:
         load_checkpoint(tmp_path / "new", RECIPE)
     assert none.value.filename == str(tmp_path / "new")
