@@ -30,11 +30,16 @@ def shortened(
     return kept
 
 
+def refuse_pipe(path: Path) -> None:
+    """Raise FileFormatError for a pipe or a device, which may have no end."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise FileFormatError(path, "a pipe or a device", "a regular file")
+
+
 def load_tensors(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     """Read tensors and notes. Raises OSError, FileFormatError."""
     path = Path(path)
-    if path.exists() and not path.is_file() and not path.is_dir():
-        raise FileFormatError(path, "a pipe or a device", "a safetensors file")
+    refuse_pipe(path)
     with path.open("rb"):  # raises Python's own errors for a missing file or a folder
         pass
     try:

@@ -13,12 +13,11 @@ from torch import Tensor, nn
 from baselines.checkpoints import load_weights
 from baselines.depth_supervised.card import recipe
 from baselines.depth_supervised.network import predicted_depth
-from baselines.pix2shape.data.rooms import camera_poses, channels_first, check_reducible
+from baselines.pix2shape.data.rooms import camera_poses, check_reducible, room_image
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.use.predict import enlarged, input_views
 from metrics.prediction_writer import RoomPredictionWriter
 from scenegen.common.new_file import check_writable
-from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
 
 METHOD = "depth-supervised"
@@ -98,13 +97,7 @@ def predicted(
 
 def stacked(rooms: RoomsFile, rows: NDArray[np.int64], size: int) -> Tensor:
     """Return the images of rows as networks take them, (B, 3, S, S), linear radiance."""
-    images = [
-        channels_first(
-            decode_image(rooms.read("image", int(row))), size, f"{rooms.path}: image, row {row}"
-        )
-        for row in rows
-    ]
-    return torch.from_numpy(np.stack(images))
+    return torch.from_numpy(np.stack([room_image(rooms, int(row), size) for row in rows]))
 
 
 def batches(count: int) -> Iterator[NDArray[np.int64]]:

@@ -12,13 +12,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from baselines.pix2shape.data.rooms import camera_poses, channels_first, check_reducible
+from baselines.pix2shape.data.rooms import camera_poses, check_reducible, room_image
 from baselines.ptn.batches import Batch
 from baselines.ptn.network import PtnConfig
 from baselines.ptn.silhouettes import Silhouettes
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import SpecError
-from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
@@ -61,8 +60,7 @@ class RoomImages:
 
     def image(self, row: int) -> Array:
         """Return an image as the encoder takes it, (3, S, S), mirrored if its row is."""
-        radiance = decode_image(self.rooms.read("image", row))
-        small = channels_first(radiance, self._size, f"{self.rooms.path}: image, row {row}")
+        small = room_image(self.rooms, row, self._size)
         return small[..., ::-1].copy() if self.mirrored[row] else small
 
     def camera(self, row: int) -> Array:

@@ -16,6 +16,7 @@ from starlette.types import ASGIApp
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from scenegen.common.errors import SpecError
+from scenegen.common.web_hosts import EVERYWHERE
 
 EXCHANGE_SECONDS = 30  # for a request and its response; who is slower is cut off
 IDLE_SECONDS = 5
@@ -101,7 +102,7 @@ def listen(host: str, port: int) -> socket.socket:
 def address_of(listening: socket.socket, host: str) -> str:
     """Return what people type in to come to the first page."""
     port = listening.getsockname()[1]
-    if host in ("0.0.0.0", "::"):  # all addresses of this machine
+    if host in (EVERYWHERE, "::"):  # all addresses of this machine
         host = socket.gethostname()
     return f"http://{f'[{host}]' if ':' in host else host}:{port}/"
 

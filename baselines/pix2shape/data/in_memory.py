@@ -7,10 +7,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from baselines.pix2shape.data.rooms import camera_poses, channels_first, check_reducible, reduced
+from baselines.pix2shape.data.rooms import camera_poses, check_reducible, reduced, room_image
 from baselines.pix2shape.network.empty_rooms import Cameras
 from scenegen.common.errors import FileFormatError
-from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
 
 
@@ -49,8 +48,8 @@ class Rooms:
 def read_rooms(path: str | Path, size: int, *, depth: bool = False) -> Rooms:
     """Read a file of rooms, its images reduced to size x size pixels.
 
-    Raises OSError, FileFormatError as `RoomsFile` and where a camera, an image or, if depth is
-    asked for, all of an image's is not known; SpecError where images cannot be reduced.
+    Raises OSError, FileFormatError as `RoomsFile` and where a camera or an image is not known or,
+    if depth is asked for, an image has none; SpecError where images cannot be reduced.
     """
     with RoomsFile(path) as rooms:
         check_reducible(path, rooms.spec.height, rooms.spec.width, size)
@@ -58,8 +57,7 @@ def read_rooms(path: str | Path, size: int, *, depth: bool = False) -> Rooms:
         images = np.empty((len(rooms), 3, size, size), np.float16)
         depths = np.empty((len(rooms), size, size), np.float32) if depth else None
         for row in range(len(rooms)):
-            radiance = decode_image(rooms.read("image", row))
-            images[row] = channels_first(radiance, size, f"{path}: image, row {row}")
+            images[row] = room_image(rooms, row, size)
             if depths is not None:
                 depths[row] = reduced(rooms.read("depth", row), size)
                 if not np.isfinite(depths[row]).any():

@@ -28,7 +28,7 @@ from scenegen.rooms.reader import RoomsDataset, RoomsFile
 
 Array = NDArray[Any]
 BRIGHTEST = 65504.0  # radiance; the largest finite number of float16, in which images may be stored
-FARTHEST = 1e4  # scene units from the room, where the networks' numbers are still exact enough
+FARTHEST = 1e4  # scene units; a camera farther away sees the whole room in less than a pixel
 LARGEST_LIGHT = 1e6  # of colours, places and falloff
 UPRIGHT = 1e-3  # of products of a pose's axes, by which they may differ from those of a rotation
 
@@ -89,7 +89,7 @@ def check_reducible(where: object, height: int, width: int, size: int) -> None:
 def camera_poses(rooms: RoomsFile) -> Array:
     """Return world_from_camera of all rows, (N, 4, 4).
 
-    Raises FileFormatError where one is unknown, far away or no rotation and place.
+    Raises FileFormatError where one is unknown, far away, or no rotation and translation.
     """
     name = "camera/world_from_camera"
     poses = _bounded(rooms, name, FARTHEST)
@@ -98,7 +98,9 @@ def camera_poses(rooms: RoomsFile) -> Array:
     mirrored, last = np.linalg.det(turns) < 0, (poses[:, 3] != (0, 0, 0, 1)).any(axis=1)
     wrong: Array = (off > UPRIGHT) | mirrored | last
     if wrong.any():
-        _refuse(rooms, name, wrong, "no rotation and place", "the pose of a camera")
+        _refuse(
+            rooms, name, wrong, "a matrix that is no rotation and translation", "a camera's pose"
+        )
     return poses
 
 
@@ -156,7 +158,7 @@ class RoomImages(Dataset[dict[str, Any]]):
             unknown = (self.label < 0) | (self.label >= len(self.classes))
             if spec.classes and unknown.any():
                 expected = f"a class of 0 to {len(self.classes) - 1}"
-                _refuse(rooms, "object/shape", unknown, "another number", expected)
+                _refuse(rooms, "object/shape", unknown, "a number that is no class", expected)
         if spec.classes and spec.classes != len(self.classes):
             expected = f"{spec.classes}, as the networks were made for"
             raise SpecError(path, f"{len(self.classes)} classes", expected)
@@ -233,6 +235,12 @@ class RoomImages(Dataset[dict[str, Any]]):
         known["condition"] = np.concatenate([np.empty(0), *condition])
         known["world_from_camera"] = pose
         return {name: np.float32(value) for name, value in known.items()}
+
+
+def room_image(rooms: RoomsFile, row: int, size: int) -> Array:
+    """Return the image of a row as the networks take it, (3, S, S). Raises as `channels_first`."""
+    where = f"{rooms.path}: image, row {row}"
+    return channels_first(decode_image(rooms.read("image", row)), size, where)
 
 
 def channels_first(radiance: Array, size: int, where: object = "image") -> Array:

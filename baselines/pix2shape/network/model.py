@@ -16,9 +16,7 @@ from baselines.pix2shape.network.surfels import Scene, render
 T = TypeVar("T")
 MATERIAL = 5  # numbers of a surfel's material: albedo, k_s, exponent
 SHINIEST = 128.0
-HIGHEST = (
-    0.6  # scene units, of a bounded relief; 0.6% of object pixels in rooms of one view exceed it
-)
+HIGHEST = 0.6  # scene units; in rooms of one view 0.6% of the object pixels stand out more
 LOW = -3.0  # added to the decoder's numbers, so that a bounded relief begins near FLAT
 
 

@@ -32,7 +32,7 @@ DIVERGED = "begin again with a smaller learning rate or other weights of the los
 
 
 class TrainingError(SceneGenError):
-    """Training cannot go on, as a loss or a gradient is not finite."""
+    """Training cannot go on, as a loss, a gradient or a weight is not finite."""
 
 
 def train(

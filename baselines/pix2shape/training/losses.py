@@ -95,7 +95,7 @@ def disagreement(
         its_depth = -points[:, 2]
         edge = math.tan(math.radians(fov_y_degrees) / 2) * its_depth.clamp(min=NEAR)
         place = torch.stack([points[:, 0], -points[:, 1]], dim=2) / edge[..., None]
-        place = torch.nan_to_num(place)  # torch's slopes at a place that is none read wrong memory
+        place = torch.nan_to_num(place)  # at NaN torch's gradient reads outside of memory
         inverse = functional.grid_sample(  # inverse depth is affine on planes
             1 / other_depth[:, None], place[:, None], padding_mode="border", align_corners=False
         )

@@ -170,7 +170,10 @@ def _complete(weights: Path, last: int) -> bool:
 
 
 def _fit_prior(state: State, source: Source) -> None:
-    """Fit the prior, unless a critic ties codes to it. Raises TrainingError before all is lost."""
+    """Fit the prior, unless a critic ties codes to it.
+
+    Raises TrainingError for what is not finite, so that it replaces no checkpoint and no weights.
+    """
     require_finite(state)
     if not state.model.config.adversarial:
         fit_prior(state.model, source)

@@ -17,6 +17,7 @@ from baselines.pix2shape.data.rooms import (
     channels_first,
     check_reducible,
     is_question_file,
+    room_image,
 )
 from baselines.pix2shape.network.config import TAUGHT_DEPTH
 from baselines.pix2shape.network.empty_rooms import Cameras
@@ -122,10 +123,7 @@ def predict_rooms(
         inputs, own = input_views(rooms)
         found = []
         for chosen in _batches(len(inputs)):
-            images = (
-                (f"{data}: image, row {row}", rooms.read("image", int(row)))
-                for row in inputs[chosen]
-            )
+            images = (room_image(rooms, int(row), spec.size) for row in inputs[chosen])
             told = condition[inputs[chosen]], Cameras(poses[inputs[chosen]], fov)
             found.append(model.codes(_stacked(images, model), *told))
         codes = torch.cat(found)
@@ -176,7 +174,7 @@ def answer_file(
         images = 1 + questions.answers
         for rows in _batches(len(questions), images):
             shown = (
-                (f"{data}: row {row}", image)
+                channels_first(decode_image(image), spec.size, f"{data}: row {row}")
                 for row in rows
                 for image in questions.read("questions", int(row))
             )
@@ -225,14 +223,9 @@ def input_views(rooms: RoomsFile) -> tuple[Array, Array]:
     return inputs, np.searchsorted(inputs, [first[int(number)] for number in scene])
 
 
-def _stacked(images: Iterable[tuple[str, Array]], model: Pix2Shape) -> Tensor:
-    """Return stored images, (H, W, 3), each with its place, as the model takes them: (B, 3, S, S).
-
-    Raises FileFormatError for radiance that is not finite.
-    """
-    size = model.config.networks.size
-    small = [channels_first(decode_image(image), size, where) for where, image in images]
-    return torch.from_numpy(np.stack(small)).to(next(model.parameters()).device)
+def _stacked(images: Iterable[Array], model: Pix2Shape) -> Tensor:
+    """Return images, (3, S, S) each, on the model's device, (B, 3, S, S)."""
+    return torch.from_numpy(np.stack(list(images))).to(next(model.parameters()).device)
 
 
 def _batches(count: int, items: int = 1) -> Iterator[Array]:

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from baselines.pix2shape.network.config import TAUGHT_DEPTH, ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
-from baselines.tensor_files import check_tensors, load_tensors, save_tensors, shortened
+from baselines.tensor_files import check_tensors, load_tensors, refuse_pipe, save_tensors, shortened
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.new_file import write_text
 from scenegen.common.records import check, from_json, normalise
@@ -96,8 +96,7 @@ def save_card(path: str | Path, card: Card) -> None:
 def load_card(path: str | Path) -> Card:
     """Read the JSON beside weights. Raises OSError, FileFormatError."""
     beside = Path(path).with_suffix(".json")
-    if beside.exists() and not beside.is_file() and not beside.is_dir():
-        raise FileFormatError(beside, "a pipe or a device", "a card of weights")
+    refuse_pipe(beside)
     if beside.stat().st_size > LARGEST_JSON:
         raise FileFormatError(beside, f"over {LARGEST_JSON} bytes", "a card of weights")
     text = beside.read_bytes()
