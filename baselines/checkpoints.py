@@ -6,10 +6,13 @@ MOMENTS.
 """
 
 import errno
-from collections.abc import Callable, Mapping
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, ParamSpec, Protocol, TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -20,6 +23,7 @@ from baselines.tensor_files import check_tensors, load_tensors, save_tensors, sh
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.random.seeding import Purpose, item_seed
 from scenegen.common.records import from_json, to_json
+from scenegen.common.run_lock import run_lock
 
 CHECKPOINT, WEIGHTS = "checkpoint.safetensors", "weights.safetensors"
 NETWORK, MOMENTS = "network.", "moments."
@@ -35,6 +39,7 @@ class Seeded(Protocol):
 
 CardT = TypeVar("CardT", bound=Seeded)
 NetworkT = TypeVar("NetworkT", bound=nn.Module)
+Given = ParamSpec("Given")
 
 
 @dataclass(eq=False)
@@ -114,6 +119,37 @@ def load_checkpoint(folder: Path, recipe: Recipe[CardT, NetworkT]) -> State[Card
     except (KeyError, ValueError) as error:
         raise FileFormatError(path, f"{error}", "a checkpoint of this release") from error
     return state
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Make the folder of a run, and keep other runs out of it for the block.
+
+    A new folder in which nothing was written is removed. Raises SceneGenError where another run
+    trains there, whose checkpoints this one would replace; OSError.
+    """
+    new = not folder.exists()
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        with run_lock(folder / ".lock", folder, "wait for it, or name another folder"):
+            yield
+    finally:
+        if new:
+            with suppress(OSError):
+                folder.rmdir()
+
+
+def one_at_a_time(train: Callable[Given, Path]) -> Callable[Given, Path]:
+    """Let a function that trains have its `run_folder` to itself, as `alone_in`."""
+    signature = inspect.signature(train)
+
+    @wraps(train)
+    def alone(*given: Given.args, **settings: Given.kwargs) -> Path:
+        folder = signature.bind(*given, **settings).arguments["run_folder"]
+        with alone_in(Path(folder)):
+            return train(*given, **settings)
+
+    return alone
 
 
 def check_new(folder: Path) -> None:

@@ -37,6 +37,7 @@ class Target:
     weight: Tensor
 
 
+@checkpoints.one_at_a_time
 def train(
     data: str | Path,
     run_folder: str | Path,

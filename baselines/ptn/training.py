@@ -48,6 +48,7 @@ class Source(Protocol):
         """Close the file."""
 
 
+@checkpoints.one_at_a_time
 def train(
     data: str | Path,
     run_folder: str | Path,
@@ -110,7 +111,6 @@ def train(
             right = torch.from_numpy(found.read("answers", slice(0, labels)).astype(np.int64))
             told = torch.cat(list(feature_batches(state.network.eval(), found, labels)))
         state.card = replace(state.card, head=fitted_head(told, right))
-    folder.mkdir(parents=True, exist_ok=True)
     checkpoints.save_weights(folder / checkpoints.WEIGHTS, state)
     return folder / checkpoints.WEIGHTS
 
@@ -122,7 +122,6 @@ def _iterate(data: str | Path, folder: Path, state: State, progress: Progress) -
         if card.iteration:
             checkpoints.check_data(data, source.fingerprint, card.fingerprint)
         card = replace(card, fingerprint=source.fingerprint, data=source.data)
-        folder.mkdir(parents=True, exist_ok=True)
         began, last = time.monotonic() - card.seconds, config.iterations
         for iteration in range(card.iteration, last):
             batch = source.batch(item_rng(config.seed, iteration, Purpose.TRAINING))

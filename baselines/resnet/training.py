@@ -67,6 +67,7 @@ class LabelledQuestions(Dataset[tuple[Tensor, int]]):
         return images_of(stored["questions"], self._size), int(stored["answers"])
 
 
+@checkpoints.one_at_a_time
 def train(
     method: Method,
     data: str | Path,
@@ -123,7 +124,6 @@ def train(
         card = replace(given, answers=source.answers, labels=len(source), fingerprint=mark)
         state = checkpoints.new_state(method.recipe, card)
     _to_device(state, chosen_device(device))
-    folder.mkdir(parents=True, exist_ok=True)
     last = state.card.iterations
     for loss in _steps(method, state, source):
         progress(state.card.iteration, last, {"loss": loss})

@@ -42,6 +42,7 @@ EVERY = 200  # iterations between checkpoints
 Progress = Callable[[int, int, Mapping[str, float]], Any]
 
 
+@checkpoints.one_at_a_time
 def train(
     data: str | Path,
     run_folder: str | Path,
@@ -103,7 +104,6 @@ def train(
     if state.card.labels:
         questions = labelled_answers(data, state.card.labels)
         train_head(state.network, *questions, state.card.size, state.card.seed)
-    folder.mkdir(parents=True, exist_ok=True)
     checkpoints.save_weights(folder / checkpoints.WEIGHTS, state)
     return folder / checkpoints.WEIGHTS
 

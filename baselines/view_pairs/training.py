@@ -5,6 +5,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from baselines import checkpoints
 from baselines.depth_supervised.card import Card
 from baselines.depth_supervised.network import ReliefSpec
 from baselines.depth_supervised.training import Progress, Target, begun, fit
@@ -13,6 +14,7 @@ from baselines.pix2shape.matching.labels import labels
 METHOD = "view-pairs"
 
 
+@checkpoints.one_at_a_time
 def train(
     data: str | Path,
     run_folder: str | Path,

@@ -7,7 +7,7 @@ from typing import Any
 
 import h5py
 import pytest
-from pix2shape_commands import bench, files_in, linked
+from pix2shape_commands import bench, files_in, linked, pix2shape
 
 from baselines import commands
 
@@ -51,6 +51,21 @@ def test_train_answer_score(name, folder):
     with h5py.File("a.h5") as file:
         assert (file.attrs["method"], file.attrs["run"]) == (name, "2 labels, seed 3")
     assert bench("train", name, *DATA.split(), "--out", "run", "--resume").exit_code == 0
+
+
+@pytest.mark.parametrize("name", [*commands.TRAINED, "pix2shape"])
+def test_two_runs_never_share_a_folder(name, folder):
+    pytest.importorskip("torch")
+    from baselines.checkpoints import alone_in
+
+    reference = (pix2shape, "train", "--set=networks.size=32", "--set=networks.width=0.0625")
+    train = reference if name == "pix2shape" else (bench, "train", name)
+    data = "rooms.h5" if name in ("depth-supervised", "view-pairs") else "iqtt-train.h5"
+    with alone_in(Path("run")):
+        done = train[0](*train[1:], "--data", data, "--out", "run")
+        assert (done.exit_code, list(files_in(Path("run")))) == (2, ["run/.lock"]), done.output
+    assert done.stderr.startswith("Error: run: found another run")
+    assert not Path("run").exists()
 
 
 def test_settings_reach_the_baseline(fake, folder):

@@ -10,7 +10,7 @@ import torch
 from lightning_fabric import Fabric
 from torch.utils.data import DataLoader
 
-from baselines.checkpoints import WEIGHTS, check_data, check_new
+from baselines.checkpoints import WEIGHTS, alone_in, check_data, check_new
 from baselines.pix2shape.data.in_memory import read_rooms
 from baselines.pix2shape.data.questions import QuestionImages, for_questions
 from baselines.pix2shape.data.rooms import Batch, RoomImages, is_question_file
@@ -78,30 +78,29 @@ def train_run(
     fabric = launched(machine, card.precision)
     check_agreement(fabric, "data, settings or checkpoint", (card, state.iteration))
     first, last = fabric.is_global_zero, card.config.iterations
-    if first:
-        folder.mkdir(parents=True, exist_ok=True)
-    if isinstance(source, RoomImages) and card.config.matching:
-        _match(source, folder, card.config, fabric, lambda losses: progress(state, losses))
-    opened = opened_logs(folder / LOGS, state.iteration + 1) if first else nullcontext()
-    with opened as logs:
-        for losses, batch in train(
-            state, source, fabric, labelled=labelled, labels=labels, workers=machine.workers
-        ):
-            if logs is None:
-                continue
-            progress(state, losses)
-            done = state.iteration == last
-            if state.iteration % LOG_EVERY == 0 or done:
-                logs.numbers(losses, state.iteration)
-            if state.iteration % machine.every == 0 or done:
-                card = replace(card, iteration=state.iteration, seconds=round(state.seconds, 1))
-                _fit_prior(state, source)
-                save_state(folder, state, card)
-                _picture(folder, logs, state, batch)
-                save_weights(folder / WEIGHTS, state.model, card)
-    if first and not _complete(folder / WEIGHTS, last):
-        _fit_prior(state, source)
-        save_weights(folder / WEIGHTS, state.model, card)
+    with alone_in(folder) if first else nullcontext():
+        if isinstance(source, RoomImages) and card.config.matching:
+            _match(source, folder, card.config, fabric, lambda losses: progress(state, losses))
+        opened = opened_logs(folder / LOGS, state.iteration + 1) if first else nullcontext()
+        with opened as logs:
+            for losses, batch in train(
+                state, source, fabric, labelled=labelled, labels=labels, workers=machine.workers
+            ):
+                if logs is None:
+                    continue
+                progress(state, losses)
+                done = state.iteration == last
+                if state.iteration % LOG_EVERY == 0 or done:
+                    logs.numbers(losses, state.iteration)
+                if state.iteration % machine.every == 0 or done:
+                    card = replace(card, iteration=state.iteration, seconds=round(state.seconds, 1))
+                    _fit_prior(state, source)
+                    save_state(folder, state, card)
+                    _picture(folder, logs, state, batch)
+                    save_weights(folder / WEIGHTS, state.model, card)
+        if first and not _complete(folder / WEIGHTS, last):
+            _fit_prior(state, source)
+            save_weights(folder / WEIGHTS, state.model, card)
     summed(torch.zeros(1, device=fabric.device))  # wait for the first process, which writes
     return folder / WEIGHTS if first else None
 

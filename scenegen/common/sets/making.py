@@ -7,7 +7,7 @@ was completed but is not in the manifest, as the run was killed right then, is m
 import platform
 import time
 from collections.abc import Callable, Generator, Sequence
-from contextlib import closing, suppress
+from contextlib import closing, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,11 +17,11 @@ from scenegen.common.hdf5.content import CONTENT_DIGEST
 from scenegen.common.hdf5.shards import opened, set_name
 from scenegen.common.new_file import check_writable
 from scenegen.common.places import check_store, is_remote, listing
+from scenegen.common.run_lock import run_lock
 from scenegen.common.sets.manifest import (
     Manifest,
     ShardRecord,
     file_sha256,
-    locked,
     read_manifest,
     shard_problem,
     write_manifest,
@@ -79,7 +79,8 @@ def complete_set(
     """
     if is_remote(place):
         check_store(place)
-    with locked(place):
+    lock = place.with_name(f".{place.name}.lock")
+    with nullcontext() if is_remote(place) else run_lock(lock, place):  # stores have no locks
         manifest = _begun(place, asked, tasks, overwrite)
         rows = {record.file: record.rows for record in manifest.shards}
         kept = [task for task in tasks if rows.keys() >= set(task.names)]

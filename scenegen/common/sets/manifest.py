@@ -6,25 +6,18 @@ run that was killed can go on, and anyone can check the files by their SHA-256.
 
 import hashlib
 import json
-import os
 import re
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
+from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.hdf5.shards import set_name
 from scenegen.common.new_file import written_beside
-from scenegen.common.places import as_place, is_remote
+from scenegen.common.places import as_place
 from scenegen.common.records import check, from_json
 from scenegen.common.workers.pool import in_threads, processors
-
-try:
-    import fcntl
-except ImportError:  # Windows has no such locks
-    fcntl = None  # type: ignore[assignment]
 
 ENDING = ".manifest.json"
 FORMAT = "pix2shape-bench manifest 2"
@@ -204,34 +197,3 @@ def wrong_files(
             wrong.append(f"{record.file} {found}")
         progress(record.rows)
     return wrong
-
-
-@contextmanager
-def locked(place: Path) -> Iterator[None]:
-    """Let nobody else make the set of this manifest meanwhile.
-
-    Raises SceneGenError where someone does. Stores behind URLs have no locks.
-    """
-    if is_remote(place):
-        yield
-        return
-    lock = place.parent / f".{place.name}.lock"
-    descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
-    try:
-        if fcntl is not None:
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                ours = lock.exists() and os.path.samestat(os.fstat(descriptor), lock.stat())
-            except BlockingIOError:
-                ours = False
-            except OSError:  # a disk without locks
-                ours = True
-            if not ours:  # or a run that has just ended removed the lock that was opened here
-                raise SceneGenError(place, "another run that makes it", "", "wait for it")
-        try:
-            yield
-        finally:
-            with suppress(OSError):
-                lock.unlink()
-    finally:
-        os.close(descriptor)

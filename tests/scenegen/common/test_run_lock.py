@@ -1,0 +1,63 @@
+"""A second run is refused while the first one goes on, and a killed run holds nobody up."""
+
+import errno
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from scenegen.common import run_lock as module
+from scenegen.common.errors import SceneGenError
+from scenegen.common.run_lock import run_lock
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from scenegen.common.run_lock import run_lock
+with run_lock(Path(sys.argv[1]), Path("set")):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_a_second_run_is_refused_until_the_first_ends(tmp_path):
+    lock = tmp_path / ".lock"
+    with run_lock(lock, tmp_path / "set"):
+        with (
+            pytest.raises(SceneGenError) as refused,
+            run_lock(lock, tmp_path / "set", "come again"),
+        ):
+            pass
+        assert (refused.value.where, refused.value.hint) == (str(tmp_path / "set"), "come again")
+        assert lock.exists()
+    assert not lock.exists()
+    with run_lock(lock, tmp_path / "set"):
+        pass
+
+
+def test_a_killed_run_holds_nobody_up(tmp_path):
+    lock = tmp_path / ".lock"
+    run = subprocess.Popen([sys.executable, "-c", HOLD, lock], stdout=subprocess.PIPE, text=True)
+    assert run.stdout is not None
+    with run, run.stdout:
+        assert run.stdout.readline() == "held\n"
+        with pytest.raises(SceneGenError), run_lock(lock, tmp_path / "set"):
+            pass
+        run.kill()
+        run.wait()
+    assert lock.exists()
+    with run_lock(lock, tmp_path / "set"):
+        pass
+
+
+def test_disks_without_locks_lock_nothing(tmp_path, monkeypatch):
+    if module.fcntl is None:
+        pytest.skip("no locks here at all")
+
+    def refuses(*_: object) -> None:
+        raise OSError(errno.ENOTSUP, "no locks")
+
+    monkeypatch.setattr(module.fcntl, "flock", refuses)
+    with run_lock(tmp_path / ".lock", Path("a")), run_lock(tmp_path / ".lock", Path("b")):
+        pass
