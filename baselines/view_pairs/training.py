@@ -9,7 +9,7 @@ from baselines import checkpoints
 from baselines.depth_supervised.card import Card
 from baselines.depth_supervised.network import ReliefSpec
 from baselines.depth_supervised.training import Progress, Target, begun, fit
-from baselines.pix2shape.matching.labels import labels
+from baselines.pix2shape.matching.labels import labels, matched_rows
 
 METHOD = "view-pairs"
 
@@ -48,10 +48,10 @@ def train(
     def matching(done: int, total: int) -> None:
         progress(at, last, {"share of images matched": done / total})
 
-    relief, matched = labels(rooms, run_folder, matching)
+    relief = labels(rooms, run_folder, matching)
 
     def target(rows: Tensor) -> Target:
         found = relief[rows].float()
         return Target(found, torch.ones_like(found))
 
-    return fit(state, rooms, run_folder, target, progress, allowed=matched)
+    return fit(state, rooms, run_folder, target, progress, allowed=matched_rows(rooms))

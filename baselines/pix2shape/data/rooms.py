@@ -19,7 +19,10 @@ from torch.utils.data import Dataset, Sampler
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Views, mapped
 from baselines.pix2shape.network.surfels import Scene
+from iqtt.files.layout import FORMAT_NAME
+from iqtt.files.tables import PARTS
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.hdf5.attributes import read_text
 from scenegen.common.hdf5.shards import open_with_shards
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.records import check
@@ -74,9 +77,11 @@ def reduced(image: Array, size: int) -> Array:
 
 
 def is_question_file(path: str | Path) -> bool:
-    """Return whether a file holds questions. Raises OSError, FileFormatError."""
+    """Return whether a file holds questions or their answers. Raises OSError, FileFormatError."""
     with open_with_shards(Path(path), "rooms or question file")[0] as file:
-        return any(name in file for name in ("questions", "labeled", "unlabeled"))
+        kind = read_text(file, "format", path)
+        released = kind is None and any(name in file for name in ("questions", *PARTS))
+        return released or kind == FORMAT_NAME
 
 
 def check_reducible(where: object, height: int, width: int, size: int) -> None:
@@ -202,14 +207,13 @@ class RoomImages(Dataset[dict[str, Any]]):
             item["relief_cameras"] = self.world_from_camera[rows].astype(np.float32)
         return item
 
-    def learn_from(self, relief: Array, matched: Array) -> None:
-        """Add to each item the relief that matching found in the views of its scene.
+    def pick_views(self, matched: Array) -> None:
+        """Pick the views of each item's scene whose relief training shall learn from.
 
         Args:
-            relief: of all rows, (N, S, S), scene units.
-            matched: the rows whose relief was found, (M,), as they have a partner.
+            matched: the rows that have a partner to be matched with, (M,).
 
-        Raises SpecError unless as many views of every scene were matched.
+        Raises SpecError unless every scene has as many of them.
         """
         order = matched[np.argsort(self._scene[matched], kind="stable")]
         numbers, counts = np.unique(self._scene[order], return_counts=True)
@@ -218,6 +222,9 @@ class RoomImages(Dataset[dict[str, Any]]):
             raise SpecError(self.path, "more in some scenes than in others", expected)
         place = np.searchsorted(numbers, self._scene)
         self._views_of = order.reshape(-1, counts[0])[place]
+
+    def learn_from(self, relief: Array) -> None:
+        """Add to each item the relief of the picked views, of all rows, (N, S, S), scene units."""
         self._relief = relief
 
     def as_batch(self, items: dict[str, Tensor]) -> Batch:

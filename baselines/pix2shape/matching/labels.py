@@ -4,6 +4,7 @@ The labels lie in the folder of a run, a file for each block of scenes, so that 
 stopped need not find them again.
 """
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,8 @@ from baselines.pix2shape.data.in_memory import Rooms
 from baselines.pix2shape.matching.search import (
     NOISE,
     ROUNDED_NOISE,
+    STEP,
+    STEPS,
     best_relief,
     joint_cost,
     matching_cost,
@@ -32,12 +35,15 @@ Progress = Callable[[int, int], Any]  # images done, in all
 def pairs_of(rooms: Rooms) -> list[tuple[list[int], list[int]]]:
     """Return for each row the rows that it is matched with, to its one side and to the other.
 
-    They show the same scene from at most WIDEST degrees away.
+    They show the same scene from at most WIDEST degrees away. Raises SpecError for unknown angles.
     """
     rows_of: dict[int, list[int]] = {}
     for row, scene in enumerate(rooms.scene.tolist()):
         rows_of.setdefault(scene, []).append(row)
     angles = rooms.angle.tolist()
+    if not all(map(math.isfinite, angles)):
+        where = f"rooms: view_angle_degrees, row {rooms.angle.isfinite().int().argmin()}"
+        raise SpecError(where, "an angle that is not finite", "degrees")
     pairs = []
     for row, scene in enumerate(rooms.scene.tolist()):
         turns = [(angles[other] - angles[row], other) for other in rows_of[scene]]
@@ -64,21 +70,27 @@ def matched_relief(rooms: Rooms, row: int, sides: tuple[list[int], list[int]]) -
     return best_relief(semi_global(joint_cost(costs)))[0]
 
 
-def labels(
-    rooms: Rooms, run_folder: str | Path, progress: Progress = lambda done, total: None
-) -> tuple[Tensor, Tensor]:
-    """Return the relief of all rows, (N, S, S) float16, and the rows that have a partner, (M,).
-
-    Labels that the run's folder holds are read, the others found and written.
-
-    Raises SpecError where no row has a partner; OSError; FileFormatError where the folder's labels
-    are not those of these rooms.
-    """
+def matched_rows(rooms: Rooms) -> Tensor:
+    """Return the rows that have a partner, (M,). Raises SpecError where there are none."""
     pairs = pairs_of(rooms)
     matched = torch.tensor([row for row, sides in enumerate(pairs) if any(sides)], dtype=torch.long)
     if not len(matched):
         expected = f"views of a scene at most {WIDEST:.0f} degrees apart"
         raise SpecError("rooms", "no such views", expected, "render with --views 0,10,20")
+    return matched
+
+
+def labels(
+    rooms: Rooms, run_folder: str | Path, progress: Progress = lambda done, total: None
+) -> Tensor:
+    """Return the relief of all rows, (N, S, S) float16; 0 for those that have no partner.
+
+    Labels that the run's folder holds are read, the others found and written.
+
+    Raises SpecError as `matched_rows`; OSError; FileFormatError where the folder's labels are not
+    those of these rooms.
+    """
+    matched, pairs = matched_rows(rooms), pairs_of(rooms)
     folder = Path(run_folder) / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
     relief = torch.zeros(len(rooms), *rooms.image.shape[2:], dtype=torch.float16)
@@ -95,7 +107,7 @@ def labels(
             save_tensors(path, {"relief": relief[rows]}, {"fingerprint": rooms.fingerprint})
         done += len(rows)
         progress(done, len(matched))
-    return relief, matched
+    return relief
 
 
 def _read(path: Path, like: Tensor, fingerprint: str) -> Tensor:
@@ -104,4 +116,7 @@ def _read(path: Path, like: Tensor, fingerprint: str) -> Tensor:
         expected = f"those of the rooms {fingerprint[:12]}"
         raise FileFormatError(path, "labels of other rooms", expected, "name another folder")
     check_tensors(path, tensors, {"relief": like})
-    return tensors["relief"]
+    relief = tensors["relief"]
+    if relief.min() < 0 or relief.max() > STEPS * STEP:
+        raise FileFormatError(f"{path}: relief", "numbers out of range", f"0 to {STEPS * STEP}")
+    return relief

@@ -3,7 +3,9 @@
 So training can go on where it was stopped, and every process can take its share of a batch.
 """
 
+import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import torch
@@ -14,7 +16,7 @@ from torch.utils.data import DataLoader, Dataset, default_collate
 from baselines.pix2shape.data.questions import QuestionImages
 from baselines.pix2shape.data.rooms import Batch, Draws, RoomImages
 from baselines.pix2shape.network.config import ModelConfig
-from baselines.pix2shape.network.shared_batch import share
+from baselines.pix2shape.network.shared_batch import LostProcessError, share
 from baselines.pix2shape.training.state import State
 from scenegen.common.errors import SceneGenError
 
@@ -61,6 +63,23 @@ class _Told(Dataset[Any]):
 def _collated(items: list[Any]) -> Any:
     errors = [item for item in items if isinstance(item, Exception)]
     return errors[0] if errors else default_collate(items)
+
+
+@contextmanager
+def readers_kept() -> Iterator[None]:
+    """Raise LostProcessError where a process that reads data for the block ended, as if killed.
+
+    torch tells of it in a signal handler, which may interrupt the block anywhere.
+    """
+    try:
+        yield
+    except RuntimeError as error:
+        ended = re.search(r"DataLoader worker .*(killed by signal|exited unexpectedly)", str(error))
+        if not ended:
+            raise
+        found = "that a process that reads the data ended, for want of memory perhaps"
+        hint = "`--resume` goes on from the checkpoint, `--workers 0` without such processes"
+        raise LostProcessError("training", found, hint=hint) from error
 
 
 def _loaded(

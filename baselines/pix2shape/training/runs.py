@@ -14,12 +14,12 @@ from baselines.checkpoints import WEIGHTS, alone_in, check_data, check_new
 from baselines.pix2shape.data.in_memory import read_rooms
 from baselines.pix2shape.data.questions import QuestionImages, for_questions
 from baselines.pix2shape.data.rooms import Batch, RoomImages, is_question_file
-from baselines.pix2shape.matching.labels import labels as labels_of
+from baselines.pix2shape.matching import labels as matching
 from baselines.pix2shape.network.config import METHOD, TAUGHT_DEPTH, ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.network.shared_batch import summed
 from baselines.pix2shape.pictures import training_sheet
-from baselines.pix2shape.training.batches import Source
+from baselines.pix2shape.training.batches import Source, readers_kept
 from baselines.pix2shape.training.launch import Machine, check_agreement, launched
 from baselines.pix2shape.training.logs import Logs, opened_logs
 from baselines.pix2shape.training.loop import check_request, require_finite, train
@@ -78,7 +78,7 @@ def train_run(
     fabric = launched(machine, card.precision)
     check_agreement(fabric, "data, settings or checkpoint", (card, state.iteration))
     first, last = fabric.is_global_zero, card.config.iterations
-    with alone_in(folder) if first else nullcontext():
+    with alone_in(folder) if first else nullcontext(), readers_kept():
         if isinstance(source, RoomImages) and card.config.matching:
             _match(source, folder, card.config, fabric, lambda losses: progress(state, losses))
         opened = opened_logs(folder / LOGS, state.iteration + 1) if first else nullcontext()
@@ -149,15 +149,19 @@ def _match(
     fabric: Fabric,
     progress: Callable[[dict[str, float]], Any],
 ) -> None:
-    """Let training learn from relief that is found by matching, or read from the run's folder."""
+    """Let training learn from relief that is found by matching, or read from the run's folder.
+
+    Raises SpecError, before the search, where the views of the rooms do not suit.
+    """
     rooms = read_rooms(source.path, config.networks.size)
+    source.pick_views(matching.matched_rows(rooms).numpy())
     for turn in (True, False):  # the first process finds what the others then read
         if turn is fabric.is_global_zero:
-            relief, matched = labels_of(
+            relief = matching.labels(
                 rooms, folder, lambda done, n: progress({"share of images matched": done / n})
             )
         summed(torch.zeros(1, device=fabric.device))
-    source.learn_from(relief.numpy(), matched.numpy())
+    source.learn_from(relief.numpy())
 
 
 def _complete(weights: Path, last: int) -> bool:

@@ -108,6 +108,10 @@ def _one_line_errors() -> Iterator[None]:
         raise UserError(f"not enough memory: {error}") from error
     except MemoryError as error:
         raise UserError(": ".join(filter(None, ("not enough memory", str(error))))) from error
+    except RuntimeError as error:  # of torch and Dr.Jit, which have no narrower one in common
+        if not re.search("out of memory|can't allocate memory|not enough memory", str(error)):
+            raise
+        raise UserError(f"not enough memory: {str(error).splitlines()[0]}") from error
     except ValueError as error:
         from scenegen.common.errors import SceneGenError
 

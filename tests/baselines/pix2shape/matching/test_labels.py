@@ -11,7 +11,7 @@ from scenegen.common.errors import FileFormatError, SpecError
 torch = pytest.importorskip("torch")
 from baselines.pix2shape.data.in_memory import read_rooms  # noqa: E402
 from baselines.pix2shape.matching import labels as module  # noqa: E402
-from baselines.pix2shape.matching.labels import FOLDER, labels, pairs_of  # noqa: E402
+from baselines.pix2shape.matching.labels import FOLDER, labels, matched_rows, pairs_of  # noqa: E402
 from baselines.tensor_files import load_tensors, save_tensors  # noqa: E402
 
 
@@ -47,12 +47,12 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 def test_labels_are_found_once(quick, rooms, tmp_path):
     done: list[tuple[int, int]] = []
-    relief, matched = labels(rooms, tmp_path, lambda *now: done.append(now))
-    assert matched.tolist() == quick == [0, 1, 2, 4, 5, 6]
+    relief = labels(rooms, tmp_path, lambda *now: done.append(now))
+    assert matched_rows(rooms).tolist() == quick == [0, 1, 2, 4, 5, 6]
     assert done == [(3, 6), (6, 6)]
     assert relief[:, 0, 0].tolist() == [0, 1 / 16, 2 / 16, 0, 4 / 16, 5 / 16, 6 / 16, 0]
     (tmp_path / FOLDER / "00001.safetensors").unlink()
-    again, _ = labels(rooms, tmp_path)
+    again = labels(rooms, tmp_path)
     assert quick == [0, 1, 2, 4, 5, 6, 4, 5, 6], "of the other scene they are read"
     assert torch.equal(again, relief)
 
@@ -63,9 +63,10 @@ def test_labels_are_found_once(quick, rooms, tmp_path):
         ({"relief": torch.zeros(3, 64, 64, dtype=torch.float16)}, {"fingerprint": "other"}),
         ({"relief": torch.zeros(2, 64, 64, dtype=torch.float16)}, {}),
         ({"relief": torch.full((3, 64, 64), torch.nan, dtype=torch.float16)}, {}),
+        ({"relief": torch.full((3, 64, 64), 7, dtype=torch.float16)}, {}),
         ({"depth": torch.zeros(3, 64, 64)}, {}),
     ],
-    ids=["other rooms", "too few", "NaN", "another tensor"],
+    ids=["other rooms", "too few", "NaN", "too far", "another tensor"],
 )
 def test_labels_of_something_else_are_refused(tensors, notes, quick, rooms, tmp_path):
     labels(rooms, tmp_path)
@@ -85,7 +86,8 @@ def test_a_label_file_that_is_cut_short_is_refused(quick, rooms, tmp_path):
         labels(rooms, tmp_path)
 
 
-def test_rooms_without_neighbouring_views_are_refused(rooms, tmp_path):
-    with pytest.raises(SpecError, match="20 degrees apart"):
-        labels(replace(rooms, angle=4 * rooms.angle), tmp_path)
+@pytest.mark.parametrize("factor", [4, torch.nan])
+def test_rooms_without_neighbouring_views_are_refused(factor, rooms, tmp_path):
+    with pytest.raises(SpecError):
+        labels(replace(rooms, angle=factor * rooms.angle), tmp_path)
     assert not list(tmp_path.iterdir())

@@ -1,5 +1,6 @@
 """A run's folder: what is written, going on after a kill, and what does not go together."""
 
+import multiprocessing
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -22,6 +23,7 @@ from torch.utils.data import default_collate  # noqa: E402
 from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
 from baselines.pix2shape.network.config import LOSSES  # noqa: E402
 from baselines.pix2shape.network.model import Prior  # noqa: E402
+from baselines.pix2shape.network.shared_batch import LostProcessError  # noqa: E402
 from baselines.pix2shape.training import runs  # noqa: E402
 from baselines.pix2shape.training.loop import TrainingError  # noqa: E402
 from baselines.pix2shape.training.runs import Machine, train_run  # noqa: E402
@@ -56,6 +58,16 @@ def same(one: Path, other: Path) -> bool:
     found, expected = load_file(one), load_file(other)
     assert found.keys() == expected.keys()
     return all(torch.equal(found[name], expected[name]) for name in found)
+
+
+def test_a_killed_reader_ends_the_run_as_a_lost_process(rooms_path, folder):
+    def kill(state: Any, losses: dict[str, float]) -> None:
+        for child in multiprocessing.active_children():
+            child.kill()
+            child.join()
+
+    with pytest.raises(LostProcessError):
+        train_run(folder, rooms_path, CONFIG, replace(HERE, workers=1), progress=kill)
 
 
 class Killed(Exception):
@@ -285,6 +297,17 @@ def test_rays_need_neighbouring_views(several_path, folder):
     with pytest.raises(SpecError) as error:
         train_run(folder, several_path, RAYS, HERE)
     assert (error.value.where, error.value.found) == ("rooms", "no such views")
+
+
+def test_rays_refuse_uneven_views_before_the_search(near_path, folder, tmp_path):
+    uneven = tmp_path / "uneven.h5"
+    shutil.copy(near_path, uneven)
+    with h5py.File(uneven, "r+") as file:
+        file["view_angle_degrees"][5] = 60
+    with pytest.raises(SpecError) as error:
+        train_run(folder, uneven, RAYS, HERE)
+    assert error.value.where == str(uneven)
+    assert not folder.exists()
 
 
 def test_a_run_begins_from_the_networks_of_another(rooms_path, unbroken, folder):

@@ -17,7 +17,15 @@ def group_of(callback):
     return group
 
 
-@pytest.mark.parametrize("error", [MemoryError(), MemoryError("Unable to allocate 7 EiB")])
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError(),
+        MemoryError("Unable to allocate 7 EiB"),
+        RuntimeError("DefaultCPUAllocator: can't allocate memory: you tried to allocate 7 bytes."),
+        RuntimeError("CUDA out of memory. Tried to allocate 7 GiB."),
+    ],
+)
 def test_too_little_memory_is_one_line(error, check_refusal):
     def fail():
         raise error
