@@ -19,7 +19,13 @@ from torch import Tensor, nn
 from torch.optim import Adam
 
 from baselines.optimiser_moments import load_moments, moments_of
-from baselines.tensor_files import check_tensors, load_tensors, save_tensors, shortened
+from baselines.tensor_files import (
+    check_tensors,
+    load_tensors,
+    save_tensors,
+    shortened,
+    whole_number,
+)
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.random.seeding import Purpose, item_seed
 from scenegen.common.records import from_json, to_json
@@ -113,7 +119,7 @@ def load_checkpoint(folder: Path, recipe: Recipe[CardT, NetworkT]) -> State[Card
     weights, moments = (_beginning(start, tensors) for start in (NETWORK, MOMENTS))
     state = _state(path, recipe, notes, weights)
     try:
-        load_moments(state.optimiser, moments, int(notes["moments"]))
+        load_moments(state.optimiser, moments, whole_number(notes, "moments"))
         if len(weights) + len(moments) != len(tensors):
             raise ValueError("tensors that are neither weights nor moments")
     except (KeyError, ValueError) as error:

@@ -4,6 +4,7 @@ Heavy imports happen inside the commands, so that `--help` is quick and works wi
 """
 
 import inspect
+import shlex
 from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
@@ -14,8 +15,10 @@ from baselines.pix2shape.commands import (
     SUBMISSION,
     WEIGHTS_PATH,
     Setting,
+    named_once,
     needs_torch,
     predict_to,
+    score_it,
 )
 from scenegen.common.command_line.groups import EXAMPLE
 from scenegen.common.command_line.options import LARGEST, OVERWRITE
@@ -130,7 +133,7 @@ def baseline(
         with RoomsFile(data) as rooms, progress_bar(len(rooms), "image") as bar:
             how = {"overwrite": overwrite, "progress": bar.update}
             write_room_baseline(name, data, out, train=train, **how)
-    print_line(f"{out}: {method} on {data}; score it with `bench score {out} --truth {data}`")
+    print_line(f"{out}: {method} on {data}; {score_it(out, data)}")
 
 
 def _answer_by_outline(
@@ -197,7 +200,7 @@ def train_baseline(
         if key not in known:
             raise click.UsageError(f"--{key}: {name} has no such setting")
     others = {key: known[key] for key in sorted(known.keys() - {*options, "resume", "progress"})}
-    for key, value in settings:
+    for key, value in named_once(settings).items():
         if key not in others:
             raise click.UsageError(f"--set: found {key!r:.40}, expected one of {', '.join(others)}")
         like = type(others[key])
@@ -226,10 +229,8 @@ def train_baseline(
     finally:
         bar.close()
     more = f" ({told})" if told else ""
-    print_line(
-        f"{weights}: {name} trained on {data}{more}; now `bench baseline {name} --weights {weights}"
-        " --data ...`"
-    )
+    use = f"bench baseline {name} --weights {shlex.quote(str(weights))} --data ..."
+    print_line(f"{weights}: {name} trained on {data}{more}; now `{use}`")
 
 
 def _package(name: str) -> Any:

@@ -27,7 +27,10 @@ def load_moments(optimiser: Adam, tensors: Mapping[str, Tensor], count: int) -> 
     """
     parameters = optimiser.param_groups[0]["params"]
     moments: dict[int, dict[str, Tensor]] = {}
-    for index in sorted({int(name.partition(".")[0]) for name in tensors}):
+    numbers = {name.partition(".")[0] for name in tensors}
+    strange = sorted(number for number in numbers if not number.isdecimal())
+    _check(not strange, f"moments of parameter {', '.join(strange)[:40]!r}, not expected")
+    for index in sorted(map(int, numbers)):
         _check(0 <= index < len(parameters), f"moments of parameter {index}, not expected")
         moments[index] = {}
         for field in MOMENTS:

@@ -49,6 +49,14 @@ def load_tensors(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
         raise FileFormatError(path, f"no safetensors file, or a damaged one ({error})") from error
 
 
+def whole_number(notes: Mapping[str, str], name: str) -> int:
+    """Return a note that is a number from 0. Raises ValueError, which tells what is there."""
+    text = notes.get(name, "")
+    if not (text.isascii() and text.isdecimal() and len(text) < 19):
+        raise ValueError(f"{name} {text!r:.40}")
+    return int(text)
+
+
 def check_tensors(
     path: str | Path,
     tensors: Mapping[str, Tensor],

@@ -3,6 +3,7 @@
 Heavy imports happen inside the commands, so that `--help` is quick and works without torch.
 """
 
+import shlex
 import sys
 from typing import Any
 
@@ -44,7 +45,7 @@ def number(*names: str, least: int, default: int, text: str, most: int = LARGEST
 
 
 class Setting(click.ParamType):  # type: ignore[type-arg]
-    """`name=value`, where the value is written as in JSON."""
+    """`name=value`, where the value is written as in JSON; what is no JSON is a text."""
 
     name = "NAME=VALUE"
 
@@ -52,11 +53,25 @@ class Setting(click.ParamType):  # type: ignore[type-arg]
         """Return name and value."""
         import json
 
-        name, _, text = str(value).partition("=")
+        name, equals, text = str(value).partition("=")
+        if not equals:
+            self.fail(f"found {value!r:.100}, expected {self.name} such as batch=8", param, ctx)
         try:
             return name.strip(), json.loads(text)
-        except (ValueError, RecursionError):
-            self.fail(f"found {value!r:.100}, expected a number, such as batch=8", param, ctx)
+        except ValueError:
+            return name.strip(), text
+        except RecursionError:
+            self.fail(f"found {value!r:.100}, expected a simpler value", param, ctx)
+
+
+def named_once(settings: tuple[tuple[str, Any], ...], **options: Any) -> dict[str, Any]:
+    """Return the settings of --set and of other options, unless one comes twice: UsageError."""
+    chosen = dict(options)
+    for name, value in settings:
+        if name in chosen:
+            raise click.UsageError(f"--set: {name!r:.40} is given twice")
+        chosen[name] = value
+    return chosen
 
 
 @click.command(epilog=f"{EXAMPLE}pix2shape train --data rooms.h5 --out run")
@@ -140,7 +155,7 @@ def train(
     from baselines.pix2shape.training.runs import train_run
     from baselines.pix2shape.use.predict import chosen_device
 
-    chosen = dict(settings) | ({} if seed is None else {"seed": seed})
+    chosen = named_once(settings, **({} if seed is None else {"seed": seed}))
     if resume and (config or chosen or labels or conditional or start):
         own = "--config, --set, --seed, --labels, --conditional and --start"
         raise click.UsageError(f"--resume goes on with the run's own {own}; leave them out")
@@ -173,6 +188,7 @@ def train(
             conditional=conditional,
             start=start,
             precision=precision,
+            chosen=chosen,
             progress=show,
         )
     except KeyboardInterrupt:
@@ -189,7 +205,8 @@ def train(
         if bar is not None:
             bar.close()
     if weights is not None:  # None in all processes but the first
-        print_line(f"{weights}: trained on {data}; now `pix2shape predict --weights {weights} ...`")
+        named = shlex.quote(str(weights))
+        print_line(f"{weights}: trained on {data}; now `pix2shape predict --weights {named} ...`")
 
 
 @click.command(epilog=f"{EXAMPLE}pix2shape predict --data rooms.h5 --out predictions.h5")
@@ -207,7 +224,7 @@ def predict(
     Every view of a room is predicted from one image, the room's view 0, and the cameras.
     """
     weights = predict_to(out, weights, data, run=run, device=device, overwrite=overwrite)
-    print_line(f"{out}: {weights} on {data}; score it with `bench score {out} --truth {data}`")
+    print_line(f"{out}: {weights} on {data}; {score_it(out, data)}")
 
 
 def predict_to(
@@ -232,6 +249,11 @@ def predict_to(
 
         predict_file(weights, data, out, **how, method=method, progress=show)
     return weights
+
+
+def score_it(out: str, data: str) -> str:
+    """Return what is said after a submission was written."""
+    return f"score it with `{shlex.join(['bench', 'score', out, '--truth', data])}`"
 
 
 def needs_torch(who: str = "pix2shape", packages: tuple[str, ...] = PACKAGES) -> None:

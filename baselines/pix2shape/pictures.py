@@ -13,7 +13,7 @@ from torch import Tensor
 from baselines.pix2shape.data.rooms import Batch
 from baselines.pix2shape.network.model import Pix2Shape, Views, shaded
 from baselines.pix2shape.network.surfels import normals_from_depth
-from scenegen.common.errors import SpecError
+from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.common.new_file import check_writable, written_beside
 from scenegen.rooms import preview
 from scenegen.rooms.preview import BACKGROUND, GAP, SMALLEST_TILE
@@ -29,6 +29,9 @@ def drawn(model: Pix2Shape, code: Tensor, views: Views) -> tuple[Tiles, Tiles, T
     surfels = model.surfels(code, views.condition, views.cameras)
     depth, opacity = surfels.depth, surfels.opacity
     image = shaded(surfels, model.lit(code, views))
+    if not (depth.isfinite().all() and image.isfinite().all()):
+        hint = "these weights do not suit these rooms"
+        raise SceneGenError("picture", "depth or radiance that is not finite", hint=hint)
     normals = normals_from_depth(depth, views.scene.fov_y_degrees)
     if opacity is not None:
         depth = torch.where(opacity > 0.5, depth, torch.nan)

@@ -126,9 +126,9 @@ def train(
     _to_device(state, chosen_device(device))
     last = state.card.iterations
     for loss in _steps(method, state, source):
-        progress(state.card.iteration, last, {"loss": loss})
         if state.card.iteration % EVERY == 0:
             checkpoints.save_checkpoint(folder, state)
+        progress(state.card.iteration, last, {"loss": loss})
     beside = Path(data).with_name(VALIDATION)
     if beside.is_file():
         share = accuracy(state.network, beside, state.card.size, state.card.answers)

@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from baselines.pix2shape.network.shared_batch import BatchNorm1d, BatchNorm2d
+from scenegen.common.errors import SpecError
 from scenegen.common.records import check, normalise
 
 SIZES = (32, 64, 128, 256)  # pixels a side
@@ -74,8 +75,9 @@ class NetworkSpec:
         expected = "false for networks without rays, which give no relief"
         check(self.rays or not self.bounded, "bounded", self.bounded, expected)
         check(self.encoder in ENCODERS, "encoder", self.encoder, f"one of {', '.join(ENCODERS)}")
-        polar, expected = self.encoder == "polar", "no camera and no classes for the polar encoder"
-        check(not (polar and self.condition), "condition", self.condition, expected)
+        if self.encoder == "polar" and self.condition:
+            found = "'polar' with a camera or classes that are told"
+            raise SpecError("encoder", found, "'paper', or networks without them, as of questions")
 
     @property
     def z(self) -> int:

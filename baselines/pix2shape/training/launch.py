@@ -10,6 +10,7 @@ from lightning_fabric import Fabric
 from baselines.pix2shape.network.shared_batch import LostProcessError, processes
 from baselines.pix2shape.training.loop import TrainingError
 from scenegen.common.errors import SpecError
+from scenegen.common.records import check
 
 T = TypeVar("T")
 NUMBERS = {"32": "32-true", "bf16": "bf16-mixed"}  # as Lightning Fabric calls them
@@ -36,9 +37,17 @@ class Machine:
 
 
 def started_elsewhere() -> tuple[int, int]:
-    """Return the processes on each machine and the machines that torchrun started; else (1, 1)."""
-    devices = int(os.environ.get(STARTED, "1"))
-    return devices, int(os.environ["WORLD_SIZE"]) // devices if torchrun() else 1
+    """Return the processes on each machine and the machines that torchrun started; else (1, 1).
+
+    Raises SpecError where the environment does not tell them.
+    """
+    if not torchrun():
+        return 1, 1
+    for name in (STARTED, "WORLD_SIZE"):
+        told = os.environ.get(name, "")
+        check(told.isdecimal() and int(told) > 0, name, repr(told), "a number, as torchrun sets it")
+    devices = int(os.environ[STARTED])
+    return devices, int(os.environ["WORLD_SIZE"]) // devices
 
 
 def torchrun() -> bool:

@@ -1,6 +1,8 @@
 """A training run and its folder: checkpoint, TensorBoard logs, a picture, and the weights."""
 
-from collections.abc import Callable
+import functools
+import json
+from collections.abc import Callable, Collection
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +12,7 @@ import torch
 from lightning_fabric import Fabric
 from torch.utils.data import DataLoader
 
-from baselines.checkpoints import WEIGHTS, alone_in, check_data, check_new
+from baselines.checkpoints import CHECKPOINT, WEIGHTS, alone_in, check_data, check_new
 from baselines.pix2shape.data.in_memory import read_rooms
 from baselines.pix2shape.data.questions import QuestionImages, for_questions
 from baselines.pix2shape.data.rooms import Batch, RoomImages, is_question_file
@@ -28,13 +30,18 @@ from baselines.pix2shape.weights.bundled import open_weights
 from baselines.pix2shape.weights.storage import PRECISIONS, Card, load_card, save_weights
 from iqtt.files.reader import open_questions
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.records import check
+from scenegen.common.new_file import check_writable
+from scenegen.common.records import check, to_json
 from scenegen.rooms.preview import save_picture
 from scenegen.rooms.reader import RoomsFile
 
 PICTURE, LOGS = "pictures.png", "logs"
 LOG_EVERY = 20  # iterations
 OF_NETWORKS = ("networks", "opacity", "material", "lights", "depth_middle", "depth_reach")
+OF_QUESTIONS = (
+    "question_batch", "labelled_batch", "turned", "temperature", "hard_negatives",
+    "easy_negatives", "compared_information",
+)  # fmt: skip
 Begun = tuple[State, Card, Source, QuestionImages | None]
 PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and batch size for that
 
@@ -49,6 +56,7 @@ def train_run(
     conditional: bool = False,
     start: str | Path | None = None,
     precision: str | None = None,
+    chosen: Collection[str] = (),
     progress: Callable[[State, dict[str, float]], Any] = lambda state, losses: None,
 ) -> Path | None:
     """Train a model, from the start or from the folder's checkpoint.
@@ -62,6 +70,8 @@ def train_run(
         conditional: whether the networks are told the class of a room's only object.
         start: weights of an earlier run with the same networks, to begin a new run from.
         precision: of the networks, "32" or "bf16"; None for 32, or for that of the checkpoint.
+        chosen: names of settings, such as "networks.size", that somebody asked for. Others are
+            changed where the data need it: rooms ask no questions, for example.
 
     Raises SpecError where configuration and data do not fit; FileExistsError where a new run finds
     a checkpoint; TrainingError; LostProcessError where another process ended; FileFormatError,
@@ -71,7 +81,7 @@ def train_run(
     if config is None:
         state, card, source, labelled = _resumed(folder, data, precision)
     else:
-        how = labels, conditional, start, precision or PRECISIONS[0]
+        how = labels, conditional, start, precision or PRECISIONS[0], chosen
         state, card, source, labelled = _begun(folder, data, config, *how)
     labels = card.labels
     check_request(card.config, source, labelled, labels, machine.devices * machine.nodes)
@@ -79,6 +89,8 @@ def train_run(
     check_agreement(fabric, "data, settings or checkpoint", (card, state.iteration))
     first, last = fabric.is_global_zero, card.config.iterations
     with alone_in(folder) if first else nullcontext(), readers_kept():
+        for name in (CHECKPOINT, PICTURE, WEIGHTS) if first else ():
+            check_writable(folder / name, overwrite=True)
         if isinstance(source, RoomImages) and card.config.matching:
             _match(source, folder, card.config, fabric, lambda losses: progress(state, losses))
         opened = opened_logs(folder / LOGS, state.iteration + 1) if first else nullcontext()
@@ -88,7 +100,6 @@ def train_run(
             ):
                 if logs is None:
                     continue
-                progress(state, losses)
                 done = state.iteration == last
                 if state.iteration % LOG_EVERY == 0 or done:
                     logs.numbers(losses, state.iteration)
@@ -98,6 +109,7 @@ def train_run(
                     save_state(folder, state, card)
                     _picture(folder, logs, state, batch)
                     save_weights(folder / WEIGHTS, state.model, card)
+                progress(state, losses)  # which may fail, as where its output is closed
         if first and not _complete(folder / WEIGHTS, last):
             _fit_prior(state, source)
             save_weights(folder / WEIGHTS, state.model, card)
@@ -123,10 +135,16 @@ def _begun(
     conditional: bool,
     start: str | Path | None,
     precision: str,
+    chosen: Collection[str],
 ) -> Begun:
     """Return a new run's state, with its card and its data."""
     check_new(folder)
-    config = _suited(config, data, labels, conditional)
+    asked, config = config, _suited(config, data, labels, conditional)
+    for name in chosen:
+        value, needed = (functools.reduce(getattr, name.split("."), c) for c in (asked, config))
+        if value != needed:
+            hint = f"leave it out: {data}, with {labels} labels, needs this value or uses none"
+            raise SpecError(name.replace("_", " "), value, needed, hint)
     source, labelled = _sources(data, config, labels)
     card = Card(
         config,
@@ -221,9 +239,13 @@ def _begin_from(start: str | Path, model: Pix2Shape, card: Card) -> Card:
     Raises SpecError, and as `open_weights`.
     """
     earlier, its_card = open_weights(start)
+    its, own = (json.loads(to_json(one.config)) for one in (its_card, card))
     for name in OF_NETWORKS:
-        its, own = getattr(its_card.config, name), getattr(card.config, name)
-        check(its == own, "start", start, f"weights of the same {name} as this run's, {own}")
+        group = own[name] if isinstance(own[name], dict) else {}
+        for part in [f"{name}.{key}" for key in group] or [name]:
+            there, here = (functools.reduce(dict.get, part.split("."), one) for one in (its, own))
+            expected = f"weights of the {part} of this run, {here}"
+            check(there == here, "start", f"{start} with {there}", expected)
     if card.method == METHOD:
         own = f"weights of {METHOD}, as other losses than the paper's would have trained this run's"
         check(its_card.method == METHOD, "start", start, own)
@@ -262,5 +284,6 @@ def _suited(config: ModelConfig, data: str | Path, labels: int, conditional: boo
             counts, shapes = rooms.spec.objects, rooms.spec.shapes
         check(counts == (1, 1), "conditional", f"objects {counts}", "one object in every room")
         networks = replace(networks, classes=len(shapes))
-    config = replace(config, mutual_information=0.0, questions=0.0, contrast=0.0, swap=0.0)
-    return replace(config, networks=networks)
+    unused: dict[str, Any] = {name: getattr(ModelConfig, name) for name in OF_QUESTIONS}
+    off = dict.fromkeys(("mutual_information", "questions", "contrast", "swap"), 0.0)
+    return replace(config, networks=networks, **unused | off)

@@ -1,7 +1,6 @@
 """The state of training and its checkpoint: weights, optimisers, number of the iteration."""
 
 import errno
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.weights import storage
 from baselines.pix2shape.weights.storage import Card
-from baselines.tensor_files import load_tensors, save_tensors
+from baselines.tensor_files import load_tensors, save_tensors, whole_number
 from scenegen.common.errors import FileFormatError
 from scenegen.common.random.seeding import Purpose, item_seed
 
@@ -54,7 +53,7 @@ def save_state(folder: Path, state: State, card: Card) -> None:
     """Write the folder's checkpoint; the old one stays until this one is complete."""
     own = state.model.state_dict().items()
     tensors = {f"model.{k}": value for k, value in own if k.split(".")[0] in storage.LEARNED}
-    notes = {"iteration": str(state.iteration), "seconds": f"{state.seconds:.3f}"}
+    notes = {"iteration": str(state.iteration)}
     for kind in KINDS:
         moments, notes[kind] = moments_of(getattr(state, kind))
         tensors |= {f"{kind}.{name}": value for name, value in moments.items()}
@@ -72,13 +71,13 @@ def load_state(folder: Path) -> tuple[State, Card]:
     own = {k.removeprefix("model."): v for k, v in tensors.items() if k.startswith("model.")}
     state = _with_optimisers(storage.load_into(card, own, path, storage.LEARNED))
     try:
-        state.iteration, state.seconds = int(notes["iteration"]), float(notes["seconds"])
-        _check(0 <= state.iteration <= card.config.iterations, f"iteration {state.iteration}")
-        _check(0 <= state.seconds < math.inf, f"seconds {state.seconds}")
+        state.iteration = whole_number(notes, "iteration")
+        _check(state.iteration <= card.config.iterations, f"iteration {state.iteration}")
+        state.seconds = card.seconds
         for kind in KINDS:
             start = f"{kind}."
             own = {k.removeprefix(start): v for k, v in tensors.items() if k.startswith(start)}
-            load_moments(getattr(state, kind), own, int(notes[kind]))
+            load_moments(getattr(state, kind), own, whole_number(notes, kind))
         strange = [name for name in tensors if name.split(".")[0] not in ("model", *KINDS)]
         _check(not strange, f"{', '.join(strange)} not expected")
     except (KeyError, ValueError) as error:

@@ -1,5 +1,6 @@
 """Sheets and animations: what stands where, files that other programs read, nothing disturbed."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import pytest
 from PIL import Image
 from pix2shape_models import made, tiny
 
-from scenegen.common.errors import SpecError
+from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.rooms.preview import srgb_bytes
 
 torch = pytest.importorskip("torch")
@@ -75,6 +76,13 @@ def test_images_depths_and_normals_of_codes(batch):
         again = torch.from_numpy(normals[i]) / 127.5 - 1
         torch.testing.assert_close(again.permute(2, 0, 1), facing[i], atol=0.005, rtol=0)
     assert (images[0] == image_tiles(radiance[:1])[0]).all()
+
+
+def test_what_is_not_finite_is_not_drawn(batch):
+    model = made(tiny())
+    dark = replace(batch.views.scene, ambient=batch.views.scene.ambient * torch.nan)
+    with pytest.raises(SceneGenError):
+        drawn(model, torch.zeros(5, 128), replace(batch.views, scene=dark))
 
 
 def test_nothing_is_drawn_where_rays_meet_nothing(batch):

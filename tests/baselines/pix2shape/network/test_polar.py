@@ -69,7 +69,7 @@ def test_a_turned_picture_has_the_same_scene_and_another_view():
 def test_no_camera_is_told():
     with pytest.raises(SpecError) as error:
         NetworkSpec(encoder="polar")
-    assert error.value.where == "condition"
+    assert error.value.where == "encoder"
     with pytest.raises(SpecError) as error:
         NetworkSpec(encoder="resnet")
     assert (error.value.where, error.value.expected) == ("encoder", "one of paper, polar")

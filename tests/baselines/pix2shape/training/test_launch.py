@@ -12,9 +12,12 @@ from typing import Any
 import pytest
 from pix2shape_models import tiny
 
+from scenegen.common.errors import SpecError
+
 torch = pytest.importorskip("torch")
 import shared_training  # noqa: E402
 
+from baselines.pix2shape.training.launch import started_elsewhere  # noqa: E402
 from baselines.pix2shape.training.state import KINDS, load_state, new_state  # noqa: E402
 
 # Seed 2 pairs no image with itself: `consistency` would then be 0, and its slope but rounding.
@@ -77,6 +80,15 @@ def folder(
     subprocess.run(command, timeout=300, check=True, env={**os.environ, **own})
     shared_training.train_all([run(kind, "2 then 1") for kind in CONFIGS])
     return lambda kind, name: top / f"{kind} {name}"
+
+
+@pytest.mark.parametrize(("here", "world"), [("-1", "2"), ("two", "2"), ("0", "2"), ("2", "")])
+def test_an_environment_that_torchrun_does_not_make_is_refused(here, world, monkeypatch):
+    monkeypatch.setenv("LOCAL_WORLD_SIZE", here)
+    monkeypatch.setenv("WORLD_SIZE", world)
+    with pytest.raises(SpecError) as error:
+        started_elsewhere()
+    assert error.value.where in ("LOCAL_WORLD_SIZE", "WORLD_SIZE")
 
 
 @pytest.mark.parametrize("kind", CONFIGS)

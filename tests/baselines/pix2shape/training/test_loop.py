@@ -69,7 +69,7 @@ def test_a_stop_in_the_middle_changes_nothing(case, rooms_path, train_questions,
     assert [("questions" in one) for one in expected] == [case == "questions"] * 4
     state = new_state(config)
     losses = run(state, source, fabric, 2, **how, **broken_how)
-    save_state(tmp_path, state, Card(config, state.iteration))
+    save_state(tmp_path, state, Card(config, state.iteration, seconds=state.seconds))
     again, card = load_state(tmp_path)
     assert (card.config, again.iteration, again.seconds > 0) == (config, 2, True)
     assert_same(bits(again), bits(state))
