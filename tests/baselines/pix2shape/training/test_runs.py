@@ -198,26 +198,6 @@ def test_questions_and_their_labels(train_questions, folder, labels):
     assert same(train_run(folder, train_questions, None, HERE), weights), "with its own labels"
 
 
-@pytest.mark.parametrize(
-    ("data", "how", "words"),
-    [
-        ("rooms", {"labels": 1}, "labels: found 1"),
-        ("rooms", {"conditional": True}, r"conditional: found objects \(1, 3\)"),
-        ("questions", {"conditional": True}, "questions"),
-        ("questions", {"labels": 4}, "labels: found 4, expected 0 to 3"),
-        ("questions", {"labels": -1}, "labels: found -1, expected 0 to 3"),
-        ("test", {}, "iqtt-test"),
-        ("large", {}, "images of 32x32"),
-    ],
-)
-def test_what_does_not_go_together(data, how, words, truths, train_questions, folder):
-    paths = {"rooms": truths.rooms, "large": truths.rooms, "test": truths.iqtt}
-    path = {**paths, "questions": train_questions}[data]
-    with pytest.raises(SceneGenError, match=words):
-        train_run(folder, path, tiny(size=64) if data == "large" else CONFIG, HERE, **how)
-    assert not folder.exists()
-
-
 @pytest.mark.parametrize("adversarial", [0.0, 1.0])
 def test_the_prior_is_that_of_codes_where_no_critic_ties_them(rooms_path, folder, adversarial):
     config = replace(CONFIG, adversarial=adversarial)
@@ -320,54 +300,6 @@ def test_rays_refuse_uneven_views_before_the_search(near_path, folder, tmp_path)
     assert not folder.exists()
 
 
-def test_a_run_begins_from_the_networks_of_another(rooms_path, unbroken, folder):
-    """And not from its optimiser, iteration or losses."""
-    start = unbroken / "weights.safetensors"
-    begun: list[dict[str, Any]] = []
-
-    def spy(state: Any, losses: dict[str, float]) -> None:
-        begun.append({name: value.clone() for name, value in state.model.state_dict().items()})
-
-    config = replace(CONFIG, iterations=1, learning_rate=1e-9)
-    train_run(folder, rooms_path, config, HERE, start=start, progress=spy)
-    stored = load_file(start)
-    parts = [name for name in begun[0] if name.startswith(("encoder", "decoder"))]
-    parts = [name for name in parts if name.endswith(("weight", "bias"))]
-    assert len(parts) > 20
-    for name in parts:
-        assert torch.allclose(begun[0][name], stored[name].float(), atol=1e-6), name
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"networks": replace(CONFIG.networks, width=0.06)},
-        {"depth_reach": 0.3},
-        {"depth_middle": 1.6},
-        {"lights": 3},
-        {"material": True},
-    ],
-    ids="-".join,
-)
-def test_a_run_begins_from_models_of_its_own_kind_alone(change, rooms_path, unbroken, folder):
-    start = unbroken / "weights.safetensors"
-    with pytest.raises(SpecError) as error:
-        train_run(folder, rooms_path, replace(CONFIG, **change), HERE, start=start)
-    assert error.value.where == "start"
-    assert not folder.exists()
-
-
-def test_weights_of_other_losses_do_not_become_the_papers(rooms_path, tmp_path, folder):
-    """What other losses trained keeps its name: no short run gives it that of the objective."""
-    other = replace(CONFIG, iterations=1, adversarial=0.0)
-    start = train_run(tmp_path / "other", rooms_path, other, HERE)
-    assert (other.method, CONFIG.method) == ("pix2shape-compact", "pix2shape")
-    with pytest.raises(SpecError) as error:
-        train_run(folder, rooms_path, replace(CONFIG, iterations=1), HERE, start=start)
-    assert error.value.where == "start"
-    assert train_run(folder, rooms_path, other, HERE, start=start) is not None
-
-
 def test_weights_that_are_not_finite_replace_no_checkpoint(rooms_path, folder, monkeypatch):
     """The last step's losses are finite; what it made is not, and the earlier files stay."""
     config = replace(CONFIG, adversarial=0.0, iterations=2)
@@ -386,31 +318,3 @@ def test_weights_that_are_not_finite_replace_no_checkpoint(rooms_path, folder, m
     assert error.value.where == "iteration 2"
     assert len(stored) == 2
     assert {name: (folder / name).read_bytes() for name in stored} == stored
-
-
-def test_depth_maps_of_earlier_runs_are_not_forgotten(rooms_path, tmp_path):
-    start, compact = None, replace(CONFIG, iterations=1, adversarial=0.0)
-    for number, (depth, earlier) in enumerate(((1.0, False), (0.0, True), (0.0, True))):
-        config, folder = replace(compact, depth=depth), tmp_path / f"run-{number}"
-        start = train_run(folder, rooms_path, config, HERE, start=start)
-        card = load_card(start)
-        assert (card.earlier_depth, card.method) == (earlier, "pix2shape-depth")
-    with pytest.raises(SpecError) as error:
-        train_run(tmp_path / "papers", rooms_path, CONFIG, HERE, start=start)
-    assert error.value.where == "start"
-
-
-def test_losses_of_questions_are_off_for_rooms(rooms_path, tmp_path):
-    config = replace(CONFIG, iterations=1, swap=1.0, contrast=1.0, question_batch=8)
-    card = load_card(train_run(tmp_path / "run", rooms_path, config, HERE))
-    assert (card.config.swap, card.config.contrast, card.method) == (0, 0, "pix2shape")
-
-
-def test_labels_of_earlier_runs_are_not_forgotten(train_questions, tmp_path):
-    config, start = replace(CONFIG, iterations=1), None
-    for labels, earlier in ((2, 0), (1, 2), (0, 3)):
-        how: dict[str, Any] = {"labels": labels, "start": start}
-        folder = tmp_path / f"run-{labels}"
-        start = train_run(folder, train_questions, config, HERE, **how)
-        card = load_card(start)
-        assert (card.labels, card.earlier_labels) == (labels, earlier)

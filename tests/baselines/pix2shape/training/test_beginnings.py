@@ -1,0 +1,141 @@
+"""What a run begins from: weights of its own kind, settings that the data leave as they were."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pix2shape_models import tiny
+
+from scenegen.common.errors import SceneGenError, SpecError
+
+torch = pytest.importorskip("torch")
+from baselines.pix2shape.network.config import model_config  # noqa: E402
+from baselines.pix2shape.training.beginnings import new_run  # noqa: E402
+from baselines.pix2shape.training.state import new_state  # noqa: E402
+from baselines.pix2shape.weights.storage import Card, save_weights  # noqa: E402
+
+CONFIG = tiny(seed=3)
+OTHER = replace(CONFIG, adversarial=0.0)
+SMALL = {"networks.size": 32, "networks.width": 0.05}
+
+
+def stored(path: Path, card: Card) -> Path:
+    """Write weights that nothing has trained yet."""
+    path.parent.mkdir(exist_ok=True)
+    save_weights(path, new_state(card.config).model, card)
+    return path
+
+
+def card_of(data: Path, config: Any = CONFIG, **how: Any) -> Card:
+    _, card, _, _ = new_run(data, config, **how)
+    return card
+
+
+@pytest.mark.parametrize(
+    ("data", "how", "words"),
+    [
+        ("rooms", {"labels": 1}, "labels: found 1"),
+        ("rooms", {"conditional": True}, r"conditional: found objects \(1, 3\)"),
+        ("questions", {"conditional": True}, "questions"),
+        ("questions", {"labels": 4}, "labels: found 4, expected 0 to 3"),
+        ("questions", {"labels": -1}, "labels: found -1, expected 0 to 3"),
+        ("test", {}, "iqtt-test"),
+        ("large", {}, "images of 32x32"),
+    ],
+)
+def test_what_does_not_go_together(data, how, words, truths, train_questions):
+    paths = {"rooms": truths.rooms, "large": truths.rooms, "test": truths.iqtt}
+    path = {**paths, "questions": train_questions}[data]
+    with pytest.raises(SceneGenError, match=words):
+        new_run(path, tiny(size=64) if data == "large" else CONFIG, **how)
+
+
+def test_a_run_begins_from_the_networks_of_another(rooms_path, tmp_path):
+    """And from new ones, of its own seed, where none are given."""
+    start = stored(tmp_path / "a.safetensors", card_of(rooms_path))
+    config = replace(CONFIG, seed=4, learning_rate=1e-9)
+    given, fresh = (new_run(rooms_path, config, start=one)[0].model for one in (start, None))
+    expected = new_state(CONFIG).model
+    for name in ("encoder", "decoder"):
+        own = dict(getattr(given, name).named_parameters())
+        for key, value in getattr(expected, name).named_parameters():
+            assert torch.allclose(own[key], value, atol=1e-3, rtol=1e-3), key
+    assert not torch.allclose(fresh.encoder.layers[0].weight, expected.encoder.layers[0].weight)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"networks": replace(CONFIG.networks, width=0.06)}, "networks.width"),
+        ({"depth_reach": 0.3}, "depth_reach"),
+        ({"depth_middle": 1.6}, "depth_middle"),
+        ({"lights": 3}, "lights"),
+        ({"material": True}, "material"),
+    ],
+)
+def test_a_run_begins_from_models_of_its_own_kind_alone(change, told, rooms_path, tmp_path):
+    start = stored(tmp_path / "a.safetensors", card_of(rooms_path))
+    with pytest.raises(SpecError) as error:
+        new_run(rooms_path, replace(CONFIG, **change), start=start)
+    assert error.value.where == "start"
+    assert told in error.value.expected
+
+
+def test_weights_of_other_losses_do_not_become_the_papers(rooms_path, tmp_path):
+    """What other losses trained keeps its name: no short run gives it that of the objective."""
+    start = stored(tmp_path / "other.safetensors", card_of(rooms_path, OTHER))
+    assert (OTHER.method, CONFIG.method) == ("pix2shape-compact", "pix2shape")
+    with pytest.raises(SpecError) as error:
+        new_run(rooms_path, CONFIG, start=start)
+    assert error.value.where == "start"
+    assert card_of(rooms_path, OTHER, start=start).method == "pix2shape-compact"
+
+
+def test_depth_maps_of_earlier_runs_are_not_forgotten(rooms_path, tmp_path):
+    start = None
+    for number, (depth, earlier) in enumerate(((1.0, False), (0.0, True), (0.0, True))):
+        card = card_of(rooms_path, replace(OTHER, depth=depth), start=start)
+        assert (card.earlier_depth, card.method) == (earlier, "pix2shape-depth")
+        start = stored(tmp_path / f"{number}.safetensors", card)
+    with pytest.raises(SpecError) as error:
+        new_run(rooms_path, CONFIG, start=start)
+    assert error.value.where == "start"
+
+
+def test_labels_of_earlier_runs_are_not_forgotten(train_questions, tmp_path):
+    start = None
+    for labels, earlier in ((2, 0), (1, 2), (0, 3)):
+        card = card_of(train_questions, labels=labels, start=start)
+        assert (card.labels, card.earlier_labels) == (labels, earlier)
+        start = stored(tmp_path / f"{labels}.safetensors", card)
+
+
+def test_what_is_of_questions_alone_is_off_for_rooms(rooms_path):
+    more = {"swap": 1.0, "contrast": 1.0, "question_batch": 8, "turned": True, "temperature": 0.5}
+    found = card_of(rooms_path, replace(CONFIG, **more)).config
+    assert found == replace(CONFIG, mutual_information=0.0, questions=0.0)
+    assert found.method == "pix2shape"
+
+
+@pytest.mark.parametrize(
+    ("data", "name", "value"),
+    [
+        ("rooms", "swap", 1.0),
+        ("rooms", "turned", True),
+        ("rooms", "question_batch", 64),
+        ("questions", "consistency", 1.0),
+        ("questions", "networks.camera", True),
+        ("questions", "networks.z_scene", 60),
+        ("questions", "questions", 1.0),
+    ],
+)
+def test_what_somebody_chose_is_not_changed(data, name, value, rooms_path, train_questions):
+    """And what nobody chose is changed as the data need it, in every configuration."""
+    path = rooms_path if data == "rooms" else train_questions
+    for base in ("paper", "compact"):
+        config = model_config(base, **SMALL, **{name: value})
+        with pytest.raises(SpecError) as error:
+            new_run(path, config, chosen=[*SMALL, name])
+        assert error.value.where == name.replace("_", " ")
+        assert new_run(path, config, chosen=SMALL)
