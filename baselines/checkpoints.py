@@ -131,18 +131,18 @@ def load_checkpoint(folder: Path, recipe: Recipe[CardT, NetworkT]) -> State[Card
 def alone_in(folder: Path) -> Iterator[None]:
     """Make the folder of a run, and keep other runs out of it for the block.
 
-    A new folder in which nothing was written is removed. Raises SceneGenError where another run
+    New folders in which nothing was written are removed. Raises SceneGenError where another run
     trains there, whose checkpoints this one would replace; OSError.
     """
-    new = not folder.exists()
+    new = [one for one in (folder, *folder.parents) if not one.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     try:
         with run_lock(folder / ".lock", folder, "wait for it, or name another folder"):
             yield
     finally:
-        if new:
-            with suppress(OSError):
-                folder.rmdir()
+        with suppress(OSError):  # the first that is not empty ends it
+            for one in new:
+                one.rmdir()
 
 
 def one_at_a_time(train: Callable[Given, Path]) -> Callable[Given, Path]:

@@ -61,11 +61,12 @@ def test_two_runs_never_share_a_folder(name, folder):
     reference = (pix2shape, "train", "--set=networks.size=32", "--set=networks.width=0.0625")
     train = reference if name == "pix2shape" else (bench, "train", name)
     data = "rooms.h5" if name in ("depth-supervised", "view-pairs") else "iqtt-train.h5"
-    with alone_in(Path("run")):
-        done = train[0](*train[1:], "--data", data, "--out", "run")
-        assert (done.exit_code, list(files_in(Path("run")))) == (2, ["run/.lock"]), done.output
-    assert done.stderr.startswith("Error: run: found another run")
-    assert not Path("run").exists()
+    run = Path("deep/run")
+    with alone_in(run):
+        done = train[0](*train[1:], "--data", data, "--out", run)
+        assert (done.exit_code, list(files_in(run))) == (2, ["deep/run/.lock"]), done.output
+    assert done.stderr.startswith("Error: deep/run: found another run")
+    assert not Path("deep").exists()
 
 
 def test_settings_reach_the_baseline(fake, folder):

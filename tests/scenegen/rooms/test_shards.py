@@ -15,7 +15,8 @@ import pytest
 
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.common.hdf5.shards import ROW_DIGESTS, SHARDS
-from scenegen.common.sets.manifest import locked, manifest_path, read_manifest
+from scenegen.common.run_lock import run_lock
+from scenegen.common.sets.manifest import manifest_path, read_manifest
 from scenegen.rooms.merge import merge_rooms
 from scenegen.rooms.reader import RoomsFile
 from scenegen.rooms.verify import verify_file, verify_set
@@ -281,7 +282,9 @@ def test_files_of_others_are_kept(tmp_path, make_rooms):
 
 
 def test_two_runs_never_make_one_set(tmp_path, make_rooms):
-    with locked(manifest_path(tmp_path / "rooms.h5")), pytest.raises(SceneGenError) as refused:
+    place = manifest_path(tmp_path / "rooms.h5")
+    lock = place.with_name(f".{place.name}.lock")
+    with run_lock(lock, place), pytest.raises(SceneGenError) as refused:
         make_rooms(tmp_path / "rooms.h5", SCENES, {"shard_size": SIZE})
     assert "another run" in refused.value.found
     assert list(tmp_path.iterdir()) == []
