@@ -153,7 +153,7 @@ def _answer_by_outline(
 
 @click.command(
     name="train",
-    epilog=f"{_listed(TRAINED)}{EXAMPLE}bench train cnn --data iqtt/iqtt-train.h5 --out run",
+    epilog=f"{_listed(TRAINED)}{EXAMPLE}bench train cnn --data iqtt-split/iqtt-train.h5 --out run",
 )
 @click.argument("name", type=click.Choice(list(TRAINED)))
 @click.option("--data", type=InputPath(), required=True, help="Rooms or questions to train on.")
