@@ -135,13 +135,13 @@ def alone_in(folder: Path) -> Iterator[None]:
     trains there, whose checkpoints this one would replace; OSError.
     """
     new = [one for one in (folder, *folder.parents) if not one.exists()]
-    folder.mkdir(parents=True, exist_ok=True)
     try:
+        folder.mkdir(parents=True, exist_ok=True)
         with run_lock(folder / ".lock", folder, "wait for it, or name another folder"):
             yield
     finally:
-        with suppress(OSError):  # the first that is not empty ends it
-            for one in new:
+        for one in new:
+            with suppress(OSError):  # it is not empty
                 one.rmdir()
 
 

@@ -13,6 +13,20 @@ except ImportError:  # Windows has no such locks
     fcntl = None  # type: ignore[assignment]
 
 
+_held: set[int] = set()  # descriptors of locks
+
+
+def _let_go() -> None:
+    """Close the locks in a forked process, which may outlive a run that was killed."""
+    for descriptor in _held:
+        os.close(descriptor)
+    _held.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_let_go)
+
+
 @contextmanager
 def run_lock(lock: Path, place: Path, hint: str = "wait for it") -> Iterator[None]:
     """Hold a lock for the block: a file, which is removed at the end.
@@ -26,16 +40,19 @@ def run_lock(lock: Path, place: Path, hint: str = "wait for it") -> Iterator[Non
     Raises SceneGenError where another run holds the lock; OSError.
     """
     descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+    _held.add(descriptor)
     try:
         if not _ours(lock, descriptor):
-            raise SceneGenError(place, "another run that makes it", "", hint)
+            raise SceneGenError(place, "another run that writes there", "", hint)
         try:
             yield
         finally:
             with suppress(OSError):
                 lock.unlink()
     finally:
-        os.close(descriptor)
+        if descriptor in _held:  # or this is a forked process
+            _held.remove(descriptor)
+            os.close(descriptor)
 
 
 def _ours(lock: Path, descriptor: int) -> bool:

@@ -78,7 +78,7 @@ def readers_kept() -> Iterator[None]:
         if not ended:
             raise
         found = "that a process that reads the data ended, for want of memory perhaps"
-        hint = "`--resume` goes on from the checkpoint, `--workers 0` without such processes"
+        hint = "`--resume` goes on from a checkpoint; `--workers 0` needs no such processes"
         raise LostProcessError("training", found, hint=hint) from error
 
 

@@ -48,8 +48,8 @@ def new_run(
     for name in chosen:
         value, needed = (functools.reduce(getattr, name.split("."), c) for c in (asked, config))
         if value != needed:
-            hint = f"leave it out: {data}, with {labels} labels, needs this value or uses none"
-            raise SpecError(name.replace("_", " "), value, needed, hint)
+            hint = f"leave it out: {data}, with {labels} labels, decides it or does not use it"
+            raise SpecError(name, value, "nothing", hint)
     source, labelled = _sources(data, config, labels)
     card = Card(
         config,

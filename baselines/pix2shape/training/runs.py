@@ -24,8 +24,8 @@ from baselines.pix2shape.training.launch import Machine, check_agreement, launch
 from baselines.pix2shape.training.logs import Logs, opened_logs
 from baselines.pix2shape.training.loop import check_request, require_finite, train
 from baselines.pix2shape.training.state import State, save_state
-from baselines.pix2shape.weights.storage import PRECISIONS, load_card, save_weights
-from scenegen.common.errors import FileFormatError
+from baselines.pix2shape.weights.storage import PRECISIONS, Card, load_card, save_weights
+from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.common.new_file import check_writable
 from scenegen.rooms.preview import save_picture
 
@@ -62,8 +62,8 @@ def train_run(
             changed where the data need it: rooms ask no questions, for example.
 
     Raises SpecError where configuration and data do not fit; FileExistsError where a new run finds
-    a checkpoint; TrainingError; LostProcessError where another process ended; FileFormatError,
-    OSError.
+    a checkpoint or weights; SceneGenError where another run trains in the folder; TrainingError;
+    LostProcessError where another process ended; FileFormatError, OSError.
     """
     folder = Path(folder)
     if config is None:
@@ -85,8 +85,8 @@ def train_run(
     check_agreement(fabric, "data, settings or checkpoint", (card, state.iteration))
     first, last = fabric.is_global_zero, card.config.iterations
     with alone_in(folder) if first else nullcontext(), readers_kept():
-        for name in (CHECKPOINT, PICTURE, WEIGHTS) if first else ():
-            check_writable(folder / name, overwrite=True)
+        if first:
+            _check_folder(folder, None if config is not None else card)
         if isinstance(source, RoomImages) and card.config.matching:
             _match(source, folder, card.config, fabric, lambda losses: progress(state, losses))
         opened = opened_logs(folder / LOGS, state.iteration + 1) if first else nullcontext()
@@ -111,6 +111,20 @@ def train_run(
             save_weights(folder / WEIGHTS, state.model, card)
     summed(torch.zeros(1, device=fabric.device))  # wait for the first process, which writes
     return folder / WEIGHTS if first else None
+
+
+def _check_folder(folder: Path, resumed: Card | None) -> None:
+    """Raise OSError where the files of a run cannot be written.
+
+    Another run may have ended in the folder before it was locked: raise FileExistsError where a new
+    run finds files of it, and SceneGenError where the checkpoint is not `resumed` any more.
+    """
+    if resumed is None:
+        check_new(folder)
+    elif load_card(folder / CHECKPOINT) != resumed:
+        raise SceneGenError(folder, "that another run went on meanwhile", hint="say --resume again")
+    for name in (CHECKPOINT, PICTURE, WEIGHTS):
+        check_writable(folder / name, overwrite=True)
 
 
 def _match(

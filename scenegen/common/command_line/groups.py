@@ -17,6 +17,9 @@ from scenegen.common.text_table import printable
 
 # An `epilog` is this and a command line. A paragraph that begins with \b keeps its line breaks.
 EXAMPLE = "\b\nExample:\n  "
+NO_MEMORY = re.compile(
+    "out of memory|can't allocate memory|[Cc]annot allocate memory|not enough memory|ALLOC_FAILED"
+)
 LONGEST_ERROR = 2000  # characters; what a file holds may be of any length
 WITHOUT_EFFECT = ("--batch", "--workers", "--scheduler")  # they change no byte of what is made
 
@@ -109,9 +112,10 @@ def _one_line_errors() -> Iterator[None]:
     except MemoryError as error:
         raise UserError(": ".join(filter(None, ("not enough memory", str(error))))) from error
     except RuntimeError as error:  # of torch and Dr.Jit, which have no narrower one in common
-        if not re.search("out of memory|can't allocate memory|not enough memory", str(error)):
+        told = [line for line in str(error).splitlines() if NO_MEMORY.search(line)]
+        if not told:
             raise
-        raise UserError(f"not enough memory: {str(error).splitlines()[0]}") from error
+        raise UserError(f"not enough memory: {told[0]}") from error
     except ValueError as error:
         from scenegen.common.errors import SceneGenError
 

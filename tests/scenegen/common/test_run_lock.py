@@ -1,6 +1,8 @@
 """A second run is refused while the first one goes on, and a killed run holds nobody up."""
 
 import errno
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -12,10 +14,13 @@ from scenegen.common.errors import SceneGenError
 from scenegen.common.run_lock import run_lock
 
 HOLD = """
-import sys, time
+import os, sys, time
 from pathlib import Path
 from scenegen.common.run_lock import run_lock
 with run_lock(Path(sys.argv[1]), Path("set")):
+    if os.fork() == 0:  # a reader of data, say, that outlives the run
+        time.sleep(60)
+        os._exit(0)
     print("held", flush=True)
     time.sleep(60)
 """
@@ -38,17 +43,19 @@ def test_a_second_run_is_refused_until_the_first_ends(tmp_path):
 
 def test_a_killed_run_holds_nobody_up(tmp_path):
     lock = tmp_path / ".lock"
-    run = subprocess.Popen([sys.executable, "-c", HOLD, lock], stdout=subprocess.PIPE, text=True)
+    command = [sys.executable, "-c", HOLD, lock]
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
     assert run.stdout is not None
     with run, run.stdout:
         assert run.stdout.readline() == "held\n"
         with pytest.raises(SceneGenError), run_lock(lock, tmp_path / "set"):
             pass
-        run.kill()
+        os.kill(run.pid, signal.SIGKILL)
         run.wait()
-    assert lock.exists()
-    with run_lock(lock, tmp_path / "set"):
-        pass
+        assert lock.exists()
+        with run_lock(lock, tmp_path / "set"):
+            pass
+        os.killpg(run.pid, signal.SIGKILL)
 
 
 def test_disks_without_locks_lock_nothing(tmp_path, monkeypatch):

@@ -242,6 +242,25 @@ def test_a_picture_that_cannot_be_written_leaves_the_checkpoint(rooms_path, fold
     assert isinstance(load_card(card), Card)
 
 
+@pytest.mark.parametrize(("config", "kind"), [(CONFIG, FileExistsError), (None, SceneGenError)])
+def test_a_run_that_ended_meanwhile_is_kept(config, kind, rooms_path, folder, monkeypatch):
+    """It trained in the folder between the first look at it and the lock."""
+    if config is None:
+        with pytest.raises(Killed):
+            train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(2))
+    launched = runs.launched
+
+    def meanwhile(*given: Any) -> Any:
+        monkeypatch.setattr(runs, "launched", launched)
+        train_run(folder, rooms_path, config, HERE)
+        return launched(*given)
+
+    monkeypatch.setattr(runs, "launched", meanwhile)
+    with pytest.raises(kind):
+        train_run(folder, rooms_path, config, HERE)
+    assert load_state(folder)[0].iteration == 4
+
+
 @pytest.mark.parametrize("name", ["pictures.png", "weights.safetensors"])
 def test_a_folder_in_the_place_of_a_file_is_refused_before_training(name, rooms_path, folder):
     (folder / name).mkdir(parents=True)

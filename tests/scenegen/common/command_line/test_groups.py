@@ -24,6 +24,7 @@ def group_of(callback):
         MemoryError("Unable to allocate 7 EiB"),
         RuntimeError("DefaultCPUAllocator: can't allocate memory: you tried to allocate 7 bytes."),
         RuntimeError("CUDA out of memory. Tried to allocate 7 GiB."),
+        RuntimeError("unable to mmap 10 bytes: Cannot allocate memory (12)"),
     ],
 )
 def test_too_little_memory_is_one_line(error, check_refusal):
