@@ -1,6 +1,6 @@
 """Submissions of relief networks. Of the rooms only images and cameras are read."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,12 @@ from torch import Tensor, nn
 from baselines.checkpoints import load_weights
 from baselines.depth_supervised.card import recipe
 from baselines.depth_supervised.network import predicted_depth
-from baselines.pix2shape.data.rooms import camera_poses, check_reducible, room_image
+from baselines.pix2shape.data.rooms import (
+    camera_poses,
+    check_reducible,
+    room_images,
+    row_batches,
+)
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.use.predict import enlarged, input_views
 from metrics.prediction_writer import RoomPredictionWriter
@@ -74,8 +79,8 @@ def submit(
         with RoomPredictionWriter(
             out, data, method=name, notes=notes, overwrite=overwrite
         ) as submission:
-            for some in batches(len(rooms)):
-                image = stacked(rooms, source[some], size)
+            for some in row_batches(len(rooms), BATCH):
+                image = room_images(rooms, source[some], size)
                 own = asked = Cameras(poses[source[some]], fov)
                 if kind == "code":
                     asked = Cameras(poses[some], fov)
@@ -93,16 +98,6 @@ def predicted(
     depth = predicted_depth(network, image, own, asked)
     depth, normal = enlarged(depth, own.fov_y_degrees, size)
     return depth.numpy(), np.moveaxis(normal.numpy(), 1, -1)
-
-
-def stacked(rooms: RoomsFile, rows: NDArray[np.int64], size: int) -> Tensor:
-    """Return the images of rows as networks take them, (B, 3, S, S), linear radiance."""
-    return torch.from_numpy(np.stack([room_image(rooms, int(row), size) for row in rows]))
-
-
-def batches(count: int) -> Iterator[NDArray[np.int64]]:
-    """Yield the rows of batch after batch."""
-    return (np.arange(first, min(first + BATCH, count)) for first in range(0, count, BATCH))
 
 
 write_submission = partial(submit, METHOD, WEIGHTS)

@@ -250,6 +250,16 @@ def room_image(rooms: RoomsFile, row: int, size: int) -> Array:
     return channels_first(decode_image(rooms.read("image", row)), size, where)
 
 
+def room_images(rooms: RoomsFile, rows: Array, size: int) -> Tensor:
+    """Return the images of rows as the networks take them, (B, 3, S, S). Raises as `room_image`."""
+    return torch.from_numpy(np.stack([room_image(rooms, int(row), size) for row in rows]))
+
+
+def row_batches(count: int, size: int) -> Iterator[Array]:
+    """Yield the numbers 0 to count - 1 in batches of a size, of which the last may be smaller."""
+    return (np.arange(first, min(first + size, count)) for first in range(0, count, size))
+
+
 def channels_first(radiance: Array, size: int, where: object = "image") -> Array:
     """Return an image as the networks take it, float32: (H, W, 3) -> (3, S, S).
 

@@ -1,4 +1,4 @@
-"""What trained weights are good for: `predict.py` writes submissions, `explore.py` draws pictures.
+"""What trained weights are good for: submissions (`predict.py`, `answers.py`) and pictures.
 
 Imports everything of pix2shape but the commands.
 """

@@ -1,7 +1,7 @@
 """Submissions of a trained model. Of the truth only the cameras of rooms are read."""
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,33 +11,29 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from baselines.pix2shape.data.questions import check_background
 from baselines.pix2shape.data.rooms import (
     camera_poses,
-    channels_first,
     check_reducible,
     is_question_file,
-    room_image,
+    room_images,
+    row_batches,
 )
 from baselines.pix2shape.network.config import TAUGHT_DEPTH
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.network.surfels import extrapolated, normals_from_depth
-from baselines.pix2shape.training.losses import squared_distances
+from baselines.pix2shape.use.answers import answer_file
 from baselines.pix2shape.weights.bundled import open_weights
-from iqtt.files.reader import open_questions, parts
-from metrics.prediction_writer import RoomPredictionWriter, write_answers
+from metrics.prediction_writer import RoomPredictionWriter
 from scenegen.common.errors import SpecError
 from scenegen.common.new_file import check_writable
 from scenegen.common.records import check
-from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 BATCH = 64  # images at a time
 TOLD = "told: one image of each scene, the cameras, and where the empty room's floor and walls are"
 DEPTH = "told: in training, true depth maps"
-TAUGHT = "told: in training, the lights of its images and the answers of {} questions"
 Progress = Callable[[int, int], Any]  # rows done, rows in all
 
 
@@ -122,70 +118,22 @@ def predict_rooms(
         condition, fov = poses[:, :3, 3], rooms.spec.fov_y_degrees
         inputs, own = input_views(rooms)
         found = []
-        for chosen in _batches(len(inputs)):
-            images = (room_image(rooms, int(row), spec.size) for row in inputs[chosen])
+        for chosen in row_batches(len(inputs), BATCH):
+            images = room_images(rooms, inputs[chosen], spec.size).to(device)
             told = condition[inputs[chosen]], Cameras(poses[inputs[chosen]], fov)
-            found.append(model.codes(_stacked(images, model), *told))
+            found.append(model.codes(images, *told))
         codes = torch.cat(found)
         method = TAUGHT_DEPTH if earlier_depth else model.config.method
         how: dict[str, Any] = {"method": method, "run": run, "overwrite": overwrite}
         how["notes"] = "; ".join([TOLD] * spec.rays + [DEPTH] * (method == TAUGHT_DEPTH))
         with RoomPredictionWriter(out, data, **how) as file:
-            for rows in _batches(len(rooms)):
+            for rows in row_batches(len(rooms), BATCH):
                 asked = condition[rows], Cameras(poses[rows], fov)
                 depth = model.surfels(codes[own[rows]], *asked).depth
                 depth, normal = enlarged(depth, fov, size)
                 for row, z, n in zip(rows, depth.cpu(), normal.cpu(), strict=True):
                     file.add(int(row), z.numpy(), np.moveaxis(n.numpy(), 0, -1))
                 progress(len(rows), len(rooms))
-
-
-@torch.inference_mode()
-def answer_file(
-    model: Pix2Shape,
-    data: str | Path,
-    out: str | Path,
-    *,
-    labels: int = 0,
-    run: str = "",
-    overwrite: bool = False,
-    progress: Progress = lambda done, total: None,
-) -> None:
-    """Write answers to the questions of a file, from images alone.
-
-    An answer's score is minus the distance of its z_scene from the reference's, as in the paper.
-
-    Args:
-        labels: answers that training was given; the submission's notes tell this.
-
-    Raises SpecError where the model does not suit questions; else as `iqtt.QuestionsFile`.
-    """
-    spec = model.config.networks
-    if spec.condition:
-        raise SpecError("weights", "a model that is told the camera", "one for questions")
-    if len(parts(data)) > 1:
-        raise SpecError(data, "training questions", "questions to answer, such as iqtt-test.h5")
-    with open_questions(data) as questions:
-        check_reducible(data, questions.height, questions.width, spec.size)
-        check_background(data, questions.spec, model.config)
-        if not len(questions):
-            raise SpecError(data, "no questions", "one or more to answer")
-        scores = []
-        images = 1 + questions.answers
-        for rows in _batches(len(questions), images):
-            shown = (
-                channels_first(decode_image(image), spec.size, f"{data}: row {row}")
-                for row in rows
-                for image in questions.read("questions", int(row))
-            )
-            image = _stacked(shown, model)
-            codes = model.codes(image, image.new_empty(len(image), 0))[:, : spec.z_scene]
-            distance = squared_distances(codes.view(len(rows), images, -1)).sqrt()
-            scores.append(-distance.cpu().double().numpy())
-            progress(len(rows), len(questions))
-    found = np.concatenate(scores)
-    how: dict[str, Any] = {"method": model.config.method, "run": run, "overwrite": overwrite}
-    write_answers(out, data, scores=found, notes=TAUGHT.format(labels), **how)
 
 
 def enlarged(depth: Tensor, fov_y_degrees: float, size: int) -> tuple[Tensor, Tensor]:
@@ -221,14 +169,3 @@ def input_views(rooms: RoomsFile) -> tuple[Array, Array]:
             stacklevel=3,
         )
     return inputs, np.searchsorted(inputs, [first[int(number)] for number in scene])
-
-
-def _stacked(images: Iterable[Array], model: Pix2Shape) -> Tensor:
-    """Return images, (3, S, S) each, on the model's device, (B, 3, S, S)."""
-    return torch.from_numpy(np.stack(list(images))).to(next(model.parameters()).device)
-
-
-def _batches(count: int, items: int = 1) -> Iterator[Array]:
-    """Yield the rows of batch after batch, where each row has so many images."""
-    size = BATCH // items
-    return (np.arange(first, min(first + size, count)) for first in range(0, count, size))

@@ -10,7 +10,8 @@ pytest.importorskip("torch")
 import torch
 
 from baselines.pix2shape.network.empty_rooms import Cameras
-from baselines.pix2shape.use.predict import answer_file, predict_rooms
+from baselines.pix2shape.use.answers import answer_file
+from baselines.pix2shape.use.predict import predict_rooms
 from baselines.pix2shape.weights.bundled import FOLDER, names, open_weights, suited
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec

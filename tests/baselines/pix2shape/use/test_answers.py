@@ -1,0 +1,138 @@
+"""Answers to questions: the nearest scene's, from images alone, and of no training questions."""
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from h5_edits import gone, put
+from pix2shape_models import edited, made, of_questions, released
+
+from iqtt.files.make import make_split
+from iqtt.files.reader import open_questions
+from iqtt.questions.specs import SplitSpec
+from metrics.scoring.evaluate import score
+from metrics.submissions.reader import open_predictions
+from metrics.submissions.validation import validate
+from scenegen.common.errors import SceneGenError
+from scenegen.rendering.ground_truth import decode_image
+
+torch = pytest.importorskip("torch")
+from baselines.pix2shape.data.rooms import channels_first  # noqa: E402
+from baselines.pix2shape.use import answers as module  # noqa: E402
+from baselines.pix2shape.use.answers import answer_file  # noqa: E402
+
+
+@pytest.fixture
+def answerer(train_questions: Path) -> Any:
+    return made(of_questions(train_questions))
+
+
+@pytest.fixture(autouse=True)
+def few_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Questions take several batches."""
+    monkeypatch.setattr(module, "BATCH", 4)
+
+
+def test_no_questions_are_refused(train_questions, tmp_path):
+    path = released(tmp_path / "none.h5", [0])
+    with h5py.File(path, "r+") as file:
+        for name in list(file):
+            kept = file[name][:0]
+            del file[name]
+            file[name] = kept
+    with pytest.raises(SceneGenError) as error:
+        answer_file(made(of_questions(train_questions)), path, tmp_path / "a.h5")
+    assert error.value.where == str(path)
+
+
+def answered(answerer: Any, path: Path, out: Path, **how: Any) -> tuple[list[int], np.ndarray]:
+    """Return answers and scores; where only one of them is written, from `metrics`."""
+    answer_file(answerer, path, out, overwrite=True, **how)
+    with open_predictions(out) as found, h5py.File(out) as file:
+        assert found.rows.tolist() == list(range(len(found)))
+        return found.answers.tolist(), file["scores"][()]
+
+
+def distances(answerer: Any, path: Path, part: str | None = None) -> np.ndarray:
+    """Return the distances of all answers' z_scene from the reference's, one image at a time."""
+    found = []
+    with open_questions(path, part) as questions, torch.no_grad():
+        for record in questions:
+            images = [channels_first(image, 32)[None] for image in decode_image(record.images)]
+            told = [(torch.from_numpy(image), torch.empty(1, 0)) for image in images]
+            codes = torch.cat([answerer.encoder(*one) for one in told]).double().numpy()
+            scene = codes[:, : answerer.config.networks.z_scene]
+            found.append(np.linalg.norm(scene[1:] - scene[0], axis=1))
+    return np.array(found)
+
+
+def test_the_nearest_scene_is_the_answer(answerer, truths, tmp_path):
+    done: list[tuple[int, int]] = []
+    how = {"progress": lambda *step: done.append(step)}
+    answers, scores = answered(answerer, truths.iqtt, tmp_path / "a.h5", **how)
+    expected = distances(answerer, truths.iqtt)
+    np.testing.assert_allclose(scores, -expected, rtol=1e-4)
+    assert answers == expected.argmin(axis=1).tolist()
+    assert len(set(answers)) > 1
+    assert done == [(1, 6)] * 6
+    assert [p for p in validate(tmp_path / "a.h5") if not p.is_hint] == []
+    assert score([tmp_path / "a.h5"]).method == "pix2shape"
+
+
+def test_questions_may_have_two_answers(answerer, tmp_path):
+    numbers = {"train": 0, "labeled": 0, "val": 0, "test": 5, "min_cube_pixels": 3}
+    spec = SplitSpec(**numbers, height=64, width=64, distractors="mirror-pair", answers=2)
+    make_split(tmp_path / "two", spec)
+    path = tmp_path / "two" / "iqtt-test.h5"
+    _, scores = answered(answerer, path, tmp_path / "a.h5")
+    np.testing.assert_allclose(scores, -distances(answerer, path), rtol=1e-4)
+    assert scores.shape == (5, 2)
+
+
+def test_the_view_has_no_say(answerer, truths, tmp_path):
+    before = answered(answerer, truths.iqtt, tmp_path / "a.h5")
+    spec = answerer.config.networks
+    assert spec.z_view == 10
+    with torch.no_grad():
+        answerer.encoder.last.weight[spec.z_scene :] *= 100
+    after = answered(answerer, truths.iqtt, tmp_path / "a.h5")
+    np.testing.assert_array_equal(after[1], before[1])
+    with torch.no_grad():
+        answerer.encoder.last.weight[: spec.z_scene] *= 2
+    assert not np.array_equal(answered(answerer, truths.iqtt, tmp_path / "a.h5")[1], before[1])
+
+
+@pytest.mark.parametrize("size", [32, 96])
+def test_the_same_image_is_the_answer_and_a_tie_abstains(answerer, tmp_path, size):
+    """Files as released: images and nothing beside; larger ones are reduced."""
+    right = [2, 0, 1, -1, 2, -2, 0]
+    path = released(tmp_path / "released.h5", right, size)
+    answers, scores = answered(answerer, path, tmp_path / "a.h5")
+    assert answers == [max(answer, -1) for answer in right]
+    assert scores[3, 0] == scores[3, 2] > scores[3, 1]
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert file.attrs["truth_fingerprint"] == ""
+
+
+def test_neither_answers_nor_lights_are_needed(answerer, truths, tmp_path):
+    folder = Path(truths.iqtt).parent
+    with h5py.File(truths.iqtt) as file:
+        assert "answers" not in file
+        assert "truth" not in file
+    expected = answered(answerer, folder / "iqtt-val.h5", tmp_path / "a.h5")
+    path = edited(folder / "iqtt-val.h5", tmp_path / "bare.h5", gone("answers", "truth"))
+    found = answered(answerer, path, tmp_path / "a.h5")
+    assert found[0] == expected[0]
+    np.testing.assert_array_equal(found[1], expected[1])
+    wrong = put("answers", slice(None), 0)
+    path = edited(folder / "iqtt-val.h5", tmp_path / "wrong.h5", wrong)
+    np.testing.assert_array_equal(answered(answerer, path, tmp_path / "a.h5")[1], expected[1])
+
+
+def test_training_questions_are_not_answered(answerer, train_questions, tmp_path):
+    with pytest.raises(SceneGenError) as error:
+        answer_file(answerer, train_questions, tmp_path / "a.h5")
+    assert (error.value.where, error.value.found) == (str(train_questions), "training questions")
+    assert not (tmp_path / "a.h5").exists()
