@@ -72,7 +72,10 @@ def matched_relief(rooms: Rooms, row: int, sides: tuple[list[int], list[int]]) -
 
 def matched_rows(rooms: Rooms) -> Tensor:
     """Return the rows that have a partner, (M,). Raises SpecError where there are none."""
-    pairs = pairs_of(rooms)
+    return _with_partner(pairs_of(rooms))
+
+
+def _with_partner(pairs: list[tuple[list[int], list[int]]]) -> Tensor:
     matched = torch.tensor([row for row, sides in enumerate(pairs) if any(sides)], dtype=torch.long)
     if not len(matched):
         expected = f"views of a scene at most {WIDEST:.0f} degrees apart"
@@ -90,7 +93,8 @@ def labels(
     Raises SpecError as `matched_rows`; OSError; FileFormatError where the folder's labels are not
     those of these rooms.
     """
-    matched, pairs = matched_rows(rooms), pairs_of(rooms)
+    pairs = pairs_of(rooms)
+    matched = _with_partner(pairs)
     folder = Path(run_folder) / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
     relief = torch.zeros(len(rooms), *rooms.image.shape[2:], dtype=torch.float16)

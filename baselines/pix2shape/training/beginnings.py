@@ -131,7 +131,7 @@ def _suited(config: ModelConfig, data: str | Path, labels: int, conditional: boo
         config = for_questions(config, data, "unlabeled")
         with open_questions(data, "labeled") as questions:
             check(0 <= labels <= len(questions), "labels", labels, f"0 to {len(questions)}")
-        return replace(config, questions=config.questions if labels else 0.0)
+        return config if labels else replace(config, questions=0.0, swap=0.0)
     check(labels == 0, "labels", labels, "0 for rooms, which ask no questions")
     check(networks.camera, "camera", networks.camera, "true: rooms are seen by known cameras")
     check(networks.classes == 0, "classes", networks.classes, "0; --conditional tells them")

@@ -128,6 +128,7 @@ def test_what_is_of_questions_alone_is_off_for_rooms(rooms_path):
         ("questions", "networks.camera", True),
         ("questions", "networks.z_scene", 60),
         ("questions", "questions", 1.0),
+        ("questions", "swap", 1.0),
     ],
 )
 def test_what_somebody_chose_is_not_changed(data, name, value, rooms_path, train_questions):
