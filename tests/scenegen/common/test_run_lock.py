@@ -19,10 +19,9 @@ from pathlib import Path
 from scenegen.common.run_lock import run_lock
 with run_lock(Path(sys.argv[1]), Path("set")):
     if os.fork() == 0:  # a reader of data, say, that outlives the run
-        time.sleep(60)
-        os._exit(0)
-    print("held", flush=True)
+        print("held", flush=True)
     time.sleep(60)
+    os._exit(0)
 """
 
 
