@@ -2,7 +2,7 @@
 
 import click
 
-from scenegen.common.command_line.groups import PackageCommands
+from scenegen.command_line.groups import PackageCommands
 
 ROOMS = tuple(
     f"scenegen.commands.{name}" for name in ("making", "rooms", "viewing", "sharing", "meshes")

@@ -29,7 +29,7 @@ from baselines.tensor_files import (
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.random.seeding import Purpose, item_seed
 from scenegen.common.records import from_json, to_json
-from scenegen.common.run_lock import run_lock
+from scenegen.files.run_lock import run_lock
 
 CHECKPOINT, WEIGHTS = "checkpoint.safetensors", "weights.safetensors"
 NETWORK, MOMENTS = "network.", "moments."

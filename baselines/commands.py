@@ -20,10 +20,10 @@ from baselines.pix2shape.commands import (
     predict_to,
     score_it,
 )
-from scenegen.common.command_line.groups import EXAMPLE
-from scenegen.common.command_line.options import LARGEST, OVERWRITE
-from scenegen.common.command_line.output import print_line, progress_bar
-from scenegen.common.command_line.paths import InputPath, OutputFolder
+from scenegen.command_line.groups import EXAMPLE
+from scenegen.command_line.options import LARGEST, OVERWRITE
+from scenegen.command_line.output import print_line, progress_bar
+from scenegen.command_line.paths import InputPath, OutputFolder
 
 UNTRAINED = {
     "constant": "one depth everywhere, the mean of the training rooms",

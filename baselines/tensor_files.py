@@ -9,7 +9,7 @@ from safetensors.torch import save
 from torch import Tensor
 
 from scenegen.common.errors import FileFormatError
-from scenegen.common.new_file import written_beside
+from scenegen.files.new_file import written_beside
 
 
 def save_tensors(path: str | Path, tensors: Mapping[str, Tensor], notes: dict[str, str]) -> None:

@@ -14,11 +14,11 @@ from collections.abc import Generator, Sequence
 from functools import partial
 from pathlib import Path
 
-from scenegen.common.sets.making import Task, complete_set
-from scenegen.common.sets.manifest import FORMAT, Manifest, ShardRecord
-from scenegen.common.workers.cluster import LOCAL, Cluster, connected
-from scenegen.common.workers.pool import processors
 from scenegen.description.specs import DatasetSpec
+from scenegen.files.cluster import LOCAL, Cluster, connected
+from scenegen.files.making import Task, complete_set
+from scenegen.files.manifest import FORMAT, Manifest, ShardRecord
+from scenegen.files.pool import processors
 from scenegen.rendering.sameness import renderer_identity
 from scenegen.rooms.make import make_dataset
 

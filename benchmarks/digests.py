@@ -23,7 +23,7 @@ import click
 import h5py
 import numpy as np
 
-from scenegen.common.new_file import write_text
+from scenegen.files.new_file import write_text
 
 VOLATILE = (
     "creation_command", "writer", "versions", "submissions", "format_version",

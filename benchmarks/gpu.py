@@ -22,9 +22,9 @@ from benchmarks.results.markdown import table
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SUITE, SplitSpec
 from scenegen.common.errors import BackendError
-from scenegen.common.new_file import write_text
 from scenegen.description.presets import PRESETS, preset_spec
 from scenegen.description.specs import DatasetSpec
+from scenegen.files.new_file import write_text
 from scenegen.rendering.backend import select_variant
 from scenegen.rooms.make import make_dataset
 

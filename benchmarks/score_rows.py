@@ -22,9 +22,9 @@ from metrics.prediction_writer import RoomPredictionWriter
 from metrics.scoring.rows import score_rows
 from metrics.scoring.runs import Settings
 from metrics.submissions.reader import open_predictions
-from scenegen.common.hdf5.row_file import new_file
-from scenegen.common.hdf5.table import Table
 from scenegen.description.specs import DatasetSpec
+from scenegen.files.row_file import new_file
+from scenegen.files.table import Table
 from scenegen.layout import columns
 from scenegen.rooms.make import make_dataset
 from scenegen.rooms.reader import RoomsFile

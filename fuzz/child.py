@@ -52,7 +52,7 @@ def run(arguments: list[str], folder: Path, limit: float, stdout: str = "file") 
 
     def command() -> Any:
         import cli
-        from scenegen.common.hdf5 import trial
+        from scenegen.files import trial
 
         trial.SECONDS = TRIAL
         program = arguments[0]

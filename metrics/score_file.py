@@ -32,8 +32,8 @@ from metrics.scoring.records import (
 from metrics.scoring.schema import parse_scores
 from metrics.submissions.problems import JsonError
 from metrics.submissions.strict_json import parse_json, read_bytes
-from scenegen.common.new_file import written_beside
 from scenegen.common.text_table import by_number
+from scenegen.files.new_file import written_beside
 
 MOST_BYTES = 256 * 2**20  # more images than may be parsed, see `strict_json.MOST_MEMORY`
 MOST_KEYS = 10_000  # of one object

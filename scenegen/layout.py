@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from scenegen.common.hdf5.content import CONTENT_DIGEST
-from scenegen.common.hdf5.table import COMPRESSIONS, Column
 from scenegen.common.text_table import piped
 from scenegen.description.specs import DatasetSpec
+from scenegen.files.content import CONTENT_DIGEST
+from scenegen.files.table import COMPRESSIONS, Column
 
 FORMAT_NAME = "pix2shape-bench/rooms"
 FORMAT_VERSION = "2.3"

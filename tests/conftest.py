@@ -23,7 +23,7 @@ def _untried(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
     A trial takes 0.2 s, and most tests are about files that HDF5 can read.
     """
     if request.node.get_closest_marker("tried") is None:
-        monkeypatch.setattr("scenegen.common.hdf5.trial.try_file", lambda path: None)
+        monkeypatch.setattr("scenegen.files.trial.try_file", lambda path: None)
 
 
 @pytest.fixture(autouse=True)

@@ -102,7 +102,7 @@ import cli
 try:
     cli.scenegen(prog_name="scenegen")
 finally:
-    print(*{"numpy", "h5py", "scenegen.common.hdf5.trial", "PIL"} & set(sys.modules))
+    print(*{"numpy", "h5py", "scenegen.files.trial", "PIL"} & set(sys.modules))
 """
     command = [sys.executable, "-c", code.replace("{path}", str(rooms_path))]
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=ENVIRONMENT)

@@ -22,7 +22,7 @@ from baselines.pix2shape.data.rooms import (
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.use.predict import enlarged, input_views
 from metrics.prediction_writer import RoomPredictionWriter
-from scenegen.common.new_file import check_writable
+from scenegen.files.new_file import check_writable
 from scenegen.rooms.reader import RoomsFile
 
 METHOD = "depth-supervised"

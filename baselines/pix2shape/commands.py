@@ -9,10 +9,10 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line.groups import EXAMPLE, needs
-from scenegen.common.command_line.options import LARGEST, MOST_PROCESSES, OVERWRITE
-from scenegen.common.command_line.output import print_line, progress_bar
-from scenegen.common.command_line.paths import InputPath, OutputFolder, OutputPath
+from scenegen.command_line.groups import EXAMPLE, needs
+from scenegen.command_line.options import LARGEST, MOST_PROCESSES, OVERWRITE
+from scenegen.command_line.output import print_line, progress_bar
+from scenegen.command_line.paths import InputPath, OutputFolder, OutputPath
 from scenegen.common.errors import SceneGenError
 
 PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")

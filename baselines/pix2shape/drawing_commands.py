@@ -8,10 +8,10 @@ from typing import Any
 import click
 
 from baselines.pix2shape.commands import A_MODEL, WEIGHTS, WEIGHTS_PATH, needs_torch, number
-from scenegen.common.command_line.groups import EXAMPLE
-from scenegen.common.command_line.options import OVERWRITE, Items
-from scenegen.common.command_line.output import print_line
-from scenegen.common.command_line.paths import InputPath, OutputPath
+from scenegen.command_line.groups import EXAMPLE
+from scenegen.command_line.options import OVERWRITE, Items
+from scenegen.command_line.output import print_line
+from scenegen.command_line.paths import InputPath, OutputPath
 
 ROOMS = click.option(
     "--data", type=InputPath(), required=True, help="Rooms whose images are encoded."

@@ -14,7 +14,7 @@ from baselines.pix2shape.data.rooms import Batch
 from baselines.pix2shape.network.model import Pix2Shape, Views, shaded
 from baselines.pix2shape.network.surfels import normals_from_depth
 from scenegen.common.errors import SceneGenError, SpecError
-from scenegen.common.new_file import check_writable, written_beside
+from scenegen.files.new_file import check_writable, written_beside
 from scenegen.rooms import preview
 from scenegen.rooms.preview import BACKGROUND, GAP, SMALLEST_TILE
 

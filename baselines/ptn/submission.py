@@ -25,7 +25,7 @@ from iqtt.files.reader import QuestionsFile, open_questions, parts
 from metrics.measures.empty_room import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from scenegen.common.errors import SpecError
-from scenegen.common.new_file import check_writable
+from scenegen.files.new_file import check_writable
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
 

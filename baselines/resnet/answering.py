@@ -16,7 +16,7 @@ from baselines.resnet.methods import Method
 from iqtt.files.reader import QuestionsFile, open_questions, parts
 from metrics.prediction_writer import write_answers
 from scenegen.common.errors import SpecError
-from scenegen.common.new_file import check_writable
+from scenegen.files.new_file import check_writable
 from scenegen.rendering.ground_truth import decode_image
 
 Array = NDArray[Any]

@@ -19,8 +19,8 @@ from baselines.rezende.reconstruct import meshes_of
 from iqtt.files.reader import open_questions, parts
 from metrics.prediction_writer import write_answers
 from scenegen.common.errors import SpecError
-from scenegen.common.new_file import check_writable
 from scenegen.common.rotations import rotation_matrix
+from scenegen.files.new_file import check_writable
 
 Array = NDArray[Any]
 METHOD = "rezende"

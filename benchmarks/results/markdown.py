@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from scenegen.common.new_file import write_text
+from scenegen.files.new_file import write_text
 
 NOTHING = "–"
 

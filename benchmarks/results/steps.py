@@ -14,7 +14,7 @@ from typing import Any
 
 import h5py
 
-from scenegen.common.new_file import write_text
+from scenegen.files.new_file import write_text
 
 ROOT = Path(__file__).parents[2]
 FINGERPRINTS = ("fingerprint", "fingerprint_labeled", "fingerprint_unlabeled")

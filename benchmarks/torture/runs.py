@@ -29,10 +29,10 @@ if kind == "packing":
     from scenegen.rooms import render
     hook(render, "pack_rooms")
 elif kind == "writing":
-    from scenegen.common.hdf5.table import Table
+    from scenegen.files.table import Table
     hook(Table, "extend_packed")
 elif kind == "manifest":
-    from scenegen.common.sets import making
+    from scenegen.files import making
     hook(making, "write_manifest")
 else:
     hook(os, kind)

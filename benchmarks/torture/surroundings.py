@@ -14,7 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from benchmarks.torture.runs import Torture, contents
-from scenegen.common.sets.manifest import read_manifest
+from scenegen.files.manifest import read_manifest
 
 # A clock that jumps 400 days ahead or back whenever it is read, as a library that is loaded first.
 # Time that only counts on, which Python takes to measure durations, is left as it is.

@@ -21,8 +21,8 @@ from iqtt.audit.proofs import shapes as shape_proofs
 from iqtt.audit.proofs.shapes import Shapes
 from iqtt.audit.proofs.verdict import Proof
 from iqtt.audit.table import AuditTable, find_tables, lacking, read_table
-from scenegen.common.hdf5.row_file import writer_name
-from scenegen.common.workers.cluster import Cluster
+from scenegen.files.cluster import Cluster
+from scenegen.files.row_file import writer_name
 
 Array = NDArray[Any]
 FORMAT = {"format": "pix2shape-bench/iqtt-audit", "format_version": "2.0"}

@@ -14,12 +14,12 @@ from iqtt.audit.features.statistics import border, border_color, measure, silhou
 from iqtt.files.layout import NO_CUBE, SCORED
 from iqtt.files.reader import QuestionsFile, answers_beside, parts
 from iqtt.questions.specs import SplitSpec
-from scenegen.common.hdf5 import trial
-from scenegen.common.hdf5.content import ColumnDigest, column_digest, dataset_digest, joint_digest
-from scenegen.common.hdf5.row_file import digest_problems
-from scenegen.common.hdf5.shards import opened_with_shards, set_name, stored_array
 from scenegen.common.records import check
-from scenegen.common.workers.cluster import Cluster
+from scenegen.files import trial
+from scenegen.files.cluster import Cluster
+from scenegen.files.content import ColumnDigest, column_digest, dataset_digest, joint_digest
+from scenegen.files.row_file import digest_problems
+from scenegen.files.shards import opened_with_shards, set_name, stored_array
 
 Array = NDArray[Any]
 ROLES = ("train", "val", "test", "test-answers")

@@ -10,11 +10,11 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line import groups, options, output
-from scenegen.common.command_line.groups import EXAMPLE
-from scenegen.common.command_line.options import Color, Range
-from scenegen.common.command_line.output import print_line, progress_bar
-from scenegen.common.command_line.paths import (
+from scenegen.command_line import groups, options, output
+from scenegen.command_line.groups import EXAMPLE
+from scenegen.command_line.options import Color, Range
+from scenegen.command_line.output import print_line, progress_bar
+from scenegen.command_line.paths import (
     InputPath,
     OutputFolder,
     OutputPath,
@@ -157,7 +157,7 @@ def make_split(
     from iqtt.files.shards import ALL_FILES
     from iqtt.questions import specs
     from scenegen.common.errors import SpecError
-    from scenegen.common.places import as_place
+    from scenegen.files.places import as_place
     from scenegen.rendering.sameness import renderer_identity
 
     suite, context = preset == "suite", click.get_current_context()

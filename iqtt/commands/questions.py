@@ -9,11 +9,11 @@ from pathlib import Path
 import click
 
 from iqtt.commands.making import QUESTIONS
-from scenegen.common.command_line import options, output
-from scenegen.common.command_line.groups import EXAMPLE
-from scenegen.common.command_line.options import Items
-from scenegen.common.command_line.output import print_line, progress_bar
-from scenegen.common.command_line.paths import InputPath, OutputPath
+from scenegen.command_line import options, output
+from scenegen.command_line.groups import EXAMPLE
+from scenegen.command_line.options import Items
+from scenegen.command_line.output import print_line, progress_bar
+from scenegen.command_line.paths import InputPath, OutputPath
 
 SHOWN = 8  # questions that `show` draws by default
 
@@ -113,8 +113,8 @@ def audit(
     from iqtt.audit.audit import audit as audit_files
     from iqtt.audit.audit import question_count, to_json
     from iqtt.audit.table import find_splits
-    from scenegen.common.hdf5.row_file import program_version
-    from scenegen.common.new_file import check_writable, write_text
+    from scenegen.files.new_file import check_writable, write_text
+    from scenegen.files.row_file import program_version
 
     if json_path:
         check_writable(Path(json_path), overwrite)

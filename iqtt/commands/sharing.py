@@ -4,11 +4,11 @@ from pathlib import Path
 
 import click
 
+from scenegen.command_line.groups import EXAMPLE, needs
+from scenegen.command_line.options import OVERWRITE
+from scenegen.command_line.output import print_line, progress_bar
+from scenegen.command_line.paths import InputPath, OutputFolder, refuse_command_inputs
 from scenegen.commands.sharing import publication_options, source_date
-from scenegen.common.command_line.groups import EXAMPLE, needs
-from scenegen.common.command_line.options import OVERWRITE
-from scenegen.common.command_line.output import print_line, progress_bar
-from scenegen.common.command_line.paths import InputPath, OutputFolder, refuse_command_inputs
 
 
 # fmt: off

@@ -7,8 +7,8 @@ import h5py
 
 from iqtt.files.layout import FORMAT_NAME, FORMAT_VERSION, OLD_VERSION, ROOT_TEXTS
 from iqtt.questions.specs import SPLITS, SplitSpec
-from scenegen.common.hdf5.attributes import check_attribute, read_texts
-from scenegen.common.hdf5.row_file import read_spec
+from scenegen.files.attributes import check_attribute, read_texts
+from scenegen.files.row_file import read_spec
 
 
 def read_root(file: h5py.File, path: Path) -> tuple[dict[str, str], SplitSpec | None, str | None]:

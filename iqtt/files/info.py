@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from iqtt.files.layout import truth_columns
 from iqtt.files.reader import AnswersFile, QuestionsFile, answers_beside, parts
 from iqtt.files.tables import NoImagesError, TableFile
-from scenegen.common.hdf5.shards import set_name
 from scenegen.common.text_table import printable
+from scenegen.files.shards import set_name
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.info import renderer_text, setting_lines, size_text
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec
 from iqtt.shapes.polycube import MAX_CUBES
-from scenegen.common.hdf5.content import CONTENT_DIGEST
-from scenegen.common.hdf5.row_file import writer_name
-from scenegen.common.hdf5.table import Column
+from scenegen.files.content import CONTENT_DIGEST
+from scenegen.files.row_file import writer_name
+from scenegen.files.table import Column
 from scenegen.rendering.backend import VERSION_ATTRIBUTES
 
 Array = NDArray[Any]

@@ -22,12 +22,12 @@ from iqtt.questions.distractors import make_pools
 from iqtt.questions.specs import SUITE, SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import DEFAULT_BATCH
-from scenegen.common.hdf5.shards import MOST_SHARDS, opened
-from scenegen.common.new_file import EXISTS
-from scenegen.common.new_folder import check_folder, folder_written_beside
-from scenegen.common.places import as_place, check_store, is_remote
 from scenegen.common.records import check
-from scenegen.common.workers.cluster import Cluster
+from scenegen.files.cluster import Cluster
+from scenegen.files.new_file import EXISTS
+from scenegen.files.new_folder import check_folder, folder_written_beside
+from scenegen.files.places import as_place, check_store, is_remote
+from scenegen.files.shards import MOST_SHARDS, opened
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.renderer import useful_workers
 

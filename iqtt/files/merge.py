@@ -17,11 +17,11 @@ from iqtt.files.layout import (
 from iqtt.files.reader import AnswersFile, QuestionsFile
 from iqtt.files.tables import NoImagesError, TableFile, table_parts
 from scenegen.common.errors import FileFormatError
-from scenegen.common.hdf5.content import CONTENT_DIGEST, SHA256, seal
-from scenegen.common.hdf5.input_file import checking
-from scenegen.common.hdf5.row_file import new_file
-from scenegen.common.hdf5.shards import opened_with_shards
-from scenegen.common.hdf5.table import Table, extend_together, pack_rows
+from scenegen.files.content import CONTENT_DIGEST, SHA256, seal
+from scenegen.files.input_file import checking
+from scenegen.files.row_file import new_file
+from scenegen.files.shards import opened_with_shards
+from scenegen.files.table import Table, extend_together, pack_rows
 from scenegen.layout import TRUTH_DIGEST
 
 STEP = 64  # questions that are read in one go

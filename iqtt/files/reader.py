@@ -13,11 +13,11 @@ from iqtt.files.layout import question_columns
 from iqtt.files.tables import TableFile, table_parts
 from iqtt.files.truth import QuestionTruth
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.hdf5 import trial
-from scenegen.common.hdf5.input_file import checking
-from scenegen.common.hdf5.row_file import RowDataset
-from scenegen.common.hdf5.shards import opened_with_shards
 from scenegen.description.specs import IMAGE_DTYPES
+from scenegen.files import trial
+from scenegen.files.input_file import checking
+from scenegen.files.row_file import RowDataset
+from scenegen.files.shards import opened_with_shards
 from scenegen.rendering.ground_truth import decode_image
 
 Array = NDArray[Any]

@@ -22,9 +22,12 @@ from iqtt.files.writer import (
 from iqtt.questions.specs import SPLITS, SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import render_question
-from scenegen.common.hdf5.content import seal
-from scenegen.common.hdf5.row_file import new_file, writer_name
-from scenegen.common.hdf5.shards import (
+from scenegen.files.cluster import Cluster
+from scenegen.files.content import seal
+from scenegen.files.making import Task, check_shared, complete_set, other_request, record_file
+from scenegen.files.manifest import FORMAT, Manifest, ShardRecord
+from scenegen.files.row_file import new_file, writer_name
+from scenegen.files.shards import (
     ROW_DIGESTS,
     Shard,
     cut,
@@ -32,10 +35,7 @@ from scenegen.common.hdf5.shards import (
     set_name,
     shard_name,
 )
-from scenegen.common.hdf5.virtual import write_list, write_virtual
-from scenegen.common.sets.making import Task, check_shared, complete_set, other_request, record_file
-from scenegen.common.sets.manifest import FORMAT, Manifest, ShardRecord
-from scenegen.common.workers.cluster import Cluster
+from scenegen.files.virtual import write_list, write_virtual
 from scenegen.rendering.backend import VERSION_ATTRIBUTES
 
 ANSWERS = "iqtt-test-answers.h5"

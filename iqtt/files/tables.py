@@ -22,12 +22,12 @@ from iqtt.files.layout import (
 )
 from iqtt.files.truth import QuestionTruth, question_truth
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.hdf5 import content
-from scenegen.common.hdf5.attributes import read_digest, read_names, read_text
-from scenegen.common.hdf5.input_file import StoredArray, checking, reading
-from scenegen.common.hdf5.row_file import and_more, column_problems
-from scenegen.common.hdf5.shards import JoinedArray, open_with_shards, stored_array
 from scenegen.common.records import LARGEST, check
+from scenegen.files import content
+from scenegen.files.attributes import read_digest, read_names, read_text
+from scenegen.files.input_file import StoredArray, checking, reading
+from scenegen.files.row_file import and_more, column_problems
+from scenegen.files.shards import JoinedArray, open_with_shards, stored_array
 from scenegen.layout import TRUTH_DIGEST
 
 Array = NDArray[Any]

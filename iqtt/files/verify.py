@@ -16,9 +16,9 @@ from iqtt.questions.distractors import make_pools
 from iqtt.questions.specs import SPLITS, SplitSpec
 from iqtt.render import groups, render_question
 from scenegen.common.errors import FileFormatError
-from scenegen.common.hdf5.row_file import digest_problems
-from scenegen.common.hdf5.shards import opened_with_shards, stored_array
-from scenegen.common.sets.manifest import Manifest, read_manifest, wrong_files
+from scenegen.files.manifest import Manifest, read_manifest, wrong_files
+from scenegen.files.row_file import digest_problems
+from scenegen.files.shards import opened_with_shards, stored_array
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rooms.verify import Check, listed_check
 

@@ -8,9 +8,9 @@ from iqtt.questions.distractors import Pools
 from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import Rendered, groups, render_questions
-from scenegen.common.hdf5.table import packing_threads
-from scenegen.common.workers.cluster import threads_of_worker
-from scenegen.common.workers.pool import in_processes, in_threads, processors
+from scenegen.files.cluster import threads_of_worker
+from scenegen.files.pool import in_processes, in_threads, processors
+from scenegen.files.table import packing_threads
 from scenegen.rendering.renderer import share_processors
 
 BLOCK = 128  # questions that a worker process makes in one go

@@ -19,7 +19,7 @@ from typing import Any
 
 from iqtt.quiz.study import Settings
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
-from scenegen.common.new_file import written_beside
+from scenegen.files.new_file import written_beside
 
 FORMAT = "pix2shape-bench/quiz"
 VERSION = 1

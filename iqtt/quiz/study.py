@@ -224,7 +224,7 @@ class Study:
         spec = self.pool.file.spec
         if beside == path or not beside.is_file() or spec is None:
             return None
-        from scenegen.common.hdf5 import trial
+        from scenegen.files import trial
 
         trial.try_file(beside)
         with QuestionsFile(beside) as file:

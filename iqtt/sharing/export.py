@@ -10,7 +10,7 @@ import numpy as np
 
 from iqtt.files.layout import answer_column, truth_columns
 from iqtt.files.reader import QuestionsFile
-from scenegen.common.hdf5.table import Column
+from scenegen.files.table import Column
 from scenegen.sharing.columns import row_column
 from scenegen.sharing.folder import ROWS_PER_FILE, ExportedTable, write_folder
 

@@ -12,8 +12,8 @@ import numpy as np
 from iqtt.files.reader import QuestionsFile
 from iqtt.sharing.published import PublishedTable
 from scenegen.common.errors import FileFormatError
-from scenegen.common.hdf5.content import ColumnDigest, row_digest
-from scenegen.common.hdf5.shards import cut
+from scenegen.files.content import ColumnDigest, row_digest
+from scenegen.files.shards import cut
 from scenegen.sharing.description import IndexColumn
 from scenegen.sharing.index_file import write_lines
 

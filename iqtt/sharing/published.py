@@ -8,9 +8,9 @@ from iqtt.files.shards import ANSWERS, FILES, MANIFEST
 from iqtt.questions.specs import SPLITS, SplitSpec
 from iqtt.sharing.withheld import check_withheld
 from scenegen.common.errors import FileFormatError
-from scenegen.common.hdf5 import trial
-from scenegen.common.hdf5.shards import opened_with_shards
 from scenegen.common.records import check
+from scenegen.files import trial
+from scenegen.files.shards import opened_with_shards
 
 
 @dataclass(frozen=True)

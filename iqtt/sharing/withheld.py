@@ -10,11 +10,11 @@ import h5py
 from iqtt.files.attributes import read_root
 from iqtt.files.layout import ROOT_TEXTS, named
 from scenegen.common.errors import SpecError
-from scenegen.common.hdf5.attributes import read_names
-from scenegen.common.hdf5.content import SHA256
-from scenegen.common.hdf5.input_file import checking
-from scenegen.common.hdf5.row_file import and_more
-from scenegen.common.hdf5.shards import ROW_DIGESTS, SHARDS, opened_with_shards
+from scenegen.files.attributes import read_names
+from scenegen.files.content import SHA256
+from scenegen.files.input_file import checking
+from scenegen.files.row_file import and_more
+from scenegen.files.shards import ROW_DIGESTS, SHARDS, opened_with_shards
 
 COMMAND = "creation_command"  # which may name the seed
 DATA = {"questions", SHARDS, ROW_DIGESTS}  # of a file of test questions

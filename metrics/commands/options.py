@@ -2,7 +2,7 @@
 
 import click
 
-from scenegen.common.command_line.options import LARGEST
+from scenegen.command_line.options import LARGEST
 
 MARKDOWN = click.option("--markdown", is_flag=True, help="Print Markdown instead of aligned text.")
 SEED = click.option(

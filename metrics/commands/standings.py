@@ -6,10 +6,10 @@ from typing import Any
 import click
 
 from metrics.commands.options import MARKDOWN, SEED
-from scenegen.common.command_line.groups import EXAMPLE
-from scenegen.common.command_line.options import OVERWRITE
-from scenegen.common.command_line.output import print_line, progress_bar
-from scenegen.common.command_line.paths import InputPath, OutputFolder, OutputPath
+from scenegen.command_line.groups import EXAMPLE
+from scenegen.command_line.options import OVERWRITE
+from scenegen.command_line.output import print_line, progress_bar
+from scenegen.command_line.paths import InputPath, OutputFolder, OutputPath
 
 
 @click.command(epilog=EXAMPLE + "bench compare baseline.json mine.json --metric chamfer")
@@ -68,7 +68,7 @@ def compare(
     from metrics.comparison.compare import compare as compare_files
     from metrics.comparison.report import text_report, to_json
     from metrics.score_file import read_scores
-    from scenegen.common.new_file import check_writable, write_text
+    from scenegen.files.new_file import check_writable, write_text
 
     for path in (json_path, html_path):
         if path:
@@ -150,7 +150,7 @@ def leaderboard(
     from metrics.leaderboard import text
     from metrics.leaderboard.ranking import leaderboard as rank
     from metrics.score_file import read_scores
-    from scenegen.common.new_file import check_writable, write_text
+    from scenegen.files.new_file import check_writable, write_text
 
     if out is not None:
         check_writable(Path(out), overwrite)

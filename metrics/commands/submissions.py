@@ -6,11 +6,11 @@ from typing import Any
 import click
 
 from metrics.commands.options import MARKDOWN, SEED
+from scenegen.command_line.groups import EXAMPLE, needs
+from scenegen.command_line.options import MESHES, MOST_PROCESSES, OVERWRITE, SCHEDULER, Items
+from scenegen.command_line.output import on_scheduler, print_line, progress_bar
+from scenegen.command_line.paths import InputPath, OutputPath, refuse_inputs
 from scenegen.commands.viewing import page_options
-from scenegen.common.command_line.groups import EXAMPLE, needs
-from scenegen.common.command_line.options import MESHES, MOST_PROCESSES, OVERWRITE, SCHEDULER, Items
-from scenegen.common.command_line.output import on_scheduler, print_line, progress_bar
-from scenegen.common.command_line.paths import InputPath, OutputPath, refuse_inputs
 
 TRUTH = click.option(
     "--truth",
@@ -90,7 +90,7 @@ def score(
     from metrics.scoring.runs import Settings, scorer_versions
     from metrics.submissions.reader import open_predictions
     from metrics.submissions.truths import find_truth
-    from scenegen.common.new_file import check_writable, write_text
+    from scenegen.files.new_file import check_writable, write_text
 
     outputs = [Path(path) for path in (json_path, csv_path, html_path) if path]
     for path in outputs:

@@ -27,8 +27,8 @@ from metrics.report.scenes import Pictured
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import ScoreFile
-from scenegen.common.new_folder import folder_written_beside
 from scenegen.common.text_table import distinct, plain, printable
+from scenegen.files.new_folder import folder_written_beside
 
 INDEX, GALLERY = "index.html", "gallery.html"
 REPORT = re.compile(r"report-\d+-[a-z0-9-]*\.html")

@@ -9,10 +9,10 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line.groups import EXAMPLE, needs
-from scenegen.common.command_line.options import LARGEST, OVERWRITE
-from scenegen.common.command_line.output import print_line
-from scenegen.common.command_line.paths import InputPath, OutputPath, refuse_inputs
+from scenegen.command_line.groups import EXAMPLE, needs
+from scenegen.command_line.options import LARGEST, OVERWRITE
+from scenegen.command_line.output import print_line
+from scenegen.command_line.paths import InputPath, OutputPath, refuse_inputs
 
 option = partial(click.option, show_default=True)
 
@@ -109,7 +109,7 @@ def _tally(db: str) -> str:
 
 def _export(db: str, file: str | None, path: str, overwrite: bool) -> None:
     from iqtt.quiz.answers import read_answers, to_csv
-    from scenegen.common.new_file import write_text
+    from scenegen.files.new_file import write_text
 
     refuse_inputs([path], [db])
     found = read_answers(db)
@@ -162,7 +162,7 @@ def quiz_report(
     from iqtt.quiz.answers import read_answers
     from metrics.people.figures import compute
     from metrics.people.text import text_report, to_json
-    from scenegen.common.new_file import check_writable, write_text
+    from scenegen.files.new_file import check_writable, write_text
 
     for path in filter(None, (json_path, html_path)):
         check_writable(Path(path), overwrite)

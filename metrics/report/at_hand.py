@@ -12,7 +12,7 @@ from pathlib import Path
 from metrics.scoring.records import ScoreFile
 from metrics.submissions.reader import BLOCK_BYTES
 from scenegen.common.errors import SceneGenError
-from scenegen.common.hdf5 import trial
+from scenegen.files import trial
 
 
 def truth_at_hand(file: ScoreFile, given: Path | None = None) -> Path | None:

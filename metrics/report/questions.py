@@ -81,7 +81,7 @@ def _has_images(path: Path) -> bool:
     """Return whether a file holds questions, as a file of answers alone does not."""
     import h5py
 
-    from scenegen.common.hdf5 import trial
+    from scenegen.files import trial
 
     trial.try_file(path)
     with h5py.File(path, "r") as file:

@@ -17,8 +17,8 @@ from metrics.scoring.metric_names import (
 )
 from metrics.scoring.questions import question_skill
 from metrics.scoring.records import GROUPINGS, Meta, Score, ScoreFile, Skill
-from scenegen.common.new_file import written_beside
 from scenegen.common.text_table import by_number, laid_out, markdown, number, plain, printable
+from scenegen.files.new_file import written_beside
 
 SKILL = "Skill: 1 is perfect, 0 is as good as the floor, below 0 is worse than the floor."
 FLOORS_OF_ROOMS = {EMPTY_ROOM: "empty room", OTHER_SCENE: "against another scene"}

@@ -27,8 +27,8 @@ from metrics.scoring.truth_digests import RowDigests, view_digests
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import Identity, RoomPredictions, on_any_machine, open_predictions
 from metrics.submissions.truths import read_true_view
-from scenegen.common.workers.cluster import Cluster
-from scenegen.common.workers.pool import worker_pool
+from scenegen.files.cluster import Cluster
+from scenegen.files.pool import worker_pool
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]

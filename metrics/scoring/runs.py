@@ -19,8 +19,8 @@ from metrics.submissions.problems import Problem, first_error
 from metrics.submissions.reader import Predictions
 from metrics.submissions.truths import FoundTruth
 from scenegen.common.errors import SceneGenError
-from scenegen.common.hdf5.row_file import writer_name
-from scenegen.common.workers.cluster import Cluster
+from scenegen.files.cluster import Cluster
+from scenegen.files.row_file import writer_name
 
 Array = NDArray[Any]
 Progress = Callable[[int], Any]

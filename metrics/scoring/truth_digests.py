@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from metrics.scoring.runs import ScoringError
 from metrics.submissions.truths import TrueView
-from scenegen.common.hdf5.content import column_digest, dataset_digest, joint_digest, row_digest
+from scenegen.files.content import column_digest, dataset_digest, joint_digest, row_digest
 from scenegen.layout import SCORED, TRUTH_DIGEST
 from scenegen.rooms.reader import RoomsFile
 

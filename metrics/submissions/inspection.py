@@ -17,8 +17,8 @@ from metrics.measures.answers import CANDIDATES, answers_from_scores
 from metrics.submissions import layout, rules
 from metrics.submissions.problems import Problem
 from scenegen.common.errors import FileFormatError
-from scenegen.common.hdf5.input_file import Fault, StoredArray, faults, reading, slab_bytes
 from scenegen.description.specs import MAX_PIXELS
+from scenegen.files.input_file import Fault, StoredArray, faults, reading, slab_bytes
 
 CHUNK_SLOTS = 10_007
 LEAST_CACHE = 1 << 20

@@ -6,7 +6,7 @@ from typing import Any, get_args
 
 from metrics.measures.answers import CANDIDATES
 from metrics.measures.depth import Alignment
-from scenegen.common.hdf5.table import Column
+from scenegen.files.table import Column
 
 FORMAT_NAME = "pix2shape-bench/predictions"
 FORMAT_VERSION = "1.1"

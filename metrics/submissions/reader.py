@@ -19,8 +19,8 @@ from metrics.submissions.inspection import Inspection, inspect
 from metrics.submissions.problems import Problem, first_error
 from metrics.submissions.rules import Ids, as_doubles
 from scenegen.common.errors import FileFormatError
-from scenegen.common.hdf5 import trial
-from scenegen.common.hdf5.input_file import StoredArray, checking, open_unchecked, reading
+from scenegen.files import trial
+from scenegen.files.input_file import StoredArray, checking, open_unchecked, reading
 
 Array = NDArray[np.float64]
 BLOCK_BYTES = 1 << 20

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from metrics.submissions.reader import Predictions
 from metrics.submissions.rules import as_doubles
 from scenegen.common.errors import FileFormatError
-from scenegen.common.hdf5 import trial
+from scenegen.files import trial
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]

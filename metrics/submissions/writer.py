@@ -18,8 +18,8 @@ from metrics.measures.answers import ABSTAINED, answers_from_scores
 from metrics.measures.depth import Alignment
 from metrics.submissions import layout, rules
 from metrics.submissions.problems import PredictionError, first_error, first_ids
-from scenegen.common.hdf5.row_file import new_file, writer_name
-from scenegen.common.hdf5.table import Table
+from scenegen.files.row_file import new_file, writer_name
+from scenegen.files.table import Table
 from scenegen.rooms.reader import RoomsFile
 
 

@@ -1,5 +1,5 @@
 """The `scenegen` commands: on files of rooms, on data cards (`sharing`), and on mesh folders.
 
-Only here and in `common.command_line` is click imported. A command parses its options, makes one
+Only here and in `scenegen.command_line` is click imported. A command parses its options, makes one
 library call and prints the result.
 """

@@ -12,8 +12,8 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line.groups import EXAMPLE, creation_command
-from scenegen.common.command_line.options import (
+from scenegen.command_line.groups import EXAMPLE, creation_command
+from scenegen.command_line.options import (
     COMPRESSION,
     DEVICE,
     IMAGE_DTYPE,
@@ -28,8 +28,8 @@ from scenegen.common.command_line.options import (
     Range,
     Size,
 )
-from scenegen.common.command_line.output import on_scheduler, print_line, progress_bar
-from scenegen.common.command_line.paths import InputPath, OutputPath
+from scenegen.command_line.output import on_scheduler, print_line, progress_bar
+from scenegen.command_line.paths import InputPath, OutputPath
 
 SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
 SHARED = ("parquet", "webdataset")  # and of files of many
@@ -173,8 +173,8 @@ def render(
 # fmt: on
 def _set_bytes(out: str) -> int:
     """Return the size of a file of rooms and of its shards, if it has any."""
-    from scenegen.common.hdf5.shards import set_name
-    from scenegen.common.places import as_place, listing
+    from scenegen.files.places import as_place, listing
+    from scenegen.files.shards import set_name
 
     place = as_place(out)
     files = [one for one in listing(place.parent) if set_name(one.name) == place.name]
@@ -185,7 +185,7 @@ def _set_bytes(out: str) -> int:
 def _told_how_to_go_on(out: str) -> Iterator[None]:
     """Say which shards are complete, and what to do, where the block is ended from outside."""
     from scenegen.common.errors import FileFormatError
-    from scenegen.common.sets.manifest import manifest_path, read_manifest
+    from scenegen.files.manifest import manifest_path, read_manifest
 
     try:
         yield

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from scenegen.common.command_line.groups import EXAMPLE
-from scenegen.common.command_line.options import (
+from scenegen.command_line.groups import EXAMPLE
+from scenegen.command_line.options import (
     CACHE_DIR,
     MESH_FILES,
     MOST_PROCESSES,
@@ -16,8 +16,8 @@ from scenegen.common.command_line.options import (
     UP,
     Names,
 )
-from scenegen.common.command_line.output import print_line, progress_bar
-from scenegen.common.command_line.paths import InputPath, OutputPath
+from scenegen.command_line.output import print_line, progress_bar
+from scenegen.command_line.paths import InputPath, OutputPath
 
 if TYPE_CHECKING:
     from scenegen.objects.meshes.check import ModelCheck
@@ -59,7 +59,7 @@ def check_objects(
     The folder is ShapeNetCore's or has a sub-folder for each class. Prints counts for each class
     and why each model is refused. Exits with 1 if no model is usable.
     """
-    from scenegen.common.new_file import check_writable, write_text
+    from scenegen.files.new_file import check_writable, write_text
     from scenegen.objects.meshes.cache import default_cache_dir
     from scenegen.objects.meshes.check import check_models
     from scenegen.objects.meshes.folders import open_models

@@ -11,10 +11,10 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line.groups import EXAMPLE, needs
-from scenegen.common.command_line.options import DEVICE, MESHES, OVERWRITE, SHOW, Items
-from scenegen.common.command_line.output import print_line, progress_bar, show_or_save
-from scenegen.common.command_line.paths import (
+from scenegen.command_line.groups import EXAMPLE, needs
+from scenegen.command_line.options import DEVICE, MESHES, OVERWRITE, SHOW, Items
+from scenegen.command_line.output import print_line, progress_bar, show_or_save
+from scenegen.command_line.paths import (
     InputPath,
     OutputFolder,
     OutputPath,
@@ -89,7 +89,7 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     Rows rendered again must agree bit for bit, or within a stated tolerance where the file was
     rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.
     """
-    from scenegen.common.sets.manifest import manifests_in
+    from scenegen.files.manifest import manifests_in
     from scenegen.layout import FORMAT_NAME
     from scenegen.objects.sources import file_objects
     from scenegen.rooms.reader import RoomsFile
@@ -195,7 +195,7 @@ def _export_single(
 ) -> None:
     """Write each row to files of its own."""
     from scenegen.common.errors import SpecError
-    from scenegen.common.new_file import check_writable
+    from scenegen.files.new_file import check_writable
     from scenegen.objects.catalogue import changed_meshes
     from scenegen.objects.sources import file_objects, mesh_folder
     from scenegen.rooms.export import export_paths, export_room

@@ -6,10 +6,10 @@ from typing import Any
 
 import click
 
-from scenegen.common.command_line.groups import EXAMPLE, needs
-from scenegen.common.command_line.options import MESHES, Items
-from scenegen.common.command_line.output import print_line
-from scenegen.common.command_line.paths import InputPath
+from scenegen.command_line.groups import EXAMPLE, needs
+from scenegen.command_line.options import MESHES, Items
+from scenegen.command_line.output import print_line
+from scenegen.command_line.paths import InputPath
 
 Command = Callable[..., Any]
 

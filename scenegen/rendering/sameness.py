@@ -3,8 +3,8 @@
 import functools
 import hashlib
 
-from scenegen.common.hdf5.row_file import writer_name
 from scenegen.description.specs import DatasetSpec
+from scenegen.files.row_file import writer_name
 from scenegen.objects.catalogue import objects_of
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.packing import pack

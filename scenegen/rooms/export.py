@@ -9,7 +9,7 @@ import png
 from numpy.typing import NDArray
 
 from scenegen.camera import transform_vectors
-from scenegen.common.new_file import written_beside
+from scenegen.files.new_file import written_beside
 from scenegen.objects.catalogue import Objects, built_in_shape
 from scenegen.rooms.obj_file import write_mtl, write_obj
 from scenegen.rooms.preview import srgb_bytes

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.hdf5.content import CONTENT_DIGEST
 from scenegen.common.records import changed_settings
 from scenegen.common.text_table import printable
+from scenegen.files.content import CONTENT_DIGEST
 from scenegen.layout import FIELDS, TRUTH_DIGEST
 from scenegen.rendering.backend import UNKNOWN, VERSION_ATTRIBUTES
 from scenegen.rooms.reader import RoomsFile

@@ -5,14 +5,14 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
-from scenegen.common.hdf5.shards import MOST_SHARDS
-from scenegen.common.new_file import check_writable
-from scenegen.common.places import as_place, check_store, is_remote
 from scenegen.common.records import check
-from scenegen.common.sets.making import refuse_other_set, remove_set
-from scenegen.common.sets.manifest import manifest_path
-from scenegen.common.workers.cluster import Cluster
 from scenegen.description.specs import DatasetSpec
+from scenegen.files.cluster import Cluster
+from scenegen.files.making import refuse_other_set, remove_set
+from scenegen.files.manifest import manifest_path
+from scenegen.files.new_file import check_writable
+from scenegen.files.places import as_place, check_store, is_remote
+from scenegen.files.shards import MOST_SHARDS
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.families.cache import MEMBERS_KEPT
 from scenegen.rendering.backend import select_variant, versions

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from scenegen.common.errors import SpecError
-from scenegen.common.new_file import written_beside
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.records import check
+from scenegen.files.new_file import written_beside
 from scenegen.rooms.reader import Room
 
 Array = NDArray[Any]

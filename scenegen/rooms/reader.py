@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from scenegen.camera import back_project, transform_points
 from scenegen.common.errors import FileFormatError
-from scenegen.common.hdf5 import input_file, row_file
-from scenegen.common.hdf5.attributes import check_attribute, read_digest, read_text, read_texts
-from scenegen.common.hdf5.content import SHA256, joint_digest
-from scenegen.common.hdf5.input_file import StoredArray
-from scenegen.common.hdf5.shards import JoinedArray, Shard, open_with_shards, stored_array
 from scenegen.common.records import check
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
+from scenegen.files import input_file, row_file
+from scenegen.files.attributes import check_attribute, read_digest, read_text, read_texts
+from scenegen.files.content import SHA256, joint_digest
+from scenegen.files.input_file import StoredArray
+from scenegen.files.shards import JoinedArray, Shard, open_with_shards, stored_array
 from scenegen.layout import (
     FIELDS,
     FORMAT_NAME,

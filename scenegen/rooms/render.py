@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.hdf5.table import PackedRows, packing_threads
-from scenegen.common.workers.cluster import threads_of_worker
-from scenegen.common.workers.pool import in_processes, in_threads, processors
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec
+from scenegen.files.cluster import threads_of_worker
+from scenegen.files.pool import in_processes, in_threads, processors
+from scenegen.files.table import PackedRows, packing_threads
 from scenegen.layout import columns
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.families.cache import MEMBERS_KEPT

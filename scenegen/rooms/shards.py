@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from scenegen.common.hdf5.content import seal
-from scenegen.common.hdf5.row_file import new_file, writer_name
-from scenegen.common.hdf5.shards import Shard, cut, opened, shard_name
-from scenegen.common.hdf5.table import PackedRows
-from scenegen.common.hdf5.virtual import write_list, write_virtual
-from scenegen.common.new_file import check_writable
-from scenegen.common.sets.making import Task, check_shared, complete_set, record_file
-from scenegen.common.sets.manifest import FORMAT, Manifest, ShardRecord, manifest_path
-from scenegen.common.workers.cluster import Cluster
 from scenegen.description.specs import Fingerprint
+from scenegen.files.cluster import Cluster
+from scenegen.files.content import seal
+from scenegen.files.making import Task, check_shared, complete_set, record_file
+from scenegen.files.manifest import FORMAT, Manifest, ShardRecord, manifest_path
+from scenegen.files.new_file import check_writable
+from scenegen.files.row_file import new_file, writer_name
+from scenegen.files.shards import Shard, cut, opened, shard_name
+from scenegen.files.table import PackedRows
+from scenegen.files.virtual import write_list, write_virtual
 from scenegen.layout import FORMAT_NAME, FORMAT_VERSION, TRUTH_DIGEST, columns
 from scenegen.rooms.reader import truth_digest
 from scenegen.rooms.render import Work

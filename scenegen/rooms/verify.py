@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.hdf5.content import ColumnDigest
-from scenegen.common.sets.manifest import manifest_path, read_manifest, wrong_files
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec, Fingerprint
+from scenegen.files.content import ColumnDigest
+from scenegen.files.manifest import manifest_path, read_manifest, wrong_files
 from scenegen.layout import FIELDS, FORMAT_VERSION, has_digests, has_old_draws
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.meshes.errors import BadMeshError

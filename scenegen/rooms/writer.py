@@ -10,13 +10,13 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.hdf5.content import seal
-from scenegen.common.hdf5.row_file import new_file, writer_name
-from scenegen.common.hdf5.shards import write_row_digests
-from scenegen.common.hdf5.table import Column, PackedRows, Table, pack_rows
 from scenegen.common.records import check
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec, Fingerprint
+from scenegen.files.content import seal
+from scenegen.files.row_file import new_file, writer_name
+from scenegen.files.shards import write_row_digests
+from scenegen.files.table import Column, PackedRows, Table, pack_rows
 from scenegen.layout import (
     CONVENTIONS,
     FORMAT_NAME,

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from scenegen.common.errors import FileFormatError
-from scenegen.common.hdf5.table import Column
+from scenegen.files.table import Column
 
 Array = NDArray[Any]
 PNG_LEVEL = 6  # of deflate

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from scenegen.common.records import check
-from scenegen.common.sets.manifest import file_sha256
 from scenegen.common.text_table import printable
+from scenegen.files.manifest import file_sha256
 
 HDF5, PARQUET, JSON = "application/x-hdf5", "application/x-parquet", "application/json"
 PAPER = """@article{rajeswar2020pix2shape,

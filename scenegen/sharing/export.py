@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from scenegen.common.hdf5.table import Column
 from scenegen.description.specs import DatasetSpec
+from scenegen.files.table import Column
 from scenegen.layout import columns
 from scenegen.rooms.reader import RoomsFile
 from scenegen.sharing.columns import column_name, decoded, row_column

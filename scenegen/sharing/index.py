@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from scenegen.common.errors import FileFormatError
-from scenegen.common.hdf5.content import column_digest, row_digest
-from scenegen.common.hdf5.shards import cut
+from scenegen.files.content import column_digest, row_digest
+from scenegen.files.shards import cut
 from scenegen.layout import FIELDS
 from scenegen.rooms.reader import RoomsFile, RowBlock
 from scenegen.sharing.columns import decoded

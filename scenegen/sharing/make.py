@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from scenegen.common.new_folder import folder_written_beside
+from scenegen.files.new_folder import folder_written_beside
 from scenegen.sharing.card import card_markdown
 from scenegen.sharing.croissant import croissant_json
 from scenegen.sharing.description import DataDescription, Publication

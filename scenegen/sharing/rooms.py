@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from scenegen.common.records import check
-from scenegen.common.sets.manifest import manifest_path
 from scenegen.common.text_table import printable
 from scenegen.description.specs import BUILT_IN
+from scenegen.files.manifest import manifest_path
 from scenegen.layout import markdown_table
 from scenegen.rendering.backend import VERSION_ATTRIBUTES
 from scenegen.rooms.reader import RoomsFile

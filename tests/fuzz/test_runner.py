@@ -17,7 +17,7 @@ import cli
 from fuzz import runner, verdict
 from fuzz.cases import Case
 from fuzz.programs import Target
-from scenegen.common.command_line.groups import UserError
+from scenegen.command_line.groups import UserError
 
 honest = Path(sys.argv[1])
 

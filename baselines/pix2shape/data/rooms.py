@@ -22,10 +22,10 @@ from baselines.pix2shape.network.surfels import Scene
 from iqtt.files.layout import FORMAT_NAME
 from iqtt.files.tables import PARTS
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.hdf5.attributes import read_text
-from scenegen.common.hdf5.shards import open_with_shards
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.records import check
+from scenegen.files.attributes import read_text
+from scenegen.files.shards import open_with_shards
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsDataset, RoomsFile
 

@@ -26,7 +26,7 @@ from baselines.pix2shape.training.loop import check_request, require_finite, tra
 from baselines.pix2shape.training.state import State, save_state
 from baselines.pix2shape.weights.storage import PRECISIONS, Card, load_card, save_weights
 from scenegen.common.errors import FileFormatError, SceneGenError
-from scenegen.common.new_file import check_writable
+from scenegen.files.new_file import check_writable
 from scenegen.rooms.preview import save_picture
 
 PICTURE, LOGS = "pictures.png", "logs"

@@ -26,8 +26,8 @@ from baselines.pix2shape.use.answers import answer_file
 from baselines.pix2shape.weights.bundled import open_weights
 from metrics.prediction_writer import RoomPredictionWriter
 from scenegen.common.errors import SpecError
-from scenegen.common.new_file import check_writable
 from scenegen.common.records import check
+from scenegen.files.new_file import check_writable
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]

@@ -16,8 +16,8 @@ from baselines.pix2shape.network.config import TAUGHT_DEPTH, ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.tensor_files import check_tensors, load_tensors, refuse_pipe, save_tensors, shortened
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.new_file import write_text
 from scenegen.common.records import check, from_json, normalise
+from scenegen.files.new_file import write_text
 
 FORMAT_VERSION = 1
 KEPT = ("encoder", "decoder", "prior")  # the networks that predicting and sampling need

@@ -21,8 +21,8 @@ import numpy as np
 from isal import isal_zlib
 
 import scenegen
-from scenegen.common.new_file import written_beside
 from scenegen.description.scenes import FAMILY_NAMES
+from scenegen.files.new_file import written_beside
 from scenegen.objects.cast_meshes import CastMesh, cast_mesh
 from scenegen.objects.families.members import make_member
 from scenegen.objects.families.parts.assembly import UPRIGHT

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenegen.common.new_file import written_beside
+from scenegen.files.new_file import written_beside
 from scenegen.objects.meshes.clean import clean_mesh
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.hull import hull_points

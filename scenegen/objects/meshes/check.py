@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from scenegen.common.errors import SceneGenError
-from scenegen.common.workers.pool import worker_pool
+from scenegen.files.pool import worker_pool
 from scenegen.objects.meshes.cache import MeshCache
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFile, ModelFolder

@@ -12,7 +12,7 @@ from iqtt.audit.proofs.images import content
 from iqtt.audit.table import content_problems, find_tables, read_table
 from iqtt.files.reader import AnswersFile
 from scenegen.common.errors import FileFormatError
-from scenegen.common.hdf5.content import column_digest, row_digest, seal
+from scenegen.files.content import column_digest, row_digest, seal
 
 # Of how many places one is changed: what a training file holds is as in the others, only twice.
 FILES = {"iqtt-train.h5": 5, "iqtt-val.h5": 1, "iqtt-test.h5": 1, "iqtt-test-answers.h5": 1}

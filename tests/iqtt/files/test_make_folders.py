@@ -15,7 +15,7 @@ from iqtt.files.make import make_split
 from iqtt.files.shards import ALL_FILES as FILES
 from iqtt.shapes.splits import TooFewShapesError
 from scenegen.common.errors import PlacementError, SpecError
-from scenegen.common.workspace import remove_leftovers
+from scenegen.files.workspace import remove_leftovers
 
 KILLED = """
 import os, signal, sys

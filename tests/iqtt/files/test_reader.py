@@ -21,7 +21,7 @@ from iqtt.files.reader import (
 )
 from iqtt.shapes.polycube import canonical, set_ids
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.hdf5.shards import open_with_shards
+from scenegen.files.shards import open_with_shards
 
 TABLES = [  # of the tiny split: file, part, answers told, truth told
     ("iqtt-train.h5", "labeled", True, True),

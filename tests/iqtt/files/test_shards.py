@@ -17,7 +17,7 @@ from iqtt.files.shards import ALL_FILES, MANIFEST
 from iqtt.files.verify import verify_split
 from iqtt.questions.specs import SUITE, SplitSpec
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.sets.manifest import read_manifest
+from scenegen.files.manifest import read_manifest
 
 SEED = 8_123_456_789_012_345
 SPEC = SplitSpec(

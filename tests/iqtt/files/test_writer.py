@@ -14,7 +14,7 @@ from iqtt.files.shards import ALL_FILES as FILES
 from iqtt.questions.distractors import make_pools
 from iqtt.questions.specs import SplitSpec
 from iqtt.render import Rendered, render_question
-from scenegen.common.hdf5.content import content_digest
+from scenegen.files.content import content_digest
 
 SPEC = SplitSpec(
     seed=3, train=7, labeled=3, val=4, test=5, cubes=(6, 7), height=24, width=32,

@@ -13,7 +13,7 @@ from iqtt import open_questions
 from iqtt.sharing.index import COLUMNS
 from iqtt.sharing.make import make_questions_card
 from scenegen.common.errors import FileFormatError
-from scenegen.common.hdf5.content import row_digest
+from scenegen.files.content import row_digest
 from scenegen.sharing.make import NAMES
 from tests.support.loaders import faultless_croissant, validate
 

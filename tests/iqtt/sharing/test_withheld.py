@@ -13,7 +13,7 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.sharing.published import published_split
 from iqtt.sharing.withheld import check_withheld
 from scenegen.common.errors import SpecError
-from scenegen.common.hdf5.shards import ROW_DIGESTS
+from scenegen.files.shards import ROW_DIGESTS
 
 
 def seeded(file):

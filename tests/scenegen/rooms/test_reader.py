@@ -13,9 +13,9 @@ import pytest
 
 from scenegen import RoomsDataset, open_rooms
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.hdf5.content import datasets
 from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
 from scenegen.description.specs import DatasetSpec
+from scenegen.files.content import datasets
 from scenegen.layout import FIELDS
 from scenegen.rendering.backend import VERSION_ATTRIBUTES, versions
 

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
-from scenegen.common.hdf5.shards import ROW_DIGESTS, SHARDS
-from scenegen.common.run_lock import run_lock
-from scenegen.common.sets.manifest import manifest_path, read_manifest
+from scenegen.files.manifest import manifest_path, read_manifest
+from scenegen.files.run_lock import run_lock
+from scenegen.files.shards import ROW_DIGESTS, SHARDS
 from scenegen.rooms.merge import merge_rooms
 from scenegen.rooms.reader import RoomsFile
 from scenegen.rooms.verify import verify_file, verify_set

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from scenegen.common.errors import FileFormatError
-from scenegen.common.hdf5.content import CONTENT_DIGEST, SHA256, content_digest, datasets, seal
+from scenegen.files.content import CONTENT_DIGEST, SHA256, content_digest, datasets, seal
 from scenegen.rooms.verify import verify_file
 
 

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenegen.common.errors import SpecError
-from scenegen.common.hdf5.table import deflated, shuffle_bytes
 from scenegen.description.specs import DatasetSpec
+from scenegen.files.table import deflated, shuffle_bytes
 from scenegen.rooms.render import render_items
 from scenegen.rooms.writer import create_rooms
 

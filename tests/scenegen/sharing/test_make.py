@@ -11,7 +11,7 @@ from markdown_it import MarkdownIt
 
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.hdf5.content import row_digest
+from scenegen.files.content import row_digest
 from scenegen.sharing.description import Publication
 from scenegen.sharing.index import COLUMNS
 from scenegen.sharing.make import NAMES, make_rooms_card

@@ -1,0 +1,156 @@
+"""Options that several commands have, and the types of options that click lacks."""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+from scenegen.command_line.paths import InputPath, OutputFolder
+
+MESH_FILES = (".glb", ".obj", ".off", ".ply", ".stl")
+NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
+LARGEST = 2**63 - 1  # whole number that files can hold
+MOST_PROCESSES = 1024
+MOST_ITEMS = 1_000_000  # numbers of a range; keeps 0-99999999999 from filling the memory
+
+
+class _Parsed(click.ParamType):  # type: ignore[type-arg]
+    """The value of an option that is not one of click's types.
+
+    `_parse` raises ValueError where the text is not what `expected` says. A value that is no text,
+    such as a default, passes as it is.
+    """
+
+    expected: str
+
+    def _parse(self, text: str) -> Any:
+        raise NotImplementedError
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse a text."""
+        if not isinstance(value, str):
+            return value
+        try:
+            return self._parse(value)
+        except ValueError:
+            self.fail(f"found {value!r:.60}, expected {self.expected}", param, ctx)
+
+
+def _matched(pattern: str, text: str) -> re.Match[str]:
+    match = re.fullmatch(pattern, text.strip())
+    if match is None:
+        raise ValueError(text)
+    return match
+
+
+class Range(_Parsed):
+    """`3` or `1-3`, as two numbers."""
+
+    name, expected = "N or N-M", "a number or a range such as 1-3"
+
+    def __init__(self, number: Callable[[str], Any]) -> None:
+        self.number = number
+
+    def _parse(self, text: str) -> tuple[Any, Any]:
+        first, last = _matched(rf"({NUMBER})(?:-({NUMBER}))?", text).groups()
+        return self.number(first), self.number(last or first)
+
+
+class Size(_Parsed):
+    """`128` or `96x128`, as (height, width)."""
+
+    name, expected = "N or HxW", "a number such as 128 or HxW such as 96x128"
+
+    def _parse(self, text: str) -> tuple[int, int]:
+        height, width = _matched("([0-9]+)(?:x([0-9]+))?", text.lower()).groups()
+        return int(height), int(width or height)
+
+
+class Items(_Parsed):
+    """`0,5,7` or `0-7` or both, as a list of numbers."""
+
+    name, expected = "0,5,7 or 0-7", "numbers such as 0,5,7 or rising ranges such as 0-7"
+
+    def _parse(self, text: str) -> list[int]:
+        chosen: list[int] = []
+        for part in text.split(","):
+            match = _matched("([0-9]+)(?:-([0-9]+))?", part)
+            first, last = int(match[1]), int(match[2] or match[1])
+            if last < first:
+                raise ValueError(part)
+            chosen.extend(range(first, min(last, first + MOST_ITEMS) + 1))
+        return chosen
+
+
+class Names(_Parsed):
+    """`mug,bowl`, as a tuple of texts."""
+
+    name, expected = "NAME,NAME", "names such as mug,bowl"
+
+    def _parse(self, text: str) -> tuple[str, ...]:
+        return tuple(part.strip() for part in text.split(","))
+
+
+class Numbers(_Parsed):
+    """`0,5,35`, as a tuple of numbers."""
+
+    name, expected = "N,N", "numbers such as 0,5,35"
+
+    def _parse(self, text: str) -> tuple[float, ...]:
+        return tuple(float(_matched(NUMBER, part)[0]) for part in text.split(","))
+
+
+class Color(_Parsed):
+    """`white`, `black`, a grey such as `0.5`, or `R,G,B`, as three numbers."""
+
+    name = "white, black, GREY or R,G,B"
+    expected = "white, black, a grey from 0 to 1, or R,G,B"
+
+    def _parse(self, text: str) -> tuple[float, ...]:
+        told = {"white": "1", "black": "0"}.get(text.lower(), text)
+        channels = tuple(float(_matched(NUMBER, part)[0]) for part in told.split(","))
+        if len(channels) not in (1, 3):
+            raise ValueError(text)
+        return channels if len(channels) == 3 else channels * 3
+
+
+# fmt: off
+WORKERS = click.option("--workers", type=click.IntRange(0, 256), default=0,
+                       show_default="one a processor, up to 8",
+                       help="Processes that render; each takes about 0.4 GiB.")
+SCHEDULER = click.option("--scheduler", metavar="ADDRESS",
+                         help="Spread the work over a Dask cluster, such as tcp://host:8786; local"
+                         " starts one on this machine.")
+SHOW = click.option("--show", type=click.Choice(["auto", "kitty", "sixel", "no"]), default="auto",
+                    show_default=True,
+                    help="Draw the picture in the terminal, in this protocol; auto does so where"
+                    " there is no --out and the terminal says that it can.")
+OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
+DEVICE = click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
+                      show_default=True,
+                      help="Where to render; auto is the CPU, which is slow without LLVM.")
+IMAGE_DTYPE = click.option("--image-dtype", type=click.Choice(["uint8", "float16", "float32"]),
+                           default="uint8", show_default=True, help="Type of stored radiance.")
+COMPRESSION = click.option("--compression", type=click.Choice(["gzip", "lzf", "none"]),
+                           default="gzip", show_default=True,
+                           help="How images are compressed; only h5py reads lzf.")
+SIZE = click.option("--size", type=Size(), default="128", show_default=True,
+                    help="Image size in pixels.")
+SEED = click.option("--seed", type=int, default=0, show_default=True,
+                    help="Seed of every random choice.")
+UP = click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True,
+                  help="Axis that points up in the meshes; in ShapeNet it is y.")
+CACHE_DIR = click.option("--cache-dir", type=OutputFolder(),
+                         help="Folder for meshes that are ready to render [the user's cache].")
+# fmt: on
+
+
+def MESHES(command: Any) -> Any:  # noqa: N802
+    """Add the options that name the folder of meshes that objects are taken from."""
+    command = UP(CACHE_DIR(command))  # the last option comes first
+    folder = InputPath(within=MESH_FILES)
+    text = "Folder with the objects, a sub-folder per class."
+    command = click.option("--objects-root", type=folder, help=text)(command)
+    text = "Folder of ShapeNetCore 1 or 2 with the objects."
+    return click.option("--shapenet-root", type=folder, help=text)(command)

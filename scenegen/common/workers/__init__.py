@@ -1,1 +1,0 @@
-"""Who does the work: threads and processes of this machine (`pool`), or a cluster (`cluster`)."""

@@ -1,0 +1,162 @@
+"""A cluster of Dask: the same bytes as one process, whatever dies; and who is let in."""
+
+import json
+import os
+import signal
+import time
+from dataclasses import replace
+from functools import partial
+
+import pytest
+from click.testing import CliRunner
+
+import cli
+from iqtt.audit.audit import audit
+from iqtt.files.make import make_split
+from iqtt.questions.specs import SplitSpec
+from metrics.scoring.runs import scorer_versions
+from scenegen.common.errors import SceneGenError
+from scenegen.files.cluster import LOCAL, connected
+from scenegen.files.making import check_shared
+from scenegen.files.manifest import FORMAT, Manifest, write_manifest
+from scenegen.rendering.sameness import renderer_identity
+
+pytest.importorskip("distributed")
+pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
+SPLIT = SplitSpec(
+    seed=5, train=9, labeled=3, val=3, test=5, cubes=(6, 7), height=24, width=24, min_cube_pixels=1
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """Return a cluster of three worker processes."""
+    with connected(LOCAL, 3, renderer_identity) as found:
+        yield found
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.glob("*.h5")}
+
+
+def test_rooms_and_questions_are_those_of_one_process(cluster, make_rooms, tmp_path):
+    rows = []
+    for name, how in (("one", {}), ("many", {"cluster": cluster, "progress": rows.append})):
+        folder = tmp_path / name
+        folder.mkdir()
+        make_rooms(folder / "rooms.h5", 10, {"shard_size": 3, **how}, views=(0.0, 40.0))
+        make_split(folder / "split", SPLIT, shard_size=3, **how)
+    assert sum(rows) == 20 + 17
+    assert contents(tmp_path / "many") == contents(tmp_path / "one")
+    assert contents(tmp_path / "many" / "split") == contents(tmp_path / "one" / "split")
+    make_split(tmp_path / "whole", SPLIT)
+    make_split(tmp_path / "elsewhere", SPLIT, cluster=cluster)
+    assert contents(tmp_path / "elsewhere") == contents(tmp_path / "whole")
+    found = [
+        json.dumps(audit([tmp_path / "whole"], cluster=how).record()) for how in (cluster, None)
+    ]
+    assert found[0] == found[1]
+
+
+def slow_square(folder, number):
+    """Return a square, and leave the number of the process that was asked."""
+    (folder / str(number)).write_text(str(os.getpid()))
+    time.sleep(0.2)
+    return number * number
+
+
+def test_tasks_of_workers_that_die_go_to_others(cluster, tmp_path):
+    """Two of three are killed in the midst of it."""
+    killed = set()
+    found = []
+    for result in cluster.in_order(partial(slow_square, tmp_path), range(24)):
+        found.append(result)
+        for file in tmp_path.iterdir():
+            worker = int(file.read_text() or 0)
+            if worker and len(killed) < 2 and worker not in killed:
+                os.kill(worker, signal.SIGKILL)
+                killed.add(worker)
+    assert len(killed) == 2
+    assert found == [number * number for number in range(24)]
+
+
+def fail(number):
+    raise SceneGenError("row 3", "a task that fails", "one that does not", "mend it")
+
+
+def test_errors_of_workers_are_raised_here(cluster):
+    with pytest.raises(SceneGenError) as raised:
+        list(cluster.in_any_order(fail, range(3)))
+    assert raised.value.found == "a task that fails"
+
+
+def versions_of(release):
+    return {"mitsuba_version": release, "process": "any"}
+
+
+def version_by_process(main):
+    """Return another version in every process but one."""
+    return versions_of("3.9.1" if os.getpid() == main else "3.8.0")
+
+
+def test_workers_with_other_versions_are_refused(cluster):
+    """At the start, and where one joins later."""
+    here = partial(version_by_process, os.getpid())
+    address = cluster.client.scheduler.address
+    with pytest.raises(SceneGenError) as refused, connected(address, 0, here):
+        pass
+    assert "mitsuba_version 3.8.0, here 3.9.1" in refused.value.found
+    later = replace(cluster, versions=here)
+    with pytest.raises(SceneGenError) as refused:
+        list(later.in_any_order(len, ["a"]))
+    assert "3.8.0" in refused.value.found
+
+
+def shared(task):
+    check_shared(*task)
+
+
+def test_a_folder_that_workers_do_not_see_is_named(cluster, tmp_path):
+    """Or one in which another run has begun."""
+    place = tmp_path / "rooms.manifest.json"
+    asked = Manifest(FORMAT, "", ("rooms.h5",), "{}", 1, 1, (), "", False, ())
+    with pytest.raises(SceneGenError) as refused:
+        list(cluster.in_any_order(shared, [(place, asked)]))
+    assert str(place) in refused.value.found
+    write_manifest(place, asked)
+    list(cluster.in_any_order(shared, [(place, asked)]))
+    with pytest.raises(SceneGenError) as refused:
+        list(cluster.in_any_order(shared, [(place, replace(asked, count=2))]))
+    assert "n 1, not 2" in refused.value.found
+
+
+def test_a_scheduler_that_goes_away_is_one_line(tmp_path):
+    with connected(LOCAL, 1, scorer_versions) as found:
+        results = found.in_order(partial(slow_square, tmp_path), range(50))
+        next(results)
+        found.client.cluster.close()
+        with pytest.raises(SceneGenError) as lost:
+            list(results)
+    assert lost.value.where == "scheduler"
+
+
+def test_no_scheduler_is_one_line(monkeypatch):
+    monkeypatch.setattr("scenegen.files.cluster.PATIENCE", 1)
+    words = ["render", "--n", "1", "--scheduler", "tcp://127.0.0.1:9", "--out", "rooms.h5"]
+    result = CliRunner().invoke(cli.scenegen, words)
+    assert result.exit_code == 2
+    assert "tcp://127.0.0.1:9" in result.stderr.splitlines()[-1]
+
+
+def test_scores_are_those_of_one_process(cluster, make_rooms, tmp_path):
+    def call(*words):
+        result = CliRunner().invoke(cli.bench, [str(word) for word in words])
+        assert result.exit_code == 0, result.output
+
+    rooms, prediction = make_rooms(tmp_path / "rooms.h5", 9), tmp_path / "empty.h5"
+    call("baseline", "empty-room", "--data", rooms, "--out", prediction)
+    scores = []
+    for name, how in (("one", []), ("many", ["--scheduler", cluster.client.scheduler.address])):
+        call("score", prediction, "--truth", rooms, "--json", tmp_path / f"{name}.json", *how)
+        scores.append(json.loads((tmp_path / f"{name}.json").read_text()))
+    assert scores[0]["metrics"] == scores[1]["metrics"]

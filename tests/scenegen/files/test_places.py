@@ -1,0 +1,116 @@
+"""URLs as targets: in memory, and of a local S3 server; the bytes are those of local files."""
+
+import os
+import tempfile
+
+import pytest
+
+from iqtt.files.make import make_split
+from iqtt.questions.specs import SplitSpec
+from scenegen.common.errors import SceneGenError, SpecError
+from scenegen.files.manifest import manifest_path, read_manifest
+from scenegen.files.places import as_place, is_remote
+
+pytest.importorskip("upath")
+SPLIT = SplitSpec(
+    seed=5, train=5, labeled=3, val=2, test=2, cubes=(6, 7), height=24, width=24, min_cube_pixels=1
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def bucket():
+    """Return the URL of a bucket of a local S3 server."""
+    moto = pytest.importorskip("moto.server")
+    boto3 = pytest.importorskip("boto3")
+    server = moto.ThreadedMotoServer(port=0, verbose=False)
+    server.start()
+    endpoint = "http://{}:{}".format(*server.get_host_and_port())
+    own = {
+        "AWS_ENDPOINT_URL": endpoint, "AWS_ACCESS_KEY_ID": "a", "AWS_SECRET_ACCESS_KEY": "b",
+        "AWS_DEFAULT_REGION": "us-east-1",
+    }  # fmt: skip
+    before = dict(os.environ)
+    os.environ.update(own)
+    boto3.client("s3").create_bucket(Bucket="bucket")
+    yield "s3://bucket"
+    os.environ.clear()
+    os.environ.update(before)
+    server.stop()
+
+
+@pytest.fixture(params=["memory", "s3"])
+def home(request):
+    """Return the URL of an empty folder in a store."""
+    name = f"{os.urandom(4).hex()}"
+    if request.param == "memory":
+        return f"memory://{name}"
+    return f"{request.getfixturevalue('bucket')}/{name}"
+
+
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    """Return the folder for temporary files."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.glob("*.h5")}
+
+
+def test_files_behind_urls_have_the_bytes_of_local_ones(home, temporary, make_rooms, tmp_path):
+    local = tmp_path / "local"
+    local.mkdir()
+    for place in (local / "one.h5", f"{home}/one.h5"):
+        make_rooms(place, 5)
+    for place in (local / "rooms.h5", f"{home}/rooms.h5"):
+        make_rooms(place, 5, {"shard_size": 2})
+    assert contents(as_place(home)) == contents(local)
+    for size, name in ((2, "shards"), (100, "whole")):
+        make_split(local / name, SPLIT, shard_size=size)
+        make_split(f"{home}/{name}", SPLIT, shard_size=size)
+        assert contents(as_place(f"{home}/{name}")) == contents(local / name)
+    assert not list(temporary.iterdir())
+
+
+def test_a_run_goes_on_behind_a_url(home, temporary, make_rooms, tmp_path):
+    path, done = f"{home}/rooms.h5", []
+
+    def stop(rows):
+        done.append(rows)
+        if sum(done) > 4:
+            raise KeyboardInterrupt
+
+    options = {"shard_size": 2, "batch": 2}
+    with pytest.raises(KeyboardInterrupt):
+        make_rooms(path, 7, {**options, "progress": stop})
+    kept = read_manifest(manifest_path(path)).shards
+    assert kept
+    as_place(f"{home}/{kept[0].file}").write_bytes(b"damaged")
+    with pytest.raises(SpecError):
+        make_rooms(path, 7, options, seed=99)
+    make_rooms(path, 7, options)
+    make_rooms(tmp_path / "rooms.h5", 7, options)
+    assert contents(as_place(home)) == contents(tmp_path)
+    with pytest.raises(FileExistsError):
+        make_rooms(path, 7, options)
+    make_rooms(path, 3, {**options, "overwrite": True})
+    names = ["rooms-00000-of-00002.h5", "rooms-00001-of-00002.h5", "rooms.h5"]
+    assert sorted(contents(as_place(home))) == names
+    assert not list(temporary.iterdir())
+
+
+@pytest.mark.parametrize("url", ["s3://no-such-bucket-of-ours/rooms.h5", "nothing://x/rooms.h5"])
+def test_a_store_that_refuses_is_told_before_the_run(bucket, make_rooms, url, temporary):
+    with pytest.raises((OSError, SceneGenError)) as refused:
+        make_rooms(url, 5, {"shard_size": 2, "progress": pytest.fail})
+    assert url.removesuffix("rooms.h5") in str(refused.value)
+    assert not list(temporary.iterdir())
+
+
+def test_a_path_of_this_machine_is_no_url(tmp_path):
+    assert not is_remote(as_place(str(tmp_path)))
+    assert not is_remote(as_place(f"file://{tmp_path}"))
+    assert is_remote(as_place("memory://x/rooms.h5"))

@@ -1,0 +1,93 @@
+"""Worker processes after the process that started them: killed, or stopped by Ctrl-C."""
+
+import functools
+import math
+import os
+import signal
+import subprocess
+import sys
+import warnings
+
+import pytest
+
+from scenegen.common.errors import SceneGenError
+from scenegen.files.pool import in_processes, in_threads
+
+BUSY = """
+import sys, time
+from scenegen.files.pool import worker_pool
+try:
+    with worker_pool(2) as pool:
+        tasks = [pool.submit(time.sleep, seconds) for seconds in (float(sys.argv[1]), 1)]
+        tasks[1].result()  # one process is busy now, and the other waits
+        time.sleep(1)
+        print("busy", flush=True)
+        [task.result() for task in tasks]
+except KeyboardInterrupt:
+    print("stopped")
+"""
+
+
+def start(seconds: float) -> subprocess.Popen[str]:
+    process = subprocess.Popen(
+        [sys.executable, "-c", BUSY, str(seconds)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    assert process.stdout.readline() == "busy\n"
+    return process
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
+def test_no_worker_outlives_a_process_that_is_killed():
+    """Were one left, it would hold standard output open, and reading it would not end."""
+    process = start(1000)
+    process.kill()
+    out, err = process.communicate(timeout=20)
+    assert out == ""
+    assert "Traceback" not in err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
+def test_ctrl_c_is_left_to_the_process_that_started_them():
+    process = start(3)
+    os.killpg(process.pid, signal.SIGINT)
+    assert process.communicate(timeout=20) == ("stopped\n", "")
+
+
+def test_results_come_in_order_from_both_kinds_of_workers():
+    tasks = [9, 1, 5, 3, 7, 2]
+    assert list(in_threads(abs, tasks, 3, 2)) == tasks
+    assert list(in_processes(abs, iter(tasks), 2)) == tasks
+
+
+@pytest.mark.parametrize("run", [in_processes, functools.partial(in_threads, ahead=1)])
+def test_errors_are_those_of_the_function(run):
+    with pytest.raises(ValueError, match="domain"):
+        list(run(math.sqrt, [4.0, -1.0, 9.0], count=2))
+
+
+def test_few_tasks_are_begun_ahead():
+    begun = []
+    results = in_threads(abs, (begun.append(i) or i for i in range(100)), 2, 5)
+    assert next(results) == 0
+    assert len(begun) <= 7
+    results.close()
+
+
+def test_warnings_of_a_process_are_given_here():
+    with pytest.warns(RuntimeWarning, match="strange"):
+        assert len(list(in_processes(_strange, [1, 2], 2))) == 2
+
+
+def _strange(task):
+    warnings.warn("strange", RuntimeWarning, stacklevel=1)
+    return task
+
+
+def test_a_process_that_ends_by_itself_is_told():
+    with pytest.raises(SceneGenError) as refused:
+        list(in_processes(os._exit, [1, 2, 3], 2))
+    assert refused.value.where == "worker processes"
