@@ -91,6 +91,7 @@ check: $(VENV)/.dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.render
@@ -100,8 +101,6 @@ bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.nearest
 	$(BIN)/python -m benchmarks.surfels
 	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.score_rows
-	$(BIN)/python -m benchmarks.quiz
-	$(BIN)/python -m benchmarks.viewing --browser
 
 # Needs an NVIDIA GPU; writes docs/gpu.md.
 bench-gpu: $(VENV)/.test
@@ -140,7 +139,7 @@ $(VENV)/.model: $(BIN)/python pyproject.toml constraints.txt
 $(VENV)/.test: $(BIN)/python pyproject.toml constraints.txt
 	$(FIND_BROWSER)
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[test]'
-	touch $@ $(VENV)/.runtime $(VENV)/.model $(VENV)/.docs
+	touch $@ $(VENV)/.runtime $(VENV)/.model
 
 $(VENV)/.dev: $(BIN)/python pyproject.toml constraints.txt
 	$(FIND_BROWSER)

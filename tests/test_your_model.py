@@ -3,9 +3,9 @@
 import json
 
 import pytest
-from page_blocks import blocks, page, run_block
+from page_blocks import blocks, run_block
 
-BLOCKS = blocks(page("your-model.md"))
+BLOCKS = blocks("your-model.md")
 SPLIT = "iqtt make-split --size 32 --train 6 --labeled 3 --val 3 --test 9 --out iqtt-split"
 SCORE_ANSWERS = "bench score answers.h5 --truth iqtt-split/iqtt-test-answers.h5"
 BATCHES = {

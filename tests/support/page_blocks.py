@@ -17,13 +17,9 @@ ENVIRONMENT = {
 }
 
 
-def page(name):
-    return (ROOT / "docs" / name).read_text()
-
-
-def blocks(text):
-    """Return (language, title, code) of each fenced block, in order."""
-    return BLOCK.findall(text)
+def blocks(page):
+    """Return (language, title, code) of each fenced block of a page of docs/, in order."""
+    return BLOCK.findall((ROOT / "docs" / page).read_text())
 
 
 def run_block(language, title, code, folder):
@@ -45,33 +41,27 @@ def run_block(language, title, code, folder):
     return done.stdout
 
 
-def told_but_not_printed(text, printed, within=0.02):
-    """Return the lines of a page's text that no later line of what was printed equals.
+def missing_lines(expected, printed, within=0.02):
+    """Return the lines of a page that were not printed, in their order.
 
-    Numbers may differ by a share, or as the last digit of what the page says allows.
+    Numbers may differ by the share `within`, or by the rounding of the page's last digit.
     """
     lines, missing = iter(printed.splitlines()), []
-    for line in filter(str.strip, text.splitlines()):
+    for line in filter(str.strip, expected.splitlines()):
         if not any(_same(line, other, within) for other in lines):
             missing.append(line)
             lines = iter(printed.splitlines())
     return missing
 
 
-def _same(told, printed, within):
-    if _words(told) != _words(printed):
-        return False
-    numbers = zip(NUMBER.findall(told), NUMBER.findall(printed), strict=True)
-    return all(near(a, b, within) for a, b in numbers)
+def _same(expected, printed, within):
+    numbers = [NUMBER.findall(line.replace(",", "")) for line in (expected, printed)]
+    words = [NUMBER.sub("#", line.replace(",", "")).split() for line in (expected, printed)]
+    return words[0] == words[1] and all(_near(a, b, within) for a, b in zip(*numbers, strict=True))
 
 
-def _words(line):
-    return " ".join(NUMBER.sub("#", line).split())
-
-
-def near(told, printed, within=0.0):
-    """Return whether a number, as it is told, is another one rounded, or near it."""
-    told, value = told.replace(",", ""), float(printed.replace(",", ""))
-    digits = len(told.partition(".")[2])
+def _near(expected, printed, within):
+    digits = len(expected.partition(".")[2])
     rounding = 0.501 * 10**-digits if digits else 0.0
-    return abs(float(told) - value) <= max(rounding, within * abs(value))
+    value = float(printed)
+    return abs(float(expected) - value) <= max(rounding, within * abs(value))
