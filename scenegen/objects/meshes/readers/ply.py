@@ -108,16 +108,18 @@ def _text_rows(body: bytes) -> TakeTable:
         values: list[list[float]] = [[] for _ in element.properties]
         sizes: list[list[int]] = [[] for _ in element.properties]
         for row in _filled(lines, element.rows):
-            words, at = row.split(), 0
+            words = row.split()
+
+            def take_words(count: int, words: list[bytes] = words) -> list[bytes]:
+                while len(words) < count:  # a long list may go on in the next line
+                    words.extend(next(_filled(lines, 1)).split())
+                taken, words[:count] = words[:count], []
+                return taken
+
             for column, one in enumerate(element.properties):
-                count = int(words[at]) if one.count_type else 1
-                at += bool(one.count_type)
-                found = words[at : at + count]
-                if len(found) != count:
-                    raise BadMeshError("PLY file", f"a line that is too short, {row[:80]!r}")
-                values[column].extend(map(float, found))
+                count = int(take_words(1)[0]) if one.count_type else 1
+                values[column].extend(map(float, take_words(count)))
                 sizes[column].append(count)
-                at += count
         return {
             one.name: (np.array(sizes[i], np.int64), np.array(values[i]).astype(np.int64))
             if one.count_type

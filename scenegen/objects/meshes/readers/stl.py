@@ -18,21 +18,22 @@ def read_stl(data: bytes) -> tuple[Array, Array]:
     Raises:
         BadMeshError: the file has neither form, or is cut short.
     """
-    count = int.from_bytes(data[80:_HEADER_BYTES], "little") if len(data) >= _HEADER_BYTES else -1
-    facets = (len(data) - _HEADER_BYTES) // _FACET.itemsize
-    whole = 0 <= count <= facets
-    is_text = data.lstrip()[:5].lower() == b"solid" and b"facet" in data[:4096].lower()
-    if is_text and not (whole and _HEADER_BYTES + count * _FACET.itemsize == len(data)):
+    # In binary files within the limits the last byte of the count, the 84th, is 0.
+    if data.lstrip()[:5].lower() == b"solid" and b"\0" not in data[:_HEADER_BYTES]:
         vertices = _text(data)
-    elif whole:
-        corners = np.frombuffer(data, _FACET, count, _HEADER_BYTES)["corners"]
-        vertices = corners.reshape(-1, 3).astype(np.float64)
-    elif count >= 0:
-        hint = "it is cut short, or no STL file"
-        raise BadMeshError("STL file", f"{facets} triangles", count, hint)
-    else:
+    elif len(data) < _HEADER_BYTES:
         found = f"{len(data)} bytes"
         raise BadMeshError("STL file", found, f"a header of {_HEADER_BYTES} bytes")
+    else:
+        count = int.from_bytes(data[80:_HEADER_BYTES], "little")
+        held = (len(data) - _HEADER_BYTES) // _FACET.itemsize
+        if count != held:
+            hint = "export it again" if count < held else "it is cut short, or no STL file"
+            raise BadMeshError(
+                "STL file", f"{held} triangles", f"{count}, as its header says", hint
+            )
+        corners = np.frombuffer(data, _FACET, count, _HEADER_BYTES)["corners"]
+        vertices = corners.reshape(-1, 3).astype(np.float64)
     return vertices, np.arange(len(vertices)).reshape(-1, 3)
 
 

@@ -93,6 +93,88 @@ def test_glb_indices_do_not_reach_into_the_next_part() -> None:
     assert faces[::2].tolist() == [[i, i + 1, i + 2] for i in (0, 4, 8, 12)]
 
 
+def tables(*arrays: np.ndarray) -> tuple[dict[str, Any], bytes]:
+    """Return accessors, from number 1 on, and the bytes of `TRIANGLES` and these arrays."""
+    kinds = {"u1": 5121, "f4": 5126}
+    types = {2: {1: "SCALAR", 3: "VEC3", 4: "VEC4"}, 3: {4: "MAT4"}}
+    views, accessors, data = [*DOCUMENT["bufferViews"]], [*DOCUMENT["accessors"]], TRIANGLES
+    for values in arrays:
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": values.nbytes})
+        kind, form = kinds[values.dtype.str[1:]], types[values.ndim][values.shape[-1]]
+        accessors.append(
+            {
+                "bufferView": len(views) - 1,
+                "componentType": kind,
+                "type": form,
+                "count": len(values),
+            }
+        )
+        data += values.tobytes()
+    return {"bufferViews": views, "accessors": accessors}, data
+
+
+POINTS = np.frombuffer(TRIANGLES, "<f4").reshape(4, 3).astype(float)
+
+
+def test_glb_instances_stand_where_their_attributes_say() -> None:
+    places = np.array([(0, 0, 0), (5, 0, 0), (0, 7, 0)], "<f4")
+    sizes = np.array([(1, 1, 1), (2, 2, 2), (1, 1, 3)], "<f4")
+    more, data = tables(places, sizes)
+    attributes = {"TRANSLATION": 1, "SCALE": 2, "_COLOR": 1}
+    instancing = {"EXT_mesh_gpu_instancing": {"attributes": attributes}}
+    node = {"mesh": 0, "translation": [0, 0, 1], "extensions": instancing}
+    required = {"extensionsRequired": ["EXT_mesh_gpu_instancing"], "nodes": [node]}
+    vertices, faces = parse_mesh(glb(DOCUMENT | more | required, data), ".glb")
+    expected = [
+        POINTS * size + place + (0, 0, 1) for size, place in zip(sizes, places, strict=True)
+    ]
+    np.testing.assert_allclose(vertices, np.concatenate(expected))
+    assert len(faces) == 6
+
+
+def test_glb_skin_places_vertices_by_their_joints_not_by_their_node() -> None:
+    """Two joints, one moved and one scaled; the last point belongs to both by halves."""
+    joints = np.array([(0, 1, 0, 0)] * 4, "<u1")
+    weights = np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 3, 0, 0), (1, 1, 0, 0)], "<f4")
+    inverse = np.stack([np.eye(4), np.diag([0.5, 0.5, 0.5, 1])]).astype("<f4")
+    inverse[0, 3, :3] = 0, 0, -1  # stored by columns
+    more, data = tables(joints, weights, inverse)
+    attributes = {"POSITION": 0, "JOINTS_0": 1, "WEIGHTS_0": 2}
+    skinned = {
+        "meshes": [{"primitives": [{"attributes": attributes, "mode": 5}]}],
+        "nodes": [
+            {"mesh": 0, "skin": 0, "scale": [100, 100, 100]},
+            {"translation": [3, 0, 0]},
+            {"scale": [4, 4, 4]},
+        ],
+        "skins": [{"joints": [1, 2], "inverseBindMatrices": 3}],
+    }
+    vertices, _ = parse_mesh(glb(DOCUMENT | more | skinned, data), ".glb")
+    by_first, by_second = POINTS + np.array([3, 0, -1]), POINTS * 2
+    expected = [by_first[0], by_second[1], by_second[2], (by_first[3] + by_second[3]) / 2]
+    np.testing.assert_allclose(vertices, expected, rtol=1e-6)
+    away = skinned | {"scenes": [{"nodes": [0, 1]}]}
+    with pytest.raises(BadMeshError, match="joint 2"):
+        parse_mesh(glb(DOCUMENT | more | away, data), ".glb")
+
+
+def test_glb_morph_weights_move_points_and_hidden_nodes_are_left_out() -> None:
+    """The second target is sparse: only its last point moves."""
+    first = np.array([(0, 0, 1)] * 4, "<f4")
+    more, data = tables(first, np.array([[3]], "<u1"), np.array([(8, 0, 0)], "<f4"))
+    index, value = ({"bufferView": 2, "componentType": 5121}, {"bufferView": 3})
+    sparse = {"count": 1, "indices": index, "values": value}
+    more["accessors"][2] = {"componentType": 5126, "type": "VEC3", "count": 4, "sparse": sparse}
+    targets = [{"POSITION": 1}, {"POSITION": 2}]
+    mesh = {"primitives": [{"attributes": {"POSITION": 0}, "mode": 5, "targets": targets}]}
+    hidden = {"mesh": 0, "extensions": {"KHR_node_visibility": {"visible": False}}}
+    nodes = [{"mesh": 0}, {"mesh": 0, "weights": [0, 0.5]}, hidden]
+    morphed = {"meshes": [mesh | {"weights": [2, 0]}], "nodes": nodes}
+    vertices, _ = parse_mesh(glb(DOCUMENT | more | morphed, data), ".glb")
+    np.testing.assert_allclose(vertices[:4], POINTS + np.array([0, 0, 2]))
+    np.testing.assert_allclose(vertices[4:], POINTS + np.outer([0, 0, 0, 1], [4, 0, 0]))
+
+
 @pytest.mark.parametrize(
     ("change", "found"),
     [
@@ -107,7 +189,9 @@ def test_glb_indices_do_not_reach_into_the_next_part() -> None:
         ({"accessors": [DOCUMENT["accessors"][0] | {"count": 10**12}]}, "longer than its data"),
         ({"accessors": [DOCUMENT["accessors"][0] | {"byteOffset": -12}]}, "longer than its data"),
         ({"accessors": [{"componentType": 5126, "type": "VEC3", "count": 9}]}, "empty tables"),
-        ({"accessors": [DOCUMENT["accessors"][0] | {"type": "MAT4"}]}, "KeyError"),
+        ({"accessors": [DOCUMENT["accessors"][0] | {"type": "MAT5"}]}, "KeyError"),
+        ({"extensionsRequired": ["VENDOR_geometry"]}, "the extension VENDOR_geometry"),
+        ({"extensionsRequired": ["KHR_materials_unlit", "EXT_x"]}, "the extension EXT_x"),
     ],
 )
 def test_glb_that_is_hostile(change: dict[str, Any], found: str) -> None:

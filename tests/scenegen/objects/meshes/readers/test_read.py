@@ -191,8 +191,30 @@ def test_off_with_its_first_line_as_it_comes(head: str) -> None:
     rows = [f"{x} {y} {z} 9 9 9 1" for x, y, z in POINTS]
     rows += [" ".join(map(str, (len(face), *face, 255, 0, 0))) for face in sorted(PYRAMID)]
     pyramid_of(*parse_mesh((head + "\n# between\n".join(rows)).encode(), ".off"))
-    with pytest.raises(BadMeshError, match="5 vertices and 4 faces"):
-        parse_mesh((head + "\n".join(rows[:-1])).encode(), ".off")
+    for lines in (rows[:-1], [*rows, "3 0 1 2"]):
+        with pytest.raises(BadMeshError, match="5 vertices and 5 faces"):
+            parse_mesh((head + "\n".join(lines)).encode(), ".off")
+
+
+@pytest.mark.parametrize("ends", [" ", "\n", " \n\t"])
+def test_off_and_ply_as_streams_of_numbers(ends: str) -> None:
+    """Lists go on in the next line, or all numbers stand in one."""
+    rows = [" ".join(map(str, (len(face), *face))) for face in sorted(PYRAMID)]
+    numbers = " ".join([*(f"{x} {y} {z}" for x, y, z in POINTS), *rows])
+    pyramid_of(*parse_mesh(f"OFF 5 5 0 {numbers.replace(' ', ends)}".encode(), ".off"))
+    head = PLY_HEAD.format("ascii") + "property float x\nproperty float y\nproperty float z\n"
+    head += "element face 5\nproperty list uchar int vertex_indices\nend_header\n"
+    lines = [f"{x} {y} {z}" for x, y, z in POINTS] + [row.replace(" ", ends) for row in rows]
+    pyramid_of(*parse_mesh((head + "\n".join(lines)).encode(), ".ply"))
+
+
+@pytest.mark.parametrize("count", [0, 1, 319, 321])
+def test_binary_stl_whose_count_is_wrong_is_never_read_in_part(count: int) -> None:
+    data = SPHERE.export(file_type="stl")
+    with pytest.raises(BadMeshError) as refused:
+        parse_mesh(data[:80] + count.to_bytes(4, "little") + data[84:], ".stl")
+    assert "320" in refused.value.found
+    assert str(count) in refused.value.expected
 
 
 def test_a_binary_stl_may_start_like_a_text_and_have_more_at_its_end() -> None:

@@ -49,7 +49,7 @@ def test_limits_hold(more: bytes, limit: str, where: str, monkeypatch: pytest.Mo
     [
         (b"ply\nformat binary_little_endian 1.0\nelement vertex 900000000000\nproperty float x\n"
          b"end_header\n", ".ply", "more rows than"),
-        (b"OFF\n900000000000 900000000000 0\n1 2 3\n", ".off", "1 vertices"),
+        (b"OFF\n900000000000 900000000000 0\n1 2 3\n", ".off", "fewer numbers"),
         (bytes(80) + b"\xff\xff\xff\xff", ".stl", "0 triangles"),
         (b"short", ".stl", "5 bytes"),
         (b"\x89PNG\r\n\x1a\n" + bytes(99), ".glb", "does not begin with glTF"),
