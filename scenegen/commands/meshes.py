@@ -57,12 +57,15 @@ def check_objects(
     """Read and clean every model of a folder, as rendering would.
 
     The folder is ShapeNetCore's or has a sub-folder for each class. Prints counts for each class
-    and why each model is refused. Exits with 1 if no model is usable.
+    and why each model is refused. Exits with 1 if no model is usable, or if files of different
+    splits have equal content.
     """
     from scenegen.files.new_file import check_writable, write_text
     from scenegen.objects.meshes.cache import default_cache_dir
     from scenegen.objects.meshes.check import check_models
     from scenegen.objects.meshes.folders import open_models
+    from scenegen.objects.meshes.listing import shared_by_splits
+    from scenegen.objects.sources import unused_notes
 
     if json_path:
         check_writable(Path(json_path), overwrite)
@@ -73,9 +76,12 @@ def check_objects(
         records = check_models(found, cache, jobs, bar.update)
     if json_path:
         write_text(json_path, _json(found, records), overwrite)
-    for line in _table(found, records):
+    for line in [*_table(found, records), *unused_notes(found)]:
         print_line(line)
-    ctx.exit(0 if any(record.ok for record in records) else 1)
+    shared = shared_by_splits(found.splits)
+    for first, second in shared:
+        print_line(f"error: one object in two splits: {first} and {second} have equal content")
+    ctx.exit(0 if any(record.ok for record in records) and not shared else 1)
 
 
 def _table(folder: "ModelFolder", records: Sequence["ModelCheck"]) -> Iterator[str]:

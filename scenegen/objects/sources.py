@@ -33,13 +33,23 @@ class ObjectSource:
     store: MeshStore | None = None
 
     def notes(self) -> list[str]:
-        """Return lines that name the models refused so far, with reasons."""
+        """Return lines that name the models refused so far, and files that are not used."""
         problems = sorted(self.store.problems.items()) if self.store else []
         lines = [f"note: {name} was passed over: {why}" for name, why in problems[:NOTES_SHOWN]]
         if len(problems) > NOTES_SHOWN:
             more = len(problems) - NOTES_SHOWN
             lines.append(f"note: and {more} more; `scenegen check-objects` lists all")
-        return lines
+        return lines + (unused_notes(self.store.folder) if self.store else [])
+
+
+def unused_notes(folder: ModelFolder) -> list[str]:
+    """Return a line that names files beside a model with its name and another suffix, if any."""
+    if not folder.unused:
+        return []
+    names = ", ".join(path.name for path in folder.unused[:NOTES_SHOWN])
+    more = ", ..." if len(folder.unused) > NOTES_SHOWN else ""
+    count = len(folder.unused)
+    return [f"note: {count} files not used, as a file of the same name is: {names}{more}"]
 
 
 def object_source(

@@ -24,7 +24,7 @@ from scenegen.objects.meshes.read import parse_mesh, read_bytes
 from scenegen.objects.solids import Array
 
 _ARRAYS = {"vertices": np.float32, "faces": np.int32, "hull_points": np.float64}
-CLEANING_VERSION = 1  # raise it when a file would give other triangles or hull points than before
+CLEANING_VERSION = 2  # raise it when a file would give other triangles or hull points than before
 
 
 @dataclass(frozen=True, eq=False)

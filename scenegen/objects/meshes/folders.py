@@ -1,6 +1,5 @@
 """Folders of mesh files with one sub-folder per class; `open_models` also recognises ShapeNet."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -36,8 +35,9 @@ def open_objects(
 ) -> ModelFolder:
     """List a folder of OBJ, PLY, STL, GLB and OFF files with one sub-folder per class.
 
-    A model's id is its path below its class's folder without the suffix, or with it where two files
-    differ in nothing else. Hidden files, and links to folders inside a class, are ignored.
+    An object's id is its path below its class's folder without the suffix. Files that differ in
+    nothing else are one object: the first of OBJ, PLY, STL, GLB, OFF is read. Hidden files are
+    ignored.
 
     Args:
         classes: names of sub-folders; None for all that hold meshes.
@@ -45,7 +45,8 @@ def open_objects(
         split: "all", or "train", "val" or "test" by `object_split` of the ids.
 
     Raises:
-        MeshFolderError: there is no such folder, class, axis or split, or no model is left.
+        MeshFolderError: there is no such folder, class, axis or split, no model is left, or files
+            of equal content are in two splits.
     """
     root = existing(root)
     if up not in ("y", "z"):
@@ -59,11 +60,8 @@ def open_objects(
 
     def models_of(name: str) -> Iterator[tuple[str, Path]]:
         folder = root / name
-        files = [(path.relative_to(folder), path) for path in mesh_files(folder, _DEPTH)]
-        ids = [below.with_suffix("").as_posix() for below, _ in files]
-        times = Counter(ids)
-        for model_id, (below, path) in zip(ids, files, strict=True):
-            yield (below.as_posix() if times[model_id] > 1 else model_id), path
+        for path in mesh_files(folder, _DEPTH, (root.resolve(),)):
+            yield path.relative_to(folder).with_suffix("").as_posix(), path
 
     return make_listing(
         root, "folder", up, names, classes, split, models_of, lambda _, i: object_split(i)

@@ -3,7 +3,8 @@
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from scenegen.description.specs import SPLITS
@@ -29,12 +30,16 @@ class ModelFolder:
         up: the axis, "y" or "z", that points up in the files.
         classes: sorted, or in the order asked for.
         models: the models of the split by class, sorted by name.
+        unused: files that differ from the file of a model in their suffix alone.
+        splits: of all files of these classes, by `object_split`; empty where splits are official.
     """
 
     kind: str
     up: str
     classes: tuple[str, ...]
     models: Mapping[str, tuple[ModelFile, ...]]
+    unused: tuple[Path, ...] = ()
+    splits: Mapping[Path, str | None] = field(default_factory=dict)
 
     def digest(self) -> str:
         """Return the SHA-256, as hex, of kind, up and all names in order, but not of the paths."""
@@ -62,18 +67,20 @@ def make_listing(
     split: str,
     models_of: Callable[[str], Iterable[tuple[str, Path]]],
     split_of: Callable[[str, str], str | None],
+    check_splits: bool = True,
 ) -> ModelFolder:
-    """Choose classes and models.
+    """Choose classes and models. Of several files with one id, the first by suffix is the model.
 
     Args:
         known: all classes, sorted.
         asked: the classes to take, among `known`; None for all that are not empty.
         models_of: gives (id, path) of a class's models.
         split_of: gives the split of (class, id).
+        check_splits: whether files of equal content in two splits are an error.
 
     Raises:
         MeshFolderError: the class or split is unknown, or a class that was asked for, or every
-            class, is empty.
+            class, is empty, or two splits share an object.
     """
     if split not in SPLITS:
         raise MeshFolderError("object split", repr(split), f"one of {', '.join(SPLITS)}")
@@ -84,22 +91,62 @@ def make_listing(
         named = ", ".join(name for name in unknown if name)
         found = f"no class {named}" if named else "no class named"
         raise MeshFolderError(root, found, f"some of {', '.join(on_disk)}")
-    models, others = {}, 0
+    models, others, splits, unused = {}, 0, {}, []
     for name in dict.fromkeys(known if asked is None else asked):
-        found_models = sorted((_valid(model_id), path) for model_id, path in models_of(name))
-        files = tuple(
-            ModelFile(f"{_valid(name)}/{model_id}", path)
-            for model_id, path in found_models
-            if split == "all" or split_of(name, model_id) == split
-        )
-        others += len(found_models) - len(files)
+        by_id: dict[str, list[Path]] = {}
+        for model_id, path in models_of(name):
+            by_id.setdefault(_valid(model_id), []).append(path)
+        files = []
+        for model_id, paths in sorted(by_id.items()):
+            path, *same = sorted(paths, key=_by_suffix)
+            unused += same
+            splits[path] = split_of(name, model_id)
+            if split in ("all", splits[path]):
+                files.append(ModelFile(f"{_valid(name)}/{model_id}", path))
+        others += len(by_id) - len(files)
         if files:
-            models[_valid(name)] = files
+            models[_valid(name)] = tuple(files)
         elif asked is not None:
-            raise _no_models(f"{root}: class {name}", split, len(found_models))
+            raise _no_models(f"{root}: class {name}", split, len(by_id))
     if not models:
         raise _no_models(root, split, others)
-    return ModelFolder(kind, up, tuple(models), models)
+    if check_splits and split != "all":
+        for first, second in shared_by_splits(splits):
+            found = f"one object in two splits, {first} and {second}"
+            raise MeshFolderError(root, found, hint="remove one of these files, equal in content")
+    told = splits if check_splits else {}
+    return ModelFolder(kind, up, tuple(models), models, tuple(unused), told)
+
+
+def _by_suffix(path: Path) -> tuple[int, str]:
+    return SUFFIXES.index(path.suffix.lower()), path.name
+
+
+def shared_by_splits(splits: Mapping[Path, str | None]) -> list[tuple[Path, Path]]:
+    """Return pairs of files that are in different splits and have equal content.
+
+    Only files as large as a file of another split are read.
+    """
+    by_size: dict[int, list[Path]] = {}
+    for path in splits:
+        with suppress(OSError):  # a file that cannot be read is refused when it is used
+            by_size.setdefault(path.stat().st_size, []).append(path)
+    pairs = []
+    for size, paths in sorted(by_size.items()):
+        if not size or len({splits[path] for path in paths}) < 2:
+            continue
+        first: dict[str, Path] = {}
+        for path in paths:
+            with suppress(OSError):
+                other = first.setdefault(_sha256(path), path)
+                if splits[other] != splits[path]:
+                    pairs.append((other, path))
+    return pairs
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _no_models(where: object, split: str, in_other_splits: int) -> MeshFolderError:
@@ -131,18 +178,20 @@ def subfolders(path: Path) -> Iterator[str]:
 
     Raises MeshFolderError where the folder cannot be listed.
     """
-    return (entry.name for entry in _entries(path) if _is_folder(entry, follow=True))
+    return (entry.name for entry in _entries(path) if _is_folder(entry))
 
 
-def mesh_files(path: Path, depth: int) -> Iterator[Path]:
-    """Yield the files with a mesh suffix, down to `depth` levels below, following no links.
+def mesh_files(path: Path, depth: int, above: tuple[Path, ...] = ()) -> Iterator[Path]:
+    """Yield the files with a mesh suffix, down to `depth` levels below.
 
-    Raises MeshFolderError where a folder cannot be listed.
+    Links are followed, but not back into one of the folders `above`. Raises MeshFolderError where a
+    folder cannot be listed.
     """
+    above = (*above, path.resolve())
     for entry in _entries(path):
-        if _is_folder(entry, follow=False):
-            if depth:
-                yield from mesh_files(Path(entry.path), depth - 1)
+        if _is_folder(entry):
+            if depth and not (entry.is_symlink() and Path(entry.path).resolve() in above):
+                yield from mesh_files(Path(entry.path), depth - 1, above)
         elif entry.name.lower().endswith(SUFFIXES):
             yield Path(entry.path)
 
@@ -152,15 +201,13 @@ def _entries(path: Path) -> list[os.DirEntry[str]]:
         with os.scandir(path) as entries:
             return [entry for entry in entries if not entry.name.startswith(".")]
     except OSError as error:
-        found, hint = (
-            f"an error ({error.strerror})",
-            "give read permission, or move the folder away",
-        )
-        raise MeshFolderError(path, found, "a readable folder", hint) from error
+        message = f"{path}: the folder cannot be read ({error.strerror})"
+        hint = "give read permission, or move the folder away"
+        raise MeshFolderError(message, hint=hint) from error
 
 
-def _is_folder(entry: os.DirEntry[str], follow: bool) -> bool:
+def _is_folder(entry: os.DirEntry[str]) -> bool:
     try:
-        return entry.is_dir(follow_symlinks=follow)
+        return entry.is_dir()
     except OSError:  # a link to itself
         return False

@@ -42,7 +42,8 @@ def open_shapenet(
     """List ShapeNetCore, of whichever version is there.
 
     Splits are the official ones if `all.csv` is in the root (models missing from it are in no
-    split), else those of `object_split`.
+    split), else those of `object_split`. Official splits are taken as they are, also where two of
+    them share an object.
 
     Args:
         classes: names such as "mug", or synsets such as "03797390"; None for all that are there.
@@ -82,7 +83,9 @@ def open_shapenet(
         return official.get((shown[name], model_id))
 
     asked = None if classes is None else [name_of(name) for name in classes]
-    return make_listing(root, kind, "y", sorted(shown), asked, split, models_of, split_of)
+    return make_listing(
+        root, kind, "y", sorted(shown), asked, split, models_of, split_of, official is None
+    )
 
 
 def shapenet_version(root: Path) -> str | None:

@@ -14,6 +14,7 @@ from click.testing import Result
 
 from scenegen.objects.meshes.check import ModelCheck, check_models
 from scenegen.objects.meshes.folders import open_objects
+from scenegen.objects.meshes.listing import object_split
 
 BOX = trimesh.creation.box()
 ROOT = Path(__file__).parents[4]
@@ -29,6 +30,9 @@ def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         path = root / f"{name}.off"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(BOX.export(file_type="off"))
+    (root / "caf\u00e9" / "d.off").write_text(
+        trimesh.creation.box((1, 2, 3)).export(file_type="off")
+    )
     double = trimesh.Trimesh(BOX.vertices, [*BOX.faces, BOX.faces[0]], process=False)
     (root / "box" / "double.off").write_text(double.export(file_type="off"))
     (root / "box" / "empty.obj").touch()
@@ -55,7 +59,21 @@ def test_table_and_json(run: Callable[..., Result], root: Path, tmp_path: Path) 
     refused = by_name["box/empty"]
     assert (refused["ok"], refused["faces"], refused["mended"]) == (False, 0, {})
     assert f"refused  box/empty: {refused['reason']}" in result.stdout
-    assert len(list((tmp_path / "xdg/pix2shape-bench/meshes").iterdir())) == 3, "equal files: one"
+    assert len(list((tmp_path / "xdg/pix2shape-bench/meshes").iterdir())) == 4, "equal files: one"
+
+
+def test_equal_files_in_two_splits_are_an_error(
+    run: Callable[..., Result], refuses: Callable[..., str], root: Path
+) -> None:
+    (root / "caf\u00e9" / "copy.off").write_bytes((root / "box" / "b.off").read_bytes())
+    assert object_split("b") == object_split("copy")
+    assert run("check-objects", root).exit_code == 0
+    (root / "caf\u00e9" / "d.off").write_bytes((root / "box" / "b.off").read_bytes())
+    assert object_split("d") == "test"
+    assert run("check-objects", root).exit_code == 1
+    for split in ("train", "test"):
+        command = ("render", "--n", "1", "--objects-root", root, "--out", "r.h5")
+        refuses(*command, "--object-split", split, words=("d.off", "two splits"))
 
 
 def test_exit_codes(run: Callable[..., Result], refuses: Callable[..., str], root: Path) -> None:
@@ -97,6 +115,7 @@ DEADLY = """
 import os, sys
 from scenegen.objects.meshes import cache, check
 from scenegen.objects.meshes.folders import open_objects
+from scenegen.objects.meshes.listing import object_split
 if __name__ == "__main__":
     for record in check.check_models(open_objects(sys.argv[1]), None, 2, None):
         print(record.name, record.ok, record.reason)
@@ -113,6 +132,7 @@ UNGUARDED = """
 import sys
 from scenegen.objects.meshes import check
 from scenegen.objects.meshes.folders import open_objects
+from scenegen.objects.meshes.listing import object_split
 check.check_models(open_objects(sys.argv[1]), None, 2)
 """
 

@@ -134,7 +134,7 @@ def test_the_official_splits_go_before_the_hash(shapenet: Callable[..., Path]) -
 
 
 def test_plain_folders(make: Make) -> None:
-    """Files of any depth; ids lack the suffix unless two would be equal; no hidden files."""
+    """Files of any depth; files that differ in suffix are one object; no hidden files."""
     root = make(
         "mug/b.obj", "mug/a.PLY", "mug/deep/er/c.stl", "mug/twin.glb", "mug/twin.off", "mug/t.mtl",
         "mug/v1.2.obj", "mug/.hidden.obj", ".git/x.obj", "caf\u00e9 \u6f22/z z.obj", "none/x.txt",
@@ -143,9 +143,10 @@ def test_plain_folders(make: Make) -> None:
     found = open_objects(root, up="z")
     assert (found.kind, found.up, found.classes) == ("folder", "z", ("caf\u00e9 \u6f22", "mug"))
     assert names_of(found) == [
-        "caf\u00e9 \u6f22/z z", "mug/a", "mug/b", "mug/deep/er/c", "mug/twin.glb", "mug/twin.off",
-        "mug/v1.2",
+        "caf\u00e9 \u6f22/z z", "mug/a", "mug/b", "mug/deep/er/c", "mug/twin", "mug/v1.2",
     ]  # fmt: skip
+    assert found.models["mug"][3].path.name == "twin.glb"
+    assert [path.name for path in found.unused] == ["twin.off"]
     assert found.models["mug"][0] == ModelFile("mug/a", root / "mug" / "a.PLY")
     assert open_models(root).kind == "folder"
 
@@ -157,7 +158,8 @@ def test_links_are_followed_to_classes_and_files_but_not_in_circles(make: Make) 
     (root / "loop").symlink_to(root / "loop")
     (root / "mug" / "c.obj").symlink_to(root / "mug" / "a.obj")
     (root / "same").symlink_to(root / "mug", target_is_directory=True)
-    names = ["a", "c", "in/b"]
+    (root / "mug" / "linked").symlink_to(make("deep/x.obj", root="elsewhere"))
+    names = ["a", "c", "in/b", "linked/deep/x"]
     assert names_of(open_objects(root)) == [f"{c}/{n}" for c in ("mug", "same") for n in names]
     (root / "03797390").symlink_to(root)
     assert open_models(root).kind == "folder"
@@ -171,6 +173,14 @@ def test_names_that_are_not_utf8_can_be_stored(make: Make) -> None:
     assert found.models["mug"][1].path.exists()
     assert found.digest()
     assert open_objects(root, split=object_split("caf\\xe9")).models["mug"]
+
+
+def test_a_copy_in_another_format_moves_no_object_to_another_split(make: Make) -> None:
+    root = make(*(f"c/{i}.obj" for i in range(20)))
+    before = {name: names_of(open_objects(root, split=name)) for name in ("train", "test")}
+    make(*(f"c/{i}.{suffix}" for i in range(20) for suffix in ("stl", "PLY")))
+    assert before == {name: names_of(open_objects(root, split=name)) for name in before}
+    assert len(open_objects(root).unused) == 40
 
 
 def test_the_digest_is_of_names_not_of_paths(shapenet: Callable[..., Path], make: Make) -> None:
@@ -231,4 +241,4 @@ def test_files_and_folders_that_cannot_be_read(
     monkeypatch.setattr("os.scandir", Mock(side_effect=PermissionError(13, "Permission denied")))
     with pytest.raises(MeshFolderError) as refused:
         open_objects(root)
-    assert "Permission denied" in refused.value.found
+    assert "Permission denied" in str(refused.value)
