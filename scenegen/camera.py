@@ -21,6 +21,7 @@ from scenegen.common.rotations import cross
 
 Vector3 = tuple[float, float, float]
 Array = NDArray[Any]
+_FIRST_CENTER = {"half": 0.5, "integer": 0.0}
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,19 @@ def transform_vectors(matrix: Array, vectors: Array) -> NDArray[np.float64]:
     return np.asarray(vectors @ matrix[:3, :3].T)
 
 
-def intrinsics(height: int, width: int, fov_y_degrees: float) -> NDArray[np.float64]:
-    """Return the (3, 3) camera matrix, in pixels, of tools with x right, y DOWN, z forward."""
+def intrinsics(
+    height: int, width: int, fov_y_degrees: float, *, pixel_centers: str
+) -> NDArray[np.float64]:
+    """Return the (3, 3) camera matrix, in pixels, of tools with x right, y DOWN, z forward.
+
+    Args:
+        pixel_centers: where the tool puts the centre of the first pixel: "half" for (0.5, 0.5), as
+            here, in COLMAP and in nerfstudio; "integer" for (0, 0), as in OpenCV and Open3D.
+
+    Raises SpecError for another name.
+    """
+    check(pixel_centers in _FIRST_CENTER, "pixel_centers", pixel_centers, "half or integer")
     focal = height / 2 / math.tan(math.radians(fov_y_degrees) / 2)
-    return np.array([[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]])
+    shift = _FIRST_CENTER[pixel_centers] - 0.5
+    x, y = width / 2 + shift, height / 2 + shift
+    return np.array([[focal, 0.0, x], [0.0, focal, y], [0.0, 0.0, 1.0]])

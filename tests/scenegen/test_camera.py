@@ -86,18 +86,25 @@ def test_outer_pixels_lie_half_a_pixel_inside_the_field_of_view(
 
 
 @settings(deadline=None)
-@given(height=SIDE, width=SIDE, fov=FOV, seed=st.integers(0, 99))
+@given(
+    height=SIDE,
+    width=SIDE,
+    fov=FOV,
+    seed=st.integers(0, 99),
+    centers=st.sampled_from([("half", 0.5), ("integer", 0.0)]),
+)
 def test_projection_takes_back_projected_points_to_their_pixels(
-    height: int, width: int, fov: float, seed: int
+    height: int, width: int, fov: float, seed: int, centers: tuple[str, float]
 ) -> None:
-    """Projection is written out here: OpenCV's, y down and z forward, pixel centres at + 0.5."""
+    """Projection is written out here: y down and z forward, first centre at 0.5 or at 0."""
+    name, first = centers
     depth = np.random.default_rng(seed).uniform(0.1, 5.0, (height, width))
     points = back_project(depth, fov)
     np.testing.assert_array_equal(points[..., 2], -depth)
-    seen = points * (1, -1, -1) @ intrinsics(height, width, fov).T
+    seen = points * (1, -1, -1) @ intrinsics(height, width, fov, pixel_centers=name).T
     columns, rows = seen[..., 0] / seen[..., 2], seen[..., 1] / seen[..., 2]
-    np.testing.assert_allclose(columns, np.tile(np.arange(width) + 0.5, (height, 1)), atol=1e-9)
-    expected_rows = np.tile(np.arange(height)[:, None] + 0.5, (1, width))
+    np.testing.assert_allclose(columns, np.tile(np.arange(width) + first, (height, 1)), atol=1e-9)
+    expected_rows = np.tile(np.arange(height)[:, None] + first, (1, width))
     np.testing.assert_allclose(rows, expected_rows, atol=1e-9)
 
 

@@ -192,7 +192,9 @@ def test_no_pixel_of_the_border_shows_the_bounding_sphere(height, width, fov, ra
     matrix = np.linalg.inv(camera.world_from_camera)
     seen = np.concatenate([points, radius * outline]) @ matrix[:3, :3].T + matrix[:3, 3]
     assert (seen[:, 2] < 0).all()
-    image = (seen * (1, -1, -1)) @ intrinsics(height, width, camera.fov_y_degrees).T
+    image = (seen * (1, -1, -1)) @ intrinsics(
+        height, width, camera.fov_y_degrees, pixel_centers="half"
+    ).T
     pixels = image[:, :2] / image[:, 2:]
     off_centre = abs(pixels - (width / 2, height / 2)) / (min(height, width) / 2)
     side = min(height, width)
@@ -202,7 +204,7 @@ def test_no_pixel_of_the_border_shows_the_bounding_sphere(height, width, fov, ra
 def test_an_edge_has_the_length_in_pixels_that_is_said():
     for height, width in ((128, 128), (64, 96), (160, 96)):
         spec = SplitSpec(height=height, width=width, min_cube_pixels=1)
-        focal = intrinsics(height, width, spec.fov_y_degrees)[0, 0]
+        focal = intrinsics(height, width, spec.fov_y_degrees, pixel_centers="half")[0, 0]
         assert spec.pixels_per_edge == pytest.approx(focal / spec.camera_distance)
 
 
