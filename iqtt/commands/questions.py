@@ -9,10 +9,10 @@ from pathlib import Path
 import click
 
 from iqtt.commands.making import QUESTIONS
-from scenegen.command_line import options, output
+from scenegen.command_line import options
 from scenegen.command_line.groups import EXAMPLE
 from scenegen.command_line.options import Items
-from scenegen.command_line.output import print_line, progress_bar
+from scenegen.command_line.output import on_scheduler, print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputPath
 
 SHOWN = 8  # questions that `show` draws by default
@@ -28,9 +28,9 @@ option = partial(click.option, show_default=True)
 @option(
     "--out",
     type=OutputPath(),
-    help="Picture to write; its suffix names the format [questions.png where none can be shown].",
+    default="questions.png",
+    help="Picture to write; its suffix names the format.",
 )
-@options.SHOW
 @option("--items", type=Items(), help="Questions to show [default: the first 8].")
 @option("--part", type=click.Choice(["labeled", "unlabeled"]), help="Part of a training file.")
 @option(
@@ -39,17 +39,13 @@ option = partial(click.option, show_default=True)
 @options.OVERWRITE
 def show(
     file: str,
-    out: str | None,
-    show: str,
+    out: str,
     items: list[int] | None,
     part: str | None,
     answers: bool,
     overwrite: bool,
 ) -> None:
-    """Draw questions of FILE: the reference on the left, its answers beside it.
-
-    Terminals that can draw pictures show them; else they are written to a file.
-    """
+    """Draw questions of FILE: the reference on the left, its answers beside it."""
     from iqtt.files.preview import question_sheet
     from iqtt.files.reader import answers_beside, open_questions, parts
     from scenegen.common.errors import SpecError
@@ -64,9 +60,8 @@ def show(
         task = questions.attributes.get("task", "")
         sheet = question_sheet([questions[row] for row in rows], answers, task)
         count = len(questions)
-    save = partial(save_picture, sheet, overwrite=overwrite)
-    done = output.show_or_save(sheet, show, out, "questions.png", save)
-    print_line(f"{done}: {len(rows)} of {file}'s {count} questions")
+    save_picture(sheet, out, overwrite)
+    print_line(f"{out}: {len(rows)} of {file}'s {count} questions")
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt info iqtt-split/iqtt-val.h5")
@@ -120,7 +115,7 @@ def audit(
         check_writable(Path(json_path), overwrite)
     groups = find_splits(splits)
     with (
-        output.on_scheduler(scheduler, 0, program_version) as cluster,
+        on_scheduler(scheduler, 0, program_version) as cluster,
         progress_bar(sum(map(question_count, groups)), "question") as bar,
     ):
         found = [

@@ -122,10 +122,6 @@ WORKERS = click.option("--workers", type=click.IntRange(0, 256), default=0,
 SCHEDULER = click.option("--scheduler", metavar="ADDRESS",
                          help="Spread the work over a Dask cluster, such as tcp://host:8786; local"
                          " starts one on this machine.")
-SHOW = click.option("--show", type=click.Choice(["auto", "kitty", "sixel", "no"]), default="auto",
-                    show_default=True,
-                    help="Draw the picture in the terminal, in this protocol; auto does so where"
-                    " there is no --out and the terminal says that it can.")
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 DEVICE = click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
                       show_default=True,

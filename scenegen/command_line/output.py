@@ -1,58 +1,21 @@
-"""What commands show: lines, pictures, progress, and the notes of a scheduler."""
+"""What commands show: lines, progress, and the notes of a scheduler."""
 
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from scenegen.command_line.paths import refuse_command_inputs
-from scenegen.command_line.streams import for_pictures, for_progress_bars
+from scenegen.command_line.streams import for_progress_bars
 from scenegen.common.text_table import printable
 
 if TYPE_CHECKING:
-    from PIL.Image import Image
-
     from scenegen.files.cluster import Cluster, Versions
 
 
 def print_line(text: str, err: bool = False) -> None:
     """Print one line, whatever names from files it holds."""
     click.echo(printable(text), err=err)
-
-
-def show_or_save(
-    picture: "Image", show: str, out: str | None, otherwise: str, save: Callable[[str], Any]
-) -> str:
-    """Show a picture in the terminal, write it, or both; return what to call it.
-
-    Args:
-        show: value of the option SHOW.
-        out: where to write it, as the user says.
-        otherwise: where to write it if it is not shown.
-        save: writes it.
-
-    Raises SpecError for kitty's protocol where it would not reach the terminal; as `save`.
-    """
-    from scenegen.common.errors import SpecError
-    from scenegen.common.terminal import abilities
-
-    protocol = abilities.protocol() if (show, out) == ("auto", None) else show
-    shown = protocol in abilities.PROTOCOLS
-    if show == "kitty" and sys.stdout.isatty() and abilities.within_another():
-        found = "tmux, screen or zellij around it, which do not pass it on"
-        raise SpecError("--show kitty", found, "a terminal of its own", "use --out")
-    if not shown or out:
-        refuse_command_inputs([out or otherwise])
-        save(out or otherwise)
-    if shown:
-        from scenegen.common.terminal.pictures import escapes
-
-        stream = for_pictures()
-        stream.write(escapes(picture, str(protocol), abilities.width()) + "\n")
-        stream.flush()
-    return out or (otherwise if not shown else "shown (--out writes a file)")
 
 
 def progress_bar(count: int | None, unit: str) -> Any:

@@ -49,11 +49,6 @@ def for_progress_bars() -> Any:
     return sys.stderr.unfiltered() if isinstance(sys.stderr, _Shown) else sys.stderr
 
 
-def for_pictures() -> Any:
-    """Return standard output for escapes that draw a picture."""
-    return sys.stdout.unfiltered() if isinstance(sys.stdout, _Shown) else sys.stdout
-
-
 class _Shown(io.TextIOWrapper):
     """A stream of text that shows what a terminal would obey as escapes.
 

@@ -5,15 +5,14 @@ Each one parses its options, makes one library call, and prints. Heavy imports h
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 from scenegen.command_line.groups import EXAMPLE, needs
-from scenegen.command_line.options import DEVICE, MESHES, OVERWRITE, SHOW, Items
-from scenegen.command_line.output import print_line, progress_bar, show_or_save
+from scenegen.command_line.options import DEVICE, MESHES, OVERWRITE, Items
+from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import (
     InputPath,
     OutputFolder,
@@ -28,9 +27,8 @@ SHARED = ("parquet", "webdataset")  # and of files of many
 @click.command(epilog=f"{EXAMPLE}scenegen preview rooms.h5 --random 12 --out sheet.png")
 @click.argument("file", type=InputPath())
 @click.option(
-    "--out", type=OutputPath(), help="Picture to write [sheet.png where none can be shown]."
+    "--out", type=OutputPath(), default="sheet.png", show_default=True, help="Picture to write."
 )
-@SHOW
 @click.option("--items", type=Items(), help="Rows to show [default: the first 12].")
 @click.option(
     "--random", "number", type=click.IntRange(1, 400), help="Number of rows to pick at random."
@@ -39,26 +37,21 @@ SHARED = ("parquet", "webdataset")  # and of files of many
 @OVERWRITE
 def preview(
     file: str,
-    out: str | None,
-    show: str,
+    out: str,
     items: list[int] | None,
     number: int | None,
     seed: int,
     overwrite: bool,
 ) -> None:
-    """Show some rooms of a file in one picture: image, depth, normals and object ids.
-
-    Terminals that can draw pictures show it; else it is written to a file.
-    """
+    """Write a picture of some rooms of a file: image, depth, normals and object ids."""
     from scenegen.rooms.preview import contact_sheet, pick_rows, save_picture
     from scenegen.rooms.reader import RoomsFile
 
     with RoomsFile(file) as rooms:
         rows = pick_rows(len(rooms), items, number, seed)
         sheet = contact_sheet([rooms[i] for i in rows])
-    save = partial(save_picture, sheet, overwrite=overwrite)
-    done = show_or_save(sheet, show, out, "sheet.png", save)
-    print_line(f"{done}: {len(rows)} of {file}'s rooms")
+    save_picture(sheet, out, overwrite)
+    print_line(f"{out}: {len(rows)} of {file}'s rooms")
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen info rooms.h5")

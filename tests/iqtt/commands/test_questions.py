@@ -10,7 +10,6 @@ import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from terminals import WITH_SIXEL, in_terminal, sixel_pixels
 
 import cli
 from iqtt.questions.specs import secret_seed
@@ -288,10 +287,3 @@ def test_a_picture_is_replaced_only_when_told(run, split, tmp_path, check_refusa
     check_refusal(refused.exit_code, refused.stdout, refused.stderr, ("--overwrite",))
     assert run(*words, "--overwrite").exit_code == 0
     assert (tmp_path / "questions.png").read_bytes()[:4] == b"\x89PNG"
-
-
-def test_show_draws_in_a_terminal(split, tmp_path):
-    command = ["-c", "import cli; cli.iqtt(prog_name='iqtt')", "show", str(split / "iqtt-val.h5")]
-    done = in_terminal(command, WITH_SIXEL, size=(24, 200, 2000, 500), cwd=tmp_path)
-    assert sixel_pixels(done.shown).std() > 10
-    assert (done.code, list(tmp_path.iterdir())) == (0, [])

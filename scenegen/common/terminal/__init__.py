@@ -1,1 +1,0 @@
-"""Pictures in terminals: what one can show (`abilities`), and how it is told (`pictures`)."""
