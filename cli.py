@@ -9,7 +9,7 @@ ROOMS = tuple(
 )
 QUESTIONS = (
     *(f"iqtt.commands.{name}" for name in ("making", "questions", "sharing")),
-    "metrics.people.commands",
+    "metrics.commands.people",
 )
 
 SCORES = ("metrics.commands.submissions", "metrics.commands.standings", "baselines.commands")

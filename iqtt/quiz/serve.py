@@ -15,9 +15,6 @@ import uvicorn
 from starlette.types import ASGIApp
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from scenegen.common.errors import SpecError
-from scenegen.common.web_hosts import EVERYWHERE
-
 EXCHANGE_SECONDS = 30  # for a request and its response; who is slower is cut off
 IDLE_SECONDS = 5
 FAREWELL_SECONDS = 3
@@ -74,37 +71,6 @@ class QuietServer(uvicorn.Server):
             for number in heard:
                 loop.remove_signal_handler(number)
                 signal.signal(number, before[number])
-
-
-def listen(host: str, port: int) -> socket.socket:
-    """Return a socket that listens; port 0 takes any free one.
-
-    Raises SpecError for a host that is not here; OSError where the port is taken.
-    """
-    try:
-        family, kind, protocol, _, address = socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )[0]
-    except (OSError, UnicodeError) as error:
-        raise SpecError("host", host, "a name or an address of this machine") from error
-    # asyncio sends small packets at once only where it is told that the protocol is TCP.
-    listening = socket.socket(family, kind, protocol)
-    try:
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.bind(address)
-        listening.listen(1024)
-    except OSError as error:
-        listening.close()
-        raise OSError(error.errno, f"port {port}: {error.strerror}; name another", host) from error
-    return listening
-
-
-def address_of(listening: socket.socket, host: str) -> str:
-    """Return what people type in to come to the first page."""
-    port = listening.getsockname()[1]
-    if host in (EVERYWHERE, "::"):  # all addresses of this machine
-        host = socket.gethostname()
-    return f"http://{f'[{host}]' if ':' in host else host}:{port}/"
 
 
 def serve(app: ASGIApp, listening: socket.socket, ready: Callable[[], Any]) -> None:

@@ -10,7 +10,7 @@ from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import MESHES, MOST_PROCESSES, OVERWRITE, SCHEDULER, Items
 from scenegen.command_line.output import on_scheduler, print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputPath, refuse_inputs
-from scenegen.commands.viewing import page_options
+from scenegen.commands.viewing import OPEN, host_options
 
 TRUTH = click.option(
     "--truth",
@@ -157,7 +157,8 @@ def validate(ctx: click.Context, submission: str, truth: str | None) -> None:
     "--items", type=Items(),
     help="Rows of the truth to show [default: all of --scores, or the first 100].",
 )  # fmt: skip
-@page_options
+@host_options(8080)
+@OPEN
 @MESHES
 def view(
     submission: str,
@@ -181,12 +182,12 @@ def view(
     from metrics.submissions.truths import find_truth
     from metrics.viewing.order import MOST_SCORED, require_rooms, shown_scores
     from metrics.viewing.page import PredictionPage
-    from scenegen.common.web_hosts import listening_host
+    from scenegen.common.web_hosts import hosts_of
     from scenegen.rooms.reader import RoomsFile
     from scenegen.viewing.geometry import shapes_of
     from scenegen.viewing.server import serve, started
 
-    where = listening_host(host, public), port, names
+    hosts = hosts_of(host, public, names)
     with open_predictions(submission) as opened:
         predictions = require_rooms(opened)
         with RoomsFile(find_truth(predictions, truth).path) as rooms:
@@ -197,9 +198,9 @@ def view(
             count = len(items) if items else min(len(predictions), MOST_SCORED)
             with progress_bar(count, "image") as bar:
                 scores = shown_scores(predictions, rooms, items, scores_path, bar.update)
-            with started(f"{predictions.method}: {submission}", *where) as server:
+            with started(f"{predictions.method}: {submission}", hosts, port) as server:
                 PredictionPage(server, rooms, predictions, scores, shape_of)
-                serve(server, print_line, open_browser, public)
+                serve(server, hosts, print_line, open_browser)
 
 
 @click.command("describe-format", epilog=EXAMPLE + "bench describe-format")

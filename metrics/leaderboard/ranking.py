@@ -23,7 +23,6 @@ from metrics.leaderboard.floors import (
     require_same_floors,
     skill_key,
 )
-from metrics.leaderboard.names import check_names
 from metrics.leaderboard.table import (
     INCOMPARABLE_MARK,
     REPORTED_MARK,
@@ -72,9 +71,8 @@ def leaderboard(
 
     Raises LeaderboardError where a file is given twice or files that claim to score all of one test
     set score different rows of it, FloorError where they state different floors of it,
-    LookAlikeError for names that could be taken for others, and UnknownMetricError.
+    and UnknownMetricError.
     """
-    check_names(files)
     _require_once(files)
     chosen = {name: metric(name).task for name in metrics or ()}
     groups: dict[tuple[str, str], list[ScoreFile]] = {}

@@ -1,4 +1,4 @@
-"""The command that shows rooms in 3D, in the browser; `bench view` has the same options."""
+"""The command that shows rooms in 3D, in the browser, and options of all that serve pages."""
 
 from collections.abc import Callable
 from functools import reduce
@@ -14,28 +14,34 @@ from scenegen.command_line.paths import InputPath
 Command = Callable[..., Any]
 
 
-def page_options(command: Command) -> Command:
-    """Add the options that say where a page is served."""
+def host_options(port: int) -> Callable[[Command], Command]:
+    """Return what adds the options that say where pages are served; `port` is the default."""
     options = (
-        click.option("--port", type=click.IntRange(0, 65535), default=8080, show_default=True,
-                     help="Port to listen at; 0 takes any that is free."),
         click.option("--host", metavar="ADDRESS",
-                     help="Address to listen at [127.0.0.1, which only this machine reaches]."),
+                     help="Address to listen at [default: 127.0.0.1, which only this machine"
+                     " reaches; with --public all addresses of this machine]."),
+        click.option("--port", type=click.IntRange(0, 65535), default=port, show_default=True,
+                     help="Port to listen at; 0 takes any that is free."),
         click.option("--public", is_flag=True,
-                     help="Let other machines in: everyone who reaches the address sees the data,"
-                     " without a password."),
+                     help="Let other machines in: everyone who reaches the address sees the pages."
+                     " There is no password, and the connection is not encrypted."),
         click.option("--name", "names", multiple=True, metavar="HOST",
-                     help="Another name under which browsers reach the page; may be repeated."),
-        click.option("--open/--no-open", "open_browser", default=False, show_default=True,
-                     help="Open the page in a browser."),
+                     help="Another name under which browsers reach the pages; may be repeated."),
     )  # fmt: skip
-    return reduce(lambda made, option: option(made), reversed(options), command)
+    return lambda command: reduce(lambda made, add: add(made), reversed(options), command)
+
+
+OPEN = click.option(
+    "--open/--no-open", "open_browser", default=False, show_default=True,
+    help="Open the page in a browser.",
+)  # fmt: skip
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen view rooms.h5 --open")
 @click.argument("file", type=InputPath())
 @click.option("--items", type=Items(), help="Rows to show [default: all].")
-@page_options
+@host_options(8080)
+@OPEN
 @MESHES
 def view(
     file: str,
@@ -53,19 +59,20 @@ def view(
     asks for nothing outside this machine. Ctrl-C ends it.
     """
     needs("scenegen view", ("viser",), "view")
-    from scenegen.common.web_hosts import listening_host
+    from scenegen.common.web_hosts import hosts_of
     from scenegen.rooms.reader import RoomsFile
     from scenegen.viewing.contents import rooms_contents
     from scenegen.viewing.geometry import shapes_of
     from scenegen.viewing.page import ScenePage
     from scenegen.viewing.server import serve, started
 
+    hosts = hosts_of(host, public, names)
     with RoomsFile(file) as rooms:
         contents = rooms_contents(rooms, items)
         shape_of = shapes_of(rooms.spec, **meshes)
-        with started(file, listening_host(host, public), port, names) as server:
+        with started(file, hosts, port) as server:
             ScenePage(server, rooms, shape_of, contents).show()
-            serve(server, print_line, open_browser, public)
+            serve(server, hosts, print_line, open_browser)
 
 
 COMMANDS = (view,)

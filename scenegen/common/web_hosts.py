@@ -1,10 +1,13 @@
 """Where a server on this machine listens, and who may ask it: its names, and its own pages.
 
+`hosts_of` decides both from the options of a command.
+
 A page of another site, open in a browser here, can send requests to this machine. It can even make
 its own name lead here (DNS rebinding), and would then be of one origin with our pages. So servers
 look at the headers Host and Origin, which such a page cannot change.
 """
 
+import errno
 import ipaddress
 import re
 import socket
@@ -20,17 +23,20 @@ LOCAL_NAMES = ("localhost",)
 
 @dataclass(frozen=True)
 class Hosts:
-    """The names under which a server may be asked.
+    """Where a server listens, and the names under which it may be asked.
 
     No page of another site has a number for its name, or `localhost`.
 
     Attributes:
+        address: the server listens there.
         names: in lower case.
-        numbers: whether any IP address will do; otherwise only those of this machine itself.
+        public: whether other machines may ask, by any IP address; otherwise only this machine, by
+            a loopback address.
     """
 
+    address: str = HERE
     names: frozenset[str] = frozenset(LOCAL_NAMES)
-    numbers: bool = False
+    public: bool = False
 
     def allow(self, host: str) -> bool:
         """Return whether the header Host names this server; the port is free, as of a tunnel."""
@@ -42,40 +48,85 @@ class Hosts:
             number = ipaddress.ip_address(name.strip("[]"))
         except ValueError:
             return name in self.names
-        return self.numbers or number.is_loopback
+        return self.public or number.is_loopback
 
 
-def listening_host(host: str | None, public: bool) -> str:
-    """Return the address to listen at: by default this machine's own, or all where `public`.
+def hosts_of(host: str | None, public: bool, names: tuple[str, ...] = ()) -> Hosts:
+    """Return where a server listens and who may ask it, from the options of its command.
+
+    Args:
+        host: address to listen at; None means 127.0.0.1, or all addresses where `public`.
+        public: whether other machines may ask.
+        names: further names under which browsers reach the server.
 
     Raises SpecError for an address that others can reach, unless `public`.
     """
     if host is None:
-        return EVERYWHERE if public else HERE
-    if not is_local(host) and not public:
+        host = EVERYWHERE if public else HERE
+    elif not _is_local(host) and not public:
         advice = "with --public, everyone who can reach the address sees the pages"
         raise SpecError("host", f"{host!r:.100}", "127.0.0.1, ::1 or localhost", advice)
-    return HERE if host.lower() in LOCAL_NAMES else host
+    machine = [socket.gethostname()] if public else []
+    known = frozenset(map(str.lower, (*LOCAL_NAMES, host, *names, *machine)))
+    return Hosts(HERE if host.lower() in LOCAL_NAMES else host, known, public)
 
 
-def hosts_of(host: str, public: bool, names: tuple[str, ...] = ()) -> Hosts:
-    """Return the hosts that requests may name: where the server listens, and `names`."""
-    own = {host, *names, *([socket.gethostname()] if public else [])}
-    return Hosts(frozenset(map(str.lower, (*LOCAL_NAMES, *own))), numbers=public)
-
-
-def is_local(host: str) -> bool:
-    """Return whether only this machine reaches a server at a host."""
+def _is_local(host: str) -> bool:
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return host.lower() in LOCAL_NAMES
 
 
+def listen(hosts: Hosts, port: int) -> socket.socket:
+    """Return a socket that listens; port 0 takes any free one.
+
+    Raises SpecError for an address of another machine, or a port that is taken.
+    """
+    try:
+        family, kind, protocol, _, place = socket.getaddrinfo(
+            hosts.address, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        # asyncio sends small packets at once only where it is told that the protocol is TCP.
+        listening = socket.socket(family, kind, protocol)
+    except (OSError, UnicodeError) as error:
+        raise _no_address(hosts) from error
+    try:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(place)
+        listening.listen(1024)
+    except OSError as error:
+        listening.close()
+        if error.errno == errno.EADDRINUSE:
+            raise SpecError("port", f"{port}, which is in use", "a free port") from error
+        if error.errno == errno.EACCES:
+            found = f"{port}, which only the system may use"
+            raise SpecError("port", found, "1024 or more, or 0 for a free one") from error
+        raise _no_address(hosts) from error
+    return listening
+
+
+def _no_address(hosts: Hosts) -> SpecError:
+    return SpecError("host", f"{hosts.address!r:.100}", "a name or an address of this machine")
+
+
+def address_of(hosts: Hosts, port: int, machine: str = "") -> str:
+    """Return the address of the first page.
+
+    Args:
+        machine: name of this machine in it, where a server listens at all addresses; by default
+            the name that the network knows.
+    """
+    host = hosts.address
+    if host in (EVERYWHERE, "::"):
+        host = machine or socket.gethostname()
+    return f"http://{f'[{host}]' if ':' in host else host}:{port}/"
+
+
 def is_own_page(sender: str, host: str) -> bool:
     """Return whether an Origin or Referer is a page of the server that the header Host names."""
     try:
-        found = urlsplit(sender)
+        address = urlsplit(sender)
     except ValueError:
         return False
-    return found.scheme in ("http", "https") and found.netloc.lower() == host.lower()
+    return address.scheme in ("http", "https") and address.netloc.lower() == host.lower()

@@ -15,10 +15,10 @@ from iqtt.quiz import sessions
 from iqtt.quiz.app import Quiz, make_app
 from iqtt.quiz.commits import Commits
 from iqtt.quiz.schema import SECRET, open_answers, stored_values
-from iqtt.quiz.serve import listen, server_of
+from iqtt.quiz.serve import server_of
 from iqtt.quiz.study import Question, Settings
 from metrics.people.references import compare
-from scenegen.common.web_hosts import hosts_of
+from scenegen.common.web_hosts import Hosts, hosts_of, listen
 
 FORM = {"Content-Type": "application/x-www-form-urlencoded"}
 MADE = Settings("a" * 64, "b" * 64, 3, questions=6, calibrations=1)
@@ -86,10 +86,11 @@ def served(study, path, most=100, public=False, names=()):
     """Serve a study from a thread."""
     db = open_answers(path, study.settings)
     key, told = bytes.fromhex(stored_values(db)[SECRET]), []
-    with listen("127.0.0.1", 0) as listening, Commits(db) as commits:
+    hosts = hosts_of(None, public, names)
+    with listen(Hosts(), 0) as listening, Commits(db) as commits:
         shown = partial(compare, study.settings.answers)
         quiz = Quiz(study, commits, key, shown, told.append, "A <b>lab</b>", most)
-        server = server_of(make_app(quiz, hosts_of("localhost", public, names)))
+        server = server_of(make_app(quiz, hosts))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
         thread.start()
         while not server.started:

@@ -22,12 +22,13 @@ SAME = 0.9  # intersection over union of two drawings of one view, at least
 @contextmanager
 def served(rooms):
     """Serve a page of a file of rooms; give it and its server."""
+    from scenegen.common.web_hosts import Hosts
     from scenegen.viewing.contents import rooms_contents
     from scenegen.viewing.geometry import shapes_of
     from scenegen.viewing.page import ScenePage
     from scenegen.viewing.server import started
 
-    with started("test", "127.0.0.1", 0) as server:
+    with started("test", Hosts(), 0) as server:
         page = ScenePage(server, rooms, shapes_of(rooms.spec), rooms_contents(rooms))
         page.show()
         yield page, server
@@ -35,9 +36,7 @@ def served(rooms):
 
 def visited(visit, server):
     """Open a server's page, wait until it has its controls, and return its `browser.Seen`."""
-    from scenegen.viewing.server import address
-
-    seen = visit(address(server), width=WIDTH, height=SIDE)
+    seen = visit(f"http://127.0.0.1:{server.get_port()}/", width=WIDTH, height=SIDE)
     seen.page.set_default_timeout(SECONDS * 1000)
     seen.page.wait_for_selector("canvas", state="attached")
     seen.page.get_by_text("Look from this view").wait_for(state="attached")

@@ -15,6 +15,7 @@ from metrics.viewing.colors import RIGHT, TOO_FAR, TOO_NEAR
 from metrics.viewing.order import shown_scores
 from metrics.viewing.page import ALONE, BESIDE, SAME, PredictionPage, aside
 from scenegen import open_rooms
+from scenegen.common.web_hosts import Hosts
 from scenegen.viewing.geometry import shapes_of
 from scenegen.viewing.server import started
 
@@ -38,7 +39,7 @@ def served(truths, tmp_path):
 
         with h5py.File(path, "r+") as file:
             file["depth"][1, 0, :3] = np.nan, np.inf, -1
-        with open_predictions(path) as found, started("test", "127.0.0.1", 0) as server:
+        with open_predictions(path) as found, started("test", Hosts(), 0) as server:
             scores = shown_scores(found, rooms)
             made = PredictionPage(server, rooms, found, scores, shapes_of(rooms.spec))
             yield rooms, made.page, server

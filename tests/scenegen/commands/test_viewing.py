@@ -20,7 +20,7 @@ def test_a_page_is_served_until_ctrl_c(rooms_path, tmp_path):
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         line = process.stdout.readline()
-        found = re.fullmatch(r"(http://127\.0\.0\.1:[0-9]+) \(Ctrl-C ends\)\n", line)
+        found = re.fullmatch(r"(http://127\.0\.0\.1:[0-9]+/) \(Ctrl-C ends\)\n", line)
         assert found, line
         assert urllib.request.urlopen(found[1]).status == 200
         process.send_signal(signal.SIGINT)

@@ -1,6 +1,6 @@
-"""`iqtt quiz` and `iqtt quiz-report`: questions for people, and what their answers tell.
+"""Commands on people's answers: the quiz that collects them, and the report on them.
 
-They parse options, make one call and print; what is heavy is imported inside.
+`cli` puts them into the group `iqtt`; they stand here because both show scores beside the answers.
 """
 
 from functools import partial
@@ -13,6 +13,7 @@ from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import LARGEST, OVERWRITE
 from scenegen.command_line.output import print_line
 from scenegen.command_line.paths import InputPath, OutputPath, refuse_inputs
+from scenegen.commands.viewing import host_options
 
 option = partial(click.option, show_default=True)
 
@@ -22,13 +23,7 @@ option = partial(click.option, show_default=True)
 @click.argument("file", type=InputPath(), required=False, metavar="[SPLIT.h5]")
 @option("--db", type=InputPath(), default="answers.db",
         help="SQLite file that keeps the answers; it is made, or taken up again.")
-@click.option("--host", help="Where to listen  [default: 127.0.0.1, or with --public all addresses"
-              " of this machine].")
-@option("--port", type=click.IntRange(0, 65535), default=8000, help="Port; 0 takes a free one.")
-@option("--public", is_flag=True, help="Let others on the network reach the quiz; the connection is"
-        " not encrypted.")
-@click.option("--name", "names", multiple=True, metavar="HOST",
-              help="Another name under which browsers reach the quiz; may be repeated.")
+@host_options(8000)
 @option("--questions", type=int, default=20, help="Questions that count, of each participant.")
 @option("--calibration", "calibrations", type=int, default=2,
         help="Questions before them whose right answers are told. The paper had 1.")
@@ -77,15 +72,15 @@ def _serve(
     from iqtt.quiz.app import Quiz, make_app
     from iqtt.quiz.commits import Commits
     from iqtt.quiz.schema import SECRET, open_answers, stored_values
-    from iqtt.quiz.serve import address_of, listen, serve
+    from iqtt.quiz.serve import serve
     from iqtt.quiz.study import Study
     from metrics.people.references import compare
-    from scenegen.common.web_hosts import hosts_of, listening_host
+    from scenegen.common.web_hosts import address_of, hosts_of, listen
 
-    host = listening_host(host, public)
+    hosts = hosts_of(host, public, names)
     with (
         Study(file, part, questions, calibrations, seed) as study,
-        listen(host, port) as listening,
+        listen(hosts, port) as listening,
     ):
         connection = open_answers(db, study.settings)
         key = bytes.fromhex(stored_values(connection)[SECRET])
@@ -93,9 +88,9 @@ def _serve(
             shown = partial(compare, study.settings.answers)
             tell = partial(print_line, err=True)
             made = Quiz(study, commits, key, shown, tell, contact, participants)
-            ready = f"{address_of(listening, host)} asks {file}; answers go to {db}; Ctrl-C ends it"
-            app = make_app(made, hosts_of(host, public, names))
-            serve(app, listening, lambda: print_line(ready))
+            address = address_of(hosts, listening.getsockname()[1])
+            ready = f"{address} asks {file}; answers go to {db}; Ctrl-C ends it"
+            serve(make_app(made, hosts), listening, lambda: print_line(ready))
     print_line(f"{db}: {_tally(db)}")
 
 
