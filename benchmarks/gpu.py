@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.results.markdown import table
+from benchmarks.markdown import table
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SUITE, SplitSpec
 from scenegen.common.errors import BackendError

@@ -28,7 +28,7 @@ from baselines.pix2shape.network.surfels import render
 from baselines.pix2shape.pictures import image_tiles, sheet
 from baselines.pix2shape.use.predict import input_views
 from baselines.pix2shape.weights.bundled import open_weights
-from benchmarks.results.markdown import table
+from benchmarks.markdown import table
 from metrics.measures.statistics import bootstrap_interval
 from scenegen.rooms.reader import RoomsFile
 

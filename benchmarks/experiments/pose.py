@@ -26,7 +26,7 @@ from sklearn.preprocessing import StandardScaler
 
 from baselines.pix2shape.data.rooms import channels_first
 from baselines.pix2shape.weights.bundled import open_weights
-from benchmarks.results.markdown import table
+from benchmarks.markdown import table
 from iqtt.files.reader import open_questions
 from scenegen.rendering.ground_truth import decode_image
 

@@ -1,11 +1,11 @@
 """The tables of docs/results.md, by the commands that anyone can type: python -m benchmarks.results
 
     steps.py      commands that are run once, and whose products are kept
+    rows.py       a row of a table: training runs, their predictions, one score file for each column
     questions.py  Table 3: the accuracy of every method on every kind of question
     rooms.py      scores of rooms, as in Tables 1 and 2
     studies.py    the ablations of the paper: losses, depth supervision, mutual information
-    markdown.py   tables, and where they go in docs/results.md
 
-Everything is kept in one folder. What is there already, and was made by the same commands from the
-same files, is not made again: stop it when you like, and start it again.
+Everything is kept in one folder. A product is not made again if the same commands made it from the
+same files, so `make results` can be stopped and started again.
 """

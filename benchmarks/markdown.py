@@ -1,8 +1,7 @@
-"""Tables in Markdown, and their places in docs/results.md, between two comments each."""
+"""Tables in Markdown, and their places in a page, between two comments each."""
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from scenegen.files.new_file import write_text
 
@@ -10,7 +9,7 @@ NOTHING = "–"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1) -> str:
-    """Return a table; its first `texts` columns are aligned to the left, as they hold no numbers.
+    """Return a table; its first `texts` columns hold no numbers and are aligned to the left.
 
     Args:
         head: names of the columns.
@@ -20,16 +19,6 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1) ->
     return "\n".join("| " + " | ".join(cells) + " |" for cells in (head, rule, *rows))
 
 
-def shown(score: dict[str, Any] | None, digits: int = 3) -> str:
-    """Return a value with its interval, if it has one."""
-    if score is None:
-        return NOTHING
-    value = f"{score['value']:.{digits}f}"
-    if score.get("low") is None:
-        return value
-    return f"{value} [{score['low']:.{digits}f}, {score['high']:.{digits}f}]"
-
-
 def put(path: Path, name: str, text: str) -> None:
     """Replace what stands between `<!-- name -->` and `<!-- end of name -->` in a page.
 
@@ -37,8 +26,7 @@ def put(path: Path, name: str, text: str) -> None:
     """
     page = path.read_text(encoding="utf-8")
     first, last = f"<!-- {name} -->", f"<!-- end of {name} -->"
-    before, found, rest = page.partition(first)
-    _, also, after = rest.partition(last)
-    if not (found and also):
-        raise ValueError(f"{path}: found no {first} ... {last}")
+    if first not in page or last not in page:
+        raise ValueError(f"{path}: {first} or {last} is missing")
+    before, after = page.partition(first)[0], page.partition(last)[2]
     write_text(path, f"{before}{first}\n\n{text}\n\n{last}{after}", overwrite=True)
