@@ -96,7 +96,6 @@ check: $(VENV)/.dev
 bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.render
 	$(BIN)/python -m benchmarks.shapes
-	$(BIN)/python -m benchmarks.models
 	$(BIN)/python -m benchmarks.questions
 	$(BIN)/python -m benchmarks.nearest
 	$(BIN)/python -m benchmarks.surfels

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.jobs.timing import repeat
+from benchmarks.timing import repeat
 from metrics.measures.chamfer_hausdorff import NearestDistances, nearest_distances
 from metrics.measures.image_search import nearest_distances_on_image
 from scenegen.camera import back_project

@@ -1,50 +1,90 @@
 """How fast questions are made, beside one Mitsuba render an image: one Markdown table.
 
-`python -m benchmarks.questions [--quick]`, from the repository's root.
+    python -m benchmarks.questions [--quick]
+
+Images have 128x128 pixels, colour only. Plain Mitsuba has its meshes and lights made beforehand,
+writes no file and refuses no view; its light has no ambient part.
 """
 
+import argparse
+import shutil
+import statistics
+import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
 
-from benchmarks.report import Job, Row, print_report
+from benchmarks.timing import Row, print_ratio, print_table, processors_busy, repeat
 
 PAPER_IMAGES = 1_200_000
-NOTES = (
-    "MiB: peak memory of the process. Plain Mitsuba has its meshes and lights made beforehand,\n"
-    "writes no file and refuses no view; its light has no ambient part."
-)
 
 
-def jobs(folder: str, quick: bool) -> Iterator[Job]:
-    """Yield the jobs."""
-    plain, repeats = (10, 2) if quick else (50, 3)
+def end_to_end(count: int, repeats: int, folder: str) -> dict[str, Any]:
+    """Time make_split from nothing to closed files: all the images in one of them."""
+    from iqtt.files.make import make_split
+    from iqtt.questions.specs import SplitSpec
+    from scenegen.rendering.renderer import useful_workers
+
+    spec = SplitSpec(train=count, labeled=0, val=0, test=0)
+    out = Path(tempfile.mkdtemp(dir=folder)) / "split"
+    make_split(out, replace(spec, train=64))  # compiles the kernels
+    seconds, busy = [], []
+    for _ in range(repeats):
+        shutil.rmtree(out)
+        measured = processors_busy(partial(make_split, out, spec, workers=0))
+        seconds.append(measured[0])
+        busy.append(measured[1])
+    used = useful_workers(4 * count, "llvm_ad_rgb")
+    record = {"seconds": seconds, "images": 4 * count, "busy": statistics.median(busy)}
+    return {**record, "workers": used, "note": f"{used} workers"}
+
+
+def pixels(count: int, repeats: int, cubes: bool) -> dict[str, Any]:
+    """Time pack, launch and fetch of colour and ids, by the cubes' kernel or the general one."""
+    from iqtt.questions.distractors import make_pools
+    from iqtt.questions.packing import pack_questions
+    from iqtt.questions.specs import SplitSpec
+    from iqtt.render import render_questions
+    from scenegen.rendering.renderer import launch_fields
+
+    spec = SplitSpec()
+    made = render_questions(spec, make_pools(spec), "train", 0, count)
+    batch = pack_questions(spec, [item.question for items in made for item in items])
+    batch = replace(batch, cubes_only=cubes)
+    seconds = repeat(lambda: launch_fields(batch, ("image", "object_id"))(), repeats)  # noqa: PLW0108
+    return {"seconds": seconds, "images": 4 * count, "note": "one batch"}
+
+
+def rows(folder: str, quick: bool) -> Iterator[Row]:
+    """Yield the rows of the table."""
+    few, repeats = (10, 2) if quick else (50, 3)
     for count in (1000,) if quick else (1000, 5000, 25000):
-        how = {"questions": count, "repeats": repeats if count < 10_000 else 1, "folder": folder}
-        what = f"iqtt make-split, end to end to closed files, {count:,} questions"
-        yield f"ours {count}", what, "questions:end_to_end", how
-    for name, blocks in (("the cubes' kernel", True), ("the general kernel", False)):
-        how = {"questions": 64, "repeats": 10 * repeats, "blocks": blocks}
-        yield name, f"pixels alone, {name}", "questions:cast", how
+        how = {"count": count, "repeats": repeats if count < 10_000 else 1, "folder": folder}
+        yield f"iqtt make-split, {count:,} questions", "questions:end_to_end", how
+    for name, cubes in (("cubes'", True), ("general", False)):
+        how = {"count": 64, "repeats": 10 * repeats, "cubes": cubes}
+        yield f"pixels alone, the {name} kernel", "questions:pixels", how
     for variant in ("scalar_rgb", "llvm_ad_rgb"):
-        how = {"questions": plain, "repeats": repeats, "variant": variant}
-        what = f"load_dict + render an image, {variant}"
-        yield f"plain {variant}", what, "questions:per_image", how
+        how = {"count": few, "repeats": repeats, "variant": variant}
+        yield f"plain Mitsuba, {variant}", "plain_mitsuba:questions", how
 
 
-def print_ratios(rows: dict[str, Row]) -> None:
-    """Print how much faster than plain Mitsuba we are, and how long the paper's split takes."""
-    ours = [row.best for key, row in rows.items() if key.startswith("ours")]
-    plain = max(row.best for key, row in rows.items() if key.startswith("plain"))
-    general, cubes = rows["the general kernel"].best, rows["the cubes' kernel"].best
-    if not min(ours) or not plain:
-        return
-    print(f"- make-split / plain Mitsuba, the faster variant: {max(ours) / plain:.1f}; goal 3")
-    if general and cubes:
-        print(f"- the cubes' kernel / the general kernel: {cubes / general:.1f}")
-    print(
-        f"- the paper's {PAPER_IMAGES:,} images at the slowest rate above:"
-        f" {PAPER_IMAGES / min(ours) / 60:.0f} minutes; goal: at most 12"
-    )
+def main() -> None:
+    """Print the table, and ratios of the fastest repeats."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="measure fewer questions")
+    quick = parser.parse_args().quick
+    with tempfile.TemporaryDirectory(prefix="bench-") as folder:
+        rates = print_table("questions", rows(folder, quick), folder)
+    ours = [rate for name, rate in rates.items() if name.startswith("iqtt")]
+    plain = max(rate for name, rate in rates.items() if name.startswith("plain"))
+    print_ratio("make-split / plain Mitsuba", max(ours), plain, 3)
+    if min(ours):
+        minutes = PAPER_IMAGES / min(ours) / 60
+        print(f"- the paper's {PAPER_IMAGES:,} images at the slowest rate: {minutes:.0f} minutes")
 
 
 if __name__ == "__main__":
-    print_report(__doc__, jobs, "128x128, colour only", NOTES, print_ratios)
+    main()

@@ -1,88 +1,238 @@
-"""How fast rooms are rendered, beside plain Mitsuba and the bare ray cast: one Markdown table.
+"""How fast rooms are rendered, beside plain Mitsuba and the bare ray cast: two Markdown tables.
 
-`python -m benchmarks.render [--quick]`, from the repository's root.
+    python -m benchmarks.render [--quick]
+
+The first is of basic shapes, the second of the built-in objects, both at 128x128 pixels with depth
+and normals. (a) is plain Mitsuba, see `plain_mitsuba`; (c) casts the same rays and evaluates
+nothing but the ray parameter and an id, so it is an upper bound. MiB is the peak memory of the
+process and its workers.
 """
 
-import re
+import argparse
 import statistics
-import sys
-import sysconfig
+import tempfile
+import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
+from typing import Any
 
-from benchmarks.report import Job, Row, Session, print_report
+from benchmarks.timing import Row, print_ratio, print_table, processors_busy, repeat
 
-HELP_RUNS = 10
-NOTES = (
-    "MiB: peak memory of the process and its workers. (a) writes no file and makes no ids, its\n"
-    "kernels are compiled beforehand, and the fastest of three ways to load the objects counts;\n"
-    "its coarse meshes, about 1,000 triangles, show. (c) evaluates nothing but t and an id."
-)
-GOALS = (
-    ("end to end / fastest (a)", "b", "a", 6.0),
-    ("end to end / (c)", "b", "c", 0.45),
-    ("rendering stage / (c)", "stage", "c", 0.75),
-)
+VARIANTS = ("llvm_ad_rgb", "scalar_rgb")
 
 
-def jobs(folder: str, quick: bool) -> Iterator[Job]:
-    """Yield the jobs; the first makes the file whose scenes all the others take."""
+def end_to_end(
+    rooms: str,
+    count: int,
+    repeats: int,
+    preset: str = "shapes",
+    workers: int = 0,
+    cache: str | None = None,
+    **settings: Any,
+) -> dict[str, Any]:
+    """Time make_dataset from nothing to a closed file; the last file stays.
+
+    The process is warm: it has made a small file before. Worker processes start anew for each file,
+    and `cache` is the folder of models on disk, as earlier rows left it.
+    """
+    from scenegen.description.presets import preset_spec
+    from scenegen.objects.sources import object_source
+    from scenegen.rendering.renderer import useful_workers
+    from scenegen.rooms.make import DEFAULT_BATCH, make_dataset
+
+    source = object_source(preset, cache_dir=cache or f"{rooms}-cache")
+    spec = preset_spec(preset, **source.settings, **settings)
+
+    def make(rows: int, seed: int) -> tuple[float, float]:
+        Path(rooms).unlink(missing_ok=True)  # so that no file's disk pages burden the next one
+        how = {"objects": source.objects, "workers": workers}
+        seeded = preset_spec(preset, **source.settings, **settings, seed=seed)
+        return processors_busy(partial(make_dataset, rooms, seeded, rows, **how))
+
+    make(DEFAULT_BATCH, spec.seed + 1)
+    seconds, busy = zip(*(make(count, spec.seed) for _ in range(repeats)), strict=True)
+    used = workers or useful_workers(count, "llvm_ad_rgb")
+    record = {"seconds": seconds, "images": count, "busy": statistics.median(busy)}
+    return {**record, "workers": used, "note": f"{used} workers"}
+
+
+def stage(rooms: str, count: int, repeats: int) -> dict[str, Any]:
+    """Time pack, launch and fetch of scenes that were proposed before, as arrays.
+
+    As in make_dataset, a batch is packed while the one before is cast.
+    """
+    import numpy as np
+
+    from scenegen.objects.sources import file_objects
+    from scenegen.rendering.packing import SceneBatch, pack_arrays
+    from scenegen.rendering.renderer import launch
+    from scenegen.rooms.make import DEFAULT_BATCH
+    from scenegen.rooms.reader import RoomsFile
+    from scenegen.sampling.scenes import sample_scenes
+
+    with RoomsFile(rooms) as file:
+        spec = file.spec
+    objects = file_objects(spec)
+    _, scenes = sample_scenes(spec, np.arange(2 * count), np.zeros(2 * count, int), objects)
+    rows = np.arange(count)  # of these; a few proposals find no room
+    parts = [scenes.take(rows[i : i + DEFAULT_BATCH]) for i in range(0, count, DEFAULT_BATCH)]
+
+    def packed(part: Any) -> SceneBatch:
+        return pack_arrays(spec, part, range(len(spec.views)), objects)
+
+    def render_all() -> None:
+        batch = packed(parts[0])
+        for following in [*parts[1:], None]:
+            fetch = launch(batch)
+            if following is not None:
+                batch = packed(following)
+            fetch()
+
+    return {"seconds": repeat(render_all, repeats), "images": count}
+
+
+def proposing(count: int, repeats: int) -> dict[str, Any]:
+    """Take the processor time of proposing scenes that all find room for their objects."""
+    from scenegen.description.specs import DatasetSpec
+    from scenegen.objects.catalogue import objects_of
+    from scenegen.rooms.make import DEFAULT_BATCH
+    from scenegen.sampling.proposals import ProposalQueue
+
+    spec = DatasetSpec()
+
+    def propose_all() -> float:
+        start = time.process_time()
+        queue = ProposalQueue(spec, range(count), objects_of(spec))
+        while (scenes := queue.take(DEFAULT_BATCH, count)) is not None:
+            for item in scenes.index.tolist():
+                queue.accept(item)
+        return time.process_time() - start
+
+    propose_all()
+    seconds = [propose_all() for _ in range(repeats)]
+    return {"seconds": seconds, "images": count, "note": "processor time, on one core"}
+
+
+def bare_cast(rooms: str, count: int, repeats: int, size: int) -> dict[str, Any]:
+    """Time the nearest hits of the primary rays alone, in batches of a size.
+
+    Every object is cast at its unit shape, in the structures of `scenegen.rendering`.
+    """
+    import drjit as dr
+    import mitsuba as mi
+    import numpy as np
+
+    from scenegen.camera import pixel_size
+    from scenegen.rendering.backend import select_variant
+    from scenegen.rendering.drjit_renderer import upload_scenes
+    from scenegen.rendering.packing import SceneBatch, pack
+    from scenegen.rendering.rays import closest_hit
+    from scenegen.rooms.reader import RoomsFile
+
+    variant = select_variant("cpu")
+    mi.set_variant(variant)
+    with RoomsFile(rooms) as file:
+        spec, scenes = file.spec, [file.scene(row) for row in range(count)]
+    batches = [pack(spec, scenes[i : i + size]) for i in range(0, count, size)]
+
+    def cameras(batch: SceneBatch) -> Any:
+        """Return 13 floats an image, padded to 16: 3x4 world_from_camera and the pixel size."""
+        table = np.zeros((len(batch), 16), np.float32)
+        table[:, :12] = batch.world_from_camera[:, :3].reshape(-1, 12)
+        table[:, 12] = [pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()]
+        return mi.Float(table.ravel())
+
+    def cast(batch: SceneBatch, uploaded: Any, table: Any) -> None:
+        pixels = spec.height * spec.width
+        index = dr.arange(mi.UInt32, len(batch) * pixels)
+        item = index // pixels
+        pixel = index - item * pixels
+        row = pixel // spec.width
+        column = pixel - row * spec.width
+        camera = [dr.gather(mi.Float, table, item * 16 + i) for i in range(13)]
+        right, up, back, origin = (mi.Vector3f(*camera[i:12:4]) for i in range(4))
+        x = (mi.Float(column) + 0.5 - spec.width / 2) * camera[12]
+        y = (spec.height / 2 - 0.5 - mi.Float(row)) * camera[12]
+        t, object_id, _, _ = closest_hit(uploaded, item, origin, right * x + up * y - back)
+        dr.eval(t, object_id)
+
+    ready = [(batch, upload_scenes(batch, variant)[0], cameras(batch)) for batch in batches]
+
+    def cast_all() -> None:
+        for arguments in ready:
+            cast(*arguments)
+        dr.sync_thread()
+
+    return {"seconds": repeat(cast_all, repeats), "images": count, "note": f"batches of {size}"}
+
+
+def basic_shapes(folder: str, quick: bool) -> Iterator[Row]:
+    """Yield the rows of basic shapes; the first makes the file whose scenes all others take."""
     rooms = f"{folder}/rooms.h5"
     first, *larger = (1000,) if quick else (1000, 5000, 20000, 100_000)
-    scenes, per_scene, repeats = (256, 8, 2) if quick else (1000, 100, 5)
-    whole = {"rooms": rooms, "count": first, "repeats": repeats}
-    what = f"(b) scenegen, end to end to a closed file, N = {first:,}"
-    yield "b", what, "rooms:end_to_end", whole
+    scenes, few, repeats = (256, 8, 2) if quick else (1000, 100, 5)
+    whole = {"rooms": rooms, "repeats": repeats}
+    yield f"(b) end to end, N = {first:,}", "render:end_to_end", {**whole, "count": first}
     shared = {"rooms": rooms, "count": scenes, "repeats": repeats}
-    yield "stage", "(b) scenegen, rendering stage alone", "rooms:stage", shared
-    what = "(b) scenegen, proposing scenes alone"
-    yield "sampling", what, "rooms:sampling", {"count": 1000 if quick else 5000, "repeats": repeats}
-    yield "c, unit scene", "(c) bare cast, unit scene", "bare_cast:unit_scene", shared
-    yield "c, lattice", "(c) bare cast, lattice of instances", "bare_cast:lattice", shared
-    plain = {"rooms": rooms, "count": per_scene, "repeats": min(repeats, 3), "folder": folder}
+    yield "(b) rendering stage alone", "render:stage", shared
+    propose = {"count": 1000 if quick else 5000, "repeats": repeats}
+    yield "(b) proposing scenes alone", "render:proposing", propose
+    for size in (64, 256):
+        yield f"(c) bare cast, batches of {size}", "render:bare_cast", {**shared, "size": size}
+    plain = {"path": rooms, "count": few, "repeats": min(repeats, 3)}
     for coarse, meshes in ((False, "the same"), (True, "coarse")):
-        for variant in ("llvm_ad_rgb", "scalar_rgb"):
-            what = f"(a) load_dict + render, {variant}, {meshes} meshes"
+        for variant in VARIANTS:
             how = {**plain, "variant": variant, "coarse": coarse}
-            yield f"a {variant} {meshes}", what, "plain_mitsuba:per_scene", how
+            yield f"(a) {meshes} meshes, {variant}", "plain_mitsuba:rooms", how
     for count in larger:
-        what = f"(b) scenegen, end to end, N = {count:,}"
-        more = {"count": count, "repeats": 3 if count < 10_000 else 1}
-        yield f"b {count}", what, "rooms:end_to_end", {**whole, **more}
+        how = {**whole, "count": count, "repeats": 3 if count < 10_000 else 1}
         if count == 5000:
-            alone = {**whole, **more, "workers": 1}
-            yield f"b {count} alone", f"{what}, --workers 1", "rooms:end_to_end", alone
+            name = f"(b) end to end, N = {count:,}, --workers 1"
+            yield name, "render:end_to_end", {**how, "workers": 1}
+        yield f"(b) end to end, N = {count:,}", "render:end_to_end", how
 
 
-def print_ratios(rows: dict[str, Row]) -> None:
-    """Print the ratios that have goals, for both kinds of meshes and of casts."""
-    best = {key: row.best for key, row in rows.items()}
-    best["b"] = max(rate for key, rate in best.items() if re.fullmatch(r"b( [0-9]+)?", key))
-    for meshes in ("same", "coarse"):
-        rates = [rate for key, rate in best.items() if key.startswith("a ") and meshes in key]
-        best[f"a, {meshes} meshes"] = max(rates)
-    for what, over, under, goal in GOALS:
-        for key in [key for key in best if key.startswith(f"{under}, ")]:
-            if best[over] and best[key]:
-                _, which = key.split(", ")
-                print(f"- {what}, {which}: {best[over] / best[key]:.2f}; goal {goal}")
+def built_in_objects(folder: str, quick: bool) -> Iterator[Row]:
+    """Yield the rows of built-in objects, and of the two ways of shading."""
+    rooms, count = f"{folder}/objects.h5", 500 if quick else 5000
+    whole = {"rooms": rooms, "count": count, "repeats": 1, "preset": "shapenet"}
+    for cache in ("empty", "warm"):
+        name = f"(b) end to end, N = {count:,}, {cache} cache"
+        yield name, "render:end_to_end", {**whole, "cache": f"{folder}/cache"}
+    stage = {"rooms": rooms, "count": 128 if quick else 512, "repeats": 1 if quick else 3}
+    yield "(b) rendering stage alone", "render:stage", stage
+    plain = {"path": rooms, "count": 8 if quick else 60, "repeats": 2, "coarse": False}
+    for variant in VARIANTS:
+        yield f"(a) {variant}", "plain_mitsuba:rooms", {**plain, "variant": variant}
+    few = {"rooms": rooms, "count": 16 if quick else 64, "repeats": 1}
+    for shading in ("paper", "path"):
+        name = f"(b) basic shapes, --shading {shading}"
+        yield name, "render:end_to_end", {**few, "shading": shading}
 
 
-def print_start_up(session: Session) -> None:
-    """Time the console script, or its function where it is not installed."""
-    script = Path(sysconfig.get_path("scripts")) / "scenegen"
-    call = "import cli; cli.scenegen(['--help'])"
-    command = [str(script), "--help"] if script.exists() else [sys.executable, "-c", call]
-    if session.timed(command)[1].returncode:
-        print("\n`scenegen --help`: does not run")
-        return
-    ours, python = (
-        statistics.median(session.timed(one)[0] for _ in range(HELP_RUNS))
-        for one in (command, [sys.executable, "-c", "pass"])
-    )
-    told = f"{ours:.2f} s, median of {HELP_RUNS} runs (Python alone: {python:.2f} s)"
-    print(f"\n`scenegen --help`: {told}; goal: under 0.3 s")
+def main() -> None:
+    """Print both tables, and ratios of the fastest repeats: noise only ever adds time."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="measure fewer images")
+    quick = parser.parse_args().quick
+    with tempfile.TemporaryDirectory(prefix="bench-") as folder:
+
+        def best(rates: dict[str, float], start: str) -> float:
+            return max(rate for name, rate in rates.items() if name.startswith(start))
+
+        rates = print_table("basic shapes", basic_shapes(folder, quick), folder)
+        whole, stage = best(rates, "(b) end to end"), rates["(b) rendering stage alone"]
+        for meshes in ("the same", "coarse"):
+            plain = best(rates, f"(a) {meshes}")
+            print_ratio(f"end to end / (a), {meshes} meshes", whole, plain, 6)
+        print_ratio("end to end / (c)", whole, best(rates, "(c)"), 0.45)
+        print_ratio("rendering stage / (c)", stage, best(rates, "(c)"), 0.75)
+        print()
+        rates = print_table("built-in objects", built_in_objects(folder, quick), folder)
+        print_ratio("end to end / (a)", best(rates, "(b) end to end"), best(rates, "(a)"), 8)
+        print_ratio("stage / (a)", rates["(b) rendering stage alone"], best(rates, "(a)"), 8)
 
 
 if __name__ == "__main__":
-    print_report(__doc__, jobs, "128x128, depth and normals", NOTES, print_ratios, print_start_up)
+    main()

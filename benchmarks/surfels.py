@@ -18,7 +18,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from baselines.pix2shape.network.surfels import Scene, back_project, render
-from benchmarks.jobs.timing import repeat
+from benchmarks.timing import repeat
 from scenegen.camera import transform_points
 from scenegen.description.presets import preset_spec
 from scenegen.rendering.packing import pack
