@@ -1,9 +1,6 @@
-"""Tables in Markdown, and their places in a page, between two comments each."""
+"""Tables in Markdown."""
 
 from collections.abc import Sequence
-from pathlib import Path
-
-from scenegen.files.new_file import write_text
 
 NOTHING = "–"
 
@@ -17,16 +14,3 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1) ->
     """
     rule = ["---"] * texts + ["---:"] * (len(head) - texts)
     return "\n".join("| " + " | ".join(cells) + " |" for cells in (head, rule, *rows))
-
-
-def put(path: Path, name: str, text: str) -> None:
-    """Replace what stands between `<!-- name -->` and `<!-- end of name -->` in a page.
-
-    Raises ValueError where the page lacks one of them.
-    """
-    page = path.read_text(encoding="utf-8")
-    first, last = f"<!-- {name} -->", f"<!-- end of {name} -->"
-    if first not in page or last not in page:
-        raise ValueError(f"{path}: {first} or {last} is missing")
-    before, after = page.partition(first)[0], page.partition(last)[2]
-    write_text(path, f"{before}{first}\n\n{text}\n\n{last}{after}", overwrite=True)

@@ -1,26 +1,24 @@
-"""Run what is not there yet, and write the tables: python -m benchmarks.results [--help]"""
+"""Run what is not there yet, and print the tables: python -m benchmarks.results [--help]"""
 
 import argparse
 import sys
 from pathlib import Path
 
-from benchmarks.markdown import put
 from benchmarks.results import questions, rooms, studies
-from benchmarks.results.steps import ROOT, make_all
+from benchmarks.results.steps import make_all
 
 TABLES = {"questions": questions, "rooms": rooms, "studies": studies}
 
 
 def main() -> None:
-    """Read the options, run, and write; exit with 1 where something failed."""
+    """Read the options, run, and print; exit with 1 where something failed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.results", description=__doc__)
     parser.add_argument("--folder", type=Path, default=Path("results"), help="of all products")
-    parser.add_argument("--only", choices=TABLES, help="one part of the page")
+    parser.add_argument("--only", choices=TABLES, help="one part")
     parser.add_argument(
         "--rows", nargs="+", default=[], metavar="NAME", help="methods or studies of --only  [all]"
     )
     parser.add_argument("--seeds", type=int, default=3, help="training runs of each method  [3]")
-    parser.add_argument("--page", type=Path, default=ROOT / "docs" / "results.md")
     parser.add_argument("--print", action="store_true", help="print the tables; run nothing")
     options = parser.parse_args()
     if options.seeds < 1 or (options.rows and not options.only):
@@ -29,11 +27,9 @@ def main() -> None:
     failed = []
     for name, part in TABLES.items():
         if options.only in (None, name):
-            if options.print:
-                print(part.page(options.folder), end="\n\n")
-                continue
-            failed += make_all(options.folder, part.plan(options.rows, options.seeds))
-            put(options.page, name, part.page(options.folder))
+            if not options.print:
+                failed += make_all(options.folder, part.plan(options.rows, options.seeds))
+            print(part.page(options.folder), end="\n\n")
     if failed:
         sys.exit(f"{len(failed)} failed: {'; '.join(failed)}")
 
