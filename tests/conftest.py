@@ -30,9 +30,9 @@ def _untried(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
 def _own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     """Keep models in no folder but the tests' own, whatever an earlier test said."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "cache"))
-    cache = sys.modules.get("scenegen.objects.families.cache")
-    if cache:
-        cache.MEMBERS_KEPT.use(None)
+    store = sys.modules.get("scenegen.objects.families.store")
+    if store:
+        store.MEMBER_STORE.use(None)
 
 
 @pytest.fixture(scope="session")

@@ -61,7 +61,7 @@ def check_objects(
     splits have equal content.
     """
     from scenegen.files.new_file import check_writable, write_text
-    from scenegen.objects.meshes.cache import default_cache_dir
+    from scenegen.objects.cache import default_cache_dir
     from scenegen.objects.meshes.check import check_models
     from scenegen.objects.meshes.folders import open_models
     from scenegen.objects.meshes.listing import shared_by_splits

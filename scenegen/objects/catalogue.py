@@ -9,8 +9,8 @@ from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.cast_meshes import CastMesh, cast_mesh
-from scenegen.objects.families.cache import MEMBERS_KEPT
 from scenegen.objects.families.members import MEMBERS, member_shape
+from scenegen.objects.families.store import MEMBER_STORE
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import object_split
 from scenegen.objects.meshes.store import MeshStore
@@ -90,7 +90,7 @@ def face_count(shape_of: Callable[[str], UnitShape], name: str) -> int:
 def mesh_to_cast(shape_of: Callable[[str], UnitShape], name: str) -> CastMesh:
     """Return a unit shape as the ray caster takes it; members of families come from their cache."""
     if _is_member(shape_of, name):
-        return MEMBERS_KEPT.mesh(*_family_and_number(name))
+        return MEMBER_STORE.mesh(*_family_and_number(name))
     return cast_mesh(shape_of(name))
 
 
@@ -101,7 +101,7 @@ def _is_member(shape_of: Callable[[str], UnitShape], name: str) -> bool:
 @lru_cache(maxsize=20_000)
 def _known(shape_of: Callable[[str], UnitShape], name: str) -> tuple[UnitShape, int]:
     if _is_member(shape_of, name):
-        return MEMBERS_KEPT.outline(*_family_and_number(name))
+        return MEMBER_STORE.outline(*_family_and_number(name))
     shape = shape_of(name)
     if name in SHAPE_NAMES:
         return shape, 0 if shape.surface else len(shape.triangles)

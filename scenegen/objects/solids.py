@@ -68,8 +68,12 @@ class UnitShape:
 
 def without_triangles(shape: UnitShape) -> UnitShape:
     """Return a shape without its triangles: the outline, which is all that placement needs."""
-    nothing = np.zeros((0, 3, 3))
-    return replace(shape, make_mesh=lambda: (nothing, nothing))
+    return replace(shape, make_mesh=no_mesh)
+
+
+def no_mesh() -> Mesh:
+    """Return no triangles and no normals."""
+    return np.zeros((0, 3, 3)), np.zeros((0, 3, 3))
 
 
 def polyhedron(name: str, points: Array) -> UnitShape:

@@ -7,9 +7,9 @@ from scenegen.common.errors import SpecError
 from scenegen.common.records import check
 from scenegen.description.presets import PRESETS
 from scenegen.description.specs import BUILT_IN, DatasetSpec
+from scenegen.objects.cache import default_cache_dir
 from scenegen.objects.catalogue import Objects, mesh_objects, objects_of
-from scenegen.objects.families.cache import MEMBERS_KEPT
-from scenegen.objects.meshes.cache import default_cache_dir
+from scenegen.objects.families.store import MEMBER_STORE
 from scenegen.objects.meshes.folders import open_objects
 from scenegen.objects.meshes.listing import ModelFolder
 from scenegen.objects.meshes.shapenet import open_shapenet
@@ -79,7 +79,7 @@ def object_source(
     if shapes is not None:
         return ObjectSource({"source": "shapes", "shapes": shapes, **split})
     if root is None:
-        MEMBERS_KEPT.use(cache_dir or default_cache_dir())
+        MEMBER_STORE.use(cache_dir or default_cache_dir())
         families = {} if classes is None else {"source": "families", "shapes": classes}
         return ObjectSource({**families, **split})
     shapenet, part = shapenet_root is not None, object_split or "all"
@@ -126,7 +126,7 @@ def file_objects(
         raise SpecError("objects", f"the folder {told}", "none: the file's objects are built in")
     root = objects_root if spec.source == "folder" else shapenet_root
     if root is None:
-        MEMBERS_KEPT.use(cache_dir or default_cache_dir())
+        MEMBER_STORE.use(cache_dir or default_cache_dir())
         return objects_of(spec)
     folder = _open(root, spec.source != "folder", spec.shapes, up, spec.object_split)
     if (folder.kind, folder.digest()) != (spec.source, spec.listing):

@@ -14,7 +14,7 @@ from scenegen.files.new_file import check_writable
 from scenegen.files.places import as_place, check_store, is_remote
 from scenegen.files.shards import MOST_SHARDS
 from scenegen.objects.catalogue import Objects, objects_of
-from scenegen.objects.families.cache import MEMBERS_KEPT
+from scenegen.objects.families.store import MEMBER_STORE
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.renderer import useful_workers
 from scenegen.rooms.render import Work
@@ -79,7 +79,7 @@ def make_dataset(
     objects = objects or objects_of(spec)
     workers = workers or useful_workers(count * len(spec.views), variant)
     attributes = {"creation_command": command, "variant": variant, **versions()}
-    work = Work(spec, batch, workers, device, objects, compression, MEMBERS_KEPT.home)
+    work = Work(spec, batch, workers, device, objects, compression, MEMBER_STORE.folder)
     place = as_place(path)
     if count > shard_size or cluster:
         make_shards(

@@ -19,7 +19,7 @@ from scenegen.files.pool import in_processes, in_threads, processors
 from scenegen.files.table import PackedRows, packing_threads
 from scenegen.layout import columns
 from scenegen.objects.catalogue import Objects, objects_of
-from scenegen.objects.families.cache import MEMBERS_KEPT
+from scenegen.objects.families.store import MEMBER_STORE
 from scenegen.rendering.ground_truth import GroundTruth, visible_pixels
 from scenegen.rendering.packing import SceneBatch, pack_arrays
 from scenegen.rendering.renderer import launch, share_processors
@@ -92,7 +92,7 @@ class Work:
 
     def prepare(self) -> None:
         """Get a worker ready: it takes its share of the processors, and the cache."""
-        MEMBERS_KEPT.use(self.cache_dir)
+        MEMBER_STORE.use(self.cache_dir)
         share_processors(self.workers, self.device)
 
     def on_cluster(self) -> "Work":

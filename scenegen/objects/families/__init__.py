@@ -2,8 +2,7 @@
 
 Each file builds one family (`vessels` two: bowls and mugs) from random proportions and styles.
 `parts` holds the geometry that several families share. Start with `members.member_shape`, which
-turns a family and a number into a unit shape; `cache` keeps members on disk. The families import
-`parts`, `solids` and nothing else of `scenegen.objects`.
+turns a family and a number into a unit shape; `store` keeps members for later.
 
 The order of the random draws is part of the data format: swapping two draws changes every member.
 """

@@ -43,14 +43,18 @@ def make_member(family: str, member: int) -> UnitShape:
     The member's random choices depend on the family and the number alone, not on the seed of a
     data set.
 
-    Raises:
-        SpecError: for a family that is not in FAMILY_NAMES, or a number not in 0 .. MEMBERS - 1.
+    Raises SpecError as `check_member`.
     """
-    if family not in _BUILDERS:
-        raise SpecError("family", repr(family), f"one of {', '.join(FAMILY_NAMES)}")
-    if not 0 <= member < MEMBERS:
-        raise SpecError(family, f"member {member}", f"0 to {MEMBERS - 1}")
+    check_member(family, member)
     place = list(_BUILDERS).index(family)
     key = np.random.SeedSequence(_ENTROPY, spawn_key=(place, member))
     rng = np.random.Generator(np.random.PCG64(key))
     return assemble(f"{family}/{member:04d}", _BUILDERS[family](rng))
+
+
+def check_member(family: str, member: int) -> None:
+    """Raise SpecError for a family that is not in FAMILY_NAMES, or a number beyond MEMBERS - 1."""
+    if family not in _BUILDERS:
+        raise SpecError("family", repr(family), f"one of {', '.join(FAMILY_NAMES)}")
+    if not 0 <= member < MEMBERS:
+        raise SpecError(family, f"member {member}", f"0 to {MEMBERS - 1}")

@@ -6,9 +6,8 @@ is refused with a reason (`errors.BadMeshError`).
 - `listing`, `folders` and `shapenet` find out which models there are, without opening them.
 - `read`, with one file format each in `readers`, gives vertices and triangles.
 - `clean` mends and normalises these, `hull` computes a convex body for placement.
-- `cache` keeps cleaned models on disk, `store` keeps unit shapes in memory.
+- `models` does all that to one file and keeps the result on disk, `store` makes unit shapes of it.
 - `check` tries every model of a folder, for `scenegen check-objects`.
 
-Start with `folders.open_models` and `store.MeshStore`. Of the rest of `scenegen` these files import
-`common`, `description` and `objects.solids`.
+Start with `folders.open_models` and `store.MeshStore`.
 """

@@ -11,9 +11,10 @@ from pathlib import Path
 
 from scenegen.common.errors import SceneGenError
 from scenegen.files.pool import worker_pool
-from scenegen.objects.meshes.cache import MeshCache
+from scenegen.objects.cache import DiskCache
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFile, ModelFolder
+from scenegen.objects.meshes.models import load_model
 
 # These count as mended; seams and unused vertices do not, as most files have some.
 DEFECTS = ("faces_out_of_range", "faces_not_finite", "degenerate_faces", "double_faces")
@@ -64,23 +65,23 @@ def check_models(
         SceneGenError: with more than one job, if processes cannot be started.
     """
     files = [file for name in folder.classes for file in folder.models[name]]
-    cache = MeshCache(cache_dir)
-    cache.try_out()
+    cache = DiskCache(cache_dir)
+    cache.check_folder()
     records: Iterator[ModelCheck] = (_check(file, folder.up, cache) for file in files)
     if jobs > 1 and len(files) > 1:
         records = _in_processes(files, folder.up, cache.folder, jobs)
-    found = {}
+    by_name = {}
     for record in records:
-        found[record.name] = record
+        by_name[record.name] = record
         if progress:
             progress(1)
-    return [found[file.name] for file in files]
+    return [by_name[file.name] for file in files]
 
 
-def _check(file: ModelFile, up: str, cache: MeshCache) -> ModelCheck:
+def _check(file: ModelFile, up: str, cache: DiskCache) -> ModelCheck:
     started = time.perf_counter()
     try:
-        _, model = cache.load(file.path, up)
+        model = load_model(file.path, up, cache)
     except BadMeshError as error:
         return ModelCheck(file.name, False, str(error), 0, {}, time.perf_counter() - started)
     seconds = time.perf_counter() - started
@@ -90,7 +91,7 @@ def _check(file: ModelFile, up: str, cache: MeshCache) -> ModelCheck:
 def _check_in_worker(file: ModelFile, up: str, cache_dir: Path | None) -> ModelCheck:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the caller has already warned about the cache
-        return _check(file, up, MeshCache(cache_dir))
+        return _check(file, up, DiskCache(cache_dir))
 
 
 def _in_processes(

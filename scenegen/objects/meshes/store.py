@@ -1,15 +1,14 @@
 """The unit shapes of a folder's models, made when first used and kept in memory for a while."""
 
-import threading
-from collections import OrderedDict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scenegen.objects.meshes.cache import CachedModel, MeshCache
+from scenegen.objects.cache import DiskCache, Recent
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFolder
+from scenegen.objects.meshes.models import Model, load_model
 from scenegen.objects.solids import UnitShape
 
 MOST_FACES_KEPT = 3_000_000  # of all shapes in memory; a face takes about 100 bytes
@@ -27,35 +26,23 @@ class MeshStore:
         self.folder = folder
         self.problems: dict[str, str] = {}
         self._files = {file.name: file for files in folder.models.values() for file in files}
-        self._cache = MeshCache(cache_dir)
+        self._disk = DiskCache(cache_dir)
         self._digests: dict[str, str] = {}
-        self._shapes: OrderedDict[str, UnitShape] = OrderedDict()
-        self._faces = 0
-        self._lock = threading.Lock()
+        self._shapes: Recent[UnitShape] = Recent(MOST_FACES_KEPT)
 
     def __reduce__(self) -> Any:
-        """Pickle what was told; another process loads its own models, and finds their problems."""
-        return MeshStore, (self.folder, self._cache.folder), {"problems": self.problems}
+        """Pickle the folders and the problems; another process loads its models itself."""
+        return MeshStore, (self.folder, self._disk.folder), {"problems": self.problems}
 
     def shape(self, name: str) -> UnitShape:
         """Return the model named "class/id" as a unit shape with flat faces, resting on its base.
 
         Raises BadMeshError where there is no such model or it cannot be used.
         """
-        with self._lock:
-            shape = self._shapes.get(name)
-            if shape is not None:
-                self._shapes.move_to_end(name)
-                return shape
-        _, model = self._load(name)
-        shape = _unit_shape(name, model)
-        with self._lock:
-            if name not in self._shapes:
-                self._faces += len(shape.triangles)
-            self._shapes[name] = shape
-            while self._faces > MOST_FACES_KEPT and len(self._shapes) > 1:
-                _, oldest = self._shapes.popitem(last=False)
-                self._faces -= len(oldest.triangles)
+        shape = self._shapes.get(name)
+        if shape is None:
+            shape = _unit_shape(name, self._load(name))
+            self._shapes.put(name, shape, len(shape.triangles))
         return shape
 
     def digest(self, name: str) -> str:
@@ -67,7 +54,7 @@ class MeshStore:
             self._load(name)
         return self._digests[name][:16]
 
-    def _load(self, name: str) -> tuple[str, CachedModel]:
+    def _load(self, name: str) -> Model:
         if name not in self._files:
             example = next(iter(self._files), "mug/1")
             expected = f"class/id of this folder and split, such as {example}"
@@ -75,15 +62,15 @@ class MeshStore:
         try:
             if name in self.problems:
                 raise BadMeshError(self.problems[name])
-            digest, model = self._cache.load(self._files[name].path, self.folder.up)
+            model = load_model(self._files[name].path, self.folder.up, self._disk)
         except BadMeshError as error:
             self.problems[name] = str(error)
             raise error.inside(name) from error
-        self._digests[name] = digest
-        return digest, model
+        self._digests[name] = model.digest
+        return model
 
 
-def _unit_shape(name: str, model: CachedModel) -> UnitShape:
+def _unit_shape(name: str, model: Model) -> UnitShape:
     triangles = model.vertices.astype(np.float64)[model.faces]
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

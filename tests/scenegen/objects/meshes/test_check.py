@@ -113,19 +113,19 @@ def test_jobs_give_what_one_gives(root: Path, tmp_path: Path) -> None:
 
 DEADLY = """
 import os, sys
-from scenegen.objects.meshes import cache, check
+from scenegen.objects.meshes import check, models
 from scenegen.objects.meshes.folders import open_objects
 from scenegen.objects.meshes.listing import object_split
 if __name__ == "__main__":
     for record in check.check_models(open_objects(sys.argv[1]), None, 2, None):
         print(record.name, record.ok, record.reason)
 else:  # in the worker processes
-    parse = cache.parse_mesh
+    parse = models.parse_mesh
     def deadly(data, suffix):
         if b"deadly" in data:
             os._exit(1)
         return parse(data, suffix)
-    cache.parse_mesh = deadly
+    models.parse_mesh = deadly
 """
 # Each worker process imports the caller's script, and so would start the check anew.
 UNGUARDED = """

@@ -1,0 +1,150 @@
+"""Shapes that take long to make are kept: on disk for later runs, in memory those used last."""
+
+import errno
+import os
+import threading
+import warnings
+from collections import OrderedDict
+from collections.abc import Hashable, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from scenegen.files.new_file import written_beside
+from scenegen.objects.solids import Array
+
+Value = TypeVar("Value")
+MOST_BYTES = 2**35  # of the entries in a folder
+ENDING = ".npz"
+
+
+def default_cache_dir() -> Path:
+    """Return `pix2shape-bench/meshes` in XDG_CACHE_HOME or, if that is not set, in ~/.cache."""
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    if not base.is_absolute():  # the XDG specification says to ignore relative paths
+        base = Path("~/.cache").expanduser()
+    return base / "pix2shape-bench" / "meshes"
+
+
+class DiskCache:
+    """Arrays in a folder, one npz file for each key. Threads and processes may share the folder.
+
+    A key is a hash of everything that its arrays follow from, so an entry never grows old. An entry
+    gets its name when it is complete; a damaged one counts as missing. If the folder cannot be
+    written to, one warning is given, and entries that are there are still read.
+
+    Attributes:
+        folder: where the entries lie; None to keep none.
+    """
+
+    def __init__(self, folder: str | Path | None = None) -> None:
+        self.folder = None if folder is None else Path(folder)
+        self._writes = self.folder is not None
+        self._unseen = MOST_BYTES  # bytes written since the size of the folder was last seen
+        self._lock = threading.Lock()
+
+    def read(self, key: str, names: Sequence[str]) -> dict[str, Array] | None:
+        """Return the arrays with these names; None where the entry is missing or damaged."""
+        if self.folder is None:
+            return None
+        try:
+            path = self.folder / f"{key}{ENDING}"
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as entry:
+                return {name: entry[name] for name in names}
+        except Exception:  # of whatever kind the damage is, the entry is made again
+            return None
+
+    def write(self, key: str, arrays: dict[str, Array]) -> None:
+        """Keep arrays under a key; a folder above MOST_BYTES loses the entries written first."""
+        if self.folder is None or not self._writes:
+            return
+        path = self.folder / f"{key}{ENDING}"
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with written_beside(path, overwrite=True) as temporary, temporary.open("xb") as file:
+                np.savez(file, **arrays)  # type: ignore[arg-type]
+                size = file.tell()
+            self._trim(size)
+        except OSError as error:
+            self._give_up(error)
+
+    def check_folder(self) -> None:
+        """Make the folder, so that a warning about it comes before the work."""
+        if self.folder is None:
+            return
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            if not os.access(self.folder, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        except OSError as error:
+            self._give_up(error)
+
+    def _trim(self, written: int) -> None:
+        """Remove what was written first from a folder that is too large.
+
+        The folder is listed at the first entry that is written, and then once in a while.
+        """
+        assert self.folder is not None
+        with self._lock:
+            self._unseen += written
+            if self._unseen < MOST_BYTES // 16:
+                return
+            self._unseen = 0
+        entries = []
+        for entry in os.scandir(self.folder):
+            with suppress(OSError):  # another process has removed it
+                if entry.name.endswith(ENDING):
+                    about = entry.stat()
+                    entries.append((about.st_mtime_ns, about.st_size, entry.path))
+        excess = sum(size for _, size, _ in entries) - MOST_BYTES
+        for _, size, path in sorted(entries):
+            if excess <= 0:
+                break
+            Path(path).unlink(missing_ok=True)
+            excess -= size
+
+    def _give_up(self, error: OSError) -> None:
+        with self._lock:
+            wrote, self._writes = self._writes, False
+        if wrote:
+            reason = os.strerror(error.errno or errno.EIO)
+            warnings.warn(
+                f"{self.folder}: cannot be written to ({reason}). Shapes that are not there are"
+                " made again in every process. Choose another --cache-dir.",
+                stacklevel=3,
+            )
+
+
+class Recent(Generic[Value]):
+    """The values used last. Threads may share it.
+
+    Attributes:
+        most: sum of the sizes of the values that are kept; a single value may be larger.
+    """
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self._values: OrderedDict[Hashable, tuple[Value, int]] = OrderedDict()
+        self._size = 0
+        self._lock = threading.Lock()
+
+    def get(self, key: Hashable) -> Value | None:
+        """Return the value of a key, None if it is not kept."""
+        with self._lock:
+            if key not in self._values:
+                return None
+            self._values.move_to_end(key)
+            return self._values[key][0]
+
+    def put(self, key: Hashable, value: Value, size: int) -> None:
+        """Keep a value; forget those that were used longest ago, until the others fit."""
+        with self._lock:
+            if key in self._values:
+                self._size -= self._values.pop(key)[1]
+            self._values[key] = value, size
+            self._size += size
+            while self._size > self.most and len(self._values) > 1:
+                _, (_, freed) = self._values.popitem(last=False)
+                self._size -= freed

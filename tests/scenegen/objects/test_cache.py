@@ -1,0 +1,169 @@
+"""The cache on disk: damage, full disks, kills, several processes; and what memory keeps."""
+
+import multiprocessing
+import os
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+
+from scenegen.objects import cache
+from scenegen.objects.cache import DiskCache, Recent, default_cache_dir
+from scenegen.objects.solids import Array
+
+NAMES = ("points", "text")
+ARRAYS = {"points": np.arange(3000.0).reshape(-1, 3), "text": np.array("a text")}
+
+
+def same(arrays: dict[str, Array] | None) -> bool:
+    return arrays is not None and all(np.array_equal(arrays[n], ARRAYS[n]) for n in NAMES)
+
+
+def test_an_entry_comes_back_as_it_was(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "cache"
+    DiskCache(folder).write("key", ARRAYS)
+    assert same(DiskCache(folder).read("key", NAMES))
+    assert DiskCache(folder).read("other", NAMES) is None
+    assert DiskCache(folder).read("key", ("points",)).keys() == {"points"}
+    first = (folder / "key.npz").read_bytes()
+    DiskCache(folder).write("key", ARRAYS)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == {"key.npz": first}
+
+
+def test_without_a_folder_nothing_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    none = DiskCache(None)
+    none.check_folder()
+    none.write("key", ARRAYS)
+    assert none.read("key", NAMES) is None
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_damaged_entries_count_as_missing(tmp_path: Path) -> None:
+    """Entries may be cut short, have one bit flipped anywhere, or hold something else."""
+    disk, path = DiskCache(tmp_path), tmp_path / "key.npz"
+    disk.write("key", ARRAYS)
+    whole = path.read_bytes()
+    cut = [whole[:length] for length in (0, 1, 30, len(whole) // 2, len(whole) - 1)]
+    places = range(60, len(whole) - 60, len(whole) // 200)
+    flipped = [whole[:at] + bytes([whole[at] ^ 64]) + whole[at + 1 :] for at in places]
+    missing = 0
+    for damaged in (*cut, *flipped, b"nonsense", bytes(len(whole))):
+        path.write_bytes(damaged)
+        arrays = disk.read("key", NAMES)
+        missing += arrays is None
+        assert arrays is None or same(arrays), "a flipped bit that says nothing"
+    assert missing > 190
+    path.unlink()
+    path.mkdir()
+    assert disk.read("key", NAMES) is None
+
+
+@pytest.mark.parametrize("other", [{"points": ARRAYS["points"]}, {**ARRAYS, "text": [object()]}])
+def test_entries_without_a_name_or_with_code_count_as_missing(
+    other: dict[str, Any], tmp_path: Path
+) -> None:
+    np.savez(tmp_path / "key.npz", **other)
+    assert DiskCache(tmp_path).read("key", NAMES) is None
+
+
+@pytest.mark.parametrize("place", ["a file", "below a file", "full"])
+def test_a_folder_that_takes_nothing_costs_one_warning(
+    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "file"
+    file.write_text("")
+    folder = {"a file": file, "below a file": file / "x"}.get(place, tmp_path / "cache")
+    DiskCache(tmp_path / "cache").write("old", ARRAYS)
+    if place == "full":
+        monkeypatch.setattr(np, "savez", Mock(side_effect=OSError(28, "No space left on device")))
+    disk = DiskCache(folder)
+    with pytest.warns(UserWarning, match="--cache-dir"):
+        disk.write("key", ARRAYS)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        disk.write("key", ARRAYS)
+        disk.check_folder()
+    assert disk.read("key", NAMES) is None
+    assert same(disk.read("old", NAMES)) == (place == "full"), "it is still read"
+    assert [path.name for path in (tmp_path / "cache").iterdir()] == ["old.npz"]
+
+
+def test_a_folder_that_is_too_large_loses_its_oldest_entries(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    DiskCache(tmp_path).write("0", ARRAYS)
+    size = (tmp_path / "0.npz").stat().st_size
+    (tmp_path / "mine.txt").write_text("mine")
+    monkeypatch.setattr(cache, "MOST_BYTES", 4 * size)
+    disk = DiskCache(tmp_path)
+    for number in range(8):
+        disk.write(f"{number}", ARRAYS)
+        os.utime(tmp_path / f"{number}.npz", (number, number))
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"4.npz", "5.npz", "6.npz", "7.npz", "mine.txt"}
+
+
+def fill(folder: Path, start: Any) -> None:
+    start.wait()
+    for number in range(12):
+        DiskCache(folder).write(f"{number}", ARRAYS)
+        assert same(DiskCache(folder).read(f"{number}", NAMES))
+
+
+def test_several_processes_fill_one_folder(tmp_path: Path) -> None:
+    context = multiprocessing.get_context("spawn")
+    start = context.Barrier(3)
+    workers = [context.Process(target=fill, args=(tmp_path / "c", start)) for _ in range(3)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join(60)
+        assert worker.exitcode == 0
+    assert len(list((tmp_path / "c").iterdir())) == 12, "and no leftovers"
+
+
+def test_a_killed_process_leaves_no_entry_that_is_not_whole(tmp_path: Path) -> None:
+    code = f"""
+import os, numpy
+from scenegen.objects.cache import DiskCache
+write = numpy.savez
+def dies(file, **arrays):
+    write(file, **arrays)
+    os._exit(9)
+numpy.savez = dies
+DiskCache({str(tmp_path)!r}).write("key", {{"points": numpy.zeros(3)}})
+"""
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 9
+    assert list(tmp_path.glob("*.npz")) == []
+    with pytest.warns(UserWarning, match="partial"):
+        DiskCache(tmp_path).write("key", ARRAYS)
+    assert [path.name for path in tmp_path.iterdir()] == ["key.npz"]
+
+
+def test_where_the_cache_lies(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert default_cache_dir() == tmp_path / "pix2shape-bench" / "meshes"
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    for unset in ("", "not/absolute"):
+        monkeypatch.setenv("XDG_CACHE_HOME", unset)
+        assert default_cache_dir() == tmp_path / "home/.cache/pix2shape-bench/meshes"
+    assert list(tmp_path.iterdir()) == [], "nothing is made before it is needed"
+
+
+def test_values_used_last_are_kept() -> None:
+    recent: Recent[str] = Recent(3)
+    for key in "abc":
+        recent.put(key, key.upper(), 1)
+    recent.put("c", "new", 1)
+    assert [recent.get(key) for key in "abcd"] == ["A", "B", "new", None]
+    recent.get("a")
+    recent.put("d", "D", 1)
+    assert [recent.get(key) for key in "abcd"] == ["A", None, "new", "D"]
+    recent.put("large", "L", 100)
+    assert [recent.get(key) for key in ("a", "c", "d", "large")] == [None, None, None, "L"]
