@@ -17,11 +17,11 @@ EXISTS = "exists already; say --overwrite to replace it"
 def written_beside(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
     """Give a hidden path to write to; it is renamed to `path` when the block ends well.
 
-    For a URL it is in the folder for temporary files, and is uploaded then.
+    For a URL it is in the folder for temporary files, and is uploaded when the block ends.
 
-    Whatever goes wrong, nothing is left under either name that was not there before; what a killed
-    process leaves, the next one removes that writes to the folder. Raises OSError as
-    `check_writable` or as the disk does, with `path` in place of the hidden path.
+    On any error nothing is left that was not there before. The next run in the folder removes what
+    a killed one left. Raises OSError as `check_writable` or as the disk does, with `path` in place
+    of the hidden path.
     """
     check_writable(path, overwrite)
     path = as_place(path)
@@ -62,28 +62,24 @@ def check_writable(path: str | Path, overwrite: bool) -> None:
         return
     check_name(path)
     path = Path(path)
-    problems = (
-        (path.is_dir(), errno.EISDIR, "is a folder; name a file in it"),
-        (path.exists() and not overwrite, errno.EEXIST, EXISTS),
-        (path.exists() and not path.is_file(), errno.EINVAL, "is not a regular file"),
-    )
-    for wrong, number, text in problems:
-        if wrong:
-            raise OSError(number, text, str(path))
-    if not os.access(path.parent, os.W_OK):
-        raise OSError(errno.EACCES, "cannot be written to", str(path.parent))
+    _refuse(path.is_dir(), errno.EISDIR, "is a folder; name a file in it", path)
+    _refuse(path.exists() and not overwrite, errno.EEXIST, EXISTS, path)
+    _refuse(path.exists() and not path.is_file(), errno.EINVAL, "is not a regular file", path)
+    writable = os.access(path.parent, os.W_OK)
+    _refuse(not writable, errno.EACCES, "cannot be written to", path.parent)
 
 
 def check_name(path: str | Path) -> None:
     """Raise an OSError for a path that no file and no folder can be written to."""
     if not str(path):
         raise OSError(errno.ENOENT, "an output has an empty path; name it")
-    parent = Path(path).parent
-    problems = (
-        (not parent.exists(), errno.ENOENT, "the folder does not exist; create it first", parent),
-        (not parent.is_dir(), errno.ENOTDIR, "is not a folder", parent),
-        (Path(path).is_symlink(), errno.ELOOP, "is a symbolic link; name what it leads to", path),
-    )
-    for wrong, number, text, where in problems:
-        if wrong:
-            raise OSError(number, text, str(where))
+    path = Path(path)
+    missing = "the folder does not exist; create it first"
+    _refuse(not path.parent.exists(), errno.ENOENT, missing, path.parent)
+    _refuse(not path.parent.is_dir(), errno.ENOTDIR, "is not a folder", path.parent)
+    _refuse(path.is_symlink(), errno.ELOOP, "is a symbolic link; name what it leads to", path)
+
+
+def _refuse(wrong: bool, number: int, text: str, path: Path) -> None:
+    if wrong:
+        raise OSError(number, text, str(path))

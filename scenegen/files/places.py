@@ -8,14 +8,14 @@ import hashlib
 import os
 import re
 import secrets
-import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
 
 from scenegen.common.errors import SceneGenError
 
 SEPARATOR = "://"
-TRIES = 3  # of an upload
 
 
 def as_place(path: str | Path) -> Path:
@@ -54,10 +54,9 @@ def is_remote(path: str | Path) -> bool:
 
 
 def listing(folder: Path) -> list[Path]:
-    """Return what is in a folder; nothing for a folder of a store that has no file yet."""
-    if not is_remote(folder):
-        return list(folder.iterdir())
-    cast("Any", folder).fs.invalidate_cache()
+    """Return what is in a folder; nothing for a folder that is not there yet."""
+    if is_remote(folder):
+        cast("Any", folder).fs.invalidate_cache()
     try:
         return list(folder.iterdir())
     except (FileNotFoundError, NotADirectoryError):
@@ -67,20 +66,13 @@ def listing(folder: Path) -> list[Path]:
 def upload(file: Path, place: Path) -> None:
     """Copy a complete file to a remote place, and read it back.
 
-    Raises OSError where the store refuses TRIES times, or gives other bytes back.
+    Raises OSError where the store refuses, or gives other bytes back.
     """
-    remote, tries = cast("Any", place), 0
-    while True:
-        tries += 1
-        try:
-            remote.fs.put_file(str(file), remote.path)
-            with file.open("rb") as ours, place.open("rb") as theirs:
-                same = _digest(ours) == _digest(theirs)
-            break
-        except Exception as error:  # each store has errors of its own
-            if tries == TRIES:
-                raise _refused(place, error) from error
-            time.sleep(2.0**tries)
+    remote = cast("Any", place)
+    with _told_by_store(place):
+        remote.fs.put_file(str(file), remote.path)
+        with file.open("rb") as ours, place.open("rb") as theirs:
+            same = _digest(ours) == _digest(theirs)
     if not same:
         raise OSError(errno.EIO, "the store gives other bytes back than it was sent", str(place))
 
@@ -96,16 +88,20 @@ def check_store(place: Path) -> None:
     before a long run.
     """
     remote = cast("Any", place.with_name(f".{place.name}-{secrets.token_hex(4)}"))
-    try:
+    with _told_by_store(place):
         remote.fs.pipe_file(remote.path, b"\n")
         remote.fs.rm_file(remote.path)
+
+
+@contextmanager
+def _told_by_store(place: Path) -> Iterator[None]:
+    """Raise what a store says as an OSError; each store has errors of its own."""
+    try:
+        yield
     except ImportError as error:
         raise lacking(place, error.name or str(error)) from error
     except Exception as error:
-        raise _refused(place, error) from error
-
-
-def _refused(place: Path, error: Exception) -> OSError:
-    number = error.errno if isinstance(error, OSError) and error.errno else errno.EIO
-    text = " ".join(str(error).split())[:200] or os.strerror(number)
-    return OSError(number, f"cannot be written: {type(error).__name__}: {text}", str(place))
+        number = error.errno if isinstance(error, OSError) and error.errno else errno.EIO
+        text = " ".join(str(error).split())[:200] or os.strerror(number)
+        text = f"cannot be written: {type(error).__name__}: {text}"
+        raise OSError(number, text, str(place)) from error

@@ -12,26 +12,15 @@ try:
 except ImportError:  # Windows has no such locks
     fcntl = None  # type: ignore[assignment]
 
-
-_held: set[int] = set()  # descriptors of locks
-
-
-def _let_go() -> None:
-    """Close the locks in a forked process, which may outlive a run that was killed."""
-    for descriptor in _held:
-        os.close(descriptor)
-    _held.clear()
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_let_go)
+_held: set[str] = set()  # locks of this process, which the system would let it take twice
 
 
 @contextmanager
-def run_lock(lock: Path, place: Path, hint: str = "wait for it") -> Iterator[None]:
+def run_lock(lock: Path, place: Path, hint: str = "wait until it ends") -> Iterator[None]:
     """Hold a lock for the block: a file, which is removed at the end.
 
-    The lock of a killed run holds nobody up. On disks without locks nothing is locked.
+    The lock ends with its process, also where that is killed and processes that it forked live on.
+    On a disk without locks nothing is locked.
 
     Args:
         place: what the run makes, for the error.
@@ -39,30 +28,33 @@ def run_lock(lock: Path, place: Path, hint: str = "wait for it") -> Iterator[Non
 
     Raises SceneGenError where another run holds the lock; OSError.
     """
+    name = os.path.realpath(lock)
+    busy = SceneGenError(f"{place}: another run is writing to it", hint=hint)
+    if name in _held:  # opening and closing the file would end the lock
+        raise busy
     descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
-    _held.add(descriptor)
     try:
-        if not _ours(lock, descriptor):
-            raise SceneGenError(place, "another run that writes there", "", hint)
+        if not _taken(lock, descriptor):
+            raise busy
+        _held.add(name)
         try:
             yield
         finally:
+            _held.remove(name)
             with suppress(OSError):
                 lock.unlink()
     finally:
-        if descriptor in _held:  # or this is a forked process
-            _held.remove(descriptor)
-            os.close(descriptor)
+        os.close(descriptor)
 
 
-def _ours(lock: Path, descriptor: int) -> bool:
+def _taken(lock: Path, descriptor: int) -> bool:
     """Take the lock if nobody has it; a run that has just ended may have removed the file."""
     if fcntl is None:
         return True
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         return lock.exists() and os.path.samestat(os.fstat(descriptor), lock.stat())
-    except BlockingIOError:
+    except (BlockingIOError, PermissionError):  # POSIX allows either
         return False
     except OSError:  # a disk without locks
         return True

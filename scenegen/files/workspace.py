@@ -1,13 +1,13 @@
-"""Hidden folders in which files are made before they get their names, each of one run alone.
+"""Hidden folders in which outputs are made before they get their names.
 
-A workspace has a random name, is made exclusively, and holds a file that its run keeps locked for
-as long as it lives. So no two runs share one, in whatever containers or threads they are, and one
-whose lock is free was left by a run that was killed. Where a disk has no locks, none is removed.
+A process holds a lock on each of its workspaces for as long as it lives. A workspace without a lock
+was left by a run that was killed: the next run in the same folder removes it.
 """
 
 import errno
 import functools
 import hashlib
+import itertools
 import os
 import platform
 import re
@@ -22,93 +22,125 @@ from scenegen.common.signals import held_back
 
 try:
     import fcntl
-except ImportError:  # Windows: nothing is locked there, and nothing that is left is removed
+except ImportError:  # Windows has no such locks: what killed runs leave there stays
     fcntl = None  # type: ignore[assignment]
 
 NAME = re.compile(r"\.pix2shape-bench-[0-9a-f]{8}-[0-9a-f]{16}\.partial")
-LOCK = "lock"
-# What a disk may say when it is written to; other errors without a path are not about the output.
+# What a disk may say when it is written to. HDF5 and OpenEXR raise errors that only quote it.
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
+TRIES = 100  # to make a workspace that no other run takes for a leftover
+_Workspace = tuple[Path, int | None]  # a folder, and the descriptor that holds its lock
 
 
 @contextmanager
 def workspace(parent: Path, path: Path) -> Iterator[Path]:
-    """Make a workspace in a folder; it is removed, with all it holds, when the block ends.
+    """Make a hidden folder in `parent`; remove it, with all it holds, when the block ends.
 
-    What killed runs left in the folder is removed when a process first comes to it. Signals wait
-    while the workspace is made, and while it is removed. Errors of the disk that concern the
-    workspace's first file or folder are raised as OSErrors about `path`.
+    What killed runs left in `parent` is removed when a process first comes to it. An error of the
+    disk is raised as an OSError about `path`, the output that is made in the workspace.
     """
+    _first_look(parent.absolute())
+    made: list[_Workspace] = []
     try:
-        _first_look(parent.absolute())
-        made: list[tuple[Path, int]] = []
         try:
-            try:
-                with held_back():
-                    made.append(_made(parent))
-                yield made[0][0]
-            finally:
-                _remove_made(made)
-        finally:  # again, as a signal may come just before that holds signals back
-            _remove_made(made)
-    except BrokenPipeError:  # of a terminal
-        raise
-    except (OSError, RuntimeError) as error:
-        named = error.filename if isinstance(error, OSError) else None
-        inside = () if named is None else _hidden_parts(named, parent)
-        number = None if inside is None else _disk_errno(error)
-        if inside is None or number is None or (named is None and number not in DISK_ERRORS):
+            with held_back():
+                made.append(_made(parent))
+            yield made[0][0]
+        except BrokenPipeError:  # of a terminal
             raise
-        where = str(path.joinpath(*inside))
-        raise OSError(number, f"cannot be written: {os.strerror(number)}", where) from error
-
-
-def _remove_made(made: list[tuple[Path, int]]) -> None:
-    """Remove workspaces of this run, each with the descriptor of its lock, and forget them."""
-    with held_back():
-        while made:
-            folder, lock = made.pop()
-            _empty(folder)
-            os.close(lock)
-            _remove(folder)
+        except (OSError, RuntimeError) as error:
+            about_path = _about(error, parent, path)
+            if about_path is None:
+                raise
+            raise about_path from error
+        finally:
+            _remove(made)
+    finally:  # again: a signal may come just before `_remove` holds signals back
+        _remove(made)
 
 
 def remove_leftovers(parent: Path) -> None:
-    """Remove from a folder the workspaces of runs that were killed, and warn, naming each.
+    """Remove the workspaces that killed runs left in a folder, and warn, naming each.
 
-    Locks may not reach from one machine to another. So those of other machines, and those from
-    before the last start of this one, are only named.
+    Locks may not reach from one machine to another. A workspace of another machine, or from before
+    the last start of this one, is only named.
     """
-    try:
+    names: list[str] = []
+    with suppress(OSError):
         names = [name for name in os.listdir(parent) if NAME.fullmatch(name)]
-    except OSError:
-        return
     for folder in (parent / name for name in names):
-        told = None
-        with suppress(OSError):
-            told = _clean(folder)
-        if told:
-            warnings.warn(told, stacklevel=2)
+        with suppress(OSError):  # its run lives, or it cannot be looked at or removed
+            _remove_leftover(folder)
 
 
-_first_look = functools.cache(remove_leftovers)  # folders may hold a million files
+_first_look = functools.cache(remove_leftovers)  # a folder may hold a million files
 
 
-def _hidden_parts(path: object, parent: Path) -> tuple[str, ...] | None:
-    """Return the parts of a path below the first file or folder of a workspace in `parent`."""
+def _remove_leftover(folder: Path) -> None:
+    lock = _locked(folder)
+    if lock is None:
+        return
     try:
-        parts = Path(os.fsdecode(path)).relative_to(parent).parts  # type: ignore[arg-type]
-    except (ValueError, TypeError):
+        files = [path for path in folder.rglob("*") if not path.is_dir()]
+        size = f"({sum(path.lstat().st_size for path in files) / 1e6:.1f} MB)"
+        if not folder.name.startswith(_prefix()):
+            text = "seems to be left by a run on another machine, or from before a restart"
+            warnings.warn(
+                f"{folder}: {text} {size}; remove it if no run writes there", stacklevel=2
+            )
+            return
+        shutil.rmtree(folder)
+        if files:
+            warnings.warn(
+                f"removed what an earlier run left unfinished: {folder} {size}", stacklevel=2
+            )
+    finally:
+        os.close(lock)
+
+
+def _made(parent: Path) -> _Workspace:
+    """Make a workspace. Another run may take it for a leftover, or remove it, before it is locked.
+
+    Then a new one is made. Some disks, such as /proc, always refuse as if it had been removed.
+    """
+    tries = itertools.count(1)
+    while True:
+        folder = parent / f"{_prefix()}{secrets.token_hex(8)}.partial"
+        try:
+            folder.mkdir()
+            return folder, _locked(folder)
+        except (FileExistsError, BlockingIOError, FileNotFoundError):
+            if next(tries) == TRIES:
+                raise
+
+
+def _locked(folder: Path) -> int | None:
+    """Lock a workspace; return the descriptor that holds the lock, None on a disk without locks.
+
+    Raises BlockingIOError where another process has the lock, and OSError where the folder is gone.
+    """
+    if fcntl is None:
         return None
-    return parts[2:] if parts and NAME.fullmatch(parts[0]) else None
+    lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        folder.lstat()  # another run may have removed it just before
+    except OSError as error:
+        os.close(lock)
+        if isinstance(error, (BlockingIOError, FileNotFoundError)):
+            raise
+        return None
+    return lock
 
 
-def _disk_errno(error: Exception) -> int | None:
-    """Return the system's number of an error; HDF5 and OpenEXR tell only what the system said."""
-    if isinstance(error, OSError) and error.errno:
-        return error.errno
-    said = [number for number in errno.errorcode if os.strerror(number) in str(error)]
-    return max(said, key=lambda number: len(os.strerror(number)), default=None)
+def _remove(made: list[_Workspace]) -> None:
+    """Remove workspaces of this process, and forget them."""
+    with held_back():
+        while made:
+            folder, lock = made.pop()
+            shutil.rmtree(folder, ignore_errors=True)
+            if lock is not None:
+                os.close(lock)
 
 
 @functools.cache
@@ -121,86 +153,23 @@ def _prefix() -> str:
     return f".pix2shape-bench-{hashlib.sha256(about.encode()).hexdigest()[:8]}-"
 
 
-def _made(parent: Path) -> tuple[Path, int]:
-    """Make a workspace; return it and the descriptor of its lock, which holds until it is closed.
+def _about(error: OSError | RuntimeError, parent: Path, path: Path) -> OSError | None:
+    """Return an error of the disk as one about `path`; None for any other error.
 
-    Another run may take it for a leftover before it is locked; then a new one is made.
+    An error that names a file is about `path` where that file is in a workspace in `parent`.
     """
-    while True:
-        folder = parent / f"{_prefix()}{secrets.token_hex(8)}.partial"
-        try:
-            folder.mkdir()
-        except FileExistsError:
-            continue
-        try:
-            lock = _locked(folder, os.O_CREAT | os.O_EXCL)
-        except OSError:
-            _remove(folder)
-            raise
-        if lock is not None:
-            return folder, lock
-
-
-def _locked(folder: Path, flags: int = 0) -> int | None:
-    """Lock a workspace; return the descriptor, None where another run has it or removed it.
-
-    Where there are no locks, the flags to make a new file decide whether it counts as locked.
-    """
-    path = folder / LOCK
-    try:
-        lock = os.open(path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | flags, 0o666)
-    except FileNotFoundError:
+    name, number = getattr(error, "filename", None), getattr(error, "errno", None)
+    where = path
+    if name is None:
+        said = [code for code in DISK_ERRORS if os.strerror(code) in str(error)]
+        number = number if number in DISK_ERRORS else next(iter(said), None)
+    else:
+        inside = Path(os.fsdecode(name))
+        if inside.parts[: len(parent.parts)] != parent.parts:
+            return None
+        hidden, *below = inside.parts[len(parent.parts) :] or [""]
+        number = number if NAME.fullmatch(hidden) else None
+        where = path.joinpath(*below[1:])
+    if number is None:
         return None
-    try:
-        if fcntl is None:
-            raise OSError(errno.ENOTSUP, os.strerror(errno.ENOTSUP))
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        ours = os.path.samestat(os.fstat(lock), path.lstat())
-    except (BlockingIOError, FileNotFoundError):
-        ours = False
-    except OSError:
-        ours = bool(flags)
-    if not ours:
-        os.close(lock)
-    return lock if ours else None
-
-
-def _clean(folder: Path) -> str | None:
-    """Remove a workspace that a killed run left; return what is to be said about it, if anything.
-
-    Raises OSError where it cannot be looked at or removed, or is somebody's.
-    """
-    lock = _locked(folder)
-    if lock is None:
-        folder.rmdir()  # fails unless its run was killed before it locked it
-        return None
-    try:
-        files = [path for path in folder.rglob("*") if path.name != LOCK and not path.is_dir()]
-        size = f"({sum(path.lstat().st_size for path in files) / 1e6:.1f} MB)"
-        if not folder.name.startswith(_prefix()):
-            text = "seems to be left by a run on another machine, or from before a restart"
-            return f"{folder}: {text} {size}; remove it if no run writes there"
-        _empty(folder)
-        (folder / LOCK).unlink()  # before it is let go: its maker may be about to lock it
-    finally:
-        os.close(lock)
-    folder.rmdir()
-    return f"removed what an earlier run left unfinished: {folder} {size}" if files else None
-
-
-def _empty(folder: Path) -> None:
-    """Remove all but the lock from a workspace whose lock is held."""
-    with suppress(OSError):
-        for path in list(folder.iterdir()):
-            if path.is_dir() and not path.is_symlink():
-                shutil.rmtree(path, ignore_errors=True)
-            elif path.name != LOCK:
-                path.unlink(missing_ok=True)
-
-
-def _remove(folder: Path) -> None:
-    """Remove a workspace that is empty but for its lock."""
-    with suppress(OSError):
-        if os.listdir(folder) == [LOCK]:
-            (folder / LOCK).unlink()
-        folder.rmdir()
+    return OSError(number, f"cannot be written: {os.strerror(number)}", str(where))

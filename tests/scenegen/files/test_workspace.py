@@ -110,11 +110,9 @@ def test_where_nothing_can_be_locked_nothing_is_removed(left, tmp_path, monkeypa
 
 
 @LINUX
-@pytest.mark.parametrize("held", [(), ("lock",)])
-def test_a_run_killed_before_it_wrote_anything_is_not_worth_a_word(left, tmp_path, held):
+def test_a_run_killed_before_it_wrote_anything_is_not_worth_a_word(left, tmp_path):
     for path in left.iterdir():
-        if path.name not in held:
-            path.unlink()
+        path.unlink()
     write_text(tmp_path / "next.txt", "mine")
     assert os.listdir(tmp_path) == ["next.txt"]
 
@@ -180,62 +178,30 @@ def test_runs_and_their_cleaners_at_once(tmp_path):
 
 
 @LINUX
-@pytest.mark.parametrize("moment", ["before the lock", "before it holds", "gone"])
+@pytest.mark.parametrize("moment", ["before it is locked", "while it is locked", "gone"])
 def test_a_cleaner_between_making_and_locking(tmp_path, monkeypatch, moment):
     """The run takes another name."""
-    real_open, real_flock, cleaned = os.open, module.fcntl.flock, []
+    real, flock, seen = module._locked, module.fcntl.flock, []
 
-    def look() -> None:
-        if not cleaned:
-            cleaned.append(True)
+    def locks(folder: Path) -> int | None:
+        seen.append(folder)
+        if len(seen) == 1 and moment == "before it is locked":
             remove_leftovers(tmp_path)
+        elif len(seen) == 1 and moment == "while it is locked":
+            flock(os.open(folder, os.O_RDONLY), module.fcntl.LOCK_EX)
+        return real(folder)
 
-    def opens(*arguments: object) -> int:
-        if moment == "before the lock":
-            look()
-        return real_open(*arguments)
+    def removed(lock: int, how: int) -> None:
+        flock(lock, how)
+        if len(seen) == 1:
+            seen[0].rmdir()
 
-    def flocks(*arguments: object) -> None:
-        if moment == "before it holds":
-            look()
-        elif moment == "gone" and not cleaned:
-            cleaned.append(True)
-            for path in tmp_path.glob(".*/lock"):
-                path.unlink()
-        real_flock(*arguments)
-
-    monkeypatch.setattr(module.os, "open", opens)
-    monkeypatch.setattr(module.fcntl, "flock", flocks)
-    write_text(tmp_path / "next.txt", "mine")
-    assert cleaned
-    assert (tmp_path / "next.txt").read_text() == "mine"
-
-
-@LINUX
-def test_a_cleaner_that_lets_go_while_a_run_locks(tmp_path, monkeypatch):
-    """The cleaner has closed its lock and not yet removed the folder when the run locks it."""
-    real_close, real_flock = os.close, module.fcntl.flock
-    let_go, inside, cleaners = threading.Event(), threading.Event(), []
-
-    def closes(descriptor: int) -> None:
-        real_close(descriptor)
-        if threading.current_thread() in cleaners:
-            let_go.set()
-            inside.wait(10)
-
-    def flocks(*arguments: object) -> None:
-        if not cleaners:
-            cleaners.append(threading.Thread(target=remove_leftovers, args=(tmp_path,)))
-            cleaners[0].start()
-            assert let_go.wait(10)
-        real_flock(*arguments)
-
-    monkeypatch.setattr(module.os, "close", closes)
-    monkeypatch.setattr(module.fcntl, "flock", flocks)
+    monkeypatch.setattr(module, "_locked", locks)
+    if moment == "gone":
+        monkeypatch.setattr(module.fcntl, "flock", removed)
     with written_beside(tmp_path / "next.txt") as temporary:
-        inside.set()
-        cleaners[0].join()
         temporary.write_text("mine")
+        assert temporary.parent != seen[0]
     assert (tmp_path / "next.txt").read_text() == "mine"
 
 
