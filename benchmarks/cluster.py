@@ -18,7 +18,7 @@ from scenegen.description.specs import DatasetSpec
 from scenegen.files.cluster import LOCAL, Cluster, connected
 from scenegen.files.making import Task, complete_set
 from scenegen.files.manifest import FORMAT, Manifest, ShardRecord
-from scenegen.files.pool import processors
+from scenegen.files.workers import processors
 from scenegen.rendering.sameness import renderer_identity
 from scenegen.rooms.make import make_dataset
 

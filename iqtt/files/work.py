@@ -9,8 +9,8 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import Rendered, groups, render_questions
 from scenegen.files.cluster import threads_of_worker
-from scenegen.files.pool import in_processes, in_threads, processors
 from scenegen.files.table import packing_threads
+from scenegen.files.workers import in_processes, in_threads, processors
 from scenegen.rendering.renderer import share_processors
 
 BLOCK = 128  # questions that a worker process makes in one go

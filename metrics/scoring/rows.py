@@ -28,7 +28,7 @@ from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import Identity, RoomPredictions, on_any_machine, open_predictions
 from metrics.submissions.truths import read_true_view
 from scenegen.files.cluster import Cluster
-from scenegen.files.pool import worker_pool
+from scenegen.files.workers import worker_pool
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]

@@ -46,7 +46,7 @@ def on_scheduler(
         yield None
         return
     from scenegen.files.cluster import connected
-    from scenegen.files.pool import processors
+    from scenegen.files.workers import processors
 
     with connected(
         scheduler, workers or processors(), versions, lambda text: print_line(text, err=True)

@@ -5,7 +5,6 @@ only here.
 """
 
 import importlib
-import itertools
 import logging
 import os
 import sys
@@ -26,8 +25,7 @@ T = TypeVar("T")
 Task = TypeVar("Task")
 LOCAL = "local"
 LOGGING = "DASK_DISTRIBUTED__LOGGING__DISTRIBUTED"  # which Dask's processes read as they start
-AHEAD = 2000  # tasks that the scheduler knows, or whose results were not taken
-BATCH = 200  # tasks that it is told of at once
+BATCH = 200  # tasks that the scheduler is told of at once, as each message costs milliseconds
 PATIENCE = 10  # seconds in which a scheduler must answer, or that pass without a worker
 MOMENT = 0.002  # seconds
 _one_at_a_time = threading.Lock()  # Mitsuba and HDF5 take one task in a process
@@ -41,12 +39,12 @@ class Cluster:
     Attributes:
         client: of Dask.
         versions: tells what the results of a process depend on; each worker must say the same.
-        told: is called with a line where there are no workers.
+        print_note: is called with a line where there are no workers.
     """
 
     client: Any
     versions: Versions
-    told: Callable[[str], Any]
+    print_note: Callable[[str], Any]
 
     def in_any_order(self, function: Callable[[Task], T], tasks: Iterable[Task]) -> Generator[T]:
         """Call a function for each task on the workers; yield results as they come.
@@ -54,65 +52,60 @@ class Cluster:
         Each worker process does one task at a time.
 
         Raises what the function raises, and SceneGenError where a task has ended several workers,
-        or where a worker has other versions.
+        where a worker has other versions, or where the scheduler is gone.
         """
-        for _, result in self._done(function, tasks, {}):
+        for _, result in self._numbered(function, tasks):
             yield result
 
     def in_order(self, function: Callable[[Task], T], tasks: Iterable[Task]) -> Generator[T]:
         """Call a function for each task as `in_any_order`, but yield results in order."""
         waiting, following = dict[int, T](), 0
-        for number, result in self._done(function, tasks, waiting):
+        for number, result in self._numbered(function, tasks):
             waiting[number] = result
             while following in waiting:
                 yield waiting.pop(following)
                 following += 1
 
-    def _done(
-        self, function: Callable[[Task], T], tasks: Iterable[Task], waiting: Mapping[int, T]
+    def _numbered(
+        self, function: Callable[[Task], T], tasks: Iterable[Task]
     ) -> Generator[tuple[int, T]]:
-        """Yield results with the numbers of their tasks; `waiting` are those not taken yet."""
+        """Yield results with the numbers of their tasks."""
         from distributed import KilledWorker, as_completed
         from distributed.comm import CommClosedError
 
         # The function travels as the result of a task: workers pass it on to each other, and Dask
         # makes it again where all that had it are gone.
         work = self.client.submit(_as_is, (function, self.versions, dict(self.versions())))
-        numbers, running, numbered = dict[str, int](), as_completed(), enumerate(tasks)
+        futures = self.client.map(_call, list(tasks), work=work, pure=False, batch_size=BATCH)
+        numbers = {future.key: number for number, future in enumerate(futures)}
+        running = as_completed(futures)
         try:
-            while True:
-                room = len(numbers) + len(waiting) <= AHEAD - BATCH
-                # Many at once: each message costs milliseconds.
-                if room and (some := list(itertools.islice(numbered, BATCH))):
-                    some_tasks = [task for _, task in some]
-                    futures = self.client.map(_call, some_tasks, work=work, pure=False)
-                    numbers.update({f.key: i for f, (i, _) in zip(futures, some, strict=True)})
-                    running.update(futures)
-                if not numbers:
-                    return
+            for _ in futures:
                 self._wait_for(running)
-                done = next(running)
-                yield numbers.pop(done.key), done.result()
+                future = next(running)
+                result = future.result()
+                future.release()
+                yield numbers[future.key], result
         except KilledWorker as error:
-            hint = "memory may be short there; see the workers' logs"
-            raise SceneGenError("cluster", "a task that ended several workers", "", hint) from error
+            what = "cluster: a task ended several workers, probably because memory ran out"
+            raise SceneGenError(what, hint="see the workers' logs") from error
         except (CancelledError, CommClosedError) as error:
-            hint = "the same command goes on, with another one or without"
-            raise SceneGenError("scheduler", "none any more", "", hint) from error
+            hint = "run the same command again to continue"
+            raise SceneGenError("The Dask scheduler disconnected", hint=hint) from error
         finally:
             with suppress(Exception):  # the scheduler may be gone; nothing depends on it
-                self.client.cancel([*running.futures, work])
+                self.client.cancel([*futures, work])
 
     def _wait_for(self, running: Any) -> None:
         """Wait for a result; say so where there has been no worker for a while."""
-        begun, alone = time.monotonic(), False
+        check_at = time.monotonic() + PATIENCE
         while not running.has_ready():
             time.sleep(MOMENT)
-            if not alone and time.monotonic() - begun > PATIENCE:
-                begun = time.monotonic()
+            if time.monotonic() > check_at:
                 alone = not self.client.scheduler_info(n_workers=-1)["workers"]
                 if alone:
-                    self.told("the cluster has no workers any more; waiting for one")
+                    self.print_note("the cluster has no workers any more; waiting for one")
+                check_at = float("inf") if alone else time.monotonic() + PATIENCE
 
 
 def threads_of_worker() -> int:
@@ -127,12 +120,24 @@ def _as_is(work: T) -> T:
 
 
 def _call(task: Task, work: tuple[Callable[[Task], T], Versions, dict[str, str]]) -> T:
-    """Do a task on a worker, which may have joined after the others were asked for versions."""
+    """Do a task on a worker, which may have joined at any time and have other versions."""
+    from distributed import get_worker
+
     function, versions, expected = work
     with _one_at_a_time:
-        differ = _differences(dict(versions()), expected)
-        if differ:
-            raise _refused("a worker", differ)
+        here = dict(versions())
+        differences = [
+            f"{name} {here.get(name)}, not {expected.get(name)}"
+            for name in sorted(here.keys() | expected.keys())
+            if here.get(name) != expected.get(name)
+        ]
+        if differences:
+            hint = (
+                "install the same versions on all machines, or the bits of the files could differ"
+            )
+            where = f"worker {get_worker().address}"
+            found, expected_here = "; ".join(differences), "the versions of the main process"
+            raise SceneGenError(where, found, expected_here, hint)
         return function(task)
 
 
@@ -141,16 +146,18 @@ def connected(
     scheduler: str,
     workers: int,
     versions: Versions,
-    told: Callable[[str], Any] = lambda text: print(text, file=sys.stderr),
+    print_note: Callable[[str], Any] = lambda text: print(text, file=sys.stderr),
 ) -> Iterator[Cluster]:
-    """Connect to a scheduler; its workers must tell the versions that this process has.
+    """Connect to a scheduler.
 
     Args:
         scheduler: its address, such as `tcp://host:8786`, or LOCAL for one that is started here
             with `workers` processes.
-        told: is called with a line where the scheduler has no workers yet, which are waited for.
+        versions: as in `Cluster`.
+        print_note: is called with a line where the scheduler has no workers yet, which are waited
+            for.
 
-    Raises SceneGenError where Dask is not installed, no scheduler answers or a worker is refused.
+    Raises SceneGenError where Dask is not installed, or no scheduler answers.
     """
     try:
         distributed = importlib.import_module("distributed")
@@ -158,16 +165,9 @@ def connected(
         raise lacking(f"--scheduler {scheduler}", "distributed") from error
     with _quiet(), _client(distributed, scheduler, workers) as client:
         if not client.scheduler_info(n_workers=-1)["workers"]:
-            told(f"{scheduler}: no workers yet; waiting for the first one")
+            print_note(f"{scheduler}: no workers yet; waiting for the first one")
             client.wait_for_workers(1)
-        expected = dict(versions())
-        for name, found in sorted(client.run(versions, on_error="return").items()):
-            differ = [f"no versions ({found!r:.100})"]
-            if isinstance(found, Mapping):
-                differ = _differences(dict(found), expected)
-            if differ:
-                raise _refused(f"worker {name}", differ)
-        yield Cluster(client, versions, told)
+        yield Cluster(client, versions, print_note)
 
 
 @contextmanager
@@ -184,9 +184,9 @@ def _client(distributed: Any, scheduler: str, workers: int) -> Iterator[Any]:
     try:
         client = distributed.Client(scheduler, timeout=PATIENCE)
     except (OSError, ValueError, TimeoutError) as error:
+        what = f"--scheduler {scheduler}: no scheduler answers ({type(error).__name__})"
         expected = "the address of a Dask scheduler, such as tcp://host:8786, or local"
-        found = f"none that answers ({type(error).__name__})"
-        raise SceneGenError(f"--scheduler {scheduler}", found, expected) from error
+        raise SceneGenError(what, expected=expected) from error
     with client:
         yield client
 
@@ -195,28 +195,14 @@ def _client(distributed: Any, scheduler: str, workers: int) -> Iterator[Any]:
 def _quiet() -> Iterator[None]:
     """Keep Dask's own lines from the terminal: lost workers are its business."""
     loggers = [logging.getLogger(name) for name in ("distributed", "tornado", "asyncio")]
-    levels, told = [logger.level for logger in loggers], os.environ.get(LOGGING)
+    levels, before = [logger.level for logger in loggers], os.environ.get(LOGGING)
     os.environ.setdefault(LOGGING, "critical")
     for logger in loggers:
         logger.setLevel(logging.CRITICAL)
     try:
         yield
     finally:
-        if told is None:
+        if before is None:
             del os.environ[LOGGING]
         for logger, level in zip(loggers, levels, strict=True):
             logger.setLevel(level)
-
-
-def _differences(found: dict[str, str], expected: dict[str, str]) -> list[str]:
-    names = sorted(found.keys() | expected.keys())
-    return [
-        f"{n} {found.get(n)}, here {expected.get(n)}"
-        for n in names
-        if found.get(n) != expected.get(n)
-    ]
-
-
-def _refused(worker: str, differ: list[str]) -> SceneGenError:
-    hint = "install the same versions on all machines, or the bits of the files could differ"
-    return SceneGenError(worker, "; ".join(differ), "the same versions as here", hint)

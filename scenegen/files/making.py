@@ -24,9 +24,9 @@ from scenegen.files.manifest import (
 )
 from scenegen.files.new_file import check_writable
 from scenegen.files.places import check_store, is_remote, listing
-from scenegen.files.pool import in_threads, processors
 from scenegen.files.run_lock import run_lock
 from scenegen.files.shards import opened, set_name
+from scenegen.files.workers import in_threads, processors
 from scenegen.files.workspace import remove_leftovers
 
 SHARE = 0.05  # of the time that writing manifests may take; that of 10,000 shards has 3 MB

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scenegen.common.errors import SpecError
 from scenegen.files.axes import name_axes
 from scenegen.files.content import SHA256, ColumnDigest, row_digest
-from scenegen.files.pool import processors
+from scenegen.files.workers import processors
 
 Array = NDArray[Any]
 COMPRESSIONS = ("gzip", "lzf", "none")

@@ -8,8 +8,8 @@ import numpy as np
 
 from scenegen.common.errors import FileFormatError
 from scenegen.files.content import SHA256
-from scenegen.files.pool import in_threads
 from scenegen.files.table import Rows, pack_rows, packing_threads
+from scenegen.files.workers import in_threads
 from scenegen.layout import FIELDS, columns
 from scenegen.rendering.backend import VERSION_ATTRIBUTES
 from scenegen.rooms.reader import RoomsFile

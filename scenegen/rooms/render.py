@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec
 from scenegen.files.cluster import threads_of_worker
-from scenegen.files.pool import in_processes, in_threads, processors
 from scenegen.files.table import PackedRows, packing_threads
+from scenegen.files.workers import in_processes, in_threads, processors
 from scenegen.layout import columns
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.families.store import MEMBER_STORE

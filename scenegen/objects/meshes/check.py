@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from scenegen.common.errors import SceneGenError
-from scenegen.files.pool import worker_pool
+from scenegen.files.workers import worker_pool
 from scenegen.objects.cache import DiskCache
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFile, ModelFolder

@@ -100,16 +100,11 @@ def version_by_process(main):
 
 
 def test_workers_with_other_versions_are_refused(cluster):
-    """At the start, and where one joins later."""
     here = partial(version_by_process, os.getpid())
     address = cluster.client.scheduler.address
-    with pytest.raises(SceneGenError) as refused, connected(address, 0, here):
-        pass
-    assert "mitsuba_version 3.8.0, here 3.9.1" in refused.value.found
-    later = replace(cluster, versions=here)
-    with pytest.raises(SceneGenError) as refused:
-        list(later.in_any_order(len, ["a"]))
-    assert "3.8.0" in refused.value.found
+    with pytest.raises(SceneGenError) as refused, connected(address, 0, here) as other:
+        list(other.in_any_order(len, ["a"]))
+    assert "mitsuba_version 3.8.0, not 3.9.1" in refused.value.found
 
 
 def shared(task):
@@ -137,7 +132,7 @@ def test_a_scheduler_that_goes_away_is_one_line(tmp_path):
         found.client.cluster.close()
         with pytest.raises(SceneGenError) as lost:
             list(results)
-    assert lost.value.where == "scheduler"
+    assert "scheduler" in lost.value.where
 
 
 def test_no_scheduler_is_one_line(monkeypatch):

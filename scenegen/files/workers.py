@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from functools import partial
 from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, TypeVar
 
@@ -17,6 +18,7 @@ from scenegen.common.signals import without_interrupts
 
 T = TypeVar("T")
 Task = TypeVar("Task")
+Made = Callable[[Task], Generator[T, None, Any]]
 PATIENCE = 5.0  # seconds, until a killed process is gone
 AHEAD = 2  # tasks for each process that are begun, or done and not yet taken
 
@@ -26,49 +28,6 @@ def processors() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-class _Worker(SpawnProcess):
-    def start(self) -> None:
-        """Start a process that never sees Ctrl-C, which a terminal sends to all processes."""
-        with without_interrupts():
-            super().start()
-
-
-class _Spawning(SpawnContext):
-    """Starts workers, and remembers them."""
-
-    def __init__(self) -> None:
-        self.started: list[_Worker] = []
-
-    def Process(self, *args: Any, **kwargs: Any) -> _Worker:  # type: ignore[override]  # noqa: N802
-        worker = _Worker(*args, **kwargs)
-        self.started.append(worker)
-        return worker
-
-
-@contextmanager
-def worker_pool(
-    count: int, function: Callable[[Any], Any] | None = None
-) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool of spawned processes: forked ones would share open files and threads' locks.
-
-    The block waits for them at its end. Where it ends by an error, they are killed instead.
-    """
-    context = _Spawning()
-    pool = ProcessPoolExecutor(count, context, _begin, (function,))
-    try:
-        yield pool
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        # One that was being started when Ctrl-C came has no number; it ends by itself.
-        begun = [worker for worker in context.started if worker.pid is not None]
-        for worker in begun:
-            worker.kill()
-        for worker in begun:
-            worker.join(PATIENCE)
-        raise
-    pool.shutdown()
 
 
 def in_threads(
@@ -89,6 +48,33 @@ def in_threads(
             yield running.popleft().result()
 
 
+def in_order(
+    make: Made[Task, T], tasks: Iterable[Task], workers: int, note: Callable[[Any], Any]
+) -> Generator[T]:
+    """Yield what a generator function makes of each task, in order, here or in processes.
+
+    What the generator returns at the end of a task goes to `note`.
+
+    Raises what the function raises, and as `in_processes`.
+    """
+    if workers == 1:
+        for task in tasks:
+            note((yield from make(task)))
+        return
+    for results, end in in_processes(partial(_listed, make), tasks, workers):
+        note(end)
+        yield from results
+
+
+def _listed(make: Made[Task, T], task: Task) -> tuple[list[T], Any]:
+    made, results = make(task), list[T]()
+    while True:
+        try:
+            results.append(next(made))
+        except StopIteration as end:
+            return results, end.value
+
+
 def in_processes(function: Callable[[Task], T], tasks: Iterable[Task], count: int) -> Generator[T]:
     """Call a function for each task, in `count` processes; yield the results in order.
 
@@ -100,11 +86,11 @@ def in_processes(function: Callable[[Task], T], tasks: Iterable[Task], count: in
     done = False
     try:
         with worker_pool(count, function) as pool:
-            running: deque[Future[tuple[T, list[_Warned]]]] = deque()
+            running: deque[Future[tuple[T, list[_Warning]]]] = deque()
 
             def oldest() -> T:
-                result, warned = running.popleft().result()
-                for text, category in warned:
+                result, caught = running.popleft().result()
+                for text, category in caught:
                     warnings.warn(text, category, stacklevel=3)
                 return result
 
@@ -117,20 +103,55 @@ def in_processes(function: Callable[[Task], T], tasks: Iterable[Task], count: in
                 yield oldest()
                 done = True
     except BrokenProcessPool as error:
-        short = "memory may be short: use fewer workers"
+        what = "A worker process was killed, probably because memory ran out"
         guard = 'call it inside `if __name__ == "__main__":`, or use one worker'
-        hint = short if done else f"{short}; in a script of your own, {guard}"
-        raise SceneGenError("worker processes", "one that was killed", "", hint) from error
+        hint = "use fewer --workers"
+        hint = hint if done else f"{hint}; in a script of your own, {guard}"
+        raise SceneGenError(what, hint=hint) from error
 
 
-_Warned = tuple[str, type[Warning]]
+class _Worker(SpawnProcess):
+    def start(self) -> None:
+        """Start a process that never sees Ctrl-C, which a terminal sends to all processes."""
+        with without_interrupts():
+            super().start()
+
+
+class _Spawning(SpawnContext):
+    Process = _Worker
+
+
+@contextmanager
+def worker_pool(
+    count: int, function: Callable[[Any], Any] | None = None
+) -> Iterator[ProcessPoolExecutor]:
+    """Open a pool of spawned processes: forked ones would share open files and threads' locks.
+
+    The block waits for them at its end. Where it ends by an error, they are killed instead.
+    """
+    pool = ProcessPoolExecutor(count, _Spawning(), _begin, (function,))
+    try:
+        yield pool
+    except BaseException:
+        # A process that was being started when Ctrl-C came is not listed; it ends by itself.
+        processes = list((pool._processes or {}).values())
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.kill()
+        for process in processes:
+            process.join(PATIENCE)
+        raise
+    pool.shutdown()
+
+
+_Warning = tuple[str, type[Warning]]
 _work: list[Callable[[Any], Any]] = []  # of this process, if it is a worker of `in_processes`
 
 
-def _do(task: Any) -> tuple[Any, list[_Warned]]:
+def _do(task: Any) -> tuple[Any, list[_Warning]]:
     with warnings.catch_warnings(record=True) as caught:
         result = _work[0](task)
-    return result, [(str(one.message), one.category) for one in caught]
+    return result, [(str(warning.message), warning.category) for warning in caught]
 
 
 def _begin(function: Callable[[Any], Any] | None) -> None:

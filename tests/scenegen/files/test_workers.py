@@ -11,11 +11,11 @@ import warnings
 import pytest
 
 from scenegen.common.errors import SceneGenError
-from scenegen.files.pool import in_processes, in_threads
+from scenegen.files.workers import in_order, in_processes, in_threads
 
 BUSY = """
 import sys, time
-from scenegen.files.pool import worker_pool
+from scenegen.files.workers import worker_pool
 try:
     with worker_pool(2) as pool:
         tasks = [pool.submit(time.sleep, seconds) for seconds in (float(sys.argv[1]), 1)]
@@ -63,6 +63,18 @@ def test_results_come_in_order_from_both_kinds_of_workers():
     assert list(in_processes(abs, iter(tasks), 2)) == tasks
 
 
+def _counted(task):
+    yield from range(task)
+    return task
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_what_a_generator_yields_and_returns_comes_in_order(workers):
+    ends = []
+    assert list(in_order(_counted, [2, 0, 3], workers, ends.append)) == [0, 1, 0, 1, 2]
+    assert ends == [2, 0, 3]
+
+
 @pytest.mark.parametrize("run", [in_processes, functools.partial(in_threads, ahead=1)])
 def test_errors_are_those_of_the_function(run):
     with pytest.raises(ValueError, match="domain"):
@@ -90,4 +102,4 @@ def _strange(task):
 def test_a_process_that_ends_by_itself_is_told():
     with pytest.raises(SceneGenError) as refused:
         list(in_processes(os._exit, [1, 2, 3], 2))
-    assert refused.value.where == "worker processes"
+    assert "worker process" in refused.value.where
