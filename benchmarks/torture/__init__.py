@@ -1,5 +1,5 @@
 """Runs that are killed, stopped, or meet trouble of many kinds, and then go on.
 
 `python -m benchmarks.torture` runs all of it. `runs` starts the commands and compares what they
-leave; `surroundings`, `cluster`, `questions` and `growth` have the cases of other kinds.
+leave; `cases` and `growth` have the trouble.
 """

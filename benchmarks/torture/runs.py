@@ -5,73 +5,70 @@ import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
-SCENES, SHARD = 400, 50
-WORDS = f"render --n {SCENES} --size 32 --min-visible-pixels 3 --shard-size {SHARD} --seed 3"
-# Run the command in a process that kills itself just before or after the k-th event of a kind.
+Process = subprocess.Popen[str]
+# The name of a case, and what was wrong: nothing if it survived.
+Results = Iterator[tuple[str, str]]
+
+ROOMS = (  # 8 shards
+    "scenegen render --n 400 --size 32 --min-visible-pixels 3 --shard-size 50 --seed 3"
+    " --out rooms.h5"
+)
+QUESTIONS = (
+    "iqtt make-split --train 120 --labeled 50 --val 30 --test 60 --shard-size 20 --seed 3"
+    " --size 32 --min-cube-pixels 1 --cubes 6-8 --out split"
+)
+# Events of a run of rooms: what is called, and how often about.
+EVENTS = {
+    "packing": ("scenegen.rooms.render:pack_rooms", 25),
+    "writing": ("scenegen.files.table:Table.extend_packed", 25),
+    "manifest": ("scenegen.files.making:write_manifest", 10),
+    "replace": ("os:replace", 18),
+    "unlink": ("os:unlink", 18),
+}
+# Runs a command in a process that kills itself just before or after the k-th call of a function.
 HOOKED = """
-import builtins, os, signal, sys
-kind, at, after = sys.argv[1], int(sys.argv[2]), sys.argv[3] == "after"
+import functools, importlib, os, signal, sys
+place, at, after = sys.argv[1], int(sys.argv[2]), sys.argv[3] == "after"
 del sys.argv[1:4]
-def hook(place, name):
-    real, seen = getattr(place, name), [0]
-    def hooked(*arguments, **named):
-        seen[0] += 1
-        if seen[0] == at and not after:
-            os.kill(os.getpid(), signal.SIGKILL)
-        result = real(*arguments, **named)
-        if seen[0] == at and after:
-            os.kill(os.getpid(), signal.SIGKILL)
-        return result
-    setattr(place, name, hooked)
-if kind == "packing":
-    from scenegen.rooms import render
-    hook(render, "pack_rooms")
-elif kind == "writing":
-    from scenegen.files.table import Table
-    hook(Table, "extend_packed")
-elif kind == "manifest":
-    from scenegen.files import making
-    hook(making, "write_manifest")
-else:
-    hook(os, kind)
-import cli
-cli.scenegen()
+module, *owners, name = place.replace(":", ".").rsplit(".", place.count(".", place.index(":")) + 1)
+owner = functools.reduce(getattr, owners, importlib.import_module(module))
+real, calls = getattr(owner, name), 0
+def hooked(*arguments, **named):
+    global calls
+    calls += 1
+    if calls == at and not after:
+        os.kill(os.getpid(), signal.SIGKILL)
+    result = real(*arguments, **named)
+    if calls == at and after:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return result
+setattr(owner, name, hooked)
 """
-EVENTS = {"packing": 25, "writing": 25, "manifest": 10, "replace": 18, "unlink": 18}
 
 
 class Torture:
-    """A folder with an unbroken run to compare others with."""
+    """A command, the files of an unbroken run of it, and a folder for cases.
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    Attributes:
+        where: the folder of the last case.
+        seconds: that the unbroken run took.
+        expected: the files of the unbroken run.
+    """
+
+    def __init__(self, folder: Path, command: str = ROOMS) -> None:
+        self.folder, self.words = folder, command.split()
         self.temporary = folder / "tmp"
-        self.temporary.mkdir()
-        self.where = folder  # of the last case
+        self.temporary.mkdir(exist_ok=True)
         self.environment = {**os.environ, "OMP_NUM_THREADS": "1", "TMPDIR": str(self.temporary)}
-        self.unbroken = folder / "unbroken"
-        self.unbroken.mkdir()
+        self.fresh("unbroken")
         start = time.perf_counter()
-        self.command(self.unbroken, "1").wait()
+        self.start().communicate()
         self.seconds = time.perf_counter() - start
-        self.expected = contents(self.unbroken)
-
-    def command(
-        self,
-        where: Path,
-        workers: str = "1",
-        hook: tuple[str, ...] = (),
-        more: tuple[str, ...] = (),
-        **options: object,
-    ) -> "subprocess.Popen[str]":
-        """Start the command in a folder, with more words; `options` are those of Popen."""
-        code = HOOKED if hook else "import cli; cli.scenegen()"
-        words = [sys.executable, "-c", code, *hook, *WORDS.split(), "--workers", workers, *more]
-        streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
-        how = {"env": self.environment, **streams, **options}
-        return subprocess.Popen(words, cwd=where, **how)  # type: ignore[call-overload]
+        self.expected = contents(self.where)
 
     def fresh(self, name: str) -> Path:
         """Return an empty folder, in which the next case takes place."""
@@ -80,43 +77,66 @@ class Torture:
         self.where.mkdir()
         return self.where
 
-    def left_behind(self) -> str:
-        """Return which temporary files the case left, here or where the system has them."""
-        folders = [folder for folder in (self.where, self.temporary) if folder.is_dir()]
-        names = [path.name for folder in folders for path in folder.iterdir()]
-        hidden = [name for name in names if name.startswith(".") or not name.startswith("rooms")]
-        return f"left behind: {hidden}" if hidden else ""
+    def start(self, *more: str, workers: int = 1, hook: str = "", **options: Any) -> Process:
+        """Start the command in the folder of the case.
 
-    def goes_on(self, where: Path) -> str:
-        """Run the same command again; return what is wrong, or nothing.
-
-        A set that was complete when its run was killed must be right, and loses a file.
+        Args:
+            more: words at its end.
+            hook: words for HOOKED; empty for a plain run.
+            options: of Popen.
         """
-        manifest = where / "rooms.manifest.json"
-        complete = manifest.exists() and '"complete": true' in manifest.read_text()
-        if complete and contents(where) != self.expected:
-            return "other bytes in a complete set"
-        if complete:
-            (where / "rooms.h5").unlink()
-        again = self.command(where)
-        said = again.communicate()[1]
-        if again.returncode:
-            return f"the second run failed: {said.strip()[-200:]}"
-        return "" if contents(where) == self.expected else "other bytes"
+        program, *words = self.words
+        code = f"{HOOKED if hook else ''}\nimport cli\ncli.{program}()"
+        command = [sys.executable, "-c", code, *hook.split(), *words]
+        streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
+        how = {"env": self.environment, "cwd": self.where, **streams, **options}
+        return subprocess.Popen([*command, "--workers", str(workers), *more], **how)
 
-    def ended(self, process: "subprocess.Popen[str]", said: str, code: int = 2) -> str:
-        """Return what is wrong with how a command ended; with code 2, that is one line and no more.
+    def under_way(self, process: Process, shards: int = 1) -> bool:
+        """Wait until some shards are there; return whether the process still runs."""
+        while len(list(self.where.glob("rooms-*"))) < shards and process.poll() is None:
+            time.sleep(0.02)
+        return process.poll() is None
 
-        Files that it left under their names must be whole.
+    def goes_on(self) -> str:
+        """Run the command again; return what is wrong, or nothing.
+
+        Where the killed run was complete, the command may refuse to replace its files.
         """
-        lines = [line for line in said.splitlines() if "warning" not in line.lower()]
-        clear = "Traceback" not in said and (code != 2 or len(lines) == 1)
-        if process.returncode != code or not clear:
-            return f"exit {process.returncode}: {said[-200:]!r}"
-        whole = all(self.expected.get(n) == data for n, data in contents(self.where).items())
+        complete = contents(self.where) == self.expected
+        again = self.start()
+        errors = again.communicate()[1]
+        if again.returncode and not (complete and again.returncode == 2):
+            return f"the second run failed: {errors.strip()[-200:]}"
+        return self.other_bytes()
+
+    def other_bytes(self) -> str:
+        """Return what is wrong with the files, or nothing."""
+        return "" if contents(self.where) == self.expected else "other bytes"
+
+    def ended(self, process: Process, code: int = 2) -> str:
+        """Wait for a command; return what is wrong with its end.
+
+        With code 2 it must say why in one line. Files under their names must be whole.
+        """
+        errors = (process.communicate()[1] or "").strip()
+        lines = [line for line in errors.splitlines() if "warning" not in line.lower()]
+        if process.returncode != code or "Traceback" in errors or (code == 2 and len(lines) != 1):
+            return f"exit {process.returncode}: {errors[-200:]!r}"
+        whole = all(self.expected.get(name) == data for name, data in contents(self.where).items())
         return "" if whole else "a file that is not whole"
+
+    def left_behind(self) -> str:
+        """Return which hidden or temporary files there are, here or where the system has them."""
+        names = [path.name for path in self.where.rglob(".*")] if self.where.is_dir() else []
+        names += [path.name for path in self.temporary.iterdir()]
+        return f"left behind: {names}" if names else ""
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Return the bytes of each HDF5 file of a folder."""
-    return {path.name: path.read_bytes() for path in folder.glob("*.h5")}
+    """Return the bytes of each HDF5 file below a folder."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*.h5")
+        if not any(part.startswith(".") for part in path.relative_to(folder).parts)
+    }
