@@ -55,9 +55,8 @@ def run(arguments: list[str], folder: Path, limit: float, stdout: str = "file") 
         from scenegen.files import trial
 
         trial.SECONDS = TRIAL
-        program = arguments[0]
         sys.argv = list(arguments)
-        return getattr(cli, program).main(arguments[1:], prog_name=program)
+        return getattr(cli, arguments[0]).main(arguments[1:], prog_name=arguments[0])
 
     return call(command, folder, limit, stdout)
 
@@ -66,31 +65,30 @@ def call(command: Callable[[], Any], folder: Path, limit: float, stdout: str = "
     """Run a function as if it were a program, in a child and in a folder."""
     with working_folder() as kept:
         out, err = kept / "out", kept / "err"
-        started = time.perf_counter()
+        start = time.perf_counter()
         child = os.fork()
         if child == 0:
             _be_the_program(command, folder, out, err, stdout)
-        code, used, timed_out = _awaited(child, started + limit)
-        seconds = time.perf_counter() - started
+        status, usage, timed_out = _wait(child, start + limit)
+        seconds = time.perf_counter() - start
         left = _outlived(child)
         streams = [path.read_bytes() if path.exists() else b"" for path in (out, err)]
-    return Run(code, seconds, used.ru_maxrss / 1024, timed_out, left, *streams)
+    code = os.waitstatus_to_exitcode(status)
+    return Run(code, seconds, usage.ru_maxrss / 1024, timed_out, left, *streams)
 
 
-def _awaited(child: int, end: float) -> tuple[int, Any, bool]:
-    """Wait for a child, or kill its process group; return exit code, use, and whether killed."""
+def _wait(child: int, end: float) -> tuple[int, Any, bool]:
+    """Wait for a child, or kill its process group; return status, usage, and whether killed."""
     pause = 0.001
-    while True:
-        pid, status, used = os.wait4(child, os.WNOHANG)
+    while time.perf_counter() < end:
+        pid, status, usage = os.wait4(child, os.WNOHANG)
         if pid:
-            return os.waitstatus_to_exitcode(status), used, False
-        if time.perf_counter() > end:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(child, signal.SIGKILL)
-            _, status, used = os.wait4(child, 0)
-            return os.waitstatus_to_exitcode(status), used, True
+            return status, usage, False
         time.sleep(pause)
         pause = min(0.02, pause * 1.5)
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(child, signal.SIGKILL)
+    return *os.wait4(child, 0)[1:], True
 
 
 def _outlived(group: int) -> bool:
@@ -114,7 +112,10 @@ def _be_the_program(
     try:
         os.setpgid(0, 0)
         os.chdir(folder)
-        _limit()
+        held = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
+        resource.setrlimit(resource.RLIMIT_DATA, (held + MEMORY,) * 2)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE,) * 2)
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         _redirect(out, err, stdout)
         home = folder / ".home"
         home.mkdir(exist_ok=True)
@@ -143,31 +144,22 @@ def _exit_code(command: Callable[[], Any]) -> int:
     return 0
 
 
-def _limit() -> None:
-    held = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_DATA, (held + MEMORY,) * 2)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (LARGEST_FILE,) * 2)
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-
 def _redirect(out: Path, err: Path, stdout: str) -> None:
     """Open the standard streams as a shell would, and let Python begin with them."""
-    nothing = os.open(os.devnull, os.O_RDONLY)
     writable = os.O_WRONLY | os.O_CREAT
     if stdout == "closed pipe":
         reader, first = os.pipe()
         os.close(reader)
     else:
         first = os.open("/dev/full" if stdout == "full" else out, writable)
-    second = os.open(err, writable)
-    for number, stream in enumerate((nothing, first, second)):
+    for number, stream in enumerate((os.open(os.devnull, os.O_RDONLY), first)):
         os.dup2(stream, number)
-    sys.stdin = io.TextIOWrapper(io.FileIO(0), "utf-8")
-    sys.stdout = io.TextIOWrapper(io.BufferedWriter(io.FileIO(1, "w")), "utf-8")
-    sys.stderr = io.TextIOWrapper(
+    os.dup2(os.open(err, writable), 2)
+    sys.stdin = sys.__stdin__ = io.TextIOWrapper(io.FileIO(0), "utf-8")
+    sys.stdout = sys.__stdout__ = io.TextIOWrapper(io.BufferedWriter(io.FileIO(1, "w")), "utf-8")
+    sys.stderr = sys.__stderr__ = io.TextIOWrapper(
         io.FileIO(2, "w"), "utf-8", "backslashreplace", write_through=True
     )
-    sys.__stdin__, sys.__stdout__, sys.__stderr__ = sys.stdin, sys.stdout, sys.stderr
 
 
 @contextlib.contextmanager

@@ -1,6 +1,6 @@
 """The honest files that cases are made from: tiny, and written by the commands.
 
-python -m fuzz.honest FOLDER
+python -m fuzz.honest FOLDER [--weights]
 """
 
 import json
@@ -24,20 +24,23 @@ STEPS = (
     "bench baseline empty-room --data rooms.h5 --out predictions.h5",
     "bench baseline constant --train train.h5 --data rooms.h5 --out constant.h5",
     "bench baseline chance --data iqtt/iqtt-test.h5 --out answers.h5",
-)
-SCORES = (
     "bench score predictions.h5 --truth rooms.h5 --json scores.json",
     "bench score constant.h5 --truth rooms.h5 --json other.json",
     "bench score answers.h5 --truth iqtt/iqtt-test-answers.h5 --json answer-scores.json",
+)
+WEIGHTS = (  # untrained ones of the smallest networks
+    "pix2shape train --data rooms.h5 --out run --set networks.size=32 --set networks.width=0.05"
+    " --set iterations=1 --set batch=2 --set critic_steps=1 --workers 0"
 )
 
 
 def make(folder: Path, weights: bool) -> None:
     """Write the honest files into an existing folder; weights take seconds, as torch does."""
     os.chdir(folder)
-    _meshes(Path("meshes"))
-    for step in (*STEPS, *SCORES):
-        _run(step)
+    _meshes(Path("meshes/mug"))
+    for step in (*STEPS, *[WEIGHTS] * weights):
+        program, *arguments = step.split()
+        getattr(cli, program).main(arguments, standalone_mode=False)
     Path("answers.json").write_text(json.dumps([0, 1, 2, 2, 1, 0]))
     named = {"answers": {str(i): i % 3 for i in range(6)}, "method": "mine", "run": "seed 0"}
     Path("named.json").write_text(json.dumps(named))
@@ -46,11 +49,12 @@ def make(folder: Path, weights: bool) -> None:
         file["answers"] = np.arange(4) % 3
     _people(Path("people.db"))
     if weights:
-        _weights(Path("weights.safetensors"))
+        for name in ("weights.safetensors", "weights.json"):
+            Path("run", name).rename(name)
 
 
 def _people(path: Path) -> None:
-    """Write the answers of three people, of whom one did not finish, with the same bytes always."""
+    """Write the answers of three people, of whom one did not finish."""
     from iqtt.quiz import sessions
     from iqtt.quiz.schema import open_answers
     from iqtt.quiz.study import Study
@@ -66,55 +70,23 @@ def _people(path: Path) -> None:
                 sessions.answer(db, token, form, position % 3, 0.0, key)
                 if position == 0:
                     sessions.go_on(db, token, form, key)
-    for change in (
-        "UPDATE participant SET name = printf('%016x', number), started_ms = 1000 * number,"
-        " token_sha256 = printf('token %d', number)",
-        "UPDATE question SET shown_ms = 1000 * position WHERE times_shown",
-        "UPDATE answer SET answered_ms = 1000 * position + 500, response_ms = 400.0 + position",
-        "UPDATE study SET value = printf('%064x', 1) WHERE name = 'secret'",
-        "PRAGMA journal_mode = DELETE",
-    ):
-        db.execute(change)
+    db.execute("PRAGMA journal_mode = DELETE")
     db.close()
 
 
-def _run(step: str) -> None:
-    program, *arguments = step.split()
-    getattr(cli, program).main(arguments, standalone_mode=False)
-
-
-def _meshes(root: Path) -> None:
+def _meshes(folder: Path) -> None:
     """Write a model in each format that is read."""
     import trimesh
 
-    shapes = {
-        "box.obj": trimesh.creation.box((1, 2, 1)),
-        "cylinder.stl": trimesh.creation.cylinder(1, 2, sections=8),
-        "ball.ply": trimesh.creation.icosphere(1),
-        "cone.off": trimesh.creation.cone(1, 1, sections=8),
-        "ring.glb": trimesh.creation.annulus(0.5, 1, 1, sections=8),
-    }
-    for name, shape in shapes.items():
-        path = root / "mug" / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        shape.export(path)
-    shapes["cylinder.stl"].export(root / "mug" / "text.stl", file_type="stl_ascii")
-    shapes["ball.ply"].export(root / "mug" / "text.ply", encoding="ascii")
-
-
-def _weights(path: Path) -> None:
-    """Write untrained weights of the smallest networks, and their card."""
-    from baselines.pix2shape.network.architecture import NetworkSpec
-    from baselines.pix2shape.network.config import ModelConfig
-    from baselines.pix2shape.training.state import new_state
-    from baselines.pix2shape.weights.storage import Card, save_weights
-
-    config = ModelConfig(
-        networks=NetworkSpec(size=32, width=0.05), iterations=4, batch=4, critic_steps=1
-    )
-    with h5py.File("rooms.h5") as rooms:
-        known = {"data": rooms.attrs["spec"], "fingerprint": rooms.attrs["fingerprint"]}
-    save_weights(path, new_state(config).model, Card(config, **known))
+    folder.mkdir(parents=True)
+    cylinder, ball = trimesh.creation.cylinder(1, 2, sections=8), trimesh.creation.icosphere(1)
+    trimesh.creation.box((1, 2, 1)).export(folder / "box.obj")
+    trimesh.creation.cone(1, 1, sections=8).export(folder / "cone.off")
+    trimesh.creation.annulus(0.5, 1, 1, sections=8).export(folder / "ring.glb")
+    cylinder.export(folder / "cylinder.stl")
+    cylinder.export(folder / "text.stl", file_type="stl_ascii")
+    ball.export(folder / "ball.ply")
+    ball.export(folder / "text.ply", encoding="ascii")
 
 
 if __name__ == "__main__":

@@ -14,9 +14,9 @@ import json, os, sys, time
 from pathlib import Path
 import click
 import cli
-from fuzz import runner, verdict
+from fuzz import verdict
 from fuzz.cases import Case
-from fuzz.programs import Target
+from fuzz.runner import run_case
 from scenegen.command_line.groups import UserError
 
 honest = Path(sys.argv[1])
@@ -57,13 +57,12 @@ def planted(how, out):
         Path(out).write_text("half"); print("Error: no", file=sys.stderr); sys.exit(2)
 
 cli.planted = planted
-runner.TARGETS = (Target("planted", (), ()),)
 verdict.MOST_MEGABYTES = 100
-bench = runner.Bench(honest, 100.0)
 found = {}
 for how in sys.argv[2:]:
     case = Case("planted", ("planted", how, "--out", "new"))
-    found[how] = sorted({fault.kind for fault in bench.tried(case, 1.5)[1]})
+    outcome = run_case(honest, 100.0, (how, case), 1.5)
+    found[how] = sorted({kind for kind, _ in outcome.faults})
 print(json.dumps(found))
 """
 KINDS = {
@@ -85,16 +84,12 @@ KINDS = {
 }
 
 
-def run_python(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, *map(str, arguments)]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-
-
 @pytest.fixture(scope="module")
 def planted(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
     honest = tmp_path_factory.mktemp("honest")
     (honest / "rooms.h5").write_bytes(b"rooms")
-    done = run_python("-c", PLANTED, honest, *KINDS)
+    command = [sys.executable, "-c", PLANTED, str(honest), *KINDS]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
