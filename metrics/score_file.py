@@ -1,43 +1,80 @@
 """Score files: `bench score` writes them; `compare`, `leaderboard` and other programs read them.
 
-docs/scores.md describes the format. Numbers that are written here read back to the same bits.
+A file holds the scores of each item and where they come from. All other numbers follow from these
+and are computed by `ScoreFile` when they are asked for; the file's `summary` repeats some for
+people, and is not read. docs/scores.md describes the format. Numbers that are written here read
+back to the same bits.
 """
 
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict
 
-from metrics.scoring.metric_names import in_order
+from metrics.measures.checks import LARGEST_MAGNITUDE
+from metrics.measures.depth import Alignment
+from metrics.measures.objects import LEAST_PIXELS
+from metrics.scoring.estimates import ACCURACY
+from metrics.scoring.known_tests import known_test
+from metrics.scoring.metric_names import (
+    EMPTY_ROOM,
+    OBJECT_SCORES,
+    Metric,
+    UnknownMetricError,
+    in_order,
+    metric,
+)
 from metrics.scoring.records import (
-    FORMAT_NAME,
-    FORMAT_VERSION,
+    COUNTS,
     GROUPINGS,
     ID_COLUMNS,
     OBJECT_COLUMNS,
     OPTIONAL_COLUMNS,
     SHAPE_COLUMN,
-    Groups,
+    AnswerGroups,
+    Label,
     Meta,
+    Name,
     Score,
     ScoreFile,
     Skill,
     Submission,
+    Task,
 )
-from metrics.scoring.schema import parse_scores
 from metrics.submissions.problems import JsonError
-from metrics.submissions.strict_json import parse_json, read_bytes
+from metrics.submissions.strict_json import (
+    LARGEST_WHOLE,
+    parse_json,
+    read_bytes,
+    refusal,
+    shown,
+    validated,
+)
 from scenegen.common.text_table import by_number
 from scenegen.files.new_file import written_beside
 
+FORMAT_NAME = "pix2shape-bench/scores"
+FORMAT_VERSION = "1.0"
 MOST_BYTES = 256 * 2**20  # more images than may be parsed, see `strict_json.MOST_MEMORY`
 MOST_KEYS = 10_000  # of one object
+ROUNDING = 1e-9  # by which an accuracy may lie outside of its interval
+RESAMPLES = range(100, 100_001)  # as many as `bench score` takes
 WITHOUT_JSON = "about 140,000 images fit; --csv writes the scores of any number of them"
+SCORE_AGAIN = "score the submission again with this release"
+Array = NDArray[Any]
+# Limits of whole numbers; ids of objects are int8 in rooms files.
+_LIMITS = {
+    "object": (1, 127),
+    "pixels": (LEAST_PIXELS, LARGEST_WHOLE),
+    "view_angle_degrees": (-1, 180),
+}
 
 __all__ = [
     "FORMAT_NAME",
@@ -52,6 +89,23 @@ __all__ = [
     "to_json",
     "write_scores",
 ]
+
+
+@dataclass(frozen=True)
+class _Stored:
+    """The keys of a score file."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")
+    format: Literal["pix2shape-bench/scores"]
+    format_version: Literal["1.0"]
+    task: Task
+    method: Name
+    alignment: Alignment
+    meta: Meta
+    items: dict[str, Any]
+    objects: dict[str, Any] = field(default_factory=dict)
+    answer_groups: AnswerGroups = field(default_factory=dict)
+    summary: Any = None
 
 
 def read_scores(path: str | Path) -> ScoreFile:
@@ -81,67 +135,68 @@ def write_scores(scores: ScoreFile, path: str | Path, overwrite: bool = False) -
         temporary.write_bytes(data)
 
 
-@contextmanager
-def _naming(path: str | Path) -> Iterator[None]:
-    """Put the path into a JsonError."""
-    try:
-        yield
-    except JsonError as error:
-        raise error.inside(path) from error
-
-
-def _parsed(data: bytes) -> ScoreFile:
-    return parse_scores(parse_json(data, MOST_KEYS))
-
-
 def to_json(scores: ScoreFile) -> str:
     """Return the text of a score file: keys in a fixed order, a line for each column of items."""
     meta = asdict(scores.meta)
     for name in ("versions", "counts", "noise_floors"):
         meta[name] = dict(sorted(meta[name].items()))
-    if not scores.meta.noise_floors:
-        del meta["noise_floors"]
     head = {
         "format": FORMAT_NAME,
         "format_version": FORMAT_VERSION,
         "task": scores.task,
         "method": scores.method,
-        "comparable": scores.comparable,
         "alignment": scores.alignment,
-        "metrics": _metrics(scores.metrics),
-        "skills": _metrics(scores.skills),
-        **{name: _groups(getattr(scores, name)) for name in GROUPINGS.get(scores.task, ())},
+        "summary": _summary(scores),
         "meta": meta,
     }
+    if scores.answer_groups:
+        head["answer_groups"] = {
+            grouping: {key: asdict(groups[key]) for key in by_number(groups)}
+            for grouping, groups in sorted(scores.answer_groups.items())
+        }
     # Only ASCII, as one wide character makes the whole text take 4 bytes a character when read.
     text = json.dumps(_plain(head), indent=2, allow_nan=False)
-    first = (*ID_COLUMNS.get(scores.task, ()), *OPTIONAL_COLUMNS.get(scores.task, ()))
-    tables = _table("items", scores.items, first)
-    if scores.objects:
-        tables += ",\n" + _table("objects", scores.objects, (*OBJECT_COLUMNS, SHAPE_COLUMN))
+    first = (*ID_COLUMNS[scores.task], *OPTIONAL_COLUMNS[scores.task])
+    tables = _table("items", scores.columns, first)
+    if scores.object_columns:
+        first = (*OBJECT_COLUMNS, SHAPE_COLUMN)
+        tables += ",\n" + _table("objects", scores.object_columns, first)
     return f"{text[:-2]},\n{tables}\n}}\n"
 
 
-def _table(key: str, columns: Mapping[str, Any], first: Sequence[str]) -> str:
+def _summary(scores: ScoreFile) -> dict[str, Any]:
+    """Return what follows from the items, for people and for jq."""
+    groups = GROUPINGS[scores.task] if scores.task == "rooms" else ()
+    return {
+        "comparable": scores.comparable,
+        "warnings": scores.warnings,
+        "metrics": {name: vars(scores.metrics[name]) for name in in_order(scores.metrics)},
+        "skills": {name: vars(scores.skills[name]) for name in in_order(scores.skills)},
+        **{
+            grouping: {
+                key: {name: vars(group[name]) for name in in_order(group)}
+                for key, group in getattr(scores, grouping).items()
+            }
+            for grouping in groups
+        },
+    }
+
+
+def _table(key: str, columns: Mapping[str, Array], first: Sequence[str]) -> str:
     names = [name for name in first if name in columns]
     names += in_order(name for name in columns if name not in first)
-    lines = [f"    {json.dumps(name)}: {json.dumps(_column(columns[name]))}" for name in names]
+    lines = [f"    {json.dumps(name)}: {json.dumps(_listed(columns[name]))}" for name in names]
     return f'  "{key}": {{\n' + ",\n".join(lines) + "\n  }"
 
 
-def _metrics(found: Mapping[str, Score | Skill]) -> dict[str, Any]:
-    return {name: vars(found[name]) for name in in_order(found)}
-
-
-def _groups(groups: Groups) -> dict[str, Any]:
-    return {key: _metrics(groups[key]) for key in by_number(groups)}
-
-
-def _column(values: Any) -> list[Any]:
-    array = np.asarray(values)
-    finite = array.dtype.kind != "f" or np.isfinite(array).all()
-    found: list[Any] = array.tolist()
-    return found if finite else [value if math.isfinite(value) else None for value in found]
+def _listed(column: Array) -> list[Any]:
+    """Return a column, or one for each of several runs, as lists, with None for no number."""
+    if column.ndim == 2:
+        return _listed(column[0]) if len(column) == 1 else [_listed(run) for run in column]
+    values: list[Any] = column.tolist()
+    if column.dtype.kind != "f" or np.isfinite(column).all():
+        return values
+    return [value if math.isfinite(value) else None for value in values]
 
 
 def _plain(value: Any) -> Any:
@@ -153,3 +208,224 @@ def _plain(value: Any) -> Any:
     if isinstance(value, np.generic):
         return _plain(value.item())
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+@contextmanager
+def _naming(path: str | Path) -> Iterator[None]:
+    """Put the path into a JsonError."""
+    try:
+        yield
+    except JsonError as error:
+        raise error.inside(path) from error
+
+
+def _parsed(data: bytes) -> ScoreFile:
+    """Return the scores in the bytes of a file. Raises JsonError at the first wrong thing."""
+    try:
+        stored = validated(_Stored, parse_json(data, MOST_KEYS))
+    except JsonError as error:
+        hint = SCORE_AGAIN if error.where == "format_version" else ""
+        raise JsonError(error.where, error.found, error.expected, hint) from error
+    task, runs = stored.task, len(stored.meta.submissions)
+    if task == "iqtt":
+        for name, empty in (("objects", {}), ("alignment", "none")):
+            if getattr(stored, name) != empty:
+                raise refusal(name, shown(getattr(stored, name)), f"{empty!r} for questions")
+    columns = _item_columns(stored.items, task, runs)
+    objects = _object_columns(stored.objects, columns[ID_COLUMNS[task][0]], runs)
+    scores = ScoreFile(
+        task,
+        stored.method,
+        stored.alignment,
+        columns,
+        stored.meta,
+        objects,
+        stored.answer_groups,
+    )
+    _check_meta(scores)
+    _check_groups(scores)
+    return scores
+
+
+def _item_columns(stored: Mapping[str, Any], task: str, runs: int) -> dict[str, Array]:
+    """Return the columns of items as arrays."""
+    first = ID_COLUMNS[task]
+    required = (*first, ACCURACY) if task == "iqtt" else first
+    whole = (*first, *OPTIONAL_COLUMNS[task])
+    columns = _columns("items", stored, required, whole, task, runs)
+    if all(name in whole or name.startswith(EMPTY_ROOM) for name in columns):
+        raise refusal("items", "no score", "at least one")
+    ids = columns[first[0]]
+    falls = np.flatnonzero(np.diff(ids) <= 0)
+    if not len(ids) or len(falls):
+        found = f"{ids[falls[0] + 1]} after {ids[falls[0]]}" if len(ids) else "no entries"
+        raise refusal(f"items.{first[0]}", found, "numbers that ascend")
+    gaps_of: dict[str, Array] = {}
+    for name, column in columns.items():
+        lacking = "" if name in whole else metric(name).lacking
+        if lacking:  # all scores of objects, and all of relief, lack the same rows
+            gaps = np.isnan(np.atleast_2d(column))
+            wrong = (gaps != gaps_of.setdefault(lacking, gaps[0])).any(axis=0)
+            if wrong.any():
+                place = f"items.{name}[{int(np.argmax(wrong))}]"
+                raise refusal(place, "null or a number", f"as in the other scores of {lacking}")
+    return columns
+
+
+def _object_columns(stored: Mapping[str, Any], rows: Array, runs: int) -> dict[str, Array]:
+    """Return the columns of single objects in these rows; no column where none is stored."""
+    if not stored:
+        return {}
+    names = (*OBJECT_COLUMNS, SHAPE_COLUMN, *OBJECT_SCORES)
+    for name in stored:
+        if name not in names:
+            raise refusal(f"objects.{name:.60}", "an unknown key", "no key of this name")
+    columns = _columns("objects", stored, names, OBJECT_COLUMNS, "rooms", runs)
+    for name in OBJECT_SCORES:
+        if np.isnan(columns[name]).any():
+            raise refusal(f"objects.{name}", "null", "numbers")
+    if not np.isin(columns["row"], rows).all():
+        raise refusal("objects.row", "a row that items lack", "rows of items")
+    keys = np.stack([columns["row"], columns["object"]])
+    if len(np.unique(keys, axis=1).T) < len(keys.T):
+        raise refusal("objects.object", "an object twice in a row", "each once")
+    return columns
+
+
+def _columns(
+    place: str,
+    stored: Mapping[str, Any],
+    required: Sequence[str],
+    whole: Sequence[str],
+    task: str,
+    runs: int,
+) -> dict[str, Array]:
+    """Return columns of equal length as arrays; those that are not `whole` numbers are scores."""
+    for name in required:
+        if name not in stored:
+            raise refusal(f"{place}.{name}", "no such key", "it to be there")
+    columns: dict[str, Array] = {}
+    for name, values in stored.items():
+        where = f"{place}.{name:.60}"
+        if name in whole:
+            limits = _LIMITS.get(name, (0, LARGEST_WHOLE))
+            columns[name] = _numbers(where, values, *limits, whole=True)
+        elif name == SHAPE_COLUMN and place == "objects":
+            with _naming(where):
+                columns[name] = np.array(validated(tuple[Label, ...], values), object)
+        else:
+            columns[name] = _scores(where, values, name, task, runs)
+        count = columns[required[0]].shape[-1] if required[0] in columns else None
+        if count not in (None, columns[name].shape[-1]):
+            found = f"{columns[name].shape[-1]} entries"
+            raise refusal(where, found, f"{count}, as in {required[0]}")
+    return columns
+
+
+def _scores(place: str, values: Any, name: str, task: str, runs: int) -> Array:
+    """Return a column of scores: (R, N) for R runs, but (N,) for those of the empty room."""
+    score = _known_metric(place, name, task)
+    limits = score.smallest, min(score.largest, LARGEST_MAGNITUDE)
+    if name.startswith(EMPTY_ROOM):
+        column = _numbers(place, values, *limits)
+    elif runs == 1:
+        column = _numbers(place, values, *limits)[None]
+    elif not isinstance(values, list) or len(values) != runs:
+        raise refusal(place, shown(values), f"a list for each of the {runs} runs")
+    else:
+        each = [_numbers(f"{place}[{i}]", run, *limits) for i, run in enumerate(values)]
+        if len(set(map(len, each))) > 1:
+            raise refusal(place, "runs of different lengths", "as many entries in each run")
+        column = np.stack(each)
+    if not score.lacking and np.isnan(column).any():
+        raise refusal(place, "null", "a number in each entry")
+    if name == ACCURACY and not np.isin(column, (0.0, 1.0)).all():
+        raise refusal(place, "a number between 0 and 1", "0 or 1 for each question")
+    return column
+
+
+def _known_metric(place: str, name: str, task: str) -> Metric:
+    """Return what a score is. Raises JsonError for a name that is no score of the task."""
+    try:
+        score = metric(name)
+    except UnknownMetricError:
+        score = None
+    if score is None or score.task != task:
+        raise refusal(place, f"no score of task {task!r}", "a name listed in docs/scores.md")
+    return score
+
+
+def _numbers(place: str, values: Any, least: float, most: float, whole: bool = False) -> Array:
+    """Return a list of numbers within limits as an array (N,); null is NaN among floats."""
+    if not isinstance(values, list):
+        raise refusal(place, shown(values), "a list of numbers")
+    kinds = {int} if whole else {int, float, type(None)}
+    try:
+        if set(map(type, values)) <= kinds:
+            column = np.array(values, np.int64 if whole else np.float64)
+            if not ((column < least) | (column > most)).any():
+                return column
+    except OverflowError:
+        pass
+    for i, value in enumerate(values):
+        if type(value) not in kinds or (value is not None and not least <= value <= most):
+            within = f"{least:g} to {most:g}" if most < LARGEST_WHOLE else f"{least:g}"
+            expected = f"a {'whole' if whole else 'finite'} number from {within}"
+            raise refusal(f"{place}[{i}]", shown(value), expected)
+    raise AssertionError("an array of numbers within limits can be made")
+
+
+def _check_meta(scores: ScoreFile) -> None:
+    """Raise JsonError unless what is said of the items can be true of them."""
+    meta, ids, task = scores.meta, scores.ids, scores.task
+    counts = meta.counts
+    if sorted(counts) != sorted(COUNTS[task]):
+        raise refusal("meta.counts", ", ".join(counts), ", ".join(COUNTS[task]))
+    total = COUNTS[task][0]
+    test = known_test(meta.truth_digest)
+    largest = int(scores.object_columns["pixels"].max(initial=1)) if scores.object_columns else 1
+    formula = task == "iqtt" and scores.runs == 1
+    rules = [
+        (total, counts[total] > ids.max(), f"more than {ids.max()}, the largest number in items"),
+        ("rows_penalised", counts.get("rows_penalised", 0) <= len(ids), f"at most {len(ids)}"),
+        ("pixels", counts.get("pixels", 1) >= largest, f"at least {largest}, as in objects"),
+        ("answers", counts.get("answers", 2) in (2, 3), "2 or 3, of each question"),
+    ]
+    if test is not None:
+        rules.append((total, counts[total] == test.rows, f"{test.rows}, as {test.name} has"))
+    for name, holds, expected in rules:
+        if not holds:
+            raise refusal(f"meta.counts.{name}", shown(counts[name]), expected)
+    if test is not None and test.task != task:
+        raise refusal("meta.truth_digest", f"that of {test.name}", f"a truth of task {task!r}")
+    if meta.resamples not in ((0,) if formula else RESAMPLES):
+        expected = "0, as the interval is Wilson's" if formula else "100 to 100000"
+        raise refusal("meta.resamples", shown(meta.resamples), expected)
+    if len({submission.sha256 for submission in meta.submissions}) < scores.runs:
+        raise refusal("meta.submissions", "the same sha256 twice", "each submission once")
+    for name in meta.noise_floors:
+        _known_metric(f"meta.noise_floors.{name:.60}", name, "rooms" if task == "rooms" else "-")
+
+
+def _check_groups(scores: ScoreFile) -> None:
+    """Raise JsonError unless the groups of questions add up to all of them."""
+    groupings = GROUPINGS[scores.task] if scores.task == "iqtt" else ()
+    for grouping, groups in scores.answer_groups.items():
+        place = f"answer_groups.{grouping:.60}"
+        if grouping not in groupings:
+            raise refusal(place, "an unknown key", "no key of this name")
+        for key, group in groups.items():
+            if len(group.right) != scores.runs or max(group.right) > group.n:
+                found = f"{group.right} of {group.n} right"
+                raise refusal(f"{place}.{key}.right", found, "as many numbers as runs, up to n")
+            value, ends = group.score.value, (group.low, group.high)
+            low, high = (value if end is None else end for end in ends)
+            if ends.count(None) == 1 or not low - ROUNDING <= value <= high + ROUNDING:
+                found = f"{value} outside of {ends}"
+                raise refusal(f"{place}.{key}", found, "an interval that holds the accuracy")
+        right = np.sum([group.right for group in groups.values()], axis=0)
+        total = scores.columns[ACCURACY].sum(axis=1)
+        questions = sum(group.n for group in groups.values())
+        if questions != len(scores.ids) or (right != total).any():
+            found = f"{right} right of {questions} questions"
+            raise refusal(place, found, f"{total} of {len(scores.ids)}, as in items")

@@ -24,5 +24,5 @@ def test_the_programs_read_every_row_and_what_they_write_can_be_scored(tmp_path)
         assert [text for code, text in printed.items() if words in code] == [lines]
     (scored,) = [text for code, text in printed.items() if "bench validate" in code]
     assert scored.startswith("mine.h5: valid\nmine: 32 images of 32 scenes of rooms.h5\n")
-    assert json.loads((tmp_path / "mine.json").read_text())["comparable"]
+    assert json.loads((tmp_path / "mine.json").read_text())["summary"]["comparable"]
     assert "9 questions" in run_block("bash", "", SCORE_ANSWERS, tmp_path)

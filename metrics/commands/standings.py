@@ -8,7 +8,7 @@ import click
 from metrics.commands.options import MARKDOWN, SEED
 from scenegen.command_line.groups import EXAMPLE
 from scenegen.command_line.options import OVERWRITE
-from scenegen.command_line.output import print_line, progress_bar
+from scenegen.command_line.output import print_line
 from scenegen.command_line.paths import InputPath, OutputFolder, OutputPath
 
 
@@ -117,12 +117,6 @@ def compare(
     " a gallery, and a report of each score file.",
 )
 @click.option(
-    "--recheck",
-    is_flag=True,
-    help="Recompute all means and intervals from the scores of the items first, and refuse files"
-    " where they differ. The standard deviations over runs cannot be recomputed.",
-)
-@click.option(
     "--paper",
     type=click.Choice(["task", "all", "none"]),
     default="task",
@@ -137,7 +131,6 @@ def leaderboard(
     form: str,
     out: str | None,
     folder: str | None,
-    recheck: bool,
     paper: Any,
     no_paper: bool,
     overwrite: bool,
@@ -155,13 +148,6 @@ def leaderboard(
     if out is not None:
         check_writable(Path(out), overwrite)
     files = [read_scores(path) for path in scores]
-    if recheck:
-        from metrics.leaderboard.recheck import recheck as recompute
-        from metrics.leaderboard.recheck import steps
-
-        with progress_bar(sum(map(steps, files)), "group") as bar:
-            for file in files:
-                recompute(file, bar.update)
     shown: Any = "none" if no_paper else paper
     if folder is not None:
         from metrics.leaderboard.site import write_site

@@ -212,7 +212,7 @@ def _notes(
     seen: dict[str, str] = {}
     for file, label in zip(files, labels, strict=True):
         if not file.comparable:
-            why = "; ".join(map(plain, file.meta.warnings))
+            why = "; ".join(map(plain, file.warnings))
             yield f"{label} says that it is not comparable{': ' if why else ''}{why}"
         if file.runs > 1:
             yield (

@@ -46,7 +46,7 @@ def require_same_test(
                     "only scores of one test set compare: score all submissions with one --truth",
                 )
         if not file.comparable and not allow_incomparable:
-            why = "; ".join(file.meta.warnings) or "not comparable"
+            why = "; ".join(file.warnings) or "not comparable"
             raise ComparisonError(
                 file.place, f"scores that are {why}", hint="or say --allow-incomparable"
             )

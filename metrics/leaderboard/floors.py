@@ -1,18 +1,20 @@
 """Floors beside scores: the empty room, noise, chance, and probes that know nothing of 3D."""
 
+import math
 from collections.abc import Sequence
 
 from metrics.leaderboard.table import Cell, Row, Table
 from metrics.report.text import FLOORS_OF_ROOMS, floor_text
+from metrics.score_file import SCORE_AGAIN
 from metrics.scoring import floors
 from metrics.scoring.floors import floor_of_kind
 from metrics.scoring.metric_names import EMPTY_ROOM, OTHER_SCENE, SKILLED
 from metrics.scoring.records import ScoreFile
-from metrics.scoring.schema import SCORE_AGAIN, agree
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import number, printable
 
 FloorRows = dict[str, dict[str, float]]
+AGREEMENT = 1e-9  # of floors, relative: other releases of libraries add differently
 SKILL_OF = "skill of "  # how the keys of columns of skills begin
 FLOOR, NOISE, CHANCE = "floor: ", "noise floor", "floor: chance"  # how their labels begin
 
@@ -79,7 +81,7 @@ def require_same_floors(files: Sequence[ScoreFile]) -> None:
     for file in whole[1:]:
         ours, theirs = _stated(whole[0]), _stated(file)
         for what in ours.keys() & theirs.keys():
-            if not agree(theirs[what], ours[what], 0.0):
+            if not math.isclose(theirs[what], ours[what], rel_tol=AGREEMENT):
                 expected = f"{ours[what]!r}, as in {whole[0].place}"
                 raise FloorError(f"{file.place}: {what}", theirs[what], expected, SCORE_AGAIN)
 

@@ -11,8 +11,8 @@ from metrics.report.axes import span, tick_labels
 from metrics.report.charts import FLOOR, Svg, kind_of, strip
 from metrics.report.paper_tables import REPORTED, SOURCE, TABLES, Figure
 from metrics.report.text import as_shown, floor_text, interval_cells, references
+from metrics.scoring.estimates import question_skill
 from metrics.scoring.metric_names import HEADLINE, in_order, metric
-from metrics.scoring.questions import question_skill
 from metrics.scoring.records import Score, ScoreFile, Skill
 from scenegen.common.text_table import by_number, distinct, number, plain
 

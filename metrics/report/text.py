@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from metrics.scoring.estimates import question_skill
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import (
     EMPTY_ROOM,
@@ -15,7 +16,6 @@ from metrics.scoring.metric_names import (
     in_order,
     metric,
 )
-from metrics.scoring.questions import question_skill
 from metrics.scoring.records import GROUPINGS, Meta, Score, ScoreFile, Skill
 from scenegen.common.text_table import by_number, laid_out, markdown, number, plain, printable
 from scenegen.files.new_file import written_beside
@@ -169,9 +169,9 @@ def as_shown(score: Score | Skill) -> float:
 
 
 def _title(scores: ScoreFile, escape: Callable[[str], str]) -> str:
-    counts = scores.meta.counts
-    what = f"{counts['rows']} images of {counts['scenes']} scenes" if "rows" in counts else ""
-    what = what or f"{counts['questions']} questions"
+    what = f"{len(scores.ids)} questions"
+    if scores.task == "rooms":
+        what = f"{len(scores.ids)} images of {len(np.unique(scores.clusters))} scenes"
     runs = f", mean of {scores.runs} runs" if scores.runs > 1 else ""
     method, truth = (escape(plain(text)) for text in (scores.method, scores.meta.truth_path))
     return f"{method}: {what} of {truth}{runs}"
@@ -179,7 +179,7 @@ def _title(scores: ScoreFile, escape: Callable[[str], str]) -> str:
 
 def _notes(scores: ScoreFile) -> Iterator[str]:
     meta = scores.meta
-    for warning in meta.warnings:
+    for warning in scores.warnings:
         yield f"warning: {warning}"
     if scores.skills:
         yield f"{SKILL} {what_the_floor_is(scores)}"

@@ -1,19 +1,81 @@
-"""Scores of a test set from those of its images: means over views, then scenes, and skills."""
+"""Scores of a test set from those of its items: means, intervals, skills, and groups."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.objects import size_range
 from metrics.measures.skill import skill, skill_intervals
-from metrics.measures.statistics import bootstrap_interval, cluster_means
+from metrics.measures.statistics import (
+    bootstrap_interval,
+    cluster_means,
+    clustered_wilson_interval,
+    linearised_means,
+)
+from metrics.scoring.floors import floor_of_questions
 from metrics.scoring.metric_names import OBJECT_SCORES, SKILLED, metric
-from metrics.scoring.records import SHAPE_COLUMN, Groups, Score, Skill
-from metrics.scoring.runs import known
 
 Array = NDArray[Any]
+CONFIDENCE = 0.95  # of all intervals
+ACCURACY = "iqtt_accuracy"
+
+
+class Bootstrap(NamedTuple):
+    """The seed and the number of resamples of the bootstrap."""
+
+    seed: int
+    resamples: int
+
+
+@dataclass(frozen=True)
+class Score:
+    """A score with its interval.
+
+    Attributes:
+        value: mean over views within a scene, then over scenes; or over questions. Rows that have
+            no such score, as they show no object, are left out.
+        low, high: ends of the interval at `CONFIDENCE`; None where there is none.
+        n: scenes, or questions, that it rests on.
+        std: standard deviation over training runs (n - 1 in the denominator); None for one run.
+    """
+
+    value: float
+    low: float | None
+    high: float | None
+    unit: str
+    n: int
+    std: float | None
+
+
+@dataclass(frozen=True)
+class Skill:
+    """A score between that of a method that sees nothing, the floor, and a perfect one.
+
+    Attributes:
+        value: 1 is perfect, 0 is the floor, below 0 is worse than it; see `measures.skill`.
+        low, high: ends of the interval at `CONFIDENCE`; None where there is none. That of
+            rooms is paired: it resamples the scenes of score and floor together.
+        floor: the floor's score on the same items, in the unit of the score; 0 where it is less.
+        floor_name: what has that score, such as "empty_room".
+    """
+
+    value: float
+    low: float | None
+    high: float | None
+    floor: float
+    floor_name: str
+
+
+Scores = Mapping[str, Score]
+Groups = Mapping[str, Scores]
+
+
+def finite(value: float) -> float | None:
+    """Return the value as Python's own float; None where it is not finite."""
+    return float(value) if np.isfinite(value) else None
 
 
 def by_presence(scores: Mapping[str, Array]) -> Iterator[tuple[list[str], Array]]:
@@ -21,46 +83,59 @@ def by_presence(scores: Mapping[str, Array]) -> Iterator[tuple[list[str], Array]
 
     An entry without a score is NaN, in all runs. Scores that no entry has are left out.
     """
-    groups: dict[bytes, list[str]] = {}
+    names_of: dict[bytes, list[str]] = {}
     for name, values in scores.items():
         there = ~np.isnan(values).reshape(-1, values.shape[-1]).any(axis=0)
-        groups.setdefault(there.tobytes(), []).append(name)
-    for key, names in groups.items():
+        names_of.setdefault(there.tobytes(), []).append(name)
+    for key, names in names_of.items():
         there = np.frombuffer(key, np.bool_)
         if there.any():
             yield names, there
 
 
-def estimates(
-    scores: Mapping[str, Array], scene: Array, seed: int, resamples: int, confidence: float
-) -> dict[str, Score]:
+def estimates(scores: Mapping[str, Array], scene: Array, bootstrap: Bootstrap) -> dict[str, Score]:
     """Return the mean of every score (R, N): runs are averaged, then views in scenes, then scenes.
 
     `scene` is (N,). Entries without a score are left out; a score that none has is not returned.
-    `std` is over the R runs. The other arguments are those of `statistics.bootstrap_interval`.
+    `std` is over the R runs.
     """
-    found: dict[str, Score] = {}
+    means_of: dict[str, Score] = {}
     for names, there in by_presence(scores):
         runs = np.stack([scores[name][:, there] for name in names], axis=-1)  # (R, M, K)
         means = cluster_means(runs.mean(axis=0), scene[there])
-        low, high = bootstrap_interval(means, seed, resamples, confidence)
+        low, high = bootstrap_interval(means, *bootstrap)
         value = means.mean(axis=0)
         each = np.stack([cluster_means(run, scene[there]).mean(axis=0) for run in runs])
         for k, name in enumerate(names):
-            found[name] = Score(
+            means_of[name] = Score(
                 float(value[k]),
-                known(low[k]),
-                known(high[k]),
+                finite(low[k]),
+                finite(high[k]),
                 metric(name).unit,
                 len(means),
                 float(each[:, k].std(ddof=1)) if len(each) > 1 else None,
             )
-    return {name: found[name] for name in scores if name in found}
+    return {name: means_of[name] for name in scores if name in means_of}
 
 
-def skills(
-    items: Mapping[str, Array], scene: Array, seed: int, resamples: int, confidence: float
-) -> dict[str, Skill]:
+def grouped_estimates(
+    scores: Mapping[str, Array], labels: Array, scene: Array, bootstrap: Bootstrap
+) -> dict[str, Scores]:
+    """Return `estimates` of the scores (R, N) of each group, by its label (N,) as a text."""
+    groups: dict[str, Scores] = {}
+    for label in sorted(set(labels.tolist())):
+        here = labels == label
+        chosen = {name: values[:, here] for name, values in scores.items()}
+        groups[str(label)] = estimates(chosen, scene[here], bootstrap)
+    return groups
+
+
+def object_sizes(pixels: Array, image_pixels: int) -> Array:
+    """Return the range of the share of the picture that each object takes, (M,) texts."""
+    return np.array([size_range(share) for share in (pixels / image_pixels).tolist()], object)
+
+
+def skills(items: Mapping[str, Array], scene: Array, bootstrap: Bootstrap) -> dict[str, Skill]:
     """Return the skills of rooms from columns of items, (N,) each, those of floors among them.
 
     There is none where no image shows an object that counts: the empty room is then the truth. A
@@ -71,7 +146,7 @@ def skills(
     of_objects = [name for name in names if name in OBJECT_SCORES]
     if not any(np.isfinite(items[name]).any() for name in of_objects):
         return {}
-    found: dict[str, Skill] = {}
+    skill_of: dict[str, Skill] = {}
     pairs = {name: np.stack([items[name], items[SKILLED[name] + name]]) for name in names}
     for group, there in by_presence(pairs):
         errors, floors = (
@@ -82,46 +157,50 @@ def skills(
         score, floor = errors.mean(axis=0), floors.mean(axis=0)
         higher = np.array([metric(name).higher_is_better for name in group])
         errors[:, higher], floors[:, higher] = 1.0 - errors[:, higher], 1.0 - floors[:, higher]
-        values = [skill(*one) for one in zip(score.tolist(), floor.tolist(), higher, strict=True)]
+        values = [skill(*row) for row in zip(score.tolist(), floor.tolist(), higher, strict=True)]
         kept = [k for k, value in enumerate(values) if value is not None]
         if not kept:
             continue
-        ends = skill_intervals(errors[:, kept], floors[:, kept], seed, resamples, confidence)
+        ends = skill_intervals(errors[:, kept], floors[:, kept], *bootstrap)
         for k, low, high in zip(kept, *ends, strict=True):
             name, value = group[k], values[k]
             assert value is not None
             column = SKILLED[name] + name
             # The ends belong to the value but for rounding; min and max keep what is not a number.
-            span = known(min(low, value)), known(max(high, value))
-            found[name] = Skill(value, *span, float(floor[k]), column)
-    return {name: found[name] for name in names if name in found}
+            span = finite(min(low, value)), finite(max(high, value))
+            skill_of[name] = Skill(value, *span, float(floor[k]), column)
+    return {name: skill_of[name] for name in names if name in skill_of}
 
 
-def object_labels(objects: Mapping[str, Array], pixels: int) -> dict[str, Array]:
-    """Return the labels of single objects, (M,), by the grouping of score files.
+def accuracy(right: Array, shapes: Array, bootstrap: Bootstrap) -> Score:
+    """Return the accuracy of R runs on Q questions, from (R, Q) of 0 or 1 and their shapes (Q,).
 
-    Args:
-        objects: columns of `ScoreFile.objects`.
-        pixels: of an image.
+    Questions about one shape are alike, so intervals take the shapes as independent. Source:
+    Pix2Shape, section "3D-IQTT" and Table 3: the percentage of questions answered correctly, here
+    as a fraction.
     """
-    sizes = [size_range(share) for share in (objects["pixels"] / pixels).tolist()]
-    return {"by_object_shape": objects[SHAPE_COLUMN], "by_object_size": np.array(sizes, object)}
+    runs, questions = right.shape
+    unit = metric(ACCURACY).unit
+    if runs == 1:
+        count = int(np.count_nonzero(right))
+        ends = clustered_wilson_interval(right[0], shapes)
+        return Score(count / questions, *ends, unit, questions, None)
+    each = right.mean(axis=0)
+    low, high = bootstrap_interval(linearised_means(each, shapes), *bootstrap)
+    std = float(right.mean(axis=1).std(ddof=1))
+    return Score(float(each.mean()), finite(low[0]), finite(high[0]), unit, questions, std)
 
 
-def object_groups(
-    scores: Mapping[str, Array],
-    labels: Array,
-    scene: Array,
-    bootstrap: Sequence[Any],
-) -> Groups:
-    """Return the means of the scores (R, M) of single objects, by their labels (M,).
+def question_skill(score: Score, counts: Mapping[str, int], answers: int) -> Skill:
+    """Return (accuracy - floor) / (1 - floor), and its interval by the same line.
 
-    Objects are averaged within scenes, then scenes. `scene` is (M,); `bootstrap` holds the last
-    arguments of `estimates`.
+    The arguments `counts` and `answers` are those of `floors.floor_of_questions`.
     """
-    found = {}
-    for label in sorted(set(labels.tolist())):
-        chosen = labels == label
-        some = {name: values[:, chosen] for name, values in scores.items()}
-        found[label] = estimates(some, scene[chosen], *bootstrap)
-    return found
+    floor, name = floor_of_questions(counts, answers)
+    value = skill(score.value, floor, higher_is_better=True)
+    assert value is not None, "no floor is perfect"
+    low, high = (
+        None if end is None else skill(end, floor, higher_is_better=True)
+        for end in (score.low, score.high)
+    )
+    return Skill(value, low, high, floor, name)

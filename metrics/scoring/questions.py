@@ -1,36 +1,23 @@
-"""Scores of submissions that answer mental-rotation questions.
-
-Questions about one shape are alike, so intervals take the shapes as independent, not the questions.
-"""
+"""Scores of submissions that answer mental-rotation questions."""
 
 import hashlib
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.answers import ABSTAINED
-from metrics.measures.skill import skill
-from metrics.measures.statistics import (
-    bootstrap_interval,
-    clustered_wilson_interval,
-    linearised_means,
-)
-from metrics.scoring.floors import floor_of_questions
-from metrics.scoring.metric_names import metric
-from metrics.scoring.records import Groups, Score, ScoreFile, Skill
+from metrics.scoring.estimates import ACCURACY, Bootstrap, accuracy
+from metrics.scoring.records import AnswerGroup, ScoreFile
 from metrics.scoring.runs import (
-    CONFIDENCE,
     Progress,
     Settings,
-    known,
     matched_rows,
     meta_of,
     refuse,
     refuse_copies,
-    warnings_of,
 )
 from metrics.scoring.truth_digests import answers_digest
 from metrics.submissions.missing_rows import candidate_problems
@@ -62,75 +49,55 @@ def score_questions(
         digest = answers_digest(truth, columns)
         shape = _shapes(truth)
     true = columns["answers"].astype(np.int64)
-    rows, whole = matched_rows(files, found.path, fingerprint, len(true), settings.allow_partial)
+    rows = matched_rows(files, found.path, fingerprint, len(true), settings.allow_partial)
     for file in files:
         refuse(file.path, candidate_problems(file, candidates))
     refuse_copies(files, lambda i, j: _same(files[i], files[j]))
     answers = np.full((len(files), len(true)), ABSTAINED)
-    for given, file in zip(answers, files, strict=True):
-        given[file.rows] = file.answers
-    right = (answers == true)[:, rows]
-    clusters = rows if shape is None else shape[rows]
+    for run, file in zip(answers, files, strict=True):
+        run[file.rows] = file.answers
+    right = (answers == true)[:, rows].astype(np.float64)
     progress(len(rows))
-
-    def grouped(labels: Array) -> Groups:
-        return {
-            str(label): {"iqtt_accuracy": _accuracy(right[:, chosen], clusters[chosen], settings)}
-            for label in np.unique(labels).tolist()
-            for chosen in [labels == label]
-        }
-
-    groups: dict[str, Any] = {"by_position": grouped(true[rows])}
-    if len(columns) > 1:
-        kinds, angles = (columns[name][rows] for name in LABELS)
-        by_kind = np.array([question_kind(row) for row in kinds.tolist()])
-        bins = np.clip(np.digitize(angles, ANGLE_BINS) - 1, 0, len(ANGLE_BINS) - 2)
-        spans = np.array([f"{a}-{b}" for a, b in itertools.pairwise(ANGLE_BINS)])
-        groups |= {"by_distractor": grouped(by_kind), "by_rotation_angle": grouped(spans[bins])}
     if not fingerprint:  # that of a truth that has none is SHA-256 of its answers
         fingerprint = hashlib.sha256(true.astype(np.uint8).tobytes()).hexdigest()
-    warnings = warnings_of(whole, len(rows), len(true), (), found, digest)
     counts = {
-        "questions": len(rows),
         "questions_in_truth": len(true),
         "answers": candidates,
         "abstained": int(np.count_nonzero(answers[:, rows] == ABSTAINED)),
-        "runs": len(files),
     }
-    items = {"question": rows, "iqtt_accuracy": right.mean(axis=0)}
+    meta = meta_of(files, found, fingerprint, digest, settings, counts)
+    shapes = rows if shape is None else shape[rows]
+
+    def grouped(labels: Array) -> dict[str, AnswerGroup]:
+        return _answer_groups(right, shapes, labels, Bootstrap(meta.seed, meta.resamples))
+
+    groups = {"by_position": grouped(true[rows])}
+    if len(columns) > 1:
+        kinds, angles = (columns[name][rows] for name in LABELS)
+        bins = np.clip(np.digitize(angles, ANGLE_BINS) - 1, 0, len(ANGLE_BINS) - 2)
+        spans = np.array([f"{a}-{b}" for a, b in itertools.pairwise(ANGLE_BINS)])
+        groups["by_distractor"] = grouped(np.array([question_kind(row) for row in kinds.tolist()]))
+        groups["by_rotation_angle"] = grouped(spans[bins])
+    items = {"question": rows, ACCURACY: right}
     if shape is not None:
-        counts["shapes"] = len(np.unique(clusters))
-        items["shape"] = clusters
-    accuracy = _accuracy(right, clusters, settings)
-    kinds_asked = {
-        kind: s["iqtt_accuracy"].n for kind, s in groups.get("by_distractor", {}).items()
-    }
-    return ScoreFile(
-        task="iqtt",
-        method=files[0].method,
-        comparable=not warnings,
-        alignment="none",
-        metrics={"iqtt_accuracy": accuracy},
-        skills={"iqtt_accuracy": question_skill(accuracy, kinds_asked, candidates)},
-        **groups,
-        items=items,
-        meta=meta_of(files, found, fingerprint, digest, settings, counts, warnings),
-    )
+        items["shape"] = shapes
+    return ScoreFile("iqtt", files[0].method, "none", items, meta, answer_groups=groups)
 
 
-def question_skill(accuracy: Score, counts: Mapping[str, int], answers: int) -> Skill:
-    """Return (accuracy - floor) / (1 - floor), and its interval by the same line.
+def _answer_groups(
+    right: Array, shapes: Array, labels: Array, bootstrap: Bootstrap
+) -> dict[str, AnswerGroup]:
+    """Return how R runs answered each group of Q questions, from (R, Q) of 0 or 1.
 
-    The arguments `counts` and `answers` are those of `floors.floor_of_questions`.
+    `shapes` are the shapes of the questions, (Q,), and `labels` their groups, (Q,).
     """
-    floor, name = floor_of_questions(counts, answers)
-    value = skill(accuracy.value, floor, higher_is_better=True)
-    assert value is not None, "no floor is perfect"
-    low, high = (
-        None if end is None else skill(end, floor, higher_is_better=True)
-        for end in (accuracy.low, accuracy.high)
-    )
-    return Skill(value, low, high, floor, name)
+    groups = {}
+    for label in np.unique(labels).tolist():
+        here = labels == label
+        score = accuracy(right[:, here], shapes[here], bootstrap)
+        counts = np.count_nonzero(right[:, here], axis=1).tolist()
+        groups[str(label)] = AnswerGroup(score.n, tuple(counts), score.low, score.high)
+    return groups
 
 
 def _shapes(truth: "AnswersFile") -> Array | None:
@@ -144,25 +111,6 @@ def _shapes(truth: "AnswersFile") -> Array | None:
     references = np.asarray(truth.read("class_id", slice(None)))[:, 0]
     _, first, index = np.unique(references, axis=0, return_index=True, return_inverse=True)
     return np.asarray(np.argsort(np.argsort(first))[index.reshape(-1)])
-
-
-def _accuracy(right: Array, clusters: Array, settings: Settings) -> Score:
-    """Return the accuracy of R runs on Q questions, from (R, Q) bool and their shapes (Q,).
-
-    Source: Pix2Shape, section "3D-IQTT" and Table 3: the percentage of questions answered
-    correctly, here as a fraction.
-    """
-    runs, questions = right.shape
-    unit = metric("iqtt_accuracy").unit
-    if runs == 1:
-        count = int(np.count_nonzero(right))
-        ends = clustered_wilson_interval(right[0].astype(float), clusters, CONFIDENCE)
-        return Score(count / questions, *ends, unit, questions, None)
-    each = right.mean(axis=0)
-    means = linearised_means(each, clusters)
-    low, high = bootstrap_interval(means, settings.seed, settings.resamples, CONFIDENCE)
-    std = float(right.mean(axis=1).std(ddof=1))
-    return Score(float(each.mean()), known(low[0]), known(high[0]), unit, questions, std)
 
 
 def _same(one: QuestionPredictions, other: QuestionPredictions) -> bool:

@@ -1,101 +1,121 @@
-"""The scores of one method on one test set, as records; `metrics.score_file` reads and writes.
+"""The scores of one method on one test set: the items, and the numbers that follow from them.
 
-`schema` reads them with pydantic, by the types and limits that are stated here; nothing is checked
-where a record is made in memory.
+`metrics.score_file` reads and writes the items with the limits that are stated here; nothing is
+checked where a record is made in memory. Means, intervals, skills and groups are computed when they
+are first asked for.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
+import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, FailFast, Field, SkipValidation
+from pydantic import ConfigDict, FailFast, Field
 
 from metrics.measures.depth import Alignment
+from metrics.scoring.estimates import (
+    ACCURACY,
+    CONFIDENCE,
+    Bootstrap,
+    Groups,
+    Score,
+    Scores,
+    Skill,
+    accuracy,
+    estimates,
+    grouped_estimates,
+    object_sizes,
+    question_skill,
+    skills,
+)
+from metrics.scoring.known_tests import Task, known_test
+from metrics.scoring.metric_names import EMPTY_ROOM, OBJECT_SCORES, metric
 from metrics.submissions.strict_json import LARGEST_WHOLE
 
-FORMAT_NAME = "pix2shape-bench/scores"
-FORMAT_VERSION = "3.0"
+__all__ = [
+    "GROUPINGS",
+    "AnswerGroup",
+    "Groups",
+    "Meta",
+    "Score",
+    "ScoreFile",
+    "Scores",
+    "Skill",
+    "Submission",
+    "Task",
+]
+
 LONGEST_NAME = 200  # characters of method, run and fingerprint
 LONGEST_TEXT = 10_000
-Task = Literal["rooms", "iqtt"]
 TruthSource = Literal["given", "known", "submission"]
-Key = TypeVar("Key")
+Array = NDArray[Any]
 Value = TypeVar("Value")
 Name = Annotated[str, Field(max_length=LONGEST_NAME)]
 Text = Annotated[str, Field(max_length=LONGEST_TEXT)]
+Label = Annotated[str, Field(pattern=r"^[^\s].{0,59}$")]  # of a group, or a shape
+Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 Whole = Annotated[int, Field(strict=True, ge=0, le=LARGEST_WHOLE)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 NotNegative = Annotated[Number, Field(ge=0.0)]
 # The first error is all that is told: no need to collect the others.
 TupleOf = Annotated[tuple[Value, ...], FailFast()]
-ByKey = Annotated[Mapping[Key, Value], FailFast()]
-# Columns of `ScoreFile.items` that identify each entry; no two entries share the first one.
+ByKey = Annotated[Mapping[str, Value], FailFast()]
+# Columns of items that identify each entry; the first one ascends.
 ID_COLUMNS = {"rooms": ("row", "scene_index", "view_index"), "iqtt": ("question",)}
 OPTIONAL_COLUMNS = {"rooms": ("view_angle_degrees",), "iqtt": ("shape",)}
-# Columns of `ScoreFile.objects`, beside its scores: whole numbers, and a text.
+# Columns of objects, beside their scores: whole numbers, and a text.
 OBJECT_COLUMNS = ("row", "object", "pixels")
 SHAPE_COLUMN = "shape"
+COUNTS = {
+    "rooms": ("rows_in_truth", "rows_penalised", "pixels"),
+    "iqtt": ("questions_in_truth", "answers", "abstained"),
+}
 GROUPINGS = {
     "rooms": ("by_view_angle", "by_object_shape", "by_object_size"),
     "iqtt": ("by_distractor", "by_rotation_angle", "by_position"),
 }
-
-
-# Unknown keys are refused; the columns of items are arrays, which pydantic does not look into.
-_CONFIG = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
-
-
-@dataclass(frozen=True)
-class Score:
-    """A score with its interval.
-
-    Attributes:
-        value: mean over views within a scene, then over scenes; or over questions. Rows that have
-            no such score, as they show no object, are left out.
-        low, high: ends of the interval at `Meta.confidence`; None where there is none.
-        n: scenes, or questions, that it rests on.
-        std: standard deviation over training runs (n - 1 in the denominator); None for one run.
-    """
-
-    __pydantic_config__ = _CONFIG
-    value: Number
-    low: Number | None
-    high: Number | None
-    unit: Text
-    n: Annotated[int, Field(strict=True, ge=1)]
-    std: NotNegative | None
-
-
-@dataclass(frozen=True)
-class Skill:
-    """A score between that of a method that sees nothing, the floor, and a perfect one.
-
-    Attributes:
-        value: 1 is perfect, 0 is the floor, below 0 is worse than it; see `measures.skill`.
-        low, high: ends of the interval at `Meta.confidence`; None where there is none. That of
-            rooms is paired: it resamples the scenes of score and floor together.
-        floor: the floor's score on the same items, in the unit of the score; 0 where it is less.
-        floor_name: what has that score, such as "empty_room".
-    """
-
-    __pydantic_config__ = _CONFIG
-    value: Annotated[Number, Field(le=1.0)]
-    low: Number | None
-    high: Number | None
-    floor: Number
-    floor_name: Annotated[Name, Field(pattern=r"\S")]
+_STRICT = ConfigDict(extra="forbid")
 
 
 @dataclass(frozen=True)
 class Submission:
     """A file that was scored: one training run."""
 
-    __pydantic_config__ = _CONFIG
+    __pydantic_config__ = _STRICT
     path: Text
-    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    sha256: Digest
     run: Name
+
+
+@dataclass(frozen=True)
+class AnswerGroup:
+    """How a group of questions was answered. Which questions it holds would help to guess answers.
+
+    Attributes:
+        n: how many questions there are.
+        right: how many of them each training run answered rightly.
+        low, high: ends of the interval of the accuracy; None where there is none.
+    """
+
+    __pydantic_config__ = _STRICT
+    n: Annotated[Whole, Field(ge=1)]
+    right: TupleOf[Whole]
+    low: Number | None
+    high: Number | None
+
+    @property
+    def score(self) -> Score:
+        """The accuracy, with its interval."""
+        runs = np.array(self.right) / self.n
+        std = float(runs.std(ddof=1)) if len(runs) > 1 else None
+        unit = metric(ACCURACY).unit
+        return Score(float(runs.mean()), self.low, self.high, unit, self.n, std)
+
+
+AnswerGroups = ByKey[Annotated[Mapping[Label, AnswerGroup], FailFast(), Field(min_length=1)]]
 
 
 @dataclass(frozen=True)
@@ -108,89 +128,69 @@ class Meta:
         truth_path: where the truth lay.
         truth_digest: SHA-256 of those values of the truth that scores depend on, as they were
             read (the attribute `truth_digest` of rooms and question files).
-        truth_source: who chose the truth: "given" by the person who scored, "known" to the
-            benchmark by its digest, or named by the "submission" alone, which is not comparable.
+        truth_given: whether the person who scored chose the truth, and not the submission.
         submissions: one for each training run.
         writer: the program and its release.
         versions: releases of the libraries that computed the scores, by package.
         seed, resamples: of the bootstrap; 0 resamples where intervals come by formula.
-        confidence: of all intervals.
-        counts: such as the number of rows, scenes, runs.
-        warnings: for a person, such as why the scores are not comparable.
+        counts: how many there are of each of `COUNTS`: rows or questions of the truth, rows with
+            values that had to be penalised, pixels of an image, answers to each question, and
+            abstentions of all runs.
         noise_floors: by name of the score, what two samples of the true surface score against each
             other at this resolution; none for scores whose floor is 0, and for questions.
     """
 
-    __pydantic_config__ = _CONFIG
+    __pydantic_config__ = _STRICT
+    confidence: ClassVar[float] = CONFIDENCE
     truth_fingerprint: Annotated[Name, Field(pattern=r"\S")]
     truth_path: Text
-    truth_digest: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-    truth_source: TruthSource
+    truth_digest: Digest
+    truth_given: Annotated[bool, Field(strict=True)]
     submissions: Annotated[TupleOf[Submission], Field(min_length=1)]
     writer: Text
-    versions: ByKey[str, Text]
+    versions: ByKey[Text]
     seed: Whole
     resamples: Whole
-    confidence: Annotated[Number, Field(ge=0.5, le=0.999)]
-    counts: ByKey[str, Whole]
-    warnings: TupleOf[Text]
-    noise_floors: ByKey[str, NotNegative] = field(default_factory=dict)
+    counts: ByKey[Whole]
+    noise_floors: ByKey[NotNegative] = field(default_factory=dict)
 
+    @property
+    def truth_source(self) -> TruthSource:
+        """Who chose the truth: the person who scored, or the submission alone.
 
-Scores = ByKey[str, Score]
-Groups = ByKey[str, Scores]
-Degrees = Annotated[str, Field(pattern="^[0-9]{1,3}$")]
-DegreeRange = Annotated[str, Field(pattern="^[0-9]{1,3}-[0-9]{1,3}$")]
-KindOfAnswers = Annotated[str, Field(pattern=r"^[^\s].{0,59}$")]
-Position = Annotated[str, Field(pattern="^[0-2]$")]
-Shape = Annotated[str, Field(pattern=r"^[^\s].{0,59}$")]
-PercentRange = Annotated[str, Field(pattern="^[0-9]{1,3}-[0-9]{1,3}$")]
+        A truth that the submission names is "known" where the benchmark knows its digest.
+        """
+        if self.truth_given:
+            return "given"
+        return "submission" if known_test(self.truth_digest) is None else "known"
 
 
 @dataclass(frozen=True, eq=False)
 class ScoreFile:
-    """All scores of one method on one test set.
+    """The items of one method on one test set, and all scores that follow from them.
 
     Attributes:
         method: its name; any text.
-        comparable: whether all of the test set was scored, nothing penalised, and the truth not
-            chosen by the submission.
         alignment: what the method says it cannot know; "none" for questions.
-        metrics: by name, see `metric_names`.
-        items: columns of equal length with an entry for each image or question: the integers of
-            `ID_COLUMNS`, maybe those of `OPTIONAL_COLUMNS` (-1 where not known; `shape` numbers the
-            shapes of references, by which intervals are clustered), and float64 by
-            name of the metric, means over the runs; NaN where a row has no such score.
-        skills: by name of the score, for some of `metrics`.
-        objects: rooms only: columns of equal length with an entry for each object that is scored
-            by itself: the integers of `OBJECT_COLUMNS` (row of the truth, id in the image, pixels
-            that show it), the text `SHAPE_COLUMN`, and float64 by name of the metric.
-        by_object_shape: scores of `objects` by shape or class, such as "sphere"; rooms only.
-        by_object_size: the same by range of the share of the picture in percent, such as "1-2".
-        by_view_angle: scores by whole degrees between a view and its scene's first one, such as
-            "35"; rooms only.
-        by_distractor: by kind of wrong answers; questions only, as are the next two.
-        by_rotation_angle: by range of degrees, such as "30-60".
-        by_position: by index of the right answer, "0" to "2".
+        columns: an entry for each of N images or questions: the integers of `ID_COLUMNS`, (N,), of
+            which the first ascend, maybe those of `OPTIONAL_COLUMNS` (-1 where not known; `shape`
+            numbers the shapes of references, by which intervals are clustered), and float64 by name
+            of the metric, (R, N) for R runs, (N,) for scores of the empty room; NaN where a row has
+            no such score.
+        object_columns: rooms only: an entry for each of L objects that are scored by themselves:
+            the integers of `OBJECT_COLUMNS`, (L,) (row of the truth, id in the image, pixels that
+            show it), the texts of `SHAPE_COLUMN`, (L,), and float64 by name of the metric, (R, L).
+        answer_groups: questions only: by grouping, then by group.
         path: where it was read from; no part of the content.
     """
 
-    __pydantic_config__ = _CONFIG
     task: Task
-    method: Name
-    comparable: Annotated[bool, Field(strict=True)]
+    method: str
     alignment: Alignment
-    metrics: Annotated[Scores, Field(min_length=1)]
-    items: Mapping[str, Annotated[NDArray[Any], SkipValidation]]
+    columns: Mapping[str, Array]
     meta: Meta
-    skills: ByKey[str, Skill] = field(default_factory=dict)
-    objects: Mapping[str, Annotated[NDArray[Any], SkipValidation]] = field(default_factory=dict)
-    by_view_angle: ByKey[Degrees, Scores] = field(default_factory=dict)
-    by_object_shape: ByKey[Shape, Scores] = field(default_factory=dict)
-    by_object_size: ByKey[PercentRange, Scores] = field(default_factory=dict)
-    by_distractor: ByKey[KindOfAnswers, Scores] = field(default_factory=dict)
-    by_rotation_angle: ByKey[DegreeRange, Scores] = field(default_factory=dict)
-    by_position: ByKey[Position, Scores] = field(default_factory=dict)
+    object_columns: Mapping[str, Array] = field(default_factory=dict)
+    answer_groups: AnswerGroups = field(default_factory=dict)
     path: Path | None = None
 
     @property
@@ -199,16 +199,138 @@ class ScoreFile:
         return len(self.meta.submissions)
 
     @property
-    def ids(self) -> NDArray[Any]:
+    def ids(self) -> Array:
         """The row of the truth, or the question, that each entry of the columns is about, (N,)."""
-        return self.items[ID_COLUMNS[self.task][0]]
+        return self.columns[ID_COLUMNS[self.task][0]]
 
     @property
-    def clusters(self) -> NDArray[Any]:
+    def clusters(self) -> Array:
         """The scene of each image, whose errors are correlated; each question by itself, (N,)."""
-        return self.items["scene_index" if self.task == "rooms" else "question"]
+        return self.columns["scene_index" if self.task == "rooms" else "question"]
 
     @property
     def place(self) -> str:
         """The path, or the method where there is none, to begin an error with."""
         return str(self.path) if self.path is not None else self.method
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why the scores are not comparable; empty where they are."""
+        meta, texts = self.meta, []
+        if meta.truth_source == "submission":
+            texts.append(
+                f"without --truth these scores are not ranked: {meta.truth_path}, digest"
+                f" {meta.truth_digest:.12}, was used because the submission names it; if it is the"
+                f" right file, score again with --truth {meta.truth_path}"
+            )
+        count = meta.counts[COUNTS[self.task][0]]
+        if len(self.ids) < count:
+            texts.append(f"only {len(self.ids)} of {count} rows were answered by all runs")
+        if meta.counts.get("rows_penalised"):
+            texts.append(f"{meta.counts['rows_penalised']} rows with values that are not finite")
+        return tuple(f"not comparable: {text}" for text in texts)
+
+    @cached_property
+    def comparable(self) -> bool:
+        """Whether all of the truth was scored, nothing penalised, and the truth is no claim."""
+        return not self.warnings
+
+    @cached_property
+    def items(self) -> Mapping[str, Array]:
+        """The columns with means over the runs, (N,) each."""
+        return _means(self.columns)
+
+    @cached_property
+    def objects(self) -> Mapping[str, Array]:
+        """The columns of single objects with means over the runs, (L,) each."""
+        return _means(self.object_columns)
+
+    @cached_property
+    def metrics(self) -> Scores:
+        """The scores over all items, by name; see `metric_names`."""
+        if self.task == "iqtt":
+            shapes = self.items.get("shape", self.ids)
+            return {ACCURACY: accuracy(self._runs_of_scores[ACCURACY], shapes, self._bootstrap)}
+        return estimates(self._runs_of_scores, self.clusters, self._bootstrap)
+
+    @cached_property
+    def skills(self) -> Mapping[str, Skill]:
+        """The skills of some of the scores, by name."""
+        if self.task == "rooms":
+            return skills(self.items, self.clusters, self._bootstrap)
+        kinds = {
+            kind: group.n for kind, group in self.answer_groups.get("by_distractor", {}).items()
+        }
+        return {
+            ACCURACY: question_skill(self.metrics[ACCURACY], kinds, self.meta.counts["answers"])
+        }
+
+    @cached_property
+    def by_view_angle(self) -> Groups:
+        """Scores by whole degrees between a view and its scene's first one, such as "35"."""
+        angle = self.columns.get("view_angle_degrees")
+        if angle is None or len(np.unique(self.columns["view_index"])) < 2:
+            return {}
+        here = angle >= 0
+        scores = {name: runs[:, here] for name, runs in self._runs_of_scores.items()}
+        return grouped_estimates(scores, angle[here], self.clusters[here], self._bootstrap)
+
+    @cached_property
+    def by_object_shape(self) -> Groups:
+        """Scores of single objects by shape or class, such as "sphere"."""
+        return self._groups_of_objects(self.object_columns.get(SHAPE_COLUMN))
+
+    @cached_property
+    def by_object_size(self) -> Groups:
+        """Scores of single objects by range of the share of the picture in percent: "1-2"."""
+        if not self.object_columns:
+            return {}
+        sizes = object_sizes(self.object_columns["pixels"], self.meta.counts["pixels"])
+        return self._groups_of_objects(sizes)
+
+    @cached_property
+    def by_distractor(self) -> Groups:
+        """Scores by kind of wrong answers."""
+        return self._groups_of_answers("by_distractor")
+
+    @cached_property
+    def by_rotation_angle(self) -> Groups:
+        """Scores by range of degrees, such as "30-60"."""
+        return self._groups_of_answers("by_rotation_angle")
+
+    @cached_property
+    def by_position(self) -> Groups:
+        """Scores by index of the right answer, "0" to "2"."""
+        return self._groups_of_answers("by_position")
+
+    @property
+    def _bootstrap(self) -> Bootstrap:
+        return Bootstrap(self.meta.seed, self.meta.resamples)
+
+    @property
+    def _runs_of_scores(self) -> dict[str, Array]:
+        """The scores of the method, (R, N) each."""
+        return {
+            name: np.atleast_2d(column)
+            for name, column in self.columns.items()
+            if column.dtype == np.float64 and not name.startswith(EMPTY_ROOM)
+        }
+
+    def _groups_of_objects(self, labels: Array | None) -> Groups:
+        if labels is None:
+            return {}
+        entry = np.searchsorted(self.ids, self.object_columns["row"])
+        scores = {name: np.atleast_2d(self.object_columns[name]) for name in OBJECT_SCORES}
+        return grouped_estimates(scores, labels, self.clusters[entry], self._bootstrap)
+
+    def _groups_of_answers(self, grouping: str) -> Groups:
+        groups = self.answer_groups.get(grouping, {})
+        return {key: {ACCURACY: group.score} for key, group in groups.items()}
+
+
+def _means(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Return columns of which those with runs, (R, N), are averaged over these."""
+    return {
+        name: column.mean(axis=0) if column.ndim == 2 else column
+        for name, column in columns.items()
+    }

@@ -6,13 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.scoring.estimates import estimates, object_groups, object_labels, skills
 from metrics.scoring.image_scores import noise_floors
 from metrics.scoring.metric_names import EMPTY_ROOM, OBJECT_SCORES
-from metrics.scoring.records import OBJECT_COLUMNS, SHAPE_COLUMN, Groups, ScoreFile
+from metrics.scoring.records import OBJECT_COLUMNS, SHAPE_COLUMN, ScoreFile
 from metrics.scoring.rows import score_rows
 from metrics.scoring.runs import (
-    CONFIDENCE,
     Progress,
     ScoringError,
     Settings,
@@ -20,7 +18,6 @@ from metrics.scoring.runs import (
     meta_of,
     refuse,
     refuse_copies,
-    warnings_of,
 )
 from metrics.scoring.truth_digests import rooms_digest
 from metrics.submissions.missing_rows import size_problems
@@ -42,7 +39,7 @@ def score_rooms(
         count, fingerprint = len(truth), truth.fingerprint
         for file in files:
             refuse(file.path, size_problems(file, truth))
-    rows, whole = matched_rows(files, found.path, fingerprint, count, settings.allow_partial)
+    rows = matched_rows(files, found.path, fingerprint, count, settings.allow_partial)
     for file in files:
         if file.has_normals != files[0].has_normals:
             told, expected = ("normals", "none") if file.has_normals else ("none", "normals")
@@ -67,59 +64,24 @@ def score_rooms(
         view = truth.read("view_index", slice(None))
         angle = view_angles(scene, view, truth.read("camera/world_from_camera", slice(None)))[rows]
         shape = object_shapes(truth, scored.objects["row"], scored.objects["object"])
-        scene_of_object = scene[scored.objects["row"]]
-        scene, view = scene[rows], view[rows]
         floors = _mean_noise_floors(truth, rows)
-        pixels = truth.spec.height * truth.spec.width
-    bootstrap = settings.seed, settings.resamples, CONFIDENCE
-    by_angle = {}
-    if len(np.unique(view)) > 1:
-        for degrees in np.unique(angle[angle >= 0]).tolist():
-            some = angle == degrees
-            of_angle = {name: runs[:, some] for name, runs in scores.items()}
-            by_angle[str(degrees)] = estimates(of_angle, scene[some], *bootstrap)
-    of_objects = {name: scored.objects[name] for name in OBJECT_SCORES}
-    objects = {
-        **{name: scored.objects[name] for name in OBJECT_COLUMNS},
-        SHAPE_COLUMN: shape,
-        **{name: runs.mean(axis=0) for name, runs in of_objects.items()},
-    }
-    groups: dict[str, Groups] = {
-        name: object_groups(of_objects, labels, scene_of_object, bootstrap)
-        for name, labels in object_labels(objects, pixels).items()
-    }
-    warnings = warnings_of(whole, len(rows), count, list(bad), found, digest)
+        counts = {
+            "rows_in_truth": count,
+            "rows_penalised": len(bad),
+            "pixels": truth.spec.height * truth.spec.width,
+        }
     items = {
         "row": rows,
-        "scene_index": scene,
-        "view_index": view,
+        "scene_index": scene[rows],
+        "view_index": view[rows],
         "view_angle_degrees": angle,
-        **{name: runs.mean(axis=0) for name, runs in scores.items()},
+        **scores,
         **{EMPTY_ROOM + name: column for name, column in scored.floors.items()},
     }
-    counts = {
-        "rows": len(rows),
-        "rows_in_truth": count,
-        "scenes": len(np.unique(scene)),
-        "runs": len(files),
-        "rows_penalised": len(bad),
-        "rows_without_objects": len(rows) - len(np.unique(objects["row"])),
-        "objects": len(objects["row"]),
-        "pixels": pixels,
-    }
+    objects = {name: scored.objects[name] for name in (*OBJECT_COLUMNS, *OBJECT_SCORES)}
+    meta = meta_of(files, found, fingerprint, digest, settings, counts, floors)
     return ScoreFile(
-        task="rooms",
-        method=files[0].method,
-        comparable=not warnings,
-        alignment=alignment,
-        metrics=estimates(scores, scene, *bootstrap),
-        skills=skills(items, scene, *bootstrap),
-        by_view_angle=by_angle,
-        by_object_shape=groups["by_object_shape"],
-        by_object_size=groups["by_object_size"],
-        items=items,
-        objects=objects,
-        meta=meta_of(files, found, fingerprint, digest, settings, counts, warnings, floors),
+        "rooms", files[0].method, alignment, items, meta, {**objects, SHAPE_COLUMN: shape}
     )
 
 

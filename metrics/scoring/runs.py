@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from metrics.measures.statistics import RESAMPLES
 from metrics.scoring.image_scores import NonFinite
-from metrics.scoring.known_tests import known_test
-from metrics.scoring.records import Meta, Submission, TruthSource
+from metrics.scoring.records import Meta, Submission
 from metrics.submissions.missing_rows import match_problems
 from metrics.submissions.problems import Problem, first_error
 from metrics.submissions.reader import Predictions
@@ -24,7 +23,6 @@ from scenegen.files.row_file import writer_name
 
 Array = NDArray[Any]
 Progress = Callable[[int], Any]
-CONFIDENCE = 0.95
 LIBRARIES = ("numpy", "pykdtree", "scipy")  # whose releases scores may depend on
 
 
@@ -68,8 +66,8 @@ def matched_rows(
     fingerprint: str | None,
     count: int,
     partial: bool,
-) -> tuple[Array, bool]:
-    """Return the rows of the truth that all files answer, and whether those are all rows.
+) -> Array:
+    """Return the rows of the truth that all files answer, in ascending order.
 
     Raises ScoringError for another truth, unknown rows, and missing ones unless `partial`.
     """
@@ -82,7 +80,7 @@ def matched_rows(
         rows = np.intersect1d(rows, file.rows)
     if not rows.size:
         raise ScoringError(files[0].path, "no row that all runs answer", f"rows of {truth_path}")
-    return rows, len(rows) == count
+    return rows
 
 
 def refuse(path: Path, problems: Sequence[Problem]) -> None:
@@ -93,11 +91,6 @@ def refuse(path: Path, problems: Sequence[Problem]) -> None:
         raise first_error(ScoringError, path, problems, advice)
 
 
-def known(value: float) -> float | None:
-    """Return the value for JSON: None where it is not finite."""
-    return float(value) if np.isfinite(value) else None
-
-
 def refuse_copies(files: Sequence[Predictions], same: Callable[[int, int], Any]) -> None:
     """Raise ScoringError where two submissions, told apart by `same`, are one training run."""
     for i, j in itertools.combinations(range(len(files)), 2):
@@ -106,55 +99,27 @@ def refuse_copies(files: Sequence[Predictions], same: Callable[[int, int], Any])
             raise ScoringError(files[j].path, found, "each training run once")
 
 
-def source_of(truth: FoundTruth, digest: str) -> TruthSource:
-    """Return where the truth comes from."""
-    if truth.source == "submission" and known_test(digest) is not None:
-        return "known"
-    return truth.source
-
-
-def warnings_of(
-    whole: bool, scored: int, count: int, penalised: Sequence[int], truth: FoundTruth, digest: str
-) -> list[str]:
-    """Return why the scores are not comparable, if they are not."""
-    found = []
-    if source_of(truth, digest) == "submission":
-        found.append(
-            f"not comparable: without --truth these scores are not ranked: {truth.path}, digest"
-            f" {digest:.12}, was used because the submission names it; if it is the right file,"
-            f" score again with --truth {truth.path}"
-        )
-    if not whole:
-        found.append(f"not comparable: only {scored} of {count} rows were answered by all runs")
-    if penalised:
-        found.append(f"not comparable: {len(penalised)} rows with values that are not finite")
-    return found
-
-
 def meta_of(
     files: Sequence[Predictions],
     truth: FoundTruth,
     fingerprint: str,
     digest: str,
     settings: Settings,
-    counts: dict[str, int],
-    warnings: list[str],
+    counts: Mapping[str, int],
     noise_floors: Mapping[str, float] | None = None,
 ) -> Meta:
-    """Return what a score file records beside its numbers."""
+    """Return what a score file records beside its items."""
     resampled = files[0].task == "rooms" or len(files) > 1
     return Meta(
         truth_fingerprint=fingerprint,
         truth_path=str(truth.path),
         truth_digest=digest,
-        truth_source=source_of(truth, digest),
+        truth_given=truth.source == "given",
         submissions=tuple(Submission(str(file.path), file.sha256, file.run) for file in files),
         writer=writer_name(),
         versions=_releases(),
         seed=settings.seed,
         resamples=settings.resamples if resampled else 0,
-        confidence=CONFIDENCE,
         counts=counts,
-        warnings=tuple(warnings),
         noise_floors=noise_floors or {},
     )

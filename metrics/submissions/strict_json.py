@@ -33,9 +33,9 @@ _EXPECTED = {
 
 
 _PATTERNS = {
-    r"^3\.[0-9]{1,4}$": "a version 3.x",
     "^[0-9a-f]{64}$": "64 hexadecimal digits",
     r"\S": "a text that is not blank",
+    r"^[^\s].{0,59}$": "a name of 1 to 60 characters",
 }
 _STRING = re.compile(rb'"(?:[^"\\]++|\\.)*+"?', re.DOTALL)
 Kind = TypeVar("Kind")

@@ -70,7 +70,7 @@ def shown_scores(
     """
     refuse(predictions.path, size_problems(predictions, truth))
     known = truth.path, truth.fingerprint, len(truth)
-    answered, _ = matched_rows([predictions], *known, partial=True)
+    answered = matched_rows([predictions], *known, partial=True)
     if scores_path is not None:
         stored = _stored_scores(scores_path, predictions, truth)
         rows = _chosen(items, np.intersect1d(answered, stored.rows), scores_path)

@@ -98,7 +98,7 @@ def test_commands_take_shards(made, tmp_path):
         data = folder / "iqtt-test.h5"
         call("baseline", "chance", "--data", data, "--out", answers)
         call("score", answers, "--truth", folder / "iqtt-test-answers.h5", "--json", score)
-        found.append(json.loads(score.read_text())["metrics"])
+        found.append(json.loads(score.read_text())["summary"]["metrics"])
     assert found[0] == found[1]
 
 

@@ -18,6 +18,7 @@ from quizzes import Site, made_answers
 
 import cli
 from iqtt.quiz.answers import read_answers
+from metrics.score_file import read_scores
 
 # Whoever starts the tests in the background has Ctrl-C ignored.
 HEAR = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
@@ -219,8 +220,8 @@ def test_export_and_submission(quiz_split, tmp_path, iqtt, refused):
     assert "answers to 24 of 24 questions\n" in result.stdout
     bench = ["score", "people.h5", "--truth", str(truth), "--json", "people.json"]
     assert CliRunner().invoke(cli.bench, bench).exit_code == 0
-    accuracy = json.loads((tmp_path / "people.json").read_text())["metrics"]["iqtt_accuracy"]
-    assert accuracy["value"] == sum(one.correct for one in read_answers("a.db").answers) / 24
+    accuracy = read_scores(tmp_path / "people.json").metrics["iqtt_accuracy"]
+    assert accuracy.value == sum(one.correct for one in read_answers("a.db").answers) / 24
     refused("quiz", "--db", "a.db", "--export", "a.csv", words=("a.csv", "overwrite"))
     refused("quiz", "--db", "a.db", "--submission", "b.h5", words=("SPLIT",))
     other = made_answers(tmp_path / "other.db", 2)

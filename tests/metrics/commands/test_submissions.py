@@ -12,6 +12,7 @@ from click.testing import CliRunner
 
 import cli
 from metrics.prediction_writer import describe_format
+from metrics.score_file import read_scores
 
 
 def bench(*arguments):
@@ -72,7 +73,7 @@ def test_a_baseline_goes_all_the_way(truths, folder):
     assert (folder / "c.html").read_text().count("data:image/webp") == 6 * 6
     assert bench("leaderboard", "oracle.json", "--html", "site").exit_code == 0
     assert (folder / "site" / "index.html").is_file()
-    assert json.loads((folder / "oracle.json").read_text())["metrics"]["chamfer"]["value"] == 0
+    assert read_scores(folder / "oracle.json").metrics["chamfer"].value == 0
     compared = bench("compare", "empty-room.json", "oracle.json", "--json", "c.json")
     assert compared.exit_code == 0, compared.output
     assert "better" in compared.stdout

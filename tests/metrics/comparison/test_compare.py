@@ -128,14 +128,14 @@ def test_questions_about_one_shape_are_not_independent():
     shapes = np.repeat(np.arange(6), 8)
     right = np.repeat([[1, 0], [1, 0], [1, 0], [1, 0], [1, 0], [1, 1]], 8, axis=0)
     plain = [iqtt_scores(name, right[:, k]) for k, name in ((1, "b"), (0, "a"))]
-    files = [replace(file, items={**file.items, "shape": shapes}) for file in plain]
+    files = [replace(file, columns={**file.columns, "shape": shapes}) for file in plain]
     (each,), (alike,) = (compare(some).differences for some in (plain, files))
     assert each.difference == alike.difference == pytest.approx(5 / 6)
     assert (each.test, alike.test) == ("exact McNemar", "sign flips")
     assert each.p_value < 1e-10
     assert alike.p_value == 2 / 2**5
     assert alike.high - alike.low > 2 * (each.high - each.low)
-    single = [replace(file, items={**file.items, "shape": np.arange(48)}) for file in plain]
+    single = [replace(file, columns={**file.columns, "shape": np.arange(48)}) for file in plain]
     assert compare(single).differences == compare(plain).differences
 
 
@@ -144,7 +144,7 @@ def test_rows_in_another_order_are_paired_by_number():
     columns = {"chamfer": rng.random(16)}
     first = rooms_scores("a", columns, SCENES)
     turned = rng.permutation(16)
-    other = replace(first, items={k: v[turned] for k, v in first.items.items()})
+    other = replace(first, columns={k: v[..., turned] for k, v in first.columns.items()})
     (d,) = compare([first, other], ["chamfer"]).differences
     assert (d.difference, d.low, d.high, d.p_value, d.ties) == (0.0, 0.0, 0.0, 1.0, 8)
     assert d.smallest is None
@@ -188,7 +188,7 @@ def test_rows_without_the_score_are_left_out():
     scenes = [0, 0, 1, 1, 2, 2, 3, 3]
     files = [rooms_scores(name, {"chamfer": np.zeros(8)}, scenes) for name in ("theirs", "ours")]
     files = [
-        replace(file, items={**file.items, "relief_correlation": column})
+        replace(file, columns={**file.columns, "relief_correlation": column})
         for file, column in zip(files, (theirs, ours), strict=True)
     ]
     (found,) = compare(files, ["relief_correlation"]).differences

@@ -37,7 +37,7 @@ def test_verdicts_come_first_and_names_stay_text():
 def test_questions_are_compared_by_kind():
     files = [iqtt_scores("a", [1, 0, 1]), iqtt_scores("b", [1, 1, 1])]
     page = Page(html_comparison(compare(files), files))
-    assert any(row[0] == "mirror" and row[1].startswith("0.3333") for row in page.rows)
+    assert any(row[0] == "mirror" and row[1].startswith("0.6667") for row in page.rows)
 
 
 def test_pictures_need_the_files_that_were_scored(rooms_path, tmp_path):
@@ -56,7 +56,7 @@ def test_pictures_need_the_files_that_were_scored(rooms_path, tmp_path):
     assert "data:image/webp" not in html_comparison(compared, files, rooms_path)
     text = html_comparison(compared, files, rooms_path, moved)
     assert text.count("data:image/webp") == 6 * 6
-    last = [replace(f, items={**f.items, "row": f.items["row"] + 1}) for f in files]
+    last = [replace(f, columns={**f.columns, "row": f.columns["row"] + 1}) for f in files]
     with pytest.raises(FileFormatError) as missing:
         html_comparison(compared, last, rooms_path, moved)
     assert missing.value.found.startswith("items.row")

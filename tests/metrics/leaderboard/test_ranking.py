@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_scores import DIGEST, iqtt_scores, rooms_scores
+from made_scores import DIGEST, iqtt_scores, make_score, rooms_scores, stated
 from refusals import refused
 
 from metrics.leaderboard.floors import FloorError
 from metrics.leaderboard.ranking import LeaderboardError, leaderboard
 from metrics.report.paper_tables import TABLES
-from metrics.score_file import Score, Skill
+from metrics.score_file import Skill
 from metrics.scoring.floors import Floor
 from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import UnknownMetricError
@@ -28,7 +28,7 @@ PAPER = ("task", "all", "none")
 
 
 def rooms(name, chamfer=0.2, mse=0.02, **other):
-    columns = {"chamfer": [chamfer] * 4, "hausdorff": [0.5] * 4, "mse_depth": [mse] * 4}
+    columns = {"chamfer": np.ones(4) * chamfer, "hausdorff": [0.5] * 4, "mse_depth": [mse] * 4}
     return rooms_scores(name, columns, SCENES, path=Path(f"{name}.json"), **other)
 
 
@@ -44,7 +44,7 @@ def test_ranks_and_best_cells():
     best = [[cell.best for cell in row.cells] for row in table.rows]
     assert best == [[True, True, False], [False, True, True], [False, True, False]]
     assert table.columns[0] == "Chamfer ↓ (scene unit)"
-    assert by_label(table)["a"].cells[0].rest == " [0.0900, 0.1100]"
+    assert by_label(table)["a"].cells[0].rest == " [0.1000, 0.1000]"
     assert table.title == f"Rooms, truth {DIGEST[:12]}"
     assert len(leaderboard(files, paper="none")) == 1
 
@@ -53,8 +53,8 @@ def test_higher_is_better_where_it_is():
     files = [iqtt_scores("low", [1, 0, 0, 0]), iqtt_scores("high", [1, 1, 0, 1])]
     (table,) = leaderboard(files, paper="none")
     shown = [(row.label, row.cells[0].best) for row in table.rows]
-    assert shown == [("high", 1), ("low", 0), ("floor: chance", 0)]
-    assert table.columns == ("IQTT accuracy ↑ (fraction)",)
+    assert shown == [("high", 1), ("low", 0), ("floor: chance, as no probe was measured", 0)]
+    assert table.columns == ("IQTT accuracy: skill ↑", "IQTT accuracy ↑ (fraction)")
     assert table.title == f"3D-IQTT, mirror questions, truth {DIGEST[:12]}"
     assert "4 questions; chance is 0.3333." in table.notes
 
@@ -98,17 +98,17 @@ def test_known_test_sets_bear_their_name(monkeypatch):
 
 def test_files_that_claim_the_whole_test_set_must_agree_on_it():
     a, b = rooms("a"), rooms("b")
-    other = replace(b, items={**b.items, "row": np.array([0, 1, 2, 4])})
+    other = replace(b, columns={**b.columns, "row": np.array([0, 1, 2, 4])})
     with refused(LeaderboardError, "b.json", found="4 rows", expected="the 4 of a.json"):
         leaderboard([a, other])
-    assert leaderboard([a, replace(other, comparable=False)])
-    turned = {name: column[::-1] for name, column in b.items.items()}
-    assert leaderboard([a, replace(b, items=turned)])
+    assert leaderboard([a, stated(other, comparable=False)])
+    turned = {name: column[..., ::-1] for name, column in b.columns.items()}
+    assert leaderboard([a, replace(b, columns=turned)])
 
 
 def test_scores_that_are_missing_leave_a_hole():
     a, b = rooms("a"), rooms("b")
-    less = replace(b, metrics={k: v for k, v in b.metrics.items() if k != "chamfer"})
+    less = replace(b, columns={k: v for k, v in b.columns.items() if k != "chamfer"})
     table = leaderboard([less, a], paper="none")[0]
     assert [(row.rank, row.label) for row in table.rows] == [("1", "a"), ("", "b")]
     assert table.rows[1].cells[0].value == "-"
@@ -120,14 +120,11 @@ def test_scores_that_are_missing_leave_a_hole():
 
 
 def test_labels_tell_runs_and_claims():
-    several = rooms("a", runs=3, alignment="scale_shift")
+    runs = [[0.198] * 4, [0.2] * 4, [0.202] * 4]
+    several = rooms("a", np.array(runs), runs=3, alignment="scale_shift")
     table = leaderboard([several, rooms("b")], paper="none")[0]
-    row = table.rows[0]
-    assert row.label == "a (3 runs; claims depth when scaled and shifted)"
+    row = by_label(table)["a (3 runs; claims depth when scaled and shifted)"]
     assert row.cells[0].rest.startswith(" ± 0.0020 [")
-    other = replace(several, meta=replace(several.meta, confidence=0.9))
-    notes = leaderboard([other, rooms("b")], paper="none")[0].notes
-    assert any(note.startswith("[low, high]: 90% and 95% interval") for note in notes)
 
 
 def skilled(name, chamfer=0.2, **other):
@@ -166,8 +163,9 @@ def test_skill_stands_before_the_score_and_floors_below_the_methods():
 def test_the_floor_by_view_angle_is_the_empty_rooms_at_that_angle():
     items = {"view_angle_degrees": np.array([0, 35, 0, 35])}
     items["empty_room_chamfer"] = np.array([0.1, 0.5, 0.3, 0.7])
-    file = rooms("a", by_view_angle=angles(0.2))
-    _, table = leaderboard([replace(file, items={**file.items, **items})], paper="none")
+    file = rooms("a")
+    file = stated(replace(file, columns={**file.columns, **items}), by_view_angle=angles(0.2))
+    _, table = leaderboard([file], paper="none")
     floor = by_label(table)["floor: empty room"]
     assert [cell.value for cell in floor.cells] == ["0.2000", "-", "0.6000"]  # 0, 5 and 35 degrees
 
@@ -220,7 +218,7 @@ def test_a_submission_stands_there_once():
 def by_kind(*rights):
     kinds = ("matched", "near")
     return {
-        kind: {"iqtt_accuracy": Score(right, None, None, "fraction", 2, None)}
+        kind: {"iqtt_accuracy": make_score("iqtt_accuracy", right)}
         for kind, right in zip(kinds, rights, strict=True)
     }
 
@@ -229,7 +227,7 @@ def test_questions_by_kind_with_the_floors_of_each_kind(monkeypatch):
     table = (Floor("near", "outline-trees", 1000, 0.6, 0.5, 0.7),)
     table += (Floor("matched", "outline-trees", 1000, 0.35, 0.3, 0.4),)
     monkeypatch.setattr("metrics.scoring.floors.FLOORS", (*table, replace(table[0], kind="other")))
-    file = replace(iqtt_scores("a", [1, 0, 1, 0]), by_distractor=by_kind(0.3, 0.7))
+    file = iqtt_scores("a", [1, 0, 1, 0], by_distractor=by_kind(0.3, 0.7))
     _, kinds, floors = leaderboard([file], paper="none")
     assert kinds.columns == ("matched", "near")
     rows = {row.label: [cell.value for cell in row.cells] for row in kinds.rows}
@@ -248,10 +246,7 @@ def test_questions_by_kind_with_the_floors_of_each_kind(monkeypatch):
 
 
 def angles(shift):
-    return {
-        str(a): {"chamfer": Score(a / 100 + shift, None, None, "scene unit", 2, None)}
-        for a in (5, 35, 0)
-    }
+    return {str(a): {"chamfer": make_score("chamfer", a / 100 + shift)} for a in (5, 35, 0)}
 
 
 def test_scores_by_view_angle_keep_the_order_of_the_ranking():
@@ -311,10 +306,10 @@ def test_figures_of_other_scores_or_angles_do_not_slip_into_a_ranking():
     assert [row.kind for row in alone.rows] == ["ranked"]
     other = {"other": iqtt_scores("a", [1]).by_distractor["mirror"]}
     for kinds in (other, {}):
-        people = leaderboard([replace(iqtt_scores("a", [1]), by_distractor=kinds)])[0]
+        people = leaderboard([iqtt_scores("a", [1], by_distractor=kinds)])[0]
         assert sum(row.kind == "reported" for row in people.rows) == len(TABLES[2].figures)
     mirror, alone, *_ = leaderboard([iqtt_scores("a", [1])])  # of which the paper has no figures
     assert {row.kind for row in mirror.rows} == {"ranked", "floor"}
     assert "Table 3" in alone.title
-    cell = by_label(people)["Human Evaluation, 3D-IQTT, 0 labels (Table 3) †"].cells[0]
+    cell = by_label(people)["Human Evaluation, 3D-IQTT, 0 labels (Table 3) †"].cells[-1]
     assert (cell.value, cell.rest) == ("0.7329", " ± 0.148")

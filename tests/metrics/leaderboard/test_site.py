@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_scores import iqtt_scores, rooms_scores
+from made_scores import iqtt_scores, rooms_scores, stated
 from pages import Page
 
 from iqtt.files.make import make_split
@@ -55,7 +55,7 @@ def first_sentences(folder):
 
 def test_the_first_sentence_says_what_the_first_row_is(tmp_path):
     two = [rooms("near", 0.0), rooms("far", 0.3)]
-    hidden = [replace(file, comparable=False) for file in two]
+    hidden = [stated(file, comparable=False) for file in two]
     tied = [rooms("a", 0.0), rooms("b", 0.0)]
     for i, (files, metrics, expected) in enumerate(
         [
@@ -106,10 +106,12 @@ def test_scores_like_the_first_ones_are_marked(files, tmp_path):
     assert [cell.count(ALIKE) for cell in rows["near"][2:]] == [1, 1, 1]
     assert [cell.count(ALIKE) for cell in rows["far"][2:]] == [0, 1, 1]
     assert ALIKE not in "".join(rows[HOSTILE])
-    comparison, verdicts = compared_with_first([files[1], files[0], replace(files[2], items={})])
+    fewer = {name: c for name, c in files[2].columns.items() if name in ("row", "scene_index")}
+    shown = [files[1], files[0], replace(files[2], columns=fewer)]
+    comparison, verdicts = compared_with_first(shown)
     assert comparison.methods == ("far",)
     assert verdicts[id(files[0]), "chamfer"] == "worse"
-    assert compared_with_first([replace(files[0], comparable=False)]) == (None, {})
+    assert compared_with_first([stated(files[0], comparable=False)]) == (None, {})
 
 
 def test_a_site_replaces_an_older_one_and_nothing_else(files, tmp_path):

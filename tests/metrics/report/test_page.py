@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from jinja2 import UndefinedError
-from made_scores import iqtt_scores, rooms_scores, simple_rooms
+from made_scores import iqtt_scores, rooms_scores, simple_rooms, stated
 from pages import Page
 
 from metrics.measures.empty_room import empty_room
@@ -31,10 +31,10 @@ def test_the_page_is_whole_escapes_names_and_loads_nothing(rooms_path, tmp_path)
             out.add(row, empty + (row + 1) / len(rooms) * (room.depth - empty))
     found = score([path], rooms_path)
     runs = (Submission(HOSTILE, "0" * 64, HOSTILE),)
-    meta = replace(found.meta, truth_path=HOSTILE, warnings=(HOSTILE,), submissions=runs)
+    meta = replace(found.meta, truth_path=HOSTILE, truth_given=False, submissions=runs)
     hostile = replace(found, method=HOSTILE, meta=meta)
     text = html_report(hostile, rooms_path, [path], [replace(hostile, method=f"{HOSTILE}2")])
-    meta = replace(meta, truth_path=CONTROLS, warnings=(CONTROLS,))
+    meta = replace(meta, truth_path=CONTROLS)
     controls = html_report(replace(found, method=CONTROLS, meta=meta), rooms_path, [path])
     assert set(controls).isdisjoint(CONTROLS.replace("[2J", ""))
     page = Page(text)
@@ -46,7 +46,7 @@ def test_the_page_is_whole_escapes_names_and_loads_nothing(rooms_path, tmp_path)
     assert "@import" not in text
     assert len(text) < 500_000
     words = " ".join(page.words)
-    assert words.count(HOSTILE) == 6  # as title, head, warning, truth, path and run
+    assert words.count(HOSTILE) == 7  # as title, head, warning (twice), truth, path and run
     assert {row[0].strip() for row in page.rows} >= {*found.metrics, "noise floor"}
     best, _, worst = (words.split(f"{how} 2 of 8 scenes")[1] for how in ("Best", "Median", "Worst"))
     assert f"row {len(found.ids) - 1} " in best.split("Median")[0]
@@ -55,7 +55,7 @@ def test_the_page_is_whole_escapes_names_and_loads_nothing(rooms_path, tmp_path)
 
 def test_the_headline_stands_beside_floor_paper_and_other_methods(tmp_path):
     skills = {"chamfer": Skill(-0.25, -0.5, -0.1, 0.16, "empty_room_chamfer")}
-    mine, other = replace(simple_rooms(), skills=skills), simple_rooms("other")
+    mine, other = simple_rooms(skills=skills), simple_rooms("other")
     page = Page(html_report(mine, tmp_path, [], [other]))
     head, chamfer = page.rows[0], next(row for row in page.rows if row[0].startswith("Chamfer"))
     cells = dict(zip(head, chamfer, strict=True))
@@ -75,10 +75,10 @@ def test_the_headline_stands_beside_floor_paper_and_other_methods(tmp_path):
 def test_questions_stand_by_kind_beside_chance_floor_and_people(tmp_path):
     scores = iqtt_scores("mine", [1, 0, 1])
     (group,) = scores.by_distractor.values()
-    scores = replace(scores, by_distractor={"other": group, "near-2": group, "<b>": group})
+    scores = stated(scores, by_distractor={"other": group, "near-2": group, "<b>": group})
     page = Page(html_report(scores, tmp_path, []))
     rows = {row[0]: row for row in page.rows if len(row) == 8}
-    assert rows["other"][4:] == ["0.3333", "-0.6300", "0.5910 outline-trees, 5,000 labels",
+    assert rows["other"][4:] == ["0.3333", "0.1850", "0.5910 outline-trees, 5,000 labels",
                                  "0.7329 ± 0.148"]  # fmt: skip
     assert rows["near-2"][6] == "0.3333 chance, as no probe was measured"
     assert rows["near-2"][7] == rows["<b>"][7] == "-"
@@ -97,22 +97,19 @@ def test_examples_of_questions_say_what_is_right(truths, tmp_path):
     assert sum(address.startswith("data:image") for address in page.addresses) == 6 * 4
 
 
-NAN = float("nan")
-
-
 @pytest.mark.parametrize(
     "scores",
     [
         rooms_scores("one row", {"chamfer": [0.1]}, [0]),
         rooms_scores("none of the headline", {"abs_rel": [0.1, 0.2]}, [0, 1]),
         iqtt_scores("one question", [1.0]),
-        iqtt_scores("two answers", [1.0, 0.0], counts={"questions": 2, "answers": 2}),
+        iqtt_scores("two answers", [1.0, 0.0], counts={"answers": 2}),
     ],
     ids=lambda scores: scores.method,
 )
 def test_little_is_a_page_too(scores, tmp_path):
-    columns = {name: [NAN] * len(c) for name, c in scores.items.items() if name in scores.metrics}
-    for shown in (scores, replace(scores, items={**scores.items, **columns})):
+    gone = {name: np.nan * c for name, c in scores.items.items() if name in scores.metrics}
+    for shown in (scores, stated(scores, items={**scores.items, **gone})):
         text = html_report(shown, tmp_path, [])
         assert scores.method in " ".join(Page(text).words)
         assert "nan" not in text

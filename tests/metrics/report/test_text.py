@@ -2,10 +2,10 @@
 
 import csv
 import re
-from dataclasses import replace
+from types import MappingProxyType
 
 import pytest
-from made_scores import iqtt_scores, simple_rooms
+from made_scores import iqtt_scores, simple_rooms, stated
 
 from metrics.report.page import html_report
 from metrics.report.text import text_report, write_csv
@@ -14,13 +14,13 @@ from metrics.scoring.floors import Floor
 from scenegen.common.text_table import number
 
 
-def rooms(name="mine", **other):
-    scores = simple_rooms(name, counts={"rows": 4, "scenes": 2}, **other)
-    return replace(scores, by_view_angle=dict.fromkeys(("0", "35", "5"), scores.metrics))
+def rooms(name="mine", numbers=MappingProxyType({}), **other):
+    scores = simple_rooms(name, **other)
+    return stated(scores, by_view_angle=dict.fromkeys(("0", "35", "5"), scores.metrics), **numbers)
 
 
 def test_the_text_shows_every_score_and_its_reference():
-    scores = rooms(noise_floors={"chamfer": 0.0123}, warnings=("mind the gap",))
+    scores = rooms(noise_floors={"chamfer": 0.0123}, truth_given=False)
     title, _, table, *_, notes = text_report(scores).split("\n\n")
     assert title == "mine: 4 images of 2 scenes of rooms.h5"
     cells = {line.split()[0]: line.split() for line in table.splitlines()}
@@ -28,10 +28,10 @@ def test_the_text_shows_every_score_and_its_reference():
     for name, score in scores.metrics.items():
         assert cells[name][1:3] == [number(score.value), f"[{number(score.low, score.value)},"]
     assert cells["noise"][:3] == ["noise", "floor", "0.0123"]
-    assert "warning: mind the gap" in notes.splitlines()
+    assert f"warning: {scores.warnings[0]}" in notes.splitlines()
     (told,) = (line for line in notes.splitlines() if line.startswith("truth: "))
-    assert all(word in told for word in ("rooms.h5", scores.meta.truth_digest[:12], "given"))
-    questions = iqtt_scores("many", [1, 0], runs=3, counts={"questions": 2, "answers": 3})
+    assert all(word in told for word in ("rooms.h5", scores.meta.truth_digest[:12], "submission"))
+    questions = iqtt_scores("many", [1, 0], runs=3)
     text = text_report(questions)
     assert text.startswith("many: 2 questions of rooms.h5, mean of 3 runs\n")
     assert "chance 0.3333" in " ".join(text.split())
@@ -45,7 +45,7 @@ def lines_of(text):
 
 def test_the_headline_comes_first_with_skills_and_their_floors(monkeypatch):
     skills = {"chamfer": Skill(-0.25, -0.5, 0.1, 0.16, "empty_room_chamfer")}
-    text = text_report(rooms(skills=skills, noise_floors={"chamfer": 0.0123}))
+    text = text_report(rooms(numbers={"skills": skills}, noise_floors={"chamfer": 0.0123}))
     head, rest = text.split("all scores")
     assert lines_of(head)["skill of chamfer"] == ["-0.2500", "[-0.5000, 0.1000]", "0: empty room"]
     assert lines_of(head)["chamfer"][-1] == "0.1600: empty room; noise floor 0.0123"
@@ -59,15 +59,15 @@ def test_the_headline_comes_first_with_skills_and_their_floors(monkeypatch):
     assert lines_of(head)["skill of iqtt_accuracy"][-1] == "0: outline"
     assert lines_of(head)["iqtt_accuracy"][-1] == "0.5000: outline; chance 0.3333"
     assert lines_of(rest)["chance"][0] == "0.3333"
-    assert lines_of(rest)["mirror"] == ["0.3333 -", "2", "-0.3333 -", "0.5000: outline"]
+    assert lines_of(rest)["mirror"] == ["0.5000 -", "2", "0.0000 -", "0.5000: outline"]
 
 
 @pytest.mark.parametrize("form", ["text", "markdown", "html"])
 def test_groups_stand_in_the_order_of_their_numbers(form, tmp_path):
-    scores = iqtt_scores("a", [1, 0], counts={"questions": 2, "answers": 3})
+    scores = iqtt_scores("a", [1, 0])
     (group,) = scores.by_distractor.values()
     spans = ["120-150", "150-180", "30-60", "60-90", "90-120"]
-    scores = replace(scores, by_rotation_angle=dict.fromkeys(spans, group))
+    scores = stated(scores, by_rotation_angle=dict.fromkeys(spans, group))
     if form == "html":
         text = html_report(scores, tmp_path, [])
     else:

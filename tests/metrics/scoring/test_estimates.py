@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from metrics.scoring.estimates import skills
+from metrics.scoring.estimates import Bootstrap, skills
 from metrics.scoring.metric_names import SKILLED
 
 SCENES = 6
@@ -19,7 +19,7 @@ def columns(**given_columns):
 
 
 def skills_of(items):
-    return skills(items, np.arange(SCENES), 0, 200, 0.95)
+    return skills(items, np.arange(SCENES), Bootstrap(0, 200))
 
 
 SHARES = st.lists(st.floats(-1.0, 1.0), min_size=SCENES, max_size=SCENES)

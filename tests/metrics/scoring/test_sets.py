@@ -29,7 +29,7 @@ def test_every_command_takes_a_set(make_rooms, tmp_path):
         call(cli.scenegen, "export", rooms, "--items", "0,7", "--format", "ply", "--out", folder)
         call(cli.scenegen, "verify", rooms, "--items", 2)
         told.append(call(cli.scenegen, "info", rooms))
-    assert scores[0]["metrics"] == scores[1]["metrics"]
+    assert scores[0]["summary"] == scores[1]["summary"]
     assert scores[0]["meta"]["truth_digest"] == scores[1]["meta"]["truth_digest"]
     sizes = [sum(p.stat().st_size for p in (tmp_path / "set").glob("rooms-*.h5"))]
     sizes.insert(0, (tmp_path / "one" / "rooms.h5").stat().st_size)

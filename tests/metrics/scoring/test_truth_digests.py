@@ -121,13 +121,13 @@ def test_a_truth_that_only_the_submission_names_is_not_comparable(truth, monkeyp
     found = score([path])
     digest = found.meta.truth_digest
     assert (found.comparable, found.meta.truth_source) == (False, "submission")
-    (warning,) = found.meta.warnings
+    (warning,) = found.warnings
     assert all(word in warning for word in (str(truth), digest[:12], "--truth"))
     assert score([path], truth).comparable
     known = KnownTest("mine", "rooms", digest, 8, "scenegen render")
     monkeypatch.setattr(known_tests, "KNOWN_TESTS", (known,))
     found = score([path])
-    assert (found.comparable, found.meta.truth_source, found.meta.warnings) == (True, "known", ())
+    assert (found.comparable, found.meta.truth_source, found.warnings) == (True, "known", ())
     assert score([path], truth).meta.truth_source == "given"
 
 

@@ -154,4 +154,4 @@ def test_scores_are_those_of_one_process(cluster, make_rooms, tmp_path):
     for name, how in (("one", []), ("many", ["--scheduler", cluster.client.scheduler.address])):
         call("score", prediction, "--truth", rooms, "--json", tmp_path / f"{name}.json", *how)
         scores.append(json.loads((tmp_path / f"{name}.json").read_text()))
-    assert scores[0]["metrics"] == scores[1]["metrics"]
+    assert scores[0]["summary"] == scores[1]["summary"]
