@@ -11,7 +11,7 @@ from pathlib import Path
 from benchmarks.markdown import NOTHING, table
 from benchmarks.results.rows import Row, cells, scores, steps
 from benchmarks.results.steps import Step
-from metrics.report.paper_tables import TABLES
+from metrics.views.paper import TABLES
 
 KINDS = ("matched", "mirror-pair", "mirror-pair-2", "other", "near", "mirror")
 SPLITS = {

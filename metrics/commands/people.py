@@ -74,7 +74,7 @@ def _serve(
     from iqtt.quiz.schema import SECRET, open_answers, stored_values
     from iqtt.quiz.serve import serve
     from iqtt.quiz.study import Study
-    from metrics.people.references import compare
+    from metrics.views.people.references import compare
     from scenegen.common.web_hosts import address_of, hosts_of, listen
 
     hosts = hosts_of(host, public, names)
@@ -116,7 +116,7 @@ def _export(db: str, file: str | None, path: str, overwrite: bool) -> None:
 
 def _submit(db: str, file: str, path: str, settings: dict[str, Any]) -> None:
     from iqtt.quiz.answers import read_answers
-    from metrics.people.submission import write_submission
+    from metrics.views.people.submission import write_submission
 
     found = read_answers(db)
     total = _require_split(found, file)
@@ -155,8 +155,8 @@ def quiz_report(
     Participants are the sample. Only those who finished count.
     """
     from iqtt.quiz.answers import read_answers
-    from metrics.people.figures import compute
-    from metrics.people.text import text_report, to_json
+    from metrics.views.people.figures import compute
+    from metrics.views.people.report import text_report, to_json
     from scenegen.files.new_file import check_writable, write_text
 
     for path in filter(None, (json_path, html_path)):
@@ -165,7 +165,7 @@ def quiz_report(
     if json_path:
         write_text(json_path, to_json(figures), overwrite)
     if html_path:
-        from metrics.people.page import html_report
+        from metrics.views.people.report import html_report
 
         write_text(html_path, html_report(figures), overwrite)
     click.echo(text_report(figures))

@@ -65,9 +65,9 @@ def compare(
     Prints the differences, their confidence intervals and significance tests, and the smallest
     difference that the test set could show.
     """
-    from metrics.comparison.compare import compare as compare_files
-    from metrics.comparison.report import text_report, to_json
     from metrics.score_file import read_scores
+    from metrics.views.compare.compare import compare as compare_files
+    from metrics.views.compare.report import text_report, to_json
     from scenegen.files.new_file import check_writable, write_text
 
     for path in (json_path, html_path):
@@ -76,18 +76,18 @@ def compare(
     if (truth or predictions) and html_path is None:
         raise click.UsageError("--truth and --predictions are for the page: give --html, too")
     files = [read_scores(path) for path in scores]
-    found = compare_files(files, metrics or None, **settings)
+    comparison = compare_files(files, metrics or None, **settings)
     if json_path:
-        write_text(json_path, to_json(found), overwrite)
+        write_text(json_path, to_json(comparison), overwrite)
     try:
         if html_path:
-            from metrics.comparison.page import html_comparison
+            from metrics.views.compare.report import html_report
 
-            given = Path(truth) if truth else None
-            page = html_comparison(found, files, given, [Path(path) for path in predictions])
+            paths = [Path(path) for path in predictions]
+            page = html_report(comparison, files, Path(truth) if truth else None, paths)
             write_text(html_path, page, overwrite)
     finally:
-        click.echo(text_report(found, markdown))
+        click.echo(text_report(comparison, markdown))
 
 
 @click.command(
@@ -140,9 +140,10 @@ def leaderboard(
     The headline ranks: relief for rooms, skill for questions. Floors, and what the paper reported
     on its own data, stand below the methods, without a rank.
     """
-    from metrics.leaderboard import text
-    from metrics.leaderboard.ranking import leaderboard as rank
     from metrics.score_file import read_scores
+    from metrics.views.leaderboard.ranking import leaderboard as rank
+    from metrics.views.leaderboard.site import to_html, write_site
+    from metrics.views.table import to_latex, to_markdown
     from scenegen.files.new_file import check_writable, write_text
 
     if out is not None:
@@ -150,18 +151,19 @@ def leaderboard(
     files = [read_scores(path) for path in scores]
     shown: Any = "none" if no_paper else paper
     if folder is not None:
-        from metrics.leaderboard.site import write_site
-
         write_site(files, folder, metrics or None, paper=shown, overwrite=overwrite)
         print_line(f"{folder}: {len(scores)} score files; open {Path(folder) / 'index.html'}")
         if out is None:
             return
     tables = rank(files, metrics or None, paper=shown)
-    page: str = getattr(text, f"to_{form}")(tables)
+    if form == "html":
+        text = to_html(tables)
+    else:
+        text = to_latex(tables) if form == "latex" else to_markdown("", tables)
     if out is None:
-        click.echo(page)
+        click.echo(text)
         return
-    write_text(out, page, overwrite)
+    write_text(out, f"{text}\n", overwrite)
     print_line(f"{out}: {len(scores)} score files")
 
 

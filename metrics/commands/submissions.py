@@ -83,13 +83,13 @@ def score(
     **settings: Any,
 ) -> None:
     """Score a submission, or several training runs of one method, and print a table."""
-    from metrics.report.text import text_report, write_csv
     from metrics.score_file import write_scores
     from metrics.scoring.evaluate import count_rows
     from metrics.scoring.evaluate import score as score_files
     from metrics.scoring.runs import Settings, scorer_versions
     from metrics.submissions.reader import open_predictions
     from metrics.submissions.truths import find_truth
+    from metrics.views.report import text_report, write_csv
     from scenegen.files.new_file import check_writable, write_text
 
     outputs = [Path(path) for path in (json_path, csv_path, html_path) if path]
@@ -97,7 +97,7 @@ def score(
         check_writable(path, overwrite)
     others: list[Any] = []
     if beside:
-        from metrics.report.page import read_beside
+        from metrics.views.report import read_beside
 
         if html_path is None:
             raise click.UsageError("--beside is for the page: give --html, too")
@@ -118,7 +118,7 @@ def score(
         write_csv(found, csv_path, overwrite)
     try:
         if html_path:
-            from metrics.report.page import html_report
+            from metrics.views.report import html_report
 
             truth_path, runs = Path(found.meta.truth_path), [Path(path) for path in submissions]
             write_text(html_path, html_report(found, truth_path, runs, others), overwrite)

@@ -4,6 +4,5 @@
 `page` puts predicted surfels beside the true ones, on a page of `scenegen.viewing`, which has the
 web server and all that knows viser.
 
-It may import everything in `metrics` but `report`, `comparison`, `leaderboard` and the commands.
 Start reading in `page`.
 """

@@ -17,7 +17,7 @@ from iqtt.quiz.commits import Commits
 from iqtt.quiz.schema import SECRET, open_answers, stored_values
 from iqtt.quiz.serve import server_of
 from iqtt.quiz.study import Question, Settings
-from metrics.people.references import compare
+from metrics.views.people.references import compare
 from scenegen.common.web_hosts import Hosts, hosts_of, listen
 
 FORM = {"Content-Type": "application/x-www-form-urlencoded"}

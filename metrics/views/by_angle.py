@@ -1,0 +1,78 @@
+"""Scores over the angle between a view and its scene's first one: floors and curves."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from metrics.measures.statistics import cluster_means
+from metrics.scoring.metric_names import HEADLINE, SKILLED, metric
+from metrics.scoring.records import Score, ScoreFile
+from metrics.views.paper import PAPER, TABLES
+from metrics.views.plots import COLOURS, LINE, Chart, Point, Series, curves, kind_of
+from metrics.views.score_tables import FLOORS_OF_ROOMS
+from metrics.views.table import Cell, make_table
+
+
+def angle_floors(file: ScoreFile, name: str) -> dict[str, float]:
+    """Return the mean of a score's floor by view angle, in whole degrees, from the items."""
+    angles, column = map(file.items.get, ("view_angle_degrees", SKILLED.get(name, "") + name))
+    if angles is None or column is None or name not in SKILLED:
+        return {}
+    floors = {}
+    for degrees in file.by_view_angle:
+        chosen = (angles == int(degrees)) & np.isfinite(column)
+        if chosen.any():
+            floors[degrees] = float(cluster_means(column[chosen], file.clusters[chosen]).mean())
+    return floors
+
+
+def view_curves(files: Sequence[ScoreFile], labels: Sequence[str]) -> Iterator[Chart]:
+    """Yield a chart of each main score by view angle: of the methods, and of the first one's floor.
+
+    The table of each also has the paper's figures. They are not drawn, as the paper states no unit.
+    There is no chart where all views have one angle. Of many methods the first six are drawn, as
+    more could not be told apart.
+    """
+    files, labels = files[:COLOURS], labels[:COLOURS]
+    for name in HEADLINE["rooms"]:
+        series = [
+            Series(label, _points(file, name), kind_of(i))
+            for i, (file, label) in enumerate(zip(files, labels, strict=True))
+        ]
+        floors = angle_floors(files[0], name)
+        points = [Point(float(key), floors[key]) for key in sorted(floors, key=int)]
+        if points:
+            series.append(Series(f"floor: {FLOORS_OF_ROOMS[SKILLED[name]]}", points, LINE))
+        if len({point.at for line in series for point in line.points}) >= 2:
+            chart = curves(series, metric(name).title, metric(name).unit)
+            assert chart is not None
+            yield _with_paper(chart, name)
+
+
+def _points(file: ScoreFile, name: str) -> list[Point]:
+    groups = file.by_view_angle
+    keys = sorted((key for key in groups if name in groups[key]), key=int)
+    return [score_point(groups[key][name], float(key)) for key in keys]
+
+
+def score_point(score: Score, at: float = 0.0) -> Point:
+    """Return a score and its interval as a point of a chart."""
+    low, high = (math.nan if end is None else end for end in (score.low, score.high))
+    return Point(at, score.value, low, high)
+
+
+def _with_paper(chart: Chart, name: str) -> Chart:
+    """Add a column for each data set on which the paper reports its method by view angle."""
+    columns: dict[str, dict[str, str]] = {}
+    for table in TABLES[:3]:
+        for f in table.figures:
+            if f.metric == name and f.method == PAPER and f.view_angle is not None:
+                columns.setdefault(f"{PAPER} †, {f.data}", {})[str(f.view_angle)] = f.text
+    rows: list[Sequence[Cell | str]] = [
+        (*row.cells, *(texts.get(row.cells[0].value, "-") for texts in columns.values()))
+        for row in chart.table.rows
+    ]
+    head = (*chart.table.head, *columns)
+    return replace(chart, table=make_table(chart.table.title, head, rows))

@@ -1,0 +1,160 @@
+"""Which score files may be compared, and where each of them has the same images or questions."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.measures.checks import LARGEST_MAGNITUDE
+from metrics.scoring.metric_names import EMPTY_ROOM, HEADLINE, metric
+from metrics.scoring.records import ID_COLUMNS, ScoreFile
+from scenegen.common.errors import SceneGenError
+from scenegen.common.text_table import plain
+
+Array = NDArray[np.float64]
+IDS_SHOWN = 5
+FLOOR_AGREEMENT = 1e-6  # relative: of the empty room, drawn on other machines
+CHANGED = "one of the files was changed"
+
+
+class ComparisonError(SceneGenError):
+    """Scores that cannot be compared with each other."""
+
+
+def require_same_test(
+    files: Sequence[ScoreFile], metrics: Sequence[str] | None, allow_incomparable: bool
+) -> tuple[str, ...]:
+    """Return the names of the scores to compare, if the files are of one test set.
+
+    Raises ComparisonError where they are not, or where one of them says that it is not comparable
+    and that is not allowed, and UnknownMetricError.
+    """
+    if len(files) < 2:
+        raise ComparisonError("comparison", f"{len(files)} score file", "two or more")
+    first = files[0]
+    for file in files:
+        for what, theirs, ours in (
+            ("task", file.task, first.task),
+            ("truth", file.meta.truth_fingerprint, first.meta.truth_fingerprint),
+            ("truth of digest", file.meta.truth_digest, first.meta.truth_digest),
+        ):
+            if theirs != ours:
+                raise ComparisonError(
+                    file.place,
+                    f"scores of {what} {plain(theirs)[:12]}",
+                    f"{plain(ours)[:12]} as in {first.place}",
+                    "only scores of one test set compare: score all submissions with one --truth",
+                )
+        if not file.comparable and not allow_incomparable:
+            why = "; ".join(file.warnings) or "not comparable"
+            raise ComparisonError(
+                file.place, f"scores that are {why}", hint="or say --allow-incomparable"
+            )
+    names = tuple(dict.fromkeys(metrics or HEADLINE[first.task]))
+    for name in names:
+        if metric(name).task != first.task:
+            raise ComparisonError("metric", name, f"a score of task {first.task!r}")
+    return names
+
+
+def common_rows(files: Sequence[ScoreFile]) -> list[NDArray[np.int64]]:
+    """Return, for each file, the indices of its entries of the rows that all files have.
+
+    The entries are in the order of their row numbers. Raises ComparisonError where comparable
+    files hold different rows, or where files disagree about which scene a row belongs to.
+    """
+    first, what = files[0], ID_COLUMNS[files[0].task][0]
+    common = np.sort(first.ids)
+    for file in files[1:]:
+        missing, extra = np.setdiff1d(first.ids, file.ids), np.setdiff1d(file.ids, first.ids)
+        if (len(missing) or len(extra)) and file.comparable and first.comparable:
+            which = f"without {_listed(missing)}" if len(missing) else f"with {_listed(extra)}"
+            raise ComparisonError(
+                file.place,
+                f"{len(file.ids)} {what}s, {which}",
+                f"the {len(first.ids)} of {first.place}",
+            )
+        common = np.intersect1d(common, file.ids)
+    if not len(common):
+        raise ComparisonError("comparison", f"no {what} that all of the files score", "some")
+    orders = []
+    for file in files:
+        rising = np.argsort(file.ids)
+        orders.append(rising[np.searchsorted(file.ids, common, sorter=rising)])
+        wrong = file.clusters[orders[-1]] != first.clusters[orders[0]]
+        if wrong.any():
+            raise ComparisonError(
+                file.place,
+                f"{what} {common[wrong][0]} in another scene",
+                f"that of {first.place}",
+                CHANGED,
+            )
+    _require_same_floors(files, orders)
+    return orders
+
+
+def _require_same_floors(files: Sequence[ScoreFile], orders: Sequence[NDArray[np.int64]]) -> None:
+    """Raise ComparisonError where files disagree about the empty room, which is the truth's."""
+    first = files[0].items
+    for file, order in zip(files[1:], orders[1:], strict=True):
+        for name in [name for name in first if name.startswith(EMPTY_ROOM) and name in file.items]:
+            ours, theirs = first[name][orders[0]], file.items[name][order]
+            same = np.isclose(theirs, ours, FLOOR_AGREEMENT, FLOOR_AGREEMENT**2, equal_nan=True)
+            if not same.all():
+                i = int(np.argmin(same))
+                found = f"{float(theirs[i])!r} in row {file.ids[order][i]}"
+                expected = f"{float(ours[i])!r} as in {files[0].place}"
+                raise ComparisonError(f"{file.place}: items.{name}", found, expected, CHANGED)
+
+
+def column(file: ScoreFile, name: str, order: NDArray[np.int64]) -> Array:
+    """Return a score of the compared rows, (N,); NaN where a row has no such score.
+
+    Raises ComparisonError where the file lacks it, or holds no usable number for one of the rows
+    that every file has a score for.
+    """
+    where = f"{file.place}: items.{name}"
+    if name not in file.items:
+        held = ", ".join(n for n in file.items if n in file.metrics)
+        raise ComparisonError(where, "none", "the scores of all items", f"the file has {held}")
+    values: Array = file.items[name][order]
+    lacking = np.isnan(values) if metric(name).lacking else np.zeros(len(values), bool)
+    bad = ~(np.abs(values) <= LARGEST_MAGNITUDE) & ~lacking
+    if bad.any():
+        rows = file.ids[order][bad]
+        raise ComparisonError(
+            where,
+            f"{len(rows)} of {len(values)} {ID_COLUMNS[file.task][0]}s without a usable number:"
+            f" {_listed(rows)}",
+            "finite numbers",
+        )
+    return values
+
+
+def pair(
+    file: ScoreFile, reference: ScoreFile, name: str, orders: tuple[NDArray[np.int64], ...]
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return a score in both files, (M,) each, and which of the compared rows have it, (N,).
+
+    Which rows those are follows from the truth. Raises ComparisonError where the files differ in
+    that, or no row has it; else as `column`.
+    """
+    ours, theirs = column(file, name, orders[0]), column(reference, name, orders[1])
+    there = ~np.isnan(theirs)
+    differ = np.isnan(ours) == there
+    where = f"{file.place}: items.{name}"
+    if differ.any():
+        rows = file.ids[orders[0]][differ]
+        raise ComparisonError(
+            where,
+            f"other rows without a number, such as {_listed(rows)}",
+            f"those of {reference.place}",
+            CHANGED,
+        )
+    if not there.any():
+        raise ComparisonError(where, "no number at all", "a row that has this score")
+    return ours[there], theirs[there], there
+
+
+def _listed(ids: NDArray[np.int64]) -> str:
+    return ", ".join(map(str, ids[:IDS_SHOWN])) + " ..." * (len(ids) > IDS_SHOWN)

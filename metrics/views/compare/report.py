@@ -1,0 +1,294 @@
+"""A comparison for people, as aligned text, Markdown or a page, and for programs, as JSON."""
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from metrics.scoring.known_tests import known_test
+from metrics.scoring.metric_names import metric
+from metrics.scoring.records import ScoreFile
+from metrics.views.at_hand import submission_at_hand, truth_at_hand
+from metrics.views.compare.compare import (
+    ALPHA,
+    CONFIDENCE,
+    POWER,
+    SIGN_FLIP,
+    Comparison,
+    Difference,
+)
+from metrics.views.compare.pairing import common_rows
+from metrics.views.examples import (
+    Example,
+    Lists,
+    Picture,
+    chosen_scenes,
+    entry_name,
+    room_examples,
+    shown_score,
+)
+from metrics.views.headline import headline_section, kinds_sections
+from metrics.views.page import Lead, Section, html_page
+from metrics.views.pictures import DEPTH, ERROR
+from metrics.views.plots import Point, strip
+from metrics.views.report import ROOMS_REMARK, curves_section
+from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
+from scenegen.common.errors import SceneGenError
+from scenegen.common.text_table import number
+
+FORMAT_NAME = "pix2shape-bench/comparison"
+FORMAT_VERSION = "1.0"
+TESTS_HEAD = ("better/worse/same", "p", "p (Holm)", "least shown", "verdict")
+_LISTS = {"best": "the best", "median": "in the middle", "worst": "the worst"}
+_NO_PICTURES = (
+    "No pictures: the truth or the submissions do not lie where the score files name them, or were"
+    " changed. Give them with --truth and --predictions."
+)
+
+
+class AtHandError(SceneGenError):
+    """A file that was given for pictures and is none of those that were scored."""
+
+
+def text_report(comparison: Comparison, as_markdown: bool = False) -> str:
+    """Return a table for each score: the reference, then the others against it; and a legend."""
+    stamp = "" if comparison.comparable else " NOT COMPARABLE, compared all the same."
+    test = known_test(comparison.truth_digest)
+    truth = test.name if test else comparison.truth_digest[:12]
+    title = f"Against {comparison.reference}, over {_size(comparison)} (truth {truth}).{stamp}"
+    notes = [*_legend(comparison), *(f"note: {note}" for note in comparison.notes)]
+    write = to_markdown if as_markdown else to_text
+    tables = [_text_table(comparison.reference, group) for group in _by_score(comparison)]
+    return write(title, tables, notes)
+
+
+def to_json(comparison: Comparison) -> str:
+    """Return JSON whose keys are the attributes of `Comparison` and `Difference`."""
+    content = {
+        "format": FORMAT_NAME,
+        "format_version": FORMAT_VERSION,
+        **asdict(comparison),
+        "confidence": CONFIDENCE,
+        "alpha": ALPHA,
+        "power": POWER,
+        "family": len(comparison.differences),
+    }
+    content["differences"] = [
+        {**asdict(d), "unit": metric(d.metric).unit, "verdict": d.verdict}
+        for d in comparison.differences
+    ]
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _size(comparison: Comparison) -> str:
+    """Return over how many items methods are compared, in words."""
+    if comparison.task == "rooms":
+        return f"{comparison.items:,} images of {comparison.clusters:,} scenes"
+    return f"{comparison.items:,} questions"
+
+
+def _by_score(comparison: Comparison) -> list[list[Difference]]:
+    """Return the differences in each score."""
+    names = dict.fromkeys(d.metric for d in comparison.differences)
+    return [[d for d in comparison.differences if d.metric == name] for name in names]
+
+
+def _text_table(reference: str, differences: Sequence[Difference]) -> Table:
+    name = differences[0].metric
+    head = ("method", "score", "difference", *TESTS_HEAD)
+    rows: list[Sequence[Cell | str]] = [
+        (reference, number(differences[0].reference_value), *("" for _ in head[2:]))
+    ]
+    rows += [(d.method, number(d.value), difference_cell(d), *paired_cells(d)) for d in differences]
+    title = f"{name} ({metric(name).unit}, {metric(name).direction})"
+    return make_table(title, head, rows)
+
+
+def difference_cell(d: Difference) -> Cell:
+    """Return a difference and its interval."""
+    value = _signed(d.difference, d.difference)
+    if d.low is None or d.high is None:
+        return Cell(value)
+    like = d.difference or max(abs(d.low), abs(d.high))
+    return Cell(value, f"[{_signed(d.low, like)}, {_signed(d.high, like)}]")
+
+
+def paired_cells(d: Difference) -> tuple[str, ...]:
+    """Return what the paired test says, below `TESTS_HEAD`."""
+    smallest = "none" if d.smallest is None else number(d.smallest)
+    counts = f"{d.wins}/{d.losses}/{d.ties}"
+    return counts, _probability(d.p_value), _probability(d.p_holm), smallest, d.verdict
+
+
+def _signed(value: float, like: float) -> str:
+    return ("+" if value > 0.0 else "") + number(value, like)
+
+
+def _probability(p: float) -> str:
+    return f"{p:.4f}" if p >= 0.0001 else "<0.0001"
+
+
+def _legend(comparison: Comparison) -> list[str]:
+    """Return in sentences what the columns of a comparison say."""
+    tests = {d.test for d in comparison.differences}
+    rooms = comparison.task == "rooms"
+    items, apart = ("scenes", "scenes") if rooms else ("questions", "shapes")
+    if len(tests) > 1:
+        test = "exact McNemar test; sign flips for means over several runs"
+    elif tests == {SIGN_FLIP}:
+        test = f"sign flips of the differences of each {apart[:-1]}"
+    else:
+        test = "exact McNemar test"
+    family = len(comparison.differences)
+    comparisons = f"{family} comparisons" if family > 1 else "1 comparison"
+    return [
+        f"difference: method - reference, paired, with its {CONFIDENCE:.0%} bootstrap interval over"
+        f" {apart} (not corrected).",
+        f"better/worse/same: {items}. p: {test}, two-sided; Holm: corrected for {comparisons}.",
+        f"least shown: what this test set would show in {POWER:.0%} of cases after the correction,"
+        " as the differences spread here; none: no difference, or none can be told.",
+    ]
+
+
+def html_report(
+    comparison: Comparison,
+    files: Sequence[ScoreFile],
+    truth: Path | None = None,
+    submissions: Sequence[Path] = (),
+) -> str:
+    """Return a page that answers first: verdicts, then differences, scenes and curves.
+
+    Args:
+        files: those that were compared, the reference first.
+        truth, submissions: where the pictures come from; else from the files that the score files
+            name, where they still lie there unchanged.
+
+    Raises AtHandError where `truth` is another one, or a submission none of those that were scored;
+    OSError and FileFormatError where a picture's row cannot be read.
+    """
+    _require_scored(files, truth, submissions)
+    rooms = comparison.task == "rooms"
+    digest = comparison.truth_digest[:12]
+    basis = f"Over {_size(comparison)}, truth {digest}; paired tests at 5%, corrected."
+    examples = _examples(comparison, files, truth, submissions) if rooms else []
+    sections = [
+        replace(headline_section(files), remarks=[basis]),
+        Section(
+            "Differences",
+            tables=[_page_table(differences) for differences in _by_score(comparison)],
+            notes=[*_legend(comparison), *comparison.notes],
+        ),
+    ]
+    if rooms:
+        remark = ROOMS_REMARK if examples else _NO_PICTURES
+        sections.append(Section("Scenes", remarks=[remark], examples=examples))
+        sections += curves_section(files)
+    else:
+        sections += kinds_sections(files)
+    return html_page(
+        f"Compared with {comparison.reference}",
+        sections,
+        leads=[Lead(label, _answer(comparison, label)) for label in comparison.methods],
+        warnings=[] if comparison.comparable else ["Not comparable, compared all the same."],
+    )
+
+
+def _require_scored(
+    files: Sequence[ScoreFile], truth: Path | None, submissions: Sequence[Path]
+) -> None:
+    """Raise AtHandError for a file that was not scored."""
+    if truth is not None and truth_at_hand(files[0], truth) is None:
+        digest = files[0].meta.truth_digest[:12]
+        raise AtHandError(truth, "another truth, or none", f"the one of digest {digest}")
+    for path in submissions:
+        if not any(submission_at_hand(file, [path]) == path for file in files):
+            raise AtHandError(path, "a file that was not scored", "the first run of a score file")
+
+
+def _answer(comparison: Comparison, label: str) -> str:
+    """Return in which scores a method is better and worse than the reference, in words."""
+    texts = []
+    for verdict, words in (
+        ("better", "better in"),
+        ("worse", "worse in"),
+        ("not shown", "no difference shown in"),
+    ):
+        titles = [
+            metric(d.metric).title
+            for d in comparison.differences
+            if d.method == label and d.verdict == verdict
+        ]
+        texts += [f"{words} {', '.join(titles)}"] if titles else []
+    return "; ".join(texts) + "."
+
+
+def _page_table(differences: Sequence[Difference]) -> Table:
+    """Return the others' differences from the reference in one score, each drawn on one scale."""
+    definition = metric(differences[0].metric)
+    points = [_point(d) for d in differences]
+    ends = [end for point in points for end in (point.value, point.low, point.high)]
+    rows: list[Sequence[Cell | str]] = []
+    for d, point in zip(differences, points, strict=True):
+        like = 0.1 if definition.unit == "correlation" else d.reference_value
+        method = Cell(d.method, f"{number(d.value)} instead of {number(d.reference_value, like)}")
+        drawing, scale = strip(point, [("zero", 0.0)], ends)
+        rows.append(
+            (method, difference_cell(d), Cell("", scale, drawing=drawing), *paired_cells(d))
+        )
+    title = f"{definition.title} ({definition.unit}, {definition.direction})"
+    return make_table(title, ("method", "difference", "on its scale", *TESTS_HEAD), rows)
+
+
+def _point(d: Difference) -> Point:
+    low, high = (math.nan if end is None else end for end in (d.low, d.high))
+    return Point(0.0, d.difference, low, high)
+
+
+def _examples(
+    comparison: Comparison,
+    files: Sequence[ScoreFile],
+    truth: Path | None,
+    submissions: Sequence[Path],
+) -> Lists:
+    """Return the scenes in which the first method with a file at hand gains and loses most.
+
+    Raises OSError and FileFormatError where a file cannot be read or lacks a row.
+    """
+    name = next((d.metric for d in comparison.differences), shown_score(files[0]))
+    where = truth_at_hand(files[0], truth)
+    paths = [submission_at_hand(file, submissions) for file in files]
+    other = next((i for i, path in enumerate(paths) if i and path), 0)
+    first, second = paths[0], paths[other]
+    if where is None or first is None or second is None or not other:
+        return []
+    reference, method = files[0], files[other]
+    orders = common_rows([reference, method])
+    apart = method.items[name][orders[1]] - reference.items[name][orders[0]]
+    score, labels = metric(name), (comparison.reference, comparison.methods[other - 1])
+    chosen = chosen_scenes(reference.clusters[orders[0]], apart, score.higher_is_better)
+    lists: Lists = []
+    for place, entries in chosen.items():
+        ours = room_examples(reference, where, first, orders[0][entries].tolist())
+        theirs = room_examples(method, where, second, orders[1][entries].tolist())
+        scenes = f"{len(entries)} scenes" if len(entries) > 1 else "1 scene"
+        title = f"{scenes} by the difference in {score.title}, {_LISTS[place]}: "
+        examples = [
+            Example(
+                entry_name(reference, int(orders[0][entry])),
+                f"{score.title} {apart[entry]:+.4g}",
+                list(_side_by_side(a, b, labels)),
+            )
+            for entry, a, b in zip(entries, ours, theirs, strict=True)
+        ]
+        lists.append((title + f"{labels[1]} against {labels[0]}", examples))
+    return lists
+
+
+def _side_by_side(a: Example, b: Example, labels: tuple[str, str]) -> Iterator[Picture]:
+    """Yield the image and true depth, then predicted depth and error of both methods."""
+    yield from a.pictures[:2]
+    for example, label in zip((a, b), labels, strict=True):
+        for picture in example.pictures:
+            if picture.caption in (DEPTH, ERROR):
+                yield replace(picture, caption=f"{picture.caption}, {label}")

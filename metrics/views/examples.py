@@ -1,0 +1,237 @@
+"""Examples on pages: scenes and questions that were predicted well and badly, with pictures."""
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.measures.answers import ABSTAINED
+from metrics.scoring.metric_names import HEADLINE, metric
+from metrics.scoring.records import ScoreFile
+from metrics.submissions.reader import QuestionPredictions, RoomPredictions, open_predictions
+from metrics.views.pictures import data_url, view_pictures
+from scenegen.common.errors import FileFormatError, SceneGenError
+from scenegen.common.text_table import number
+from scenegen.rendering.ground_truth import decode_image
+from scenegen.rooms.preview import srgb_bytes
+from scenegen.rooms.reader import RoomsFile
+
+Array = NDArray[Any]
+SHOWN = 6  # examples in a list, where there are enough
+LETTERS = "ABC"
+ANSWERS_ENDING = "-answers"  # of the name of the file of answers, beside that of the questions
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture, as a data URL.
+
+    Attributes:
+        mark: stands behind the caption; or empty.
+        right: whether it shows the right answer.
+    """
+
+    caption: str
+    url: str
+    mark: str = ""
+    right: bool = False
+
+
+@dataclass(frozen=True)
+class Example:
+    """An image or a question, and pictures of it.
+
+    Attributes:
+        name: scene, view and row, or the number of the question.
+        text: its scores, or what was answered, in words.
+    """
+
+    name: str
+    text: str
+    pictures: Sequence[Picture]
+
+
+Lists = list[tuple[str, list[Example]]]  # titles and examples
+
+
+def examples_of(scores: ScoreFile, truth: Path, submission: Path) -> Lists:
+    """Return titles and examples: the best, median and worst scenes, or answers right and wrong.
+
+    Raises OSError and FileFormatError where truth or submission cannot be read.
+    """
+    if scores.task == "iqtt":
+        return _questions(scores, truth, submission)
+    name = shown_score(scores)
+    return _scenes(scores, truth, submission, name) if name else []
+
+
+def shown_score(scores: ScoreFile) -> str:
+    """Return the first score of the headline that any image has a number for; else ""."""
+    for name in (*HEADLINE[scores.task], *scores.metrics):
+        if name in scores.items and np.isfinite(np.asarray(scores.items[name], float)).any():
+            return name
+    return ""
+
+
+def chosen_scenes(
+    scenes: Array, values: Array, higher_is_better: bool, most: int = SHOWN
+) -> dict[str, list[int]]:
+    """Return entries to show by "best", "median" and "worst", one of each scene, none twice.
+
+    Scenes stand in the order of their mean value, equal ones by their number. Of each scene it is
+    the view whose value is nearest to that mean, of equal ones the first. Where there are fewer
+    than three times `most` scenes, each list gets a third; a single scene is the best one.
+
+    Args:
+        scenes, values: of each entry, (N,); entries whose value is not finite are left out.
+        most: scenes in each list.
+    """
+    kept = np.flatnonzero(np.isfinite(values))
+    if not len(kept):
+        return {}
+    labels, place = np.unique(scenes[kept], return_inverse=True)
+    means = np.bincount(place, values[kept]) / np.bincount(place)
+    off = np.abs(values[kept] - means[place])
+    first = np.lexsort((kept, off, place))  # by scene, the nearest view first
+    entry = kept[first[np.searchsorted(place[first], np.arange(len(labels)))]]
+    order = entry[np.argsort(-means if higher_is_better else means, kind="stable")]
+    shown = min(most, max(1, len(order) // 3))
+    rest = order[shown : max(shown, len(order) - shown)]
+    middle = max((len(rest) - shown) // 2, 0)
+    lists = {
+        "best": order[:shown],
+        "median": rest[middle:][:shown],
+        "worst": order[::-1][: min(shown, len(order) - shown)],
+    }
+    return {title: entries.tolist() for title, entries in lists.items() if len(entries)}
+
+
+def _scenes(scores: ScoreFile, truth: Path, submission: Path, name: str) -> Lists:
+    values = np.asarray(scores.items[name], float)
+    chosen = chosen_scenes(scores.clusters, values, metric(name).higher_is_better)
+    entries = [entry for entries in chosen.values() for entry in entries]
+    shown = dict(zip(entries, room_examples(scores, truth, submission, entries), strict=True))
+    count = len(np.unique(scores.clusters[np.isfinite(values)]))
+    lists: Lists = []
+    for place, entries in chosen.items():
+        title = f"{place.capitalize()} {len(entries)} of {count} scenes by {metric(name).title}"
+        title = title if count > 1 else "The only scene"
+        lists.append((title, [shown[entry] for entry in entries]))
+    return lists
+
+
+def room_examples(
+    scores: ScoreFile, truth: Path, submission: Path, entries: Sequence[int]
+) -> Iterator[Example]:
+    """Yield entries of a score file with the pictures of `pictures.view_pictures`.
+
+    Raises OSError and FileFormatError where a file cannot be read or lacks an entry's row.
+    """
+    with RoomsFile(truth) as rooms, open_predictions(submission) as predictions:
+        assert isinstance(predictions, RoomPredictions)
+        place = {row: i for i, row in enumerate(predictions.rows.tolist())}
+        for entry in entries:
+            row = int(scores.items["row"][entry])
+            if row not in place or row >= len(rooms):
+                expected = f"rows of {submission} and {truth}"
+                raise FileFormatError(scores.place, f"items.row: {row}", expected)
+            pictures = room_pictures(rooms, predictions, row, place[row])
+            yield Example(entry_name(scores, entry), _entry_scores(scores, entry), pictures)
+
+
+def room_pictures(
+    rooms: RoomsFile, predictions: RoomPredictions, row: int, place: int
+) -> list[Picture]:
+    """Return the pictures of a row; `place` is that of its prediction."""
+    urls = view_pictures(
+        decode_image(rooms.read("image", row)),
+        rooms.read("depth", row),
+        predictions.depth(place),
+        rooms.read("normal", row),
+        float(rooms.read("camera/fov_y_degrees", row)),
+        predictions.normal(place) if predictions.has_normals else None,
+    )
+    return [Picture(caption, url) for caption, url in urls.items()]
+
+
+def entry_name(scores: ScoreFile, entry: int) -> str:
+    """Return scene, view and row of an entry, in words."""
+    row, scene, view = (int(scores.items[n][entry]) for n in ("row", "scene_index", "view_index"))
+    angles = scores.items.get("view_angle_degrees")
+    angle = f" ({int(angles[entry])}°)" if angles is not None and angles[entry] >= 0 else ""
+    return f"scene {scene}, view {view}{angle}, row {row}"
+
+
+def _entry_scores(scores: ScoreFile, entry: int) -> str:
+    return ", ".join(
+        f"{metric(name).title} {number(float(scores.items[name][entry]))}"
+        for name in HEADLINE["rooms"]
+        if name in scores.items and np.isfinite(scores.items[name][entry])
+    )
+
+
+def chosen_questions(right: NDArray[np.bool_], most: int = SHOWN) -> dict[str, list[int]]:
+    """Return entries to show that are "right" and "wrong", (Q,), spread evenly over the file."""
+    lists = {}
+    for title, entries in (("right", np.flatnonzero(right)), ("wrong", np.flatnonzero(~right))):
+        places = np.rint(np.linspace(0, len(entries) - 1, min(most, len(entries)))).astype(int)
+        if len(entries):
+            lists[title] = entries[places].tolist()
+    return lists
+
+
+def _questions(scores: ScoreFile, truth: Path, submission: Path) -> Lists:
+    """Return questions answered rightly and wrongly; none where their pictures are not there."""
+    from iqtt.files.reader import QuestionsFile
+
+    images = _questions_beside(truth)
+    if images is None:
+        return []
+    joined = None if images.samefile(truth) else truth
+    try:
+        questions = QuestionsFile(images, answers=joined)
+    except SceneGenError:  # a file of answers by itself, or the questions of another split
+        return []
+    with questions, open_predictions(submission) as predictions:
+        assert isinstance(predictions, QuestionPredictions)
+        answer = dict(zip(predictions.rows.tolist(), predictions.answers.tolist(), strict=True))
+        ids = scores.ids.tolist()
+        answers = np.array([answer.get(i, ABSTAINED) for i in ids])
+        true = np.asarray(questions.read("answers", slice(None)), np.int64)[scores.ids]
+        right = answers == true
+        totals = {"right": int(right.sum()), "wrong": int((~right).sum())}
+        return [
+            (
+                f"{len(entries)} of {totals[title]:,} questions answered {title}ly",
+                [_question(questions[ids[i]], int(true[i]), int(answers[i])) for i in entries],
+            )
+            for title, entries in chosen_questions(right).items()
+        ]
+
+
+def _questions_beside(truth: Path) -> Path | None:
+    """Return the file with the questions whose answers are in `truth`; None where there is none.
+
+    It lies beside the truth and has the same name without "-answers", or is the truth itself.
+    """
+    beside = truth.with_name(truth.stem.removesuffix(ANSWERS_ENDING) + truth.suffix)
+    return next((path for path in (beside, truth) if os.path.isfile(path)), None)
+
+
+def _question(record: Any, right: int, answer: int) -> Example:
+    """Return the pictures of a question; each answer tells whether it is right and was chosen."""
+    urls = [data_url(srgb_bytes(np.nan_to_num(image))) for image in record.radiance]
+    pictures = [Picture("reference", urls[0])]
+    for k, url in enumerate(urls[1:]):
+        marks = ["right"] * (k == right) + ["answered"] * (k == answer)
+        pictures.append(Picture(f"answer {LETTERS[k]}", url, ", ".join(marks), k == right))
+    text = f"right is {LETTERS[right]}, "
+    text += "no answer was given" if answer == ABSTAINED else f"{LETTERS[answer]} was answered"
+    kinds: Sequence[str | None] = record.truth.distractor_kind if record.truth else ()
+    wrong = sorted({kind for kind in kinds if kind})
+    text += f"; wrong answers: {', '.join(wrong)}" if wrong else ""
+    return Example(f"question {record.index}", text, pictures)

@@ -1,0 +1,116 @@
+"""Floors beside scores: the empty room, noise, chance, and probes that know nothing of 3D."""
+
+import math
+from collections.abc import Sequence
+
+from metrics.score_file import SCORE_AGAIN
+from metrics.scoring import floors
+from metrics.scoring.floors import floor_of_kind
+from metrics.scoring.metric_names import EMPTY_ROOM, OTHER_SCENE, SKILLED
+from metrics.scoring.records import ScoreFile
+from metrics.views.by_angle import angle_floors
+from metrics.views.score_tables import FLOORS_OF_ROOMS, floor_text
+from metrics.views.table import Cell, Row, Table, make_row
+from scenegen.common.errors import SceneGenError
+from scenegen.common.text_table import number
+
+FloorRows = dict[str, dict[str, float]]  # by the label of the row, then by the key of the column
+SKILL_OF = "skill of "  # begins the keys of columns of skills
+FLOOR, NOISE, CHANCE = "floor: ", "noise floor", "floor: chance"
+AGREEMENT = 1e-9  # of floors, relative: other releases of libraries add differently
+
+
+class FloorError(SceneGenError):
+    """Score files of one test set that state different floors."""
+
+
+def floor_rows(file: ScoreFile, names: Sequence[str]) -> FloorRows:
+    """Return what the floors of a file's test set score.
+
+    The floor of a relief differs from file to file: its skill has one, 0, the score itself none.
+    """
+    rows: FloorRows = {}
+    for name in names:
+        if name in file.skills:
+            text = floor_text(file, name) if is_shared(name) else FLOORS_OF_ROOMS[EMPTY_ROOM]
+            row = rows.setdefault(FLOOR + " ".join(text.split()), {})
+            row[SKILL_OF + name] = 0.0
+            if is_shared(name):
+                row[name] = file.skills[name].floor
+    noise = file.meta.noise_floors
+    if any(name in noise for name in names):
+        rows[NOISE] = {name: noise[name] for name in names if name in noise}
+    if "answers" in file.meta.counts and not any(label.startswith(CHANCE) for label in rows):
+        rows[CHANCE] = {"iqtt_accuracy": 1.0 / file.meta.counts["answers"]}
+    return rows
+
+
+def floor_rows_of_groups(file: ScoreFile, name: str, keys: Sequence[str]) -> FloorRows:
+    """Return the floors of a score by view angle, or by kind of question."""
+    if file.task == "rooms":
+        values = angle_floors(file, name) if is_shared(name) else {}
+        return {FLOOR + FLOORS_OF_ROOMS[EMPTY_ROOM]: values} if values else {}
+    if "answers" not in file.meta.counts:
+        return {}
+    answers = file.meta.counts["answers"]
+    best = {kind: floor_of_kind(kind, answers)[0] for kind in keys}
+    chance = dict.fromkeys(keys, 1.0 / answers)
+    return {CHANCE: chance} if best == chance else {f"{FLOOR}best": best, CHANCE: chance}
+
+
+def own_floors(file: ScoreFile) -> dict[str, float]:
+    """Return the floors that belong to this file's predictions alone, by name of the score."""
+    return {name: skill.floor for name, skill in file.skills.items() if not is_shared(name)}
+
+
+def is_shared(name: str) -> bool:
+    """Return whether all files of one test set have the same floor of this score."""
+    return SKILLED.get(name) != OTHER_SCENE
+
+
+def require_same_floors(files: Sequence[ScoreFile]) -> None:
+    """Raise FloorError where comparable files of one test set state different floors.
+
+    Floors follow from the test set alone, so that one of the files must be wrong.
+    """
+    whole = [file for file in files if file.comparable]
+    for file in whole[1:]:
+        ours, theirs = _stated(whole[0]), _stated(file)
+        for name in ours.keys() & theirs.keys():
+            if not math.isclose(theirs[name], ours[name], rel_tol=AGREEMENT):
+                expected = f"{ours[name]!r}, as in {whole[0].place}"
+                raise FloorError(f"{file.place}: {name}", theirs[name], expected, SCORE_AGAIN)
+
+
+def _stated(file: ScoreFile) -> dict[str, float]:
+    skills = {
+        f"skills.{name}.floor": skill.floor
+        for name, skill in file.skills.items()
+        if is_shared(name)
+    }
+    noise = {f"meta.noise_floors.{name}": value for name, value in file.meta.noise_floors.items()}
+    return skills | noise
+
+
+def floors_table(files: Sequence[ScoreFile]) -> Table | None:
+    """Return what each probe reached on the kinds of question in these files; None if unknown."""
+    shown = {kind for file in files for kind in file.by_distractor}
+    measured = [floor for floor in floors.FLOORS if floor.kind in shown]
+    kinds = tuple(dict.fromkeys(floor.kind for floor in measured))
+    if not kinds:
+        return None
+    cells: dict[str, dict[str, Cell]] = {}
+    for floor in measured:
+        ends = f"[{number(floor.low, floor.accuracy)}, {number(floor.high, floor.accuracy)}]"
+        cells.setdefault(floor.name, {})[floor.kind] = Cell(number(floor.accuracy), ends)
+    rows: list[Row] = [
+        make_row(["", name, *(row.get(kind, Cell()) for kind in kinds)], "floor")
+        for name, row in cells.items()
+    ]
+    note = (
+        "Fraction of right answers of methods that know nothing of 3D, with 95% intervals, by kind"
+        " of question and number of labelled questions; measured once, as docs/results.md says. The"
+        " best that lies above chance is the floor of skill."
+    )
+    head = ("#", "method", *kinds)
+    return Table("3D-IQTT: floors by kind of question", head, tuple(rows), (note,), named_by=1)

@@ -1,0 +1,393 @@
+"""Score files side by side: one ranking for each test set, with the paper's figures beside it.
+
+Scores of different test sets never share a ranking. Scores that are not comparable stand below it,
+and so do floors and the paper's figures, which were measured on the authors' data; none has a rank.
+"""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from metrics.scoring.known_tests import known_test
+from metrics.scoring.metric_names import HEADLINE, metric
+from metrics.scoring.records import ID_COLUMNS, Score, ScoreFile, Skill
+from metrics.views.by_angle import angle_floors
+from metrics.views.compare.compare import Comparison, compare
+from metrics.views.compare.pairing import ComparisonError
+from metrics.views.leaderboard.floors import (
+    SKILL_OF,
+    floor_rows,
+    floor_rows_of_groups,
+    floors_table,
+    is_shared,
+    own_floors,
+    require_same_floors,
+)
+from metrics.views.leaderboard.rows import (
+    ALIKE,
+    INCOMPARABLE_MARK,
+    Column,
+    Entry,
+    build_table,
+    figures_by_row,
+    paper_table,
+    score_column,
+    skill_column,
+)
+from metrics.views.paper import PAPER_KIND, TABLES, Figure
+from metrics.views.score_tables import SKILL, labels_of, what_the_floor_is
+from metrics.views.table import Table
+from scenegen.common.errors import SceneGenError
+from scenegen.common.text_table import by_number, plain
+
+Paper = Literal["all", "task", "none"]
+WIDEST = 6  # columns of scores in one table
+ANGLES = "Angle between each view and its scene's first one."
+KINDS = 'Kinds of wrong answers; "-2" ends those of questions with two answers.'
+AS_RANKED = "Rows as in the ranking."
+ALIKE_NOTE = (
+    f"{ALIKE} not told apart from the first method in this score: paired test over the same items,"
+    " corrected for all scores and methods of the table, at 5%. Skills have no test of their own."
+)
+
+
+class LeaderboardError(SceneGenError):
+    """Score files that cannot stand in one table."""
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """What is shown of one test set.
+
+    Attributes:
+        entries: the methods, best first; those that are not comparable come last.
+        tables: the ranking; where it would be too wide, that of skills, then the scores.
+        groups: scores by view angle, or by kind of question.
+        comparison: of the comparable methods with the first one, where it was asked for.
+    """
+
+    title: str
+    entries: tuple[Entry, ...]
+    tables: tuple[Table, ...]
+    groups: tuple[Table, ...]
+    comparison: Comparison | None = None
+
+    @property
+    def files(self) -> list[ScoreFile]:
+        """The score files, best first."""
+        return [entry.file for entry in self.entries]
+
+
+def leaderboard(
+    files: Sequence[ScoreFile], metrics: Sequence[str] | None = None, *, paper: Paper = "task"
+) -> tuple[Table, ...]:
+    """Return the tables of all test sets, and then those that belong to none; see `rankings`."""
+    ranked, others = rankings(files, metrics, paper=paper)
+    tables = [table for ranking in ranked for table in (*ranking.tables, *ranking.groups)]
+    return (*tables, *others)
+
+
+def rankings(
+    files: Sequence[ScoreFile],
+    metrics: Sequence[str] | None = None,
+    *,
+    paper: Paper = "task",
+    tested: bool = False,
+    links: Mapping[int, str] | None = None,
+) -> tuple[list[Ranking], list[Table]]:
+    """Return what is shown of each test set, in the order of the files, and further tables.
+
+    The digest of its truth tells a test set, wherever its file lay and whatever made it. Further
+    tables have what probes reached on the kinds of questions, and the paper's own tables.
+
+    Args:
+        files: any number, of any test sets.
+        metrics: the scores to show; the first one ranks. A task that has none of them, or any task
+            if they are None, shows `metric_names.HEADLINE`, skills before the scores themselves.
+        paper: which of the paper's figures to show: "none"; or those of the shown scores in each
+            ranking, and the paper's tables of which some figure found no place, "all" of them or
+            those of the files' tasks.
+        tested: whether to compare the methods with the first one, and to mark scores that are not
+            told apart from its.
+        links: addresses of the methods' own pages, by the id of the score file.
+
+    Raises LeaderboardError where a file is given twice or files that claim to score all of one test
+    set score different rows of it, FloorError where they state different floors of it, and
+    UnknownMetricError.
+    """
+    _require_once(files)
+    tasks = {name: metric(name).task for name in metrics or ()}
+    groups: dict[tuple[str, str], list[ScoreFile]] = {}
+    for file in files:
+        groups.setdefault((file.task, file.meta.truth_digest), []).append(file)
+    ranked: list[Ranking] = []
+    placed: set[Figure] = set()
+    for (task, _), members in groups.items():
+        _require_same_rows(members)
+        require_same_floors(members)
+        names = [name for name in tasks if tasks[name] == task]
+        there = [n for n in HEADLINE[task] if any(n in file.metrics for file in members)]
+        columns = _columns(members, names or there or HEADLINE[task][:1], headline=not names)
+        figures = [] if paper == "none" else _figures(members, columns)
+        ranking, used = _ranking(members, files, columns, figures, tested, links or {})
+        ranked.append(ranking)
+        placed.update(used)
+    others = [table] if (table := floors_table(files)) else []
+    if paper != "none":
+        shown = {file.task for file in files if paper == "task"} or {"rooms", "iqtt"}
+        for source in TABLES:
+            kept = tuple(f for f in source.figures if metric(f.metric).task in shown)
+            if not placed.issuperset(kept):
+                others.append(paper_table(replace(source, figures=kept)))
+    return ranked, others
+
+
+def _require_once(files: Sequence[ScoreFile]) -> None:
+    """Raise LeaderboardError where two files hold scores of the same submissions."""
+    for first, second in itertools.combinations(files, 2):
+        runs, others = ({run.sha256 for run in file.meta.submissions} for file in (first, second))
+        if runs == others and first.meta.truth_digest == second.meta.truth_digest:
+            found = f"scores of the same submissions as {first.place}"
+            raise LeaderboardError(second.place, found, "each submission once")
+
+
+def _require_same_rows(files: Sequence[ScoreFile]) -> None:
+    """Raise LeaderboardError where files that claim to score all rows score different ones."""
+    whole = [file for file in files if file.comparable]
+    for file in whole[1:]:
+        if not np.array_equal(np.sort(file.ids), np.sort(whole[0].ids)):
+            items = ID_COLUMNS[file.task][0]
+            raise LeaderboardError(
+                file.place,
+                f"{len(file.ids)} {items}s",
+                f"the {len(whole[0].ids)} of {whole[0].place}",
+                "both claim to score the whole of one test set",
+            )
+
+
+def _columns(files: Sequence[ScoreFile], names: Sequence[str], headline: bool) -> dict[str, Column]:
+    """Return the columns by key: scores, and skills where any file has them.
+
+    In the headline the skills stand before all scores that they are made of; else after each.
+    """
+    skilled = [name for name in names if any(name in file.skills for file in files)]
+    if headline:
+        others = [name for name in names if name not in skilled]
+        keys = [*others, *(SKILL_OF + name for name in skilled), *skilled]
+    else:
+        keys = [k for n in names for k in ((n, SKILL_OF + n) if n in skilled else (n,))]
+    return {
+        key: skill_column(key.removeprefix(SKILL_OF)) if key not in names else score_column(key)
+        for key in keys
+    }
+
+
+def _figures(files: Sequence[ScoreFile], columns: Mapping[str, Column]) -> list[Figure]:
+    """Return the paper's figures of the shown scores; none beside other kinds of questions."""
+    if any(set(file.by_distractor) - {PAPER_KIND} for file in files):
+        return []
+    tables = [table for table in TABLES if not table.ablation]
+    return [f for table in tables for f in table.figures if f.metric in columns]
+
+
+def _ranking(
+    members: Sequence[ScoreFile],
+    files: Sequence[ScoreFile],
+    columns: Mapping[str, Column],
+    figures: Sequence[Figure],
+    tested: bool,
+    links: Mapping[int, str],
+) -> tuple[Ranking, list[Figure]]:
+    """Return what is shown of a test set, and the figures of the paper that have found a place."""
+    labels = labels_of(members)
+    order = _order(members, columns)
+    ranked = [members[i] for i in order]
+    comparison, alike = compared_with_first(ranked) if tested else (None, {})
+    entries = tuple(
+        Entry(
+            _label(members[i], labels[i]),
+            members[i],
+            _by_key(members[i]),
+            own_floors(members[i]),
+            alike.get(id(members[i]), frozenset()),
+            links.get(id(members[i]), ""),
+        )
+        for i in order
+    )
+    title, first = _title(ranked[0]), ranked[0]  # comparable, if any is
+    names = [key for key in columns if not key.startswith(SKILL_OF)]
+    notes = [*_notes(ranked), *_same_request_notes(members, files)]
+    placed = [f for f in figures if f.view_angle is None and f.metric in columns]
+    tables = []
+    for i, part in enumerate(_parts(columns)):
+        marked = any(entry.alike & part.keys() for entry in entries)
+        floors = {k: row for k, row in floor_rows(first, names).items() if row.keys() & part.keys()}
+        table = build_table(
+            f"{title}: scores" if i else title,
+            part,
+            entries,
+            floors,
+            figures_by_row([f for f in placed if f.metric in part], lambda figure: figure.metric),
+            [AS_RANKED] if i else notes,
+            ranked=not i,
+        )
+        tables.append(replace(table, notes=(*table.notes, ALIKE_NOTE)) if marked else table)
+    groups = []
+    for name in names:
+        for table, used in _group_tables(title, entries, name, figures):
+            groups.append(table)
+            placed += used
+    return Ranking(title, entries, tuple(tables), tuple(groups), comparison), placed
+
+
+def _order(files: Sequence[ScoreFile], columns: Mapping[str, Column]) -> list[int]:
+    """Indices of the files: comparable ones from best to worst, those without a score, others.
+
+    The first column decides; where it is equal, the second one does, and so on.
+    """
+
+    def place(i: int) -> tuple[bool, list[tuple[bool, float]]]:
+        scores, values = _by_key(files[i]), []
+        for key, column in columns.items():
+            sign = -1.0 if column.higher_is_better else 1.0
+            values.append((key not in scores, sign * scores[key].value if key in scores else 0.0))
+        return not files[i].comparable, values
+
+    return sorted(range(len(files)), key=place)
+
+
+def _by_key(file: ScoreFile) -> dict[str, Score | Skill]:
+    """Return the scores of a file, and their skills, by the keys of their columns."""
+    return {**file.metrics, **{SKILL_OF + name: skill for name, skill in file.skills.items()}}
+
+
+def compared_with_first(
+    files: Sequence[ScoreFile],
+) -> tuple[Comparison | None, dict[int, frozenset[str]]]:
+    """Return the comparison of ranked files with the first one, and which scores are alike.
+
+    These are the names of the scores by the id of the file. Files that lack a score that the first
+    one has, or cannot be paired with it, are left out; without any other there is no comparison.
+    """
+    ranked = [file for file in files if file.comparable]
+    if not ranked:
+        return None, {}
+    first = ranked[0]
+    names = [name for name in HEADLINE[first.task] if name in first.metrics and name in first.items]
+    paired = [file for file in ranked[1:] if _pairs(first, file, names)]
+    if not paired or not names:
+        return None, {}
+    comparison = compare([first, *paired], names)
+    alike = {
+        id(file): frozenset(
+            d.metric
+            for d in comparison.differences
+            if d.method == method and d.verdict == "not shown"
+        )
+        for method, file in zip(comparison.methods, paired, strict=True)
+    }
+    return comparison, alike
+
+
+def _pairs(first: ScoreFile, file: ScoreFile, names: Sequence[str]) -> bool:
+    if not all(name in file.items for name in names):
+        return False
+    try:
+        compare([first, file], names, resamples=100)
+    except ComparisonError:
+        return False
+    return True
+
+
+def _parts(columns: Mapping[str, Column]) -> list[dict[str, Column]]:
+    """Return the columns as one table; where it would be too wide, skills and scores apart."""
+    skills = {key: column for key, column in columns.items() if key.startswith(SKILL_OF)}
+    scores = {key: column for key, column in columns.items() if key not in skills}
+    return [skills, scores] if skills and len(columns) > WIDEST else [dict(columns)]
+
+
+def _group_tables(
+    title: str, entries: Sequence[Entry], name: str, figures: Sequence[Figure]
+) -> Iterator[tuple[Table, list[Figure]]]:
+    """Yield a score by view angle or by kind of question, with the paper's figures it shows."""
+    first = entries[0].file
+    by_angle = first.task == "rooms"
+    rows = []
+    for entry in entries:
+        groups = entry.file.by_view_angle if by_angle else entry.file.by_distractor
+        scores = {key: group[name] for key, group in groups.items() if name in group}
+        floors = {} if is_shared(name) else angle_floors(entry.file, name)
+        rows.append(replace(entry, scores=scores, floors=floors, alike=frozenset()))
+    keys = by_number({key for row in rows for key in row.scores})
+    if len(keys) < (1 if by_angle else 2):  # a single kind stands in the title
+        return
+    used = [f for f in figures if f.metric == name and str(f.view_angle) in keys]
+    column = score_column(name)
+    table = build_table(
+        f"{title}: {column.head} by {'view angle' if by_angle else 'kind of question'}",
+        {key: replace(column, head=f"{key}°" if by_angle else plain(key)) for key in keys},
+        rows,
+        floor_rows_of_groups(first, name, keys),
+        figures_by_row(used, lambda figure: str(figure.view_angle)),
+        [ANGLES if by_angle else KINDS, AS_RANKED],
+    )
+    yield table, used
+
+
+def _title(file: ScoreFile) -> str:
+    """Return task and truth, and the kind of the questions if all have one."""
+    task = "Rooms" if file.task == "rooms" else "3D-IQTT"
+    if len(file.by_distractor) == 1:
+        task += f", {plain(*file.by_distractor)} questions"
+    test = known_test(file.meta.truth_digest)
+    return f"{task}, {plain(test.name) if test else f'truth {file.meta.truth_digest[:12]}'}"
+
+
+def _label(file: ScoreFile, name: str) -> str:
+    """Return a method's name with what has to be known about it."""
+    texts = [f"{file.runs} runs"] if file.runs > 1 else []
+    if file.alignment != "none":
+        claim = metric(f"rmse_after_{file.alignment}").title.partition(", ")[2]
+        texts.append(f"claims depth when {claim}")
+    mark = "" if file.comparable else f" {INCOMPARABLE_MARK}"
+    return name + (f" ({'; '.join(texts)})" if texts else "") + mark
+
+
+def _notes(files: Sequence[ScoreFile]) -> Iterator[str]:
+    first, counts = files[0], files[0].meta.counts
+    if first.task == "rooms":
+        yield f"{len(first.ids):,} images of {len(np.unique(first.clusters)):,} scenes."
+    else:
+        chance = f"; chance is {1.0 / counts['answers']:.4f}" if "answers" in counts else ""
+        yield f"{len(first.ids):,} questions{chance}."
+    if any(file.skills for file in files):
+        yield f"{SKILL} {what_the_floor_is(first)}"
+    levels = " and ".join(
+        f"{level:.4g}%" for level in sorted({100.0 * f.meta.confidence for f in files})
+    )
+    over = "shapes" if "shape" in first.items else "questions"
+    yield (
+        f"[low, high]: {levels} interval over {'scenes' if first.task == 'rooms' else over}."
+        " ±: standard deviation over training runs. Best in bold, which is no test of a difference:"
+        " see bench compare."
+    )
+    if first.meta.noise_floors:
+        yield (
+            "Noise floor: the score of the true surface, sampled elsewhere, against itself. Floors"
+            " are as the score files state them; files that disagree are refused. A relief has a"
+            " floor of its own beside it."
+        )
+
+
+def _same_request_notes(members: Sequence[ScoreFile], files: Sequence[ScoreFile]) -> Iterator[str]:
+    """Yield a note on each other test set that the same request made."""
+    requests = {file.meta.truth_fingerprint for file in members}
+    digests = {f.meta.truth_digest for f in files if f.meta.truth_fingerprint in requests}
+    for digest in sorted(digests - {members[0].meta.truth_digest}):
+        yield (
+            f"Not ranked with truth {digest[:12]}: it answers the same request, but its content"
+            " differs, so its scores are ranked separately."
+        )

@@ -1,0 +1,171 @@
+"""Rows of a leaderboard: methods with their ranks, then floors, then the paper's figures."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from metrics.scoring.metric_names import metric
+from metrics.scoring.records import Score, ScoreFile, Skill
+from metrics.views.leaderboard.floors import FloorRows
+from metrics.views.paper import REPORTED, SOURCE, Figure, PaperTable
+from metrics.views.score_tables import interval_cells, score_cell
+from metrics.views.table import Cell, Row, Table, make_row
+from scenegen.common.text_table import number
+
+REPORTED_MARK, INCOMPARABLE_MARK = "†", "‡"
+ALIKE = "≈"  # stands behind scores that are not told apart from those of the first method
+NOT_COMPARABLE = (
+    f"{INCOMPARABLE_MARK} not comparable, so not ranked: not all of the test set was scored, or"
+    " values that are not finite were given the worst score, or only the submission named the truth"
+    " (score it again with --truth)."
+)
+FigureRows = Mapping[str, Mapping[str, Figure]]  # by the label of the row, then by the column's key
+
+
+@dataclass(frozen=True)
+class Column:
+    """The head of a column, and which of its scores are better."""
+
+    head: str
+    higher_is_better: bool = True
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A method in a table.
+
+    Attributes:
+        label: the method's name and what has to be known about it.
+        scores: by the keys of the columns.
+        floors: those that other methods do not share, by the keys of the columns.
+        alike: keys of the columns in which it is not told apart from the first method.
+        link: address of its own page; or empty.
+    """
+
+    label: str
+    file: ScoreFile
+    scores: Mapping[str, Score | Skill]
+    floors: Mapping[str, float]
+    alike: frozenset[str] = frozenset()
+    link: str = ""
+
+
+def build_table(
+    title: str,
+    columns: Mapping[str, Column],
+    entries: Sequence[Entry],
+    floors: FloorRows,
+    figures: FigureRows,
+    notes: Sequence[str],
+    ranked: bool = False,
+) -> Table:
+    """Return a table of the scored methods, then of floors, then of the paper's figures.
+
+    Args:
+        columns: the columns by their keys.
+        entries: the methods, best first.
+        notes: stand below the table, before those on marks of its rows.
+        ranked: whether the first column ranks the methods.
+    """
+    places = _ranks(entries, next(iter(columns))) if ranked else [""] * len(entries)
+    best = {key: _best(entries, key, column) for key, column in columns.items()}
+    rows = [
+        make_row(
+            [rank, entry.label, *(_cell(entry, key, best[key]) for key in columns)],
+            "" if entry.file.comparable else "incomparable",
+            entry.link,
+        )
+        for rank, entry in zip(places, entries, strict=True)
+    ]
+    for label, values in floors.items():
+        cells = (number(values[key]) if key in values else "-" for key in columns)
+        rows.append(make_row(["", label, *cells], "floor"))
+    notes = list(notes)
+    if not all(entry.file.comparable for entry in entries):
+        notes.append(NOT_COMPARABLE)
+    if figures:
+        shares = all(f.labels is not None for row in figures.values() for f in row.values())
+        unit = "" if shares else "; it states no unit of length"
+        notes.append(f"{REPORTED_MARK} {SOURCE}, {REPORTED}, so not ranked{unit}.")
+    rows += _figure_rows(figures, tuple(columns))
+    head = ("#", "method", *(column.head for column in columns.values()))
+    return Table(title, head, tuple(rows), tuple(notes), named_by=1)
+
+
+def _ranks(entries: Sequence[Entry], key: str) -> list[str]:
+    """Return the places of entries by a score; those that look equal share one."""
+    ranks, place, last = list[str](), 0, ""
+    for count, entry in enumerate(entries, 1):
+        if entry.file.comparable and key in entry.scores:
+            shown = interval_cells(entry.scores[key])[0]
+            place, last = place if shown == last else count, shown
+            ranks.append(str(place))
+        else:
+            ranks.append("")
+    return ranks
+
+
+def _best(entries: Sequence[Entry], key: str, column: Column) -> str:
+    """Return the best of the comparable scores of a column as it is shown; empty without any."""
+    scores = [e.scores[key] for e in entries if e.file.comparable and key in e.scores]
+    better = max if column.higher_is_better else min
+    return interval_cells(better(scores, key=lambda score: score.value))[0] if scores else ""
+
+
+def _cell(entry: Entry, key: str, best: str) -> Cell:
+    best = best if entry.file.comparable else ""
+    cell = score_cell(entry.scores.get(key), best, entry.floors.get(key))
+    return replace(cell, value=f"{cell.value} {ALIKE}") if key in entry.alike else cell
+
+
+def score_column(name: str) -> Column:
+    """Return the column of a score: title, an arrow that tells which way is better, and unit."""
+    score = metric(name)
+    arrow = "↑" if score.higher_is_better else "↓"
+    return Column(f"{score.title} {arrow} ({score.unit})", score.higher_is_better)
+
+
+def skill_column(name: str) -> Column:
+    """Return the column of the skill of a score."""
+    return Column(f"{metric(name).title}: skill ↑")
+
+
+def figures_by_row(
+    figures: Iterable[Figure],
+    key: Callable[[Figure], str],
+    label: Callable[[Figure], str] | None = None,
+) -> dict[str, dict[str, Figure]]:
+    """Return figures of the paper by the label of their row, then by the key of their column."""
+    rows: dict[str, dict[str, Figure]] = {}
+    for figure in figures:
+        row = rows.setdefault(f"{(label or _figure_label)(figure)} {REPORTED_MARK}", {})
+        row[key(figure)] = figure
+    return rows
+
+
+def _figure_label(figure: Figure) -> str:
+    labels = "" if figure.labels is None else f", {figure.labels} labels"
+    return f"{figure.method}, {figure.data}{labels} (Table {figure.table})"
+
+
+def _figure_rows(figures: FigureRows, keys: Sequence[str]) -> list[Row]:
+    rows = []
+    for label, row in figures.items():
+        cells = {key: Cell(f.text, f"± {f.spread}" if f.spread else "") for key, f in row.items()}
+        rows.append(make_row(["", label, *(cells.get(k, Cell()) for k in keys)], "reported"))
+    return rows
+
+
+def paper_table(table: PaperTable) -> Table:
+    """Return a table of the paper on its own."""
+
+    def key(figure: Figure) -> str:
+        angle = "" if figure.view_angle is None else f" {figure.view_angle}°"
+        labels = "" if figure.labels is None else f", {figure.labels} labels"
+        return metric(figure.metric).title + angle + labels
+
+    keys = tuple(dict.fromkeys(map(key, table.figures)))
+    figures = figures_by_row(table.figures, key, lambda figure: f"{figure.method}, {figure.data}")
+    title = f"{SOURCE}, {table.kind} {table.number}: {REPORTED}. {table.caption}"
+    notes = (f"{REPORTED_MARK} {REPORTED}. Unit: {table.unit}.", table.remark)
+    rows = tuple(_figure_rows(figures, keys))
+    return Table(title, ("#", "method", *keys), rows, notes, named_by=1)

@@ -1,0 +1,181 @@
+"""A leaderboard as a static site: rankings, a gallery, and a report of each score file.
+
+The pages load nothing but each other, so that any server of files can show them, such as GitHub
+Pages. Right answers of questions stand on none of them.
+"""
+
+import itertools
+import re
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from metrics.scoring.known_tests import known_test
+from metrics.scoring.metric_names import metric
+from metrics.scoring.records import ScoreFile
+from metrics.views.at_hand import submission_at_hand, truth_at_hand
+from metrics.views.by_angle import view_curves
+from metrics.views.compare.report import TESTS_HEAD, difference_cell, paired_cells
+from metrics.views.headline import answer
+from metrics.views.leaderboard.gallery import gallery
+from metrics.views.leaderboard.ranking import Paper, Ranking, rankings
+from metrics.views.page import Lead, Link, Section, html_page
+from metrics.views.report import html_report
+from metrics.views.score_tables import labels_of
+from metrics.views.table import Cell, Table, make_row, make_table
+from scenegen.common.text_table import plain, printable
+from scenegen.files.new_folder import folder_written_beside
+
+INDEX, GALLERY = "index.html", "gallery.html"
+REPORT = re.compile(r"report-\d+-[a-z0-9-]*\.html")
+GALLERY_TITLE = "Predicted depth of the same scenes, spread evenly over the test set"
+
+
+def to_html(tables: Sequence[Table]) -> str:
+    """Return the tables of a leaderboard as one page."""
+    return html_page("Leaderboard", [Section(table.title, tables=[table]) for table in tables])
+
+
+def write_site(
+    files: Sequence[ScoreFile],
+    folder: str | Path,
+    metrics: Sequence[str] | None = None,
+    *,
+    paper: Paper = "task",
+    overwrite: bool = False,
+) -> None:
+    """Write index.html, gallery.html and a report of each score file to a folder.
+
+    Pictures come from the truths and submissions that the score files name, where they still lie
+    there unchanged. With `overwrite` an older site is replaced as a whole.
+
+    Raises as `ranking.rankings` and `new_folder.folder_written_beside`.
+    """
+    folder = Path(folder)
+    names = report_names(files)
+    links = {id(file): name for file, name in zip(files, names, strict=True)}
+    ranked, others = rankings(files, metrics, paper=paper, tested=True, links=links)
+    old = [p.name for p in folder.glob("report-*.html") if REPORT.fullmatch(p.name)]
+    with folder_written_beside(folder, {INDEX, GALLERY, *names, *old}, overwrite) as new:
+        sections = [section for ranking in ranked for section in _sections(ranking)]
+        sections += [Section(table.title, tables=[table], folded=True) for table in others]
+        gallery_sections = [_gallery_section(ranking, links) for ranking in ranked]
+        for name, title, content in (
+            (INDEX, "Leaderboard", sections),
+            (GALLERY, "Gallery", gallery_sections),
+        ):
+            pages = ((INDEX, "Leaderboard"), (GALLERY, "Gallery"))
+            navigation = [Link(address, text, address == name) for address, text in pages]
+            page = html_page(title, content, links=navigation)
+            (new / name).write_text(page, encoding="utf-8")
+        for file, name in zip(files, names, strict=True):
+            (new / name).write_text(_report(file), encoding="utf-8")
+
+
+def report_names(files: Sequence[ScoreFile]) -> list[str]:
+    """Return names for the reports: a number, then what of the method's name suits an address."""
+    words = [re.sub(r"[^a-z0-9]+", "-", file.method.lower()).strip("-")[:40] for file in files]
+    return [f"report-{i}-{word or 'method'}.html" for i, word in enumerate(words, 1)]
+
+
+def _report(file: ScoreFile) -> str:
+    """The report of a score file, with pictures of rooms where truth and submission are at hand."""
+    truth = truth_at_hand(file) if file.task == "rooms" else None
+    submission = submission_at_hand(file) if truth else None
+    runs = [submission] if submission else []
+    return html_report(file, truth or Path(file.meta.truth_path), runs, home=INDEX)
+
+
+def _sections(ranking: Ranking) -> Iterator[Section]:
+    """Yield the ranking of a test set with its curves, then folded tables."""
+    compared = [file for file in ranking.files if file.comparable]
+    charts = []
+    if compared and compared[0].task == "rooms":
+        labels = dict(zip(map(id, ranking.files), labels_of(ranking.files), strict=True))
+        charts = list(view_curves(compared, [labels[id(file)] for file in compared]))
+    yield Section(
+        ranking.title,
+        leads=[_lead(ranking)],
+        remarks=[_how_made(ranking.files[0])],
+        tables=ranking.tables,
+        charts=charts,
+    )
+    for table in ranking.groups:
+        yield Section(table.title, tables=[table], folded=True)
+    if ranking.comparison is not None:
+        rows: list[Sequence[Cell | str]] = [
+            (f"{d.method}, {metric(d.metric).title}", difference_cell(d), *paired_cells(d))
+            for d in ranking.comparison.differences
+        ]
+        against = f"method, against {ranking.comparison.reference}"
+        table = make_table("Paired tests", (against, "difference", *TESTS_HEAD), rows)
+        yield Section(f"Paired tests: {ranking.title}", tables=[table], folded=True)
+
+
+def _lead(ranking: Ranking) -> Lead:
+    """Return what the first row of a ranking is, and its first score."""
+    row, entry = ranking.tables[0].rows[0], ranking.entries[0]
+    first = row.cells[2]
+    firsts = sum(other.cells[0].value == "1" for other in ranking.tables[0].rows)
+    if not row.cells[0].value:
+        words = "is not ranked"
+    elif firsts > 1:
+        words = f"is one of {firsts} in the first place"
+    else:
+        words = "leads" if len(ranking.entries) > 1 else "alone"
+    head = ranking.tables[0].head[2]
+    return Lead(entry.label, f"{words}: {first} {head}", entry.link)
+
+
+def _gallery_section(ranking: Ranking, links: Mapping[int, str]) -> Section:
+    """Return the answer of each method, with a link to its report, and scenes as they see them."""
+    labels = labels_of(ranking.files)
+    rows = []
+    for file, label in zip(ranking.files, labels, strict=True):
+        lead = answer(file)
+        rows.append(make_row([label, lead.strong, lead.text], link=links[id(file)]))
+    table = Table("", ("method", "", "of what"), tuple(rows))
+    scenes = gallery(ranking.files, labels)
+    examples = [(GALLERY_TITLE, scenes)] if scenes else []
+    remark = _how_made(ranking.files[0])
+    return Section(ranking.title, remarks=[remark], tables=[table], examples=examples)
+
+
+def _how_made(file: ScoreFile) -> str:
+    """Return preset and command of a test set of the benchmark, and of others the preset alone.
+
+    The command that a truth records may name the seed, from which anyone can make the right answers
+    and depths of a test set that is withheld.
+    """
+    test = known_test(file.meta.truth_digest)
+    if test:
+        return f"{preset_of(test.command)}; {printable(test.command)}"
+    command = _recorded_command(file)
+    return preset_of(command) if command else plain(Path(file.meta.truth_path).name)
+
+
+def preset_of(command: str) -> str:
+    """Return the preset that a command names, in words; the default one where it names none."""
+    try:
+        words = shlex.split(command)
+    except ValueError:
+        words = command.split()
+    names = [b for a, b in itertools.pairwise(words) if a == "--preset"]
+    names += [word.partition("=")[2] for word in words if word.startswith("--preset=")]
+    default = "shapes" if "render" in words else "small"
+    return f"preset {plain(names[-1]) if names else default}"
+
+
+def _recorded_command(file: ScoreFile) -> str:
+    truth = truth_at_hand(file)
+    if truth is None:
+        return ""
+    if file.task == "rooms":
+        from scenegen.rooms.reader import RoomsFile
+
+        with RoomsFile(truth) as rooms:
+            return str(rooms.attributes.get("creation_command", ""))
+    from iqtt.files.reader import AnswersFile
+
+    with AnswersFile(truth) as answers:
+        return str(answers.attributes.get("creation_command", ""))

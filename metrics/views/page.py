@@ -1,0 +1,113 @@
+"""Pages that hold everything they show: sections of text, tables, charts and pictures.
+
+All pages are filled into one template, which escapes whatever it shows.
+"""
+
+import base64
+import functools
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+from metrics.views.examples import Example
+from metrics.views.plots import Chart
+from metrics.views.table import Table
+from scenegen.common.text_table import printable
+
+_TEMPLATES = Path(__file__).parent / "templates"
+
+
+@dataclass(frozen=True)
+class Lead:
+    """A sentence that answers first: its beginning in bold, and the rest.
+
+    Attributes:
+        link: address that the beginning leads to; or empty.
+    """
+
+    strong: str
+    text: str
+    link: str = ""
+
+
+@dataclass(frozen=True)
+class Section:
+    """What stands under a heading, in this order.
+
+    Attributes:
+        leads, remarks: sentences, large and small.
+        tables: each with its title, unless that is the section's.
+        examples: titles of lists, and their items with pictures.
+        notes: a list in small letters.
+        folded: whether it opens at a click; its tables are printed all the same.
+    """
+
+    title: str
+    leads: Sequence[Lead] = ()
+    remarks: Sequence[str] = ()
+    tables: Sequence[Table] = ()
+    examples: Sequence[tuple[str, Sequence[Example]]] = ()
+    charts: Sequence[Chart] = ()
+    notes: Sequence[str] = ()
+    folded: bool = False
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link to another page of the same site; `current` marks the page itself."""
+
+    address: str
+    text: str
+    current: bool = False
+
+
+def html_page(
+    title: str,
+    sections: Sequence[Section],
+    leads: Sequence[Lead] = (),
+    warnings: Sequence[str] = (),
+    links: Sequence[Link] = (),
+) -> str:
+    """Return a page that asks for nothing: `leads` and `warnings` first, then the sections.
+
+    A section without a title belongs to what stands first.
+
+    The Content-Security-Policy of the page allows the pictures that it holds and its one style
+    sheet, by SHA-256, and no script, style, frame, form or request.
+    """
+    style = "\n" + (_TEMPLATES / "style.css").read_text(encoding="utf-8")
+    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
+    policy = (
+        f"default-src 'none'; style-src 'sha256-{digest}'; img-src data:;"
+        " base-uri 'none'; form-action 'none'"
+    )
+    page: str = _template().render(
+        title=title, sections=sections, leads=leads, warnings=warnings, links=links,
+        style=Markup(style), policy=policy,
+    )  # fmt: skip
+    return page
+
+
+@functools.cache
+def _template() -> Any:
+    environment = Environment(
+        loader=FileSystemLoader(_TEMPLATES, encoding="utf-8"),
+        autoescape=True,
+        finalize=_shown,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template("page.html")
+
+
+def _shown(value: Any) -> Any:
+    """Return what the template prints, control characters of texts as escapes; markup as it is."""
+    is_text = isinstance(value, str) and not isinstance(value, Markup)
+    return printable(value, keep="\n\t") if is_text else value

@@ -1,0 +1,221 @@
+"""Tables of one score file: its headline, all scores, and the main ones by group."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from metrics.scoring.estimates import question_skill
+from metrics.scoring.known_tests import known_test
+from metrics.scoring.metric_names import (
+    EMPTY_ROOM,
+    HEADLINE,
+    OTHER_SCENE,
+    SKILLED,
+    in_order,
+    metric,
+)
+from metrics.scoring.records import GROUPINGS, Meta, Score, ScoreFile, Skill
+from metrics.views.table import Cell, Table, make_table
+from scenegen.common.text_table import by_number, distinct, number, plain
+
+SKILL = "Skill: 1 is perfect, 0 is as good as the floor, below 0 is worse than the floor."
+FLOORS_OF_ROOMS = {EMPTY_ROOM: "empty room", OTHER_SCENE: "against another scene"}
+GROUP_TITLES = {
+    "by_view_angle": "by degrees between the view and the scene's first one",
+    "by_object_shape": "of single objects, by shape",
+    "by_object_size": "of single objects, by share of the picture in percent",
+    "by_distractor": "by kind of question",
+    "by_rotation_angle": "by rotation between reference and right answer, degrees",
+    "by_position": "by place of the right answer",
+}
+GROUP_SCORES = {"rooms": HEADLINE["rooms"], "iqtt": ("iqtt_accuracy",)}
+
+
+def headline_rows(scores: ScoreFile) -> Table:
+    """Return a row for each skill of a headline score, then for each such score, with floors."""
+    names = [name for name in HEADLINE[scores.task] if name in scores.metrics]
+    rows: list[Sequence[str]] = [
+        (f"skill of {n}", *interval_cells(scores.skills[n]), f"0: {floor_text(scores, n)}")
+        for n in names
+        if n in scores.skills
+    ]
+    rows += [(n, *interval_cells(scores.metrics[n]), _floors_beside(scores, n)) for n in names]
+    return make_table("", ("headline", "value", _interval_head(scores), "floor"), rows)
+
+
+def _interval_head(scores: ScoreFile) -> str:
+    return f"{100 * scores.meta.confidence:.4g}% interval"
+
+
+def floor_text(scores: ScoreFile, name: str) -> str:
+    """Return the name of the floor of a score that has a skill."""
+    if scores.task == "rooms":
+        return FLOORS_OF_ROOMS[SKILLED[name]]
+    return scores.skills[name].floor_name
+
+
+def _floors_beside(scores: ScoreFile, name: str) -> str:
+    """Return the floor of a score, and what chance or noise gives, each with its name."""
+    like, texts = as_shown(scores.metrics[name]), []
+    if name in scores.skills:
+        texts.append(f"{number(scores.skills[name].floor, like)}: {floor_text(scores, name)}")
+    label, value = references(scores).get(name, ("", 0.0))
+    if label and not any(f": {label}" in text for text in texts):
+        texts.append(f"{label} {number(value, like)}")
+    return "; ".join(texts) or "-"
+
+
+def references(scores: ScoreFile) -> dict[str, tuple[str, float]]:
+    """Return by name of the score what noise or chance gives, with the label of either."""
+    values = {name: ("noise floor", floor) for name, floor in scores.meta.noise_floors.items()}
+    if "answers" in scores.meta.counts:
+        values["iqtt_accuracy"] = ("chance", 1.0 / scores.meta.counts["answers"])
+    return values
+
+
+def all_scores(scores: ScoreFile) -> Table:
+    """Return a row for each score; what chance or noise gives follows its score."""
+    rows: list[Sequence[str]] = []
+    beside = references(scores)
+    for name in in_order(scores.metrics):
+        score = scores.metrics[name]
+        better = "higher" if metric(name).higher_is_better else "lower"
+        std = "-" if score.std is None else number(score.std, score.value)
+        skill = scores.skills.get(name)
+        floor = "-" if skill is None else number(skill.floor, as_shown(score))
+        rows.append((name, *interval_cells(score), std, floor, score.unit, better))
+        if name in beside:
+            label, value = beside[name]
+            rows.append((f"  {label}", number(value, score.value), "-", "-", "-", score.unit, ""))
+    interval = _interval_head(scores)
+    head = ("score", "value", interval, "std of runs", "floor", "unit", "better")
+    return make_table("all scores", head, rows)
+
+
+def group_tables(scores: ScoreFile) -> Iterator[tuple[str, Table]]:
+    """Yield each grouping that the scores have, and its table: a row for each group."""
+    for grouping in GROUPINGS[scores.task]:
+        groups = getattr(scores, grouping)
+        if not groups:
+            continue
+        held = {name for group in groups.values() for name in group}
+        names = [name for name in GROUP_SCORES[scores.task] if name in held] or in_order(held)
+        with_floors = grouping == "by_distractor" and "answers" in scores.meta.counts
+        rows: list[Sequence[Cell | str]] = []
+        for key in by_number(groups):
+            group = groups[key]
+            cells = [_group_cell(group.get(name)) for name in names]
+            n = str(max(score.n for score in group.values()))
+            rows.append((key, *cells, n, *(_kind_cells(scores, key) if with_floors else ())))
+        head = ("", *names, "n", *(("skill", "floor") if with_floors else ()))
+        yield grouping, make_table(GROUP_TITLES[grouping], head, rows)
+
+
+def _group_cell(score: Score | None) -> Cell:
+    return Cell() if score is None else score_cell(replace(score, std=None))
+
+
+def _kind_cells(scores: ScoreFile, kind: str) -> tuple[Cell, str]:
+    """Return the skill in a kind of questions, and its floor."""
+    skill = kind_skill(scores, kind)
+    return score_cell(skill), f"{number(skill.floor)}: {skill.floor_name}"
+
+
+def kind_skill(scores: ScoreFile, kind: str) -> Skill:
+    """Return the skill in a kind of questions over the floor of that kind."""
+    accuracy = scores.by_distractor[kind]["iqtt_accuracy"]
+    return question_skill(accuracy, {kind: accuracy.n}, scores.meta.counts["answers"])
+
+
+def interval_cells(score: Score | Skill) -> tuple[str, str]:
+    """Return a value and its interval as text; "-" stands for no interval."""
+    like = as_shown(score)
+    if score.low is None or score.high is None:
+        return number(score.value, like), "-"
+    return number(score.value, like), f"[{number(score.low, like)}, {number(score.high, like)}]"
+
+
+def score_cell(score: Score | Skill | None, best: str = "", floor: float | None = None) -> Cell:
+    """Return a value, with standard deviation over runs, interval, and a floor of its own.
+
+    Args:
+        best: the best value of the column, as it is shown.
+    """
+    if score is None:
+        return Cell()
+    value, interval = interval_cells(score)
+    std = getattr(score, "std", None)
+    rest = [] if std is None else [f"± {number(std, score.value)}"]
+    rest += [] if interval == "-" else [interval]
+    rest += [] if floor is None else [f"floor {number(floor, as_shown(score))}"]
+    return Cell(value, " ".join(rest), value == best)
+
+
+def as_shown(score: Score | Skill) -> float:
+    """Return a number with as many decimals as a score is shown with: four where 0 is a middle."""
+    signed = isinstance(score, Skill) or score.unit == "correlation"
+    return 0.1 if signed else score.value
+
+
+def labels_of(files: Sequence[ScoreFile]) -> list[str]:
+    """Return names of the files' methods, all of them different."""
+    return distinct([f.method for f in files], [f.path.stem if f.path else "" for f in files])
+
+
+def title_of(scores: ScoreFile) -> str:
+    """Return method, size and truth."""
+    size = f"{len(scores.ids)} questions"
+    if scores.task == "rooms":
+        size = f"{len(scores.ids)} images of {len(np.unique(scores.clusters))} scenes"
+    runs = f", mean of {scores.runs} runs" if scores.runs > 1 else ""
+    return f"{plain(scores.method)}: {size} of {plain(scores.meta.truth_path)}{runs}"
+
+
+def notes_of(scores: ScoreFile) -> Iterator[str]:
+    """Yield what has to be known to read the tables, and where the scores come from."""
+    meta = scores.meta
+    for warning in scores.warnings:
+        yield f"warning: {warning}"
+    if scores.skills:
+        yield f"{SKILL} {what_the_floor_is(scores)}"
+    bootstrap = f"{meta.resamples} resamples, seed {meta.seed}"
+    if scores.task == "rooms":
+        claim = f"alignment claimed: {scores.alignment} (points are never aligned)"
+        yield f"intervals: bootstrap over scenes, {bootstrap}; {claim}"
+        if meta.noise_floors:
+            yield "noise floor: the score of the true surface, sampled elsewhere, against itself"
+    else:
+        how = "Wilson's" if scores.runs == 1 else f"bootstrap, {bootstrap}"
+        over = "questions, as the truth does not tell their shapes"
+        if "shape" in scores.items:
+            over = f"the shapes of references, {len(np.unique(scores.items['shape']))} in all"
+        yield f"intervals: {how}, over {over}"
+        yield "abstentions and ties count as wrong"
+    yield (
+        f"truth: {plain(meta.truth_path)}, digest {meta.truth_digest[:12]}, {source_text(meta)};"
+        f" fingerprint {meta.truth_fingerprint[:12]}"
+    )
+    runs = ", ".join(f"{run.path} {run.sha256[:12]}" for run in meta.submissions)
+    yield f"submissions: {plain(runs)}"
+
+
+def what_the_floor_is(scores: ScoreFile) -> str:
+    """Return in a sentence what the floor of the skills is."""
+    if scores.task == "rooms":
+        return (
+            "The floor is the empty room: walls and floor from the true camera, no objects; of"
+            " relief it is the same prediction, held against the relief of another scene."
+        )
+    return "The floor is the best method without 3D, by kind of question: docs/results.md."
+
+
+def source_text(meta: Meta) -> str:
+    """Return in words where the truth comes from."""
+    test = known_test(meta.truth_digest)
+    name = f" ({test.name})" if test else ""
+    return {
+        "given": "given to be scored against",
+        "known": "known to the benchmark",
+        "submission": "chosen by the submission itself",
+    }[meta.truth_source] + name

@@ -1,0 +1,167 @@
+"""One table in four formats: text for terminals, Markdown, LaTeX, and HTML (by `page`).
+
+Cells hold texts as they are. Each format escapes them, so that a name from a stranger's file stays
+within its cell and does nothing else.
+"""
+
+import itertools
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from scenegen.common.text_table import aligned, markdown, piped, printable
+
+_LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    '"': r"{\char34}",
+    "`": r"\textasciigrave{}",
+    "'": r"\textquotesingle{}",
+    "°": r"\textdegree{}",
+    "↑": r"\ensuremath{\uparrow}",
+    "↓": r"\ensuremath{\downarrow}",
+    "±": r"\ensuremath{\pm}",
+    "≈": r"\ensuremath{\approx}",
+    "†": r"\textdagger{}",
+    "‡": r"\textdaggerdbl{}",
+}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A value and what follows it.
+
+    Attributes:
+        value: such as "0.1234"; "-" where there is none.
+        rest: what follows in small letters, such as "± 0.01 [0.10, 0.15]"; or empty.
+        best: whether the value is bold.
+        drawing: a picture before the value on pages, as a data URL; or empty.
+    """
+
+    value: str = "-"
+    rest: str = ""
+    best: bool = False
+    drawing: str = ""
+
+    def __str__(self) -> str:
+        return " ".join(filter(None, (self.value, self.rest)))
+
+
+@dataclass(frozen=True)
+class Row:
+    """Cells, one for each column.
+
+    Attributes:
+        kind: "" for an ordinary row. Rows of other kinds, such as "floor", have their name in
+            italics, and LaTeX has a line between kinds.
+        link: address of the page that the row's name leads to; or empty.
+    """
+
+    cells: tuple[Cell, ...]
+    kind: str = ""
+    link: str = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows under a head, with a title and notes below.
+
+    Attributes:
+        named_by: number of the column that names each row.
+    """
+
+    title: str
+    head: tuple[str, ...]
+    rows: tuple[Row, ...]
+    notes: tuple[str, ...] = ()
+    named_by: int = 0
+
+
+def make_row(cells: Iterable[Cell | str], kind: str = "", link: str = "") -> Row:
+    """Return a row of cells, of which those without anything but a value are texts."""
+    return Row(tuple(c if isinstance(c, Cell) else Cell(c) for c in cells), kind, link)
+
+
+def make_table(title: str, head: Sequence[str], rows: Iterable[Iterable[Cell | str]]) -> Table:
+    """Return a table of ordinary rows."""
+    return Table(title, tuple(head), tuple(map(make_row, rows)))
+
+
+def to_text(title: str, tables: Iterable[Table], notes: Iterable[str] = ()) -> str:
+    """Return tables with aligned columns, each below its title, and the notes as lines."""
+    lines = [title]
+    for table in tables:
+        rows = [[printable(str(cell)) for cell in row.cells] for row in table.rows]
+        lines += ["", *filter(None, [table.title])]
+        lines += ["  " + line for line in aligned([table.head, *rows])]
+        lines += table.notes
+    return "\n".join(map(printable, [*lines, "", *notes]))
+
+
+def to_markdown(title: str, tables: Iterable[Table], notes: Iterable[str] = ()) -> str:
+    """Return Markdown tables, with notes as lists."""
+    parts = [_markdown(title)] if title else []
+    for table in tables:
+        rows = [
+            [_markdown_cell(table, row, i) for i in range(len(row.cells))] for row in table.rows
+        ]
+        parts += [f"**{_markdown(table.title)}**"] if table.title else []
+        parts += ["\n".join(piped([[*map(_markdown, table.head)], *rows])), _listed(table.notes)]
+    return "\n\n".join(filter(None, [*parts, _listed(notes)]))
+
+
+def _markdown(text: str) -> str:
+    return markdown(printable(text))
+
+
+def _markdown_cell(table: Table, row: Row, column: int) -> str:
+    cell = row.cells[column]
+    value = _markdown(cell.value)
+    mark = "**" if cell.best else "*" if row.kind and column == table.named_by else ""
+    return " ".join(filter(None, (f"{mark}{value}{mark}", _markdown(cell.rest))))
+
+
+def _listed(notes: Iterable[str]) -> str:
+    return "\n".join(f"- {_markdown(note)}" for note in notes)
+
+
+def to_latex(tables: Iterable[Table]) -> str:
+    """Return LaTeX tables (booktabs), after a comment that names the packages they need."""
+    text = "\n\n".join("\n".join(_latex_lines(table)) for table in tables)
+    note = "" if text.isascii() else "; names are not all ASCII: XeLaTeX or LuaLaTeX shows them"
+    return f"% needs \\usepackage{{booktabs,graphicx,textcomp}}{note}\n{text}"
+
+
+def latex(text: str) -> str:
+    """Escape one line of text so that LaTeX, with the package textcomp, shows it unchanged."""
+    escaped = "".join(_LATEX.get(c, c) for c in printable(text))
+    return re.sub("-(?=-)", "-{}", escaped)  # two hyphens in a row would become a dash
+
+
+def _latex_lines(table: Table) -> Iterator[str]:
+    yield from (r"\begin{table}", r"\centering", rf"\caption{{{latex(table.title)}}}")
+    yield r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
+    columns = "r" * table.named_by + "l" + "c" * (len(table.head) - table.named_by - 1)
+    yield from (rf"\begin{{tabular}}{{{columns}}}", r"\toprule")
+    yield " & ".join(map(latex, table.head)) + r" \\"
+    for _, rows in itertools.groupby(table.rows, lambda row: row.kind):
+        yield r"\midrule"
+        for row in rows:
+            yield " & ".join(_latex_cell(table, row, i) for i in range(len(row.cells))) + r" \\"
+    yield from (r"\bottomrule", r"\end{tabular}}")
+    yield from (rf"\par\footnotesize {latex(note)}" for note in table.notes)
+    yield r"\end{table}"
+
+
+def _latex_cell(table: Table, row: Row, column: int) -> str:
+    cell = row.cells[column]
+    value = latex(cell.value)
+    if cell.best:
+        value = rf"\textbf{{{value}}}"
+    elif row.kind and column == table.named_by:
+        value = rf"\emph{{{value}}}"
+    return " ".join(filter(None, (value, latex(cell.rest))))

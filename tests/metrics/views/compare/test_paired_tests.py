@@ -1,0 +1,133 @@
+"""Paired tests against scipy, by hand, and by simulation where no difference exists."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binomtest, permutation_test
+
+from metrics.views.compare.paired_tests import (
+    holm,
+    mcnemar_exact,
+    sign_flip_test,
+    smallest_detectable_difference,
+    smallest_significant_fraction,
+)
+from metrics.measures.checks import EmptyError, MeasureError, NonFiniteError
+
+
+def detectable(differences, _):
+    return smallest_detectable_difference(differences)
+
+
+def test_identical_methods_differ_by_nothing():
+    a = np.random.default_rng(0).random(30)
+    assert sign_flip_test(a - a, seed=0) == 1.0
+    assert mcnemar_exact(a > 0.5, a > 0.5) == 1.0
+
+
+def test_sign_flips_by_hand():
+    # Of the 8 sign patterns of 1, 2, 3 only +++ and --- reach a sum of 6.
+    assert sign_flip_test([1.0, 2.0, 3.0], seed=0) == 0.25
+    # The sums are +-6, +-4, +-2 and twice 0; half of them reach the observed 4.
+    assert sign_flip_test([-1.0, 2.0, 3.0], seed=0) == 0.5
+    assert sign_flip_test([5.0], seed=0) == 1.0
+    assert sign_flip_test([0.1] * 3, seed=0) == sign_flip_test([1e90] * 3, seed=0) == 0.25
+
+
+def test_sign_flips_agree_with_scipy():
+    for count in (9, 30):
+        differences = np.random.default_rng(count).standard_normal(count) + 0.5
+        pair, settings = (differences, np.zeros(count)), {"n_resamples": 9999, "rng": 1}
+        expected = permutation_test(
+            pair, lambda x, y: np.mean(x - y), permutation_type="samples", **settings
+        ).pvalue
+        found = sign_flip_test(differences, seed=0)
+        assert found == pytest.approx(expected, abs=1e-12 if count == 9 else 0.006)
+        assert found == sign_flip_test(differences, seed=0)
+        assert found == sign_flip_test(-differences, seed=0)
+
+
+def test_sign_flips_reject_five_percent_where_nothing_differs():
+    rng = np.random.default_rng(5)
+    p = np.array([sign_flip_test(rng.laplace(size=40), seed=i, flips=199) for i in range(1500)])
+    assert (p <= 0.05).mean() == pytest.approx(0.05, abs=0.018)
+    assert p.min() >= 1 / 200
+
+
+@given(st.integers(0, 60), st.integers(0, 60), st.integers(0, 5), st.integers(1, 5))
+def test_mcnemar_agrees_with_the_binomial_test(only_a, only_b, both, neither):
+    a = np.repeat([True, False, True, False], [only_a, only_b, both, neither])
+    b = np.repeat([False, True, True, False], [only_a, only_b, both, neither])
+    trials = only_a + only_b
+    expected = binomtest(only_a, trials).pvalue if trials else 1.0
+    assert mcnemar_exact(a, b) == pytest.approx(expected, rel=1e-9)
+
+
+def test_mcnemar_stays_exact_on_many_questions():
+    a = np.arange(20000) < 10400
+    assert mcnemar_exact(a, ~a) == pytest.approx(binomtest(10400, 20000).pvalue, rel=1e-9)
+    assert mcnemar_exact(np.ones(5000, dtype=bool), np.zeros(5000, dtype=bool)) == 0.0
+
+
+def test_holm_by_hand():
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.5, 0.9, 0.4]).tolist() == [1.0, 1.0, 1.0]
+    assert holm([]).tolist() == []
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=20))
+def test_holm_rejects_step_by_step(p_values):
+    adjusted = holm(p_values)
+    order = np.argsort(p_values, kind="stable")
+    rejecting = True
+    for rank, index in enumerate(order):
+        rejecting = rejecting and p_values[index] * (len(p_values) - rank) <= 0.05
+        assert (adjusted[index] <= 0.05) == rejecting
+    assert ((adjusted >= p_values) & (adjusted <= 1.0)).all()
+
+
+def test_the_detectable_difference_is_detected_with_its_power():
+    rng = np.random.default_rng(2)
+    differences = rng.standard_normal((2000, 100))
+    effect = 2.8015852 / 10.0  # (1.9599640 + 0.8416212) / sqrt(100)
+    found = [smallest_detectable_difference(row) for row in differences]
+    assert np.mean(found) == pytest.approx(effect, rel=0.01)
+    means, errors = differences.mean(axis=1) + effect, differences.std(axis=1, ddof=1) / 10.0
+    assert (np.abs(means / errors) > 1.9599640).mean() == pytest.approx(0.8, abs=0.03)
+
+
+def test_the_smallest_significant_fraction_is_the_first_that_is():
+    assert smallest_significant_fraction(100) == 0.06
+    for discordant, significant in ((5, False), (6, True)):
+        a = np.arange(100) < discordant
+        assert (mcnemar_exact(a, np.zeros(100, dtype=bool)) <= 0.05) == significant
+
+
+NAN = np.nan
+NONE = np.zeros(0, dtype=bool)
+WRONG_DIFFERENCES = ((EmptyError, []), (NonFiniteError, [1.0, NAN]), (MeasureError, [[1.0, 2.0]]))
+
+
+@pytest.mark.parametrize(
+    ("kind", "where", "test", "arguments"),
+    [
+        *(
+            (kind, "differences", test, [values, 0])
+            for test in (sign_flip_test, detectable)
+            for kind, values in WRONG_DIFFERENCES
+        ),
+        (MeasureError, "differences", detectable, [[1.0], 0]),
+        (MeasureError, "power", smallest_detectable_difference, [[1.0, 2.0], 0.05, 1.0]),
+        (MeasureError, "answers", mcnemar_exact, [[0, 1], [True, False]]),
+        (MeasureError, "answers", mcnemar_exact, [[True], [True, False]]),
+        (EmptyError, "answers", mcnemar_exact, [NONE, NONE]),
+        *((MeasureError, "p-values", holm, [bad]) for bad in ([1.1], [-0.1], [NAN], [[0.5]])),
+        (EmptyError, "questions", smallest_significant_fraction, [0]),
+        (MeasureError, "alpha", smallest_significant_fraction, [10, 0.0]),
+    ],
+)
+def test_wrong_input_is_named(kind, where, test, arguments):
+    with pytest.raises(MeasureError) as caught:
+        test(*arguments)
+    assert (type(caught.value), caught.value.where) == (kind, where)

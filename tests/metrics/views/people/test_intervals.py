@@ -1,0 +1,86 @@
+"""Intervals against SciPy, against plain loops, and by simulation."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from metrics.views.people.intervals import (
+    crossed_estimate,
+    line_within_people,
+    mean_estimate,
+    mean_of_people,
+    within,
+)
+
+RNG = np.random.default_rng(3)
+
+
+def test_student_s_interval_is_scipy_s():
+    values = RNG.normal(0.7, 0.1, 15)
+    found = mean_estimate(values)
+    expected = stats.ttest_1samp(values, 0).confidence_interval()
+    assert (found.low, found.high) == pytest.approx(tuple(expected))
+    assert mean_estimate([0.5]).low is None
+    assert within(mean_estimate([0.0, 1.0])).low == 0.0
+
+
+def test_means_of_people_count_alike():
+    assert mean_of_people([1, 1, 1, 0], ["a", "a", "a", "b"]).value == 0.5
+
+
+def test_crossed_variance_by_plain_loops():
+    values, people = RNG.random(60), np.repeat(np.arange(6), 10)
+    questions = RNG.integers(0, 20, 60)
+    mean = values.mean()
+
+    def variance(labels):
+        groups = sorted(set(labels))
+        total = sum(sum(values[i] - mean for i in range(60) if labels[i] == g) ** 2 for g in groups)
+        return len(groups) / (len(groups) - 1) * total / 60**2
+
+    parts = variance(people.tolist()), variance(questions.tolist())
+    error = max(*parts, sum(parts) - variance(list(range(60)))) ** 0.5
+    found = crossed_estimate(values, people, questions)
+    assert found.high - found.value == pytest.approx(stats.t.ppf(0.975, 5) * error)
+
+
+def test_crossed_intervals_hold_the_truth_where_questions_differ():
+    """Each question has a difficulty of its own: people alone give intervals that are too short."""
+    hits = {"people": 0, "crossed": 0}
+    for _ in range(300):
+        people, questions = np.repeat(np.arange(30), 20), np.tile(np.arange(20), 30)
+        chance = np.clip(0.6 + RNG.normal(0, 0.15, 20)[questions], 0, 1)
+        chance = np.clip(chance + RNG.normal(0, 0.1, 30)[people], 0, 1)
+        right = (RNG.random(600) < chance).astype(float)
+        for name, one in (
+            ("people", mean_of_people(right, people)),
+            ("crossed", crossed_estimate(right, people, questions)),
+        ):
+            hits[name] += one.low <= 0.6 <= one.high
+    assert hits["people"] < 0.85 * 300
+    assert hits["crossed"] >= 0.92 * 300
+
+
+def test_the_line_is_least_squares_with_a_height_for_each_person():
+    people = np.repeat(np.arange(8), 12)
+    angles = RNG.uniform(30, 180, 96)
+    seconds = 1 + 0.02 * angles + RNG.normal(0, 2, 8)[people] + RNG.normal(0, 0.3, 96)
+    found = line_within_people(angles, seconds, people)
+    dummies = (people[:, None] == np.arange(8)).astype(float)
+    expected = np.linalg.lstsq(np.column_stack([angles, dummies]), seconds, rcond=None)[0][0]
+    assert found.slope.value == pytest.approx(expected)
+    assert found.slope.low < 0.02 < found.slope.high
+    assert found.intercept + found.slope.value * angles.mean() == pytest.approx(seconds.mean())
+    residuals = seconds - dummies @ (dummies.T @ seconds / 12)
+    x = angles - dummies @ (dummies.T @ angles / 12)
+    residuals -= found.slope.value * x
+    scores = [(x[people == g] @ residuals[people == g]) ** 2 for g in range(8)]
+    error = (8 / 7 * sum(scores)) ** 0.5 / (x @ x)
+    assert found.slope.high - found.slope.value == pytest.approx(stats.t.ppf(0.975, 7) * error)
+
+
+def test_lines_that_cannot_be_drawn():
+    assert line_within_people([], [], []) is None
+    assert line_within_people([50.0, 50.0], [1, 2], ["a", "a"]) is None
+    assert line_within_people([50.0, 60.0], [1, 2], ["a", "b"]) is None
+    assert line_within_people([50.0, 60.0], [1, 2], ["a", "a"]).slope.low is None
