@@ -13,6 +13,7 @@ from metrics.views.paper import PAPER, PAPER_KIND, PEOPLE, REPORTED, SOURCE, TAB
 from metrics.views.plots import kind_of, strip
 from metrics.views.score_tables import (
     GROUP_TITLES,
+    INTERVAL,
     SKILL,
     as_shown,
     floor_text,
@@ -79,11 +80,10 @@ def headline_section(files: Sequence[ScoreFile], title: str = "") -> Section:
     table = make_table(
         "Headline", [heads[i] for i in kept], [[row[i] for i in kept] for row in rows]
     )
-    level = f"{100 * scores.meta.confidence:.4g}%"
     over = "scenes" if scores.task == "rooms" else "shapes or questions"
     notes = [f"{SKILL} {what_the_floor_is(scores)}"] if scores.skills else []
     notes += [
-        f"[low, high]: {level} interval over {over}. On its scale: the dot is this method with its"
+        f"[low, high]: {INTERVAL} over {over}. On its scale: the dot is this method with its"
         " interval, the solid line its floor, and dashed lines are the methods beside it.",
         PAPER_NOTE,
     ]

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from metrics.score_file import read_scores
+from metrics.scoring.estimates import CONFIDENCE
 from metrics.scoring.metric_names import HEADLINE, in_order, metric
 from metrics.scoring.records import ScoreFile
 from metrics.submissions.reader import open_predictions
@@ -165,13 +166,12 @@ def _all_numbers(scores: ScoreFile) -> Iterator[Section]:
     table = make_table("Definitions", ("score", "of one item"), rows)
     yield Section("How each number is defined", tables=[table], folded=True)
     meta = scores.meta
-    level = f"{100 * meta.confidence:.4g}%"
     drawn = f" from {meta.resamples} resamples with seed {meta.seed}" if meta.resamples else ""
     counts = ", ".join(f"{name.replace('_', ' ')} {n}" for name, n in meta.counts.items())
     notes = [
         f"{counts}.",
         f"Truth: {meta.truth_path} {meta.truth_digest[:12]}, {source_text(meta)}.",
-        f"Scored by {meta.writer}, with intervals at {level}{drawn}.",
+        f"Scored by {meta.writer}, with intervals at {CONFIDENCE:.0%}{drawn}.",
         *(f"{run.path} {run.run} {run.sha256[:16]}" for run in meta.submissions),
     ]
     yield Section("Where the numbers come from", notes=notes, folded=True)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from metrics.scoring.estimates import question_skill
+from metrics.scoring.estimates import CONFIDENCE, question_skill
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import (
     EMPTY_ROOM,
@@ -19,6 +19,7 @@ from metrics.scoring.records import GROUPINGS, Meta, Score, ScoreFile, Skill
 from metrics.views.table import Cell, Table, make_table
 from scenegen.common.text_table import by_number, distinct, number, plain
 
+INTERVAL = f"{CONFIDENCE:.0%} interval"
 SKILL = "Skill: 1 is perfect, 0 is as good as the floor, below 0 is worse than the floor."
 FLOORS_OF_ROOMS = {EMPTY_ROOM: "empty room", OTHER_SCENE: "against another scene"}
 GROUP_TITLES = {
@@ -41,11 +42,7 @@ def headline_rows(scores: ScoreFile) -> Table:
         if n in scores.skills
     ]
     rows += [(n, *interval_cells(scores.metrics[n]), _floors_beside(scores, n)) for n in names]
-    return make_table("", ("headline", "value", _interval_head(scores), "floor"), rows)
-
-
-def _interval_head(scores: ScoreFile) -> str:
-    return f"{100 * scores.meta.confidence:.4g}% interval"
+    return make_table("", ("headline", "value", INTERVAL, "floor"), rows)
 
 
 def floor_text(scores: ScoreFile, name: str) -> str:
@@ -69,7 +66,7 @@ def _floors_beside(scores: ScoreFile, name: str) -> str:
 def references(scores: ScoreFile) -> dict[str, tuple[str, float]]:
     """Return by name of the score what noise or chance gives, with the label of either."""
     values = {name: ("noise floor", floor) for name, floor in scores.meta.noise_floors.items()}
-    if "answers" in scores.meta.counts:
+    if scores.task == "iqtt":
         values["iqtt_accuracy"] = ("chance", 1.0 / scores.meta.counts["answers"])
     return values
 
@@ -88,8 +85,7 @@ def all_scores(scores: ScoreFile) -> Table:
         if name in beside:
             label, value = beside[name]
             rows.append((f"  {label}", number(value, score.value), "-", "-", "-", score.unit, ""))
-    interval = _interval_head(scores)
-    head = ("score", "value", interval, "std of runs", "floor", "unit", "better")
+    head = ("score", "value", INTERVAL, "std of runs", "floor", "unit", "better")
     return make_table("all scores", head, rows)
 
 
@@ -101,7 +97,7 @@ def group_tables(scores: ScoreFile) -> Iterator[tuple[str, Table]]:
             continue
         held = {name for group in groups.values() for name in group}
         names = [name for name in GROUP_SCORES[scores.task] if name in held] or in_order(held)
-        with_floors = grouping == "by_distractor" and "answers" in scores.meta.counts
+        with_floors = grouping == "by_distractor"
         rows: list[Sequence[Cell | str]] = []
         for key in by_number(groups):
             group = groups[key]

@@ -1,4 +1,4 @@
-"""A reader of HTML pages that checks them."""
+"""A reader of HTML pages that checks them, and of tables before they are printed."""
 
 from html.parser import HTMLParser
 
@@ -12,6 +12,16 @@ class Page(HTMLParser):
         self.tags, self.attributes = set(), set()
         self.feed(text)
         assert self.open == []
+
+    @property
+    def text(self):
+        """All words, with single spaces."""
+        return " ".join(" ".join(self.words).split())
+
+    @property
+    def pictures(self):
+        """Addresses of pictures of scenes and questions."""
+        return [address for address in self.addresses if address.startswith("data:image/webp")]
 
     def handle_starttag(self, tag, attrs):
         self.tags.add(tag)
@@ -30,4 +40,10 @@ class Page(HTMLParser):
     def handle_data(self, data):
         self.words.append(data)
         if "td" in self.open or "th" in self.open:
-            self.rows[-1][-1] += data
+            self.rows[-1][-1] += f" {data}" if "small" in self.open else data
+
+
+def cells_of(table):
+    """Return the texts of a table's rows by their names, without the columns up to these."""
+    first = table.named_by + 1
+    return {row.cells[first - 1].value: [str(c) for c in row.cells[first:]] for row in table.rows}

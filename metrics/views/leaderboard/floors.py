@@ -40,7 +40,7 @@ def floor_rows(file: ScoreFile, names: Sequence[str]) -> FloorRows:
     noise = file.meta.noise_floors
     if any(name in noise for name in names):
         rows[NOISE] = {name: noise[name] for name in names if name in noise}
-    if "answers" in file.meta.counts and not any(label.startswith(CHANCE) for label in rows):
+    if file.task == "iqtt" and not any(label.startswith(CHANCE) for label in rows):
         rows[CHANCE] = {"iqtt_accuracy": 1.0 / file.meta.counts["answers"]}
     return rows
 
@@ -50,8 +50,6 @@ def floor_rows_of_groups(file: ScoreFile, name: str, keys: Sequence[str]) -> Flo
     if file.task == "rooms":
         values = angle_floors(file, name) if is_shared(name) else {}
         return {FLOOR + FLOORS_OF_ROOMS[EMPTY_ROOM]: values} if values else {}
-    if "answers" not in file.meta.counts:
-        return {}
     answers = file.meta.counts["answers"]
     best = {kind: floor_of_kind(kind, answers)[0] for kind in keys}
     chance = dict.fromkeys(keys, 1.0 / answers)

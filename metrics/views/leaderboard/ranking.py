@@ -38,7 +38,7 @@ from metrics.views.leaderboard.rows import (
     skill_column,
 )
 from metrics.views.paper import PAPER_KIND, TABLES, Figure
-from metrics.views.score_tables import SKILL, labels_of, what_the_floor_is
+from metrics.views.score_tables import INTERVAL, SKILL, labels_of, what_the_floor_is
 from metrics.views.table import Table
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import by_number, plain
@@ -357,20 +357,17 @@ def _label(file: ScoreFile, name: str) -> str:
 
 
 def _notes(files: Sequence[ScoreFile]) -> Iterator[str]:
-    first, counts = files[0], files[0].meta.counts
+    first = files[0]
     if first.task == "rooms":
         yield f"{len(first.ids):,} images of {len(np.unique(first.clusters)):,} scenes."
     else:
-        chance = f"; chance is {1.0 / counts['answers']:.4f}" if "answers" in counts else ""
-        yield f"{len(first.ids):,} questions{chance}."
+        chance = 1.0 / first.meta.counts["answers"]
+        yield f"{len(first.ids):,} questions; chance is {chance:.4f}."
     if any(file.skills for file in files):
         yield f"{SKILL} {what_the_floor_is(first)}"
-    levels = " and ".join(
-        f"{level:.4g}%" for level in sorted({100.0 * f.meta.confidence for f in files})
-    )
     over = "shapes" if "shape" in first.items else "questions"
     yield (
-        f"[low, high]: {levels} interval over {'scenes' if first.task == 'rooms' else over}."
+        f"[low, high]: {INTERVAL} over {'scenes' if first.task == 'rooms' else over}."
         " ±: standard deviation over training runs. Best in bold, which is no test of a difference:"
         " see bench compare."
     )

@@ -125,7 +125,7 @@ def test_pictures_of_another_split_are_left_out(truths, folder):
     shutil.copy(truths.iqtt.with_name("iqtt-val.h5"), folder / "q-test.h5")
     given = ("--truth", "q-test-answers.h5", "--html", "p.html")
     assert bench("score", "chance.h5", *given).exit_code == 0
-    assert "data:image" not in (folder / "p.html").read_text()
+    assert "data:image/webp" not in (folder / "p.html").read_text()
 
 
 def test_chance_goes_all_the_way(truths, folder):

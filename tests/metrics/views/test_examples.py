@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from metrics.views.examples import chosen_questions
-from metrics.views.examples import chosen_scenes
+from metrics.views.examples import chosen_questions, chosen_scenes
 
 
 def test_scenes_stand_by_their_mean_with_the_view_nearest_to_it():

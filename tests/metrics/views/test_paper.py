@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from metrics.views.paper import TABLES
 from metrics.scoring.metric_names import metric
+from metrics.views.paper import TABLES
 
 # Rows of numbers, copied from the authors' source; what stands before the first & is dropped.
 TABLE_1 = r"""

@@ -9,9 +9,9 @@ import pytest
 from made_scores import iqtt_scores, rooms_scores
 from scipy.stats import binomtest, norm
 
+from metrics.measures.statistics import bootstrap_interval
 from metrics.views.compare.compare import Difference, compare, least_p_value
 from metrics.views.compare.paired_tests import holm
-from metrics.measures.statistics import bootstrap_interval
 
 SCENES = np.repeat(np.arange(8), 2)
 

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binomtest, permutation_test
 
+from metrics.measures.checks import EmptyError, MeasureError, NonFiniteError
 from metrics.views.compare.paired_tests import (
     holm,
     mcnemar_exact,
@@ -13,7 +14,6 @@ from metrics.views.compare.paired_tests import (
     smallest_detectable_difference,
     smallest_significant_fraction,
 )
-from metrics.measures.checks import EmptyError, MeasureError, NonFiniteError
 
 
 def detectable(differences, _):

@@ -8,9 +8,9 @@ import pytest
 from made_scores import DIGEST, iqtt_scores, rooms_scores, stated
 from refusals import refused
 
+from metrics.scoring.metric_names import UnknownMetricError
 from metrics.views.compare.compare import compare
 from metrics.views.compare.pairing import ComparisonError
-from metrics.scoring.metric_names import UnknownMetricError
 
 SCENES = [0, 0, 1, 1, 2, 2]
 

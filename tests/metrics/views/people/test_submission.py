@@ -9,12 +9,12 @@ from quizzes import made_answers
 
 from iqtt.quiz.answers import read_answers
 from iqtt.quiz.study import Study
-from metrics.views.people.figures import counted
-from metrics.views.people.submission import write_submission
 from metrics.prediction_writer import PredictionError, write_answers
 from metrics.scoring.evaluate import score
 from metrics.scoring.runs import Settings
 from metrics.submissions.reader import open_predictions
+from metrics.views.people.figures import counted
+from metrics.views.people.submission import write_submission
 
 
 @pytest.fixture(scope="module")
