@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from iqtt.audit.features.outlines import nearest_outline
 from iqtt.audit.features.statistics import THUMBNAIL
-from iqtt.audit.probes.small_network import SmallNetwork
+from iqtt.audit.probes.patterns import pattern_responses
 from iqtt.audit.probes.trees import FOLDS, among_others, choose, next_to_reference, one_thread
 
 Array = NDArray[Any]
@@ -45,7 +45,7 @@ FAULTS = (WITHOUT, LIGHT, MIRRORED, FRAMES)
 ERROR_RATE = 0.01  # probability that some probe of a fair set of questions seems to beat chance
 LEAST_QUESTIONS = 50  # a classifier learns nothing from fewer
 COMPONENTS = 24  # principal components of thumbnails that classifiers see
-NETWORK_QUESTIONS = 2_000  # that the small network looks at, half to learn and half to answer
+PATTERN_QUESTIONS = 2_000  # whose pictures are searched for small patterns
 
 _LIGHT = {
     "brightness": "shape's brightness",
@@ -233,7 +233,7 @@ def _learned(evidence: Evidence) -> Iterator[_Guess]:
     }
     for title, values in features.items():
         yield (title, "learned", WITHOUT, choose(among_others(values), right) == right)
-    yield ("pictures, small network", "learned", WITHOUT, _by_network(statistics, right))
+    yield ("small patterns of pixels", "learned", WITHOUT, _by_patterns(statistics, right))
     columns = next_to_reference(outline, apart[:, 0, 1:])
     yield ("outlines, by trees", "learned", OUTLINE, choose(columns, right) == right)
     cubes = np.stack(list(evidence.cubes.values()), axis=2)
@@ -247,17 +247,13 @@ def _learned(evidence: Evidence) -> Iterator[_Guess]:
             yield (title, "learned", sees, chosen == right[told])
 
 
-def _by_network(statistics: Array, right: Array) -> Array:
-    """Return which questions two small networks answer rightly, each those the other learns."""
-    rows = np.linspace(0, len(right) - 1, min(len(right), NETWORK_QUESTIONS)).astype(np.int64)
-    pictures = statistics["thumbnails"][rows, 1:].reshape(len(rows), -1, THUMBNAIL, THUMBNAIL)
-    half = np.arange(len(rows)) % 2
-    hits = np.zeros(len(rows), np.bool_)
-    for k in range(2):
-        network = SmallNetwork().fit(pictures[half != k], right[rows[half != k]])
-        chosen = network.scores(pictures[half == k]).argmax(axis=1)
-        hits[half == k] = chosen == right[rows[half == k]]
-    return hits
+def _by_patterns(statistics: Array, right: Array) -> Array:
+    """Return which questions, of at most PATTERN_QUESTIONS, small patterns answer rightly."""
+    count = min(len(right), PATTERN_QUESTIONS)
+    rows = np.linspace(0, len(right) - 1, count).astype(np.int64)
+    pictures = statistics["thumbnails"][rows, 1:].reshape(count, -1, THUMBNAIL, THUMBNAIL)
+    chosen = choose(among_others(pattern_responses(pictures)), right[rows])
+    return np.asarray(chosen == right[rows])
 
 
 def _by_place(places: Sequence[Array], answers: int) -> list[_Guess]:

@@ -42,7 +42,7 @@ def fair(seed: int, count: int = 300, answers: int = 3, **changes: Any) -> Evide
     return replace(Evidence(statistics, right, mirrored, cubes, frames, [right]), **changes)
 
 
-LEARNED_PIXELS = ("low-resolution pixels", "pictures, small network")
+LEARNED_PIXELS = ("low-resolution pixels", "small patterns of pixels")
 
 
 def shortcuts(evidence: Evidence) -> set[tuple[str, str, str]]:
@@ -162,13 +162,13 @@ def test_what_only_a_forest_sees() -> None:
     assert ("low-resolution pixels", "learned", WITHOUT) in found
 
 
-def test_marks_anywhere_are_seen_by_the_small_network() -> None:
+def test_marks_anywhere_are_seen_by_small_patterns() -> None:
     evidence = fair(12, 600)
     pictures = 0.5 + 0.1 * evidence.statistics["thumbnails"].reshape(600, 4, 32, 32)
     for row, (y, x) in enumerate(np.random.default_rng(0).integers(4, 28, (600, 2))):
         pictures[row, 1 + evidence.right[row], y, x - 2 : x + 2] = 1
     flat = pictures.reshape(600, 4, -1)
-    assert ("pictures, small network", "learned", WITHOUT) in shortcuts(
+    assert ("small patterns of pixels", "learned", WITHOUT) in shortcuts(
         changed(evidence, "thumbnails", flat)
     )
 
