@@ -4,8 +4,10 @@ Heavy imports happen inside the commands, so that `--help` is quick and works wi
 """
 
 import inspect
+import json
 import shlex
 from collections.abc import Mapping
+from dataclasses import fields
 from importlib import import_module
 from typing import Any
 
@@ -19,10 +21,12 @@ from baselines.pix2shape.commands import (
     needs_torch,
     predict_to,
     score_it,
+    shown_rows,
+    shown_training,
 )
 from scenegen.command_line.groups import EXAMPLE
 from scenegen.command_line.options import LARGEST, OVERWRITE
-from scenegen.command_line.output import print_line, progress_bar
+from scenegen.command_line.output import print_line
 from scenegen.command_line.paths import InputPath, OutputFolder
 
 UNTRAINED = {
@@ -39,8 +43,8 @@ UNTRAINED = {
     "pix2shape-views": "questions: the same, with an encoder of its own",
 }
 REFERENCE = ("pix2shape", "pix2shape-compact", "pix2shape-rays", "pix2shape-views")
-# Packages `baselines.<name>`, - written as _, whose functions `train` and `write_submission` make
-# a baseline that is trained with `bench train NAME`. A new one is a line here.
+# Baselines that are trained with `bench train NAME`. A new one is a line here and one in HOMES: a
+# module with a dataclass `Settings`, and functions `train` and `write_submission`.
 TRAINED = {
     "cnn": "questions: ResNets and a softmax over the answers",
     "depth-supervised": "rooms: a network trained with true depth, as a ceiling",
@@ -48,6 +52,14 @@ TRAINED = {
     "rezende": "questions: meshes, by a renderer without gradients",
     "siamese": "questions: the answer whose features are nearest",
     "view-pairs": "rooms: a network trained with pairs of images, no depth",
+}
+HOMES = {
+    "cnn": "resnets.cnn",
+    "depth-supervised": "relief.depth_supervised",
+    "ptn": "ptn",
+    "rezende": "rezende",
+    "siamese": "resnets.siamese",
+    "view-pairs": "relief.view_pairs",
 }
 ALL = {**UNTRAINED, **TRAINED}
 
@@ -107,48 +119,39 @@ def baseline(
     if labels is not None and name != "outline-trees":
         raise click.UsageError(f"--labels: {name} learns from none")
     method = name
-    if name in ("outline", "outline-trees"):
-        _answer_by_outline(name, data, out, train, labels, overwrite)
-    elif name in REFERENCE:
+    if name in REFERENCE:
         used = predict_to(out, weights, data, method=name, overwrite=overwrite)
         method += f", weights {used},"
-    elif name in TRAINED:
-        with progress_bar(None, "row") as bar:
-
-            def show(done: int, total: int) -> None:
-                bar.total = total
-                bar.update(done)
-
-            write = _package(name).write_submission
-            given = {} if weights is None else {"weights": weights}
-            write(data, out, **given, overwrite=overwrite, progress=show)
     elif name == "chance":
         from baselines.trivial import write_chance
 
         write_chance(data, out, seed, overwrite)
     else:
-        from baselines.trivial import write_room_baseline
-        from scenegen.rooms.reader import RoomsFile
+        with shown_rows() as show:
+            how: dict[str, Any] = {"overwrite": overwrite, "progress": show}
+            if name in TRAINED:
+                _module(name).write_submission(data, out, weights, **how)
+            elif name in ("outline", "outline-trees"):
+                _answer_by_outline(name, data, out, train, labels, how)
+            else:
+                from baselines.trivial import write_room_baseline
 
-        with RoomsFile(data) as rooms, progress_bar(len(rooms), "image") as bar:
-            how = {"overwrite": overwrite, "progress": bar.update}
-            write_room_baseline(name, data, out, train=train, **how)
+                write_room_baseline(name, data, out, train=train, **how)
     print_line(f"{out}: {method} on {data}; {score_it(out, data)}")
 
 
 def _answer_by_outline(
-    name: str, data: str, out: str, train: str | None, labels: int | None, overwrite: bool
+    name: str, data: str, out: str, train: str | None, labels: int | None, how: Mapping[str, Any]
 ) -> None:
-    from baselines.outline.submission import write_outline, write_outline_trees
+    from baselines.outline import write_outline, write_outline_trees
 
     if (train is None) == (name == "outline-trees"):
         needs = "needs" if train is None else "uses no"
         raise click.UsageError(f"--train: {name} {needs} labelled questions")
-    with progress_bar(None, "question") as bar:
-        if train is None:
-            write_outline(data, out, overwrite=overwrite, progress=bar.update)
-        else:
-            write_outline_trees(data, out, train, labels, overwrite=overwrite, progress=bar.update)
+    if train is None:
+        write_outline(data, out, **how)
+    else:
+        write_outline_trees(data, out, train, labels, **how)
 
 
 @click.command(
@@ -189,54 +192,45 @@ def train_baseline(
 ) -> None:
     """Train a baseline; weights and checkpoint are written to a folder."""
     options = {"labels": labels, "seed": seed, "iterations": iterations}
-    given = {key: value for key, value in options.items() if value is not None}
-    if resume and (given or settings):
-        own = "--labels, --seed, --iterations and --set"
-        raise click.UsageError(f"--resume goes on with the run's own {own}; leave them out")
-    train = _package(name).train
-    parameters = inspect.signature(train).parameters.values()
-    known = {p.name: p.default for p in parameters if p.kind is p.KEYWORD_ONLY}
-    for key in given:
-        if key not in known:
-            raise click.UsageError(f"--{key}: {name} has no such setting")
-    others = {key: known[key] for key in sorted(known.keys() - {*options, "resume", "progress"})}
+    chosen = {key: value for key, value in options.items() if value is not None}
+    if resume and (chosen or settings):
+        message = "--resume goes on with the run's own --labels, --seed, --iterations and --set"
+        raise click.UsageError(f"{message}; leave them out")
+    module = _module(name)
+    from scenegen.common.records import check, from_json
+
+    parameters = inspect.signature(module.train).parameters.values()
+    arguments = {p.name for p in parameters if p.kind is p.KEYWORD_ONLY} - {"resume", "progress"}
+    names = {field.name for field in fields(module.Settings)}
+    if labels is not None and "labels" not in arguments:
+        raise click.UsageError(f"--labels: {name} has no such setting")
+    others = sorted((names | arguments) - options.keys())
     for key, value in named_once(settings).items():
         if key not in others:
             raise click.UsageError(f"--set: found {key!r:.40}, expected one of {', '.join(others)}")
-        like = type(others[key])
-        if like not in (type(value), type(None)) and (like, type(value)) != (float, int):
-            text = f"--set: {key}: found {value!r:.40}, expected one like {others[key]!r}"
-            raise click.UsageError(text)
-        given[key] = value
-    bar, told = progress_bar(None, "it"), ""
+        if key in arguments:
+            check(isinstance(value, str), key, repr(value), "a text")
+        chosen[key] = value
+    how = {key: chosen.pop(key) for key in arguments & chosen.keys()}
+    made = from_json(module.Settings, json.dumps(chosen), "settings")
+    text = ""
+    with shown_training(out, every=100) as show:
 
-    def show(done: int, total: int, numbers: Mapping[str, float]) -> None:
-        nonlocal told
-        told = ", ".join(f"{key} {value:.3g}" for key, value in numbers.items())
-        if bar.total is None:  # the first iteration, of a resumed run too
-            bar.total, bar.initial, bar.n = total, done - 1, done - 1
-        bar.set_postfix_str(told, refresh=False)
-        bar.update(done - bar.n)
-        if bar.disable and (done % 100 == 0 or done == total):  # no terminal, but perhaps a log
-            print_line(f"{done} of {total}: {told}")
+        def remember(done: int, total: int, numbers: Mapping[str, float]) -> None:
+            nonlocal text
+            text = ", ".join(f"{key} {value:.3g}" for key, value in numbers.items())
+            show(done, total, numbers)
 
-    try:
-        weights = train(data, out, **given, resume=resume, progress=show)
-    except KeyboardInterrupt:
-        click.echo()
-        print_line(f"Stopped; `--resume` goes on from {out}'s last checkpoint, if it got one.")
-        raise
-    finally:
-        bar.close()
-    more = f" ({told})" if told else ""
+        weights = module.train(data, out, made, **how, resume=resume, progress=remember)
+    more = f" ({text})" if text else ""
     use = f"bench baseline {name} --weights {shlex.quote(str(weights))} --data ..."
     print_line(f"{weights}: {name} trained on {data}{more}; now `{use}`")
 
 
-def _package(name: str) -> Any:
-    """Return the package of a trained baseline. Raises UserError where torch is missing."""
+def _module(name: str) -> Any:
+    """Return the module of a trained baseline. Raises UserError where torch is missing."""
     needs_torch(name, ("torch", "safetensors"))
-    return import_module(f"baselines.{name.replace('-', '_')}")
+    return import_module(f"baselines.{HOMES[name]}")
 
 
 COMMANDS = (baseline, train_baseline)

@@ -20,7 +20,7 @@ from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 ROOM_BASELINES = ("constant", "mean-depth", "empty-room", "oracle")
-Progress = Callable[[int], Any]
+Progress = Callable[[int, int], Any]  # rows done since the last call, in all
 
 
 def write_room_baseline(
@@ -30,7 +30,7 @@ def write_room_baseline(
     *,
     train: str | Path | None = None,
     overwrite: bool = False,
-    progress: Progress = lambda done: None,
+    progress: Progress = lambda done, total: None,
 ) -> None:
     """Write the submission of a baseline for a rooms file.
 
@@ -66,7 +66,7 @@ def write_room_baseline(
                     fov = float(rooms.read("camera/fov_y_degrees", row))
                     size = rooms.spec.height, rooms.spec.width
                     submission.add(row, *empty_room(matrix, fov, *size))
-                progress(1)
+                progress(1, len(rooms))
 
 
 def write_chance(data: str | Path, out: str | Path, seed: int = 0, overwrite: bool = False) -> None:
@@ -85,18 +85,18 @@ def _mean_depth(rooms: RoomsFile, train: str | Path) -> Array:
     with RoomsFile(train) as training:
         same_rooms = training.fingerprint == rooms.fingerprint
         if same_rooms or training.spec.seed == rooms.spec.seed:
-            found = f"the test file's seed, {rooms.spec.seed}, and so its cameras and places"
+            message = f"the test file's seed, {rooms.spec.seed}, and so its cameras and places"
             hint = "render training rooms with another --seed"
-            raise SpecError("train", found, "another seed", hint)
-        sizes = [f"images of {one.spec.height}x{one.spec.width}" for one in (training, rooms)]
+            raise SpecError("train", message, "another seed", hint)
+        sizes = [f"images of {file.spec.height}x{file.spec.width}" for file in (training, rooms)]
         if sizes[0] != sizes[1]:
             raise SpecError("train", sizes[0], f"{sizes[1]}, as in the test file")
         shape = training.spec.height, training.spec.width
         total, count = np.zeros(shape), np.zeros(shape)
         for row in range(len(training)):
             depth = training.read("depth", row)
-            known = np.isfinite(depth)
-            total += np.where(known, depth, 0.0)
-            count += known
+            surface = np.isfinite(depth)
+            total += np.where(surface, depth, 0.0)
+            count += surface
     overall = total.sum() / max(count.sum(), 1.0)
     return np.where(count > 0, total / np.maximum(count, 1.0), overall)

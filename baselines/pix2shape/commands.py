@@ -5,6 +5,8 @@ Heavy imports happen inside the commands, so that `--help` is quick and works wi
 
 import shlex
 import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import click
@@ -16,9 +18,9 @@ from scenegen.command_line.paths import InputPath, OutputFolder, OutputPath
 from scenegen.common.errors import SceneGenError
 
 PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
-A_MODEL = "A .safetensors file with its .json beside it, or the name of bundled weights"
+A_MODEL = "A .safetensors file, or the name of bundled weights"
 
-WEIGHTS_PATH = InputPath(beside=lambda path: [path.with_suffix(".json")])
+WEIGHTS_PATH = InputPath()
 WEIGHTS = click.option(
     "--weights", type=WEIGHTS_PATH, help=f"{A_MODEL}  [those that suit the data]."
 )
@@ -92,8 +94,8 @@ def named_once(settings: tuple[tuple[str, Any], ...], **options: Any) -> dict[st
     "settings",
     type=Setting(),
     multiple=True,
-    help="Change one setting of the configuration, such as batch=8 or networks.size=128; the"
-    " weights.json of a run lists all settings.",
+    help="Change one setting of the configuration, such as batch=8 or networks.size=128;"
+    " docs/pix2shape.md lists them.",
 )
 @click.option("--seed", type=click.IntRange(0, LARGEST), help="Seed of every random choice  [0].")
 @number("--labels", least=0, default=0, text="Labelled questions whose answers may be used.")
@@ -151,62 +153,73 @@ def train(
     """
     needs_torch()
     from baselines.pix2shape.network.config import model_config
-    from baselines.pix2shape.training import launch
-    from baselines.pix2shape.training.runs import train_run
-    from baselines.pix2shape.use.predict import chosen_device
+    from baselines.pix2shape.training.run import train_run
+    from baselines.training import launch
 
     chosen = named_once(settings, **({} if seed is None else {"seed": seed}))
     if resume and (config or chosen or labels or conditional or start):
-        own = "--config, --set, --seed, --labels, --conditional and --start"
-        raise click.UsageError(f"--resume goes on with the run's own {own}; leave them out")
+        options = "--config, --set, --seed, --labels, --conditional and --start"
+        raise click.UsageError(f"--resume goes on with the run's own {options}; leave them out")
     here, machines = launch.started_elsewhere()
-    devices, nodes = devices or here, nodes or machines
-    accelerator = "gpu" if chosen_device(device, devices).type == "cuda" else "cpu"
-    bar: Any = None
-
-    def show(state: Any, losses: dict[str, float]) -> None:
-        nonlocal bar
-        last = state.model.config.iterations
-        told = {name: f"{value:.3g}" for name, value in losses.items()}
-        if bar is None:  # the first iteration, of a resumed run too; only the first process shows
-            bar = progress_bar(last, "it")
-            bar.initial = bar.n = max(0, state.iteration - 1)
-        bar.set_postfix(told, refresh=False)
-        bar.update(state.iteration - bar.n)  # none while images are matched
-        logged = state.iteration and state.iteration % every == 0
-        if bar.disable and logged:  # no terminal, but perhaps a log
-            losses_told = ", ".join(f"{name} {value}" for name, value in told.items())
-            print_line(f"{state.iteration} of {last}, {state.seconds:.0f} s: {losses_told}")
-
+    machine = launch.Machine(device, devices or here, nodes or machines, workers, every)
     try:
-        weights = train_run(
-            out,
-            data,
-            None if resume else model_config(config or "compact", **chosen),
-            launch.Machine(accelerator, devices, nodes, workers, every),
-            labels=labels,
-            conditional=conditional,
-            start=start,
-            precision=precision,
-            chosen=chosen,
-            progress=show,
-        )
+        with shown_training(out, every) as show:
+            weights = train_run(
+                out,
+                data,
+                None if resume else model_config(config or "compact", **chosen),
+                machine,
+                labels=labels,
+                conditional=conditional,
+                start=start,
+                precision=precision,
+                chosen=chosen,
+                progress=show,
+            )
     except KeyboardInterrupt:
         if not launch.is_first_here():
             sys.exit(1)
-        click.echo()
-        print_line(f"Stopped; `--resume` goes on from {out}'s last checkpoint, if it got one.")
         raise
     except (SceneGenError, OSError) as error:
         if launch.is_told_elsewhere(error):
             sys.exit(2)
         raise
-    finally:
-        if bar is not None:
-            bar.close()
     if weights is not None:  # None in all processes but the first
         named = shlex.quote(str(weights))
         print_line(f"{weights}: trained on {data}; now `pix2shape predict --weights {named} ...`")
+
+
+@contextmanager
+def shown_training(
+    out: str, every: int
+) -> Iterator[Callable[[int, int, Mapping[str, float]], None]]:
+    """Give a function that shows iterations done, in all, and losses: as a bar, or in lines.
+
+    Lines come every `every` iterations where there is no terminal, but perhaps a log.
+    """
+    bar: Any = None
+
+    def show(done: int, total: int, losses: Mapping[str, float]) -> None:
+        nonlocal bar
+        text = ", ".join(f"{name} {value:.3g}" for name, value in losses.items())
+        if bar is None:  # the first iteration, of a resumed run too; only the first process shows
+            bar = progress_bar(total, "it")
+            bar.initial = bar.n = max(0, done - 1)
+        bar.set_postfix_str(text, refresh=False)
+        bar.update(done - bar.n)  # none while images are matched
+        if bar.disable and done and (done % every == 0 or done == total):
+            print_line(f"{done} of {total}: {text}")
+
+    try:
+        yield show
+    except KeyboardInterrupt:
+        if bar is not None:
+            click.echo()
+            print_line(f"Stopped; `--resume` goes on from {out}'s last checkpoint, if it got one.")
+        raise
+    finally:
+        if bar is not None:
+            bar.close()
 
 
 @click.command(epilog=f"{EXAMPLE}pix2shape predict --data rooms.h5 --out predictions.h5")
@@ -238,17 +251,24 @@ def predict_to(
     """
     needs_torch()
     from baselines.pix2shape.use.predict import predict_file
-    from baselines.pix2shape.weights.bundled import suited
+    from baselines.pix2shape.weights import suited
 
     weights = weights or suited(data, method)
+    with shown_rows() as show:
+        predict_file(weights, data, out, **how, method=method, progress=show)
+    return weights
+
+
+@contextmanager
+def shown_rows() -> Iterator[Callable[[int, int], None]]:
+    """Give a function that shows, as a bar, rows done since its last call, and rows in all."""
     with progress_bar(None, "row") as bar:
 
         def show(done: int, total: int) -> None:
             bar.total = total
             bar.update(done)
 
-        predict_file(weights, data, out, **how, method=method, progress=show)
-    return weights
+        yield show
 
 
 def score_it(out: str, data: str) -> str:

@@ -39,7 +39,7 @@ def sample(
     needs_torch()
     from baselines.pix2shape.pictures import check_picture, save_pictures
     from baselines.pix2shape.use.explore import sample_sheet
-    from baselines.pix2shape.weights.bundled import open_weights
+    from baselines.pix2shape.weights import open_weights
 
     check_picture(out, False, overwrite)
     model, card = open_weights(weights)
@@ -113,7 +113,7 @@ def _model_and_rooms(
     needs_torch()
     from baselines.pix2shape.pictures import check_picture
     from baselines.pix2shape.use.explore import known_rooms
-    from baselines.pix2shape.weights.bundled import open_weights, suited
+    from baselines.pix2shape.weights import open_weights, suited
     from scenegen.rooms.preview import pick_rows
 
     check_picture(out, animated, overwrite)

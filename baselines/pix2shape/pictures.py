@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from torch import Tensor
 
-from baselines.pix2shape.data.rooms import Batch
+from baselines.pix2shape.batch import Batch
 from baselines.pix2shape.network.model import Pix2Shape, Views, shaded
 from baselines.pix2shape.network.surfels import normals_from_depth
 from scenegen.common.errors import SceneGenError, SpecError
@@ -18,7 +17,6 @@ from scenegen.files.new_file import check_writable, written_beside
 from scenegen.rooms import preview
 from scenegen.rooms.preview import BACKGROUND, GAP, SMALLEST_TILE
 
-Array = NDArray[Any]
 Tiles = list[NDArray[np.uint8]]  # (H, W, 3) each
 FRAME_MILLISECONDS = 80
 

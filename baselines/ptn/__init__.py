@@ -1,12 +1,10 @@
 """Perspective Transformer Nets (Yan et al., NeurIPS 2016): voxels learnt from silhouettes alone.
 
     projection.py   the transformer: a volume seen along the rays of a camera, differentiable
-    network.py      settings, encoder and volume decoder
-    batches.py      what an iteration sees
+    network.py      settings, card, encoder and volume decoder
     silhouettes.py  silhouettes of a room's objects, from the image or from ids
     rooms.py        batches of rooms of several views
     questions.py    batches of polycubes
-    card.py         the card of weights
     matching.py     which of the answers shows the reference's volume
     submission.py   `write_submission`
     training.py     `train`
@@ -16,4 +14,5 @@ docs/baselines.md says what it is told that other baselines are not, and what it
 
 from scenegen.common.lazy_names import lazy_names
 
-__getattr__ = lazy_names(__name__, {"training": "train", "submission": "write_submission"})
+HOMES = {"network": "Settings", "training": "train", "submission": "write_submission"}
+__getattr__ = lazy_names(__name__, HOMES)

@@ -14,6 +14,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from baselines.ptn.network import VOXELS, Ptn
+from baselines.training.rotations import rotation_grid
 from scenegen.common.rotations import rotation_matrix
 
 COARSE, FINE = 8, 16  # voxels a side of the volumes that are compared, at first and at last
@@ -21,23 +22,9 @@ GRID = 1200  # rotations that are tried first, some 20 degrees apart
 KEPT, TURNS = 4, 32  # how many of the best are turned further, and in how many ways each
 FINER = ((0.2, COARSE), (0.1, FINE))  # radians of these turns, and voxels a side, in each round
 CHUNK = 256  # rotations at a time
-PSI = 1.533751168755204288118041  # positive root of psi^4 = psi + 4
 FEATURES = ("fit of volumes", "nearness of codes")
 FINELY = 4
 RIDGE = 1e-3  # keeps the head's weights finite where labels are few
-
-
-def rotation_grid(count: int) -> Tensor:
-    """Return rotations spread evenly over SO(3), (count, 3, 3).
-
-    Super-Fibonacci spirals: Alexa, "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling of
-    SO(3)" (CVPR 2022).
-    """
-    s = np.arange(count) + 0.5
-    r, rest = np.sqrt(s / count), np.sqrt(1 - s / count)
-    a, b = 2 * math.pi * s / math.sqrt(2), 2 * math.pi * s / PSI
-    quaternion = np.stack([r * np.sin(a), r * np.cos(a), rest * np.sin(b), rest * np.cos(b)])
-    return torch.from_numpy(rotation_matrix(quaternion)).float()
 
 
 def small_turns(count: int, angle: float) -> Tensor:
@@ -61,10 +48,10 @@ def best_fits(reference: Tensor, answers: Tensor) -> Tensor:
             middle.
         answers: (K, D, D, D).
     """
-    start = rotation_grid(GRID)
-    found = _level(reference, answers, COARSE).fits(start)
+    start = torch.from_numpy(rotation_grid(GRID))
+    coarse = _level(reference, answers, COARSE).fits(start)
     best = []
-    for answer, first in zip(answers, found.unbind(dim=1), strict=True):
+    for answer, first in zip(answers, coarse.unbind(dim=1), strict=True):
         turns, fits = start, first
         for angle, side in FINER:
             top = turns[fits.topk(KEPT).indices]
@@ -92,11 +79,11 @@ class _Level:
         side = len(self.reference)
         voxels, parts = self.reference.flatten(), []
         strides = torch.tensor([1.0, side, side * side])
-        for some in torch.split(rotations, CHUNK):
-            places = self.points @ some  # the inverse of each rotation, on the left
+        for chunk in torch.split(rotations, CHUNK):
+            places = self.points @ chunk  # the inverse of each rotation, on the left
             nearest = places.add_(1).mul_(side / 2).floor_().clamp_(0, side - 1) @ strides
-            found = voxels.index_select(0, nearest.flatten().int()).view(nearest.shape)
-            parts.append(_centred(found))
+            values = voxels.index_select(0, nearest.flatten().int()).view(nearest.shape)
+            parts.append(_centred(values))
         return torch.cat(parts) @ self.answers.T
 
 
@@ -130,22 +117,22 @@ def features(model: Ptn, images: Tensor) -> Tensor:
     return torch.stack([fits, nearness], dim=-1)
 
 
-def fitted_head(found: Tensor, right: Tensor) -> tuple[float, ...]:
+def fitted_head(values: Tensor, right: Tensor) -> tuple[float, ...]:
     """Return weights of features that make right answers most likely, by a softmax over answers.
 
     Args:
-        found: as `features` gives them, (Q, K, F); right: (Q,).
+        values: as `features` gives them, (Q, K, F); right: (Q,).
     """
-    spread = found.std(dim=(0, 1)).clamp(min=1e-9).double()
-    scaled = found.double() / spread
-    weights = torch.zeros(found.shape[-1], dtype=torch.double, requires_grad=True)
+    spread = values.std(dim=(0, 1)).clamp(min=1e-9).double()
+    scaled = values.double() / spread
+    weights = torch.zeros(values.shape[-1], dtype=torch.double, requires_grad=True)
     optimiser = torch.optim.LBFGS([weights], max_iter=100, line_search_fn="strong_wolfe")
 
     def loss() -> Tensor:
         optimiser.zero_grad()
-        value = functional.cross_entropy(scaled @ weights, right) + RIDGE * weights.square().sum()
-        value.backward()  # type: ignore[no-untyped-call]
-        return value
+        total = functional.cross_entropy(scaled @ weights, right) + RIDGE * weights.square().sum()
+        total.backward()  # type: ignore[no-untyped-call]
+        return total
 
     optimiser.step(loss)  # type: ignore[no-untyped-call]
     return tuple((weights.detach() / spread).tolist())

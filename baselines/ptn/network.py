@@ -11,21 +11,22 @@ from itertools import pairwise
 
 import torch
 from torch import Tensor, nn
+from torch.optim import Adam
 
-from scenegen.common.records import check, normalise
+from baselines.training.checkpoint import Card as BaseCard
+from baselines.training.checkpoint import Method, check_numbers
+from scenegen.common.records import LARGEST, check
 
 VOXELS = 32  # along each side of the volume; the decoder's layers give no other number
 FIRST_BIAS = -2.0  # of the occupancies' logits: most of a volume is empty
-PAPER_WIDTH = 64
+Corner = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class PtnConfig:
-    """The settings of networks and training; defaults suit one core, `width` 64 is the paper's.
+class Settings:
+    """Settings of networks and training; defaults suit one core, `width` 64 is the paper's.
 
     Attributes:
-        task: "rooms", whose networks are told the image's camera, or "questions".
-        low, high: corners of the volume's box, in the frame of the volume, scene units.
         silhouettes: where those of rooms come from, "image" or "ids".
         size: side of the images that the encoder takes, pixels; a multiple of 8.
         batch: images of an iteration.
@@ -33,11 +34,9 @@ class PtnConfig:
         rays: pixels of each silhouette that an iteration looks at.
         samples: places along each ray.
         learning_rate: of Adam; it falls to zero over the second half of the iterations.
+        seed: of the first weights and of every random choice of training.
     """
 
-    task: str
-    low: tuple[float, float, float]
-    high: tuple[float, float, float]
     silhouettes: str = "image"
     size: int = 64
     width: int = 16
@@ -51,35 +50,54 @@ class PtnConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        normalise(self)
-        check(self.task in ("rooms", "questions"), "task", self.task, "rooms or questions")
         check(self.silhouettes in ("image", "ids"), "silhouettes", self.silhouettes, "image or ids")
-        check(
-            all(a < b for a, b in zip(self.low, self.high, strict=True)), "low", self.low, "< high"
-        )
-        check(self.size % 8 == 0 and 8 <= self.size <= 512, "size", self.size, "8 to 512, by 8")
-        check(self.width % 2 == 0 and 2 <= self.width <= 256, "width", self.width, "even, 2 to 256")
-        for name in ("iterations", "batch", "views", "rays"):
-            check(1 <= getattr(self, name) <= 10**7, name, getattr(self, name), "1 to 10**7")
-        check(2 <= self.samples <= 1024, "samples", self.samples, "2 to 1024")
-        check(0 < self.learning_rate <= 1, "learning rate", self.learning_rate, "0 to 1")
-        check(0 <= self.weight_decay <= 1, "weight decay", self.weight_decay, "0 to 1")
+        ranges = {
+            "size": (8, 512), "width": (2, 256), "iterations": (1, 10**7), "batch": (1, 10**7),
+            "views": (1, 10**7), "rays": (1, 10**7), "samples": (2, 1024),
+            "learning_rate": (1e-12, 1), "weight_decay": (0, 1), "seed": (0, LARGEST),
+        }  # fmt: skip
+        check_numbers(self, ranges)
+        check(self.size % 8 == 0, "size", self.size, "a multiple of 8")
+        check(self.width % 2 == 0, "width", self.width, "an even number")
+
+
+@dataclass(frozen=True)
+class Card(BaseCard):
+    """The card of a model.
+
+    Attributes:
+        task: "rooms", whose networks are told the image's camera, or "questions".
+        low, high: corners of the volume's box, in the frame of the volume, scene units.
+        head: how the features of an answer are weighted, for questions (`matching.features`).
+    """
+
+    settings: Settings
+    task: str = "rooms"
+    low: Corner = (0.0, 0.0, 0.0)
+    high: Corner = (1.0, 1.0, 1.0)
+    head: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check(self.task in ("rooms", "questions"), "task", self.task, "rooms or questions")
+        rising = all(a < b for a, b in zip(self.low, self.high, strict=True))
+        check(rising, "low", self.low, f"below {self.high}")
 
 
 class Ptn(nn.Module):
     """Encoder and volume decoder."""
 
-    def __init__(self, config: PtnConfig) -> None:
-        """Make the layers."""
+    def __init__(self, settings: Settings, task: str, box: tuple[Corner, Corner]) -> None:
+        """Make the layers. The arguments are those of a `Card`."""
         super().__init__()
-        self.config = config
-        width, told = config.width, 3 * (config.task == "rooms")
+        self.settings, self._box = settings, box
+        width, told = settings.width, 3 * (task == "rooms")
         channels = (3, width, 2 * width, 4 * width)
         layers: list[nn.Module] = []
         for a, b in pairwise(channels):
             layers += [nn.Conv2d(a, b, 5, stride=2, padding=2), nn.ReLU()]
         self.pixels = nn.Sequential(*layers, nn.Flatten())
-        last, wide = 4 * width * (config.size // 8) ** 2, 16 * width
+        last, wide = 4 * width * (settings.size // 8) ** 2, 16 * width
         self.code = nn.Sequential(
             *(nn.Linear(last + told, wide), nn.ReLU()),
             *(nn.Linear(wide, wide), nn.ReLU()),
@@ -104,12 +122,11 @@ class Ptn(nn.Module):
     @property
     def box(self) -> Tensor:
         """Corners of the volume, (2, 3)."""
-        return torch.tensor((self.config.low, self.config.high))
+        return torch.tensor(self._box)
 
     def encode(self, image: Tensor, camera: Tensor) -> Tensor:
         """Return codes, (B, 8 width), of images, (B, 3, S, S), and cameras, (B, 3 or 0)."""
-        found: Tensor = self.code(torch.cat([self.pixels(image - 0.5), camera], dim=1))
-        return found
+        return self.code(torch.cat([self.pixels(image - 0.5), camera], dim=1))
 
     def decode(self, code: Tensor, camera: Tensor) -> Tensor:
         """Return occupancies from 0 to 1, (B, 32, 32, 32) by z, y and x."""
@@ -118,3 +135,14 @@ class Ptn(nn.Module):
     def forward(self, image: Tensor, camera: Tensor) -> Tensor:
         """Return the volumes of images: `decode` of `encode`."""
         return self.decode(self.encode(image, camera), camera)
+
+
+def _network(card: Card) -> Ptn:
+    return Ptn(card.settings, card.task, (card.low, card.high))
+
+
+def _optimisers(card: Card, model: Ptn) -> dict[str, Adam]:
+    return {"adam": Adam(model.parameters(), weight_decay=card.settings.weight_decay)}
+
+
+METHOD = Method("ptn", Card, _network, _optimisers)

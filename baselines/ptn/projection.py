@@ -7,9 +7,29 @@ where it enters and leaves the volume's box, instead of over planes of depth tha
 all rays, so that none is wasted outside. Functions of tensors; places are in the volume's frame.
 """
 
+from dataclasses import dataclass
+
 import torch
 from torch import Tensor
 from torch.nn import functional
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """B images, with R rays each, over all of its views, in the frame of the image's volume.
+
+    Attributes:
+        image: linear radiance, (B, 3, S, S).
+        camera: position of the image's camera, (B, 3); (B, 0) where the model is not told it.
+        origin, direction: of rays through pixels' centres, (B, R, 3).
+        silhouette: whether a ray meets the shape, 0 or 1, (B, R).
+    """
+
+    image: Tensor
+    camera: Tensor
+    origin: Tensor
+    direction: Tensor
+    silhouette: Tensor
 
 
 def sampled(volume: Tensor, box: Tensor, points: Tensor) -> Tensor:
@@ -24,8 +44,10 @@ def sampled(volume: Tensor, box: Tensor, points: Tensor) -> Tensor:
     """
     low, high = box
     grid = (2 * (points - low) / (high - low) - 1)[:, :, None, None]
-    found = functional.grid_sample(volume[:, None], grid, padding_mode="zeros", align_corners=False)
-    return found[:, 0, :, 0, 0]
+    values = functional.grid_sample(
+        volume[:, None], grid, padding_mode="zeros", align_corners=False
+    )
+    return values[:, 0, :, 0, 0]
 
 
 def crossing(box: Tensor, origin: Tensor, direction: Tensor) -> tuple[Tensor, Tensor]:
@@ -86,7 +108,8 @@ def first_hit(
     place = above.int().argmax(dim=-1, keepdim=True)
     before = (place - 1).clamp(min=0)
     (v0, v1), (r0, r1) = (
-        [one.gather(-1, at).squeeze(-1) for at in (before, place)] for one in (values, reach)
+        [numbers.gather(-1, at).squeeze(-1) for at in (before, place)]
+        for numbers in (values, reach)
     )
     share = torch.where(v1 > v0, (threshold - v0) / (v1 - v0).clamp(min=1e-12), 1.0)
     return torch.where(above.any(dim=-1), r0 + (r1 - r0) * share.clamp(0, 1), torch.nan)

@@ -5,33 +5,24 @@ mirror that swaps x and z, so an image whose camera stands nearer the z axis is 
 network only ever sees rooms from one side.
 """
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
-from baselines.pix2shape.data.rooms import camera_poses, check_reducible, room_image
-from baselines.ptn.batches import Batch
-from baselines.ptn.network import PtnConfig
+from baselines.ptn.network import Corner, Settings
+from baselines.ptn.projection import Batch
 from baselines.ptn.silhouettes import Silhouettes
+from baselines.training.images import Array, check_reducible
+from baselines.training.rooms import camera_poses, room_image
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import SpecError
+from scenegen.description.specs import DatasetSpec
 from scenegen.rooms.reader import RoomsFile
 
-Array = NDArray[Any]
-Corner = tuple[float, float, float]
 SWAPPED = (2, 1, 0)  # x, y, z of the mirrored room
 
 
-def room_box(path: str | Path) -> tuple[Corner, Corner]:
-    """Return the corners of the part of the unit box that a file's objects can reach.
-
-    Raises as `RoomsFile`.
-    """
-    with RoomsFile(path) as rooms:
-        spec = rooms.spec
+def room_box(spec: DatasetSpec) -> tuple[Corner, Corner]:
+    """Return the corners of the part of the unit box that objects can reach."""
     return (0.0, 0.0, 0.0), (1.0, min(1.0, 2 * spec.object_radius[1]), 1.0)
 
 
@@ -88,21 +79,9 @@ class TrainingRooms:
         fingerprint, data: fingerprint and request of the file.
     """
 
-    def __init__(self, path: str | Path, config: PtnConfig) -> None:
-        """Check the file. Raises SpecError where a scene has one view; as `RoomsFile`."""
-        self._rooms = rooms = RoomsFile(path)
-        try:
-            self._prepare(rooms, config)
-        except BaseException:
-            self.close()
-            raise
-
-    def close(self) -> None:
-        """Close the file."""
-        self._rooms.close()
-
-    def _prepare(self, rooms: RoomsFile, config: PtnConfig) -> None:
-        self._images, self._config = RoomImages(rooms, config.size), config
+    def __init__(self, rooms: RoomsFile, settings: Settings) -> None:
+        """Check an open file. Raises SpecError where a scene has one view; as `RoomImages`."""
+        self._images, self._settings = RoomImages(rooms, settings.size), settings
         single = [rows[0] for rows in self._images.rows_of if len(rows) < 2]
         if single:
             scene = int(rooms.read("scene_index", int(single[0])))
@@ -110,26 +89,26 @@ class TrainingRooms:
             hint = "render the file with --views 0,35,80"
             raise SpecError(f"{rooms.path}: scene {scene}", "one view", expected, hint)
         self.fingerprint, self.data = rooms.fingerprint, rooms.spec.to_json()
-        self._silhouettes = Silhouettes(rooms, config.silhouettes)
+        self._silhouettes = Silhouettes(rooms, settings.silhouettes)
 
     def batch(self, rng: np.random.Generator) -> Batch:
         """Draw a batch: any view of a scene is the input, and the volume is seen from `views`."""
-        config, images = self._config, self._images
+        settings, images = self._settings, self._images
         count = images.shape[0] * images.shape[1]
         made: list[tuple[Array, Array, Array, Array]] = []
-        for scene in rng.integers(len(images.rows_of), size=config.batch):
+        for scene in rng.integers(len(images.rows_of), size=settings.batch):
             rows = images.rows_of[scene]
             row = int(rng.choice(rows))
             mirrored = bool(images.mirrored[row])
-            rays, found = [], []
-            again = len(rows) < config.views
-            for other in rng.choice(rows, size=config.views, replace=again):
-                pixels = rng.integers(count, size=config.rays)
+            rays, meets = [], []
+            again = len(rows) < settings.views
+            for other in rng.choice(rows, size=settings.views, replace=again):
+                pixels = rng.integers(count, size=settings.rays)
                 world = images.rays(int(other), pixels)
-                found.append(self._silhouettes.at(int(other), pixels, *world))
+                meets.append(self._silhouettes.at(int(other), pixels, *world))
                 rays.append(world[..., [*SWAPPED]] if mirrored else world)
             joined = np.concatenate(rays, axis=1)
-            made.append((images.image(row), images.camera(row), joined, np.concatenate(found)))
+            made.append((images.image(row), images.camera(row), joined, np.concatenate(meets)))
         image, camera, rays_, shown = (
             torch.from_numpy(np.stack(part).astype(np.float32)) for part in zip(*made, strict=True)
         )

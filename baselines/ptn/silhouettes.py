@@ -5,17 +5,14 @@ camera, lights and reflectance of the walls, and a pixel that differs shows an o
 up to rounding, as the paper's shading equation knows no shadows and no light from other surfaces.
 """
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from baselines.training.images import Array
 from scenegen.common.errors import SpecError
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rendering.shading import shade
 from scenegen.rooms.reader import RoomsFile
 
-Array = NDArray[Any]
 ROUNDING = {"uint8": 0.75 / 255, "float16": 2e-3, "float32": 1e-4}  # of the stored radiance
 LIGHTS = ("count", "position", "color", "ambient", "attenuation")
 

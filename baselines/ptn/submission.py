@@ -5,31 +5,28 @@ where the occupancy along a pixel's ray first exceeds a half; elsewhere the empt
 the method is told, as its volume holds objects alone.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
-from baselines.checkpoints import load_weights
-from baselines.pix2shape.data.rooms import channels_first, check_reducible, is_question_file
-from baselines.ptn.card import RECIPE, Card
 from baselines.ptn.matching import features
-from baselines.ptn.network import Ptn
+from baselines.ptn.network import METHOD, Ptn
 from baselines.ptn.projection import first_hit, outward
 from baselines.ptn.rooms import SWAPPED, RoomImages
-from iqtt.files.reader import QuestionsFile, open_questions, parts
+from baselines.training.checkpoint import load_weights
+from baselines.training.images import Array
+from baselines.training.questions import each_question, is_question_file, open_test
 from metrics.measures.empty_room import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
+from scenegen import open_rooms
 from scenegen.common.errors import SpecError
+from scenegen.common.records import check
 from scenegen.files.new_file import check_writable
-from scenegen.rendering.ground_truth import decode_image
-from scenegen.rooms.reader import RoomsFile
 
-Array = NDArray[Any]
 FILES = Path(__file__).with_name("files")
 SAMPLES = 96  # places along each ray, closer than in training
 AT_ONCE = 16  # questions
@@ -57,66 +54,36 @@ def write_submission(
     Raises SpecError where weights and data do not fit; OSError, FileFormatError.
     """
     task = "questions" if is_question_file(data) else "rooms"
-    if weights is None:
-        weights = FILES / f"{task}.safetensors"
-        if not weights.is_file():
-            hint = "train some with `bench train ptn` and name them with --weights"
-            raise SpecError("weights", "none", f"some of ptn for {task}", hint)
-    state = load_weights(weights, RECIPE)
-    model, card = state.network, state.card
-    if card.config.task != task:
-        raise SpecError(weights, f"weights for {card.config.task}", f"some for {task}")
+    model, card = load_weights(weights or FILES / f"ptn-{task}.safetensors", METHOD)
+    if card.task != task:
+        raise SpecError(weights, f"weights for {card.task}", f"some for {task}")
     check_writable(Path(out), overwrite)
     if task == "rooms":
-        if compare is not None:
-            raise SpecError("compare", repr(compare), "none, as rooms ask no questions")
+        check(compare is None, "compare", compare, "none, as rooms ask no questions")
         _predict_rooms(model, data, out, run, overwrite, progress)
         return
-    if compare is not None and compare not in COMPARED:
-        raise SpecError("compare", repr(compare), " or ".join(COMPARED))
-    head = COMPARED[compare] if compare else card.head or COMPARED["volumes"]
-    found = []
-    with open_test_questions(data, card) as questions:
-        count = len(questions)
-        for some in feature_batches(model, questions, count):
-            found.append((some.double() @ torch.tensor(head, dtype=torch.double)).numpy())
-            progress(len(some), count)
+    check(compare is None or compare in COMPARED, "compare", compare, " or ".join(COMPARED))
+    head = torch.tensor(
+        COMPARED[compare] if compare else card.head or COMPARED["volumes"], dtype=torch.double
+    )
+
+    def scores(images: Tensor) -> Tensor:
+        return features(model, images).double() @ head
+
+    with open_test(data, card.settings.size) as questions:
+        values = each_question(questions, card.settings.size, scores, AT_ONCE, progress=progress)
+    how: dict[str, Any] = {"run": run, "overwrite": overwrite}
     method = f"ptn {compare}" if compare else "ptn"
-    scores = np.concatenate(found)
-    write_answers(out, data, method=method, scores=scores, run=run, overwrite=overwrite)
-
-
-def open_test_questions(data: str | Path, card: Card) -> QuestionsFile:
-    """Open questions to answer. Raises as `QuestionsFile`, and SpecError for training questions."""
-    if len(parts(data)) > 1:
-        raise SpecError(data, "training questions", "questions to answer, such as iqtt-test.h5")
-    questions = open_questions(data)
-    try:
-        check_reducible(data, questions.height, questions.width, card.config.size)
-    except BaseException:
-        questions.close()
-        raise
-    return questions
-
-
-def feature_batches(model: Ptn, questions: QuestionsFile, count: int) -> Iterator[Tensor]:
-    """Yield `matching.features` of the first questions of a table, batch after batch."""
-    size = model.config.size
-    for first in range(0, count, AT_ONCE):
-        stored = decode_image(
-            questions.read("questions", slice(first, min(first + AT_ONCE, count)))
-        )
-        images = np.stack([[channels_first(one, size) for one in question] for question in stored])
-        yield features(model, torch.from_numpy(images))
+    write_answers(out, data, method=method, scores=values.numpy(), **how)
 
 
 @torch.inference_mode()
 def _predict_rooms(
     model: Ptn, data: str | Path, out: str | Path, run: str, overwrite: bool, progress: Progress
 ) -> None:
-    method = "ptn" if model.config.silhouettes == "image" else "ptn, silhouettes from ids"
-    with RoomsFile(data) as rooms:
-        images = RoomImages(rooms, model.config.size)
+    method = "ptn" if model.settings.silhouettes == "image" else "ptn, silhouettes from ids"
+    with open_rooms(data) as rooms:
+        images = RoomImages(rooms, model.settings.size)
         how: dict[str, Any] = {"method": method, "run": run, "overwrite": overwrite}
         with RoomPredictionWriter(out, data, **how) as file:
             for rows in images.rows_of:

@@ -6,18 +6,17 @@
     network.py      encoder and decoder of the variational model, and the head that labels train
     images.py       what it learns from: the images of question files
     primitives.py   single basic shapes, rendered by scenegen, on which it works or fails
-    card.py         the card of weights: settings, and where they come from
+    card.py         settings, and the card of weights
     head.py         training on labels
     training.py     training on images; start reading here
     reconstruct.py  meshes and pictures of trained weights
     answers.py      answers to questions
 
 docs/baselines.md says what the paper leaves open and where this method fails: objects must be
-alone, centred and without background. `train` and `write_submission` are loaded when they are
-first used.
+alone, centred and without background.
 """
 
 from scenegen.common.lazy_names import lazy_names
 
-HOMES = {"training": "train", "answers": "write_submission"}
+HOMES = {"card": "Settings", "training": "train", "answers": "write_submission"}
 __getattr__ = lazy_names(__name__, HOMES)

@@ -1,40 +1,34 @@
 """Answers to questions: from meshes compared under all rotations, or from the trained head."""
 
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
+from torch import Tensor
 
-from baselines.checkpoints import load_weights
-from baselines.pix2shape.data.rooms import check_reducible, is_question_file
-from baselines.rezende.card import RECIPE
+from baselines.rezende.card import METHOD
 from baselines.rezende.head import codes_of
-from baselines.rezende.images import question_images
 from baselines.rezende.network import Model
 from baselines.rezende.reconstruct import meshes_of
-from iqtt.files.reader import open_questions, parts
+from baselines.training.checkpoint import load_weights
+from baselines.training.images import Array
+from baselines.training.questions import Progress, each_question, is_question_file, open_test
+from baselines.training.rotations import rotation_grid
 from metrics.prediction_writer import write_answers
 from scenegen.common.errors import SpecError
-from scenegen.common.rotations import rotation_matrix
 from scenegen.files.new_file import check_writable
 
-Array = NDArray[Any]
-METHOD = "rezende"
-WEIGHTS = Path(__file__).with_name("files") / "questions-0.safetensors"
+WEIGHTS = Path(__file__).with_name("files") / "rezende.safetensors"
 ROTATIONS = 512  # tried for each answer; any rotation is within about 20 degrees of one
 FINE, STEPS = 8, 8  # rotations that are refined, and steps of that
 COARSE = 42  # vertices of the reference that are turned: those of the icosphere before the last cut
-Progress = Callable[[int, int], Any]
 
 
 def write_submission(
     data: str | Path,
     out: str | Path,
-    weights: str | Path = WEIGHTS,
+    weights: str | Path | None = None,
     *,
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
@@ -55,30 +49,24 @@ def write_submission(
     if not is_question_file(data):
         hint = "it reconstructs single objects without background; docs/baselines.md says why"
         raise SpecError(data, "rooms", "questions, the only data that rezende answers", hint)
-    state = load_weights(weights, RECIPE)
-    model, card = state.network, state.card
+    model, card = load_weights(weights or WEIGHTS, METHOD)
     check_writable(Path(out), overwrite)
-    if len(parts(data)) > 1:
-        raise SpecError(data, "training questions", "questions to answer, such as iqtt-test.h5")
-    with open_questions(data) as questions:
-        check_reducible(data, questions.height, questions.width, card.size)
-        scores = []
-        for row in range(len(questions)):
-            stored = questions.read("questions", row)
-            scores.append(answer_scores(model, stored, card.size, card.labels > 0))
-            progress(1, len(questions))
-    found = np.array(scores).reshape(len(scores), -1)
-    write_answers(out, data, method=METHOD, scores=found, overwrite=overwrite)
+
+    def scores(images: Tensor) -> Tensor:
+        return model.head(codes_of(model, images)) if card.labels else mesh_scores(model, images)
+
+    with open_test(data, card.settings.size) as questions:
+        values = each_question(questions, card.settings.size, scores, 1, progress=progress)
+    numbers = values.double().numpy()
+    write_answers(out, data, method=METHOD.name, scores=numbers, overwrite=overwrite)
 
 
-def answer_scores(model: Model, stored: Array, size: int, by_head: bool) -> Array:
-    """Return the scores of a question's answers, (A,), of images as stored, (1 + A, H, W, 3)."""
-    if by_head:
-        with torch.no_grad():
-            scores: Array = model.head(codes_of(model, stored[None], size))[0].double().numpy()
-            return scores
-    meshes = meshes_of(model, np.stack(question_images(stored, size)))
-    return np.array([-mesh_distance(meshes[0], mesh) for mesh in meshes[1:]], np.float64)
+def mesh_scores(model: Model, images: Tensor) -> Tensor:
+    """Return the scores of one question's answers by their meshes, (1, A) float64."""
+    meshes = meshes_of(model, images[0].numpy())
+    return torch.tensor(
+        [[-mesh_distance(meshes[0], mesh) for mesh in meshes[1:]]], dtype=torch.double
+    )
 
 
 def mesh_distance(one: Array, other: Array) -> float:
@@ -123,14 +111,6 @@ def _distances(one: Array, other: Array, turns: Array) -> Array:
 
 
 @cache
-def rotations(count: int = ROTATIONS) -> Array:
-    """Return rotations that are spread evenly over SO(3), (count, 3, 3) float32.
-
-    Two irrational winding rates on two circles (Alexa, Super-Fibonacci spirals, CVPR 2022).
-    """
-    sqrt2, psi = 2**0.5, 1.533751168755204288118041
-    s = np.arange(count) + 0.5
-    t, d = s / count, 2 * np.pi * s
-    r, big, a, b = np.sqrt(t), np.sqrt(1 - t), d / sqrt2, d / psi
-    quaternions = np.stack([r * np.sin(a), r * np.cos(a), big * np.sin(b), big * np.cos(b)])
-    return rotation_matrix(quaternions).astype(np.float32)
+def rotations() -> Array:
+    """Return the rotations that are tried, (ROTATIONS, 3, 3) float32."""
+    return rotation_grid(ROTATIONS)

@@ -1,19 +1,18 @@
-"""The card of stored weights: settings, and what was done; and how networks are made of it."""
+"""Settings of model and training, and the card of weights."""
 
 from dataclasses import dataclass
 
 from torch.optim import Adam
 
-from baselines import checkpoints
 from baselines.rezende.network import Model
-from scenegen.common.records import LARGEST, check, normalise
-
-FORMAT_VERSION = 1
+from baselines.training.checkpoint import Card as BaseCard
+from baselines.training.checkpoint import Method, check_numbers
+from scenegen.common.records import LARGEST, check
 
 
 @dataclass(frozen=True)
-class Card:
-    """Settings of model and training, and where the weights come from.
+class Settings:
+    """Settings of model and training.
 
     Attributes:
         size: height and width that images are reduced to, pixels.
@@ -26,9 +25,6 @@ class Card:
         spread: standard deviation of offsets before anything is seen, about the sphere.
         learning_rate: of Adam; it falls linearly to 0 over the second half of training.
         seed: of the first weights and of every random choice.
-        labels: answers that the head was trained on; 0 where it was not.
-        fingerprint: of the data.
-        iteration, seconds: what has been done.
     """
 
     size: int = 32
@@ -41,29 +37,30 @@ class Card:
     spread: float = 1.0
     learning_rate: float = 0.001
     seed: int = 0
-    labels: int = 0
-    fingerprint: str = ""
-    iteration: int = 0
-    seconds: float = 0.0
-    format_version: int = FORMAT_VERSION
 
     def __post_init__(self) -> None:
-        normalise(self)
-        for name, low, high in (
-            ("size", 16, 128), ("code", 2, 1024), ("iterations", 1, LARGEST), ("batch", 1, 1024),
-            ("pairs", 1, 256), ("width", 1e-4, 1.0), ("noise", 1e-3, 10.0), ("spread", 1e-3, 1e6),
-            ("learning_rate", 1e-8, 1.0), ("seed", 0, LARGEST), ("labels", 0, LARGEST),
-            ("iteration", 0, self.iterations), ("format_version", FORMAT_VERSION, FORMAT_VERSION),
-        ):  # fmt: skip
-            value = getattr(self, name)
-            check(low <= value <= high, name.replace("_", " "), value, f"{low:g} to {high:g}")
+        ranges = {
+            "size": (16, 128), "code": (2, 1024), "iterations": (1, LARGEST), "batch": (1, 1024),
+            "pairs": (1, 256), "width": (1e-4, 1.0), "noise": (1e-3, 10.0), "spread": (1e-3, 1e6),
+            "learning_rate": (1e-8, 1.0), "seed": (0, LARGEST),
+        }  # fmt: skip
+        check_numbers(self, ranges)
         check(self.size % 8 == 0, "size", self.size, "a multiple of 8")
 
 
-def _optimiser(card: Card, model: Model) -> Adam:
-    learned = [*model.encoder.parameters(), *model.decoder.parameters()]
-    return Adam(learned, lr=card.learning_rate)
+@dataclass(frozen=True)
+class Card(BaseCard):
+    """The card of a model; `labels` is 0 where the head was not trained."""
+
+    settings: Settings
 
 
-State = checkpoints.State[Card, Model]
-RECIPE = checkpoints.Recipe("rezende", Card, lambda card: Model(card.size, card.code), _optimiser)
+def _optimisers(_card: Card, model: Model) -> dict[str, Adam]:
+    return {"adam": Adam([*model.encoder.parameters(), *model.decoder.parameters()])}
+
+
+def _network(card: Card) -> Model:
+    return Model(card.settings.size, card.settings.code)
+
+
+METHOD = Method("rezende", Card, _network, _optimisers)

@@ -1,19 +1,15 @@
 """Images of one object each, and the lights that are told with them: what the model learns from."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from baselines.pix2shape.data.rooms import channels_first, check_reducible
 from baselines.rezende.rasteriser import Views
-from iqtt.files.reader import open_questions, parts
-from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.rendering.ground_truth import decode_image
+from baselines.training.images import Array, check_reducible
+from baselines.training.questions import check_truth, question_images
+from iqtt import QuestionsFile
+from scenegen.common.errors import FileFormatError
 
-Array = NDArray[Any]
 MOST_QUESTIONS = 5_000  # that are read; their 20,000 small images take 250 MB
 
 
@@ -45,7 +41,7 @@ class Pictures:
         return replace(self.views, light_position=position, light_color=color)
 
 
-def read_question_pictures(path: str | Path, size: int, part: str | None) -> Pictures:
+def read_question_pictures(questions: QuestionsFile, size: int) -> Pictures:
     """Read the images of a file's first questions, at most MOST_QUESTIONS, four after four.
 
     As in the Pix2Shape paper, lights, cameras, reflectance and background are told; shapes,
@@ -53,26 +49,19 @@ def read_question_pictures(path: str | Path, size: int, part: str | None) -> Pic
     Lengths are scaled so that every question has the same distance of the camera, which changes no
     image.
 
-    Raises as `QuestionsFile`, and SpecError where the file tells no lights, or its images cannot
-    be reduced to `size` x `size`.
+    Raises FileFormatError; SpecError where the file tells no lights, or its images cannot be
+    reduced to `size` x `size`.
     """
-    with open_questions(path, part) as questions:
-        check_reducible(path, questions.height, questions.width, size)
-        spec, count = questions.spec, min(len(questions), MOST_QUESTIONS)
-        if spec is None or not questions.has_truth or not count:
-            lights = "with" if questions.has_truth else "without"
-            found = f"{len(questions)} questions {lights} lights"
-            expected = "some, with the group `truth` that tells the lights"
-            raise SpecError(path, found, expected, "`iqtt make-split` writes it")
-        images = []
-        for row in range(count):
-            images += question_images(questions.read("questions", row), size)
-        names = "light_position", "light_color", "camera_distance"
-        position, color, distance = (questions.read(name, slice(0, count)) for name in names)
-        if not (np.isfinite(position).all() and np.isfinite(color).all()):
-            found = "light_position or light_color that is not finite"
-            raise FileFormatError(path, found, "the lights of each image")
-        fingerprint = str(questions.fingerprint)
+    check_truth(questions)
+    check_reducible(questions.path, questions.height, questions.width, size)
+    spec, count = questions.spec, min(len(questions), MOST_QUESTIONS)
+    assert spec is not None, "check_truth asks for it"
+    images = [image for row in range(count) for image in question_images(questions, row, size)]
+    names = "light_position", "light_color", "camera_distance"
+    position, color, distance = (questions.read(name, slice(0, count)) for name in names)
+    if not (np.isfinite(position).all() and np.isfinite(color).all()):
+        message = "light_position or light_color that is not finite"
+        raise FileFormatError(questions.path, message, "the lights of each image")
     scale = (spec.camera_distance / distance)[:, None, None, None]
     rows = len(images), position.shape[2], 3
     views = Views(
@@ -86,25 +75,4 @@ def read_question_pictures(path: str | Path, size: int, part: str | None) -> Pic
         light_position=(position * scale).reshape(rows),
         light_color=(color * scale**2).reshape(rows),  # as light falls off with the square
     )
-    return Pictures(np.stack(images), 0.5 * spec.max_radius, views, fingerprint)
-
-
-def question_images(stored: Array, size: int) -> list[Array]:
-    """Return the images of one question as the encoder takes them, (3, S, S) each."""
-    return [channels_first(image, size) for image in decode_image(stored)]
-
-
-def labelled_answers(path: str | Path, labels: int) -> tuple[Array, Array]:
-    """Read images and answers of the first labelled questions of a training file.
-
-    Returns stored images, (labels, 1 + A, H, W, 3), and which answer is right, (labels,).
-    Raises as `QuestionsFile`, and SpecError where there are fewer.
-    """
-    if len(parts(path)) < 2:
-        raise SpecError(path, "no training questions", "a training file such as iqtt-train.h5")
-    with open_questions(path, "labeled") as questions:
-        known = len(questions) if questions.has_answers else 0
-        if not 1 <= labels <= known:
-            raise SpecError("labels", labels, f"0 to {known}, as many as the file has")
-        rows = slice(0, labels)
-        return questions.read("questions", rows), questions.read("answers", rows)
+    return Pictures(np.stack(images), 0.5 * spec.max_radius, views, str(questions.fingerprint))

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from baselines.pix2shape.data.rooms import channels_first
-from baselines.rezende.images import Array, Pictures
+from baselines.rezende.images import Pictures
 from baselines.rezende.rasteriser import Views
+from baselines.training.images import Array, channels_first
 from scenegen.camera import Camera, Vector3
 from scenegen.common.errors import SpecError
 from scenegen.common.random.seeding import Purpose, item_rng

@@ -6,10 +6,11 @@ import numpy as np
 import torch
 from PIL import Image
 
-from baselines.rezende.images import Array, Pictures
+from baselines.rezende.images import Pictures
 from baselines.rezende.network import Model
 from baselines.rezende.rasteriser import rasterise
 from baselines.rezende.sphere import icosphere
+from baselines.training.images import Array
 
 BATCH = 64  # images at a time
 ZOOM, GAP = 3, 2  # pixels of a sheet for each of an image, and between images

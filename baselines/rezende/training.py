@@ -14,51 +14,47 @@ The gradient of the first term with respect to decoder(z) is sampled by
 reparametrised.
 """
 
-import json
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from baselines import checkpoints
-from baselines.rezende.card import RECIPE, Card, State
+from baselines.rezende.card import METHOD, Card, Settings
 from baselines.rezende.estimator import sampled_gradient, with_gradient
-from baselines.rezende.head import train_head
-from baselines.rezende.images import Array, Pictures, labelled_answers, read_question_pictures
+from baselines.rezende.head import codes_of, train_head
+from baselines.rezende.images import Pictures, read_question_pictures
 from baselines.rezende.network import Model, divergence
 from baselines.rezende.rasteriser import project, rasterise
-from iqtt.files.reader import parts
-from scenegen.common.errors import SceneGenError
+from baselines.training.checkpoint import WEIGHTS, State, load_weights, save_weights
+from baselines.training.fit import Loss, Progress, falling_late, fit
+from baselines.training.images import Array, check_reducible
+from baselines.training.questions import (
+    LABELED,
+    UNLABELED,
+    check_labels,
+    each_question,
+    open_training,
+    training_answers,
+)
+from baselines.training.run_folder import alone_in, begun, check_new, earlier_state
 from scenegen.common.random.seeding import Purpose, item_rng, item_seed
-from scenegen.common.records import check, from_json
+from scenegen.common.records import check
 
 WINDOW = 0.16  # half the side of the window of pixels around a vertex, as a share of the picture
 EVERY = 200  # iterations between checkpoints
-Progress = Callable[[int, int, Mapping[str, float]], Any]
+LARGEST_SLOPE = 1000.0  # norm of all gradients
 
 
-@checkpoints.one_at_a_time
 def train(
     data: str | Path,
     run_folder: str | Path,
+    settings: Settings = Settings(),  # noqa: B008 (it is frozen)
     *,
     labels: int = 0,
-    seed: int = 0,
-    iterations: int = Card.iterations,
-    size: int = Card.size,
-    code: int = Card.code,
-    batch: int = Card.batch,
-    pairs: int = Card.pairs,
-    width: float = Card.width,
-    noise: float = Card.noise,
-    spread: float = Card.spread,
-    learning_rate: float = Card.learning_rate,
-    start: str | Path | None = None,
+    start: str | None = None,
     resume: bool = False,
     progress: Progress = lambda done, total, numbers: None,
 ) -> Path:
@@ -66,83 +62,70 @@ def train(
 
     Args:
         data: a file such as iqtt-train.h5; its unlabelled questions give the images.
-        run_folder: gets checkpoints, and the weights at the end.
+        run_folder: gets checkpoints and weights.
         labels: how many of the labelled questions' answers to use, the first ones.
         start: weights of an earlier run, whose encoder and decoder are kept as they are; only the
             head is trained. So runs with different labels can share them.
         resume: whether to go on from the folder's checkpoint, with the run's own settings.
         progress: called after each iteration with its number, how many there will be, and numbers.
 
-    The other settings are those of `Card`.
-
     Raises SpecError for settings or data that do not fit; FileExistsError where a new run finds a
-    checkpoint; SceneGenError where a loss is not finite; OSError, FileFormatError.
+    checkpoint; TrainingError; OSError, FileFormatError.
     """
-    given = {
-        "size": size, "code": code, "iterations": iterations, "batch": batch, "pairs": pairs,
-        "width": width, "noise": noise, "spread": spread, "learning_rate": learning_rate,
-        "seed": seed, "labels": labels,
-    }  # fmt: skip
     folder = Path(run_folder)
-    if start is not None:
-        check(
-            isinstance(start, str | Path) and not resume, "start", start, "weights, for a new run"
-        )
-        checkpoints.check_new(folder)
-        state = checkpoints.load_weights(start, RECIPE)
-        state.card = replace(state.card, labels=labels)
-    else:
-        if resume:
-            card = checkpoints.load_checkpoint(folder, RECIPE).card
+    check(start is None or not resume, "start", start, "none, as --resume goes on with a run")
+    with alone_in(folder), open_training(data, LABELED) as labelled:
+        if start is not None:
+            check_new(folder)
+            model, card = load_weights(start, METHOD)
+            card = replace(card, labels=labels)
         else:
-            card = from_json(Card, json.dumps(given), "settings")
-        if card.labels:
-            labelled_answers(data, card.labels)  # raises before the long work, not after it
-        part = "unlabeled" if len(parts(data)) > 1 else None
-        pictures = read_question_pictures(data, card.size, part)
-        state = train_pictures(pictures, folder, card, resume=resume, progress=progress)
-    if state.card.labels:
-        questions = labelled_answers(data, state.card.labels)
-        train_head(state.network, *questions, state.card.size, state.card.seed)
-    checkpoints.save_weights(folder / checkpoints.WEIGHTS, state)
-    return folder / checkpoints.WEIGHTS
+            earlier = earlier_state(folder, METHOD, resume)
+            if earlier is not None:
+                settings, labels = earlier.card.settings, earlier.card.labels
+            card = Card("rezende", settings, labels=labels)
+        check_labels(labelled, labels)  # before hours of training
+        check_reducible(data, labelled.height, labelled.width, card.settings.size)
+        if start is None:
+            with open_training(data, UNLABELED) as questions:
+                pictures = read_question_pictures(questions, settings.size)
+            card = replace(card, fingerprint=pictures.fingerprint)
+            state = begun(METHOD, card, earlier, data)
+            train_pictures(pictures, folder, state, progress)
+            model, card = state.network, state.card
+        if labels:
+            codes = each_question(
+                labelled, card.settings.size, lambda images: codes_of(model, images), 1, labels
+            )
+            train_head(model, codes, training_answers(labelled, labels), card.settings.seed)
+        save_weights(folder / WEIGHTS, METHOD, model, card)
+    return folder / WEIGHTS
 
 
 def train_pictures(
     pictures: Pictures,
     folder: Path,
-    card: Card,
-    *,
-    resume: bool = False,
+    state: State[Card, Model],
     progress: Progress = lambda done, total, numbers: None,
-) -> State:
-    """Train encoder and decoder on pictures. Raises as `train`.
+) -> None:
+    """Train encoder and decoder of a state on pictures. Raises as `fit`."""
+    settings, model = state.card.settings, state.network
 
-    With `resume` the checkpoint's card counts, not `card`.
-    """
-    if resume:
-        state = checkpoints.load_checkpoint(folder, RECIPE)
-        checkpoints.check_data("data", pictures.fingerprint, state.card.fingerprint)
-    else:
-        checkpoints.check_new(folder)
-        state = checkpoints.new_state(RECIPE, replace(card, fingerprint=pictures.fingerprint))
-    folder.mkdir(parents=True, exist_ok=True)
-    began = time.monotonic() - state.card.seconds
-    while (number := state.card.iteration) < (last := state.card.iterations):
-        numbers = _step(state, pictures, number)
-        seconds = round(time.monotonic() - began, 3)
-        state.card = replace(state.card, iteration=number + 1, seconds=seconds)
-        if (number + 1) % EVERY == 0 or number + 1 == last:
-            checkpoints.save_checkpoint(folder, state)
-        progress(number + 1, last, numbers)
-    return state
+    def losses(number: int) -> Iterator[Loss]:
+        yield bound(model, pictures, settings, number)
+
+    fit(
+        folder, METHOD, state, losses, falling_late, every=EVERY, clip=LARGEST_SLOPE,
+        progress=progress,
+    )  # fmt: skip
 
 
-def _step(state: State, pictures: Pictures, number: int) -> dict[str, float]:
-    """Take one step; return the bound's two terms for an image, in nats."""
-    card, model = state.card, state.network
-    rows = item_rng(card.seed, number, Purpose.TRAINING).integers(len(pictures), size=card.batch)
-    generator = torch.Generator().manual_seed(item_seed(card.seed, number, Purpose.TRAINING))
+def bound(model: Model, pictures: Pictures, settings: Settings, number: int) -> Loss:
+    """Return what iteration `number` minimises; its numbers are two terms of an image, in nats."""
+    rows = item_rng(settings.seed, number, Purpose.TRAINING).integers(
+        len(pictures), size=settings.batch
+    )
+    generator = torch.Generator().manual_seed(item_seed(settings.seed, number, Purpose.TRAINING))
     image = torch.from_numpy(pictures.image[rows])
     mean, log_variance = model.encode(image)
     drawn = torch.randn(mean.shape, generator=generator)
@@ -153,23 +136,13 @@ def _step(state: State, pictures: Pictures, number: int) -> dict[str, float]:
         totals.append(squared.sum(axis=(2, 3)).mean() * likelihood)
         return torch.from_numpy(near_vertices(squared, around)) * likelihood
 
-    likelihood, totals = 1 / (2 * card.noise**2), list[float]()
+    likelihood, totals = 1 / (2 * settings.noise**2), list[float]()
     around = windows(model, offsets, pictures)
-    gradient, _ = sampled_gradient(misfit, offsets, card.width, card.pairs, generator)
+    gradient, _ = sampled_gradient(misfit, offsets, settings.width, settings.pairs, generator)
     nats = divergence(mean, log_variance)
-    prior = (offsets**2).sum() / (2 * card.spread**2)
-    loss = (with_gradient(offsets, gradient) + prior + nats.sum()) / card.batch
-    terms = {"misfit": float(totals[0]), "divergence": float(nats.mean().detach())}
-    if not np.isfinite(sum(terms.values())):
-        hint = "begin again with a smaller learning rate"
-        raise SceneGenError(f"iteration {number}", "a loss that is not finite", hint=hint)
-    for group in state.optimiser.param_groups:
-        group["lr"] = card.learning_rate * min(1.0, 2 * (1 - number / card.iterations))
-    state.optimiser.zero_grad()
-    torch.autograd.backward(loss)
-    torch.nn.utils.clip_grad_norm_(state.optimiser.param_groups[0]["params"], 1000.0)
-    state.optimiser.step()
-    return terms
+    prior = (offsets**2).sum() / (2 * settings.spread**2)
+    loss = (with_gradient(offsets, gradient) + prior + nats.sum()) / settings.batch
+    return Loss(loss, {"misfit": torch.tensor(float(totals[0])), "divergence": nats.mean()})
 
 
 @torch.no_grad()

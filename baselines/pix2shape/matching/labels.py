@@ -12,7 +12,6 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from baselines.pix2shape.data.in_memory import Rooms
 from baselines.pix2shape.matching.search import (
     NOISE,
     ROUNDED_NOISE,
@@ -23,7 +22,9 @@ from baselines.pix2shape.matching.search import (
     matching_cost,
     semi_global,
 )
-from baselines.tensor_files import check_tensors, load_tensors, save_tensors
+from baselines.pix2shape.network.empty_rooms import Cameras
+from baselines.training.checkpoint import check_tensors, load_tensors, save_tensors
+from baselines.training.rooms import Rooms
 from scenegen.common.errors import FileFormatError, SpecError
 
 WIDEST = 20.0  # degrees between two views that are matched
@@ -64,8 +65,10 @@ def matched_relief(rooms: Rooms, row: int, sides: tuple[list[int], list[int]]) -
     for others in filter(None, sides):
         rows = torch.tensor([row]).expand(len(others))
         images = rooms.image[rows].float(), rooms.image[others].float()
-        cameras = rooms.cameras(rows), rooms.cameras(torch.tensor(others))
-        cost = matching_cost(images[0], cameras[0], images[1], cameras[1], noise)
+        cameras, other_cameras = (
+            Cameras(rooms.world_from_camera[views], rooms.fov_y_degrees) for views in (rows, others)
+        )
+        cost = matching_cost(images[0], cameras, images[1], other_cameras, noise)
         costs.append(cost.mean(dim=0, keepdim=True))
     return best_relief(semi_global(joint_cost(costs)))[0]
 
@@ -106,8 +109,8 @@ def labels(
         if path.exists():
             relief[rows] = _read(path, relief[rows], rooms.fingerprint)
         else:
-            found = [matched_relief(rooms, row, pairs[row]) for row in rows.tolist()]
-            relief[rows] = torch.stack(found).half()
+            maps = [matched_relief(rooms, row, pairs[row]) for row in rows.tolist()]
+            relief[rows] = torch.stack(maps).half()
             save_tensors(path, {"relief": relief[rows]}, {"fingerprint": rooms.fingerprint})
         done += len(rows)
         progress(done, len(matched))

@@ -39,6 +39,6 @@ def reprojected(
     away = -points[:, 2]
     edge = math.tan(math.radians(others.fov_y_degrees) / 2) * away.clamp(min=NEAR)
     place = torch.stack([points[:, 0], -points[:, 1]], dim=3) / edge[..., None]
-    found = functional.grid_sample(values, place, padding_mode="border", align_corners=False)
+    shown = functional.grid_sample(values, place, padding_mode="border", align_corners=False)
     seen = (place.abs() < 1).all(dim=3) & (away > NEAR)
-    return found.view(batch, -1, count, size, size), seen.view(batch, count, size, size)
+    return shown.view(batch, -1, count, size, size), seen.view(batch, count, size, size)

@@ -45,10 +45,10 @@ def matching_cost(
     tried = reliefs(image)[:, None, None]
     depth = torch.maximum(walls[:, None] - tried, entry[:, None])
     slope, other_slope = _squared_slope(image), _squared_slope(other)
-    told = torch.cat([other, other_slope], dim=1)
-    found, seen = reprojected(told, others, depth, cameras)
-    squared = (found[:, :3] - image[:, :, None]).square().sum(dim=1)
-    ratio = squared / (3 * noise**2 + SHIFT**2 * (found[:, 3] + slope) / 2)
+    values = torch.cat([other, other_slope], dim=1)
+    shown, seen = reprojected(values, others, depth, cameras)
+    squared = (shown[:, :3] - image[:, :, None]).square().sum(dim=1)
+    ratio = squared / (3 * noise**2 + SHIFT**2 * (shown[:, 3] + slope) / 2)
     return torch.where(seen, ratio / (ratio + SCALE), UNSEEN) + RISE * tried / tried[-1]
 
 

@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from baselines.pix2shape.network.shared_batch import BatchNorm1d, BatchNorm2d
+from baselines.training.processes import BatchNorm1d, BatchNorm2d
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check, normalise
 
@@ -101,12 +101,12 @@ class NetworkSpec:
         ones than 128 leave the largest layers out.
         """
         falling = table[0] > table[-1]
-        found = sorted(table)
+        rising = sorted(table)
         layers = self.size.bit_length() - 3  # strides of two from size to 4 pixels
-        while len(found) < layers:
-            found.insert(0, max(1, found[0] // 2))
-        found = found[len(found) - layers :]
-        wide = [max(4, round(self.width * channels)) for channels in found]
+        while len(rising) < layers:
+            rising.insert(0, max(1, rising[0] // 2))
+        rising = rising[len(rising) - layers :]
+        wide = [max(4, round(self.width * channels)) for channels in rising]
         return wide[::-1] if falling else wide
 
 

@@ -111,8 +111,8 @@ class Prior(nn.Module):
         (Ghosh et al. 2020, "From Variational to Deterministic Autoencoders").
         """
         if self.classes:
-            told = condition[:, -self.classes :]
-            sums, counts = told.T @ codes, told.sum(dim=0)[:, None]
+            classes = condition[:, -self.classes :]
+            sums, counts = classes.T @ codes, classes.sum(dim=0)[:, None]
             self.mean.copy_(torch.where(counts > 0, sums / counts.clamp(min=1), codes.mean(dim=0)))
         else:
             self.mean.copy_(codes.mean(dim=0))
@@ -179,10 +179,10 @@ class Pix2Shape(nn.Module):
         raw = self.decoder(code, condition).float()
         if self.config.networks.rays:
             assert cameras is not None, "networks of rays are told the camera"
-            found = self._relief(raw[:, 0])
-            relief = torch.where(found > FLAT, found, 0)
-            if self.config.networks.bounded:  # the same numbers, with the slopes of `found`
-                relief = found + (relief - found).detach()
+            smooth = self._relief(raw[:, 0])
+            relief = torch.where(smooth > FLAT, smooth, 0)
+            if self.config.networks.bounded:  # the same numbers, with the slopes of `smooth`
+                relief = smooth + (relief - smooth).detach()
             pose, fov = cameras.world_from_camera, cameras.fov_y_degrees
             walls, entry, _ = empty_rooms(pose, fov, relief.shape[-1])
             depth = torch.maximum(walls - relief, entry)

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from baselines.pix2shape.network.architecture import NetworkSpec, finished
-from baselines.pix2shape.network.shared_batch import BatchNorm1d, BatchNorm2d
+from baselines.training.processes import BatchNorm1d, BatchNorm2d
 
 CHANNELS = (256, 512, 1024)  # at an angle in 2, 4 and 8; multiplied by the width
 BRIGHT = 0.99  # a pixel of at least this radiance in all channels counts as background

@@ -6,48 +6,67 @@ So training can go on where it was stopped, and every process can take its share
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import torch
-from lightning_fabric import Fabric
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset, default_collate
 
-from baselines.pix2shape.data.questions import QuestionImages
-from baselines.pix2shape.data.rooms import Batch, Draws, RoomImages
+from baselines.pix2shape.batch import Batch
 from baselines.pix2shape.network.config import ModelConfig
-from baselines.pix2shape.network.shared_batch import LostProcessError, share
-from baselines.pix2shape.training.state import State
+from baselines.pix2shape.questions import QuestionImages
+from baselines.pix2shape.rooms import RoomImages
+from baselines.training.images import Draws
+from baselines.training.processes import LostProcessError, share
 from scenegen.common.errors import SceneGenError
 
-Source = RoomImages | QuestionImages
 LABELS_PER_PLACE = 100  # labels for each labelled question among those compared
 
 
-def batch_size(config: ModelConfig, source: Source) -> int:
-    """Return how many items a batch has: images of rooms, or questions."""
-    return config.reconstructed_questions if isinstance(source, QuestionImages) else config.batch
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """What a run learns from.
+
+    Attributes:
+        images: of rooms, or of questions.
+        labelled: questions whose first `labels` answers may be used; None if `labels` is 0.
+    """
+
+    images: RoomImages | QuestionImages
+    labelled: QuestionImages | None = None
+    labels: int = 0
+
+    @property
+    def fingerprint(self) -> str:
+        """The fingerprint of rooms, or those of the parts of a question file that are used."""
+        used = (self.images, self.labelled)
+        return " ".join(str(source.fingerprint) for source in used if source is not None)
+
+    def batch_size(self, config: ModelConfig) -> int:
+        """Return how many items a batch of images has: rooms, or questions."""
+        asks = isinstance(self.images, QuestionImages)
+        return config.reconstructed_questions if asks else config.batch
+
+    def question_sizes(self, config: ModelConfig) -> tuple[int, int]:
+        """Return how many questions with and without a label are compared in each iteration."""
+        compared = config.contrast or config.questions or config.swap
+        if not isinstance(self.images, QuestionImages) or not compared:
+            return 0, 0
+        if config.labelled_batch:
+            labelled = config.labelled_batch if self.labels else 0
+            return labelled, config.question_batch if config.contrast else 0
+        if not config.contrast:
+            return (config.question_batch if self.labels else 0), 0
+        few = -(-self.labels // LABELS_PER_PLACE)  # more would repeat few labels too often
+        labelled = min(few, config.question_batch // 4)
+        return labelled, config.question_batch - labelled
 
 
-def question_sizes(config: ModelConfig, source: Source, labels: int) -> tuple[int, int]:
-    """Return how many questions with and without a label are compared in each iteration."""
-    compared = config.contrast or config.questions or config.swap
-    if not isinstance(source, QuestionImages) or not compared:
-        return 0, 0
-    if config.labelled_batch:
-        labelled = config.labelled_batch if labels else 0
-        return labelled, config.question_batch if config.contrast else 0
-    if not config.contrast:
-        return (config.question_batch if labels else 0), 0
-    few = -(-labels // LABELS_PER_PLACE)  # more would repeat few labels too often
-    labelled = min(few, config.question_batch // 4)
-    return labelled, config.question_batch - labelled
-
-
-class _Told(Dataset[Any]):
+class _Catching(Dataset[Any]):
     """A source that returns errors; raised in a worker, they would come as a whole traceback."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: RoomImages | QuestionImages) -> None:
         self._source = source
 
     def __len__(self) -> int:
@@ -77,32 +96,38 @@ def readers_kept() -> Iterator[None]:
         ended = re.search(r"DataLoader worker .*(killed by signal|exited unexpectedly)", str(error))
         if not ended:
             raise
-        found = "that a process that reads the data ended, for want of memory perhaps"
+        message = "that a process that reads the data ended, for want of memory perhaps"
         hint = "`--resume` goes on from a checkpoint; `--workers 0` needs no such processes"
-        raise LostProcessError("training", found, hint=hint) from error
+        raise LostProcessError("training", message, hint=hint) from error
+
+
+@dataclass(frozen=True)
+class Loading:
+    """How batches are read.
+
+    Attributes:
+        config: of the run.
+        device: gets the batches.
+        first: the iteration to begin with.
+        workers: processes that read images; as many again read the questions that are compared.
+    """
+
+    config: ModelConfig
+    device: torch.device
+    first: int
+    workers: int
 
 
 def _loaded(
-    source: Source,
-    rows: int,
-    size: int,
-    own: slice,
-    first: int,
-    seed: int,
-    fabric: Fabric,
-    workers: int,
+    source: RoomImages | QuestionImages, draws: Draws, how: Loading, workers: int
 ) -> Iterator[dict[str, Tensor]]:
-    """Yield batch after batch without end, beginning with batch `first`.
-
-    Args:
-        own: which rows of every batch are this process's.
-    """
+    """Yield batch after batch without end."""
     loader = DataLoader(
-        _Told(source),
-        batch_sampler=Draws(rows, size, seed, first, own),
+        _Catching(source),
+        batch_sampler=draws,
         num_workers=workers,
         collate_fn=_collated,
-        pin_memory=fabric.device.type == "cuda",
+        pin_memory=how.device.type == "cuda",
     )
     for items in loader:
         if isinstance(items, Exception):
@@ -110,47 +135,41 @@ def _loaded(
         yield items
 
 
-def image_batches(source: Source, fabric: Fabric, state: State, workers: int) -> Iterator[Batch]:
-    """Yield batches of images without end, beginning with the state's iteration.
+def image_batches(sources: Sources, how: Loading) -> Iterator[Batch]:
+    """Yield batches of images without end.
 
     Where no loss is of them, they are for pictures, and every process gets them whole.
     """
-    config = state.model.config
-    size = batch_size(config, source)
-    first = state.iteration * config.batches_per_iteration
-    own = share(size) if config.uses_images else slice(None)
-    where = own, first, config.seed, fabric
-    for items in _loaded(source, len(source), size, *where, workers):
-        yield source.as_batch(items).to(fabric.device)
+    config, source = how.config, sources.images
+    size, first = sources.batch_size(config), how.first * config.batches_per_iteration
+    rows = share(size) if config.uses_images else slice(None)
+    draws = Draws(len(source), size, config.seed, first, rows)
+    for items in _loaded(source, draws, how, how.workers):
+        yield source.as_batch(items).to(how.device)
 
 
-def question_batches(
-    source: Source,
-    labelled: QuestionImages | None,
-    labels: int,
-    fabric: Fabric,
-    state: State,
-    workers: int,
-) -> Iterator[tuple[Batch, Tensor]]:
+def question_batches(sources: Sources, how: Loading) -> Iterator[tuple[Batch, Tensor]]:
     """Yield the questions whose codes are compared, and their answers.
 
     The answer is -1 for a question without a label. Of each batch, labelled questions first, this
     process gets its share, which may hold questions of one kind only.
     """
-    config = state.model.config
-    with_label, without = question_sizes(config, source, labels)
-    own, where = share(with_label + without), (state.iteration, config.seed, fabric)
-    known = slice(min(own.start, with_label), min(own.stop, with_label))
-    others = slice(max(own.start - with_label, 0), max(own.stop - with_label, 0))
+    config, source, labelled = how.config, sources.images, sources.labelled
+    with_label, without = sources.question_sizes(config)
+    mine, seed = share(with_label + without), config.seed
+    first = slice(min(mine.start, with_label), min(mine.stop, with_label))
+    others = slice(max(mine.start - with_label, 0), max(mine.stop - with_label, 0))
     streams = []
-    if labelled is not None and known.start < known.stop:
-        several = workers if config.labelled_batch else 0
-        streams.append(_loaded(labelled, labels, with_label, known, *where, several))
+    if labelled is not None and first.start < first.stop:
+        draws = Draws(sources.labels, with_label, seed, how.first, first)
+        streams.append(_loaded(labelled, draws, how, how.workers if config.labelled_batch else 0))
     if others.start < others.stop:
-        unknown = _loaded(source, len(source), without, others, *where, workers)
+        unlabelled = _loaded(
+            source, Draws(len(source), without, seed, how.first, others), how, how.workers
+        )
         streams.append(
-            {**items, "answer": torch.full((len(items["image"]),), -1)} for items in unknown
+            {**items, "answer": torch.full((len(items["image"]),), -1)} for items in unlabelled
         )
     for parts in zip(*streams, strict=False):
         items = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
-        yield source.as_batch(items).to(fabric.device), items["answer"].to(fabric.device)
+        yield source.as_batch(items).to(how.device), items["answer"].to(how.device)

@@ -4,21 +4,32 @@ import functools
 import json
 from collections.abc import Collection
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from baselines.checkpoints import check_data
-from baselines.pix2shape.data.questions import QuestionImages, for_questions
-from baselines.pix2shape.data.rooms import RoomImages, is_question_file
-from baselines.pix2shape.network.config import METHOD, TAUGHT_DEPTH, ModelConfig
+from baselines.pix2shape.network.config import METHOD as PAPER
+from baselines.pix2shape.network.config import TAUGHT_DEPTH, ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
-from baselines.pix2shape.training.batches import Source
-from baselines.pix2shape.training.state import State, load_state, new_state
-from baselines.pix2shape.weights.bundled import open_weights
-from baselines.pix2shape.weights.storage import PRECISIONS, Card
-from iqtt.files.reader import open_questions
+from baselines.pix2shape.questions import QuestionImages, for_questions
+from baselines.pix2shape.rooms import RoomImages
+from baselines.pix2shape.training.batches import Sources
+from baselines.pix2shape.weights import METHOD, Card, open_weights
+from baselines.training.checkpoint import State, load_checkpoint
+from baselines.training.images import Opened
+from baselines.training.questions import (
+    LABELED,
+    UNLABELED,
+    check_labels,
+    is_question_file,
+    open_training,
+)
+from baselines.training.run_folder import begun
+from iqtt import QuestionsFile
+from scenegen import open_rooms
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check, to_json
+from scenegen.description.specs import DatasetSpec
 from scenegen.rooms.reader import RoomsFile
 
 OF_NETWORKS = ("networks", "opacity", "material", "lights", "depth_middle", "depth_reach")
@@ -26,7 +37,8 @@ OF_QUESTIONS = (
     "question_batch", "labelled_batch", "turned", "temperature", "hard_negatives",
     "easy_negatives", "compared_information",
 )  # fmt: skip
-Begun = tuple[State, Card, Source, QuestionImages | None]
+ModelState = State[Card, Pix2Shape]
+Files = Opened[RoomsFile] | tuple[Opened[QuestionsFile], Opened[QuestionsFile]]
 
 
 def new_run(
@@ -36,110 +48,124 @@ def new_run(
     labels: int = 0,
     conditional: bool = False,
     start: str | Path | None = None,
-    precision: str = PRECISIONS[0],
+    precision: str = "32",
     chosen: Collection[str] = (),
-) -> Begun:
-    """Return a new run's state, with its card, its images and its labelled questions, if any.
+) -> tuple[ModelState, Sources]:
+    """Return a new run's state, and what it learns from.
 
     The arguments are those of `train_run`. Raises SpecError where they and the data do not fit;
     as `open_weights`, and as the readers of the data.
     """
-    asked, config = config, _suited(config, data, labels, conditional)
+    files = _opened(data)
+    suited = _suited(config, files, labels, conditional)
     for name in chosen:
-        value, needed = (functools.reduce(getattr, name.split("."), c) for c in (asked, config))
+        value, needed = (functools.reduce(getattr, name.split("."), c) for c in (config, suited))
         if value != needed:
             hint = f"leave it out: {data}, with {labels} labels, decides it or does not use it"
             raise SpecError(name, value, "nothing", hint)
-    source, labelled = _sources(data, config, labels)
+    sources = _sources(files, suited, labels)
     card = Card(
-        config,
-        data=source.spec.to_json(),
-        fingerprint=_fingerprint(source, labelled),
+        "pix2shape",
+        suited,
         labels=labels,
+        data=sources.images.spec.to_json(),
+        fingerprint=sources.fingerprint,
         precision=precision,
-        classes=source.classes if config.networks.classes else (),
+        classes=sources.images.classes if suited.networks.classes else (),
     )
-    state = new_state(config)
+    state = begun(METHOD, card, None, data)
     if start is not None:
-        card = _begin_from(start, state.model, card)
-    return state, card, source, labelled
+        _begin_from(start, state)
+    return state, sources
 
 
-def resumed_run(folder: Path, data: str | Path, precision: str | None) -> Begun:
-    """Return the state of a folder's checkpoint, with its card and its data, as `new_run`.
+def resumed_run(
+    folder: Path, data: str | Path, precision: str | None
+) -> tuple[ModelState, Sources]:
+    """Return the state of a folder's checkpoint, and what it learns from.
 
-    Raises SpecError for another precision or other data than those of the run; as `load_state`, and
-    as the readers of the data.
+    Raises SpecError for another precision or other data than those of the run; as
+    `load_checkpoint`, and as the readers of the data.
     """
-    state, card = load_state(folder)
+    earlier = load_checkpoint(folder, METHOD)
+    card = earlier.card
     expected = f"{card.precision}, as the run began with"
     check(precision in (None, card.precision), "precision", precision, expected)
-    source, labelled = _sources(data, card.config, card.labels)
-    check_data(data, _fingerprint(source, labelled), card.fingerprint)
-    return state, card, source, labelled
+    sources = _sources(_opened(data), card.settings, card.labels)
+    return begun(METHOD, replace(card, fingerprint=sources.fingerprint), earlier, data), sources
 
 
-def _sources(
-    data: str | Path, config: ModelConfig, labels: int
-) -> tuple[Source, QuestionImages | None]:
-    """Open the images, and the labelled questions if some of their answers are used."""
-    if config.networks.camera:
-        return RoomImages(data, config), None
-    labelled = QuestionImages(data, "labeled", config) if labels else None
-    return QuestionImages(data, "unlabeled", config), labelled
-
-
-def _begin_from(start: str | Path, model: Pix2Shape, card: Card) -> Card:
-    """Give a model encoder and decoder of weights; return the card, which says what taught them.
-
-    Raises SpecError, and as `open_weights`.
-    """
-    earlier, its_card = open_weights(start)
-    its, own = (json.loads(to_json(one.config)) for one in (its_card, card))
-    for name in OF_NETWORKS:
-        group = own[name] if isinstance(own[name], dict) else {}
-        for part in [f"{name}.{key}" for key in group] or [name]:
-            there, here = (functools.reduce(dict.get, part.split("."), one) for one in (its, own))
-            expected = f"weights of the {part} of this run, {here}"
-            check(there == here, "start", f"{start} with {there}", expected)
-    if card.method == METHOD:
-        own = f"weights of {METHOD}, as other losses than the paper's would have trained this run's"
-        check(its_card.method == METHOD, "start", start, own)
-    same = its_card.classes == card.classes
-    check(same, "start", start, f"weights of the same classes as this run's, {card.classes}")
-    for name in ("encoder", "decoder"):
-        getattr(model, name).load_state_dict(getattr(earlier, name).state_dict())
-    return replace(
-        card,
-        earlier_labels=its_card.labels + its_card.earlier_labels,
-        earlier_depth=its_card.method == TAUGHT_DEPTH,
+def _opened(data: str | Path) -> Files:
+    """Open rooms, or the unlabelled and the labelled questions of a training file."""
+    if not is_question_file(data):
+        return Opened(partial(open_rooms, data))
+    unlabelled, labelled = (
+        Opened(partial(open_training, data, part)) for part in (UNLABELED, LABELED)
     )
+    return unlabelled, labelled
 
 
-def _fingerprint(source: Source, labelled: QuestionImages | None) -> str:
-    """Return the fingerprint of rooms, or those of the parts of a question file that are used."""
-    return " ".join(str(one.fingerprint) for one in (source, labelled) if one is not None)
+def _sources(files: Files, config: ModelConfig, labels: int) -> Sources:
+    """Return what a run learns from; the labelled questions if some of their answers are used."""
+    if isinstance(files, Opened):
+        return Sources(RoomImages(files, config))
+    unlabelled, labelled = files
+    check_labels(labelled.file, labels)
+    answered = QuestionImages(labelled, config) if labels else None
+    return Sources(QuestionImages(unlabelled, config), answered, labels)
 
 
-def _suited(config: ModelConfig, data: str | Path, labels: int, conditional: bool) -> ModelConfig:
+def _suited(config: ModelConfig, files: Files, labels: int, conditional: bool) -> ModelConfig:
     """Return the configuration as the data needs it. Raises SpecError where they do not fit."""
+    if isinstance(files, Opened):
+        return _for_rooms(config, files.file.spec, labels, conditional)
+    unlabelled = files[0].file
+    if conditional:
+        message = "questions, which have no classes"
+        raise SpecError(unlabelled.path, message, "rooms for --conditional")
+    config = for_questions(config, unlabelled)
+    return config if labels else replace(config, questions=0.0, swap=0.0)
+
+
+def _for_rooms(
+    config: ModelConfig, spec: DatasetSpec, labels: int, conditional: bool
+) -> ModelConfig:
+    """Return the configuration for rooms; what is of questions alone is off."""
     networks = config.networks
-    if is_question_file(data):
-        if conditional:
-            raise SpecError(data, "questions, which have no classes", "rooms for --conditional")
-        check(config.depth == 0, "depth", config.depth, "0 for questions, which have no depth maps")
-        config = for_questions(config, data, "unlabeled")
-        with open_questions(data, "labeled") as questions:
-            check(0 <= labels <= len(questions), "labels", labels, f"0 to {len(questions)}")
-        return config if labels else replace(config, questions=0.0, swap=0.0)
     check(labels == 0, "labels", labels, "0 for rooms, which ask no questions")
     check(networks.camera, "camera", networks.camera, "true: rooms are seen by known cameras")
     check(networks.classes == 0, "classes", networks.classes, "0; --conditional tells them")
     if conditional:
-        with RoomsFile(data) as rooms:
-            counts, shapes = rooms.spec.objects, rooms.spec.shapes
-        check(counts == (1, 1), "conditional", f"objects {counts}", "one object in every room")
-        networks = replace(networks, classes=len(shapes))
+        single = spec.objects == (1, 1)
+        check(single, "conditional", f"objects {spec.objects}", "one object in every room")
+        networks = replace(networks, classes=len(spec.shapes))
     unused: dict[str, Any] = {name: getattr(ModelConfig, name) for name in OF_QUESTIONS}
     off = dict.fromkeys(("mutual_information", "questions", "contrast", "swap"), 0.0)
     return replace(config, networks=networks, **unused | off)
+
+
+def _begin_from(start: str | Path, state: ModelState) -> None:
+    """Give a state encoder and decoder of weights; its card then says what taught them.
+
+    Raises SpecError, and as `open_weights`.
+    """
+    model, card = open_weights(start)
+    records = [json.loads(to_json(record)) for record in (card.settings, state.card.settings)]
+    for name in OF_NETWORKS:
+        group = records[1][name] if isinstance(records[1][name], dict) else {}
+        for part in [f"{name}.{key}" for key in group] or [name]:
+            there, here = (functools.reduce(dict.get, part.split("."), r) for r in records)
+            expected = f"weights of the {part} of this run, {here}"
+            check(there == here, "start", f"{start} with {there}", expected)
+    if state.card.submission == PAPER:
+        expected = f"weights of {PAPER}, as other losses than the paper's would have trained them"
+        check(card.submission == PAPER, "start", start, expected)
+    same, classes = card.classes == state.card.classes, state.card.classes
+    check(same, "start", start, f"weights of the same classes as this run's, {classes}")
+    for name in ("encoder", "decoder"):
+        getattr(state.network, name).load_state_dict(getattr(model, name).state_dict())
+    state.card = replace(
+        state.card,
+        earlier_labels=card.labels + card.earlier_labels,
+        earlier_depth=card.submission == TAUGHT_DEPTH,
+    )

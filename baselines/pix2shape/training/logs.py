@@ -54,11 +54,11 @@ def opened_logs(folder: Path, first: int) -> Iterator[Logs]:
     """Open a folder of logs for the block, as `Logs`."""
     before = threading.excepthook
 
-    def told(error: threading.ExceptHookArgs) -> None:
+    def quiet(error: threading.ExceptHookArgs) -> None:
         if not isinstance(error.exc_value, OSError):
             before(error)
 
-    threading.excepthook = told
+    threading.excepthook = quiet
     try:
         logs = Logs(folder, first)
         try:

@@ -16,8 +16,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from baselines.pix2shape.network.shared_batch import summed
 from baselines.pix2shape.network.surfels import back_project
+from baselines.training.processes import summed
 
 HIDDEN = 0.1  # scene units behind another surface at which a surfel counts as hidden by it
 NEAR = 0.05  # scene units; surfels nearer to the other camera than this, or behind it, are left out

@@ -13,16 +13,16 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from baselines.pix2shape.data.rooms import Batch
+from baselines.pix2shape.batch import Batch
 from baselines.pix2shape.network.architecture import CAMERA
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.network.model import Pix2Shape, mapped, shaded
-from baselines.pix2shape.network.shared_batch import gathered, share, summed
 from baselines.pix2shape.training import losses
+from baselines.training.processes import gathered, share, summed
 
 Numbers = dict[str, Tensor]
-Asked = tuple[Batch, Tensor]
+Questions = tuple[Batch, Tensor]  # images, and which answers are right
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,24 +61,24 @@ def draw(images: int, z: int, seed: int, questions: int = 0, each: int = 0) -> N
         questions, each: how many questions are compared in all, and images in each.
     """
     source = torch.Generator().manual_seed(seed)
-    own, asked = share(images), share(questions * each)
+    mine, compared = share(images), share(questions * each)
     return Noise(
-        torch.randn(images, z, generator=source)[own],
-        torch.rand(images, generator=source)[own],
+        torch.randn(images, z, generator=source)[mine],
+        torch.rand(images, generator=source)[mine],
         torch.randperm(images, generator=source),
-        2 * torch.pi * torch.rand(questions * each, generator=source)[asked],
-        (torch.rand(questions, generator=source) < 0.5).repeat_interleave(each)[asked],
+        2 * torch.pi * torch.rand(questions * each, generator=source)[compared],
+        (torch.rand(questions, generator=source) < 0.5).repeat_interleave(each)[compared],
         torch.randperm(questions * each, generator=source),
     )
 
 
 def critic_step(
-    model: Pix2Shape, batch: Batch, noise: Noise, asked: Asked | None = None
+    model: Pix2Shape, batch: Batch, noise: Noise, questions: Questions | None = None
 ) -> tuple[Tensor, Numbers]:
     """Return what critic and statistics network minimise, and the parts to report by name.
 
     Args:
-        asked: as for `generator_step`.
+        questions: as for `generator_step`.
     """
     config, views = model.config, batch.views
     numbers: Numbers = {}
@@ -101,20 +101,21 @@ def critic_step(
     if config.disentangles:
         order = noise.order
         if config.compared_information:
-            assert asked is not None, "check_request sees to it"
+            assert questions is not None, "check_request sees to it"
+            compared = questions[0]
             with torch.no_grad():
-                code, order = model.encode(asked[0].image, asked[0].views), noise.compared_order
+                code, order = model.encode(compared.image, compared.views), noise.compared_order
         total = total - _information(model, code, order)
     return total, numbers
 
 
 def generator_step(
-    model: Pix2Shape, batch: Batch, noise: Noise, asked: Asked | None = None
+    model: Pix2Shape, batch: Batch, noise: Noise, questions: Questions | None = None
 ) -> tuple[Tensor, Numbers]:
     """Return what encoder and decoder minimise, and the losses by name.
 
     Args:
-        asked: the images of Q questions, one after the other, and which answers are right, (Q,);
+        questions: the images of Q questions, one after the other, and their right answers, (Q,);
             -1 for a question without a label.
     """
     config, views = model.config, batch.views
@@ -127,14 +128,14 @@ def generator_step(
         if config.reconstruction:
             # A material explains an image on flat surfaces, too: where matching finds the surfaces,
             # images teach the material on them and no more.
-            given = config.material and config.matching
-            seen = replace(surfels, depth=depth.detach()) if given else surfels
+            taught = config.material and config.matching
+            seen = replace(surfels, depth=depth.detach()) if taught else surfels
             again = shaded(seen, model.lit(code, views))
             numbers["reconstruction"] = _compared(config, batch.image, again)
         if config.depth and batch.depth is not None:
-            known = torch.isfinite(batch.depth)
-            wrong = torch.where(known, depth - torch.where(known, batch.depth, 0), 0)
-            numbers["depth"] = summed((wrong**2).sum()) / summed(known.sum()).clamp(min=1)
+            surface = torch.isfinite(batch.depth)
+            wrong = torch.where(surface, depth - torch.where(surface, batch.depth, 0), 0)
+            numbers["depth"] = summed((wrong**2).sum()) / summed(surface.sum()).clamp(min=1)
     if config.adversarial or config.code_reconstruction:
         made = model.image(noise.code, views)
         if config.adversarial:
@@ -150,19 +151,19 @@ def generator_step(
         theirs = noise.order[share(len(noise.order))]
         others, camera = gathered(pose)[theirs], gathered(views.condition)[theirs, :CAMERA]
         classes = views.condition[:, CAMERA:]
-        asked_there = torch.cat([camera, classes], dim=1), Cameras(others, fov)
-        elsewhere = model.surfels(code, *asked_there).depth
+        there = torch.cat([camera, classes], dim=1), Cameras(others, fov)
+        elsewhere = model.surfels(code, *there).depth
         numbers["consistency"] = (
             losses.disagreement(depth, elsewhere, torch.linalg.solve(others, pose), fov)
             + losses.disagreement(elsewhere, depth, torch.linalg.solve(pose, others), fov)
         ) / 2
     if config.matching:
-        assert batch.relief is not None, "runs.py had it found"
+        assert batch.relief is not None, "run.py had it found"
         numbers["matching"] = _matching(model, batch, code, noise)
     if config.disentangles and not config.compared_information:
         numbers["mutual_information"] = _information(model, code, noise.order)
-    if asked is not None:
-        numbers |= _question_losses(model, *asked, noise)
+    if questions is not None:
+        numbers |= _question_losses(model, *questions, noise)
     weighted = (getattr(config, name) * loss for name, loss in numbers.items())
     return sum(weighted, batch.image.new_zeros(())), numbers
 
@@ -174,31 +175,31 @@ def _matching(model: Pix2Shape, batch: Batch, code: Tensor, noise: Noise) -> Ten
     """
     relief = batch.relief
     assert relief is not None
-    views = len(relief.found[0])
+    views = len(relief.values[0])
     drawn = (noise.share * views).long().clamp(max=views - 1)
     each = torch.arange(len(drawn), device=drawn.device)
     positions = relief.world_from_camera[each, drawn, :3, 3]
     classes = batch.views.condition[:, CAMERA:]
-    asked = model.relief(code, torch.cat([positions, classes], dim=1))
-    return (asked - relief.found[each, drawn].float()).abs().mean()
+    decoded = model.relief(code, torch.cat([positions, classes], dim=1))
+    return (decoded - relief.values[each, drawn].float()).abs().mean()
 
 
 def _question_losses(model: Pix2Shape, images: Batch, answers: Tensor, noise: Noise) -> Numbers:
     """Return the losses that compare the images of questions, by name."""
     config, numbers = model.config, Numbers()
-    own = model.encode(images.image, images.views)
+    code = model.encode(images.image, images.views)
     if config.disentangles and config.compared_information:
-        numbers["mutual_information"] = _information(model, own, noise.compared_order)
-    scene, whole = gathered(own[:, : config.networks.z_scene]), gathered(answers)
-    codes, known = scene.view(len(whole), -1, scene.shape[1]), whole >= 0
-    if config.questions and known.any():
-        numbers["questions"] = losses.question_loss(codes[known], whole[known])
+        numbers["mutual_information"] = _information(model, code, noise.compared_order)
+    scene, whole = gathered(code[:, : config.networks.z_scene]), gathered(answers)
+    codes, labelled = scene.view(len(whole), -1, scene.shape[1]), whole >= 0
+    if config.questions and labelled.any():
+        numbers["questions"] = losses.question_loss(codes[labelled], whole[labelled])
     if config.contrast:
         numbers["contrast"] = losses.contrast_loss(
             codes, whole, config.temperature, config.hard_negatives, config.easy_negatives
         )
-    if config.swap and known.any():
-        numbers["swap"] = _swapped(model, images, own, answers)
+    if config.swap and labelled.any():
+        numbers["swap"] = _swapped(model, images, code, answers)
     return numbers
 
 
@@ -214,16 +215,16 @@ def _swapped(model: Pix2Shape, images: Batch, code: Tensor, answers: Tensor) -> 
     Every reference is decoded, so that batch normalisation sees as many images in each process;
     where no answer is told, its own scene is taken and it counts nothing.
     """
-    known, each = answers >= 0, len(code) // len(answers)
+    labelled, each = answers >= 0, len(code) // len(answers)
     first = torch.arange(0, len(code), each, device=code.device)
-    scene = code[first + torch.where(known, 1 + answers, 0), : model.config.networks.z_scene]
+    scene = code[first + torch.where(labelled, 1 + answers, 0), : model.config.networks.z_scene]
     swapped = torch.cat([scene, code[first, model.config.networks.z_scene :]], dim=1)
     views = mapped(images.views, lambda values: values[first])
     again = model.image(swapped, views)
-    count = known.sum()
+    count = labelled.sum()
     loss = again.sum() * 0
     if count:
-        loss = count * _compared(model.config, images.image[first][known], again[known])
+        loss = count * _compared(model.config, images.image[first][labelled], again[labelled])
     return summed(loss) / summed(count)
 
 

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from baselines.pix2shape.data.rooms import Batch
+from baselines.pix2shape.batch import Batch
 
 
 def turned(batch: Batch, angle: Tensor, mirror: Tensor) -> Batch:

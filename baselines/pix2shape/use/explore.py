@@ -3,39 +3,40 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from PIL import Image
 from torch.utils.data import default_collate
 
-from baselines.pix2shape.data.rooms import RoomImages, as_views
-from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.batch import as_views
 from baselines.pix2shape.network.model import Pix2Shape, Views, mapped
 from baselines.pix2shape.network.surfels import Scene
 from baselines.pix2shape.pictures import drawn, image_tiles, sheet
-from baselines.pix2shape.weights.storage import Card
+from baselines.pix2shape.rooms import RoomImages
+from baselines.pix2shape.weights import Card
+from baselines.training.images import Array, Opened
+from scenegen import open_rooms
 from scenegen.camera import Camera, look_at
 from scenegen.common.errors import SpecError
 from scenegen.common.random.seeding import Purpose, item_seed
+from scenegen.common.records import check
 from scenegen.description.specs import DatasetSpec
 from scenegen.sampling.cameras import sample_cameras
 from scenegen.sampling.lights import sample_lights
 
-Array = NDArray[Any]
 ROW = 8  # tiles in a row of a sheet
 
 
 def known_rooms(data: str | Path, card: Card) -> RoomImages:
     """Open rooms for a model to encode. Raises as `RoomImages`, and SpecError for other classes."""
-    _check_camera(card.config)
-    rooms = RoomImages(data, replace(card.config, depth=0.0))
+    _check_camera(card)
+    rooms = RoomImages(Opened(partial(open_rooms, data)), replace(card.settings, depth=0.0))
     if card.classes and rooms.classes != card.classes:
-        known = f"{', '.join(card.classes)}, as the model knows"
-        raise SpecError(data, f"classes {', '.join(rooms.classes)}", known)
+        expected = f"{', '.join(card.classes)}, as the model knows"
+        raise SpecError(data, f"classes {', '.join(rooms.classes)}", expected)
     return rooms
 
 
@@ -51,11 +52,10 @@ def sample_sheet(
 
     Raises SpecError for a label that the model does not know, and for a model of questions.
     """
-    _check_camera(card.config)
+    _check_camera(card)
     spec = replace(DatasetSpec.from_json(card.data), seed=seed)
-    known = f"one of {', '.join(card.classes)}" if card.classes else "none: it knows no classes"
-    if label is not None and label not in card.classes:
-        raise SpecError("class", repr(label), known)
+    classes = f"one of {', '.join(card.classes)}" if card.classes else "none: it knows no classes"
+    check(label is None or label in card.classes, "class", repr(label), classes)
     one_hot = np.zeros((count, len(card.classes)))
     for i in range(count if card.classes else 0):
         one_hot[i, i % len(card.classes) if label is None else card.classes.index(label)] = 1
@@ -82,9 +82,9 @@ def interpolation_sheet(
     share = torch.linspace(0, 1, steps)[:, None]
     views = mapped(batch.views, lambda values: values[:1].expand(steps, *values.shape[1:]))
     images, depths, normals = drawn(model, (1 - share) * code[:1] + share * code[1:], views)
-    given = image_tiles(batch.image)
-    blank = np.full_like(given[0], 250)
-    return sheet([[given[0], *images, given[1]], [blank, *depths, blank], [blank, *normals, blank]])
+    start, end = image_tiles(batch.image)
+    blank = np.full_like(start, 250)
+    return sheet([[start, *images, end], [blank, *depths, blank], [blank, *normals, blank]])
 
 
 def rotation_frames(
@@ -98,13 +98,13 @@ def rotation_frames(
     batch = rooms.as_batch(default_collate([rooms[row] for row in rows]))
     with torch.no_grad():
         code = model.encode(batch.image, batch.views)
-    given, frames = image_tiles(batch.image), []
+    inputs, frames = image_tiles(batch.image), []
     for angle in degrees:
         cameras = [turned(rooms.world_from_camera[row], rooms.spec, angle) for row in rows]
         poses = [camera.world_from_camera for camera in cameras]
-        known = list(map(rooms.view, rows, poses))
-        views = as_views(default_collate(known), rooms.spec.fov_y_degrees)
-        frames.append(sheet([given, *drawn(model, code, views)]))
+        told = list(map(rooms.view, rows, poses))
+        views = as_views(default_collate(told), rooms.spec.fov_y_degrees)
+        frames.append(sheet([inputs, *drawn(model, code, views)]))
     return frames
 
 
@@ -129,12 +129,12 @@ def known_views(
     lights = (light_position - positions[:, None]) @ poses[:, :3, :3]
     condition = np.concatenate([positions, one_hot], axis=1)
     same = (spec.ambient, spec.attenuation, spec.room_reflectance)
-    each = (np.tile(one, (len(positions), 1)) for one in same)
-    known = (condition, poses, lights, light_color, *each)
-    told, pose, *scene = (torch.from_numpy(np.float32(values)) for values in known)
+    each = (np.tile(values, (len(positions), 1)) for values in same)
+    arrays = (condition, poses, lights, light_color, *each)
+    told, pose, *scene = (torch.from_numpy(np.float32(values)) for values in arrays)
     return Views(told, Scene(spec.fov_y_degrees, *scene), world_from_camera=pose)
 
 
-def _check_camera(config: ModelConfig) -> None:
-    if not config.networks.camera:
+def _check_camera(card: Card) -> None:
+    if not card.settings.networks.camera:
         raise SpecError("weights", "a model of questions", "one of rooms")

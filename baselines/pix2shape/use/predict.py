@@ -1,36 +1,30 @@
 """Submissions of a trained model. Of the truth only the cameras of rooms are read."""
 
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from baselines.pix2shape.data.rooms import (
-    camera_poses,
-    check_reducible,
-    is_question_file,
-    room_images,
-    row_batches,
-)
 from baselines.pix2shape.network.config import TAUGHT_DEPTH
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.network.surfels import extrapolated, normals_from_depth
 from baselines.pix2shape.use.answers import answer_file
-from baselines.pix2shape.weights.bundled import open_weights
+from baselines.pix2shape.weights import open_weights
+from baselines.training.images import Array, check_reducible, row_batches
+from baselines.training.launch import chosen_device
+from baselines.training.questions import is_question_file
+from baselines.training.rooms import camera_poses, input_views, room_images
 from metrics.prediction_writer import RoomPredictionWriter
+from scenegen import open_rooms
 from scenegen.common.errors import SpecError
-from scenegen.common.records import check
 from scenegen.files.new_file import check_writable
 from scenegen.rooms.reader import RoomsFile
 
-Array = NDArray[Any]
 BATCH = 64  # images at a time
 TOLD = "told: one image of each scene, the cameras, and where the empty room's floor and walls are"
 DEPTH = "told: in training, true depth maps"
@@ -60,10 +54,9 @@ def predict_file(
     another method.
     """
     model, card = open_weights(weights)
-    own = card.method
-    if method not in (None, own):
+    if method not in (None, card.submission):
         hint = "names tell what a model was told and taught; `pix2shape predict` takes any weights"
-        raise SpecError("weights", f"{weights}, whose method is {own}", method, hint)
+        raise SpecError("weights", f"{weights}, whose method is {card.submission}", method, hint)
     model.to(chosen_device(device))
     check_writable(Path(out), overwrite)
     how: dict[str, Any] = {"run": run, "overwrite": overwrite, "progress": progress}
@@ -71,16 +64,6 @@ def predict_file(
         answer_file(model, data, out, labels=card.labels + card.earlier_labels, **how)
     else:
         predict_rooms(model, data, out, earlier_depth=card.earlier_depth, **how)
-
-
-def chosen_device(name: str, count: int = 1) -> torch.device:
-    """Return a device by name; "auto" is a GPU if there is one. Raises SpecError."""
-    if name == "cuda" and not torch.cuda.is_available():
-        raise SpecError("device", "no GPU that this torch can use", hint="say --device cpu")
-    if name == "cpu" or not torch.cuda.is_available():
-        return torch.device("cpu")
-    check(count <= torch.cuda.device_count(), "devices", count, str(torch.cuda.device_count()))
-    return torch.device("cuda")
 
 
 @torch.inference_mode()
@@ -111,29 +94,51 @@ def predict_rooms(
         what = "is told classes, which are part of the truth" if spec.classes else "is not told it"
         raise SpecError("weights", f"a model that {what}", "one that is told the camera alone")
     device = next(model.parameters()).device
-    with RoomsFile(data) as rooms:
-        size = rooms.spec.height
-        check_reducible(data, size, rooms.spec.width, spec.size)
+    method = TAUGHT_DEPTH if earlier_depth else model.config.method
+    notes = "; ".join([TOLD] * spec.rays + [DEPTH] * (method == TAUGHT_DEPTH))
+    with open_rooms(data) as rooms:
+        check_reducible(data, rooms.spec.height, rooms.spec.width, spec.size)
         poses = torch.from_numpy(camera_poses(rooms).astype(np.float32)).to(device)
         condition, fov = poses[:, :3, 3], rooms.spec.fov_y_degrees
-        inputs, own = input_views(rooms)
-        found = []
-        for chosen in row_batches(len(inputs), BATCH):
-            images = room_images(rooms, inputs[chosen], spec.size).to(device)
-            told = condition[inputs[chosen]], Cameras(poses[inputs[chosen]], fov)
-            found.append(model.codes(images, *told))
-        codes = torch.cat(found)
-        method = TAUGHT_DEPTH if earlier_depth else model.config.method
-        how: dict[str, Any] = {"method": method, "run": run, "overwrite": overwrite}
-        how["notes"] = "; ".join([TOLD] * spec.rays + [DEPTH] * (method == TAUGHT_DEPTH))
-        with RoomPredictionWriter(out, data, **how) as file:
-            for rows in row_batches(len(rooms), BATCH):
-                asked = condition[rows], Cameras(poses[rows], fov)
-                depth = model.surfels(codes[own[rows]], *asked).depth
-                depth, normal = enlarged(depth, fov, size)
-                for row, z, n in zip(rows, depth.cpu(), normal.cpu(), strict=True):
-                    file.add(int(row), z.numpy(), np.moveaxis(n.numpy(), 0, -1))
-                progress(len(rows), len(rooms))
+        inputs, scene_of = input_views(rooms)
+        codes = []
+        for places in row_batches(len(inputs), BATCH):
+            rows = inputs[places]
+            images = room_images(rooms, rows, spec.size).to(device)
+            codes.append(model.codes(images, condition[rows], Cameras(poses[rows], fov)))
+        code = torch.cat(codes)
+
+        def depth(rows: Array) -> Tensor:
+            views = condition[rows], Cameras(poses[rows], fov)
+            return model.surfels(code[scene_of[rows]], *views).depth
+
+        how: dict[str, Any] = {"method": method, "notes": notes, "run": run}
+        write_depths(rooms, out, data, depth, progress, overwrite=overwrite, **how)
+
+
+def write_depths(
+    rooms: RoomsFile,
+    out: str | Path,
+    data: str | Path,
+    depth_of: Callable[[Array], Tensor],
+    progress: Progress,
+    **how: Any,
+) -> None:
+    """Write the depth of every row of an open rooms file, and the normals that follow from it.
+
+    Args:
+        data: path of the rooms, as the submission records it.
+        depth_of: returns planar depth, (B, S, S), of some rows.
+        how: as for `RoomPredictionWriter`.
+    """
+    size, fov = rooms.spec.height, rooms.spec.fov_y_degrees
+    with RoomPredictionWriter(out, data, **how) as submission:
+        for rows in row_batches(len(rooms), BATCH):
+            depth, normal = enlarged(depth_of(rows), fov, size)
+            normals = np.moveaxis(normal.cpu().numpy(), 1, -1)
+            for row, z, n in zip(rows, depth.cpu().numpy(), normals, strict=True):
+                submission.add(int(row), z, n)
+            progress(len(rows), len(rooms))
 
 
 def enlarged(depth: Tensor, fov_y_degrees: float, size: int) -> tuple[Tensor, Tensor]:
@@ -153,19 +158,3 @@ def enlarged(depth: Tensor, fov_y_degrees: float, size: int) -> tuple[Tensor, Te
     least = 0.5 / depth.amax(dim=(1, 2), keepdim=True)  # keeps extrapolated depth finite
     normals = functional.interpolate(normals, scale_factor=factor, mode="bilinear")
     return 1 / torch.maximum(inverse, least), functional.normalize(normals, dim=1)
-
-
-def input_views(rooms: RoomsFile) -> tuple[Array, Array]:
-    """Return each scene's input row, (S,), and for each row its scene's place in there, (N,)."""
-    scene, view = (rooms.read(name, slice(None)) for name in ("scene_index", "view_index"))
-    first: dict[int, int] = {}
-    for row in np.argsort(view, kind="stable"):
-        first.setdefault(int(scene[row]), int(row))
-    inputs = np.array(sorted(first.values()))
-    if late := np.count_nonzero(view[inputs]):
-        warnings.warn(
-            f"{rooms.path}: {late} of {len(inputs)} scenes have no view 0; the model's input is the"
-            " first of their other views",
-            stacklevel=3,
-        )
-    return inputs, np.searchsorted(inputs, [first[int(number)] for number in scene])

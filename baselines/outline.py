@@ -1,0 +1,140 @@
+"""Answers by outlines: the nearest one, without any label, or what trees learn from labels.
+
+Both see the silhouettes of `iqtt.audit.features.outlines` and nothing else, so they know neither
+cubes nor rotations. What they reach on a kind of questions is its floor.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iqtt.audit.features.outlines import nearest_outline, outlines
+from iqtt.audit.features.statistics import border_color, silhouettes
+from iqtt.audit.probes.trees import AnswerTrees, next_to_reference
+from iqtt.files.reader import QuestionsFile, open_questions, parts
+from metrics.prediction_writer import write_answers
+from scenegen.common.errors import SpecError
+from scenegen.common.records import check
+
+Array = NDArray[Any]
+Progress = Callable[[int, int], Any]  # questions done since the last call, in all
+CHUNK = 64  # questions in memory at once
+ENSEMBLE = 3  # sets of trees
+
+
+@dataclass(frozen=True, eq=False)
+class Outlines:
+    """The outlines of Q questions with K answers each.
+
+    Attributes:
+        features: (Q, 1 + K, D), as `iqtt.audit.features.outlines.outlines` gives them.
+        distances: between any two images of a question, (Q, 1 + K, 1 + K, P).
+    """
+
+    features: Array
+    distances: Array
+
+
+def write_outline(
+    data: str | Path,
+    out: str | Path,
+    *,
+    overwrite: bool = False,
+    progress: Progress = lambda done, total: None,
+) -> None:
+    """Answer the questions of a file by the nearest outline; no label is used.
+
+    Raises as `open_questions` and `write_answers`.
+    """
+    with open_questions(data) as questions:
+        seen = read_outlines(questions, len(questions), progress)
+    scores = nearest_scores(seen)
+    write_answers(out, data, method="outline", scores=scores, overwrite=overwrite)
+
+
+def write_outline_trees(
+    data: str | Path,
+    out: str | Path,
+    train: str | Path,
+    labels: int | None = None,
+    *,
+    overwrite: bool = False,
+    progress: Progress = lambda done, total: None,
+) -> None:
+    """Answer the questions of a file by trees that learn from labelled ones. Deterministic.
+
+    Args:
+        train: a file with labelled questions of as many answers, such as iqtt-train.h5.
+        labels: how many of its labelled questions to learn from, the first ones; all by default.
+
+    Raises SpecError where the training file has no answers or fewer than `labels`, asks questions
+    with another number of answers, or is the file to answer; else as `open_questions` and
+    `write_answers`.
+    """
+    with open_questions(data) as questions, _open_labelled(train) as labelled:
+        _check_training(questions, labelled, labels)
+        count = len(labelled) if labels is None else labels
+        learned = read_outlines(labelled, count, progress)
+        right = labelled.read("answers", slice(0, count)).astype(np.int64)
+        seen = read_outlines(questions, len(questions), progress)
+    scores = tree_scores(learned, right, seen)
+    text = f"{count} labels of {train}"
+    write_answers(out, data, method="outline-trees", scores=scores, notes=text, overwrite=overwrite)
+
+
+def read_outlines(
+    questions: QuestionsFile, count: int, progress: Progress = lambda done, total: None
+) -> Outlines:
+    """Return the outlines of the first questions of a file.
+
+    Args:
+        progress: called with the questions read since the last call, and the questions in all.
+
+    Raises FileFormatError where the file is damaged.
+    """
+    parts = []
+    background = border_color(questions.read("questions", slice(0, min(count, CHUNK))))
+    for start in range(0, max(count, 1), CHUNK):
+        images = questions.read("questions", slice(start, min(start + CHUNK, count)))
+        parts.append(outlines(silhouettes(images, background)))
+        progress(len(images), count)
+    features, distances = map(np.concatenate, zip(*parts, strict=True))
+    return Outlines(features, distances)
+
+
+def nearest_scores(seen: Outlines) -> Array:
+    """Return a score of each answer, (Q, K): the nearer its outline, the higher."""
+    return -nearest_outline(seen.distances)[:, 0, 1:].astype(np.float64)
+
+
+def tree_scores(learned: Outlines, right: Array, seen: Outlines) -> Array:
+    """Return a score of each answer of the questions that are seen, (Q, K), by what was learned.
+
+    Args:
+        right: the right answers of the questions to learn from, (N,).
+    """
+    columns, questions = (
+        next_to_reference(part.features, part.distances[:, 0, 1:]) for part in (learned, seen)
+    )
+    return AnswerTrees(ENSEMBLE).fit(columns, right).scores(questions)
+
+
+def _open_labelled(train: str | Path) -> QuestionsFile:
+    names = parts(train)
+    return open_questions(train, "labeled" if "labeled" in names else names[0])
+
+
+def _check_training(questions: QuestionsFile, labelled: QuestionsFile, labels: int | None) -> None:
+    count, path = len(labelled), labelled.path
+    check(labelled.has_answers and count > 0, "train", path, "a file with answers")
+    if labels is not None:
+        expected = f"from 1 to {count:,}, the labelled questions of {path}"
+        check(1 <= labels <= count, "labels", labels, expected)
+    if labelled.fingerprint is not None and labelled.fingerprint == questions.fingerprint:
+        raise SpecError("train", path, "another file than the one to answer")
+    answers, expected = labelled.answers, f"{questions.answers}"
+    check(labelled.answers == questions.answers, "train", f"{answers} answers a question", expected)

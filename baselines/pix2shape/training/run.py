@@ -1,0 +1,180 @@
+"""A training run and its folder: checkpoint, TensorBoard logs, a picture, and the weights."""
+
+from collections.abc import Collection, Mapping
+from contextlib import nullcontext
+from pathlib import Path
+
+import torch
+from lightning_fabric import Fabric
+from torch.utils.data import DataLoader
+
+from baselines.pix2shape.matching import labels as matching
+from baselines.pix2shape.network.config import ModelConfig
+from baselines.pix2shape.network.model import Pix2Shape
+from baselines.pix2shape.pictures import training_sheet
+from baselines.pix2shape.rooms import RoomImages
+from baselines.pix2shape.training.batches import Loading, Sources, readers_kept
+from baselines.pix2shape.training.beginnings import ModelState, new_run, resumed_run
+from baselines.pix2shape.training.iterations import Iterations, check_request
+from baselines.pix2shape.training.logs import Logs, opened_logs
+from baselines.pix2shape.weights import METHOD
+from baselines.training.checkpoint import CHECKPOINT, WEIGHTS, load_card
+from baselines.training.fit import Progress, falling_late, fit
+from baselines.training.launch import Machine, check_agreement, launched
+from baselines.training.processes import summed
+from baselines.training.rooms import rooms_of
+from baselines.training.run_folder import alone_in, check_new
+from scenegen.common.errors import SceneGenError
+from scenegen.files.new_file import check_writable
+from scenegen.rooms.preview import save_picture
+
+PICTURE, LOGS = "pictures.png", "logs"
+LOG_EVERY = 20  # iterations
+PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and batch size for that
+
+
+def train_run(
+    folder: str | Path,
+    data: str | Path,
+    config: ModelConfig | None,
+    machine: Machine,
+    *,
+    labels: int = 0,
+    conditional: bool = False,
+    start: str | Path | None = None,
+    precision: str | None = None,
+    chosen: Collection[str] = (),
+    progress: Progress = lambda done, total, losses: None,
+) -> Path | None:
+    """Train a model, from the start or from the folder's checkpoint.
+
+    Where several processes train, all but the first call this only to compute: the first alone
+    writes and reports progress. Returns the path of the weights; None in the others.
+
+    Args:
+        config: None goes on from the checkpoint, with its labels, classes and precision.
+        labels: number of answers that training on questions may use.
+        conditional: whether the networks are told the class of a room's only object.
+        start: weights of an earlier run with the same networks, to begin a new run from.
+        precision: of the networks, "32" or "bf16"; None for 32, or for that of the checkpoint.
+        chosen: names of settings, such as "networks.size", that somebody asked for. Others are
+            changed where the data need it: rooms ask no questions, for example.
+
+    Raises SpecError where configuration and data do not fit; FileExistsError where a new run finds
+    a checkpoint or weights; SceneGenError where another run trains in the folder; TrainingError;
+    LostProcessError where another process ended; FileFormatError, OSError.
+    """
+    folder = Path(folder)
+    if config is None:
+        state, sources = resumed_run(folder, data, precision)
+    else:
+        check_new(folder)
+        state, sources = new_run(
+            data,
+            config,
+            labels=labels,
+            conditional=conditional,
+            start=start,
+            precision=precision or "32",
+            chosen=chosen,
+        )
+    model, settings, began = state.network, state.card.settings, state.card.iteration
+    check_request(model, sources, machine.devices * machine.nodes)
+    fabric = launched(machine, state.card.precision)
+    check_agreement(fabric, "data, settings or checkpoint", state.card)
+    first = fabric.is_global_zero
+    with alone_in(folder) if first else nullcontext(), readers_kept():
+        if first:
+            _check_folder(folder, state, resumed=config is None)
+        if isinstance(sources.images, RoomImages) and settings.matching:
+            _match(sources.images, folder, state, fabric, progress)
+        state.to(fabric.device)
+        loading = Loading(settings, fabric.device, began, machine.workers)
+        iterations = Iterations(model, sources, loading, fabric.autocast)
+        with opened_logs(folder / LOGS, began + 1) if first else nullcontext() as logs:
+
+            def show(done: int, total: int, losses: Mapping[str, float]) -> None:
+                assert logs is not None, "the first process shows"
+                if done % LOG_EVERY == 0 or done == total:
+                    logs.numbers(losses, done)
+                if done % machine.every == 0 or done == total:
+                    _picture(folder, logs, state, iterations)
+                progress(done, total, losses)  # which may fail, as where its output is closed
+
+            fit(
+                folder,
+                METHOD,
+                state,
+                iterations,
+                learning_rate,
+                every=machine.every,
+                prepare=lambda: settings.adversarial or fit_prior(model, sources),
+                progress=show,
+            )
+    summed(torch.zeros(1, device=fabric.device))  # wait for the first process, which writes
+    return folder / WEIGHTS if first else None
+
+
+def learning_rate(config: ModelConfig, iteration: int) -> float:
+    """Return the learning rate of an iteration, counted from 0."""
+    return falling_late(config, iteration) if config.decay else config.learning_rate
+
+
+def _check_folder(folder: Path, state: ModelState, resumed: bool) -> None:
+    """Raise OSError where the files of a run cannot be written.
+
+    Another run may have ended in the folder before it was locked: raise FileExistsError where a new
+    run finds files of it, and SceneGenError where the checkpoint is another one now.
+    """
+    if not resumed:
+        check_new(folder)
+    elif load_card(folder / CHECKPOINT, METHOD) != state.card:
+        raise SceneGenError(folder, "that another run went on meanwhile", hint="say --resume again")
+    for name in (CHECKPOINT, PICTURE, WEIGHTS):
+        check_writable(folder / name, overwrite=True)
+
+
+def _match(
+    source: RoomImages, folder: Path, state: ModelState, fabric: Fabric, progress: Progress
+) -> None:
+    """Let training learn from relief that is found by matching, or read from the run's folder.
+
+    Raises SpecError, before the search, where the views of the rooms do not suit.
+    """
+    card = state.card
+    rooms = rooms_of(source.opened.file, card.settings.networks.size)
+    source.pick_views(matching.matched_rows(rooms).numpy())
+
+    def show(done: int, total: int) -> None:
+        share = {"share of images matched": done / total}
+        progress(card.iteration, card.settings.iterations, share)
+
+    for turn in (True, False):  # the first process finds what the others then read
+        if turn is fabric.is_global_zero:
+            relief = matching.labels(rooms, folder, show)
+        summed(torch.zeros(1, device=fabric.device))
+    source.learn_from(relief.numpy())
+
+
+@torch.no_grad()
+def fit_prior(model: Pix2Shape, sources: Sources) -> None:
+    """Fit the prior to the codes of the first images, as no critic ties codes to it."""
+    source, device = sources.images, next(model.parameters()).device
+    loader = DataLoader(source, batch_size=BATCH, sampler=range(min(len(source), PRIOR_ITEMS)))
+    learning = model.training
+    model.eval()
+    codes, conditions = [], []
+    for items in loader:
+        batch = source.as_batch(items).to(device)
+        codes.append(model.encode(batch.image, batch.views))
+        conditions.append(batch.views.condition)
+    model.prior.fit(torch.cat(codes), torch.cat(conditions))
+    model.train(learning)
+
+
+def _picture(folder: Path, logs: Logs, state: ModelState, iterations: Iterations) -> None:
+    batch, numbers = iterations.batch, torch.Generator().manual_seed(0)
+    noise = torch.randn(len(batch.image), state.card.settings.networks.z, generator=numbers)
+    picture = training_sheet(state.network, batch, noise.to(batch.image.device))
+    save_picture(picture, folder / PICTURE, overwrite=True)
+    logs.picture(picture, state.card.iteration)

@@ -1,0 +1,147 @@
+"""The networks that give the relief of a room from one image and its camera.
+
+Relief is how far a surface lies before the empty room, along the viewing axis, in scene units:
+depth = depth of the empty room - relief. So both networks are told where floor and walls are, as
+the baseline empty-room is.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from baselines.pix2shape.network.architecture import Decoder, Encoder, NetworkSpec, contrast
+from baselines.pix2shape.network.empty_rooms import FLAT, Cameras, empty_rooms, planes_of
+from baselines.training.checkpoint import Card as BaseCard
+from baselines.training.checkpoint import check_numbers
+from scenegen.common.records import LARGEST, check
+
+KINDS = ("unet", "code")
+SIZES = (32, 64, 128, 256)  # pixels a side
+LEVELS = (32, 64, 96, 128)  # channels at 1/2, 1/4, 1/8 and 1/16 of the image size
+FINE = 16  # channels at full size
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which network, how large, and how it is trained.
+
+    Attributes:
+        network: "unet" has skip connections and gives the relief at the input's own camera alone;
+            "code" is the reference model's encoder and decoder, which pass the image through a
+            code of 128 numbers and give the relief at any camera.
+        size: image size, pixels a side.
+        width: multiplies the channels; of "code" those of the paper's tables.
+        seed: of the first weights and of every random choice of training.
+        iterations, batch: length of training, and images in each batch.
+        learning_rate: of Adam; it rises over WARM_UP iterations and falls to 0 along a cosine.
+    """
+
+    network: str = "unet"
+    size: int = 64
+    width: float = 1.0
+    seed: int = 0
+    iterations: int = 1200
+    batch: int = 16
+    learning_rate: float = 0.003
+
+    def __post_init__(self) -> None:
+        check(self.network in KINDS, "network", self.network, " or ".join(KINDS))
+        check(self.size in SIZES, "size", self.size, f"one of {', '.join(map(str, SIZES))}")
+        ranges = {
+            "width": (0.05, 4), "seed": (0, LARGEST), "iterations": (1, LARGEST),
+            "batch": (2, LARGEST), "learning_rate": (1e-12, 1),
+        }  # fmt: skip
+        check_numbers(self, ranges)
+
+
+@dataclass(frozen=True)
+class Card(BaseCard):
+    """The card of a relief network."""
+
+    settings: Settings
+
+
+def relief_network(card: Card) -> nn.Module:
+    """Return an untrained network: (image (B, 3, S, S), its `Cameras`, `Cameras` asked for).
+
+    It returns the relief that the cameras asked for see, (B, S, S), which may be below 0.
+    """
+    settings = card.settings
+    return CodeNetwork(settings) if settings.network == "code" else UNet(settings)
+
+
+def predicted_depth(network: nn.Module, image: Tensor, own: Cameras, asked: Cameras) -> Tensor:
+    """Return planar depth, (B, S, S), scene units: what the network gives, before the walls."""
+    relief = network(image, own, asked)
+    walls, entry, _ = empty_rooms(asked.world_from_camera, asked.fov_y_degrees, image.shape[-1])
+    return torch.maximum(walls - torch.where(relief > FLAT, relief, 0), entry)
+
+
+class Residual(nn.Module):
+    """Two convolutions with batch normalisation, and a way around them (He et al. 2016)."""
+
+    def __init__(self, before: int, after: int) -> None:
+        super().__init__()
+        self.first = nn.Conv2d(before, after, 3, padding=1, bias=False)
+        self.second = nn.Conv2d(after, after, 3, padding=1, bias=False)
+        self.norms = nn.ModuleList(nn.BatchNorm2d(after) for _ in range(2))
+        self.around = nn.Conv2d(before, after, 1) if before != after else nn.Identity()
+
+    def forward(self, values: Tensor) -> Tensor:
+        """(B, before, H, W) -> (B, after, H, W)."""
+        inner = functional.relu(self.norms[0](self.first(values)))
+        return functional.relu(self.norms[1](self.second(inner)) + self.around(values))
+
+
+class UNet(nn.Module):
+    """An encoder and a decoder joined at every size (Ronneberger et al. 2015)."""
+
+    def __init__(self, settings: Settings) -> None:
+        super().__init__()
+        fine, *levels = (max(4, round(settings.width * n)) for n in (FINE, *LEVELS))
+        self.full = nn.Conv2d(3 + 3 + 4, fine, 3, padding=1)
+        self.halve = nn.Conv2d(fine, levels[0], 4, 2, 1)
+        before = [levels[0], *levels[:-1]]
+        self.down = nn.ModuleList(Residual(a, b) for a, b in zip(before, levels, strict=True))
+        rising = levels[::-1]
+        joined = itertools.pairwise(rising)
+        self.up = nn.ModuleList(Residual(a + b, b) for a, b in joined)
+        self.enlarge = nn.Conv2d(levels[0], 4 * fine, 1)
+        self.join = nn.Conv2d(2 * fine, fine, 3, padding=1)
+        self.last = nn.Conv2d(fine, 1, 3, padding=1)
+
+    def forward(self, image: Tensor, own: Cameras, asked: Cameras) -> Tensor:
+        """As `relief_network` says; only the image's own camera can be asked for."""
+        if asked is not own:
+            raise ValueError("a unet gives the relief at the image's own camera alone")
+        channels = torch.cat([image, contrast(image), planes_of(own, image.shape[-1])], dim=1)
+        channels = channels.contiguous(memory_format=torch.channels_last)
+        full = functional.relu(self.full(channels))
+        values, kept = functional.relu(self.halve(full)), []
+        for level, block in enumerate(self.down):
+            values = block(functional.max_pool2d(values, 2) if level else values)
+            kept.append(values)
+        for block, beside in zip(self.up, kept[-2::-1], strict=True):
+            larger = functional.interpolate(values, scale_factor=2.0, mode="nearest")
+            values = block(torch.cat([larger, beside], dim=1))
+        values = functional.relu(functional.pixel_shuffle(self.enlarge(values), 2))
+        values = functional.relu(self.join(torch.cat([values, full], dim=1)))
+        with torch.autocast(values.device.type, enabled=False):  # bfloat16 is too coarse
+            return self.last(values.float())[:, 0]
+
+
+class CodeNetwork(nn.Module):
+    """The reference model's encoder and decoder, as in the paper's tables, between them a code."""
+
+    def __init__(self, settings: Settings) -> None:
+        super().__init__()
+        networks = NetworkSpec(size=settings.size, width=settings.width)
+        self.encoder, self.decoder = Encoder(networks), Decoder(networks)
+
+    def forward(self, image: Tensor, own: Cameras, asked: Cameras) -> Tensor:
+        """As `relief_network` says."""
+        code = self.encoder(image, own.world_from_camera[:, :3, 3])
+        return self.decoder(code, asked.world_from_camera[:, :3, 3])[:, 0]

@@ -1,0 +1,42 @@
+"""`view-pairs`: relief by matching views of a scene, then a network that gives it from one image.
+
+Training data are rooms of several views, neighbours at most 20 degrees apart, such as `scenegen
+render --views 0,10,20,30,40,50,60,70,80 --image-dtype float16`. Images and cameras are read, and no
+depth, normals, ids or lights.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from baselines.pix2shape.matching.labels import labels, matched_rows
+from baselines.relief import predict, training
+from baselines.relief.network import Settings
+from baselines.relief.training import Lessons
+from baselines.training.rooms import Rooms
+from scenegen.common.records import check
+
+METHOD = "view-pairs"
+__all__ = ["Settings", "train", "write_submission"]
+
+
+def lessons_of(
+    rooms: Rooms, settings: Settings, folder: Path, progress: Callable[[int, int], Any]
+) -> Lessons:
+    """Return the relief that matching finds, of the rows that have a partner."""
+    check(settings.network == "unet", "network", settings.network, "unet")
+    relief = labels(rooms, folder, progress)
+
+    def target(rows: Tensor) -> tuple[Tensor, Tensor]:
+        goal = relief[rows].float()
+        return goal, torch.ones_like(goal)
+
+    return Lessons(matched_rows(rooms), target)
+
+
+train = partial(training.train, METHOD, lessons_of, False)
+write_submission = partial(predict.write_submission, METHOD)

@@ -1,0 +1,46 @@
+"""Four ResNets of shared weights, three fully connected layers, and a softmax over the answers.
+
+Pix2Shape (IJCV 2020), section 3D-IQTT and the appendix's figure "3D-IQTT baseline architecture".
+"""
+
+from functools import partial
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from baselines.resnets import answering, training
+from baselines.resnets.architecture import ResNet
+from baselines.resnets.card import Answerer, Card, Settings
+from baselines.training.checkpoint import Method
+
+__all__ = ["Settings", "train", "write_submission"]
+
+HIDDEN = (2048, 512, 256)
+
+
+class AnswerClassifier(nn.Module):
+    """Images of a question to the logarithm of each answer's probability.
+
+    The fully connected layers see the features of all images side by side, so that a network is
+    made for one number of answers, and nothing in it knows that the order of answers is arbitrary.
+    """
+
+    def __init__(self, card: Card) -> None:
+        super().__init__()
+        self.resnet = ResNet(card.settings.depth, card.settings.width)
+        sizes = ((1 + card.answers) * self.resnet.features, *HIDDEN)
+        layers: list[nn.Module] = []
+        for i in range(len(HIDDEN)):
+            layers += [nn.Linear(sizes[i], sizes[i + 1]), nn.ReLU()]
+        self.head = nn.Sequential(*layers, nn.Linear(HIDDEN[-1], card.answers))
+
+    def forward(self, images: Tensor) -> Tensor:
+        """Return logarithms of probabilities, (Q, K), of images, (Q, 1 + K, 3, S, S)."""
+        features = self.resnet(images.flatten(0, 1)).view(len(images), -1)
+        return torch.log_softmax(self.head(features), dim=1)
+
+
+KIND = Answerer(Method("cnn", Card, AnswerClassifier), functional.nll_loss, any_number=False)
+train = partial(training.train, KIND)
+write_submission = partial(answering.write_submission, KIND)

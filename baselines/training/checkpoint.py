@@ -1,0 +1,315 @@
+"""Weights and checkpoints: safetensors files that hold their card. Reading them runs no code.
+
+Weights go by the network's own names for them. In a checkpoint these begin with "network.", and the
+moments of each optimiser with its name.
+"""
+
+import errno
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+from torch import Tensor, nn
+from torch.optim import Adam
+
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.random.seeding import Purpose, item_seed
+from scenegen.common.records import LARGEST, check, from_json, normalise, to_json
+from scenegen.files.new_file import written_beside
+
+CHECKPOINT, WEIGHTS = "checkpoint.safetensors", "weights.safetensors"
+VERSION = "1"
+NETWORK = "network."
+MOMENTS = ("exp_avg", "exp_avg_sq", "step")  # of Adam
+OTHER_CARD = "these are weights of another configuration than the card's"
+
+
+@dataclass(frozen=True)
+class Card:
+    """What a file of weights says of itself: settings of the run, and what was done.
+
+    Attributes:
+        method: name of the method, as in `bench train NAME`.
+        settings: of networks and training, a frozen dataclass of the method with at least `seed`,
+            `iterations` and `learning_rate`; each method's card declares its type.
+        labels: how many answers of questions training was given.
+        data, fingerprint: request and fingerprint of the training file.
+        iteration, seconds: how many iterations are done, and how long they took.
+    """
+
+    method: str
+    settings: Any
+    labels: int = 0
+    data: str = ""
+    fingerprint: str = ""
+    iteration: int = 0
+    seconds: float = 0.0
+
+    def __post_init__(self) -> None:
+        last = self.settings.iterations
+        check_numbers(self, {"labels": (0, LARGEST), "iteration": (0, last), "seconds": (0, 1e9)})
+
+
+def check_numbers(record: Any, ranges: Mapping[str, tuple[float, float]]) -> None:
+    """Give a record's fields Python's own types, and raise SpecError for a number out of range."""
+    normalise(record)
+    for name, (low, high) in ranges.items():
+        value = getattr(record, name)
+        check(low <= value <= high, name.replace("_", " "), value, f"{low:g} to {high:g}")
+
+
+CardT = TypeVar("CardT", bound=Card)
+NetworkT = TypeVar("NetworkT", bound=nn.Module)
+
+
+def one_adam(_card: Any, network: nn.Module) -> dict[str, Adam]:
+    """Return one optimiser of all weights, whose learning rate `fit` sets."""
+    return {"adam": Adam(network.parameters())}
+
+
+@dataclass(frozen=True)
+class Method(Generic[CardT, NetworkT]):
+    """How the cards of a method are read, and what is made of them.
+
+    Attributes:
+        name: as in `bench train NAME`.
+        card: class of the cards.
+        network: makes the untrained network of a card.
+        optimisers: makes the optimisers, by name, of a card's network.
+        kept: beginnings of the names that files of weights hold; all by default.
+    """
+
+    name: str
+    card: type[CardT]
+    network: Callable[[CardT], NetworkT]
+    optimisers: Callable[[CardT, NetworkT], dict[str, Adam]] = one_adam
+    kept: tuple[str, ...] = ("",)
+
+
+@dataclass(eq=False)
+class State(Generic[CardT, NetworkT]):
+    """Everything that training changes."""
+
+    card: CardT
+    network: NetworkT
+    optimisers: dict[str, Adam]
+
+    def to(self, device: torch.device) -> None:
+        """Move weights and moments to a device."""
+        self.network.to(device)
+        for optimiser in self.optimisers.values():
+            optimiser.load_state_dict(optimiser.state_dict())
+
+
+def new_state(method: Method[CardT, NetworkT], card: CardT) -> State[CardT, NetworkT]:
+    """Return an untrained network, whose weights the card's seed decides, and its optimisers."""
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(item_seed(card.settings.seed, 0, Purpose.WEIGHTS))
+        network = method.network(card)
+    return State(card, network, method.optimisers(card, network))
+
+
+def save_weights(
+    path: str | Path,
+    method: Method[CardT, NetworkT],
+    network: NetworkT,
+    card: CardT,
+    dtype: torch.dtype = torch.float16,
+) -> None:
+    """Write weights and their card; the file is replaced when it is complete.
+
+    Args:
+        dtype: type of the stored numbers; tensors beyond its range keep their own.
+    """
+    kept = {}
+    for name, value in _kept(method, network.state_dict()).items():
+        short = value.to(dtype) if value.is_floating_point() else value
+        kept[name] = short if torch.isfinite(short).all() else value
+    save_tensors(path, kept, _notes("weights", card))
+
+
+def load_weights(path: str | Path, method: Method[CardT, NetworkT]) -> tuple[NetworkT, CardT]:
+    """Read weights; the network is in evaluation mode.
+
+    Raises OSError; FileFormatError where the file is damaged or holds something else.
+    """
+    tensors, card, _ = _load(path, method, "weights")
+    return _network(path, method, card, tensors, method.kept).eval(), card
+
+
+def save_checkpoint(folder: Path, state: State[CardT, NetworkT]) -> None:
+    """Write the folder's checkpoint; the old one stays until this one is complete."""
+    tensors = {NETWORK + name: value for name, value in state.network.state_dict().items()}
+    notes = _notes("checkpoint", state.card)
+    for kind, optimiser in state.optimisers.items():
+        moments = optimiser.state_dict()["state"]
+        notes[kind] = str(len(moments))  # parameters with moments: no loss may train some
+        for index, values in moments.items():
+            tensors |= {f"{kind}.{index}.{name}": value for name, value in values.items()}
+    save_tensors(folder / CHECKPOINT, tensors, notes)
+
+
+def load_checkpoint(folder: Path, method: Method[CardT, NetworkT]) -> State[CardT, NetworkT]:
+    """Read the folder's checkpoint. Raises OSError, FileFormatError."""
+    path = folder / CHECKPOINT
+    if not path.is_file():
+        raise FileNotFoundError(errno.ENOENT, "holds no checkpoint to resume", str(folder))
+    tensors, card, notes = _load(path, method, "checkpoint")
+    network = _network(path, method, card, _beginning(NETWORK, tensors), ("",))
+    state = State(card, network, method.optimisers(card, network))
+    read = sum(name.startswith(NETWORK) for name in tensors)
+    for kind, optimiser in state.optimisers.items():
+        moments = _beginning(f"{kind}.", tensors)
+        _load_moments(f"{path}: {kind}", optimiser, moments, notes.get(kind, "no count"))
+        read += len(moments)
+    if read != len(tensors):
+        raise FileFormatError(path, "tensors that are neither weights nor moments", "a checkpoint")
+    return state
+
+
+def load_card(path: str | Path, method: Method[CardT, NetworkT]) -> CardT:
+    """Read the card of a checkpoint alone. Raises OSError, FileFormatError."""
+    with _opened(Path(path)) as file:
+        return _card(path, file.metadata() or {}, method, "checkpoint")
+
+
+def save_tensors(path: str | Path, tensors: Mapping[str, Tensor], notes: dict[str, str]) -> None:
+    """Write tensors and notes; the file appears, or is replaced, when it is complete."""
+    kept = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
+    with written_beside(path, overwrite=True) as temporary:
+        temporary.write_bytes(save(kept, metadata=notes or None))
+
+
+def load_tensors(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
+    """Read tensors and notes. Raises OSError, FileFormatError."""
+    with _opened(Path(path)) as file:
+        return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118
+
+
+def check_tensors(
+    path: str | Path, tensors: Mapping[str, Tensor], expected: Mapping[str, Tensor]
+) -> None:
+    """Raise FileFormatError unless the tensors of a file are finite and have the expected shapes.
+
+    Args:
+        path: of the file, for messages.
+        tensors: what was read.
+        expected: made on torch's device "meta", so that a hostile card costs no memory.
+    """
+    for name in sorted(expected.keys() ^ tensors.keys()):
+        found, wanted = ("nothing", "a tensor") if name in expected else ("a tensor", "nothing")
+        raise FileFormatError(f"{path}: {name}", found, wanted, OTHER_CARD)
+    for name, like in expected.items():
+        value, place = tensors[name], f"{path}: {name}"
+        if value.shape != like.shape:
+            shape, wanted = (f"shape {tuple(shape)}" for shape in (value.shape, like.shape))
+            raise FileFormatError(place, shape, wanted, OTHER_CARD)
+        kinds = [(v.is_floating_point(), v.is_complex()) for v in (value, like)]
+        if kinds[0] != kinds[1] or (value.element_size() == 1 and like.element_size() > 1):
+            raise FileFormatError(place, value.dtype, like.dtype)
+        cast = value.to(like.dtype)
+        not_negative = name.endswith(("running_var", "exp_avg_sq", "step"))
+        if not torch.isfinite(cast).all() or (not_negative and (cast < 0).any()):
+            raise FileFormatError(place, "NaN, infinity, or below 0 where that cannot be")
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """Open a safetensors file for the block. Raises OSError, FileFormatError."""
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise FileFormatError(path, "a pipe or a device", "a regular file")  # it may have no end
+    with path.open("rb"):  # raises Python's own errors for a missing file or a folder
+        pass
+    try:
+        with safe_open(path, "pt") as file:
+            yield file
+    except SafetensorError as error:
+        raise FileFormatError(path, f"no safetensors file, or a damaged one ({error})") from error
+
+
+def _notes(content: str, card: Card) -> dict[str, str]:
+    return {"content": content, "version": VERSION, "card": to_json(card)}
+
+
+def _kept(method: Method[CardT, NetworkT], tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    return {name: value for name, value in tensors.items() if name.startswith(method.kept)}
+
+
+def _beginning(start: str, tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    return {k.removeprefix(start): v for k, v in tensors.items() if k.startswith(start)}
+
+
+def _load(
+    path: str | Path, method: Method[CardT, NetworkT], content: str
+) -> tuple[dict[str, Tensor], CardT, dict[str, str]]:
+    """Return tensors, card and notes of a file. Raises OSError, FileFormatError."""
+    tensors, notes = load_tensors(path)
+    return tensors, _card(path, notes, method, content), notes
+
+
+def _card(
+    path: str | Path, notes: Mapping[str, str], method: Method[CardT, NetworkT], content: str
+) -> CardT:
+    """Return the card in a file's notes. Raises FileFormatError."""
+    expected = f"{content} of {method.name}"
+    if notes.get("content") != content or "card" not in notes:
+        hint = f"name {WEIGHTS} beside it" if notes.get("content") == "checkpoint" else ""
+        raise FileFormatError(path, notes.get("content", "no card")[:40], expected, hint)
+    if notes.get("version") != VERSION:
+        found = f"format version {notes.get('version')!s:.20}"
+        raise FileFormatError(path, found, VERSION, "use the release that wrote it")
+    try:
+        card = from_json(method.card, notes["card"], "card")
+        check(card.method == method.name, "method", f"{card.method:.40}", method.name)
+    except SpecError as error:
+        wrong = error.inside(path)
+        raise FileFormatError(wrong.where, wrong.found, wrong.expected, wrong.hint) from error
+    return card
+
+
+def _network(
+    path: str | Path,
+    method: Method[CardT, NetworkT],
+    card: CardT,
+    tensors: Mapping[str, Tensor],
+    parts: tuple[str, ...],
+) -> NetworkT:
+    """Return the network of a card with a file's weights.
+
+    Shapes are compared before anything is allocated, so that a hostile card costs no memory.
+    """
+    with torch.device("meta"):
+        names = method.network(card).state_dict()
+    check_tensors(path, tensors, {k: v for k, v in names.items() if k.startswith(parts)})
+    network = method.network(card)
+    network.load_state_dict(dict(tensors), strict=False)
+    return network
+
+
+def _load_moments(place: str, optimiser: Adam, tensors: Mapping[str, Tensor], count: str) -> None:
+    """Set the moments of an optimiser. Raises FileFormatError where they do not suit its weights.
+
+    Args:
+        count: how many parameters have moments. Each of these has all of MOMENTS.
+    """
+    parameters = optimiser.param_groups[0]["params"]
+    indices = {name.partition(".")[0] for name in tensors}
+    if strange := sorted(indices - {str(index) for index in range(len(parameters))}):
+        raise FileFormatError(place, f"moments of parameter {strange[0]!r:.40}", "of its weights")
+    if str(len(indices)) != count:
+        raise FileFormatError(place, f"moments of {len(indices)} parameters", f"{count:.20}")
+    moments: dict[int, dict[str, Tensor]] = {}
+    expected = {}
+    for index in sorted(map(int, indices)):
+        for name in MOMENTS:
+            shape = () if name == "step" else parameters[index].shape
+            expected[f"{index}.{name}"] = torch.empty(shape, device="meta")
+            moments.setdefault(index, {})[name] = tensors.get(f"{index}.{name}", torch.empty(0))
+    check_tensors(place, tensors, expected)
+    groups = optimiser.state_dict()["param_groups"]
+    optimiser.load_state_dict({"state": moments, "param_groups": groups})

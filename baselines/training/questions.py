@@ -1,0 +1,115 @@
+"""Images and answers of questions, read from an open file and checked."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from baselines.training.images import Array, channels_first, check_reducible, row_batches
+from iqtt import QuestionsFile, open_questions
+from iqtt.files.layout import FORMAT_NAME
+from iqtt.files.tables import PARTS
+from scenegen.common.errors import SpecError
+from scenegen.files.attributes import read_text
+from scenegen.files.shards import open_with_shards
+from scenegen.rendering.ground_truth import decode_image
+
+LABELED, UNLABELED = PARTS
+Progress = Callable[[int, int], Any]  # questions done since the last call, in all
+
+
+def is_question_file(path: str | Path) -> bool:
+    """Return whether a file holds questions or their answers. Raises OSError, FileFormatError."""
+    with open_with_shards(Path(path), "rooms or question file")[0] as file:
+        kind = read_text(file, "format", path)
+        released = kind is None and any(name in file for name in ("questions", *PARTS))
+        return released or kind == FORMAT_NAME
+
+
+def open_training(path: str | Path, part: str) -> QuestionsFile:
+    """Open the labelled or the unlabelled questions of a training file.
+
+    Raises as `open_questions`, and SpecError for another file.
+    """
+    try:
+        return open_questions(path, part)
+    except SpecError as error:
+        expected = "a training file such as iqtt-train.h5"
+        raise SpecError(path, "no training questions", expected) from error
+
+
+def open_test(path: str | Path, size: int) -> QuestionsFile:
+    """Open questions to answer, whose images can be reduced to a size.
+
+    Raises as `open_questions`, and SpecError for training questions, none, and other images.
+    """
+    try:
+        questions = open_questions(path)
+    except SpecError as error:
+        expected = "questions to answer, such as iqtt-test.h5"
+        raise SpecError(path, "training questions", expected) from error
+    try:
+        check_reducible(path, questions.height, questions.width, size)
+        if not len(questions):
+            raise SpecError(path, "no questions", "one or more to answer")
+    except BaseException:
+        questions.close()
+        raise
+    return questions
+
+
+def check_labels(labelled: QuestionsFile, labels: int, least: int = 0) -> None:
+    """Raise SpecError unless a file tells the answers of as many questions."""
+    count = len(labelled) if labelled.has_answers else 0
+    if not least <= labels <= count:
+        expected = f"{least} to {count}, as many answers as {labelled.path} tells"
+        raise SpecError("labels", labels, expected, "`iqtt make-split --labeled N` makes more")
+
+
+def check_truth(questions: QuestionsFile) -> None:
+    """Raise SpecError unless a file of ours holds questions and tells shapes, views and lights."""
+    if questions.spec is None or not questions.has_truth or not len(questions):
+        truth = "with" if questions.has_truth else "without"
+        message = f"{len(questions)} questions {truth} the group `truth`"
+        expected = "some, with that group, which tells shapes and lights"
+        raise SpecError(questions.path, message, expected, "`iqtt make-split` writes it")
+
+
+def question_images(questions: QuestionsFile, row: int, size: int) -> Array:
+    """Return the images of a question as networks take them, (1 + K, 3, S, S), reference first."""
+    where = f"{questions.path}: row {row}"
+    stored = decode_image(questions.read("questions", row))
+    return np.stack([channels_first(image, size, where) for image in stored])
+
+
+@torch.no_grad()
+def each_question(
+    questions: QuestionsFile,
+    size: int,
+    function: Callable[[Tensor], Tensor],
+    batch: int,
+    count: int | None = None,
+    progress: Progress = lambda done, total: None,
+) -> Tensor:
+    """Return a function of the images of each of the first questions, on the CPU.
+
+    Args:
+        function: of images, (B, 1 + K, 3, S, S), to values, (B, ...).
+        count: how many questions; None for all.
+
+    Raises FileFormatError where an image is damaged, not finite or huge.
+    """
+    total, values = len(questions) if count is None else count, []
+    for rows in row_batches(total, batch):
+        images = np.stack([question_images(questions, int(row), size) for row in rows])
+        values.append(function(torch.from_numpy(images)).cpu())
+        progress(len(rows), total)
+    return torch.cat(values)
+
+
+def training_answers(labelled: QuestionsFile, labels: int) -> Tensor:
+    """Return which answers are right, of the first labelled questions, (labels,)."""
+    return torch.from_numpy(labelled.read("answers", slice(0, labels)).astype(np.int64))

@@ -1,0 +1,142 @@
+"""Images and cameras of rooms, read from an open file and checked."""
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from baselines.training.images import Array, channels_first, check_reducible, reduced
+from scenegen import open_rooms
+from scenegen.common.errors import FileFormatError
+from scenegen.rendering.ground_truth import decode_image
+from scenegen.rooms.reader import RoomsFile
+
+FARTHEST = 1e4  # scene units; a camera farther away sees the whole room in less than a pixel
+UPRIGHT = 1e-3  # of products of a pose's axes, by which they may differ from those of a rotation
+
+
+@dataclass(frozen=True, eq=False)
+class Rooms:
+    """The rows of a file of rooms in memory, N of them.
+
+    Attributes:
+        image: linear radiance, (N, 3, S, S), float16.
+        world_from_camera: (N, 4, 4).
+        scene: number of the scene, (N,).
+        angle: of the view, about the vertical axis from the scene's first one, degrees, (N,).
+        rounded: whether radiance was stored in 8 bits.
+        depth: planar, scene units, (N, S, S), NaN where there is no surface; None if not asked for.
+        data, fingerprint: request and fingerprint of the file.
+    """
+
+    image: Tensor
+    world_from_camera: Tensor
+    fov_y_degrees: float
+    scene: Tensor
+    angle: Tensor
+    rounded: bool
+    depth: Tensor | None
+    data: str
+    fingerprint: str
+
+    def __len__(self) -> int:
+        return len(self.image)
+
+
+def read_rooms(path: str | Path, size: int, *, depth: bool = False) -> Rooms:
+    """Read a file of rooms; raises as `rooms_of` and `open_rooms`."""
+    with open_rooms(path) as rooms:
+        return rooms_of(rooms, size, depth=depth)
+
+
+def rooms_of(rooms: RoomsFile, size: int, *, depth: bool = False) -> Rooms:
+    """Read all rooms of a file, their images reduced to size x size pixels.
+
+    Raises FileFormatError where a camera or an image is not known or, if depth is asked for, an
+    image has none; SpecError where images cannot be reduced.
+    """
+    check_reducible(rooms.path, rooms.spec.height, rooms.spec.width, size)
+    poses = camera_poses(rooms).astype(np.float32)
+    images = np.empty((len(rooms), 3, size, size), np.float16)
+    depths = np.empty((len(rooms), size, size), np.float32) if depth else None
+    for row in range(len(rooms)):
+        images[row] = room_image(rooms, row, size)
+        if depths is not None:
+            depths[row] = reduced(rooms.read("depth", row), size)
+            if not np.isfinite(depths[row]).any():
+                raise FileFormatError(f"{rooms.path}: depth, row {row}", "no surface", "some")
+    scene, angle = (rooms.read(n, slice(None)) for n in ("scene_index", "view_angle_degrees"))
+    return Rooms(
+        torch.from_numpy(images),
+        torch.from_numpy(poses),
+        rooms.spec.fov_y_degrees,
+        torch.from_numpy(np.asarray(scene)),
+        torch.from_numpy(np.asarray(angle)),
+        rooms.spec.image_dtype == "uint8",
+        None if depths is None else torch.from_numpy(depths),
+        rooms.spec.to_json(),
+        rooms.fingerprint,
+    )
+
+
+def room_image(rooms: RoomsFile, row: int, size: int) -> Array:
+    """Return the image of a row as the networks take it, (3, S, S). Raises as `channels_first`."""
+    where = f"{rooms.path}: image, row {row}"
+    return channels_first(decode_image(rooms.read("image", row)), size, where)
+
+
+def room_images(rooms: RoomsFile, rows: Array, size: int) -> Tensor:
+    """Return the images of rows as the networks take them, (B, 3, S, S). Raises as `room_image`."""
+    return torch.from_numpy(np.stack([room_image(rooms, int(row), size) for row in rows]))
+
+
+def camera_poses(rooms: RoomsFile) -> Array:
+    """Return world_from_camera of all rows, (N, 4, 4).
+
+    Raises FileFormatError where one is unknown, far away, or no rotation and translation.
+    """
+    name = "camera/world_from_camera"
+    poses = bounded(rooms, name, FARTHEST)
+    turns = poses[:, :3, :3].astype(float)
+    off: Array = np.abs(turns.transpose(0, 2, 1) @ turns - np.eye(3)).max(axis=(1, 2))
+    mirrored, last = np.linalg.det(turns) < 0, (poses[:, 3] != (0, 0, 0, 1)).any(axis=1)
+    message = "a matrix that is no rotation and translation"
+    refuse_rows(rooms, name, (off > UPRIGHT) | mirrored | last, message, "a camera's pose")
+    return poses
+
+
+def bounded(rooms: RoomsFile, name: str, most: float) -> Array:
+    """Return what the networks are told of all rows. Raises FileFormatError beyond +-`most`."""
+    values: Array = rooms.read(name, slice(None))
+    fine = np.abs(values.reshape(len(values), -1)) <= most  # NaN is not
+    expected = f"finite numbers of at most {most:g}, as the networks are told them"
+    refuse_rows(rooms, name, ~fine.all(axis=1), "numbers that are not finite, or huge", expected)
+    return values
+
+
+def refuse_rows(rooms: RoomsFile, name: str, wrong: Any, message: str, expected: str) -> None:
+    """Raise FileFormatError for the first of the rows that are wrong, (N,), if any is."""
+    if wrong.any():
+        where = f"{rooms.path}: {name}, row {np.flatnonzero(wrong)[0]}"
+        hint = "render the file anew with `scenegen render`, or leave this row out"
+        raise FileFormatError(where, message, expected, hint)
+
+
+def input_views(rooms: RoomsFile) -> tuple[Array, Array]:
+    """Return each scene's input row, (S,), and for each row its scene's place in there, (N,)."""
+    scene, view = (rooms.read(name, slice(None)) for name in ("scene_index", "view_index"))
+    first: dict[int, int] = {}
+    for row in np.argsort(view, kind="stable"):
+        first.setdefault(int(scene[row]), int(row))
+    inputs = np.array(sorted(first.values()))
+    if late := np.count_nonzero(view[inputs]):
+        warnings.warn(
+            f"{rooms.path}: {late} of {len(inputs)} scenes have no view 0; the model's input is the"
+            " first of their other views",
+            stacklevel=3,
+        )
+    return inputs, np.searchsorted(inputs, [first[int(number)] for number in scene])
