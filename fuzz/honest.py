@@ -49,8 +49,7 @@ def make(folder: Path, weights: bool) -> None:
         file["answers"] = np.arange(4) % 3
     _people(Path("people.db"))
     if weights:
-        for name in ("weights.safetensors", "weights.json"):
-            Path("run", name).rename(name)
+        Path("run/weights.safetensors").rename("weights.safetensors")
 
 
 def _people(path: Path) -> None:

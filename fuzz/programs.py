@@ -90,7 +90,6 @@ OUTPUTS = ("--out", "--json", "--csv", "--html", "--export", "--submission")
 FOUND_BY = {
     "predictions.h5": ["rooms.h5"],
     "constant.h5": ["rooms.h5"],
-    "weights.safetensors": ["weights.json"],
     "iqtt/iqtt-test.h5": ["iqtt/iqtt-test-answers.h5"],
 }
 

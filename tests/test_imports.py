@@ -51,7 +51,7 @@ def first_users(*lines, cwd):
 
 
 def test_importing_the_packages_loads_nothing_heavy(tmp_path):
-    packages = "scenegen, iqtt, metrics, baselines.pix2shape, baselines.cnn, cli"
+    packages = "scenegen, iqtt, metrics, baselines.pix2shape, baselines.resnets, cli"
     code = f"import sys, {packages}; print(*set({HEAVY!r}) & set(sys.modules))"
     assert python(code, cwd=tmp_path) == "\n"
 

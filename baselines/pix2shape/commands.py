@@ -213,7 +213,9 @@ def shown_training(
     try:
         yield show
     except KeyboardInterrupt:
-        if bar is not None:
+        from baselines.training.launch import is_first_here
+
+        if is_first_here():
             click.echo()
             print_line(f"Stopped; `--resume` goes on from {out}'s last checkpoint, if it got one.")
         raise

@@ -12,6 +12,7 @@ under the true lights.
 
 from collections import defaultdict
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +22,14 @@ import torch
 from numpy.typing import NDArray
 from torch.utils.data import default_collate
 
-from baselines.pix2shape.data.rooms import RoomImages, reduced
 from baselines.pix2shape.network.empty_rooms import empty_rooms
 from baselines.pix2shape.network.model import Pix2Shape, Views, shaded
 from baselines.pix2shape.network.surfels import render
 from baselines.pix2shape.pictures import image_tiles, sheet
-from baselines.pix2shape.use.predict import input_views
-from baselines.pix2shape.weights.bundled import open_weights
+from baselines.pix2shape.rooms import RoomImages
+from baselines.pix2shape.weights import open_weights
+from baselines.training.images import Opened, reduced
+from baselines.training.rooms import input_views
 from benchmarks.markdown import table
 from metrics.measures.statistics import bootstrap_interval
 from scenegen.rooms.reader import RoomsFile
@@ -66,9 +68,9 @@ def read(model: Pix2Shape, data: Path) -> dict[str, Array]:
 
     Lights are directions from the camera's target, (N, L, 3), NaN in slots that are not used.
     """
-    source, size = RoomImages(data, model.config), model.config.networks.size
-    found = defaultdict(list)
-    with RoomsFile(data) as rooms:
+    opened, size = Opened(partial(RoomsFile, data)), model.config.networks.size
+    source, found = RoomImages(opened, model.config), defaultdict(list)
+    with opened.file as rooms:
         target = np.array(rooms.spec.camera_target)
         for row in map(int, input_views(rooms)[0]):
             batch = source.as_batch(default_collate([source[row]]))

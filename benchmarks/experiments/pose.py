@@ -24,8 +24,8 @@ from sklearn.model_selection import cross_val_predict
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from baselines.pix2shape.data.rooms import channels_first
-from baselines.pix2shape.weights.bundled import open_weights
+from baselines.pix2shape.weights import open_weights
+from baselines.training.images import channels_first
 from benchmarks.markdown import table
 from iqtt.files.reader import open_questions
 from scenegen.rendering.ground_truth import decode_image

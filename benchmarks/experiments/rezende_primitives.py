@@ -13,11 +13,11 @@ import numpy as np
 import torch
 from PIL import Image
 
-from baselines.checkpoints import CHECKPOINT, WEIGHTS, save_weights
-from baselines.rezende.card import Card
+from baselines.rezende.card import METHOD, Card, Settings
 from baselines.rezende.primitives import PRIMITIVE_SETS, render_primitives
 from baselines.rezende.reconstruct import errors, reconstruct, sheet, untrained
 from baselines.rezende.training import train_pictures
+from baselines.training.checkpoint import CHECKPOINT, load_checkpoint, new_state
 
 TRAINED, TESTED, SHOWN = 4_000, 400, 10  # images of each set
 TRAIN_SEED, TEST_SEED = 1, 2
@@ -31,17 +31,20 @@ TRAIN_SEED, TEST_SEED = 1, 2
 def main(runs: Path, picture: Path, iterations: int, only: tuple[str, ...]) -> None:
     """Train, measure and draw."""
     torch.set_num_threads(1)
-    card = Card(iterations=iterations)
+    settings = Settings(iterations=iterations)
     sheets = []
     print(f"{'set':12} {'':9} {'radiance':>8} {'silhouette IoU':>14} {'depth':>6} {'CPU s':>6}")
     for name in only or PRIMITIVE_SETS:
         folder = runs / name
-        train = render_primitives(name, TRAINED, card.size, TRAIN_SEED)
-        resume = (folder / CHECKPOINT).exists()
-        state = train_pictures(train, folder, card, resume=resume)
+        train = render_primitives(name, TRAINED, settings.size, TRAIN_SEED)
+        folder.mkdir(parents=True, exist_ok=True)
+        if (folder / CHECKPOINT).exists():
+            state = load_checkpoint(folder, METHOD)
+        else:
+            state = new_state(METHOD, Card("rezende", settings, fingerprint=train.fingerprint))
+        train_pictures(train, folder, state)
         model = state.network.eval()
-        save_weights(folder / WEIGHTS, state)
-        test = render_primitives(name, TESTED, card.size, TEST_SEED)
+        test = render_primitives(name, TESTED, settings.size, TEST_SEED)
         found = reconstruct(model, test)
         for what, one in (("sphere", untrained(test)), ("trained", found)):
             e = errors(one, test)

@@ -42,3 +42,9 @@ def turned_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPa
     """Return a file of 3 rooms seen from 0, 10 and 80 degrees, 32x32."""
     path = tmp_path_factory.mktemp("turned") / "turned.h5"
     return make_rooms(path, 3, views=(0.0, 10.0, 80.0), min_visible_pixels=2)
+
+
+@pytest.fixture(scope="session")
+def train_questions(truths: Any) -> Path:
+    """Return a file of 3 labelled questions and 3 others, 32x32."""
+    return Path(truths.iqtt).with_name("iqtt-train.h5")

@@ -1,6 +1,7 @@
 """`bench train` and `bench baseline` with trained baselines, as a user types them, and mistakes."""
 
 import importlib.util
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -27,13 +28,18 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """Put a baseline in the place of `cnn` that keeps what it is asked for."""
     asked: dict[str, Any] = {}
 
-    def train(data, run_folder, *, labels=5, seed=0, depth=18, resume=False, progress=None):
-        asked.update(data=data, labels=labels, seed=seed, depth=depth, resume=resume)
+    @dataclass(frozen=True)
+    class Settings:
+        seed: int = 0
+        depth: int = 18
+
+    def train(data, run_folder, settings, *, labels=5, device="auto", resume=False, progress=None):
+        asked.update(data=data, labels=labels, device=device, resume=resume, **vars(settings))
         progress(1, 1, {"loss": 0.25})
         return Path(run_folder) / "w.safetensors"
 
-    package = SimpleNamespace(train=train)
-    monkeypatch.setattr(commands, "import_module", lambda name: package)
+    module = SimpleNamespace(train=train, Settings=Settings)
+    monkeypatch.setattr(commands, "import_module", lambda name: module)
     return asked
 
 
@@ -56,7 +62,7 @@ def test_train_answer_score(name, folder):
 @pytest.mark.parametrize("name", [*commands.TRAINED, "pix2shape"])
 def test_two_runs_never_share_a_folder(name, folder):
     pytest.importorskip("torch")
-    from baselines.checkpoints import alone_in
+    from baselines.training.run_folder import alone_in
 
     reference = (pix2shape, "train", "--set=networks.size=32", "--set=networks.width=0.0625")
     train = reference if name == "pix2shape" else (bench, "train", name)
@@ -70,11 +76,12 @@ def test_two_runs_never_share_a_folder(name, folder):
 
 
 def test_settings_reach_the_baseline(fake, folder):
-    line = f"train cnn {DATA} --out run --set depth=50 --seed 7"
+    line = f"train cnn {DATA} --out run --set depth=50 --set device=cpu --seed 7"
     done = bench(*line.split())
     assert done.exit_code == 0, done.output
     assert fake == {
-        "data": "iqtt-train.h5", "labels": 5, "seed": 7, "depth": 50, "resume": False
+        "data": "iqtt-train.h5", "labels": 5, "seed": 7, "depth": 50, "device": "cpu",
+        "resume": False,
     }  # fmt: skip
     assert "loss 0.25" in done.stdout
     assert "run/w.safetensors" in done.stdout
@@ -85,11 +92,12 @@ def test_settings_reach_the_baseline(fake, folder):
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("--iterations 5", ("--iterations", "cnn")),
+        ("--iterations 5", ("iterations",)),
+        ("--set device=3", ("device", "3")),
         ("--set colour=1", ("--set", "'colour'", "depth")),
-        ('--set depth="deep"', ("--set", "depth", "'deep'", "18")),
+        ('--set depth="deep"', ("depth", "'deep'")),
         ("--set depth=3 --set depth=3", ("--set", "'depth'")),
-        ("--set depth=true", ("--set", "depth", "True")),
+        ("--set depth=true", ("depth", "True")),
         ("--set resume=true", ("--set", "'resume'")),
         ("--set progress=1", ("--set", "'progress'")),
         ("--resume --seed 2", ("--resume",)),
@@ -108,7 +116,7 @@ MISTAKES = [
     ("train cnn --data iqtt-test.h5 --out run", ("iqtt-test.h5", "no training questions")),
     ("train cnn --data nothing.h5 --out run", ("nothing.h5",)),
     (f"train cnn {DATA} --out run --set depth=34", ("depth", "18 or 50")),
-    (f"train cnn {DATA} --out run --set width=wide", ("--set", "width", "'wide'")),
+    (f"train cnn {DATA} --out run --set width=wide", ("width", "'wide'")),
     (f"train cnn {DATA} --out run", ("iqtt-train.h5", "32x32", "64")),
     (f"train cnn {DATA} --out run --resume", ("run: ", "checkpoint")),
     (f"train ptm {DATA} --out run", ("ptm",)),
@@ -128,28 +136,12 @@ def test_a_mistake_is_one_line_and_leaves_nothing(line, words, folder, check_ref
     assert files_in(folder) == before
 
 
-def test_without_bundled_weights(folder, monkeypatch, check_refusal):
-    pytest.importorskip("torch")
-    from dataclasses import replace
-
-    from baselines.resnet import answering
-
-    bundled = answering._bundled
-    monkeypatch.setattr(
-        answering, "_bundled", lambda method: bundled(replace(method, files=folder / "none"))
-    )
-    result = bench("baseline", "siamese", "--data", "iqtt-test.h5")
-    check_refusal(
-        result.exit_code, result.stdout, result.stderr, ("--weights", "bench train siamese")
-    )
-
-
 def test_who_interrupts_is_told_how_to_go_on(folder, fake, monkeypatch):
-    def train(data, run_folder, *, resume, progress):
+    def train(*given, **how):
         raise KeyboardInterrupt
 
-    package = SimpleNamespace(train=train)
-    monkeypatch.setattr(commands, "import_module", lambda name: package)
+    module = commands.import_module("baselines.resnets.cnn")
+    monkeypatch.setattr(module, "train", train)
     result = bench(*f"train cnn {DATA} --out run".split())
     assert (result.exit_code, "--resume" in result.stdout) == (1, True)
 
@@ -165,9 +157,11 @@ def test_without_the_optional_packages(line, gone, tmp_path, monkeypatch, check_
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
 
 
-@pytest.mark.parametrize("name", commands.TRAINED)
-def test_every_trained_baseline_has_both_functions(name):
+def test_every_trained_baseline_has_a_module():
     pytest.importorskip("torch")
-    package = commands._package(name)
-    assert callable(package.train)
-    assert callable(package.write_submission)
+    assert commands.HOMES.keys() == commands.TRAINED.keys()
+    for name in commands.TRAINED:
+        module = commands._module(name)
+        assert module.Settings(iterations=7, seed=3).iterations == 7
+        assert callable(module.train)
+        assert callable(module.write_submission)

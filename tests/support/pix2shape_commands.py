@@ -7,7 +7,7 @@ from typing import Any
 
 from click.testing import CliRunner
 from h5_edits import damaged_chunk
-from pix2shape_models import edited, of_questions, tiny, told, written
+from pix2shape_models import edited, of_questions, origin, tiny, written
 
 import cli
 
@@ -36,12 +36,11 @@ def prepare(folder: Path, rooms: Path, questions: Path, make_rooms: Callable[...
         shutil.copy(path, folder)
     make_rooms(folder / "large.h5", 3, height=64, width=64)
     edited(folder / "rooms.h5", folder / "damaged.h5", damaged_chunk("image", 5))
-    known = told(rooms)
-    written(folder / "rooms.safetensors", tiny(), **known)
+    data = origin(rooms)
+    written(folder / "rooms.safetensors", tiny(), **data)
     written(folder / "questions.safetensors", of_questions(folder / "iqtt-train.h5"))
-    written(folder / "classes.safetensors", tiny(classes=2), classes=("mug", "bowl"), **known)
+    written(folder / "classes.safetensors", tiny(classes=2), classes=("mug", "bowl"), **data)
     (folder / "text.safetensors").write_text("no weights")
-    shutil.copy(folder / "rooms.json", folder / "text.json")
     return folder
 
 

@@ -6,6 +6,7 @@ torch is imported when one is made: the commands are tested without it, too.
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,46 +22,89 @@ def tiny(size: int = SIZE, **settings: Any) -> Any:
     from baselines.pix2shape.network.config import ModelConfig
 
     names = ("classes", "camera", "z_scene", "z_view", "encoder", "spherical", "rays", "bounded")
-    own = {name: settings.pop(name) for name in names if name in settings}
-    networks = NetworkSpec(size=size, width=0.05, **own)
+    of_networks = {name: settings.pop(name) for name in names if name in settings}
+    networks = NetworkSpec(size=size, width=0.05, **of_networks)
     plain = {"iterations": 4, "batch": 4, "critic_steps": 1}
     return ModelConfig(networks=networks, **{**plain, **settings})
 
 
+def room_source(path: Path, config: Any) -> Any:
+    """Return the images of a rooms file as a model of this configuration is shown them."""
+    from baselines.pix2shape.rooms import RoomImages
+    from baselines.training.images import Opened
+    from scenegen import open_rooms
+
+    return RoomImages(Opened(partial(open_rooms, path)), config)
+
+
+def question_source(path: Path, part: str | None, config: Any) -> Any:
+    """Return the images of a question file, as `room_source`."""
+    from baselines.pix2shape.questions import QuestionImages
+    from baselines.training.images import Opened
+    from iqtt import open_questions
+
+    return QuestionImages(Opened(partial(open_questions, path, part)), config)
+
+
+def suited(config: Any, path: Path, part: str | None = "unlabeled") -> Any:
+    """Return the configuration that training on a file of questions gives a model."""
+    from baselines.pix2shape.questions import for_questions
+    from iqtt import open_questions
+
+    with open_questions(path, part) as questions:
+        return for_questions(config, questions)
+
+
 def of_questions(train: Path, **settings: Any) -> Any:
     """Return the configuration that training on a file of questions gives a tiny model."""
-    from baselines.pix2shape.data.questions import for_questions
+    return suited(tiny(**settings), train)
 
-    return for_questions(tiny(**settings), train, "unlabeled")
+
+def state_of(config: Any, **card: Any) -> Any:
+    """Return the untrained state of a configuration."""
+    from baselines.pix2shape.weights import METHOD
+    from baselines.training.checkpoint import new_state
+
+    return new_state(METHOD, card_of(config, **card))
+
+
+def card_of(config: Any, **card: Any) -> Any:
+    """Return a card of a configuration."""
+    from baselines.pix2shape.weights import Card
+
+    names = tuple(f"class {i}" for i in range(config.networks.classes))
+    return Card("pix2shape", config, **{"classes": names, **card})
 
 
 def made(config: Any, seed: int = 0) -> Any:
     """Return a model whose depth maps differ clearly from code to code."""
     import torch
 
-    from baselines.pix2shape.training.state import new_state
-
-    model = new_state(replace(config, seed=seed)).model.eval()
+    model = state_of(replace(config, seed=seed)).network.eval()
     with torch.no_grad():
         model.encoder.last.weight.mul_(5)
         model.decoder.last.weight.mul_(10)
     return model
 
 
-def written(path: Path, config: Any, **card: Any) -> Path:
-    """Write the weights of such a model."""
-    from baselines.pix2shape.weights.storage import Card, save_weights
+def stored(path: Path, network: Any, card: Any) -> Path:
+    """Write weights and their card."""
+    from baselines.pix2shape.weights import METHOD
+    from baselines.training.checkpoint import save_weights
 
-    names = tuple(f"class {i}" for i in range(config.networks.classes))
-    save_weights(path, made(config), Card(config, **{"classes": names, **card}))
+    save_weights(path, METHOD, network, card)
     return path
 
 
-def told(rooms: Path, **more: Any) -> dict[str, Any]:
+def written(path: Path, config: Any, **card: Any) -> Path:
+    """Write the weights of such a model."""
+    return stored(path, made(config), card_of(config, **card))
+
+
+def origin(rooms: Path) -> dict[str, Any]:
     """Return what a card tells of the rooms that a model was trained on."""
     with h5py.File(rooms) as file:
-        mark, spec = str(file.attrs["fingerprint"]), str(file.attrs["spec"])
-    return {"data": spec, "fingerprint": mark, **more}
+        return {"data": str(file.attrs["spec"]), "fingerprint": str(file.attrs["fingerprint"])}
 
 
 def edited(path: Path, to: Path, *edits: Callable[[h5py.File], Any]) -> Path:

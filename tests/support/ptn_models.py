@@ -5,26 +5,29 @@ from typing import Any
 import numpy as np
 import torch
 
-from baselines.checkpoints import new_state
-from baselines.ptn.card import RECIPE, Card
-from baselines.ptn.network import VOXELS, Ptn, PtnConfig
+from baselines.ptn.network import METHOD, VOXELS, Card, Ptn, Settings
+from baselines.training.checkpoint import new_state
 
 torch.set_num_threads(1)
 TINY: dict[str, Any] = {"width": 2, "size": 16, "batch": 2, "rays": 40, "samples": 12}
 
 
-def tiny(task: str = "rooms", **settings: Any) -> Ptn:
-    """Return an untrained model of the unit box, or of a cube around 0."""
+def card_of(task: str = "rooms", **settings: Any) -> Card:
+    """Return a card of the unit box, or of a cube around 0."""
     low, high = ((0, 0, 0), (1, 0.5, 1)) if task == "rooms" else ((-1,) * 3, (1,) * 3)
-    card = Card(PtnConfig(task, low, high, **{**TINY, **settings}))
-    return new_state(RECIPE, card).network.eval()
+    return Card("ptn", Settings(**{**TINY, **settings}), task=task, low=low, high=high)
+
+
+def tiny(task: str = "rooms", **settings: Any) -> Ptn:
+    """Return an untrained model of such a card."""
+    return new_state(METHOD, card_of(task, **settings)).network.eval()
 
 
 def voxel_centres(model: Ptn) -> Any:
     """Return the places of a volume's values, (D, D, D, 3) by z, y and x."""
     unit = (np.arange(VOXELS) + 0.5) / VOXELS
     z, y, x = np.meshgrid(unit, unit, unit, indexing="ij")
-    low, high = np.array(model.config.low), np.array(model.config.high)
+    low, high = model.box.double().numpy()
     return low + np.stack([x, y, z], axis=-1) * (high - low)
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from baselines.pix2shape.network.config import ModelConfig
-from baselines.pix2shape.training.launch import Machine
-from baselines.pix2shape.training.runs import train_run
+from baselines.pix2shape.training.run import train_run
+from baselines.training.launch import Machine
 
 
 def train_all(runs: list[dict[str, Any]]) -> None:
@@ -24,18 +24,18 @@ def train_all(runs: list[dict[str, Any]]) -> None:
 
 def train(run: dict[str, Any], folder: Path) -> None:
     """Train a run of four iterations."""
-    found: list[dict[str, float]] = []
+    reported: list[dict[str, float]] = []
 
-    def progress(state: Any, losses: dict[str, float]) -> None:
-        found.append(losses)
-        if state.iteration == 3:  # the checkpoint is that of iteration 2
+    def progress(done: int, total: int, losses: dict[str, float]) -> None:
+        reported.append(losses)
+        if done == 3:  # the checkpoint is that of iteration 2
             shutil.copytree(folder, f"{folder}-half", dirs_exist_ok=True)
 
     config = run["config"] and ModelConfig.from_json(run["config"])
     machine = Machine("cpu", run["processes"], workers=0, every=2)
     how = {"labels": run["labels"], "progress": progress}
     if train_run(folder, run["data"], config, machine, **how) is not None:
-        (folder / "losses.json").write_text(json.dumps(found))
+        (folder / "losses.json").write_text(json.dumps(reported))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 `outlines` makes them of silhouettes, with numpy alone and no learned part: sizes, moments,
 widths, the boundary's shape, and how the silhouette's parts lie to each other. None of them knows
-of cubes, rotations or 3D. The audit's probes and `baselines/outline` look at them.
+of cubes, rotations or 3D. The audit's probes and `baselines/outline.py` look at them.
 """
 
 import itertools

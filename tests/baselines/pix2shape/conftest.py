@@ -1,4 +1,4 @@
-"""One thread a test process: the tests' own processes share the cores already. Files to predict."""
+"""A tiny model, and files to predict."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 from pix2shape_models import made, tiny
 
-torch = pytest.importorskip("torch")
-torch.set_num_threads(1)
+pytest.importorskip("torch")
 
 
 @pytest.fixture(scope="session")
@@ -30,19 +29,3 @@ def single_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPa
     """Return a file of 4 rooms with one object of two classes."""
     path = tmp_path_factory.mktemp("single") / "single.h5"
     return make_rooms(path, 4, objects=(1, 1), shapes=("box", "sphere"))
-
-
-@pytest.fixture(scope="session")
-def train_questions(truths: Any) -> Path:
-    """Return a file of 3 labelled questions and 3 others."""
-    return Path(truths.iqtt).with_name("iqtt-train.h5")
-
-
-@pytest.fixture(scope="session")
-def fabric() -> Any:
-    """Return the one process in which tests train."""
-    from lightning_fabric import Fabric
-
-    fabric = Fabric(accelerator="cpu", devices=1)
-    fabric.launch()
-    return fabric

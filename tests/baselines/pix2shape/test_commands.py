@@ -1,7 +1,6 @@
 """The reference model's commands as a user types them, with and without torch; mistakes, too."""
 
 import importlib.util
-import json
 import os
 import shutil
 import socket
@@ -35,9 +34,11 @@ def test_train_predict_score(folder):
     small = [f"--set={one}" for one in ("iterations=2", "batch=2", "consistency=0")]
     made = train(*small, "--set=networks.size=32", "--set=networks.width=0.05", "--seed", 5)
     assert made.exit_code == 0, made.output
-    card = json.loads((folder / "run" / "weights.json").read_text())
+    from baselines.pix2shape.weights import open_weights
+
+    settings = vars(open_weights(folder / "run" / "weights.safetensors")[1].settings)
     expected = {"iterations": 2, "batch": 2, "seed": 5, "decay": True}
-    assert expected.items() <= card["config"].items(), "the others are compact's"
+    assert expected.items() <= settings.items(), "the others are compact's"
     on = ("--data", "large.h5", "--weights", "run/weights.safetensors")
     done = pix2shape("predict", *on, "--run", "one")
     assert done.exit_code == 0, done.output
@@ -78,12 +79,12 @@ def test_questions(folder):
 
 
 def test_who_interrupts_is_told_how_to_go_on(folder, monkeypatch):
-    from baselines.pix2shape.training import runs
+    from baselines.pix2shape.training import run
 
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(runs, "train_run", interrupted)
+    monkeypatch.setattr(run, "train_run", interrupted)
     result = train("--set=iterations=2")
     assert result.exit_code == 1
     assert "--resume" in result.stdout
@@ -116,10 +117,10 @@ def test_a_process_that_is_killed_ends_the_other_with_one_line(folder, check_ref
 
 
 def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
-    from baselines.pix2shape.weights import bundled
+    from baselines.pix2shape import weights
 
-    monkeypatch.setattr(bundled, "FOLDER", folder / "none")
-    assert bundled.names() == []
+    monkeypatch.setattr(weights, "FOLDER", folder / "none")
+    assert weights.names() == []
     result = pix2shape("sample")
     check_refusal(result.exit_code, result.stdout, result.stderr, ("'shapes-rays'",))
     result = bench("baseline", "pix2shape", "--data", "rooms.h5")
@@ -127,8 +128,7 @@ def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
     assert "are bundled" not in result.stderr
     (folder / "none").mkdir()
     for name in ("shapes-paper", "shapes-single"):
-        for ending in ("safetensors", "json"):
-            shutil.copy(f"rooms.{ending}", f"none/{name}.{ending}")
+        shutil.copy("rooms.safetensors", f"none/{name}.safetensors")
     made = bench("baseline", "pix2shape", "--data", "rooms.h5")
     assert "weights shapes-paper, on rooms.h5" in made.stdout, made.output
     given = ("--data", "rooms.h5", "--weights", "shapes-paper", "--out", "other.h5")
@@ -146,7 +146,7 @@ MISTAKES = [
     ("predict", ("--data",)),
     (f"predict {WITH} --data nothing.h5", ("nothing.h5",)),
     (f"predict {WITH} --data .", (".: is a folder",)),
-    (f"predict {ROOMS} --weights rooms.json", ("'rooms.json'", ".safetensors")),
+    (f"predict {ROOMS} --weights rooms.h5", ("'rooms.h5'", ".safetensors")),
     (f"predict {ROOMS} --weights text.safetensors", ("text.safetensors",)),
     (f"predict {WITH} {ROOMS} --out rooms.h5 --overwrite", ("rooms.h5", "not an input")),
     (f"predict {WITH} --data damaged.h5", ("damaged.h5", "image, row 5")),
@@ -178,7 +178,7 @@ MISTAKES = [
     (f"train {LARGE} --set networks.camera=false", ("camera",)),
     (f"train {LARGE} --resume", ("run: ", "checkpoint")),
     (f"train {LARGE} --resume --seed 3", ("--resume",)),
-    (f"train {LARGE} --out rooms.json", ("rooms.json: File exists",)),
+    (f"train {LARGE} --out iqtt-val.h5", ("iqtt-val.h5: File exists",)),
 ]
 BASELINE_MISTAKES = [
     (f"oracle {ROOMS} {WITH}", ("--weights", "oracle")),

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from pix2shape_models import made, tiny
+from pix2shape_models import made, room_source, tiny
 
 from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.rooms.preview import srgb_bytes
@@ -16,7 +16,7 @@ torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
 from baselines.pix2shape import pictures  # noqa: E402
-from baselines.pix2shape.data.rooms import Batch, RoomImages  # noqa: E402
+from baselines.pix2shape.batch import Batch  # noqa: E402
 from baselines.pix2shape.network.surfels import normals_from_depth  # noqa: E402
 from baselines.pix2shape.pictures import drawn, image_tiles, save_pictures, sheet  # noqa: E402
 
@@ -26,7 +26,7 @@ PAPER = (250, 250, 250)
 
 @pytest.fixture
 def batch(rooms_path: Path) -> Batch:
-    source = RoomImages(rooms_path, tiny())
+    source = room_source(rooms_path, tiny())
     return source.as_batch(default_collate([source[row] for row in range(5)]))
 
 

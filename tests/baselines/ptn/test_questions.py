@@ -1,17 +1,19 @@
 """Batches of polycubes: silhouettes are those of the file's own images, and of turned shapes."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from refusals import refused
 
 torch = pytest.importorskip("torch")
 
 from ptn_models import cubes_volume, tiny  # noqa: E402
 
 from baselines.ptn.projection import silhouettes  # noqa: E402
-from baselines.ptn.questions import TrainingShapes, check_questions, meets_cubes  # noqa: E402
+from baselines.ptn.questions import TrainingShapes, meets_cubes  # noqa: E402
 from iqtt.files.make import make_split  # noqa: E402
 from iqtt.files.reader import open_questions  # noqa: E402
 from iqtt.questions.specs import SplitSpec  # noqa: E402
@@ -46,9 +48,8 @@ def test_silhouettes_of_cubes_are_where_images_are_not_background(split):
 def test_volumes_of_the_truth_have_the_batchs_silhouettes(split):
     path = split / "iqtt-train.h5"
     model = tiny("questions", batch=3, rays=200, views=3, size=48)
-    source = TrainingShapes(path, model.config)
-    batch = source.batch(np.random.default_rng(0))
-    source.close()
+    with open_questions(path, "unlabeled") as questions:
+        batch = TrainingShapes(questions, model.settings).batch(np.random.default_rng(0))
     assert batch.camera.shape == (3, 0)
     with open_questions(path, "unlabeled") as questions:
         (question,) = questions
@@ -67,8 +68,12 @@ def test_volumes_of_the_truth_have_the_batchs_silhouettes(split):
         assert (found != (batch.silhouette[item] > 0)).float().mean() < 0.03
 
 
-def test_files_that_tell_no_shapes_are_refused(split):
-    check_questions(split / "iqtt-train.h5")
-    for path in (split / "iqtt-test.h5", split / "iqtt-val.h5"):
-        with pytest.raises(SpecError):
-            check_questions(path)
+def test_files_that_tell_no_shapes_and_odd_sizes_are_refused(split):
+    settings = tiny("questions").settings
+    with open_questions(split / "iqtt-test.h5") as questions, refused(SpecError, "iqtt-test.h5"):
+        TrainingShapes(questions, settings)
+    with (
+        open_questions(split / "iqtt-train.h5", "unlabeled") as questions,
+        refused(SpecError, "iqtt-train.h5", "48x48", "32"),
+    ):
+        TrainingShapes(questions, replace(settings, size=32))

@@ -3,6 +3,7 @@
 import h5py
 import numpy as np
 import pytest
+from refusals import refused
 
 torch = pytest.importorskip("torch")
 
@@ -31,9 +32,9 @@ def test_a_ball_is_where_all_views_of_a_batch_see_it(make_rooms, tmp_path):
     model = tiny(batch=6, rays=300, size=32)
     with RoomsFile(path) as rooms:
         places = rooms.read("camera/world_from_camera", slice(None))[:, :3, 3]
-    source, seen = TrainingRooms(path, model.config), set()
-    batch = source.batch(np.random.default_rng(0))
-    source.close()
+    seen = set()
+    with RoomsFile(path) as rooms:
+        batch = TrainingRooms(rooms, model.settings).batch(np.random.default_rng(0))
     assert batch.image.shape == (6, 3, 32, 32)
     assert 0.02 < batch.silhouette.mean() < 0.5
     for item in range(6):
@@ -62,8 +63,8 @@ def test_an_image_is_mirrored_where_its_camera_stands_nearer_z(make_rooms, tmp_p
 
 def test_the_box_holds_every_object(make_rooms, tmp_path):
     path = make_rooms(tmp_path / "rooms.h5", 4, pose="any")
-    top = room_box(path)[1][1]
     with RoomsFile(path) as rooms:
+        top = room_box(rooms.spec)[1][1]
         assert top == 2 * rooms.spec.object_radius[1]
         scale = rooms.read("object/scale", slice(None))
         height = rooms.read("object/world_from_object", slice(None))[:, :, 1, 3]
@@ -71,17 +72,15 @@ def test_the_box_holds_every_object(make_rooms, tmp_path):
 
 
 def test_files_that_tell_too_little_are_refused(make_rooms, tmp_path):
-    config = tiny().config
-    one = make_rooms(tmp_path / "one.h5", 2)
-    with pytest.raises(SpecError) as error:
-        TrainingRooms(one, config)
-    assert "--views" in error.value.hint
+    single = make_rooms(tmp_path / "one.h5", 2)
     odd = make_rooms(tmp_path / "odd.h5", 1, height=36, width=32, **BALL)
-    with pytest.raises(SpecError):
-        TrainingRooms(odd, config)
     blind = make_rooms(tmp_path / "blind.h5", 1, **BALL)
     with h5py.File(blind, "r+") as file:
         file["camera/world_from_camera"][1] = np.nan
-    with pytest.raises(FileFormatError) as error:
-        TrainingRooms(blind, config)
-    assert "row 1" in error.value.where
+    for path, kind, where, hint in (
+        (single, SpecError, "scene 0", "--views"),
+        (odd, SpecError, "odd.h5", ""),
+        (blind, FileFormatError, "row 1", ""),
+    ):
+        with RoomsFile(path) as rooms, refused(kind, where, hint=hint):
+            TrainingRooms(rooms, tiny().settings)

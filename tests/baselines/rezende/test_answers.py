@@ -4,26 +4,31 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 from refusals import refused
 from scipy.spatial.transform import Rotation
 
-from baselines.checkpoints import new_state, save_weights
 from baselines.rezende import write_submission
-from baselines.rezende.answers import answer_scores, mesh_distance, refined, rotations
-from baselines.rezende.card import RECIPE, Card
+from baselines.rezende.answers import WEIGHTS, mesh_distance, mesh_scores, refined, rotations
+from baselines.rezende.card import METHOD, Card, Settings
 from baselines.rezende.sphere import icosphere
-from iqtt.files.reader import open_questions
+from baselines.training.checkpoint import load_weights, new_state, save_weights
+from baselines.training.questions import question_images
+from iqtt import open_questions
 from metrics.submissions.validation import validate
-from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.errors import SpecError
 
-CARD = Card(size=16, code=4)
+CARD = Card("rezende", Settings(size=16, code=4))
+
+
+def stored(path, card=CARD):
+    save_weights(path, METHOD, new_state(METHOD, card).network, card)
+    return path
 
 
 @pytest.fixture
 def weights(tmp_path):
-    path = tmp_path / "weights.safetensors"
-    save_weights(path, new_state(RECIPE, CARD))
-    return path
+    return stored(tmp_path / "weights.safetensors")
 
 
 def chiral():
@@ -32,19 +37,6 @@ def chiral():
     arms = zip(np.eye(3), (0.8, 1.6, 2.4))
     length = 1 + sum(reach * (sphere @ axis).clip(0) ** 6 for axis, reach in arms)
     return (0.7 * sphere * length[:, None]).astype(np.float32)
-
-
-def test_rotations_are_proper_and_cover_all_others():
-    found = rotations().astype(float)
-    np.testing.assert_allclose(
-        found @ found.swapaxes(1, 2), np.tile(np.eye(3), (512, 1, 1)), atol=1e-6
-    )
-    np.testing.assert_allclose(np.linalg.det(found), 1, atol=1e-6)
-    others = Rotation.random(500, random_state=0).as_matrix()
-    trace = np.einsum("aij,bij->ab", others, found).max(axis=1)
-    angle = np.degrees(np.arccos(((trace - 1) / 2).clip(-1, 1)))
-    assert angle.max() < 30
-    assert angle.mean() < 17
 
 
 def test_a_turned_and_moved_mesh_is_nearer_than_its_mirror_image_or_another():
@@ -65,23 +57,22 @@ def test_refined_rotations_are_proper_even_towards_a_mirror_image():
     assert best < 1e-3
 
 
-@pytest.mark.parametrize("by_head", [False, True], ids=["meshes", "head"])
-def test_an_equal_image_has_the_best_score(split, by_head):
-    model = new_state(RECIPE, CARD).network.eval()
+def test_an_equal_image_has_the_best_score(split):
+    model = new_state(METHOD, CARD).network.eval()
     model.decoder[-1].weight.data *= 300  # untrained meshes are almost spheres
     with open_questions(split / "iqtt-val.h5") as questions:
-        stored = questions.read("questions", 0).copy()
-    stored[3] = stored[0]
-    scores = answer_scores(model, stored, 16, by_head)
-    assert scores.shape == (3,)
-    assert np.isfinite(scores).all()
-    if not by_head:
-        assert scores.argmax() == 2
+        images = torch.from_numpy(question_images(questions, 0, 16))[None]
+    images[0, 3] = images[0, 0]
+    with torch.no_grad():
+        scores = mesh_scores(model, images)
+    assert scores.shape == (1, 3)
+    assert scores.isfinite().all()
+    assert scores.argmax() == 2
 
 
 @pytest.mark.parametrize("labels", [0, 5])
 def test_submissions_are_valid_and_do_not_depend_on_the_answers(split, tmp_path, weights, labels):
-    save_weights(weights, new_state(RECIPE, replace(CARD, labels=labels)))
+    stored(weights, replace(CARD, labels=labels))
     told = []
     for name in ("iqtt-test.h5", "iqtt-val.h5"):
         out = tmp_path / f"answers-{name}"
@@ -102,9 +93,14 @@ def test_rooms_training_files_and_other_sizes_are_refused(split, tmp_path, weigh
         write_submission(tmp_path / "rooms.h5", out, weights)
     with refused(SpecError, "iqtt-train.h5", "training questions"):
         write_submission(split / "iqtt-train.h5", out, weights)
-    save_weights(weights, new_state(RECIPE, Card(size=24)))
+    other = stored(tmp_path / "other.safetensors", Card("rezende", Settings(size=24)))
     with refused(SpecError, "iqtt-test.h5", "64x64", "24"):
-        write_submission(split / "iqtt-test.h5", out, weights)
-    with pytest.raises(FileFormatError):
-        write_submission(split / "iqtt-test.h5", out, split / "iqtt-test.h5")
+        write_submission(split / "iqtt-test.h5", out, other)
     assert not out.exists()
+
+
+def test_bundled_weights_were_trained_without_labels():
+    model, card = load_weights(WEIGHTS, METHOD)
+    assert (card.labels, card.iteration) == (0, card.settings.iterations)
+    mean, _ = model.encode(torch.rand(2, 3, card.settings.size, card.settings.size))
+    assert (mean[0] != mean[1]).any()

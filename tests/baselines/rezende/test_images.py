@@ -7,11 +7,16 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from baselines.rezende.images import labelled_answers, read_question_pictures
+from baselines.rezende import images
 from baselines.rezende.rasteriser import rasterise
-from iqtt.files.reader import open_questions
+from iqtt import open_questions
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.objects.basic_shapes import unit_shape
+
+
+def read_question_pictures(path, size, part=None):
+    with open_questions(path, part) as questions:
+        return images.read_question_pictures(questions, size)
 
 
 def cubes_mesh(cubes, turn):
@@ -25,7 +30,7 @@ def cubes_mesh(cubes, turn):
 
 
 def test_true_shapes_drawn_with_what_is_told_are_the_images(split):
-    pictures = read_question_pictures(split / "iqtt-val.h5", 64, None)
+    pictures = read_question_pictures(split / "iqtt-val.h5", 64)
     assert len(pictures) == 12
     with open_questions(split / "iqtt-val.h5") as questions:
         for row in range(3):
@@ -55,10 +60,10 @@ def test_images_are_reduced_and_their_questions_limited(split, monkeypatch):
 
 
 def test_what_tells_no_lights_or_has_another_size_is_refused(split):
-    with refused(SpecError, "iqtt-test.h5", "2 questions without lights"):
-        read_question_pictures(split / "iqtt-test.h5", 32, None)
+    with refused(SpecError, "iqtt-test.h5", "2 questions without"):
+        read_question_pictures(split / "iqtt-test.h5", 32)
     with refused(SpecError, "iqtt-val.h5", "64x64", "48"):
-        read_question_pictures(split / "iqtt-val.h5", 48, None)
+        read_question_pictures(split / "iqtt-val.h5", 48)
 
 
 def test_damaged_lights_are_refused(split, tmp_path):
@@ -67,15 +72,4 @@ def test_damaged_lights_are_refused(split, tmp_path):
     with h5py.File(path, "r+") as file:
         file["truth/light_color"][1, 2] = np.nan
     with pytest.raises(FileFormatError):
-        read_question_pictures(path, 32, None)
-
-
-def test_answers_are_the_first_ones_of_the_labelled_part(split):
-    images, right = labelled_answers(split / "iqtt-train.h5", 3)
-    with open_questions(split / "iqtt-train.h5", "labeled") as questions:
-        np.testing.assert_array_equal(images, questions.read("questions", slice(0, 3)))
-        np.testing.assert_array_equal(right, questions.read("answers", slice(0, 3)))
-    with refused(SpecError, "labels", "5", "0 to 4"):
-        labelled_answers(split / "iqtt-train.h5", 5)
-    with refused(SpecError, "iqtt-val.h5", "no training questions"):
-        labelled_answers(split / "iqtt-val.h5", 1)
+        read_question_pictures(path, 32)

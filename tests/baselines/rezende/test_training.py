@@ -6,24 +6,24 @@ import numpy as np
 import pytest
 import torch
 from refusals import refused
-from safetensors.torch import load_file
 
-from baselines.checkpoints import CHECKPOINT, load_weights, new_state
-from baselines.rezende import train, training
-from baselines.rezende.card import RECIPE, Card
+from baselines.rezende import training
+from baselines.rezende.card import METHOD, Card, Settings
 from baselines.rezende.reconstruct import errors, reconstruct, untrained
-from baselines.rezende.training import near_vertices, pixel_errors, train_pictures, windows
+from baselines.rezende.training import bound, near_vertices, pixel_errors, train_pictures, windows
+from baselines.training.checkpoint import new_state
 from scenegen.common.errors import SpecError
 
-TINY = Card(size=16, code=4, iterations=80, batch=8, pairs=4, learning_rate=0.003)
-QUICK = {"size": 16, "code": 4, "iterations": 4, "batch": 4, "pairs": 1}
+TINY = Settings(size=16, code=4, iterations=80, batch=8, pairs=4, learning_rate=0.003)
+
+
+def state_of(settings=TINY):
+    return new_state(METHOD, Card("rezende", settings))
 
 
 def test_one_view_of_a_box_is_learned(one_box, tmp_path):
-    misfits = []
-    state = train_pictures(
-        one_box, tmp_path, TINY, progress=lambda done, total, told: misfits.append(told["misfit"])
-    )
+    misfits, state = [], state_of()
+    train_pictures(one_box, tmp_path, state, lambda *now: misfits.append(now[2]["misfit"]))
     assert np.mean(misfits[-5:]) < 0.4 * np.mean(misfits[:5])
     before = errors(untrained(one_box), one_box)
     after = errors(reconstruct(state.network, one_box), one_box)
@@ -32,7 +32,8 @@ def test_one_view_of_a_box_is_learned(one_box, tmp_path):
 
 
 def test_the_renderer_has_no_gradient_and_yet_the_networks_get_one(one_box, monkeypatch):
-    state = new_state(RECIPE, replace(TINY, spread=1e6))
+    settings = replace(TINY, spread=1e6)
+    state = state_of(settings)
     offsets = torch.zeros(2, 8, 162, 3, requires_grad=True)
     squared = pixel_errors(state.network, offsets, one_box, np.arange(8))
     assert isinstance(squared, np.ndarray)  # no tensor, so nothing to differentiate
@@ -46,13 +47,13 @@ def test_the_renderer_has_no_gradient_and_yet_the_networks_get_one(one_box, monk
         return torch.ones_like(mean), torch.zeros(len(mean))
 
     monkeypatch.setattr(training, "sampled_gradient", fixed)
-    training._step(state, one_box, 0)
+    torch.autograd.backward(bound(state.network, one_box, settings, 0).total)
     bias = state.network.decoder[-1].bias
     np.testing.assert_allclose(bias.grad, torch.ones_like(bias), rtol=1e-5)
 
 
 def test_errors_are_summed_in_the_windows_of_vertices(one_box):
-    model = new_state(RECIPE, TINY).network
+    model = state_of().network
     offsets = torch.zeros(8, 162, 3)
     around = windows(model, offsets, one_box)
     squared = np.random.default_rng(0).random((2, 8, 16, 16), np.float32)
@@ -65,7 +66,7 @@ def test_errors_are_summed_in_the_windows_of_vertices(one_box):
 
 
 def test_the_far_side_is_charged_with_nothing_and_the_middle_keeps_its_depth(one_box):
-    model = new_state(RECIPE, TINY).network
+    model = state_of().network
     offsets = torch.zeros(8, 162, 3)
     sums = near_vertices(np.ones((1, 8, 16, 16), np.float32), windows(model, offsets, one_box))
     height = model.sphere[:, 2].numpy()
@@ -78,7 +79,7 @@ def test_the_far_side_is_charged_with_nothing_and_the_middle_keeps_its_depth(one
 
 
 def test_what_moves_one_vertex_changes_errors_in_its_window_alone(one_box):
-    state = new_state(RECIPE, TINY)
+    state = state_of()
     state.network.smooth = torch.eye(162)
     offsets = torch.zeros(2, 8, 162, 3)
     vertex = int(state.network.sphere[:, 2].argmax())  # it faces the camera
@@ -94,71 +95,19 @@ def test_what_moves_one_vertex_changes_errors_in_its_window_alone(one_box):
     np.testing.assert_allclose(near[0, :, vertex], changed.sum(axis=(1, 2)), rtol=0.4)
 
 
-def test_a_run_that_was_stopped_ends_with_the_same_bits(one_box, tmp_path, monkeypatch):
-    card = replace(TINY, iterations=5)
-    whole = train_pictures(one_box, tmp_path / "whole", card)
-    monkeypatch.setattr(training, "EVERY", 2)
-
-    def stop(done, total, numbers):
-        if done == 3:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        train_pictures(one_box, tmp_path / "parts", card, progress=stop)
-    with pytest.raises(FileExistsError):
-        train_pictures(one_box, tmp_path / "parts", card)
-    parts = train_pictures(one_box, tmp_path / "parts", card, resume=True)
-    assert parts.card.iteration == 5
-    for name, value in whole.network.state_dict().items():
-        assert torch.equal(value, parts.network.state_dict()[name]), name
-    ends = [load_file(tmp_path / run / CHECKPOINT) for run in ("whole", "parts")]
-    assert all(torch.equal(value, ends[1][name]) for name, value in ends[0].items())
-    with refused(SpecError, "data", "other"):
-        train_pictures(replace(one_box, fingerprint="other"), tmp_path / "parts", card, resume=True)
-
-
-def test_questions_are_trained_on_and_labels_change_the_head_alone(split, tmp_path):
-    data, told = split / "iqtt-train.h5", []
-    first = train(
-        data, tmp_path / "a", **QUICK, progress=lambda done, total, n: told.append((done, total))
-    )
-    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
-    second = train(data, tmp_path / "b", labels=4, start=first)
-    (model, card), (other, labelled) = (
-        (state.network, state.card)
-        for state in (load_weights(first, RECIPE), load_weights(second, RECIPE))
-    )
-    assert (card.labels, labelled.labels) == (0, 4)
-    assert (card.iteration, labelled.iteration) == (4, 4)
-    for name, value in model.state_dict().items():
-        if not name.startswith("head."):
-            assert torch.equal(value, other.state_dict()[name]), name
-    assert not torch.equal(model.head.shift, other.head.shift)
-    direct = train(data, tmp_path / "c", labels=4, **QUICK)
-    assert direct.read_bytes() != first.read_bytes()
-    again = train(data, tmp_path / "c", resume=True)
-    assert load_weights(again, RECIPE).card.labels == 4
-    with pytest.raises(FileExistsError):
-        train(data, tmp_path / "c", start=first)
+def test_the_head_has_an_optimiser_of_its_own():
+    state = state_of()
+    learned = {id(w) for w in state.optimisers["adam"].param_groups[0]["params"]}
+    named = state.network.named_parameters()
+    left = {name.partition(".")[0] for name, weights in named if id(weights) not in learned}
+    assert left == {"head"}
 
 
 @pytest.mark.parametrize(
-    ("settings", "where"),
-    [
-        ({"labels": 5}, "labels"),
-        ({"size": 20}, "size"),
-        ({"pairs": 0}, "pairs"),
-        ({"width": float("inf")}, "width"),
-        ({"batch": "many"}, "batch"),
-        ({"start": 5}, "start"),
-        ({"start": "x.safetensors", "resume": True}, "start"),
-    ],
-    ids=["labels", "size", "pairs", "width", "batch", "start", "start-and-resume"],
-)
-def test_settings_that_do_not_fit_are_refused_before_anything_is_written(
-    split, tmp_path, settings, where
-):
-    with pytest.raises(SpecError) as caught:
-        train(split / "iqtt-train.h5", tmp_path / "run", **{**QUICK, **settings})
-    assert where in caught.value.where
-    assert not (tmp_path / "run").exists()
+    ("name", "value"),
+    [("size", 20), ("size", 10**6), ("code", 10**9), ("pairs", 0), ("width", float("inf")),
+     ("iterations", 0), ("seed", -1)],
+)  # fmt: skip
+def test_impossible_settings_are_refused(name, value):
+    with refused(SpecError, name):
+        replace(TINY, **{name: value})

@@ -9,10 +9,10 @@ import pytest
 from scenegen.common.errors import FileFormatError, SpecError
 
 torch = pytest.importorskip("torch")
-from baselines.pix2shape.data.in_memory import read_rooms  # noqa: E402
 from baselines.pix2shape.matching import labels as module  # noqa: E402
 from baselines.pix2shape.matching.labels import FOLDER, labels, matched_rows, pairs_of  # noqa: E402
-from baselines.tensor_files import load_tensors, save_tensors  # noqa: E402
+from baselines.training.checkpoint import load_tensors, save_tensors  # noqa: E402
+from baselines.training.rooms import read_rooms  # noqa: E402
 
 
 @pytest.fixture

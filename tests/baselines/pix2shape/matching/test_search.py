@@ -2,6 +2,7 @@
 
 import itertools
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,6 @@ import pytest
 from scenegen.rooms.reader import RoomsFile
 
 torch = pytest.importorskip("torch")
-from baselines.pix2shape.data.in_memory import read_rooms  # noqa: E402
 from baselines.pix2shape.matching.labels import matched_relief, pairs_of  # noqa: E402
 from baselines.pix2shape.matching.search import (  # noqa: E402
     LARGE,
@@ -22,7 +22,12 @@ from baselines.pix2shape.matching.search import (  # noqa: E402
     matching_cost,
     semi_global,
 )
-from baselines.pix2shape.network.empty_rooms import empty_rooms  # noqa: E402
+from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms  # noqa: E402
+from baselines.training.rooms import read_rooms  # noqa: E402
+
+
+def cameras(rooms: Any, rows: Any) -> Cameras:
+    return Cameras(rooms.world_from_camera[rows], rooms.fov_y_degrees)
 
 
 @pytest.mark.parametrize("bits", [16, 8])
@@ -53,7 +58,7 @@ def test_the_true_relief_costs_less_than_the_empty_room(near_path):
     rooms = read_rooms(near_path, 64, depth=True)
     row, other = torch.tensor([1]), torch.tensor([2])
     views = [rooms.image[i].float() for i in (row, other)]
-    cost = matching_cost(views[0], rooms.cameras(row), views[1], rooms.cameras(other))[0]
+    cost = matching_cost(views[0], cameras(rooms, row), views[1], cameras(rooms, other))[0]
     assert cost.shape == (STEPS, 64, 64)
     walls, _, _ = empty_rooms(rooms.world_from_camera[row], rooms.fov_y_degrees, 64)
     true = (walls - rooms.depth[row])[0]
@@ -68,11 +73,11 @@ def test_the_true_relief_costs_less_than_the_empty_room(near_path):
 def test_what_the_other_image_does_not_show_costs_the_same_at_every_relief(near_path):
     rooms = read_rooms(near_path, 64)
     row, other = torch.tensor([0]), torch.tensor([3])
-    turned = rooms.cameras(other)
+    turned = cameras(rooms, other)
     away = torch.diag(torch.tensor([-1.0, 1.0, -1.0, 1.0]))
     turned = type(turned)(turned.world_from_camera @ away, turned.fov_y_degrees)
     image = rooms.image[row].float()
-    cost = matching_cost(image, rooms.cameras(row), image, turned)
+    cost = matching_cost(image, cameras(rooms, row), image, turned)
     torch.testing.assert_close(cost[:, 0], torch.full_like(cost[:, 0], UNSEEN))
     assert (cost.diff(dim=1) > 0).all(), "so that the empty room is chosen"
     assert (best_relief(semi_global(joint_cost([cost]))) == 0).all()

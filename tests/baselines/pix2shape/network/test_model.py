@@ -3,12 +3,12 @@
 from dataclasses import fields, replace
 
 import pytest
-from pix2shape_models import made, tiny
+from pix2shape_models import made, room_source, tiny
 
 torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
-from baselines.pix2shape.data.rooms import Relief, RoomImages  # noqa: E402
+from baselines.pix2shape.batch import Relief  # noqa: E402
 from baselines.pix2shape.network.empty_rooms import empty_rooms  # noqa: E402
 from baselines.pix2shape.network.model import Material, Surfels, shaded  # noqa: E402
 from baselines.pix2shape.network.surfels import render  # noqa: E402
@@ -27,20 +27,20 @@ def colourful(make_rooms, tmp_path_factory):
 
 
 def batch_of(path, config):
-    source = RoomImages(path, config)
+    source = room_source(path, config)
     return source.as_batch(default_collate([source[row] for row in range(len(source))]))
 
 
 def test_rooms_of_several_materials_are_for_models_that_learn_them(colourful):
     with pytest.raises(SpecError) as error:
-        RoomImages(colourful, tiny())
+        room_source(colourful, tiny())
     assert "material=true" in error.value.hint
     scene = batch_of(colourful, tiny(**LEARNS)).views.scene
     told = {f.name: getattr(scene, f.name) for f in fields(scene)}
     unknown = {name for name, v in told.items() if torch.is_tensor(v) and v.isnan().any()}
     assert unknown == {"light_position", "reflectance"}
     with pytest.raises(SpecError):
-        RoomImages(colourful, tiny(lights=3))
+        room_source(colourful, tiny(lights=3))
 
 
 def test_images_and_losses_follow_from_what_the_model_says(colourful):

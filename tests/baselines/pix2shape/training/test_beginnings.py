@@ -5,58 +5,56 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from pix2shape_models import tiny
+from pix2shape_models import state_of, stored, tiny
+from refusals import refused
 
 from scenegen.common.errors import SceneGenError, SpecError
 
 torch = pytest.importorskip("torch")
+
 from baselines.pix2shape.network.config import model_config  # noqa: E402
 from baselines.pix2shape.training.beginnings import new_run  # noqa: E402
-from baselines.pix2shape.training.state import new_state  # noqa: E402
-from baselines.pix2shape.weights.storage import Card, save_weights  # noqa: E402
 
 CONFIG = tiny(seed=3)
 OTHER = replace(CONFIG, adversarial=0.0)
 SMALL = {"networks.size": 32, "networks.width": 0.05}
 
 
-def stored(path: Path, card: Card) -> Path:
-    """Write weights that nothing has trained yet."""
-    path.parent.mkdir(exist_ok=True)
-    save_weights(path, new_state(card.config).model, card)
-    return path
+def card_of(data: Path, config: Any = CONFIG, **how: Any) -> Any:
+    return new_run(data, config, **how)[0].card
 
 
-def card_of(data: Path, config: Any = CONFIG, **how: Any) -> Card:
-    _, card, _, _ = new_run(data, config, **how)
-    return card
+def untrained(path: Path, data: Path, config: Any = CONFIG, **how: Any) -> Path:
+    """Write the weights with which a run begins."""
+    state = new_run(data, config, **how)[0]
+    return stored(path, state.network, state.card)
 
 
 @pytest.mark.parametrize(
-    ("data", "how", "words"),
+    ("data", "how", "where"),
     [
-        ("rooms", {"labels": 1}, "labels: found 1"),
-        ("rooms", {"conditional": True}, r"conditional: found objects \(1, 3\)"),
-        ("questions", {"conditional": True}, "questions"),
-        ("questions", {"labels": 4}, "labels: found 4, expected 0 to 3"),
-        ("questions", {"labels": -1}, "labels: found -1, expected 0 to 3"),
-        ("test", {}, "iqtt-test"),
-        ("large", {}, "images of 32x32"),
+        ("rooms", {"labels": 1}, "labels"),
+        ("rooms", {"conditional": True}, "conditional"),
+        ("questions", {"conditional": True}, "iqtt-train.h5"),
+        ("questions", {"labels": 4}, "labels"),
+        ("questions", {"labels": -1}, "labels"),
+        ("test", {}, "iqtt-test.h5"),
+        ("large", {}, "rooms.h5"),
     ],
 )
-def test_what_does_not_go_together(data, how, words, truths, train_questions):
+def test_what_does_not_go_together(data, how, where, truths, train_questions):
     paths = {"rooms": truths.rooms, "large": truths.rooms, "test": truths.iqtt}
     path = {**paths, "questions": train_questions}[data]
-    with pytest.raises(SceneGenError, match=words):
+    with refused(SceneGenError, where):
         new_run(path, tiny(size=64) if data == "large" else CONFIG, **how)
 
 
 def test_a_run_begins_from_the_networks_of_another(rooms_path, tmp_path):
     """And from new ones, of its own seed, where none are given."""
-    start = stored(tmp_path / "a.safetensors", card_of(rooms_path))
+    start = untrained(tmp_path / "a.safetensors", rooms_path)
     config = replace(CONFIG, seed=4, learning_rate=1e-9)
-    given, fresh = (new_run(rooms_path, config, start=one)[0].model for one in (start, None))
-    expected = new_state(CONFIG).model
+    given, fresh = (new_run(rooms_path, config, start=path)[0].network for path in (start, None))
+    expected = state_of(CONFIG).network
     for name in ("encoder", "decoder"):
         own = dict(getattr(given, name).named_parameters())
         for key, value in getattr(expected, name).named_parameters():
@@ -75,7 +73,7 @@ def test_a_run_begins_from_the_networks_of_another(rooms_path, tmp_path):
     ],
 )
 def test_a_run_begins_from_models_of_its_own_kind_alone(change, told, rooms_path, tmp_path):
-    start = stored(tmp_path / "a.safetensors", card_of(rooms_path))
+    start = untrained(tmp_path / "a.safetensors", rooms_path)
     with pytest.raises(SpecError) as error:
         new_run(rooms_path, replace(CONFIG, **change), start=start)
     assert error.value.where == "start"
@@ -84,20 +82,21 @@ def test_a_run_begins_from_models_of_its_own_kind_alone(change, told, rooms_path
 
 def test_weights_of_other_losses_do_not_become_the_papers(rooms_path, tmp_path):
     """What other losses trained keeps its name: no short run gives it that of the objective."""
-    start = stored(tmp_path / "other.safetensors", card_of(rooms_path, OTHER))
+    start = untrained(tmp_path / "other.safetensors", rooms_path, OTHER)
     assert (OTHER.method, CONFIG.method) == ("pix2shape-compact", "pix2shape")
     with pytest.raises(SpecError) as error:
         new_run(rooms_path, CONFIG, start=start)
     assert error.value.where == "start"
-    assert card_of(rooms_path, OTHER, start=start).method == "pix2shape-compact"
+    assert card_of(rooms_path, OTHER, start=start).submission == "pix2shape-compact"
 
 
 def test_depth_maps_of_earlier_runs_are_not_forgotten(rooms_path, tmp_path):
     start = None
     for number, (depth, earlier) in enumerate(((1.0, False), (0.0, True), (0.0, True))):
-        card = card_of(rooms_path, replace(OTHER, depth=depth), start=start)
-        assert (card.earlier_depth, card.method) == (earlier, "pix2shape-depth")
-        start = stored(tmp_path / f"{number}.safetensors", card)
+        state, _ = new_run(rooms_path, replace(OTHER, depth=depth), start=start)
+        card = state.card
+        assert (card.earlier_depth, card.submission) == (earlier, "pix2shape-depth")
+        start = stored(tmp_path / f"{number}.safetensors", state.network, card)
     with pytest.raises(SpecError) as error:
         new_run(rooms_path, CONFIG, start=start)
     assert error.value.where == "start"
@@ -106,14 +105,15 @@ def test_depth_maps_of_earlier_runs_are_not_forgotten(rooms_path, tmp_path):
 def test_labels_of_earlier_runs_are_not_forgotten(train_questions, tmp_path):
     start = None
     for labels, earlier in ((2, 0), (1, 2), (0, 3)):
-        card = card_of(train_questions, labels=labels, start=start)
+        state, _ = new_run(train_questions, CONFIG, labels=labels, start=start)
+        card = state.card
         assert (card.labels, card.earlier_labels) == (labels, earlier)
-        start = stored(tmp_path / f"{labels}.safetensors", card)
+        start = stored(tmp_path / f"{labels}.safetensors", state.network, card)
 
 
 def test_what_is_of_questions_alone_is_off_for_rooms(rooms_path):
     more = {"swap": 1.0, "contrast": 1.0, "question_batch": 8, "turned": True, "temperature": 0.5}
-    found = card_of(rooms_path, replace(CONFIG, **more)).config
+    found = card_of(rooms_path, replace(CONFIG, **more)).settings
     assert found == replace(CONFIG, mutual_information=0.0, questions=0.0)
     assert found.method == "pix2shape"
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 torch = pytest.importorskip("torch")
-from baselines.pix2shape.data.rooms import Batch, Relief  # noqa: E402
+from baselines.pix2shape.batch import Batch, Relief  # noqa: E402
 from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
 from baselines.pix2shape.network.config import LOSSES, ModelConfig  # noqa: E402
 from baselines.pix2shape.network.model import Pix2Shape, Surfels, Views, mapped  # noqa: E402

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 torch = pytest.importorskip("torch")
-from baselines.pix2shape.data.rooms import Batch  # noqa: E402
+from baselines.pix2shape.batch import Batch  # noqa: E402
 from baselines.pix2shape.network.model import Surfels, Views, shaded  # noqa: E402
 from baselines.pix2shape.network.surfels import Scene  # noqa: E402
 from baselines.pix2shape.training.turning import turned  # noqa: E402

@@ -19,9 +19,9 @@ from scenegen.common.errors import SceneGenError
 from scenegen.rendering.ground_truth import decode_image
 
 torch = pytest.importorskip("torch")
-from baselines.pix2shape.data.rooms import channels_first  # noqa: E402
 from baselines.pix2shape.use import answers as module  # noqa: E402
 from baselines.pix2shape.use.answers import answer_file  # noqa: E402
+from baselines.training.images import channels_first  # noqa: E402
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 from h5_edits import values
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pix2shape_models import edited, made, tiny
+from pix2shape_models import card_of, edited, made, room_source, tiny
 
 from scenegen.camera import Camera, look_at
 from scenegen.description.presets import PAPER_VIEWS
@@ -23,12 +23,10 @@ from scenegen.sampling.lights import sample_lights
 torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
-from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
 from baselines.pix2shape.network.surfels import render  # noqa: E402
 from baselines.pix2shape.pictures import drawn, image_tiles, sheet  # noqa: E402
 from baselines.pix2shape.use import explore  # noqa: E402
 from baselines.pix2shape.use.explore import rotation_frames, sample_sheet, turned  # noqa: E402
-from baselines.pix2shape.weights.storage import Card  # noqa: E402
 
 SPEC = DatasetSpec(height=32, width=32)
 CLASSES = ("bag", "bowl", "mug")
@@ -39,11 +37,7 @@ def conditional() -> Any:
     return made(tiny(classes=3))
 
 
-def card_of(model: Any, **more: Any) -> Card:
-    return Card(model.config, data=SPEC.to_json(), **more)
-
-
-def reconstructions(model: Any, source: RoomImages, rows: list[int], seen_as: list[int]) -> Any:
+def reconstructions(model: Any, source: Any, rows: list[int], seen_as: list[int]) -> Any:
     """Return the tiles of rows' codes, seen from (and lit as) other rows."""
     batch = source.as_batch(default_collate([source[row] for row in rows]))
     views = source.as_batch(default_collate([source[row] for row in seen_as])).views
@@ -51,7 +45,7 @@ def reconstructions(model: Any, source: RoomImages, rows: list[int], seen_as: li
         return drawn(model, model.encode(batch.image, batch.views), views)
 
 
-def inputs(source: RoomImages, rows: list[int]) -> Any:
+def inputs(source: Any, rows: list[int]) -> Any:
     """Return the tiles of rows' own images."""
     return image_tiles(torch.from_numpy(np.stack([source[row]["image"] for row in rows])))
 
@@ -90,7 +84,7 @@ def test_turned_cameras_stay_in_the_open_octant(azimuth, elevation, share):
 
 
 def test_what_is_known_of_views_is_what_training_was_told(several_path):
-    source = RoomImages(several_path, tiny())
+    source = room_source(several_path, tiny())
     expected = source.as_batch(default_collate([source[row] for row in range(9)])).views
     with RoomsFile(several_path) as rooms:
         spec, depth = rooms.spec, torch.tensor(rooms.read("depth", slice(None)))
@@ -115,7 +109,7 @@ def test_what_is_known_of_views_is_what_training_was_told(several_path):
 
 @pytest.mark.parametrize("count", [1, 9])
 def test_samples_are_the_seeds(model, count):
-    card = card_of(model)
+    card = card_of(model.config, data=SPEC.to_json())
     found = [sample_sheet(model, card, count, seed).tobytes() for seed in (4, 4, 5)]
     torch.manual_seed(0)
     assert found[0] == found[1] == sample_sheet(model, card, count, 4).tobytes()
@@ -128,7 +122,7 @@ def test_samples_are_seen_as_training_images_were(conditional, monkeypatch):
     monkeypatch.setattr(explore, "drawn", lambda *given: seen.append(given) or drawn(*given))
     conditional.prior.mean.fill_(7)
     several = replace(SPEC, views=PAPER_VIEWS)  # of which samples need the first alone
-    card = Card(conditional.config, data=several.to_json(), classes=CLASSES)
+    card = card_of(conditional.config, data=several.to_json(), classes=CLASSES)
     try:
         sample_sheet(conditional, card, 5, 6)
     finally:
@@ -148,7 +142,7 @@ def test_samples_are_seen_as_training_images_were(conditional, monkeypatch):
 
 
 def test_an_interpolation_ends_in_the_two_reconstructions(model, several_path):
-    source = RoomImages(several_path, model.config)
+    source = room_source(several_path, model.config)
     found = pixels(explore.interpolation_sheet(model, source, 3, 7, 5))
     ends, given = reconstructions(model, source, [3, 7], [3, 3]), inputs(source, [3, 7])
     blank = np.full_like(given[0], 250)
@@ -163,7 +157,7 @@ def test_an_interpolation_ends_in_the_two_reconstructions(model, several_path):
 
 
 def test_a_rotation_turns_from_the_reconstructions_to_the_files_other_views(model, several_path):
-    source, rows = RoomImages(several_path, model.config), [6, 0, 3]
+    source, rows = room_source(several_path, model.config), [6, 0, 3]
     frames = [pixels(frame) for frame in rotation_frames(model, source, rows, [0.0, 35.0, 80.0])]
     given = inputs(source, rows)
     for view, frame in enumerate(frames):
@@ -176,18 +170,18 @@ def test_a_rotation_turns_from_the_reconstructions_to_the_files_other_views(mode
 def test_a_rotation_of_other_rooms_is_shaded_with_their_own(model, several_path, tmp_path, name):
     """Whatever the rooms that the model was trained on were lit with."""
     path = edited(several_path, tmp_path / "other.h5", values(name, lambda old: old * 0.5))
-    source = RoomImages(path, model.config)
+    source = room_source(path, model.config)
     (frame,) = rotation_frames(model, source, [0], [0.0])
     expected = pixels(sheet([reconstructions(model, source, [0], [0])[0]]))
     assert np.abs(pixels(frame)[140:268, 6:134] - expected[6:134, 6:134]).max() <= 2
-    usual = RoomImages(several_path, model.config)
+    usual = room_source(several_path, model.config)
     other = pixels(sheet([reconstructions(model, usual, [0], [0])[0]]))
     assert (other != expected).any()
 
 
 def test_a_rotation_tells_the_class(single_path):
     model = made(tiny(classes=2))
-    source, rows = RoomImages(single_path, model.config), [0, 1, 2, 3]
+    source, rows = room_source(single_path, model.config), [0, 1, 2, 3]
     (frame,) = rotation_frames(model, source, rows, [0.0])
     expected = sheet([inputs(source, rows), *reconstructions(model, source, rows, rows)])
     assert np.abs(pixels(frame) - pixels(expected)).max() <= 2

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 from h5_edits import damaged_chunk, put, values
-from pix2shape_models import edited, made, of_rows, tiny, told, written
+from pix2shape_models import edited, made, of_rows, origin, room_source, tiny, written
 
 from metrics.scoring.evaluate import score
 from metrics.submissions.reader import open_predictions
@@ -19,7 +19,6 @@ from scenegen.rooms.reader import RoomsFile
 torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
-from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
 from baselines.pix2shape.network.empty_rooms import empty_rooms  # noqa: E402
 from baselines.pix2shape.use import predict  # noqa: E402
 from baselines.pix2shape.use.predict import enlarged, predict_file, predict_rooms  # noqa: E402
@@ -40,7 +39,7 @@ def few_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def decoded(model: Any, path: Path, source: int, row: int) -> tuple[np.ndarray, np.ndarray]:
     """Return depth and normals of one row's image, seen from another row's camera."""
-    rooms = RoomImages(path, model.config)
+    rooms = room_source(path, model.config)
     pair = rooms.as_batch(default_collate([rooms[source], rooms[row]]))
     with torch.no_grad():
         code = model.encode(pair.image, pair.views)[:1]
@@ -224,7 +223,7 @@ def test_answers_say_what_training_was_told(truths, tmp_path):
 
 
 def test_a_file_is_replaced_only_when_told(rooms_path, tmp_path, monkeypatch):
-    weights, out = written(tmp_path / "w.safetensors", tiny(), **told(rooms_path)), tmp_path / "p"
+    weights, out = written(tmp_path / "w.safetensors", tiny(), **origin(rooms_path)), tmp_path / "p"
     out.write_text("mine")
     with monkeypatch.context() as patch:
         patch.setattr(predict, "predict_rooms", lambda *_, **__: pytest.fail("found too late"))

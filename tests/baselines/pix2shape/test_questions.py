@@ -9,16 +9,17 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from pix2shape_models import released, tiny
+from h5_edits import put
+from pix2shape_models import edited, question_source, released, suited, tiny
+from refusals import refused
 
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
-from scenegen.common.errors import SpecError
+from scenegen.common.errors import FileFormatError, SpecError
 
 torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
-from baselines.pix2shape.data.questions import QuestionImages, for_questions  # noqa: E402
 from baselines.pix2shape.network.surfels import render  # noqa: E402
 
 SPEC = SplitSpec(
@@ -45,7 +46,7 @@ def train_path(folder: Path) -> Path:
     return folder / "iqtt-train.h5"
 
 
-def batch_of(source: QuestionImages) -> Any:
+def batch_of(source: Any) -> Any:
     return source.as_batch(default_collate([source[row] for row in range(len(source))]))
 
 
@@ -56,7 +57,7 @@ def scales(file: h5py.File) -> np.ndarray:
 
 
 def test_items_are_the_four_images_and_batches_four_after_four(train_path):
-    source = QuestionImages(train_path, "unlabeled", TINY)
+    source = question_source(train_path, "unlabeled", TINY)
     assert len(source) == 3
     batch = batch_of(source)
     with h5py.File(train_path) as file:
@@ -79,7 +80,7 @@ def test_items_are_the_four_images_and_batches_four_after_four(train_path):
 
 def test_the_truth_shaded_with_what_is_told_is_the_image(train_path):
     """Where the neighbours lie in one plane, so that normals of the depth map are exact."""
-    source = QuestionImages(train_path, "unlabeled", TINY)
+    source = question_source(train_path, "unlabeled", TINY)
     batch = batch_of(source)
     with h5py.File(train_path) as file:
         depth = file["truth/unlabeled/depth"][:].astype(np.float64)
@@ -101,16 +102,16 @@ def test_the_truth_shaded_with_what_is_told_is_the_image(train_path):
 
 
 def test_answers_are_those_of_the_labelled_part(train_path, folder):
-    labelled = QuestionImages(train_path, "labeled", TINY)
+    labelled = question_source(train_path, "labeled", TINY)
     with h5py.File(train_path) as file:
         answers = file["labeled/answers"][:].tolist()
     assert [labelled[row]["answer"] for row in range(4)] == answers
     assert labelled.has_answers
     assert batch_of(labelled).image.shape == (16, 3, 32, 32), "the answer is no part of the batch"
-    unlabelled = QuestionImages(train_path, "unlabeled", TINY)
+    unlabelled = question_source(train_path, "unlabeled", TINY)
     assert not unlabelled.has_answers
     assert "answer" not in unlabelled[0]
-    assert QuestionImages(folder / "iqtt-val.h5", None, TINY).has_answers
+    assert question_source(folder / "iqtt-val.h5", None, TINY).has_answers
 
 
 def test_shapes_and_rotations_are_never_read(train_path, tmp_path):
@@ -125,59 +126,53 @@ def test_shapes_and_rotations_are_never_read(train_path, tmp_path):
         }
         for name in TRUTH | {"light_count"}:
             truth[name][...] = 0
-    blank = QuestionImages(tmp_path / "blank.h5", "labeled", TINY)
-    told = QuestionImages(train_path, "labeled", TINY)
+    blank = question_source(tmp_path / "blank.h5", "labeled", TINY)
+    told = question_source(train_path, "labeled", TINY)
     for row in range(4):
         assert blank[row].keys() == told[row].keys()
         assert all(np.array_equal(blank[row][name], told[row][name]) for name in told[row])
 
 
-@pytest.mark.parametrize(
-    ("name", "part", "where", "found"),
-    [
-        ("iqtt-test.h5", None, "iqtt-test.h5", "1 questions without lights"),
-        ("iqtt-train.h5", None, "part", "none"),
-        ("iqtt-val.h5", "labeled", "part", "labeled"),
-    ],
-)
-def test_files_without_lights_and_other_parts_are_refused(folder, name, part, where, found):
-    with pytest.raises(SpecError) as error:
-        QuestionImages(folder / name, part, TINY)
-    assert where in str(error.value)
-    assert found in str(error.value)
+def test_files_without_lights_are_refused(folder, tmp_path):
+    test, plain = folder / "iqtt-test.h5", released(tmp_path / "released.h5", [0, 1, 2], size=64)
+    for path in (test, plain):
+        for call in (question_source, lambda path, part, config: suited(config, path, part)):
+            with refused(SpecError, str(path), "questions without"):
+                call(path, None, TINY)
+    with refused(SpecError, "networks"):
+        question_source(folder / "iqtt-val.h5", None, tiny())
 
 
-def test_released_files_are_refused(tmp_path):
-    path = released(tmp_path / "released.h5", [0, 1, 2], size=64)
-    for call in (QuestionImages, lambda *given: for_questions(TINY, *given[:2])):
-        with pytest.raises(SpecError) as error:
-            call(path, None, TINY)
-        assert error.value.where == str(path)
+def test_damaged_lights_are_refused(folder, tmp_path):
+    path = edited(
+        folder / "iqtt-val.h5", tmp_path / "bad.h5", put("truth/light_color", (1, 2), np.nan)
+    )
+    with refused(FileFormatError, f"{path}: row 1", "light_color"):
+        question_source(path, None, TINY)
 
 
 def test_no_questions_and_odd_sizes_are_refused(tmp_path):
     path = tmp_path / "split" / "iqtt-train.h5"
     for size, part, found in (
         ((48, 64), "unlabeled", "images of 48x64"),
-        ((32, 32), "labeled", "0 questions with lights"),
+        ((32, 32), "labeled", "0 questions with"),
     ):
         spec = replace(SPEC, train=1, labeled=0, val=0, test=0, height=size[0], width=size[1])
         make_split(path.parent, spec, overwrite=True)
-        with pytest.raises(SpecError) as error:
-            QuestionImages(path, part, TINY)
-        assert (error.value.where, error.value.found) == (str(path), found)
+        with refused(SpecError, str(path), found):
+            question_source(path, part, TINY)
 
 
 def test_the_polar_encoder_needs_a_white_background(train_path):
     """By which it tells shape from background; otherwise all pixels would count as shape."""
     with pytest.raises(SpecError) as error:
-        for_questions(tiny(camera=False, encoder="polar"), train_path, "unlabeled")
+        suited(tiny(camera=False, encoder="polar"), train_path)
     assert error.value.where == str(train_path)
 
 
 def test_the_configuration_for_questions(train_path):
     plain = tiny(classes=7, camera=False, batch=12, seed=9)
-    config = for_questions(plain, train_path, "unlabeled")
+    config = suited(plain, train_path)
     spec = config.networks
     assert (spec.camera, spec.classes, spec.z_view, spec.z) == (False, 0, 10, plain.networks.z)
     assert (spec.size, spec.width, config.batch, config.seed) == (32, 0.05, 12, 9)
@@ -191,5 +186,5 @@ def test_the_configuration_for_questions(train_path):
     assert 1 - config.depth_reach < np.nanmin(depth) < np.nanmax(depth) < 1 + config.depth_reach
     for change in ({"z_scene": 10}, {"z_view": 32}):
         with pytest.raises(SpecError) as error:
-            for_questions(tiny(**change), train_path, "labeled")
+            suited(tiny(**change), train_path, "labeled")
         assert error.value.where.replace(" ", "_") in change

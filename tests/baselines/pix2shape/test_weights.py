@@ -12,7 +12,7 @@ import torch
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.use.answers import answer_file
 from baselines.pix2shape.use.predict import predict_rooms
-from baselines.pix2shape.weights.bundled import FOLDER, names, open_weights, suited
+from baselines.pix2shape.weights import FOLDER, names, open_weights, suited
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.measures.empty_room import empty_room
@@ -29,10 +29,10 @@ def test_they_are_small_and_each_has_its_card() -> None:
     assert sum(path.stat().st_size for path in FOLDER.iterdir()) <= 25_000_000
     for name in names():
         model, card = open_weights(name)
-        assert card.config == model.config
-        if card.config.decay:  # else a run that ended early is one that asked for less
-            assert card.iteration == card.config.iterations
-        assert card.config.depth == 0, "they learned without depth maps"
+        assert card.settings == model.config
+        if card.settings.decay:  # else a run that ended early is one that asked for less
+            assert card.iteration == card.settings.iterations
+        assert card.settings.depth == 0, "they learned without depth maps"
 
 
 CLASSES = "shapenet-single-classes"  # told what is there, so that it predicts nothing

@@ -1,7 +1,6 @@
 """Rooms as batches: what the file holds, as the networks take it, and no ground truth."""
 
 from collections.abc import Callable
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from h5_edits import put, values
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from pix2shape_models import edited, tiny
+from pix2shape_models import edited, room_source, tiny
 
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.presets import VESSELS
@@ -20,10 +17,9 @@ from scenegen.rooms.reader import RoomsFile
 torch = pytest.importorskip("torch")
 from torch.utils.data import default_collate  # noqa: E402
 
-from baselines.pix2shape.data.rooms import Draws, RoomImages  # noqa: E402
 from baselines.pix2shape.network.surfels import render  # noqa: E402
 
-KNOWN = {"light_position", "light_color", "ambient", "attenuation", "reflectance"}
+TOLD = {"light_position", "light_color", "ambient", "attenuation", "reflectance"}
 
 
 @pytest.fixture(scope="session")
@@ -48,14 +44,14 @@ def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
 
 
 def test_images_are_means_of_blocks_of_linear_radiance(views_path, rooms_path):
-    source = RoomImages(views_path, tiny())
+    source = room_source(views_path, tiny())
     with RoomsFile(views_path) as rooms:
         for row, room in enumerate(rooms):
             image = source[row]["image"]
             parts = [room.radiance[i::2, j::2] for i in (0, 1) for j in (0, 1)]
             assert (image.shape, image.dtype) == ((3, 32, 32), np.float32)
             np.testing.assert_allclose(image, np.moveaxis(sum(parts) / 4, -1, 0), rtol=1e-6)
-    eight_bits = RoomImages(rooms_path, tiny())[2]["image"]
+    eight_bits = room_source(rooms_path, tiny())[2]["image"]
     with h5py.File(rooms_path) as file:
         stored = np.moveaxis(file["image"][2], -1, 0)
     np.testing.assert_allclose(255 * eight_bits, stored, rtol=1e-6)
@@ -63,7 +59,7 @@ def test_images_are_means_of_blocks_of_linear_radiance(views_path, rooms_path):
 
 def test_the_truth_shaded_with_what_is_told_is_the_image(views_path):
     """Lights, camera and material are those of the image: the renderer's own hits prove it."""
-    source = RoomImages(views_path, tiny())
+    source = room_source(views_path, tiny())
     batch = source.as_batch(default_collate([source[row] for row in range(len(source))]))
     with h5py.File(views_path) as file:
         depth, normal = torch.tensor(file["depth"][:]), torch.tensor(file["normal"][:])
@@ -74,7 +70,7 @@ def test_the_truth_shaded_with_what_is_told_is_the_image(views_path):
 
 
 def test_each_view_is_a_row_with_its_own_camera(views_path):
-    source = RoomImages(views_path, tiny())
+    source = room_source(views_path, tiny())
     with RoomsFile(views_path) as rooms:
         poses = rooms.read("camera/world_from_camera", slice(None))
         scenes, spec = rooms.read("scene_index", slice(None)), rooms.spec
@@ -92,7 +88,7 @@ def test_each_view_is_a_row_with_its_own_camera(views_path):
 
 @pytest.mark.parametrize("camera", [True, False])
 def test_the_class_is_one_hot_behind_the_camera(vessels_path, camera):
-    source = RoomImages(vessels_path, tiny(classes=7, camera=camera))
+    source = room_source(vessels_path, tiny(classes=7, camera=camera))
     assert source.classes == VESSELS
     with h5py.File(vessels_path) as file:
         models = file["object/model"].asstr()[:, 0]
@@ -127,7 +123,7 @@ def test_what_networks_cannot_be_told_is_refused(name, place, value, make_rooms,
     path = make_rooms(tmp_path / "rooms.h5", 4, image_dtype="float32")
     path = edited(path, tmp_path / "bad.h5", put(name, place, value))
     with pytest.raises(FileFormatError) as error:
-        RoomImages(path, tiny())[2]
+        room_source(path, tiny())[2]
     assert error.value.where == f"{path}: {name}, row 2"
 
 
@@ -135,15 +131,15 @@ def test_what_networks_cannot_be_told_is_refused(name, place, value, make_rooms,
 def test_a_class_that_is_none_is_refused(number, vessels_path, tmp_path):
     path = edited(vessels_path, tmp_path / "bad.h5", put("object/shape", (2, 0), number))
     with pytest.raises(FileFormatError) as error:
-        RoomImages(path, tiny(classes=len(VESSELS)))
+        room_source(path, tiny(classes=len(VESSELS)))
     assert error.value.where == f"{path}: object/shape, row 2"
 
 
 def test_depth_is_read_only_for_supervision(views_path, tmp_path):
-    item = RoomImages(views_path, tiny())[0]
-    assert set(item) == KNOWN | {"image", "condition", "world_from_camera"}
+    item = room_source(views_path, tiny())[0]
+    assert set(item) == TOLD | {"image", "condition", "world_from_camera"}
     path = edited(views_path, tmp_path / "hole.h5", put("depth", (1, 7, 10), np.nan))
-    source = RoomImages(path, tiny(depth=1.0))
+    source = room_source(path, tiny(depth=1.0))
     with h5py.File(path) as file:
         parts = [file["depth"][1][i::2, j::2] for i in (0, 1) for j in (0, 1)]
     item = source[1]
@@ -151,7 +147,7 @@ def test_depth_is_read_only_for_supervision(views_path, tmp_path):
     assert np.argwhere(np.isnan(item["depth"])).tolist() == [[3, 5]]
     batch = source.as_batch(default_collate([source[0], item]))
     assert batch.depth.shape == (2, 32, 32)
-    plain = RoomImages(path, tiny())
+    plain = room_source(path, tiny())
     assert plain.as_batch(default_collate([plain[1]])).depth is None
 
 
@@ -161,7 +157,7 @@ def test_nothing_of_the_truth_is_read(views_path, tmp_path):
     edits = [values(name, np.zeros_like) for name in names]
     path = edited(views_path, tmp_path / "blank.h5", *edits)
     for row in range(6):
-        assert same(RoomImages(path, tiny())[row], RoomImages(views_path, tiny())[row])
+        assert same(room_source(path, tiny())[row], room_source(views_path, tiny())[row])
 
 
 @pytest.mark.parametrize(
@@ -180,32 +176,5 @@ def test_nothing_of_the_truth_is_read(views_path, tmp_path):
 def test_rooms_that_do_not_suit_are_refused(make_rooms, tmp_path, classes, rooms, found):
     path = make_rooms(tmp_path / "odd.h5", 3, **rooms)
     with pytest.raises(SpecError) as error:
-        RoomImages(path, tiny(classes=classes))
+        room_source(path, tiny(classes=classes))
     assert (error.value.where, error.value.found) == (str(path), found)
-
-
-@settings(deadline=None, max_examples=40)
-@given(st.integers(1, 20), st.integers(1, 7), st.integers(0, 2**32), st.integers(0, 30))
-def test_a_batch_depends_on_its_number_alone(rows, batch, seed, first):
-    through = list(islice(Draws(rows, batch, seed), first + 3))
-    assert list(islice(Draws(rows, batch, seed, first), 3)) == through[first:]
-    drawn = [row for one in through for row in one]
-    assert len(drawn) == batch * (first + 3)
-    for epoch in range(len(drawn) // rows):
-        assert sorted(drawn[epoch * rows : (epoch + 1) * rows]) == list(range(rows))
-
-
-@pytest.mark.parametrize("world", [1, 2, 3])
-def test_processes_share_each_batch(world):
-    shares = [Draws(11, 5, 3, share=slice(rank, None, world)) for rank in range(world)]
-    for whole, *parts in islice(zip(Draws(11, 5, 3), *shares, strict=True), 9):
-        assert sorted(row for part in parts for row in part) == sorted(whole)
-        assert max(map(len, parts)) - min(map(len, parts)) <= 1
-
-
-def test_the_order_changes_with_epoch_and_seed():
-    def orders(seed: int) -> list[tuple[int, ...]]:
-        return [tuple(one) for one in islice(Draws(20, 20, seed), 5)]
-
-    assert orders(1) == orders(1)
-    assert len({*orders(1), *orders(2)}) == 10

@@ -3,7 +3,7 @@
 import pytest
 
 torch = pytest.importorskip("torch")
-from baselines.resnet.architecture import ResNet  # noqa: E402
+from baselines.resnets.architecture import ResNet  # noqa: E402
 
 
 @pytest.mark.parametrize(

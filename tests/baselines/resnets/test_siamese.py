@@ -3,13 +3,15 @@
 import pytest
 
 torch = pytest.importorskip("torch")
-from baselines.resnet.methods import Card  # noqa: E402
-from baselines.siamese.network import NearestAnswer, contrastive_loss  # noqa: E402
+from baselines.resnets.card import Card, Settings  # noqa: E402
+from baselines.resnets.siamese import NearestAnswer, contrastive_loss  # noqa: E402
+
+SMALL = Card("siamese", Settings(width=4, size=16), labels=1)
 
 
 @pytest.mark.parametrize("answers", [2, 3])
 def test_scores_are_minus_the_distance_from_the_reference(answers):
-    network = NearestAnswer(Card("siamese", 3, 1, width=4, size=16)).eval()
+    network = NearestAnswer(SMALL).eval()
     images = torch.rand(2, 1 + answers, 3, 16, 16)
     images[0, 2] = images[0, 0]
     scores = network(images)
@@ -23,7 +25,7 @@ def test_scores_are_minus_the_distance_from_the_reference(answers):
 
 def test_resnet_50_has_the_features_itself():
     with torch.device("meta"):
-        network = NearestAnswer(Card("siamese", 3, 1, depth=50, width=64))
+        network = NearestAnswer(Card("siamese", Settings(depth=50, width=64), labels=1))
     assert isinstance(network.last, torch.nn.Identity)
 
 
@@ -41,7 +43,7 @@ def test_the_loss_is_the_papers():
 
 
 def test_the_loss_has_a_gradient_where_two_images_are_equal():
-    network = NearestAnswer(Card("siamese", 3, 1, width=4, size=16))
+    network = NearestAnswer(SMALL)
     images = torch.rand(2, 4, 3, 16, 16)
     images[:, 1] = images[:, 0]
     contrastive_loss(network(images), torch.tensor([0, 0])).backward()

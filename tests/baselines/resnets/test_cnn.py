@@ -3,13 +3,15 @@
 import pytest
 
 torch = pytest.importorskip("torch")
-from baselines.cnn.network import METHOD, AnswerClassifier  # noqa: E402
-from baselines.resnet.methods import Card  # noqa: E402
+from baselines.resnets.card import Card, Settings  # noqa: E402
+from baselines.resnets.cnn import KIND, AnswerClassifier  # noqa: E402
 
 
 @pytest.mark.parametrize("answers", [2, 3])
 def test_layers_and_probabilities(answers):
-    network = AnswerClassifier(Card("cnn", answers, 1, width=4, size=16)).eval()
+    network = AnswerClassifier(
+        Card("cnn", Settings(width=4, size=16), labels=1, answers=answers)
+    ).eval()
     widths = [layer.out_features for layer in network.head if isinstance(layer, torch.nn.Linear)]
     assert widths == [2048, 512, 256, answers]
     images = torch.rand(2, 1 + answers, 3, 16, 16)
@@ -24,4 +26,4 @@ def test_layers_and_probabilities(answers):
 def test_the_loss_is_the_cross_entropy():
     scores = torch.tensor([[0.7, 0.2, 0.1], [0.5, 0.25, 0.25]]).log()
     expected = -(torch.tensor(0.7).log() + torch.tensor(0.25).log()) / 2
-    assert METHOD.loss(scores, torch.tensor([0, 2])) == pytest.approx(expected.item())
+    assert KIND.loss(scores, torch.tensor([0, 2])) == pytest.approx(expected.item())

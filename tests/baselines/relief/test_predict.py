@@ -13,12 +13,11 @@ from metrics.submissions.validation import validate
 from scenegen.common.errors import FileFormatError, SpecError
 
 torch = pytest.importorskip("torch")
-from baselines.checkpoints import new_state, save_weights  # noqa: E402
-from baselines.depth_supervised import predict, write_submission  # noqa: E402
-from baselines.depth_supervised.card import Card, recipe  # noqa: E402
-from baselines.depth_supervised.network import ReliefSpec  # noqa: E402
+from baselines.pix2shape.use import predict  # noqa: E402
+from baselines.relief.depth_supervised import METHOD, write_submission  # noqa: E402
+from baselines.relief.network import Card, Settings, relief_network  # noqa: E402
+from baselines.training.checkpoint import Method, new_state, save_weights  # noqa: E402
 
-METHOD = "depth-supervised"
 TRUTH = (
     "depth", "normal", "object_id", "object/shape", "object/world_from_object", "object/scale",
     "object/visible_pixels", "object/count", "light/position", "light/color", "light/ambient",
@@ -37,12 +36,13 @@ def weights(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Return weights of both kinds whose relief differs clearly from image to image."""
     found = {}
     for kind in ("unet", "code"):
-        state = new_state(recipe(METHOD), Card(METHOD, ReliefSpec(kind, 32, 0.1)))
+        method = Method(METHOD, Card, relief_network)
+        state = new_state(method, Card(METHOD, Settings(kind, 32, 0.1)))
         with torch.no_grad():
             for name, value in state.network.named_parameters():
                 value.mul_(10 if name.endswith("last.weight") else 1)
         found[kind] = tmp_path_factory.mktemp(kind) / "w.safetensors"
-        save_weights(found[kind], state)
+        save_weights(found[kind], method, state.network, state.card)
     return found
 
 

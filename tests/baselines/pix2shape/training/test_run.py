@@ -2,7 +2,7 @@
 
 import multiprocessing
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import h5py
 import pytest
 from h5_edits import attribute
 from PIL import Image
-from pix2shape_models import edited, tiny
+from pix2shape_models import edited, room_source, tiny
 
 from scenegen.common.errors import SceneGenError, SpecError
 
@@ -20,20 +20,20 @@ from safetensors.torch import load_file  # noqa: E402
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator  # noqa: E402
 from torch.utils.data import default_collate  # noqa: E402
 
-from baselines.pix2shape.data.rooms import RoomImages  # noqa: E402
 from baselines.pix2shape.network.config import LOSSES  # noqa: E402
 from baselines.pix2shape.network.model import Prior  # noqa: E402
-from baselines.pix2shape.network.shared_batch import LostProcessError  # noqa: E402
-from baselines.pix2shape.training import runs  # noqa: E402
-from baselines.pix2shape.training.loop import TrainingError, train  # noqa: E402
-from baselines.pix2shape.training.runs import Machine, train_run  # noqa: E402
-from baselines.pix2shape.training.state import State, load_state  # noqa: E402
-from baselines.pix2shape.weights.storage import Card, load_card, load_model  # noqa: E402
+from baselines.pix2shape.training import run as module  # noqa: E402
+from baselines.pix2shape.training.run import train_run  # noqa: E402
+from baselines.pix2shape.weights import METHOD  # noqa: E402
+from baselines.training.checkpoint import load_checkpoint, load_weights  # noqa: E402
+from baselines.training.fit import TrainingError  # noqa: E402
+from baselines.training.launch import Machine  # noqa: E402
+from baselines.training.processes import LostProcessError  # noqa: E402
 
 HERE = Machine("cpu", workers=0, every=2)
 CONFIG = tiny(seed=3)
-STORED = {f"{name}.{end}" for name in ("checkpoint", "weights") for end in ("json", "safetensors")}
-FILES = {"logs", "pictures.png", *STORED}
+WEIGHTS, CHECKPOINT = "weights.safetensors", "checkpoint.safetensors"
+FILES = {"logs", "pictures.png", WEIGHTS, CHECKPOINT}
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def same(one: Path, other: Path) -> bool:
 
 
 def test_a_killed_reader_ends_the_run_as_a_lost_process(rooms_path, folder):
-    def kill(state: Any, losses: dict[str, float]) -> None:
+    def kill(*_: Any) -> None:
         for child in multiprocessing.active_children():
             child.kill()
             child.join()
@@ -74,28 +74,33 @@ class Killed(Exception):
     pass
 
 
-def killed_at(iteration: int) -> Callable[[Any, dict[str, float]], None]:
-    def progress(state: Any, losses: dict[str, float]) -> None:
-        if state.iteration == iteration:
+def killed_at(iteration: int) -> Callable[[int, int, Any], None]:
+    def progress(done: int, total: int, losses: Any) -> None:
+        if done == iteration:
             raise Killed
 
     return progress
 
 
+def weights_of(folder: Path) -> Any:
+    return load_weights(folder / WEIGHTS, METHOD)
+
+
 def test_what_a_run_leaves(rooms_path, unbroken):
-    weights = unbroken / "weights.safetensors"
     assert names(unbroken) == FILES
-    model, card = load_model(weights)
+    model, card = weights_of(unbroken)
     with h5py.File(rooms_path) as file:
-        told = (str(file.attrs["fingerprint"]), str(file.attrs["spec"]))
-    assert (card.fingerprint, card.data) == told
+        origin = (str(file.attrs["fingerprint"]), str(file.attrs["spec"]))
+    assert (card.fingerprint, card.data) == origin
     assert (card.iteration, card.labels, card.classes, card.seconds > 0) == (4, 0, (), True)
     off = {"mutual_information": 0.0, "questions": 0.0}
-    assert card.config == model.config == replace(CONFIG, **off)
-    state, again = load_state(unbroken)
-    assert again == card
-    found, expected = model.encoder.state_dict(), state.model.encoder.state_dict()
+    assert card.settings == model.config == replace(CONFIG, **off)
+    state = load_checkpoint(unbroken, METHOD)
+    assert state.card == card
+    found, expected = model.encoder.state_dict(), state.network.encoder.state_dict()
     torch.testing.assert_close(dict(found), dict(expected), atol=1e-3, rtol=1e-3)
+    stored = {name.partition(".")[0] for name in load_file(unbroken / WEIGHTS)}
+    assert stored == {"encoder", "decoder", "prior"}, "critic and statistics are not needed"
     with Image.open(unbroken / "pictures.png") as picture:
         assert picture.size == (4 * 134 + 6, 6 * 134 + 6)
 
@@ -114,15 +119,14 @@ def test_a_killed_run_goes_on_as_if_it_had_not_been(last, rooms_path, folder, un
     with pytest.raises(Killed):
         train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(last))
     assert names(folder) == FILES
-    state, card = load_state(folder)
-    assert state.iteration == card.iteration == 2
+    assert load_checkpoint(folder, METHOD).card.iteration == 2
     steps: list[int] = []
-    train_run(folder, rooms_path, None, HERE, progress=lambda s, _: steps.append(s.iteration))
+    train_run(folder, rooms_path, None, HERE, progress=lambda done, *_: steps.append(done))
     assert steps == [3, 4]
-    for name in ("checkpoint.safetensors", "weights.safetensors"):
+    for name in (CHECKPOINT, WEIGHTS):
         assert same(folder / name, unbroken / name), name
-    again = load_card(folder / "weights.safetensors")
-    assert again == replace(load_card(unbroken / "weights.safetensors"), seconds=again.seconds)
+    (_, again), (_, card) = weights_of(folder), weights_of(unbroken)
+    assert again == replace(card, seconds=again.seconds)
 
 
 def test_a_kill_before_the_first_checkpoint(rooms_path, folder, unbroken):
@@ -137,13 +141,10 @@ def test_a_kill_before_the_first_checkpoint(rooms_path, folder, unbroken):
 def test_a_kill_between_the_last_checkpoint_and_its_weights(rooms_path, folder, unbroken):
     with pytest.raises(Killed):
         train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(3))
-    for end in ("safetensors", "json"):
-        shutil.copy(unbroken / f"checkpoint.{end}", folder)
-    assert load_card(folder / "weights.safetensors").iteration == 2
+    shutil.copy(unbroken / CHECKPOINT, folder)
+    assert weights_of(folder)[1].iteration == 2
     train_run(folder, rooms_path, None, HERE)
-    for end in ("safetensors", "json"):
-        name = f"weights.{end}"
-        assert (folder / name).read_bytes() == (unbroken / name).read_bytes(), name
+    assert (folder / WEIGHTS).read_bytes() == (unbroken / WEIGHTS).read_bytes()
 
 
 def test_a_run_goes_on_in_the_precision_that_it_began_with(rooms_path, folder, unbroken):
@@ -156,7 +157,7 @@ def test_a_run_goes_on_in_the_precision_that_it_began_with(rooms_path, folder, u
         train_run(folder, rooms_path, None, HERE, precision="32")
     assert (error.value.where, error.value.found) == ("precision", "32")
     assert same(train_run(folder, rooms_path, None, HERE), whole)
-    assert load_card(whole).precision == "bf16"
+    assert load_weights(whole, METHOD)[1].precision == "bf16"
 
 
 def test_a_finished_run_is_neither_trained_on_nor_replaced(rooms_path, folder, unbroken):
@@ -175,7 +176,7 @@ def test_a_finished_run_is_neither_trained_on_nor_replaced(rooms_path, folder, u
 
 def test_classes_are_told(single_path, folder):
     weights = train_run(folder, single_path, CONFIG, HERE, conditional=True)
-    model, card = load_model(weights)
+    model, card = load_weights(weights, METHOD)
     assert card.classes == ("box", "sphere")
     assert (model.config.networks.classes, model.config.networks.condition) == (2, 5)
     again, how = folder.with_name("again"), {"conditional": True, "progress": killed_at(3)}
@@ -188,11 +189,11 @@ def test_classes_are_told(single_path, folder):
 def test_questions_and_their_labels(train_questions, folder, labels):
     seen: list[dict[str, float]] = []
     config = replace(CONFIG, iterations=2)
-    how = {"labels": labels, "progress": lambda _, numbers: seen.append(numbers)}
+    how = {"labels": labels, "progress": lambda done, total, numbers: seen.append(numbers)}
     weights = train_run(folder, train_questions, config, HERE, **how)
     assert all(("questions" in numbers) == bool(labels) for numbers in seen)
     assert all("mutual_information" in numbers for numbers in seen)
-    model, card = load_model(weights)
+    model, card = load_weights(weights, METHOD)
     assert (card.labels, model.config.opacity) == (labels, True)
     assert not model.config.networks.camera
     assert same(train_run(folder, train_questions, None, HERE), weights), "with its own labels"
@@ -201,8 +202,8 @@ def test_questions_and_their_labels(train_questions, folder, labels):
 @pytest.mark.parametrize("adversarial", [0.0, 1.0])
 def test_the_prior_is_that_of_codes_where_no_critic_ties_them(rooms_path, folder, adversarial):
     config = replace(CONFIG, adversarial=adversarial)
-    model, card = load_model(train_run(folder, rooms_path, config, HERE))
-    prior, source = model.prior, RoomImages(rooms_path, card.config)
+    model, card = load_weights(train_run(folder, rooms_path, config, HERE), METHOD)
+    prior, source = model.prior, room_source(rooms_path, card.settings)
     if adversarial:
         assert torch.equal(prior.mean, torch.zeros(128))
         assert torch.equal(prior.factor, torch.eye(128))
@@ -234,12 +235,12 @@ def test_a_picture_that_cannot_be_written_leaves_the_checkpoint(rooms_path, fold
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr(runs, "save_picture", full)
+        patch.setattr(module, "save_picture", full)
         with pytest.raises(OSError, match="No space"):
             train_run(folder, rooms_path, CONFIG, HERE)
-    assert load_state(folder)[0].iteration == 2
-    card = train_run(folder, rooms_path, None, HERE).with_suffix(".json")
-    assert isinstance(load_card(card), Card)
+    assert load_checkpoint(folder, METHOD).card.iteration == 2
+    train_run(folder, rooms_path, None, HERE)
+    assert weights_of(folder)[1].iteration == 4
 
 
 @pytest.mark.parametrize(("config", "kind"), [(CONFIG, FileExistsError), (None, SceneGenError)])
@@ -248,17 +249,17 @@ def test_a_run_that_ended_meanwhile_is_kept(config, kind, rooms_path, folder, mo
     if config is None:
         with pytest.raises(Killed):
             train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(2))
-    launched = runs.launched
+    launched = module.launched
 
     def meanwhile(*given: Any) -> Any:
-        monkeypatch.setattr(runs, "launched", launched)
+        monkeypatch.setattr(module, "launched", launched)
         train_run(folder, rooms_path, config, HERE)
         return launched(*given)
 
-    monkeypatch.setattr(runs, "launched", meanwhile)
+    monkeypatch.setattr(module, "launched", meanwhile)
     with pytest.raises(kind):
         train_run(folder, rooms_path, config, HERE)
-    assert load_state(folder)[0].iteration == 4
+    assert load_checkpoint(folder, METHOD).card.iteration == 4
 
 
 @pytest.mark.parametrize("name", ["pictures.png", "weights.safetensors"])
@@ -284,7 +285,9 @@ def test_a_run_of_rays_learns_from_matching_alone(near_path, folder, tmp_path):
         file["normal"][...] = 0.0
         file["object_id"][...] = 0
     done: list[dict[str, float]] = []
-    train_run(folder, near_path, RAYS, HERE, progress=lambda state, losses: done.append(losses))
+    train_run(
+        folder, near_path, RAYS, HERE, progress=lambda now, total, losses: done.append(losses)
+    )
     assert [set(losses) for losses in done[-3:]] == [{"matching"}] * 3
     assert done[0].keys() == {"share of images matched"}
     other = tmp_path / "other"
@@ -319,19 +322,17 @@ def test_rays_refuse_uneven_views_before_the_search(near_path, folder, tmp_path)
     assert not folder.exists()
 
 
-def test_weights_that_are_not_finite_replace_no_checkpoint(rooms_path, folder, monkeypatch):
-    """The last step's losses are finite; what it made is not, and the earlier files stay."""
-    config = replace(CONFIG, adversarial=0.0, iterations=2)
+def test_a_prior_that_is_not_finite_replaces_no_checkpoint(rooms_path, folder, monkeypatch):
+    """The last step's losses and weights are finite, and the earlier files stay."""
     stored: dict[str, bytes] = {}
 
-    def spoiled(state: State, *given: Any, **how: Any) -> Iterator[Any]:
-        for step in train(state, *given, **how):
-            if state.iteration == 2:
-                stored.update({one.name: one.read_bytes() for one in folder.glob("*.safetensors")})
-                next(state.model.encoder.parameters()).data.fill_(torch.nan)
-            yield step
+    def spoiled(model: Any, sources: Any) -> None:
+        if folder.joinpath(WEIGHTS).exists():
+            stored.update({path.name: path.read_bytes() for path in folder.glob("*.safetensors")})
+            model.prior.mean.fill_(torch.nan)
 
-    monkeypatch.setattr(runs, "train", spoiled)
+    monkeypatch.setattr(module, "fit_prior", spoiled)
+    config = replace(CONFIG, adversarial=0.0, iterations=2)
     with pytest.raises(TrainingError) as error:
         train_run(folder, rooms_path, config, replace(HERE, every=1))
     assert error.value.where == "iteration 2"

@@ -1,24 +1,24 @@
 """What each network may be asked, and that depth stays between the room's walls and open sides."""
 
 import pytest
+from refusals import refused
 
 from scenegen.common.errors import SpecError
 
 torch = pytest.importorskip("torch")
-from baselines.depth_supervised.network import (  # noqa: E402
-    Cameras,
-    ReliefSpec,
-    contrast,
-    predicted_depth,
-    relief_network,
-)
-from baselines.pix2shape.network.empty_rooms import empty_rooms  # noqa: E402
+from baselines.pix2shape.network.architecture import contrast  # noqa: E402
+from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms  # noqa: E402
+from baselines.relief.network import Card, Settings, predicted_depth, relief_network  # noqa: E402
 
 
 def cameras(*positions: tuple[float, float, float]) -> Cameras:
     pose = torch.eye(4).repeat(len(positions), 1, 1)
     pose[:, :3, 3] = torch.tensor(positions)
     return Cameras(pose, 30.0)
+
+
+def network_of(kind: str, size: int) -> torch.nn.Module:
+    return relief_network(Card("depth-supervised", Settings(kind, size, 0.1)))
 
 
 OWN, OTHER = cameras((0.5, 0.5, 2.0), (0.4, 0.6, 2.2)), cameras((0.6, 0.5, 2.1), (0.3, 0.5, 2.0))
@@ -28,7 +28,7 @@ OWN, OTHER = cameras((0.5, 0.5, 2.0), (0.4, 0.6, 2.2)), cameras((0.6, 0.5, 2.1),
 @pytest.mark.parametrize("kind", ["unet", "code"])
 def test_depth_lies_between_the_walls_and_the_open_sides(kind, size):
     torch.manual_seed(0)
-    network = relief_network(ReliefSpec(kind, size, 0.1)).eval()
+    network = network_of(kind, size).eval()
     image = torch.rand(2, 3, size, size)
     walls, entry, _ = empty_rooms(OWN.world_from_camera, 30.0, size)
     with torch.no_grad():
@@ -45,14 +45,14 @@ def test_depth_lies_between_the_walls_and_the_open_sides(kind, size):
 
 
 def test_a_unet_sees_with_the_images_own_camera_alone():
-    network = relief_network(ReliefSpec("unet", 32, 0.1))
+    network = network_of("unet", 32)
     with pytest.raises(ValueError, match="own camera"):
         network(torch.rand(2, 3, 32, 32), OWN, OTHER)
 
 
 def test_a_code_is_seen_from_any_camera():
     torch.manual_seed(0)
-    network = relief_network(ReliefSpec("code", 32, 0.1)).train()
+    network = network_of("code", 32).train()
     image = torch.rand(2, 3, 32, 32)
     for _ in range(2):  # the condition's layers begin at 0
         loss = (network(image, OWN, OWN) - torch.rand(2, 32, 32)).square().mean()
@@ -70,7 +70,11 @@ def test_contrast_is_blind_to_what_is_even():
     assert float(contrast(even)[0, 0, 8, 8]) == pytest.approx(8 * 0.8)
 
 
-@pytest.mark.parametrize("wrong", [{"kind": "mlp"}, {"size": 48}, {"width": 100.0}])
-def test_impossible_networks_are_refused(wrong):
-    with pytest.raises(SpecError, match=r"network|size|width"):
-        ReliefSpec(**wrong)
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("network", "mlp"), ("size", 48), ("width", 100.0), ("iterations", 0), ("batch", 1),
+     ("learning_rate", -1.0), ("seed", -1)],
+)  # fmt: skip
+def test_impossible_settings_are_refused(name, value):
+    with refused(SpecError, name.replace("_", " ")):
+        Settings(**{name: value})

@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from baselines.outline.submission import (
+from baselines.outline import (
     Outlines,
     nearest_scores,
     tree_scores,

@@ -1,0 +1,317 @@
+"""Training: the same to the bit whenever it was stopped; it learns; it stops at nonsense."""
+
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pix2shape_models import question_source, room_source, state_of, suited, tiny
+from refusals import refused
+
+from scenegen.common.errors import SpecError
+
+torch = pytest.importorskip("torch")
+from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
+from baselines.pix2shape.questions import QuestionImages  # noqa: E402
+from baselines.pix2shape.rooms import RoomImages  # noqa: E402
+from baselines.pix2shape.training import iterations  # noqa: E402
+from baselines.pix2shape.training.batches import Loading, Sources  # noqa: E402
+from baselines.pix2shape.training.iterations import Iterations, check_request  # noqa: E402
+from baselines.pix2shape.training.run import learning_rate  # noqa: E402
+from baselines.pix2shape.training.turning import turned  # noqa: E402
+from baselines.pix2shape.weights import METHOD  # noqa: E402
+from baselines.training.checkpoint import load_checkpoint  # noqa: E402
+from baselines.training.fit import TrainingError, fit  # noqa: E402
+
+TINY = tiny(mutual_information=0.0, questions=0.0)
+PLAIN = replace(TINY, adversarial=0.0, code_reconstruction=0.0)
+CPU = torch.device("cpu")
+Losses = list[dict[str, float]]
+
+
+class Stop(Exception):
+    """What ends a run before its last iteration."""
+
+
+def bits(state: Any) -> dict[str, Any]:
+    """Return all that training changes, by name."""
+    found = {f"model.{name}": value.clone() for name, value in state.network.state_dict().items()}
+    for kind, optimiser in state.optimisers.items():
+        for index, values in optimiser.state_dict()["state"].items():
+            found |= {f"{kind}.{index}.{name}": value.clone() for name, value in values.items()}
+    return found
+
+
+def assert_same(one: dict[str, Any], other: dict[str, Any]) -> None:
+    assert one.keys() == other.keys()
+    assert [name for name in one if not torch.equal(one[name], other[name])] == []
+
+
+def run(
+    state: Any,
+    sources: Any,
+    folder: Path,
+    steps: int | None = None,
+    workers: int = 0,
+    every: int = 1,
+) -> Losses:
+    """Train, all iterations or some, and return the losses."""
+    sources = sources if isinstance(sources, Sources) else Sources(sources)
+    config, begun, reported = state.card.settings, state.card.iteration, []
+    check_request(state.network, sources, 1)
+    losses = Iterations(state.network, sources, Loading(config, CPU, begun, workers))
+
+    def progress(done: int, total: int, numbers: Any) -> None:
+        reported.append(numbers)
+        if len(reported) == steps:
+            raise Stop
+
+    try:
+        fit(folder, METHOD, state, losses, learning_rate, every=every, progress=progress)
+    except Stop:
+        assert len(reported) == steps
+    return reported
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+@pytest.mark.parametrize("case", ["rooms", "critic steps", "workers", "questions"])
+def test_a_stop_in_the_middle_changes_nothing(case, rooms_path, train_questions, tmp_path):
+    """Weights, moments and losses to the bit; nor do processes that read."""
+    config = replace(TINY, decay=True)
+    workers = 2 if case == "workers" else 0
+    if case == "critic steps":
+        config = replace(config, critic_steps=2, consistency=0.1)
+    if case == "questions":
+        more = {"questions": 0.1, "contrast": 1.0, "mutual_information": 0.1, "consistency": 1.0}
+        config = suited(replace(config, **more, batch=12, question_batch=8), train_questions)
+        parts = (question_source(train_questions, p, config) for p in ("unlabeled", "labeled"))
+        sources = Sources(*parts, 2)
+    else:
+        sources = Sources(room_source(rooms_path, config))
+    unbroken = state_of(config)
+    expected = run(unbroken, sources, tmp_path)
+    assert unbroken.card.iteration == 4
+    assert [("questions" in losses) for losses in expected] == [case == "questions"] * 4
+    state = state_of(config)
+    losses = run(state, sources, tmp_path, 2, workers)
+    again = load_checkpoint(tmp_path, METHOD)
+    assert (again.card, again.card.iteration) == (state.card, 2)
+    assert_same(bits(again), bits(state))
+    losses += run(again, sources, tmp_path, workers=workers)
+    assert losses == expected
+    assert_same(bits(again), bits(unbroken))
+
+
+def test_the_seed_decides_and_nothing_else(rooms_path, tmp_path):
+    found = []
+    for seed in (1, 1, 2):
+        torch.manual_seed(len(found))
+        before = torch.get_rng_state()
+        state = state_of(replace(TINY, seed=seed))
+        assert torch.equal(torch.get_rng_state(), before)
+        losses = run(state, room_source(rooms_path, TINY), tmp_path, 2)
+        found.append((losses, bits(state)))
+    assert found[0][0] == found[1][0]
+    assert_same(found[0][1], found[1][1])
+    assert not torch.equal(*(found[i][1]["model.decoder.last.weight"] for i in (0, 2)))
+
+
+def test_every_step_has_noise_of_its_own(rooms_path, tmp_path, monkeypatch):
+    """Of each critic's batch, too; but the same wherever training began."""
+    seeds: list[int] = []
+    draw = iterations.draw
+    monkeypatch.setattr(iterations, "draw", lambda *a: (seeds.append(a[2]), draw(*a))[1])
+    config = replace(TINY, critic_steps=2, iterations=2)
+    for first in (0, 0, 1):
+        run(state_of(config, iteration=first), room_source(rooms_path, config), tmp_path)
+    assert len(set(seeds[:4])) == 4
+    assert seeds == [*seeds[:4], *seeds[:4], *seeds[2:4]]
+
+
+def test_only_the_labels_that_are_told_are_used(train_questions, tmp_path, monkeypatch):
+    config = suited(replace(TINY, questions=1.0, batch=8), train_questions)
+    source = question_source(train_questions, "unlabeled", config)
+    labelled = question_source(train_questions, "labeled", config)
+    read: set[int] = set()
+    item = QuestionImages.__getitem__
+
+    def spy(self: QuestionImages, row: int) -> dict[str, Any]:
+        if self is labelled:
+            read.add(row)
+        return item(self, row)
+
+    monkeypatch.setattr(QuestionImages, "__getitem__", spy)
+    losses = run(state_of(config), Sources(source, labelled, 2), tmp_path)
+    assert read == {0, 1}
+    assert all("questions" in one for one in losses)
+    read.clear()
+    losses = run(state_of(config), Sources(source, labelled, 0), tmp_path)
+    assert read == set()
+    assert not any("questions" in one for one in losses)
+
+
+def test_some_of_the_contrasted_questions_are_labelled(train_questions, tmp_path, monkeypatch):
+    plain = replace(TINY, questions=1.0, contrast=1.0, batch=8, question_batch=8)
+    config = suited(plain, train_questions)
+    source = question_source(train_questions, "unlabeled", config)
+    labelled = question_source(train_questions, "labeled", config)
+    step, asked = iterations.generator_step, []
+
+    def spy(model: Any, batch: Any, noise: Any, questions: Any) -> Any:
+        asked.append(questions)
+        return step(model, batch, noise, questions)
+
+    monkeypatch.setattr(iterations, "generator_step", spy)
+    items = [labelled[row] for row in range(len(labelled))]
+    told = {item["image"].tobytes(): item["answer"] for item in items}
+    for labels, known in ((3, 1), (0, 0)):
+        asked.clear()
+        losses = run(state_of(config), Sources(source, labelled, labels), tmp_path, 2)
+        assert all(("questions" in one) == (labels > 0) and "contrast" in one for one in losses)
+        for images, answers in asked:
+            assert images.image.shape == (32, 3, 32, 32)
+            assert (answers >= 0).tolist() == [True] * known + [False] * (8 - known)
+            rows = images.image.view(8, -1)[:known].numpy()
+            assert [told[row.tobytes()] for row in rows] == answers[:known].tolist()
+        assert len({images.image.numpy().tobytes() for images, _ in asked}) == len(asked)
+    losses = run(state_of(config), labelled, tmp_path, 2)  # a file with answers, but no labels
+    assert all("contrast" in one and "questions" not in one for one in losses)
+    assert run(state_of(replace(config, contrast=0.0)), source, tmp_path, 1)
+    assert asked[-1] is None, "nothing is compared without a label"
+
+
+@pytest.mark.parametrize(
+    ("labels", "expected"), [(0, 0), (1, 1), (100, 1), (101, 2), (200, 2), (1000, 8), (9000, 8)]
+)
+def test_one_place_for_every_hundred_labels_up_to_a_quarter(labels, expected, train_questions):
+    config = replace(TINY, questions=1.0, contrast=1.0, question_batch=32)
+    config = suited(config, train_questions)
+    source = question_source(train_questions, "labeled", config)
+    sources = Sources(source, source, labels)
+    assert sources.question_sizes(config) == (expected, 32 - expected)
+    plain = replace(config, contrast=0.0)
+    assert sources.question_sizes(plain) == (32 if labels else 0, 0)
+    several = replace(config, labelled_batch=5)
+    assert sources.question_sizes(several) == (5 if labels else 0, 32)
+    assert sources.question_sizes(replace(several, contrast=0.0)) == (5 if labels else 0, 0)
+
+
+def test_compared_questions_are_turned_and_may_be_all_that_is_learned_from(
+    train_questions, tmp_path, monkeypatch
+):
+    """The critic sees the same pictures; the encoder sees no others."""
+    zero = dict.fromkeys(("adversarial", "reconstruction", "code_reconstruction"), 0.0)
+    on = dict.fromkeys(("contrast", "questions", "mutual_information"), 1.0)
+    own = {**zero, **on, "question_batch": 8, "labelled_batch": 2, "compared_information": True}
+    config = suited(replace(TINY, **own), train_questions)
+    source = question_source(train_questions, "unlabeled", config)
+    labelled = question_source(train_questions, "labeled", config)
+    seen: list[Any] = []
+    step, critic = iterations.generator_step, iterations.critic_step
+
+    def spy(name: str, function: Any) -> Any:
+        def spied(model: Any, batch: Any, noise: Any, questions: Any) -> Any:
+            seen.append((name, questions, noise))
+            return function(model, batch, noise, questions)
+
+        return spied
+
+    monkeypatch.setattr(iterations, "generator_step", spy("generator", step))
+    monkeypatch.setattr(iterations, "critic_step", spy("critic", critic))
+    pictures = []
+    for turn in (False, True):
+        seen.clear()
+        state = state_of(replace(config, turned=turn))
+        losses = run(state, Sources(source, labelled, 3), tmp_path, 2)
+        assert set(losses[0]) == {"mutual_information", "questions", "contrast"}
+        assert [name for name, _, _ in seen] == ["critic", "generator"] * 2
+        assert seen[0][1] is seen[1][1]
+        assert (seen[0][1][1] >= 0).tolist() == [True] * 2 + [False] * 8
+        pictures.append(seen[0])
+    (_, (plain, _), _), (_, (found, _), noise) = pictures
+    expected = turned(plain, noise.turn, noise.mirror)
+    assert torch.equal(found.image, expected.image)
+    assert not torch.equal(found.image, plain.image)
+
+
+def test_views_of_questions_are_not_compared(train_questions, tmp_path):
+    config = replace(suited(TINY, train_questions), consistency=1.0)
+    source = question_source(train_questions, "unlabeled", config)
+    with refused(SpecError, "consistency"):
+        run(state_of(config), source, tmp_path)
+
+
+@pytest.mark.parametrize("change", [{"material": True}, {"lights": 3}])
+def test_materials_and_lights_are_learned_from_images_alone(change, rooms_path, tmp_path):
+    blind = {"adversarial": 0.0, "code_reconstruction": 0.0, "reconstruction": 0.0}
+    config = replace(TINY, **blind, consistency=1.0, **change)
+    with pytest.raises(SpecError) as error:
+        run(state_of(config), room_source(rooms_path, config), tmp_path)
+    assert error.value.where in change
+
+
+def test_the_generators_step_leaves_the_critic_alone(rooms_path, tmp_path, monkeypatch):
+    config = replace(TINY, mutual_information=0.1, networks=replace(TINY.networks, z_view=2))
+    state, before = state_of(config), {}
+    step = iterations.generator_step
+
+    def spy(model: Any, *rest: Any) -> Any:
+        before.update(bits(state))
+        return step(model, *rest)
+
+    monkeypatch.setattr(iterations, "generator_step", spy)
+    start = bits(state)
+    run(state, room_source(rooms_path, config), tmp_path, 3)
+    after = bits(state)
+    for name, value in after.items():
+        if name.removeprefix("model.").split(".")[0] in ("critic", "statistics"):
+            assert torch.equal(value, before[name]), name
+    for network in (state.network.critic, state.network.statistics):
+        assert all(p.requires_grad for p in network.parameters())
+    for kind in ("encoder", "decoder", "critic", "statistics"):
+        weight = next(n for n in start if n.startswith(f"model.{kind}.") and "weight" in n)
+        assert not torch.equal(start[weight], after[weight]), kind
+
+
+def test_it_learns(rooms_path, tmp_path):
+    config = replace(PLAIN, iterations=60, batch=4, learning_rate=3e-3)
+    config = replace(config, networks=NetworkSpec(size=32, width=0.05, z_scene=32))
+    losses = run(state_of(config), room_source(rooms_path, config), tmp_path, every=60)
+    found = [numbers["reconstruction"] for numbers in losses]
+    assert np.mean(found[-10:]) < 0.5 * found[0]
+
+
+@pytest.mark.parametrize("decay", [False, True])
+def test_the_learning_rate(decay):
+    config = replace(PLAIN, iterations=10, learning_rate=0.01, decay=decay)
+    rates = [learning_rate(config, iteration) for iteration in range(10)]
+    falling = [0.01] * 6 + [0.008, 0.006, 0.004, 0.002]
+    assert rates == pytest.approx(falling if decay else [0.01] * 10)
+
+
+@pytest.mark.parametrize("config", [TINY, PLAIN], ids=["all", "plain"])
+def test_an_image_that_is_not_finite_stops_it(rooms_path, tmp_path, monkeypatch, config):
+    """As no file can have that is read: row 5 has one impossible pixel."""
+    item = RoomImages.__getitem__
+
+    def poisoned(self: RoomImages, row: int) -> dict[str, Any]:
+        values = item(self, row)
+        if row == 5:
+            values["image"][:, 4, 4] = math.nan
+        return values
+
+    monkeypatch.setattr(RoomImages, "__getitem__", poisoned)
+    state = state_of(replace(config, batch=2))
+    with pytest.raises(TrainingError) as error:
+        run(state, room_source(rooms_path, config), tmp_path)
+    assert 0 < state.card.iteration < 4
+    assert error.value.where == f"iteration {state.card.iteration}"
+    again, statistics = load_checkpoint(tmp_path, METHOD), re.compile("running|tracked")
+    found, expected = (
+        {name: value for name, value in bits(one).items() if not statistics.search(name)}
+        for one in (state, again)
+    )
+    assert_same(found, expected)

@@ -1,0 +1,102 @@
+"""Networks learn the relief they are shown: true depth where there is any, or matched views."""
+
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+from h5_edits import put, values
+from pix2shape_models import edited
+from refusals import refused
+
+from scenegen.common.errors import FileFormatError, SpecError
+
+torch = pytest.importorskip("torch")
+from safetensors.torch import load_file  # noqa: E402
+
+from baselines.pix2shape.matching.labels import FOLDER  # noqa: E402
+from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms  # noqa: E402
+from baselines.relief import depth_supervised, training, view_pairs  # noqa: E402
+from baselines.relief.depth_supervised import views_of_scenes  # noqa: E402
+from baselines.relief.network import Card, Settings, predicted_depth, relief_network  # noqa: E402
+from baselines.relief.training import learning_rate  # noqa: E402
+from baselines.training.checkpoint import Method, load_weights  # noqa: E402
+from baselines.training.rooms import read_rooms  # noqa: E402
+
+SMALL = Settings(size=32, width=0.25, iterations=2, batch=4)
+UNSEEN = (
+    "depth", "normal", "object_id", "object/shape", "object/world_from_object", "object/scale",
+    "object/visible_pixels", "object/count", "light/position", "light/color", "light/ambient",
+    "light/attenuation", "material/reflectance",
+)  # fmt: skip
+
+
+def same(one, other):
+    found, expected = load_file(one), load_file(other)
+    return all(torch.equal(found[name], expected[name]) for name in expected)
+
+
+def test_a_unet_learns_nine_images_by_heart(turned_path, tmp_path, monkeypatch):
+    monkeypatch.setattr(training, "WARM_UP", 10)
+    settings = replace(SMALL, iterations=80, batch=9, learning_rate=0.01)
+    path = depth_supervised.train(turned_path, tmp_path, settings)
+    network, card = load_weights(path, Method("depth-supervised", Card, relief_network))
+    rooms = read_rooms(turned_path, 32, depth=True)
+    cameras = Cameras(rooms.world_from_camera, rooms.fov_y_degrees)
+    with torch.no_grad():
+        depth = predicted_depth(network, rooms.image.float(), cameras, cameras)
+    walls = empty_rooms(cameras.world_from_camera, cameras.fov_y_degrees, 32)[0]
+    error, before = ((guess - rooms.depth).abs().mean() for guess in (depth, walls))
+    assert error < before / 2, "the empty room is left far behind"
+    assert (card.iteration, card.fingerprint) == (80, rooms.fingerprint)
+    assert card.seconds > 0
+
+
+def test_pixels_without_a_surface_teach_nothing(turned_path, tmp_path):
+    def blank(file: h5py.File) -> None:
+        depth = file["depth"][()]
+        depth[:, :16] = np.nan
+        file["depth"][...] = depth
+
+    train = depth_supervised.train
+    holes = edited(turned_path, tmp_path / "holes.h5", blank)
+    found = train(holes, tmp_path / "holes", SMALL)
+    assert all(torch.isfinite(value).all() for value in load_file(found).values())
+    assert not same(found, train(turned_path, tmp_path / "whole", SMALL))
+    empty = edited(turned_path, tmp_path / "empty.h5", values("depth", lambda d: d + np.nan))
+    with refused(FileFormatError, "depth, row 0", "no surface"):
+        train(empty, tmp_path / "empty", SMALL)
+    with refused(SpecError, "turned.h5", "images of 32x32"):
+        train(turned_path, tmp_path / "large", replace(SMALL, size=64))
+
+
+def test_view_pairs_reads_nothing_but_images_and_cameras(near_path, tmp_path):
+    edits = [values(name, np.zeros_like) for name in UNSEEN]
+    edits.append(values("scene", lambda old: np.full_like(old, b"{}")))
+    blank = edited(near_path, tmp_path / "blank.h5", *edits)
+    expected = view_pairs.train(near_path, tmp_path / "one", SMALL)
+    assert len(list((tmp_path / "one" / FOLDER).iterdir())) == 1
+    assert same(view_pairs.train(blank, tmp_path / "two", SMALL), expected)
+    other = edited(near_path, tmp_path / "other.h5", put("image", 1, np.float16(0.5)))
+    assert not same(view_pairs.train(other, tmp_path / "three", SMALL), expected)
+    with refused(SpecError, "network", "code"):
+        view_pairs.train(near_path, tmp_path / "four", replace(SMALL, network="code"))
+
+
+def test_each_row_is_seen_from_the_cameras_of_its_own_scene(turned_path):
+    rooms = read_rooms(turned_path, 32)
+    assert rooms.depth is None
+    assert rooms.rounded
+    found = [rows.tolist() for rows in views_of_scenes(rooms)]
+    assert found == [[row - row % 3 + k for k in range(3)] for row in range(9)]
+    mixed = replace(rooms, scene=torch.tensor([2, 0, 1, 0, 2, 2, 1, 0, 1]))
+    assert views_of_scenes(mixed)[3].tolist() == [1, 3, 7]
+
+
+def test_the_learning_rate_rises_and_falls_to_nothing():
+    settings = Settings(iterations=1000, learning_rate=0.1)
+    rates = [learning_rate(settings, i) for i in range(1000)]
+    assert 0 < rates[0] < 0.001
+    assert 0.085 < max(rates) == rates[199] < 0.1
+    assert rates[199:] == sorted(rates[199:], reverse=True)
+    assert rates[-1] < 1e-5

@@ -1,0 +1,143 @@
+"""Submissions: scores of every answer by images alone, and what is refused."""
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from pix2shape_models import edited, released
+
+from iqtt import open_questions
+from iqtt.files.make import make_split
+from iqtt.questions.specs import SplitSpec
+from metrics.scoring.evaluate import score
+from scenegen.common.errors import SceneGenError, SpecError
+
+torch = pytest.importorskip("torch")
+from baselines.resnets import cnn, siamese  # noqa: E402
+from baselines.resnets.answering import FILES, accuracy  # noqa: E402
+from baselines.training.checkpoint import WEIGHTS, load_weights  # noqa: E402
+from baselines.training.questions import question_images  # noqa: E402
+
+MODULES = {"cnn": cnn, "siamese": siamese}
+SMALL = {"width": 4, "size": 16, "batch": 2}
+each = pytest.mark.parametrize("name", MODULES)
+
+
+@pytest.fixture(scope="module")
+def run_folders(train_questions: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Return the folder of a short run of each method, which no test changes."""
+    folder = tmp_path_factory.mktemp("runs")
+    for name, module in MODULES.items():
+        module.train(train_questions, folder / name, module.Settings(seed=1, iterations=3, **SMALL))
+    return {name: folder / name for name in MODULES}
+
+
+def scores_of(network: Any, path: Path, row: int) -> Any:
+    """Return the scores of one question, seen alone."""
+    with open_questions(path) as questions, torch.no_grad():
+        return network(torch.from_numpy(question_images(questions, row, 16))[None])[0].numpy()
+
+
+@each
+def test_a_submission_is_valid_and_holds_the_networks_scores(name, run_folders, truths, tmp_path):
+    weights, out = run_folders[name] / WEIGHTS, tmp_path / "answers.h5"
+    told = []
+    module = MODULES[name]
+    module.write_submission(truths.iqtt, out, weights, progress=lambda *done: told.append(done))
+    assert told == [(6, 6)]
+    network, card = load_weights(weights, module.KIND.method)
+    with h5py.File(out) as file:
+        assert file.attrs["run"] == "3 labels, seed 1"
+        for row, scores in enumerate(file["scores"][:]):
+            assert scores_of(network, truths.iqtt, row) == pytest.approx(scores, rel=1e-4)
+    right = score([out]).metrics["iqtt_accuracy"].value
+    val = truths.iqtt.with_name("iqtt-val.h5")
+    assert 0 <= right <= 1
+    assert card.validation == accuracy(network, val, 16, 3)
+
+
+@each
+def test_labels_and_answers_of_the_questions_are_not_read(name, run_folders, truths, tmp_path):
+    """The same images in a file of the authors' layout, which holds nothing else."""
+    weights = run_folders[name] / WEIGHTS
+    bare = released(tmp_path / "bare.h5", [0] * 6, 32)
+    with h5py.File(bare, "r+") as file, h5py.File(truths.iqtt) as questions:
+        file["questions"][:] = questions["questions"][:] / np.float32(255)
+    found = []
+    for data in (bare, truths.iqtt):
+        MODULES[name].write_submission(data, tmp_path / "x.h5", weights, overwrite=True)
+        with h5py.File(tmp_path / "x.h5") as file:
+            found.append(file["scores"][:])
+    assert found[0] == pytest.approx(found[1], abs=1e-4)
+
+
+def test_other_weights_and_data_are_refused(run_folders, truths, train_questions, tmp_path):
+    folder = run_folders["cnn"]
+    (tmp_path / "text.safetensors").write_text("none")
+    out = tmp_path / "x.h5"
+    cases = [
+        (truths.iqtt, run_folders["siamese"] / WEIGHTS, "weights.safetensors"),
+        (truths.iqtt, folder / "checkpoint.safetensors", "checkpoint.safetensors"),
+        (truths.iqtt, tmp_path / "text.safetensors", "text.safetensors"),
+        (train_questions, folder / WEIGHTS, "iqtt-train.h5"),
+        (truths.rooms, folder / WEIGHTS, "rooms.h5"),
+        (released(tmp_path / "odd.h5", [0], 24), folder / WEIGHTS, "odd.h5"),
+    ]
+    for data, weights, where in cases:
+        with pytest.raises(SceneGenError) as error:
+            cnn.write_submission(data, out, weights)
+        assert where in error.value.where
+    assert not out.exists()
+    with pytest.raises(FileNotFoundError):
+        cnn.write_submission(truths.iqtt, out, tmp_path / "none.safetensors")
+
+
+def test_questions_of_two_answers(run_folders, tmp_path):
+    """A softmax has as many outputs as in training; distances are measured to any answer."""
+    spec = SplitSpec(
+        train=4, labeled=4, val=2, test=5, cubes=(8, 8), distractors="mirror-pair", answers=2,
+        height=32, width=32, min_cube_pixels=0,
+    )  # fmt: skip
+    make_split(tmp_path / "two", spec)
+    test, out = tmp_path / "two" / "iqtt-test.h5", tmp_path / "x.h5"
+    siamese.write_submission(test, out, run_folders["siamese"] / WEIGHTS)
+    with h5py.File(out) as file:
+        assert file["scores"].shape == (5, 2)
+    with pytest.raises(SpecError) as error:
+        cnn.write_submission(test, out, run_folders["cnn"] / WEIGHTS, overwrite=True)
+    assert error.value.found == "questions of 2 answers"
+    settings = cnn.Settings(iterations=2, **SMALL)
+    weights = cnn.train(tmp_path / "two/iqtt-train.h5", tmp_path / "run", settings)
+    cnn.write_submission(test, out, weights, overwrite=True)
+    with h5py.File(out) as file:
+        assert file["scores"].shape == (5, 2)
+
+
+def test_no_answers_no_accuracy(run_folders, truths, tmp_path):
+    network, _ = load_weights(run_folders["cnn"] / WEIGHTS, cnn.KIND.method)
+    val = Path(truths.iqtt).with_name("iqtt-val.h5")
+    assert accuracy(network, truths.iqtt, 16, 3) is None
+    assert accuracy(network, val, 16, 2) is None
+    assert accuracy(network, tmp_path / "none.h5", 16, 3) is None
+
+    def right(file):
+        rows = range(len(file["answers"]))
+        file["answers"][:] = [scores_of(network, val, row).argmax() for row in rows]
+
+    assert accuracy(network, edited(val, tmp_path / "v.h5", right), 16, 3) == 1.0
+
+
+@each
+def test_bundled_weights_are_small_and_tell_answers_apart(name, tmp_path):
+    path = FILES / f"{name}.safetensors"
+    assert path.stat().st_size < 15_000_000
+    card = load_weights(path, MODULES[name].KIND.method)[1]
+    assert (card.labels, card.answers, card.settings.seed) == (1000, 3, 0)
+    assert card.iteration == card.settings.iterations
+    spec = SplitSpec(train=0, labeled=0, val=0, test=2, height=64, width=64, min_cube_pixels=0)
+    make_split(tmp_path / "split", spec)
+    MODULES[name].write_submission(tmp_path / "split/iqtt-test.h5", tmp_path / "a.h5")
+    with h5py.File(tmp_path / "a.h5") as file:
+        assert len(np.unique(file["scores"][:])) == 6

@@ -1,0 +1,64 @@
+"""Training on labels: answers stay with their questions, and the networks learn them."""
+
+import numpy as np
+import pytest
+from refusals import refused
+
+from scenegen.common.errors import SpecError
+
+torch = pytest.importorskip("torch")
+from baselines.resnets import cnn, siamese  # noqa: E402
+from baselines.resnets.training import permuted  # noqa: E402
+from baselines.training.checkpoint import load_weights  # noqa: E402
+
+
+def test_permuted_answers_stay_with_their_questions():
+    images = torch.arange(6 * 4.0).view(6, 4, 1, 1, 1).expand(6, 4, 3, 2, 2)
+    right = torch.tensor([0, 1, 2, 0, 1, 2])
+    seen = set()
+    for iteration in range(20):
+        mixed, new = permuted(images, right, 5, iteration)
+        rows = torch.arange(6)
+        assert torch.equal(mixed[:, 0], images[:, 0])
+        assert torch.equal(mixed[rows, 1 + new], images[rows, 1 + right])
+        values = mixed[:, 1:, 0, 0, 0].sort(dim=1).values
+        assert torch.equal(values, images[:, 1:, 0, 0, 0])
+        seen |= set(enumerate(new.tolist()))
+        assert torch.equal(permuted(images, right, 5, iteration)[1], new)
+    assert len(seen) == 18, "the right answer of each question comes to stand everywhere"
+
+
+@pytest.mark.parametrize("module", [cnn, siamese], ids=["cnn", "siamese"])
+def test_it_learns_the_questions_that_it_sees(module, train_questions, tmp_path):
+    told = []
+    settings = module.Settings(size=16, width=8, batch=3, learning_rate=0.003, iterations=60)
+    how = {"device": "cpu", "progress": lambda *now: told.append(now)}
+    path = module.train(train_questions, tmp_path, settings, **how)
+    losses = [numbers["loss"] for *_, numbers in told[:-1]]
+    assert np.mean(losses[-5:]) < 0.3 * np.mean(losses[:5])
+    assert [done for done, *_ in told] == [*range(1, 61), 60]
+    accuracy = told[-1][2]["accuracy on iqtt-val.h5"]
+    assert 0 <= accuracy <= 1
+    card = load_weights(path, module.KIND.method)[1]
+    assert (card.validation, card.answers, card.labels) == (accuracy, 3, 3)
+
+
+@pytest.mark.parametrize(
+    ("settings", "where"),
+    [
+        ({"depth": 34}, "depth"), ({"width": 10**9}, "width"), ({"size": 0}, "size"),
+        ({"batch": 0}, "batch"), ({"learning_rate": float("nan")}, "learning rate"),
+        ({"iterations": 0}, "iterations"), ({"seed": -1}, "seed"),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_settings_out_of_range(settings, where):
+    with refused(SpecError, where):
+        cnn.Settings(**settings)
+
+
+def test_no_labels_and_other_sizes_are_refused(train_questions, tmp_path):
+    for settings, labels, where in (({}, 0, "labels"), ({"size": 24}, None, "iqtt-train.h5")):
+        with refused(SpecError, where):
+            cnn.train(train_questions, tmp_path / "run", cnn.Settings(**settings), labels=labels)
+    assert not (tmp_path / "run").exists()

@@ -1,0 +1,176 @@
+"""What holds for every baseline that is trained: runs go on bit for bit, and refuse what is wrong.
+
+`training/test_fit.py` has the loop itself; here each method's batches, seeds and settings take
+part.
+"""
+
+import json
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import h5py
+import pytest
+from h5_edits import attribute
+from pix2shape_models import edited
+
+from baselines.commands import HOMES
+from scenegen.common.errors import SceneGenError, SpecError
+
+torch = pytest.importorskip("torch")
+from baselines.training.checkpoint import CHECKPOINT, WEIGHTS, load_tensors  # noqa: E402
+
+RELIEF = {"size": 32, "width": 0.25, "batch": 4}
+RESNET = {"size": 16, "width": 4, "batch": 2}
+PTN = {"size": 16, "width": 2, "batch": 2, "rays": 40, "samples": 12}
+REZENDE = {"size": 16, "code": 4, "batch": 4, "pairs": 1}
+CASES: dict[str, tuple[str, str, dict[str, Any], dict[str, Any]]] = {
+    "cnn": ("cnn", "questions", RESNET, {}),
+    "siamese": ("siamese", "questions", RESNET, {"labels": 2}),
+    "unet": ("depth-supervised", "rooms", RELIEF, {}),
+    "code": ("depth-supervised", "rooms", {**RELIEF, "width": 0.05, "network": "code"}, {}),
+    "view-pairs": ("view-pairs", "rooms", RELIEF, {}),
+    "ptn, rooms": ("ptn", "rooms", PTN, {}),
+    "ptn, ids": ("ptn", "rooms", {**PTN, "silhouettes": "ids"}, {}),
+    "ptn, questions": ("ptn", "questions", PTN, {"labels": 2}),
+    "rezende": ("rezende", "questions", REZENDE, {"labels": 2}),
+}
+each = pytest.mark.parametrize("case", CASES)
+Train = Callable[..., Path]
+
+
+@pytest.fixture(scope="session")
+def data(turned_path: Path, truths: Any) -> dict[str, Path]:
+    """Return rooms of 3 views, and 3 labelled questions and 3 others, all of 32x32 pixels."""
+    return {"rooms": turned_path, "questions": Path(truths.iqtt).with_name("iqtt-train.h5")}
+
+
+@pytest.fixture
+def train(case: str, data: dict[str, Path], tmp_path: Path, monkeypatch: Any) -> Train:
+    """Train a case into a folder; settings are those of the case unless it goes on."""
+    name, kind, settings, how = CASES[case]
+    module = import_module(f"baselines.{HOMES[name]}")
+    package = HOMES[name].partition(".")[0]
+    monkeypatch.setattr(f"baselines.{package}.training.EVERY", 2)
+
+    def run(folder: str, path: Path | None = None, **more: Any) -> Path:
+        changed = {
+            k: more.pop(k) for k in more.keys() & module.Settings.__dataclass_fields__.keys()
+        }
+        goes_on = more.get("resume", False)
+        made = module.Settings(**{"iterations": 5, **settings, **changed})
+        arguments = [path or data[kind], tmp_path / folder, *[made] * (not goes_on)]
+        return module.train(*arguments, **{**({} if goes_on else how), **more})
+
+    return run
+
+
+def content(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the tensors of a file, and its card, without the seconds that training took."""
+    tensors, notes = load_tensors(path)
+    return tensors, {**json.loads(notes["card"]), "seconds": 0}
+
+
+def differing(one: Path, other: Path) -> list[str]:
+    found, expected = content(one)[0], content(other)[0]
+    assert found.keys() == expected.keys()
+    return [name for name in found if not torch.equal(found[name], expected[name])]
+
+
+def killed_at(iteration: int) -> Callable[..., None]:
+    def progress(done: int, total: int, numbers: Any) -> None:
+        if done == iteration:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+@each
+def test_a_stop_in_the_middle_changes_nothing(case, train, tmp_path):
+    """Weights, moments and card to the bit; the seed decides, and nothing else."""
+    steps: list[Any] = []
+    whole = train("whole", seed=7, progress=lambda *now: steps.append(now))
+    assert [now[:2] for now in steps if now[0]][:5] == [(done, 5) for done in range(1, 6)]
+    with pytest.raises(KeyboardInterrupt):
+        train("cut", seed=7, progress=killed_at(3))
+    assert content(tmp_path / "cut" / CHECKPOINT)[1]["iteration"] == 2
+    with pytest.raises(FileExistsError):
+        train("cut")
+    again: list[int] = []
+    cut = train("cut", resume=True, progress=lambda done, *_: again.append(done))
+    assert [done for done in again if done > 2][:3] == [3, 4, 5]
+    for name in (WEIGHTS, CHECKPOINT):
+        assert differing(whole.with_name(name), cut.with_name(name)) == []
+        assert content(whole.with_name(name))[1] == content(cut.with_name(name))[1]
+    assert differing(whole, train("other", seed=8))
+
+
+@each
+def test_the_card_tells_data_and_labels(case, train, data):
+    name, kind, settings, how = CASES[case]
+    card = content(train("run", iterations=1))[1]
+    with h5py.File(data[kind]) as file:
+        part = "labeled" if name in ("cnn", "siamese") else "unlabeled"
+        mark = file.attrs["fingerprint" if kind == "rooms" else f"fingerprint_{part}"]
+    labels = 3 if name == "cnn" else how.get("labels", 0)
+    assert (card["method"], card["fingerprint"], card["labels"]) == (name, mark, labels)
+    assert card["settings"].items() >= settings.items()
+
+
+@each
+def test_a_run_goes_on_with_its_own_data_alone(case, train, data, tmp_path):
+    train("run", iterations=1)
+    kind = CASES[case][1]
+    marks = ["fingerprint"] if kind == "rooms" else ["fingerprint_labeled", "fingerprint_unlabeled"]
+    edits = [attribute(name, "0" * 64) for name in marks]
+    other = edited(data[kind], tmp_path / "other.h5", *edits)
+    with pytest.raises(SpecError) as error:
+        train("run", other, resume=True)
+    assert (error.value.where, error.value.found) == (str(other), "fingerprint 000000000000")
+    with pytest.raises(FileNotFoundError):
+        train("none", resume=True)
+
+
+@each
+@pytest.mark.parametrize("what", ["nothing.h5", "other", "iqtt-test.h5", "batch", "labels"])
+def test_what_cannot_be_trained_on_leaves_no_folder(case, what, train, data, tmp_path):
+    kind = CASES[case][1]
+    if what == "iqtt-test.h5":
+        kind = "rooms"
+    paths = {"other": data["questions" if kind == "rooms" else "rooms"]}
+    path = paths.get(what, data["questions"].with_name(what) if "h5" in what else data[kind])
+    how = {"batch": 0} if what == "batch" else {}
+    if what == "labels" and kind == "questions":
+        how = {"labels": 4}
+    elif what in ("other", "labels") and CASES[case][0] == "ptn":
+        path, how = data["rooms"], {"labels": 1}
+    elif what == "labels":
+        return
+    with pytest.raises((SceneGenError, OSError)):
+        train("run", path, **how)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "keyword"), [("ptn", PTN, "networks"), ("rezende", REZENDE, "start")]
+)
+def test_labels_alone_are_learned_from_weights_of_another_run(
+    name, settings, keyword, data, tmp_path
+):
+    """The networks stay as they are stored, and the card says what is new."""
+    module, path = import_module(f"baselines.{HOMES[name]}"), data["questions"]
+    plain = module.train(path, tmp_path / "plain", module.Settings(**settings, iterations=2))
+    later = module.train(path, tmp_path / "later", labels=3, **{keyword: str(plain)})
+    (_, before), (tensors, card) = content(plain), content(later)
+    heads = {key for key in tensors if key.startswith("head.")}
+    assert set(differing(plain, later)) == heads
+    assert (before["labels"], card["labels"]) == (0, 3)
+    new = {key for key in card if card[key] != before[key]}
+    assert new == ({"labels", "head"} if name == "ptn" else {"labels"})
+    with pytest.raises(FileExistsError):
+        module.train(path, tmp_path / "later", **{keyword: str(plain)})
+    wrong = {"resume": True} if name == "rezende" else {"settings": module.Settings(width=2)}
+    with pytest.raises(SpecError) as error:
+        module.train(path, tmp_path / "wrong", **wrong, **{keyword: str(plain)})
+    assert error.value.where == keyword

@@ -1,0 +1,91 @@
+"""Images as networks take them, the order of rows, and files that forked processes read."""
+
+import os
+import pickle
+from functools import partial
+from itertools import islice
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from refusals import refused
+
+from scenegen import open_rooms
+from scenegen.common.errors import FileFormatError, SpecError
+
+pytest.importorskip("torch")
+from baselines.training.images import (
+    Draws,
+    Opened,
+    channels_first,
+    check_reducible,
+    reduced,
+    row_batches,
+)
+
+
+def test_images_are_means_of_blocks_channels_first():
+    image = np.random.default_rng(0).random((6, 6, 3)).astype(np.float32)
+    parts = [image[i::3, j::3] for i in range(3) for j in range(3)]
+    np.testing.assert_allclose(reduced(image, 2), sum(parts) / 9, rtol=1e-6)
+    found = channels_first(image, 2)
+    assert (found.shape, found.dtype, found.flags.c_contiguous) == ((3, 2, 2), np.float32, True)
+    np.testing.assert_array_equal(found, np.moveaxis(reduced(image, 2), -1, 0))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e30, -1e30])
+def test_radiance_that_networks_cannot_take_is_refused(value):
+    image = np.zeros((4, 4, 3), np.float32)
+    image[1, 2, 0] = value
+    with refused(FileFormatError, "row 7"):
+        channels_first(image, 4, "row 7")
+
+
+@pytest.mark.parametrize(("height", "width"), [(48, 64), (50, 50), (16, 16)])
+def test_images_of_other_sizes_are_refused(height, width):
+    with refused(SpecError, "rooms.h5", f"images of {height}x{width}", "32"):
+        check_reducible("rooms.h5", height, width, 32)
+
+
+def test_batches_of_rows():
+    assert [rows.tolist() for rows in row_batches(5, 2)] == [[0, 1], [2, 3], [4]]
+
+
+def test_every_process_opens_the_file_for_itself(rooms_path):
+    opened = Opened(partial(open_rooms, rooms_path))
+    assert opened.file is opened.file
+    child = os.fork()
+    if not child:
+        os._exit(0 if opened.file.read("image", 7).shape == (32, 32, 3) else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    again = pickle.loads(pickle.dumps(opened))
+    assert again.file is not opened.file
+    assert (again.file.read("image", 3) == opened.file.read("image", 3)).all()
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(1, 20), st.integers(1, 7), st.integers(0, 2**32), st.integers(0, 30))
+def test_a_batch_depends_on_its_number_alone(rows, batch, seed, first):
+    through = list(islice(Draws(rows, batch, seed), first + 3))
+    assert list(islice(Draws(rows, batch, seed, first), 3)) == through[first:]
+    drawn = [row for batch_rows in through for row in batch_rows]
+    assert len(drawn) == batch * (first + 3)
+    for epoch in range(len(drawn) // rows):
+        assert sorted(drawn[epoch * rows : (epoch + 1) * rows]) == list(range(rows))
+
+
+@pytest.mark.parametrize("world", [1, 2, 3])
+def test_processes_share_each_batch(world):
+    shares = [Draws(11, 5, 3, share=slice(rank, None, world)) for rank in range(world)]
+    for whole, *parts in islice(zip(Draws(11, 5, 3), *shares, strict=True), 9):
+        assert sorted(row for part in parts for row in part) == sorted(whole)
+        assert max(map(len, parts)) - min(map(len, parts)) <= 1
+
+
+def test_the_order_changes_with_epoch_and_seed():
+    def orders(seed: int) -> list[tuple[int, ...]]:
+        return [tuple(rows) for rows in islice(Draws(20, 20, seed), 5)]
+
+    assert orders(1) == orders(1)
+    assert len({*orders(1), *orders(2)}) == 10
