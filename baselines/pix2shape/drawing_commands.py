@@ -114,7 +114,7 @@ def _model_and_rooms(
     from baselines.pix2shape.pictures import check_picture
     from baselines.pix2shape.use.explore import known_rooms
     from baselines.pix2shape.weights import open_weights, suited
-    from scenegen.rooms.preview import pick_rows
+    from scenegen.files.pictures import pick_rows
 
     check_picture(out, animated, overwrite)
     model, card = open_weights(weights or suited(data))

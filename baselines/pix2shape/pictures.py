@@ -14,6 +14,7 @@ from baselines.pix2shape.network.model import Pix2Shape, Views, shaded
 from baselines.pix2shape.network.surfels import normals_from_depth
 from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.files.new_file import check_writable, written_beside
+from scenegen.files.pictures import check_picture_name, check_picture_size, save_picture
 from scenegen.rooms import preview
 from scenegen.rooms.preview import BACKGROUND, GAP, SMALLEST_TILE
 
@@ -80,7 +81,7 @@ def check_picture(path: str | Path, animated: bool, overwrite: bool) -> None:
     """Raise now what `save_pictures` would raise once all is drawn."""
     path = Path(path)
     if not animated:
-        preview.check_picture_name(path)
+        check_picture_name(path)
     elif path.suffix.lower() not in (".gif", ".webp"):
         raise SpecError("out", repr(path.name), "an animation's name such as turn.gif")
     check_writable(path, overwrite)
@@ -94,9 +95,9 @@ def save_pictures(frames: Sequence[Image.Image], path: str | Path, overwrite: bo
     """
     check_picture(path, len(frames) > 1, overwrite)
     if len(frames) == 1:
-        preview.save_picture(frames[0], path, overwrite)
+        save_picture(frames[0], path, overwrite)
         return
     rest, pause = [*frames[1:], *frames[-2:0:-1]], FRAME_MILLISECONDS
-    preview.check_picture_size(frames[0], Path(path))
+    check_picture_size(frames[0], Path(path))
     with written_beside(path, overwrite) as temporary:
         frames[0].save(temporary, save_all=True, append_images=rest, duration=pause, loop=0)

@@ -10,11 +10,9 @@ from torch import Tensor
 
 from baselines.training.images import Array, channels_first, check_reducible, row_batches
 from iqtt import QuestionsFile, open_questions
-from iqtt.files.layout import FORMAT_NAME
-from iqtt.files.tables import PARTS
+from iqtt.files.reader import PARTS, holds_questions
 from scenegen.common.errors import SpecError
-from scenegen.files.attributes import read_text
-from scenegen.files.shards import open_with_shards
+from scenegen.files.shards import OpenFile
 from scenegen.rendering.ground_truth import decode_image
 
 LABELED, UNLABELED = PARTS
@@ -23,10 +21,8 @@ Progress = Callable[[int, int], Any]  # questions done since the last call, in a
 
 def is_question_file(path: str | Path) -> bool:
     """Return whether a file holds questions or their answers. Raises OSError, FileFormatError."""
-    with open_with_shards(Path(path), "rooms or question file")[0] as file:
-        kind = read_text(file, "format", path)
-        released = kind is None and any(name in file for name in ("questions", *PARTS))
-        return released or kind == FORMAT_NAME
+    with OpenFile(path, "rooms or question file") as opened:
+        return holds_questions(opened)
 
 
 def open_training(path: str | Path, part: str) -> QuestionsFile:

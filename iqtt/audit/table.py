@@ -15,11 +15,10 @@ from iqtt.files.layout import NO_CUBE, SCORED
 from iqtt.files.reader import QuestionsFile, answers_beside, parts
 from iqtt.questions.specs import SplitSpec
 from scenegen.common.records import check
-from scenegen.files import trial
 from scenegen.files.cluster import Cluster
 from scenegen.files.content import ColumnDigest, column_digest, dataset_digest, joint_digest
-from scenegen.files.row_file import digest_problems
-from scenegen.files.shards import opened_with_shards, set_name, stored_array
+from scenegen.files.rows import content_problems as problems_of_file
+from scenegen.files.shards import OpenFile, set_name
 
 Array = NDArray[Any]
 ROLES = ("train", "val", "test", "test-answers")
@@ -66,7 +65,7 @@ class AuditTable:
     """What was read of a table of Q questions: everything except the pixels.
 
     Attributes:
-        spec, split, fingerprint, format_version: as in the file; None for a released file.
+        spec, split, fingerprint: as in the file; None for a released file.
         answers: which of the answers is right, (Q,); None if the file does not tell.
         truth: the datasets `TRUTH` by name, (Q, ...) each; empty if the file has no shapes.
         contents: digest of each dataset that was read, by its file and its name there; empty if
@@ -85,7 +84,6 @@ class AuditTable:
     spec: SplitSpec | None
     split: str | None
     fingerprint: str | None
-    format_version: str | None
     image_dtype: str
     answers: Array | None
     truth: dict[str, Array]
@@ -115,11 +113,6 @@ class AuditTable:
         blank = (len(self), self.images, 1, 3)
         return self.truth["cubes"] if self.truth else np.full(blank, NO_CUBE)
 
-    @property
-    def since_format_2(self) -> bool:
-        """Whether the rules of format 2.0 hold: splits by hash, and lines of sight apart."""
-        return int((self.format_version or "0").split(".")[0]) >= 2
-
     def __len__(self) -> int:
         return self.source.count
 
@@ -148,7 +141,6 @@ def find_tables(paths: Sequence[str | Path]) -> list[Source]:
     names = [path.name for path in files.values()]
     sources: list[Source] = []
     for path in files.values():
-        trial.try_file(path)
         shown = path.name if names.count(path.name) == 1 else str(path)
         for part in parts(path):
             beside = answers_beside(path)
@@ -238,16 +230,14 @@ def read_table(
         read = truth if answers is None else {"answers": answers, **truth}
         digests = {name: dataset_digest(values) for name, values in read.items()}
         digests["questions"] = column_digest(digests_of_images)
-        stored = questions.stored_bytes()  # files before format 2.0 hold no camera_distance
-        contents = {questions.stored_at(n): digest for n, digest in digests.items() if n in stored}
-        told = questions.stored_content_digest is not None
+        contents = {questions.stored_at(name): digest for name, digest in digests.items()}
+        told = questions.spec is not None  # released files tell no digests
         scored = joint_digest({name: digests[name] for name in SCORED if name in digests})
         return AuditTable(
             source,
             questions.spec,
             questions.split,
             questions.fingerprint,
-            questions.attributes.get("format_version"),
             questions.image_dtype,
             answers,
             truth,
@@ -269,9 +259,8 @@ def content_problems(tables: Sequence[AuditTable]) -> list[str]:
     known = {place: digest for table in tables for place, digest in table.contents.items()}
     for path in dict.fromkeys(path for path, _ in known):
         digests = {name: digest for (where, name), digest in known.items() if where == path}
-        with opened_with_shards(path, "question file") as (file, shards):
-            stored = partial(stored_array, shards=shards)
-            problems += [f"{path.name}: {text}" for text in digest_problems(file, digests, stored)]
+        with OpenFile(path, "question file") as opened:
+            problems += [f"{path.name}: {text}" for text in problems_of_file(opened, digests)]
     return problems
 
 
@@ -280,8 +269,6 @@ def _scan_images(
 ) -> tuple[list[tuple[Array, ...]], bytes]:
     """Return what `_scan` finds in these rows, `chunk` at a time, and the digests of the rows."""
     scans, digest = [], ColumnDigest(keep_rows=True)
-    for path in filter(None, (source.path, source.answers)):
-        trial.try_file(path)  # a worker of a cluster has not seen it
     with source.open() as questions:
         for start in range(rows.start, rows.stop, chunk):
             stop = min(start + chunk, rows.stop)

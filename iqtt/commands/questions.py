@@ -12,7 +12,7 @@ from iqtt.commands.making import QUESTIONS
 from scenegen.command_line import options
 from scenegen.command_line.groups import EXAMPLE
 from scenegen.command_line.options import Items
-from scenegen.command_line.output import on_scheduler, print_line, progress_bar
+from scenegen.command_line.output import on_scheduler, print_checks, print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputPath
 
 SHOWN = 8  # questions that `show` draws by default
@@ -49,14 +49,14 @@ def show(
     from iqtt.files.preview import question_sheet
     from iqtt.files.reader import answers_beside, open_questions, parts
     from scenegen.common.errors import SpecError
-    from scenegen.rooms.preview import pick_rows, save_picture
+    from scenegen.files.pictures import pick_rows, save_picture
 
     chosen = part or parts(file)[0]
     beside = answers_beside(file) if answers else None
     with open_questions(file, chosen or None, beside) as questions:
         if answers and not (questions.has_answers or questions.has_truth):
             raise SpecError(file, "no answers, and no file of answers beside it", "answers")
-        rows = pick_rows(len(questions), items)[: None if items else SHOWN]
+        rows = pick_rows(len(questions), items, default=SHOWN)
         task = questions.attributes.get("task", "")
         sheet = question_sheet([questions[row] for row in rows], answers, task)
         count = len(questions)
@@ -162,11 +162,7 @@ def verify(
     seed = None if secret_seed is None else read_seed(secret_seed)
     with progress_bar(sum(one.count for one in find_tables([folder])), "question") as bar:
         checks = verify_split(folder, items, device, seed, bar.update)
-    for check in checks:
-        print_line(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:26} {check.detail}")
-    failed = sum(not check.ok for check in checks)
-    print_line(f"{folder}: {f'{failed} of {len(checks)} checks failed' if failed else 'verified'}")
-    ctx.exit(1 if failed else 0)
+    ctx.exit(print_checks(folder, checks))
 
 
 COMMANDS = (show, info, verify, audit)

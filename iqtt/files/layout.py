@@ -4,31 +4,25 @@ A training file has two tables of questions, in the groups `labeled` and `unlabe
 files have one, at the root. `truth` tells what is known of the questions of each table.
 """
 
-import math
+import re
 from typing import Any
 
 from numpy.typing import NDArray
 
-from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec
+from iqtt.questions.specs import DISTRACTOR_KINDS, SPLITS, SplitSpec
 from iqtt.shapes.polycube import MAX_CUBES
+from scenegen.common.records import LARGEST
 from scenegen.files.content import CONTENT_DIGEST
 from scenegen.files.row_file import writer_name
-from scenegen.files.table import Column
+from scenegen.files.schema import DIGEST, Column, Format
+from scenegen.layout import RELEASE, VARIANT
 from scenegen.rendering.backend import VERSION_ATTRIBUTES
 
 Array = NDArray[Any]
 FORMAT_NAME = "pix2shape-bench/iqtt"
-FORMAT_VERSION = "2.0"
-OLD_VERSION = "1.2"  # the last of the format with one camera for all questions; still read
-DIGESTS_SINCE = (1, 2)  # version from which on files have digests
-CAMERAS_SINCE = (2, 0)  # version from which on each question tells its camera
+FORMAT_VERSION = "1.0"
 # The datasets that scores depend on; `truth_digest` is the joint digest of those there.
 SCORED = ("answers", "distractor_kind", "angle_degrees")
-# Root attributes, all of them texts; fingerprints and digests of truth have a part's name as well.
-ROOT_TEXTS = (
-    *("format", "format_version", "writer", "variant", *VERSION_ATTRIBUTES),
-    *("spec", "split", "task", "conventions", "creation_command", CONTENT_DIGEST),
-)
 NO_CUBE = -128
 ID_BYTES = 2 * MAX_CUBES
 CONVENTIONS = (
@@ -41,33 +35,44 @@ TASK = (
     "One answer shows the shape of the reference, turned. Which one? Every cube of a shape shows in"
     " every picture."
 )
-
-
-def old_camera_distance(spec: SplitSpec) -> float:
-    """Return the distance of the camera in files before format 2.0, cube edges.
-
-    Their one camera framed the largest shape that was allowed, whatever the size of the image.
-    """
-    return 1.02 * spec.max_radius / math.sin(math.radians(spec.fov_degrees) / 2)
+# Fingerprints, and digests of truth, are root attributes too: one of each table (`named`).
+FORMAT = Format(
+    FORMAT_NAME,
+    FORMAT_VERSION,
+    "question file",
+    {
+        "writer": ".+",
+        "variant": VARIANT,
+        **dict.fromkeys(VERSION_ATTRIBUTES, RELEASE),
+        "spec": ".+",
+        "split": "|".join(SPLITS),
+        "task": ".+",
+        "conventions": re.escape(CONVENTIONS),
+        "creation_command": ".*",
+        CONTENT_DIGEST: DIGEST,
+    },
+    optional=frozenset({"creation_command"}),
+)
+ROOT_TEXTS = ("format", "format_version", *FORMAT.texts)
 
 
 def question_columns(spec: SplitSpec) -> list[Column]:
     """Return the column of the images; with three answers it is that of the released files."""
-    meaning = {
-        "unit": "linear radiance, times `scale`",
-        "shape": f"(Q, {1 + spec.answers}, H, W, 3)",
-        "frame": "pixels: row 0 on top",
-        "meaning": f"reference, then {spec.answers} answers; RGB",
-        "scale": 1 / 255 if spec.image_dtype == "uint8" else 1.0,
-    }
     shape = (1 + spec.answers, spec.height, spec.width, 3)
-    return [Column("questions", shape, spec.image_dtype, True, meaning)]
+    scale = {"scale": 1 / 255 if spec.image_dtype == "uint8" else 1.0}
+    unit, frame = "linear radiance, times `scale`", "pixels: row 0 on top"
+    meaning = f"reference, then {spec.answers} answers; RGB"
+    return [
+        Column(
+            "questions", shape, spec.image_dtype, unit, frame, meaning, own_chunk=True, more=scale
+        )
+    ]
 
 
 def answer_column() -> Column:
     """Return the column of the right answers, as in the released files."""
     meaning = "which of the answers shows the reference's shape, from 0"
-    return Column("answers", (), "uint8", attributes={"meaning": meaning})
+    return Column("answers", (), "uint8", meaning=meaning)
 
 
 def named(attribute: str, part: str) -> str:
@@ -75,45 +80,44 @@ def named(attribute: str, part: str) -> str:
     return f"{attribute}_{part}".rstrip("_")
 
 
-def truth_columns(spec: SplitSpec, version: tuple[int, int] = CAMERAS_SINCE) -> list[Column]:
+def truth_columns(spec: SplitSpec) -> list[Column]:
     """Return the columns of `truth`: shapes, views, lights and difficulty of each question."""
     most, lights, images = spec.cubes[1], spec.lights[1], 1 + spec.answers
-
-    def column(
-        name: str, shape: tuple[int, ...], dtype: str, unit: str, meaning: str, **more: Any
-    ) -> Column:
-        own_chunk = name == "depth"
-        return Column(name, shape, dtype, own_chunk, {"unit": unit, "meaning": meaning, **more})
-
     coordinates = f"integer coordinates of the cubes of each shape; {NO_CUBE} in unused rows"
     shape_id = "canonical shape under the 24 rotations: its sorted cubes, two bytes each"
     kind = "of each answer: -1 the right one, else an index into `names`"
     angle = "difficulty: smallest rotation from the reference's view to the right answer's"
+    distance = "from the camera of all images to the world's origin; it lies on +z"
+    # fmt: off
     columns = [
-        column("cube_count", (), "int32", "1", "cubes of each of the shapes"),
-        column("cubes", (images, most, 3), "int8", "cube edge", coordinates),
-        column("shape_id", (images, ID_BYTES), "uint8", "1", shape_id),
-        column("class_id", (images, ID_BYTES), "uint8", "1", "the same, mirror images as one"),
-        column(
-            "world_from_shape", (images, 3, 3), "float64", "1", "rotation of each image's shape"
-        ),
-        column("light_count", (images,), "int32", "1", "point lights of each image"),
-        column(
-            "light_position", (images, lights, 3), "float64", "cube edge", "world; unused: zero"
-        ),
-        column("light_color", (images, lights, 3), "float64", "radiance", "L_j; unused: zero"),
-        column("distractor_kind", (spec.answers,), "int8", "1", kind, names=list(DISTRACTOR_KINDS)),
-        column("angle_degrees", (), "float64", "degree", angle),
-        column("visible_pixels", (images, most), "int32", "pixel", "pixels that show each cube"),
+        Column("cube_count", (), "int32", "1", "-", "cubes of each of the shapes",
+               within=(1, most)),
+        Column("cubes", (images, most, 3), "int8", "cube edge", "-", coordinates),
+        Column("shape_id", (images, ID_BYTES), "uint8", "1", "-", shape_id),
+        Column("class_id", (images, ID_BYTES), "uint8", "1", "-",
+               "the same, mirror images as one"),
+        Column("world_from_shape", (images, 3, 3), "float64", "1", "world from shape",
+               "rotation of each image's shape"),
+        Column("light_count", (images,), "int32", "1", "-", "point lights of each image",
+               within=(0, lights)),
+        Column("light_position", (images, lights, 3), "float64", "cube edge", "world",
+               "zero where unused"),
+        Column("light_color", (images, lights, 3), "float64", "radiance", "RGB",
+               "L_j; zero where unused"),
+        Column("distractor_kind", (spec.answers,), "int8", "1", "-", kind,
+               within=(-1, len(DISTRACTOR_KINDS) - 1), more={"names": list(DISTRACTOR_KINDS)}),
+        Column("angle_degrees", (), "float64", "degree", "-", angle, within=(0, 180)),
+        Column("visible_pixels", (images, most), "int32", "pixel", "-",
+               "pixels that show each cube"),
+        Column("camera_distance", (), "float64", "cube edge", "world", distance,
+               within=(1e-3, LARGEST)),
     ]
-    if version >= CAMERAS_SINCE:
-        text = "from the camera of all images to the world's origin; it lies on +z"
-        columns.append(column("camera_distance", (), "float64", "cube edge", text))
     if spec.with_depth:
-        text = "planar depth, camera frame; NaN on the background"
         columns.append(
-            column("depth", (images, spec.height, spec.width), "float32", "cube edge", text)
+            Column("depth", (images, spec.height, spec.width), "float32", "cube edge", "camera",
+                   "planar depth; NaN on the background", own_chunk=True)
         )
+    # fmt: on
     return columns
 
 

@@ -14,13 +14,10 @@ from iqtt.files.layout import (
     truth_attributes,
     truth_columns,
 )
-from iqtt.files.reader import AnswersFile, QuestionsFile
-from iqtt.files.tables import NoImagesError, TableFile, table_parts
+from iqtt.files.reader import TableFile, open_tables
 from scenegen.common.errors import FileFormatError
 from scenegen.files.content import CONTENT_DIGEST, SHA256, seal
-from scenegen.files.input_file import checking
 from scenegen.files.row_file import new_file
-from scenegen.files.shards import opened_with_shards
 from scenegen.files.table import Table, extend_together, pack_rows
 from scenegen.layout import TRUTH_DIGEST
 
@@ -41,28 +38,18 @@ def merge_questions(
     Raises as `QuestionsFile` and `new_file`; SpecError for a released file; and FileFormatError
     where a value is not the one that was written to its shard. Nothing is then left.
     """
-    total, tables = 0, _tables(Path(path))
-    with new_file(out, overwrite) as file:
-        for kind, part in tables:
-            with kind(path, part) as table:
-                if table.spec is None:
-                    raise FileFormatError(path, "a released file", "one that iqtt make-split wrote")
-                if not file.attrs:
-                    names = [n for n in ROOT_TEXTS if n not in ("split", CONTENT_DIGEST)]
-                    told = {n: table.attributes[n] for n in names if n in table.attributes}
-                    file.attrs.update({**told, "split": table.split})
+    tables = open_tables(path)
+    with tables[0] as first:
+        if first.spec is None:
+            raise FileFormatError(path, "a released file", "one that iqtt make-split wrote")
+        with new_file(out, overwrite) as file:
+            names = [n for n in ROOT_TEXTS if n not in ("split", CONTENT_DIGEST)]
+            told = {n: first.attributes[n] for n in names if n in first.attributes}
+            file.attrs.update({**told, "split": first.split})
+            for table in tables:
                 _copy(table, file, progress)
-                total += len(table)
-        seal(file)
-    return total
-
-
-def _tables(path: Path) -> list[tuple[type[TableFile], str]]:
-    with opened_with_shards(path, "question file") as (file, _), checking(file):
-        try:
-            return [(QuestionsFile, part) for part in table_parts(file, path, "questions")]
-        except NoImagesError:
-            return [(AnswersFile, part) for part in table_parts(file, path, "answers")]
+            seal(file)
+        return sum(map(len, tables))
 
 
 def _copy(table: TableFile, file: h5py.File, progress: Callable[[int], Any]) -> None:
@@ -88,9 +75,10 @@ def _copy(table: TableFile, file: h5py.File, progress: Callable[[int], Any]) -> 
             packed.append(pack_rows(values, one.columns, compression))
         extend_together(written, packed)
         progress(rows.stop - rows.start)
+    told = table.stored_digests()
     for one in written:
         for name, dataset in one.datasets.items():
-            if dataset.attrs[SHA256] != table.stored_digest(name):
+            if dataset.attrs[SHA256] != told.get(name):
                 found = f"values of {name} that are not those which were written"
                 raise FileFormatError(table.path, found, "", "iqtt verify tells which")
     assert table.fingerprint is not None

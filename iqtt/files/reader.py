@@ -1,27 +1,56 @@
-"""Read question files, ours and the released 3D-IQTT v2: records by row, map-style dataset."""
+"""Read question files, ours and the released 3D-IQTT v2: records by row, map-style dataset.
 
-from collections.abc import Iterator, Sequence
+A training file holds two tables of questions, "labeled" and "unlabeled"; other files one, at the
+root, which is called "".
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Self
 
+import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.files.attributes import read_root
-from iqtt.files.layout import question_columns
-from iqtt.files.tables import TableFile, table_parts
-from iqtt.files.truth import QuestionTruth
+from iqtt.files.layout import (
+    FORMAT,
+    SCORED,
+    answer_column,
+    named,
+    question_columns,
+    truth_columns,
+)
+from iqtt.files.truth import QuestionTruth, question_truth
+from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.specs import IMAGE_DTYPES
-from scenegen.files import trial
+from scenegen.files.attributes import (
+    check_attribute,
+    read_digest,
+    read_names,
+    read_root,
+    read_text,
+)
 from scenegen.files.input_file import checking
-from scenegen.files.row_file import RowDataset
-from scenegen.files.shards import opened_with_shards
+from scenegen.files.rows import RowDataset, RowFile, describing
+from scenegen.files.shards import OpenFile
+from scenegen.layout import TRUTH_DIGEST
 from scenegen.rendering.ground_truth import decode_image
 
 Array = NDArray[Any]
+PARTS = ("labeled", "unlabeled")
 TOLERANCE = 0.01  # how far the images of released files may leave 0..1
+RELEASED_ANSWERS = 3  # of a question
+
+
+class NoImagesError(FileFormatError):
+    """The file holds answers but no images; these are in another file."""
+
+
+class NoAnswersError(FileFormatError):
+    """The file holds questions but no answers; these are in another file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,27 +83,177 @@ def open_questions(
     return QuestionsFile(path, part, answers)
 
 
+def open_tables(path: str | Path) -> "list[TableFile]":
+    """Open a file once for all its tables: those of questions, or else of answers without images.
+
+    Closing one table closes all. Raises as `QuestionsFile`.
+    """
+    opened = OpenFile(path, FORMAT.kind)
+    kind: type[TableFile] = QuestionsFile
+    with checking(opened.file):
+        try:
+            names = table_names(opened, kind.CONTENT)
+        except NoImagesError:
+            kind = AnswersFile
+            names = table_names(opened, kind.CONTENT)
+    return [kind(opened, name) for name in names]
+
+
 def parts(path: str | Path) -> tuple[str, ...]:
     """Return the tables of a file: "labeled" and "unlabeled", or "" for one at the root.
 
     Raises OSError, FileFormatError as `QuestionsFile`.
     """
-    with opened_with_shards(Path(path), "question file") as (file, _), checking(file):
-        read_root(file, Path(path))
-        return table_parts(file, Path(path), QuestionsFile.CONTENT)
+    with OpenFile(path, FORMAT.kind) as opened, checking(opened.file):
+        return table_names(opened, QuestionsFile.CONTENT)
+
+
+def holds_questions(opened: OpenFile) -> bool:
+    """Return whether an open file holds questions or their answers, ours or released ones.
+
+    Such a file can then be handed to `QuestionsFile`, and another one to `RoomsFile`.
+    """
+    with checking(opened.file):
+        kind = read_text(opened.file, "format", opened.path)
+        released = kind is None and any(name in opened.file for name in ("questions", *PARTS))
+        return released or kind == FORMAT.name
 
 
 def answers_beside(path: str | Path) -> Path | None:
-    """Return the file of answers beside a test file, such as iqtt-test-answers.h5, if any.
-
-    Raises FileFormatError as `trial.try_file`: nobody named this file.
-    """
+    """Return the file of answers beside a test file, such as iqtt-test-answers.h5, if any."""
     path = Path(path)
     beside = path.with_name(f"{path.stem}-answers{path.suffix}")
-    if not beside.is_file():
-        return None
-    trial.try_file(beside)
-    return beside
+    return beside if beside.is_file() else None
+
+
+class TableFile(RowFile):
+    """An open file and one of its tables. Use it as a context manager, or close it.
+
+    Attributes, besides those of `RowFile`:
+        part: which of its tables: "labeled" or "unlabeled", or "" for the only one.
+        tables: all of them.
+        spec: the settings it was made with, without the seed unless it is a file of answers; None
+            for a released file.
+        split: "train", "val" or "test"; None for a released file.
+        answers: how many answers a question has, 2 or 3.
+        fingerprint: SHA-256 of settings, shapes, views and answers of this table; None for a
+            released file.
+    """
+
+    CONTENT: ClassVar[str]  # the column that every table has
+    SCORED = SCORED
+
+    def __init__(self, path: str | Path | OpenFile, part: str | None = None) -> None:
+        """Open a file, or take an open one, and check the layout of one of its tables.
+
+        Raises:
+            OSError: no such file, or a folder.
+            FileFormatError: not HDF5, without such a table, of another format, or damaged.
+            SpecError: `part` is not given where there are two, or names none of them.
+        """
+        self.spec: SplitSpec | None = None
+        self.split: str | None = None
+        self.fingerprint: str | None = None
+        self._known_answers: Array | None = None
+        self._part = part
+        super().__init__(path if isinstance(path, OpenFile) else OpenFile(path, FORMAT.kind))
+
+    def _open_columns(self) -> None:
+        file = self.opened.file
+        if "format" in file.attrs:
+            self.attributes = read_root(file, self.path, FORMAT)
+            self.split = self.attributes["split"]
+            with describing(f"{self.path}: attribute 'spec'"):
+                self.spec = SplitSpec.from_json(self.attributes["spec"])
+        self.answers = self.spec.answers if self.spec else RELEASED_ANSWERS
+        self.tables = table_names(self.opened, self.CONTENT)
+        self.part = self._chosen(self._part)
+        self._count_rows(self._named(self.CONTENT))
+        self._open_images()
+        if self._named("answers") in file:
+            self._take_answers()
+        home = f"truth/{self.part}".rstrip("/")
+        if self.spec is None:
+            return
+        if home in file:
+            self._take(home, truth_columns(self.spec))
+            place = f"{self.path}: {home}/distractor_kind"
+            kinds = read_names(self._stored["distractor_kind"].dataset, "names", place)
+            check_attribute(
+                place, "names", kinds, kinds == list(DISTRACTOR_KINDS), ", ".join(DISTRACTOR_KINDS)
+            )
+        self.fingerprint = read_text(file, named("fingerprint", self.part), self.path, needed=True)
+        digest = named(TRUTH_DIGEST, self.part)
+        self.stored_truth_digest = read_digest(file, digest, self.path, self.has_answers)
+
+    def _named(self, name: str) -> str:
+        """Return the name of a data set of this table in its file."""
+        return f"{self.part}/{name}".lstrip("/")
+
+    def _chosen(self, part: str | None) -> str:
+        if part is None and len(self.tables) == 1:
+            return self.tables[0]
+        if part is None or part not in self.tables:
+            expected = " or ".join(self.tables) or "none, as there is one table only"
+            raise SpecError(f"{self.path}: part", part or "none", expected)
+        return part
+
+    def _open_images(self) -> None:
+        """Take the images, if these are the file's content."""
+
+    def _take_answers(self) -> None:
+        """Read all answers, of any type of integers, and check them."""
+        stored = self._stored["answers"] = self.opened.array(self._named("answers"))
+        if stored.shape not in ((len(self),), (len(self), 1)) or stored.dtype.kind not in "iu":
+            found = f"shape {stored.shape}, type {stored.dtype}"
+            expected = f"shape ({len(self)},), whole numbers"
+            raise FileFormatError(f"{self.path}: answers", found, expected)
+        answers = stored[()].reshape(-1)
+        wrong = np.flatnonzero((answers < 0) | (answers >= self.answers))
+        if len(wrong):
+            place, expected = self.place("answers", int(wrong[0])), f"0 to {self.answers - 1}"
+            raise FileFormatError(place, answers[wrong[0]], expected)
+        self._known_answers = answers.astype(np.uint8)
+        if self.spec is not None:
+            self._schema["answers"] = self.opened.file[self.part or "/"], answer_column()
+
+    @property
+    def has_answers(self) -> bool:
+        """Whether the file tells which answers are right."""
+        return self._known_answers is not None
+
+    @property
+    def has_truth(self) -> bool:
+        """Whether the file tells shapes, views and lights."""
+        return "cubes" in self._stored
+
+    def table(self, part: str) -> Self:
+        """Return another table of the same open file; raises as when one is opened."""
+        return type(self)(self.opened, part)
+
+    def read(self, name: str, rows: int | slice) -> Any:
+        """Read rows of one column, such as "questions", "answers" or "cubes", as `RowFile.read`.
+
+        Answers come as uint8, whatever integers the file has.
+        """
+        if name == "answers" and self._known_answers is not None:
+            return self._known_answers[rows]
+        return super().read(name, rows)
+
+    def truth(self, row: int) -> QuestionTruth | None:
+        """Return what the file tells of one question beside images and answer; None if nothing.
+
+        Raises as `read`.
+        """
+        if not self.has_truth:
+            return None
+        assert self.spec is not None  # truth is read only where there is one
+        names = (name for name in self.fields if name not in ("questions", "answers"))
+        return question_truth({name: self.read(name, row) for name in names}, self.spec)
+
+    def reopener(self) -> Callable[[], "TableFile"]:
+        """Return a function, which can be pickled, that opens the same table again."""
+        return partial(type(self), self.path, self.part)
 
 
 class AnswersFile(TableFile):
@@ -82,14 +261,11 @@ class AnswersFile(TableFile):
 
     CONTENT = "answers"
 
-    def _open_content(self) -> int:
-        return self._take_answers()
-
 
 class QuestionsFile(TableFile):
     """An open question file: a sequence of `QuestionRecord`s.
 
-    Attributes:
+    Attributes, besides those of `TableFile`:
         height, width: size of an image, pixels.
         image_dtype: "uint8", "float16" or "float32".
         beside: the file with the answers, if it is another one.
@@ -98,9 +274,12 @@ class QuestionsFile(TableFile):
     CONTENT = "questions"
 
     def __init__(
-        self, path: str | Path, part: str | None = None, answers: str | Path | None = None
+        self,
+        path: str | Path | OpenFile,
+        part: str | None = None,
+        answers: str | Path | None = None,
     ) -> None:
-        """Open a question file and check the layout of one of its tables.
+        """Open a question file, or take an open one, and check the layout of one of its tables.
 
         Args:
             path: a file of ours, or a released one.
@@ -109,7 +288,7 @@ class QuestionsFile(TableFile):
 
         Raises:
             OSError: no such file, or a folder.
-            FileFormatError: not HDF5, not a question file, of a newer format, or damaged; or the
+            FileFormatError: not HDF5, not a question file, of another format, or damaged; or the
                 answers belong to another file.
             SpecError: `part` is not given where there are two, or names none of them; or `answers`
                 is given for a file that has its own.
@@ -136,43 +315,41 @@ class QuestionsFile(TableFile):
     def __iter__(self) -> Iterator[QuestionRecord]:
         return (self[i] for i in range(len(self)))
 
+    def reopener(self) -> Callable[[], "QuestionsFile"]:
+        """Return a function, which can be pickled, that opens the same table again."""
+        answers = None if self.beside is None else self.beside.path
+        return partial(QuestionsFile, self.path, self.part, answers)
+
     def close(self) -> None:
         """Close the file, and the file of its answers; idempotent."""
         super().close()
         if self.beside is not None:
             self.beside.close()
 
-    def _open_content(self) -> int:
-        images = self._datasets["questions"] = self._dataset("questions")
-        shape: tuple[int, ...] = images.shape or ()
-        kind = str(images.dtype.name)
-        kinds: tuple[str, ...] = IMAGE_DTYPES
-        expected = "(Q, 4, H, W, 3)"
-        good = len(shape) == 5 and shape[1] == 4 and shape[4] == 3 and min(shape[2:4]) > 0
+    def _open_images(self) -> None:
         if self.spec is not None:
-            (column,) = question_columns(self.spec)
-            expected, kinds = f"(Q, {', '.join(map(str, column.shape))})", (column.dtype,)
-            good = shape[1:] == column.shape
-        if not good:
-            raise FileFormatError(f"{self.path}: questions", f"shape {shape}", expected)
-        if kind not in kinds:
-            raise FileFormatError(f"{self.path}: questions", f"type {kind}", " or ".join(kinds))
-        self.height, self.width = shape[2:4]
-        self.image_dtype = kind
-        if self.spec is None and kind != "uint8" and shape[0]:
-            self._check_range()
-        if f"{self.part}/answers" in self._file:
-            self._take_answers(shape[0])
-        return shape[0]
+            self._take(self.part, question_columns(self.spec))
+        else:
+            self._take_released_images()
+        images = self._stored["questions"]
+        self.height, self.width = images.shape[2:4]
+        self.image_dtype = str(images.dtype.name)
 
-    def _check_range(self) -> None:
-        """Refuse floating-point images with values from 0 to 255; the first row is looked at."""
-        first = self.read("questions", 0)
-        low, high = first.min(), first.max()
-        if not (low >= -TOLERANCE and high <= 1 + TOLERANCE):  # so NaN is refused too
-            raise FileFormatError(
-                self.place("questions", 0), f"values from {low:g} to {high:g}", "0 to 1"
-            )
+    def _take_released_images(self) -> None:
+        """Take images of any size; floating-point ones have radiance from 0 to 1."""
+        images = self._stored["questions"] = self.opened.array(self._named("questions"))
+        shape, kind = images.shape, str(images.dtype.name)
+        place, answers = f"{self.path}: questions", 1 + RELEASED_ANSWERS
+        if len(shape) != 5 or (shape[1], shape[4]) != (answers, 3) or min(shape[2:4]) == 0:
+            raise FileFormatError(place, f"shape {shape}", f"(Q, {answers}, H, W, 3)")
+        if kind not in IMAGE_DTYPES:
+            raise FileFormatError(place, f"type {kind}", " or ".join(IMAGE_DTYPES))
+        if kind != "uint8" and len(self):
+            first = self.read("questions", 0)
+            low, high = first.min(), first.max()
+            if not (low >= -TOLERANCE and high <= 1 + TOLERANCE):  # so NaN is refused too
+                found = f"values from {low:g} to {high:g}"
+                raise FileFormatError(self.place("questions", 0), found, "0 to 1")
 
     def _join(self, answers: str | Path) -> None:
         """Add answers and truth of another file, if they belong to the questions of this one."""
@@ -182,9 +359,9 @@ class QuestionsFile(TableFile):
         if (len(beside), beside.fingerprint) != (len(self), self.fingerprint):
             expected = f"{_identity(self)}, as in {self.path}"
             raise FileFormatError(f"{answers}: answers", _identity(beside), expected)
-        self._datasets |= beside._datasets
         self._stored |= beside._stored
-        self._ranges, self.kind_names = beside._ranges, beside.kind_names
+        self._schema |= beside._schema
+        self._known_answers = beside._known_answers
         self.stored_truth_digest = beside.stored_truth_digest
 
 
@@ -193,27 +370,49 @@ class QuestionsDataset(RowDataset):
 
     def __init__(
         self,
-        path: str | Path,
+        questions: str | Path | QuestionsFile,
         part: str | None = None,
         fields: Sequence[str] | None = None,
         answers: str | Path | None = None,
     ) -> None:
-        """Check the file once.
+        """Check the file once, or take one that is open, with its part and answers.
 
         Args:
-            path, part, answers: as for `QuestionsFile`.
+            questions, part, answers: as for `QuestionsFile`.
             fields: what an item has: "questions", "answers", or a dataset of the truth such as
                 "cubes"; by default the questions, and the answers if there are any.
 
         Raises as `QuestionsFile`, and SpecError for an unknown field.
         """
-        opener = partial(QuestionsFile, Path(path), part, answers)
-        with opener() as file:
+        if isinstance(questions, QuestionsFile):
+            opened: AbstractContextManager[QuestionsFile] = nullcontext(questions)
+        else:
+            opened = QuestionsFile(questions, part, answers)
+        with opened as file:
             default = ("questions", "answers") if file.has_answers else ("questions",)
-            super().__init__(opener, len(file), default if fields is None else fields)
-            for name in self.fields:
-                file.check_field(name)
+            super().__init__(file, default if fields is None else fields)
             self.spec, self.fingerprint = file.spec, file.fingerprint
+
+
+def table_names(opened: OpenFile, content: str) -> tuple[str, ...]:
+    """Return the tables of a file that hold a column; ("",) if it is at the root.
+
+    Raises FileFormatError where there is none; its hint says what to open instead.
+    """
+    file, path = opened.file, opened.path
+    names = tuple(part for part in PARTS if f"{part}/{content}" in file)
+    if names or content in file:
+        return names or ("",)
+    if content == "questions" and any(name in file for name in ("answers", "labeled/answers")):
+        images = path.name.replace("-answers", "")
+        what = images if images != path.name else "the file of questions"
+        hint = f"open {what} instead, with this file for answers"
+        raise NoImagesError(path, "answers but no images", "questions", hint)
+    if content == "answers" and "questions" in file:
+        hint = "ask those who made the questions for the file of answers"
+        raise NoAnswersError(path, "questions but no answers", "answers", hint)
+    expected = f"a dataset {content!r}, 'labeled/{content}' or 'unlabeled/{content}'"
+    raise FileFormatError(path, "no question file", expected)
 
 
 def _identity(file: TableFile) -> str:

@@ -1,12 +1,12 @@
 """What a question file tells of one question, as a record: shapes, views, lights, answers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from numpy.typing import NDArray
 
-from iqtt.questions.specs import SplitSpec
+from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec
 from scenegen.camera import Camera
 
 Array = NDArray[Any]
@@ -44,9 +44,7 @@ class QuestionTruth:
     depth: Array | None
 
 
-def question_truth(
-    values: Mapping[str, Any], kind_names: Sequence[str], spec: SplitSpec
-) -> QuestionTruth:
+def question_truth(values: Mapping[str, Any], spec: SplitSpec) -> QuestionTruth:
     """Return the record of one row of `layout.truth_columns`, without the padding."""
     cubes = int(values["cube_count"])
 
@@ -63,7 +61,7 @@ def question_truth(
         light_position=per_image("light_position"),
         light_color=per_image("light_color"),
         distractor_kind=tuple(
-            None if kind < 0 else kind_names[kind] for kind in values["distractor_kind"]
+            None if kind < 0 else DISTRACTOR_KINDS[kind] for kind in values["distractor_kind"]
         ),
         angle_degrees=float(values["angle_degrees"]),
         visible_pixels=values["visible_pixels"][:, :cubes],

@@ -2,25 +2,28 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from iqtt.files.layout import FORMAT_VERSION
-from iqtt.files.reader import AnswersFile, QuestionsFile, parts
-from iqtt.files.shards import ALL_FILES, ANSWERS, FILES, MANIFEST
-from iqtt.files.tables import TableFile
+from iqtt.files.reader import QuestionsFile, open_tables
+from iqtt.files.shards import ALL_FILES, FILES, MANIFEST
 from iqtt.questions.distractors import make_pools
 from iqtt.questions.specs import SPLITS, SplitSpec
 from iqtt.render import groups, render_question
 from scenegen.common.errors import FileFormatError
-from scenegen.files.manifest import Manifest, read_manifest, wrong_files
-from scenegen.files.row_file import digest_problems
-from scenegen.files.shards import opened_with_shards, stored_array
+from scenegen.files.manifest import Manifest, read_manifest
+from scenegen.files.rows import content_problems
+from scenegen.files.verify import (
+    Check,
+    listed_check,
+    made_elsewhere,
+    manifest_checks,
+    spread_rows,
+)
 from scenegen.rendering.backend import select_variant, versions
-from scenegen.rooms.verify import Check, listed_check
 
 
 def verify_split(
@@ -48,12 +51,20 @@ def verify_split(
         checks += _against_manifest(folder, read_manifest(folder / MANIFEST), progress)
         if not all(check.ok for check in checks):
             return checks
-    for name in names:
-        with opened_with_shards(folder / name, "question file") as (file, shards):
-            opened = partial(stored_array, shards=shards)
-            problems = digest_problems(file, {}, opened)
+    told: dict[str, str] = {}
+    spec: SplitSpec | None = None
+    for name in names:  # the file of answers, which may tell the seed, comes after the others
+        tables = open_tables(folder / name)
+        with tables[0]:
+            problems = [problem for table in tables for problem in table.problems()]
+            problems += content_problems(tables[0].opened, {})
+            told, spec = tables[0].attributes, tables[0].spec
         checks.append(listed_check(name, "every value and attribute, by SHA-256", problems))
-    return [*checks, _made_again(folder, items, device, seed)]
+        if spec is None:
+            raise FileFormatError(folder / name, "a released file", "one of iqtt make-split")
+    assert spec is not None
+    again = spec if seed is None else replace(spec, seed=seed)
+    return [*checks, _made_again(folder, again, told, items, device)]
 
 
 def _against_manifest(
@@ -62,13 +73,9 @@ def _against_manifest(
     if set(manifest.files) != set(ALL_FILES):
         found = ", ".join(manifest.files)
         raise FileFormatError(folder / MANIFEST, found[:80], "the files of a split")
-    told = "every file is complete"
-    whole = [] if manifest.complete else ["the split is not complete"]
-    wrong = wrong_files(folder, manifest, progress)
     gaps = [problem for name in manifest.files for problem in _gaps(manifest, name)]
     return [
-        listed_check("manifest", told, whole),
-        listed_check("checksums", f"SHA-256 of {len(manifest.shards)} files", wrong),
+        *manifest_checks(folder, manifest, progress),
         listed_check("rows", f"each of {manifest.count} questions once", gaps),
     ]
 
@@ -87,37 +94,26 @@ def _gaps(manifest: Manifest, name: str) -> Iterator[str]:
         yield f"{name} has {following} questions, not {expected}"
 
 
-def _any_table(folder: Path) -> TableFile:
-    """Open a table of a split: that of the answers to the test, which may tell the seed, if any."""
-    names = [name for split in ("test", "train", "val") for name in reversed(FILES[split])]
-    path = next(folder / name for name in names if (folder / name).is_file())
-    return AnswersFile(path) if path.name == ANSWERS else QuestionsFile(path, parts(path)[0])
-
-
-def _made_again(folder: Path, items: int, device: str, seed: int | None) -> Check:
-    """Make some questions of each file again, with the seed of the file of answers."""
+def _made_again(
+    folder: Path, spec: SplitSpec, told: dict[str, str], items: int, device: str
+) -> Check:
+    """Make some questions of each file again; `told` are the texts of a file of the split."""
     title = "made again from the seed"
-    answers = folder / FILES["test"][-1]
-    with _any_table(folder) as table:
-        told, spec = table.attributes, table.spec
-    assert spec is not None  # files of ours tell it
-    if seed is not None:
-        spec = replace(spec, seed=seed)
     if spec == spec.public():
         return Check(title, True, "not checked: the files do not tell the seed")
     here = {"variant": select_variant(device), "format_version": FORMAT_VERSION, **versions()}
-    others = [f"{x} {told.get(x)}, here {here[x]}" for x in here if told.get(x) != here[x]]
+    others = made_elsewhere(told, here)
     if others:
         return Check(title, True, f"not checked: {'; '.join(others)}")
     pools, wrong, count = make_pools(spec), [], 0
     for split in SPLITS:
-        path = folder / FILES[split][0]
+        path, answers = folder / FILES[split][0], folder / FILES[split][-1]
         for part, (first, rows) in groups(spec, split).items() if path.is_file() else ():
-            beside = answers if split == "test" and answers.is_file() else None
+            beside = answers if answers != path and answers.is_file() else None
             with QuestionsFile(path, part, beside) as questions:
-                for row in np.unique(np.linspace(0, rows - 1, min(items, rows)).astype(int)):
-                    again = render_question(spec, pools, split, first + int(row), device)
-                    stored, count = questions[int(row)], count + 1
+                for row in spread_rows(rows, items):
+                    again = render_question(spec, pools, split, first + row, device)
+                    stored, count = questions[row], count + 1
                     same = np.array_equal(stored.images, again.images)
                     if stored.truth is not None:
                         cubes = again.question.shapes.cubes

@@ -23,8 +23,9 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.render import Rendered
 from iqtt.shapes.polycube import canonical, canonical_class, set_ids
 from scenegen.files.content import SHA256, joint_digest
+from scenegen.files.schema import Column
 from scenegen.files.shards import write_row_digests
-from scenegen.files.table import Column, PackedRows, Rows, Table, extend_together, pack_rows
+from scenegen.files.table import PackedRows, Rows, Table, extend_together, pack_rows
 from scenegen.layout import TRUTH_DIGEST
 
 OF_QUESTION = (

@@ -9,8 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from iqtt.files.reader import QuestionsFile, answers_beside
-from iqtt.files.tables import NoAnswersError
+from iqtt.files.reader import NoAnswersError, QuestionsFile, answers_beside
 from iqtt.questions.specs import question_kind
 from iqtt.quiz.draw import Cell, cells_of, draw_rows
 from iqtt.quiz.pictures import KeptPictures, png
@@ -224,9 +223,6 @@ class Study:
         spec = self.pool.file.spec
         if beside == path or not beside.is_file() or spec is None:
             return None
-        from scenegen.files import trial
-
-        trial.try_file(beside)
         with QuestionsFile(beside) as file:
             same = file.spec is not None and file.spec.public() == spec.public()
             enough = file.has_answers and len(file) >= calibrations > 0

@@ -10,7 +10,7 @@ import numpy as np
 
 from iqtt.files.layout import answer_column, truth_columns
 from iqtt.files.reader import QuestionsFile
-from scenegen.files.table import Column
+from scenegen.files.schema import Column
 from scenegen.sharing.columns import row_column
 from scenegen.sharing.folder import ROWS_PER_FILE, ExportedTable, write_folder
 
@@ -63,15 +63,21 @@ def exported_columns(questions: QuestionsFile) -> list[Column]:
     """Return the columns: `row`, each image, the right answer and the truth, as far as told."""
     kind = questions.image_dtype
     shape = (questions.height, questions.width, 3)
-    told = {
-        "unit": "linear radiance, times `scale`",
-        "frame": "pixels: row 0 on top",
-        "scale": 1 / 255 if kind == "uint8" else 1.0,
-    }
+    unit, frame = "linear radiance, times `scale`", "pixels: row 0 on top"
+    scale = {"scale": 1 / 255 if kind == "uint8" else 1.0}
     columns = [
         ROW,
         *(
-            Column(name, shape, kind, True, {**told, "meaning": f"{name.replace('_', ' ')}; RGB"})
+            Column(
+                name,
+                shape,
+                kind,
+                unit,
+                frame,
+                f"{name.replace('_', ' ')}; RGB",
+                own_chunk=True,
+                more=scale,
+            )
             for name in image_names(questions.answers)
         ),
     ]
@@ -79,11 +85,7 @@ def exported_columns(questions: QuestionsFile) -> list[Column]:
         columns.append(replace(answer_column(), name="answer"))
     if questions.has_truth:
         assert questions.spec is not None  # truth is read only where there is one
-        for column in truth_columns(questions.spec):
-            told = dict(column.attributes)
-            if column.name == "distractor_kind":
-                told["names"] = questions.kind_names
-            columns.append(replace(column, attributes=told))
+        columns += truth_columns(questions.spec)
     return columns
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from iqtt.files.reader import QuestionsFile
+from iqtt.questions.specs import DISTRACTOR_KINDS
 from iqtt.sharing.published import PublishedTable
 from scenegen.common.errors import FileFormatError
 from scenegen.files.content import ColumnDigest, row_digest
@@ -135,8 +136,9 @@ def _lines(table: PublishedTable, questions: QuestionsFile) -> Iterator[dict[str
                 **_told(questions, {name: values[place] for name, values in block.items()}),
                 "questions_sha256": digests[place].hex(),
             }
+    told = questions.stored_digests()
     for name, digest in found.items():
-        if questions.stored_digest(name) not in (None, digest.hex):
+        if told.get(name) not in (None, digest.hex):
             wrong = f"values of {name} that are not those which were written"
             raise FileFormatError(table.path, wrong, "", "iqtt verify tells which")
 
@@ -148,7 +150,7 @@ def _told(questions: QuestionsFile, values: dict[str, Any]) -> dict[str, Any]:
     )
     told |= {"answer": int(values["answers"])} if questions.has_answers else {}
     if questions.has_truth:
-        kinds = [questions.kind_names[kind] for kind in values["distractor_kind"] if kind >= 0]
+        kinds = [DISTRACTOR_KINDS[kind] for kind in values["distractor_kind"] if kind >= 0]
         told |= {
             "cube_count": int(values["cube_count"]),
             "camera_distance": float(values["camera_distance"]),

@@ -9,8 +9,7 @@ from iqtt.questions.specs import SPLITS, SplitSpec
 from iqtt.sharing.withheld import check_withheld
 from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
-from scenegen.files import trial
-from scenegen.files.shards import opened_with_shards
+from scenegen.files.shards import OpenFile
 
 
 @dataclass(frozen=True)
@@ -103,20 +102,15 @@ def published_split(folder: str | Path, with_answers: bool = False) -> Published
 
 
 def _pieces_listed(path: Path, meaning: str) -> list[tuple[Path, str]]:
-    """Return a file and, if it shows shards as one, these; each is tried before it is opened."""
-    trial.try_file(path)
-    with opened_with_shards(path, "question file") as (_, shards):
-        names = [shard.file for shard in shards.shards] if shards else []
-    for name in names:
-        trial.try_file(path.with_name(name))
+    """Return a file and, if it shows shards as one, these."""
+    with OpenFile(path, "question file") as opened:
+        names = [shard.file for shard in opened.shards]
     listed = [(path.with_name(name), f"shard of {path.name}") for name in names]
     return [(path, f"{meaning}; shows its shards as one file" if names else meaning), *listed]
 
 
 def _tables(path: Path, split: str, answers: Path | None) -> list[PublishedTable]:
     tables = []
-    with opened_with_shards(path, "question file") as (_, shards):
-        listed = shards.shards if shards else ()
     for part in parts(path):
         with QuestionsFile(path, part, answers) as table:
             expected = "one that iqtt make-split wrote"
@@ -124,9 +118,8 @@ def _tables(path: Path, split: str, answers: Path | None) -> list[PublishedTable
                 raise FileFormatError(path, "a released file", expected)
             if table.split != split:
                 raise FileFormatError(path, f"questions for {table.split}", split)
-            pieces = tuple((shard.file, shard.rows) for shard in listed if shard.part == part)
-            whole = ((path.name, len(table)),)
-            one = PublishedTable(path, split, part, answers, len(table), pieces or whole)
+            pieces = tuple((piece.name, rows) for piece, rows in table.parts)
+            one = PublishedTable(path, split, part, answers, len(table), pieces)
         check(
             sum(rows for _, rows in one.pieces) == one.count,
             one.name,

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import h5py
 
-from iqtt.files.attributes import read_root
-from iqtt.files.layout import ROOT_TEXTS, named
+from iqtt.files.layout import FORMAT, ROOT_TEXTS, named
+from iqtt.questions.specs import SplitSpec
 from scenegen.common.errors import SpecError
-from scenegen.files.attributes import read_names
+from scenegen.files.attributes import read_names, read_root
 from scenegen.files.content import SHA256
 from scenegen.files.input_file import checking
-from scenegen.files.row_file import and_more
-from scenegen.files.shards import ROW_DIGESTS, SHARDS, opened_with_shards
+from scenegen.files.rows import and_more, describing
+from scenegen.files.shards import ROW_DIGESTS, SHARDS, OpenFile
 
 COMMAND = "creation_command"  # which may name the seed
 DATA = {"questions", SHARDS, ROW_DIGESTS}  # of a file of test questions
@@ -30,9 +30,11 @@ def check_withheld(path: Path, is_test: bool) -> None:
 
     Raises SpecError; OSError and FileFormatError as `QuestionsFile`.
     """
-    with opened_with_shards(path, "question file") as (file, _), checking(file):
-        _, spec, _ = read_root(file, path)
-        found = ["the seed"] if spec is not None and spec.seed is not None else []
+    with OpenFile(path, FORMAT.kind) as opened, checking(opened.file):
+        file = opened.file
+        with describing(f"{path}: attribute 'spec'"):
+            spec = SplitSpec.from_json(read_root(file, path, FORMAT)["spec"])
+        found = ["the seed"] if spec.seed is not None else []
         found += ["the command that made it"] if COMMAND in file.attrs else []
         found += _beside_images(file, path) if is_test else []
     if found:

@@ -42,7 +42,7 @@ def rooms_digest(truth: RoomsFile, scored: Mapping[int, RowDigests]) -> str:
             )
         else:
             columns[name] = dataset_digest(truth.read(name, slice(None)))
-    return _checked(truth.path, columns, truth.stored_truth_digest(), truth.stored_digests())
+    return _checked(truth.path, columns, truth.stored_truth_digest, truth.stored_digests())
 
 
 def answers_digest(truth: "AnswersFile", columns: Mapping[str, NDArray[Any]]) -> str:
@@ -51,8 +51,7 @@ def answers_digest(truth: "AnswersFile", columns: Mapping[str, NDArray[Any]]) ->
     Raises ScoringError where it is not the one that was written with the file.
     """
     found = {name: dataset_digest(rows) for name, rows in columns.items()}
-    own = {name: truth.stored_digest(name) for name in columns}
-    told = {name: digest for name, digest in own.items() if digest is not None}
+    told = {name: digest for name, digest in truth.stored_digests().items() if name in columns}
     return _checked(truth.path, found, truth.stored_truth_digest, told)
 
 

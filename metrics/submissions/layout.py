@@ -6,7 +6,7 @@ from typing import Any, get_args
 
 from metrics.measures.answers import CANDIDATES
 from metrics.measures.depth import Alignment
-from scenegen.files.table import Column
+from scenegen.files.schema import Column
 
 FORMAT_NAME = "pix2shape-bench/predictions"
 FORMAT_VERSION = "1.1"
@@ -68,7 +68,11 @@ class Dataset:
         """Return the column that our writer stores for images of this size."""
         sizes: dict[str | int, int] = {"H": height, "W": width}
         shape = tuple(sizes[s] if isinstance(s, str) else s for s in self.shape)
-        return Column(self.name, shape, self.dtype, len(shape) > 1, self.attributes)
+        more = {"shape": self.shown_shape}
+        return Column(
+            self.name, shape, self.dtype, self.unit, self.frame, self.meaning,
+            own_chunk=len(shape) > 1, more=more,
+        )  # fmt: skip
 
     @property
     def attributes(self) -> dict[str, Any]:

@@ -139,8 +139,7 @@ class _Tally:
 
 
 def _against_questions(predictions: QuestionPredictions, truth_path: Path) -> list[Problem]:
-    from iqtt.files.reader import AnswersFile, QuestionsFile
-    from iqtt.files.tables import NoAnswersError
+    from iqtt.files.reader import AnswersFile, NoAnswersError, QuestionsFile
 
     try:
         truth_file: AnswersFile | QuestionsFile = AnswersFile(truth_path)

@@ -237,8 +237,7 @@ def _checked_answers(
 
 def _questions(path: str | Path) -> tuple[int, int, str]:
     """Return how many questions a file holds, how many answers each offers, and its fingerprint."""
-    from iqtt.files.reader import AnswersFile, QuestionsFile
-    from iqtt.files.tables import NoImagesError
+    from iqtt.files.reader import AnswersFile, NoImagesError, QuestionsFile
 
     try:
         with QuestionsFile(path) as questions:

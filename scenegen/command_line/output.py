@@ -1,6 +1,6 @@
 """What commands show: lines, progress, and the notes of a scheduler."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +11,22 @@ from scenegen.common.text_table import printable
 
 if TYPE_CHECKING:
     from scenegen.files.cluster import Cluster, Versions
+    from scenegen.files.verify import Check
 
 
 def print_line(text: str, err: bool = False) -> None:
     """Print one line, whatever names from files it holds."""
     click.echo(printable(text), err=err)
+
+
+def print_checks(what: str, checks: "Sequence[Check]") -> int:
+    """Print the outcome of checks of a file or folder; return the exit code."""
+    for check in checks:
+        print_line(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:26} {check.detail}")
+    failed = sum(not check.ok for check in checks)
+    outcome = f"{failed} of {len(checks)} checks failed" if failed else "verified"
+    print_line(f"{what}: {outcome}")
+    return 1 if failed else 0
 
 
 def progress_bar(count: int | None, unit: str) -> Any:

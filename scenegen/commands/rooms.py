@@ -12,7 +12,7 @@ import click
 
 from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import DEVICE, MESHES, OVERWRITE, Items
-from scenegen.command_line.output import print_line, progress_bar
+from scenegen.command_line.output import print_checks, print_line, progress_bar
 from scenegen.command_line.paths import (
     InputPath,
     OutputFolder,
@@ -44,7 +44,8 @@ def preview(
     overwrite: bool,
 ) -> None:
     """Write a picture of some rooms of a file: image, depth, normals and object ids."""
-    from scenegen.rooms.preview import contact_sheet, pick_rows, save_picture
+    from scenegen.files.pictures import pick_rows, save_picture
+    from scenegen.rooms.preview import contact_sheet
     from scenegen.rooms.reader import RoomsFile
 
     with RoomsFile(file) as rooms:
@@ -82,27 +83,23 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     Rows rendered again must agree bit for bit, or within a stated tolerance where the file was
     rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.
     """
-    from scenegen.files.manifest import manifests_in
+    from scenegen.files.manifest import Manifest, manifests_in
+    from scenegen.files.verify import Check
     from scenegen.layout import FORMAT_NAME
     from scenegen.objects.sources import file_objects
     from scenegen.rooms.reader import RoomsFile
     from scenegen.rooms.verify import verify_file, verify_set
 
-    manifests = manifests_in(Path(file), FORMAT_NAME) if Path(file).is_dir() else []
-    checks = []
-    for path in [place.with_name(found.files[0]) for place, found in manifests] or [Path(file)]:
-        with RoomsFile(path) as rooms:
-            count = len(rooms)
-            objects = file_objects(rooms.spec, **meshes)
-        with progress_bar(count, "image") as bar:
-            check_all = verify_set if manifests else verify_file
-            checks += check_all(path, items, device, objects, bar.update)
-    for check in checks:
-        print_line(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:26} {check.detail}")
-    failed = sum(not check.ok for check in checks)
-    outcome = f"{failed} of {len(checks)} checks failed" if failed else "verified"
-    print_line(f"{file}: {outcome}")
-    ctx.exit(1 if failed else 0)
+    paths: list[tuple[Path, Manifest | None]] = [(Path(file), None)]
+    if Path(file).is_dir():
+        sets = manifests_in(Path(file), FORMAT_NAME)
+        paths = [(place.with_name(manifest.files[0]), manifest) for place, manifest in sets]
+    checks: list[Check] = []
+    for path, manifest in paths:
+        with RoomsFile(path) as rooms, progress_bar(len(rooms), "image") as bar:
+            how = (file_objects(rooms.spec, **meshes), items, device, bar.update)
+            checks += verify_set(rooms, manifest, *how) if manifest else verify_file(rooms, *how)
+    ctx.exit(print_checks(file, checks))
 
 
 @click.command(
@@ -189,10 +186,10 @@ def _export_single(
     """Write each row to files of its own."""
     from scenegen.common.errors import SpecError
     from scenegen.files.new_file import check_writable
+    from scenegen.files.pictures import pick_rows
     from scenegen.objects.catalogue import changed_meshes
     from scenegen.objects.sources import file_objects, mesh_folder
     from scenegen.rooms.export import export_paths, export_room
-    from scenegen.rooms.preview import pick_rows
     from scenegen.rooms.reader import RoomsFile
 
     mesh_folder(meshes["shapenet_root"], meshes["objects_root"], meshes["up"])

@@ -1,23 +1,42 @@
 """Attributes of HDF5 files: the kind and size of each are checked before it is read."""
 
 import re
-from collections.abc import Iterable
 from typing import Any
 
 import h5py
 
 from scenegen.common.errors import FileFormatError
 from scenegen.common.records import LONGEST_JSON
+from scenegen.files.schema import DIGEST, Format
 
 LONGEST = 1_000  # characters of a text, but for these:
 LONGER = ("spec", "creation_command")
 MOST_NAMES = 100  # in a list
 
 
-def read_texts(item: Any, names: Iterable[str], place: object) -> dict[str, str]:
-    """Return the attributes that are there, each of which holds a text. Raises as `read_text`."""
-    found = {name: read_text(item, name, place) for name in names}
-    return {name: text for name, text in found.items() if text is not None}
+def read_root(file: h5py.File, place: object, kind: Format) -> dict[str, str]:
+    """Return the texts at the root of a file that has a format.
+
+    Raises FileFormatError for a file of another kind or major version, and where a text is missing
+    or cannot be true of any file. Other attributes are not read.
+    """
+    name = read_text(file, "format", place)
+    if name != kind.name:
+        found = "no attribute 'format'" if name is None else f"format {name!r:.60}"
+        raise FileFormatError(f"{place}: not a {kind.kind}", found, repr(kind.name))
+    version = read_text(file, "format_version", place, needed=True)
+    major = kind.version.partition(".")[0]
+    if not re.fullmatch(rf"{major}\.\d+", str(version)):
+        where = f"{place}: this release reads format version {major}.x, and the file has {version}"
+        raise FileFormatError(where, hint="read it with the release that wrote it")
+    texts = {"format": name, "format_version": str(version)}
+    for key, pattern in kind.texts.items():
+        text = read_text(file, key, place, key not in kind.optional)
+        if text is not None:
+            good = re.fullmatch(pattern, text, re.DOTALL) is not None
+            check_attribute(place, key, text, good, f"a text that matches {pattern:.60}")
+            texts[key] = text
+    return texts
 
 
 def read_text(item: Any, name: str, place: object, needed: bool = False) -> str | None:
@@ -40,7 +59,7 @@ def read_text(item: Any, name: str, place: object, needed: bool = False) -> str 
 def read_digest(item: Any, name: str, place: object, needed: bool = False) -> str | None:
     """Return an attribute that holds a SHA-256, as hex. Raises as `read_text`."""
     text = read_text(item, name, place, needed)
-    good = text is None or re.fullmatch("[0-9a-f]{64}", text) is not None
+    good = text is None or re.fullmatch(DIGEST, text) is not None
     check_attribute(place, name, text, good, "64 hexadecimal digits")
     return text
 

@@ -263,6 +263,10 @@ class StoredArray:
     def __len__(self) -> int:
         return int(self.shape[0])
 
+    def pieces(self) -> Iterator[h5py.Dataset]:
+        """Yield the data set that holds the values."""
+        yield self.dataset
+
     def __getitem__(self, rows: int | slice | tuple[()]) -> Any:
         """Return one row, some, or all for (). Raises IndexError, and as HDF5 does on damage."""
         if self.dataset.chunks is None:

@@ -12,12 +12,12 @@ digests of the set follow from those of its shards, and a damaged row can be nam
 import json
 import re
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager, nullcontext
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import h5py
 import numpy as np
@@ -34,7 +34,6 @@ from scenegen.files.input_file import (
     virtual_sources,
 )
 from scenegen.files.places import as_place, is_remote
-from scenegen.files.trial import Trials, was_tried
 
 Array = NDArray[Any]
 SHARDS = "shards"  # in the file of a set: a line of JSON for each shard
@@ -102,46 +101,123 @@ def opened(place: Path) -> Iterator[h5py.File]:
         yield stack.enter_context(h5py.File(source, "r"))
 
 
-def open_with_shards(path: Path, kind: str) -> tuple[h5py.File, "ShardFiles | None"]:
-    """Open a file as `open_file`, or the file of a set and its shards.
+class OpenFile:
+    """An open HDF5 file of which every object is safe to open, and its shards if it is a set.
 
-    Raises as `open_file`, and FileFormatError where a shard is missing, or a virtual data set leads
-    to anything but the data set of its name in the shards.
+    The shards are opened when they are first read; a few are kept open. Use it as a context
+    manager, or close it.
+
+    Attributes:
+        path: of the file.
+        file: what h5py opened. Its virtual data sets are read by `array` only.
+        shards: of a set; empty for a whole file.
     """
-    file = open_unchecked(path, kind)
-    with checking(file):
-        found = list(faults(file))
-        virtual = [fault for fault in found if fault.virtual]
-        others = [fault for fault in found if not fault.virtual]
-        is_set = virtual and not others and isinstance(file.get(SHARDS), h5py.Dataset)
-        for fault in others if is_set else found:
-            raise FileFormatError(f"{path}: {fault.name}", fault.found, fault.expected)
-        if not is_set:
-            return file, None
-        shards = _read_list(file[SHARDS], path)
-        part_of = {shard.file: shard.part for shard in shards}
-        for fault in virtual:
-            sources = virtual_sources(file[fault.name])
-            part = part_of.get(sources[0][0]) if sources else None
-            own = [shard for shard in shards if shard.part == part]
-            starts = accumulate((shard.rows for shard in own), initial=0)
-            expected = [
-                (shard.file, fault.name, start, shard.rows)
-                for shard, start in zip(own, starts, strict=False)
-            ]
-            if sources != expected:
-                strange = [f"rows from {one}" for one in sources if one not in expected]
-                where, found_here = f"{path}: {fault.name}", [*strange, "rows in another order"][0]
-                raise FileFormatError(where, found_here, "all rows of its shards, in their order")
-        return file, ShardFiles(path, shards, kind)
 
+    def __init__(self, path: str | Path, kind: str) -> None:
+        """Open a file; `kind` is what it should be.
 
-@contextmanager
-def opened_with_shards(path: Path, kind: str) -> Iterator[tuple[h5py.File, "ShardFiles | None"]]:
-    """Open a file as `open_with_shards`, and close all that was opened."""
-    file, shards = open_with_shards(path, kind)
-    with closing(shards) if shards else nullcontext(), file:
-        yield file, shards
+        Raises OSError for what is no regular file, and FileFormatError for one that is not HDF5, or
+        cut off, or of which something cannot be read within bounds, or leads out of the file other
+        than to the shards beside it, or of which a shard is missing.
+        """
+        self.path, self._kind = Path(path), kind
+        self.file = open_unchecked(path, kind)
+        self.shards: list[Shard] = []
+        self._open: OrderedDict[int, h5py.File] = OrderedDict()
+        self._arrays: dict[tuple[int, str], StoredArray] = {}
+        with checking(self.file):
+            unsafe = list(faults(self.file))
+            # Reading the list would follow it if it were virtual too, so that is no set.
+            virtual = all(fault.virtual and fault.name != SHARDS for fault in unsafe)
+            is_set = virtual and isinstance(self.file.get(SHARDS), h5py.Dataset)
+            if unsafe and not is_set:
+                fault = min(unsafe, key=lambda fault: fault.virtual)
+                raise FileFormatError(f"{path}: {fault.name}", fault.found, fault.expected)
+            if unsafe:
+                self.shards = _read_list(self.file[SHARDS], self.path)
+                for fault in unsafe:
+                    self._check_sources(self.file[fault.name])
+                self._check_shards()
+
+    def _check_sources(self, dataset: h5py.Dataset) -> None:
+        """Raise FileFormatError unless a virtual data set shows the rows of its shards in order."""
+        sources, name = virtual_sources(dataset), dataset.name.lstrip("/")
+        shards = [self.shards[i] for i in self.numbers(dataset)]
+        starts = accumulate((shard.rows for shard in shards), initial=0)
+        expected = [(s.file, name, start, s.rows) for s, start in zip(shards, starts, strict=False)]
+        if sources != expected:
+            strange = [f"rows from {source}" for source in sources if source not in expected]
+            where, found = f"{self.path}: {name}", [*strange, "rows in another order"][0]
+            raise FileFormatError(where, found, "all rows of its shards, in their order")
+
+    def _check_shards(self) -> None:
+        missing = [s.file for s in self.shards if not (self.path.parent / s.file).is_file()]
+        if missing:
+            more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+            hint = "copy all files of the set together, or run the command that made it again"
+            raise FileFormatError(self.path, f"no {missing[0]}{more} beside it", "all shards", hint)
+
+    def array(self, name: str) -> "StoredArray | JoinedArray":
+        """Return a data set, to be read. Raises FileFormatError where there is none."""
+        dataset = self.file.get(name)
+        if not isinstance(dataset, h5py.Dataset):
+            raise FileFormatError(f"{self.path}: {name}", "no dataset of this name", "one")
+        return JoinedArray(self, dataset) if dataset.is_virtual else StoredArray(dataset)
+
+    def numbers(self, dataset: h5py.Dataset) -> list[int]:
+        """Return which shards hold the rows of a virtual data set."""
+        storage = dataset.id.get_create_plist()
+        first = storage.get_virtual_filename(0) if storage.get_virtual_count() else None
+        part = next((shard.part for shard in self.shards if shard.file == first), None)
+        return [i for i, shard in enumerate(self.shards) if shard.part == part]
+
+    def shard(self, number: int) -> h5py.File:
+        """Return an open shard. Raises FileFormatError where it is not the one that was made."""
+        if number not in self._open:
+            shard = self.shards[number]
+            place = self.path.parent / shard.file
+            file = open_file(place, self._kind)
+            found = file.attrs.get(CONTENT_DIGEST)
+            if found != shard.content_digest:
+                file.close()
+                expected = f"{shard.content_digest:.16}..., as {self.path.name} tells"
+                hint = "it is of another run, or was changed"
+                raise FileFormatError(place, f"content {found!r:.20}", expected, hint)
+            self._open[number] = file
+            while len(self._open) > MOST_OPEN:
+                oldest, other = self._open.popitem(last=False)
+                other.close()
+                self._arrays = {k: v for k, v in self._arrays.items() if k[0] != oldest}
+        self._open.move_to_end(number)
+        return self._open[number]
+
+    def shard_array(self, number: int, name: str) -> StoredArray:
+        """Return a data set of a shard, which keeps what it knows of its chunks."""
+        file = self.shard(number)
+        if (number, name) not in self._arrays:
+            stored, rows = StoredArray(file[name]), self.shards[number].rows
+            if len(stored) != rows:
+                raise FileFormatError(f"{file.filename}: {name}", f"{len(stored)} rows", f"{rows}")
+            self._arrays[number, name] = stored
+        return self._arrays[number, name]
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the file has not been closed."""
+        return bool(self.file)
+
+    def close(self) -> None:
+        """Close the file and its shards; idempotent."""
+        self.file.close()
+        self._arrays.clear()
+        while self._open:
+            self._open.popitem()[1].close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 def _read_list(listed: h5py.Dataset, path: Path) -> list[Shard]:
@@ -168,96 +244,26 @@ def _read_list(listed: h5py.Dataset, path: Path) -> list[Shard]:
     return found
 
 
-class ShardFiles:
-    """The shards of a set, opened when they are first read; a few are kept open."""
-
-    def __init__(self, path: Path, shards: Sequence[Shard], kind: str) -> None:
-        """Keep where they are. Raises FileFormatError where one of them is missing."""
-        self.path, self.shards, self._kind = path, shards, kind
-        self._trials = Trials() if was_tried(path) else None  # a shard is tried where its set was
-        self._open: OrderedDict[int, h5py.File] = OrderedDict()
-        self._arrays: dict[tuple[int, str], StoredArray] = {}
-        missing = [shard.file for shard in shards if not (path.parent / shard.file).is_file()]
-        if missing:
-            more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
-            hint = "copy all files of the set together, or run the command that made it again"
-            raise FileFormatError(path, f"no {missing[0]}{more} beside it", "all shards", hint)
-
-    def file(self, number: int) -> h5py.File:
-        """Return an open shard.
-
-        Raises FileFormatError where it is not the one that was made, and as `Trials.try_file`.
-        """
-        if number not in self._open:
-            shard = self.shards[number]
-            if self._trials is not None:
-                self._trials.try_file(self.path.parent / shard.file)
-            file = open_file(self.path.parent / shard.file, self._kind)
-            found = file.attrs.get(CONTENT_DIGEST)
-            if found != shard.content_digest:
-                file.close()
-                raise FileFormatError(
-                    self.path.parent / shard.file,
-                    f"content {found!r:.20}",
-                    f"{shard.content_digest:.16}..., as {self.path.name} tells",
-                    "it is of another run, or was changed",
-                )
-            self._open[number] = file
-            while len(self._open) > MOST_OPEN:
-                oldest, other = self._open.popitem(last=False)
-                other.close()
-                self._arrays = {k: v for k, v in self._arrays.items() if k[0] != oldest}
-        self._open.move_to_end(number)
-        return self._open[number]
-
-    def array(self, number: int, name: str) -> StoredArray:
-        """Return a data set of a shard, which keeps what it knows of its chunks."""
-        file = self.file(number)
-        if (number, name) not in self._arrays:
-            stored, rows = StoredArray(file[name]), self.shards[number].rows
-            if len(stored) != rows:
-                where = f"{file.filename}: {name}"
-                raise FileFormatError(where, f"{len(stored)} rows", f"{rows}")
-            self._arrays[number, name] = stored
-        return self._arrays[number, name]
-
-    def numbers(self, dataset: h5py.Dataset) -> list[int]:
-        """Return which shards hold the rows of a virtual data set of the set."""
-        storage = dataset.id.get_create_plist()
-        first = storage.get_virtual_filename(0) if storage.get_virtual_count() else None
-        part = next((shard.part for shard in self.shards if shard.file == first), None)
-        return [i for i, shard in enumerate(self.shards) if shard.part == part]
-
-    def stored_bytes(self, dataset: h5py.Dataset) -> int:
-        """Return the bytes on disk of a virtual data set of the set, in all its shards."""
-        numbers = self.numbers(dataset)
-        return sum(int(self.file(i)[dataset.name].id.get_storage_size()) for i in numbers)
-
-    def close(self) -> None:
-        """Close all that is open."""
-        if self._trials is not None:
-            self._trials.close()
-        self._arrays.clear()
-        while self._open:
-            self._open.popitem()[1].close()
-
-
 class JoinedArray:
     """A data set of a set, read from the shards as `StoredArray` reads one of a file."""
 
-    def __init__(self, files: ShardFiles, dataset: h5py.Dataset) -> None:
+    def __init__(self, opened: OpenFile, dataset: h5py.Dataset) -> None:
         """Raise FileFormatError where the shards of its part have another number of rows."""
-        self.dataset, self._files = dataset, files
-        self._numbers = files.numbers(dataset)
-        self._starts = [0, *accumulate(files.shards[i].rows for i in self._numbers)]
+        self.dataset, self._opened = dataset, opened
+        self._numbers = opened.numbers(dataset)
+        self._starts = [0, *accumulate(opened.shards[i].rows for i in self._numbers)]
         if self._starts[-1] != dataset.shape[0]:
-            where = f"{files.path}: {dataset.name}"
+            where = f"{opened.path}: {dataset.name}"
             raise FileFormatError(where, f"{dataset.shape[0]} rows", f"{self._starts[-1]}")
         self.shape: tuple[int, ...] = dataset.shape
         self.dtype, self.attrs = dataset.dtype, dataset.attrs
 
     def __len__(self) -> int:
         return int(self.shape[0])
+
+    def pieces(self) -> Iterator[h5py.Dataset]:
+        """Yield the data sets of the shards that hold the values."""
+        return (self._opened.shard(number)[self.dataset.name] for number in self._numbers)
 
     def __getitem__(self, rows: int | slice | tuple[()]) -> Any:
         """Return one row, some, or all for (). Raises IndexError, and as HDF5 does on damage."""
@@ -270,7 +276,7 @@ class JoinedArray:
         for number in np.unique(shard).tolist():
             places = np.flatnonzero(shard == number)
             inside = chosen[places] - self._starts[number]
-            stored = self._files.array(self._numbers[number], self.dataset.name)
+            stored = self._opened.shard_array(self._numbers[number], self.dataset.name)
             if stored.shape[1:] != self.shape[1:] or stored.dtype != self.dtype:
                 found = f"{stored.dtype} {stored.shape}"
                 raise ValueError(f"{found} in a shard, not {self.dtype} {self.shape}")
@@ -280,13 +286,3 @@ class JoinedArray:
             else:
                 values[places] = [stored[i] for i in inside.tolist()]
         return values
-
-
-Opened = Callable[[h5py.Dataset], StoredArray | JoinedArray]
-
-
-def stored_array(dataset: h5py.Dataset, shards: ShardFiles | None) -> StoredArray | JoinedArray:
-    """Return a data set of a file that `open_with_shards` opened, to be read."""
-    if shards is not None and dataset.is_virtual:
-        return JoinedArray(shards, dataset)
-    return StoredArray(dataset)

@@ -9,7 +9,7 @@ import struct
 from collections import deque
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from scenegen.common.errors import SpecError
 from scenegen.files.axes import name_axes
 from scenegen.files.content import SHA256, ColumnDigest, row_digest
+from scenegen.files.schema import Column
 from scenegen.files.workers import processors
 
 Array = NDArray[Any]
@@ -32,28 +33,6 @@ MOST_PACKING = 128  # rows that may wait to be written; bounds the memory
 MOST_PACKERS = 8  # threads that compress
 BLOCK_ROWS = 1024  # rows of the small datasets that are kept and written together
 Rows = Mapping[str, Sequence[Any] | Array]  # values of as many rows for each column
-
-
-@dataclass(frozen=True)
-class Column:
-    """A dataset with one entry a row.
-
-    Attributes:
-        shape: of a row.
-        dtype: NumPy name, or "text" for UTF-8 strings.
-        own_chunk: whether each row is a compressed chunk of its own, as images are.
-        attributes: HDF5 attributes.
-        axes: names of a row's axes (`axes.name_axes`); the axis of rows is called "row".
-        shuffle: whether own chunks go through HDF5's shuffle filter, if a number has several bytes.
-    """
-
-    name: str
-    shape: tuple[int, ...]
-    dtype: str
-    own_chunk: bool = False
-    attributes: Mapping[str, Any] = field(default_factory=dict)
-    axes: tuple[str, ...] | None = None
-    shuffle: bool = True
 
 
 class Table:

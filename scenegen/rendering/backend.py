@@ -13,6 +13,7 @@ import os
 import re
 import sys
 import warnings
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 
@@ -150,3 +151,9 @@ def warn_of_slow_rendering() -> None:
         SlowFallbackWarning,
         stacklevel=4,
     )
+
+
+def renderer_text(attributes: Mapping[str, str]) -> str:
+    """Return the versions that rendered a file, from its root attributes."""
+    names = zip(("Mitsuba", "Dr.Jit", "LLVM"), VERSION_ATTRIBUTES, strict=True)
+    return ", ".join(f"{name} {attributes.get(key, UNKNOWN)}" for name, key in names)

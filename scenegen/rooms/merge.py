@@ -34,7 +34,7 @@ def merge_rooms(
     """
     with RoomsFile(path) as rooms:
         fields, views = columns(rooms.spec), len(rooms.spec.views)
-        compression = str(rooms.attributes["compression"])
+        compression = rooms.compression()
         attributes = {name: str(rooms.attributes[name]) for name in COPIED}
         with create_rooms(
             out, rooms.spec, len(rooms) // views, compression=compression, overwrite=overwrite,

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from scenegen.camera import pixel_directions, transform_points, transform_vectors
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.description.specs import DatasetSpec
+from scenegen.files.rows import RowBlock
 from scenegen.objects.catalogue import Objects, changed_meshes
 from scenegen.rendering.ground_truth import visible_pixels
 from scenegen.rendering.packing import SceneBatch, pack
 from scenegen.rendering.shading import shade
-from scenegen.rooms.reader import Room, RoomsFile, RowBlock
+from scenegen.rooms.reader import Room, RoomsFile
 from scenegen.rooms.writer import described
 
 Array = NDArray[Any]

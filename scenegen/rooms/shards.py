@@ -81,9 +81,7 @@ class _Shards:
                     fingerprint.add(text)
         axes = {column.name: column.axes or () for column in columns(spec)}
         with new_file(self.path, overwrite=True) as file:
-            rows = sum(shard.rows for shard in shards)
-            told = root_attributes(spec, rows, self.work.compression)
-            file.attrs.update({**told, **self.attributes})
+            file.attrs.update({**root_attributes(spec), **self.attributes})
             write_virtual(file, folder, shards, axes)
             write_list(file, shards)
             file.attrs["fingerprint"] = fingerprint.hex

@@ -5,10 +5,8 @@ the description the pixels.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,15 +15,25 @@ from numpy.typing import NDArray
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec, Fingerprint
-from scenegen.files.content import ColumnDigest
-from scenegen.files.manifest import manifest_path, read_manifest, wrong_files
-from scenegen.layout import FIELDS, FORMAT_VERSION, has_digests, has_old_draws
-from scenegen.objects.catalogue import Objects, objects_of
+from scenegen.files.manifest import Manifest
+from scenegen.files.rows import RowBlock
+from scenegen.files.verify import (
+    SHOWN,
+    Check,
+    content_check,
+    listed_check,
+    made_elsewhere,
+    manifest_checks,
+    read_all,
+    spread_rows,
+)
+from scenegen.layout import FORMAT_VERSION
+from scenegen.objects.catalogue import Objects
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import render
-from scenegen.rooms.reader import Room, RoomsFile, RowBlock
+from scenegen.rooms.reader import Room, RoomsFile
 from scenegen.rooms.row_rules import (
     LOBE_TOLERANCE,
     PIXELS,
@@ -45,147 +53,103 @@ NORMAL_TOLERANCE = 1e-3
 IMAGE_TOLERANCE = {"uint8": 0.0, "float16": 2.0**-10, "float32": 1e-4}
 PATH_TOLERANCE = 0.1  # share by which the mean of a path-traced image's channel may differ
 EDGE_SHARE = 1e-3  # of a row's pixels that may disagree
-SHOWN = 5  # problems that a message names; of more it gives the number
 BLOCK_PIXELS = 2**20  # of the rows that are read at once
 BATCH_PIXELS = 2**22  # of the rows that are rendered at once
 TRIED_AT_ONCE = 100  # proposals of a scene that is drawn again
 
 
-@dataclass(frozen=True)
-class Check:
-    """One rule, whether the file keeps it, and what was checked or found wrong (`detail`)."""
-
-    name: str
-    ok: bool
-    detail: str
-
-
 def verify_file(
-    path: str | Path,
+    rooms: RoomsFile,
+    objects: Objects,
     items: int = 8,
     device: str = "auto",
-    objects: Objects | None = None,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> list[Check]:
     """Check every row's values, and render `items` rows, spread evenly over the file, again.
 
     Args:
-        objects: what its scenes are made of; None where its objects are built in.
+        objects: what its scenes are made of.
         progress: called with the number of rows read since the last call.
 
-    Raises as `RoomsFile`; SpecError where the file shows meshes and `objects` are not given; and
-    BackendError where the device cannot render here.
+    Raises FileFormatError where its attributes cannot be read, and BackendError where the device
+    cannot render here.
     """
-    with RoomsFile(path) as rooms:
-        objects = objects or objects_of(rooms.spec)
-        rules = row_rules(rooms.spec)
-        broken: dict[str, list[str]] = {name: [] for name in rules}
-        fingerprint = Fingerprint(rooms.spec)
-        digests = {field.name: ColumnDigest() for field in FIELDS}
-        step = max(1, BLOCK_PIXELS // (rooms.spec.height * rooms.spec.width))
-        for start in range(0, len(rooms), step):
-            block = RowBlock(rooms, range(start, min(start + step, len(rooms))))
-            digests = {name: x for name, x in digests.items() if name in block.values}
-            for name, digest in digests.items():
-                digest.update(block.values[name])
-            for i in block.rows:
-                if block.read("view_index", i) == 0:
-                    fingerprint.add(block.read("scene", i))
-                for name, problem in row_problems(rooms, block, i, objects):
-                    broken[name].append(f"row {i}: {problem}")
-                progress(1)
-        layout = f"{len(rooms)} rows, format {rooms.attributes['format_version']}"
-        checks = [listed_check("layout", layout, rooms.problems())]
-        checks.append(_content(rooms, {name: x.hex for name, x in digests.items()}))
-        for name, rule in rules.items():
-            checks.append(listed_check(name, f"{rule} ({len(rooms)} rows)", broken[name]))
-        same = fingerprint.hex == rooms.fingerprint
-        checks.append(Check("fingerprint", same, rooms.fingerprint if same else "does not match"))
-        return checks + _some_again(rooms, items, device, objects)
+    fingerprint = Fingerprint(rooms.spec)
+
+    def look(block: RowBlock, row: int) -> Iterable[tuple[str, str]]:
+        if block.read("view_index", row) == 0:
+            fingerprint.add(block.read("scene", row))
+        return row_problems(rooms, block, row, objects)
+
+    step = max(1, BLOCK_PIXELS // (rooms.spec.height * rooms.spec.width))
+    digests, broken = read_all(rooms, step, look, progress)
+    rules = row_rules(rooms.spec)
+    same = fingerprint.hex == rooms.fingerprint
+    layout = f"{len(rooms)} rows, format {rooms.attributes['format_version']}"
+    return [
+        listed_check("layout", layout, rooms.problems()),
+        content_check("content", rooms.opened, digests),
+        *(listed_check(x, f"{rules[x]} ({len(rooms)} rows)", broken[x]) for x in rules),
+        Check("fingerprint", same, rooms.fingerprint if same else "does not match"),
+        *_some_again(rooms, items, device, objects),
+    ]
 
 
 def verify_set(
-    path: str | Path,
+    rooms: RoomsFile,
+    manifest: Manifest,
+    objects: Objects,
     items: int = 8,
     device: str = "auto",
-    objects: Objects | None = None,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> list[Check]:
     """Check the shards of a set against its manifest, and render `items` rows again.
 
     Every byte is checked by the SHA-256 of its file, so values are not looked at one by one.
 
-    Args and errors as `verify_file`; FileFormatError also where the manifest cannot be read.
+    Args and errors as `verify_file`.
     """
-    path = Path(path)
-    manifest = read_manifest(manifest_path(path))
-
-    wrong = wrong_files(path.parent, manifest, progress)
-    told = "every shard and the set are complete"
-    checks = [
-        listed_check("manifest", told, [] if manifest.complete else ["the set is not complete"])
-    ]
-    checks.append(listed_check("checksums", f"SHA-256 of {len(manifest.shards)} shards", wrong))
-    if wrong:
+    checks = manifest_checks(rooms.path.parent, manifest, progress)
+    if not checks[-1].ok:
         return checks
-    with RoomsFile(path) as rooms:
-        checks.append(listed_check("layout", f"{len(rooms)} rows", rooms.problems()))
-        views = len(rooms.spec.views)
-        scene, view = (rooms.read(n, slice(None)) for n in ("scene_index", "view_index"))
-        count = manifest.count * views
-        known = [(one.file, one.rows, one.content_digest) for one in manifest.shards]
-        listed = [(one.file, one.rows, one.content_digest) for one in rooms.shards] or known
-        missing = [] if len(scene) == count else [f"{len(scene)} rows, not {count}"]
-        missing += [] if listed == known else ["other shards than in the manifest"]
-        if not missing:
-            every = np.arange(count)
-            out = np.flatnonzero((scene != every // views) | (view != every % views))
-            missing = [f"row {row}" for row in out[:SHOWN].tolist()]
-        checks.append(listed_check("rows", f"each of {count} once, in order", missing))
-        checks += _some_again(rooms, items, device, objects or objects_of(rooms.spec))
-    return checks
+    views = len(rooms.spec.views)
+    scene, view = (rooms.read(name, slice(None)) for name in ("scene_index", "view_index"))
+    count = manifest.count * views
+    recorded = [(shard.file, shard.rows, shard.content_digest) for shard in manifest.shards]
+    shards = [(shard.file, shard.rows, shard.content_digest) for shard in rooms.opened.shards]
+    wrong = [] if len(scene) == count else [f"{len(scene)} rows, not {count}"]
+    wrong += ["other shards than in the manifest"] if shards and shards != recorded else []
+    if not wrong:
+        every = np.arange(count)
+        misplaced = np.flatnonzero((scene != every // views) | (view != every % views))
+        wrong = [f"row {row}" for row in misplaced[:SHOWN].tolist()]
+    return [
+        *checks,
+        listed_check("layout", f"{len(rooms)} rows", rooms.problems()),
+        listed_check("rows", f"each of {count} once, in order", wrong),
+        *_some_again(rooms, items, device, objects),
+    ]
 
 
 def _some_again(rooms: RoomsFile, items: int, device: str, objects: Objects) -> list[Check]:
     """Draw and render some rows again, spread evenly over the file."""
-    rows = np.unique(np.linspace(0, len(rooms) - 1, min(items, len(rooms))).round().astype(int))
-    if not len(rows):
+    rows = spread_rows(len(rooms), items)
+    if not rows:
         return []
     return [_sampled_again(rooms, rows, objects), _rendered_again(rooms, rows, device, objects)]
 
 
-def listed_check(name: str, detail: str, problems: Sequence[str]) -> Check:
-    """Return the outcome of a check: what was checked, or the first problems."""
-    if not problems:
-        return Check(name, True, detail)
-    more = f" and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
-    return Check(name, False, "; ".join(problems[:SHOWN]) + more)
-
-
-def _content(rooms: RoomsFile, digests: dict[str, str]) -> Check:
-    """Check that the file's values and attributes are those that were written, bit for bit."""
-    if not has_digests(rooms.attributes):
-        version = rooms.attributes["format_version"]
-        return Check("content", True, f"not checked: format {version} has no digests")
-    problems = rooms.content_problems(digests)
-    return listed_check("content", "every value and attribute as written, by SHA-256", problems)
-
-
-def _sampled_again(rooms: RoomsFile, rows: Array, objects: Objects) -> Check:
+def _sampled_again(rooms: RoomsFile, rows: Sequence[int], objects: Objects) -> Check:
     """Check that the seed still gives the stored descriptions."""
-    if has_old_draws(rooms.attributes):
-        version = rooms.attributes["format_version"]
-        detail = f"not checked: format {version} drew other scenes from a seed"
-        return Check("drawn again from the seed", True, detail)
     wrong = []
-    for i in rows.tolist():
+    for row in rows:
         try:
-            stored = rooms.scene(i)
+            stored = rooms.scene(row)
             same = any(scene == stored for scene in _proposals(rooms, stored.index, objects))
         except (FileFormatError, SpecError):
             same = False
         if not same:
-            wrong.append(f"row {i}")
+            wrong.append(f"row {row}")
     detail = ", ".join(wrong) + " cannot be drawn again" if wrong else f"{len(rows)} rows"
     return Check("drawn again from the seed", not wrong, detail)
 
@@ -198,22 +162,17 @@ def _proposals(rooms: RoomsFile, index: int, objects: Objects) -> Iterator[Scene
         yield from (drawn.scene(k) for k in range(len(drawn)))
 
 
-def _rendered_again(rooms: RoomsFile, rows: Array, device: str, objects: Objects) -> Check:
+def _rendered_again(rooms: RoomsFile, rows: Sequence[int], device: str, objects: Objects) -> Check:
     """Check that the stored descriptions still give the stored pixels."""
-    if has_old_draws(rooms.attributes) and rooms.spec.source == "shapes":
-        version = rooms.attributes["format_version"]
-        detail = f"not checked: format {version} showed meshes of basic shapes"
-        return Check("rendered again", True, detail)
     here = {"variant": select_variant(device), "format_version": FORMAT_VERSION, **versions()}
-    stored = {name: str(rooms.attributes.get(name, "not stored")) for name in here}
-    others = [f"{x} {stored[x]}, here {here[x]}" for x in here if stored[x] != here[x]]
+    others = made_elsewhere(rooms.attributes, here)
     wrong, off = [], 0
-    again = _render(rooms, rows.tolist(), device, objects)
-    for i in rows.tolist():
-        if i not in again:
-            wrong.append(f"row {i} (cannot be rendered)")
+    again = _render(rooms, rows, device, objects)
+    for row in rows:
+        if row not in again:
+            wrong.append(f"row {row} (cannot be rendered)")
             continue
-        room, pixels = again[i]
+        room, pixels = again[row]
         pairs = {name: (getattr(room, name), pixels[name]) for name in PIXELS}
         differs = [
             name for name, pair in pairs.items() if not np.array_equal(*pair, equal_nan=True)
@@ -223,7 +182,7 @@ def _rendered_again(rooms: RoomsFile, rows: Array, device: str, objects: Objects
             with np.errstate(all="ignore"):
                 differs = [n for n in differs if not _within_tolerance(n, *pairs[n], rooms.spec)]
         if differs:
-            wrong.append(f"row {i} ({', '.join(differs)})")
+            wrong.append(f"row {row} ({', '.join(differs)})")
     what = f"{off} of {len(rows)} rows within the tolerance alone" if off else "bit for bit"
     detail = "differ: " + ", ".join(wrong) if wrong else f"{len(rows)} rows, {what}"
     remark = f" (the file's {'; '.join(others)})" if others else ""
@@ -231,7 +190,7 @@ def _rendered_again(rooms: RoomsFile, rows: Array, device: str, objects: Objects
 
 
 def _render(
-    rooms: RoomsFile, rows: list[int], device: str, objects: Objects
+    rooms: RoomsFile, rows: Sequence[int], device: str, objects: Objects
 ) -> dict[int, tuple[Room, dict[str, Array]]]:
     """Return the rooms of some rows and their pixels rendered again, where that is possible.
 

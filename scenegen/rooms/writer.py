@@ -15,8 +15,9 @@ from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec, Fingerprint
 from scenegen.files.content import seal
 from scenegen.files.row_file import new_file, writer_name
+from scenegen.files.schema import Column
 from scenegen.files.shards import write_row_digests
-from scenegen.files.table import Column, PackedRows, Table, pack_rows
+from scenegen.files.table import PackedRows, Table, pack_rows
 from scenegen.layout import (
     CONVENTIONS,
     FORMAT_NAME,
@@ -134,15 +135,13 @@ def described(batch: SceneBatch, images: Array) -> dict[str, Array]:
     }
 
 
-def root_attributes(spec: DatasetSpec, rows: int, compression: str) -> dict[str, Any]:
+def root_attributes(spec: DatasetSpec) -> dict[str, Any]:
     """Return the root attributes that a file of rooms has from the start."""
     return {
         "format": FORMAT_NAME,
         "format_version": FORMAT_VERSION,
         "writer": writer_name(),
         "spec": spec.to_json(),
-        "count": rows,
-        "compression": compression,
         "conventions": CONVENTIONS,
     }
 
@@ -167,7 +166,7 @@ def create_rooms(
     most = MAX_COUNT // len(spec.views)
     check(1 <= count <= most, "n", count, f"from 1 to {most:,} scenes")
     with new_file(path, overwrite) as file:
-        file.attrs.update(root_attributes(spec, rows, compression), **(attributes or {}))
+        file.attrs.update(root_attributes(spec), **(attributes or {}))
         writer = RoomsWriter(file, spec, count, compression, is_shard)
         yield writer
         if writer.table.rows != rows:

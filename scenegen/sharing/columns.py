@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from scenegen.common.errors import FileFormatError
-from scenegen.files.table import Column
+from scenegen.files.schema import Column
 
 Array = NDArray[Any]
 PNG_LEVEL = 6  # of deflate
@@ -21,7 +21,7 @@ def column_name(dataset: str) -> str:
 
 def row_column(meaning: str) -> Column:
     """Return the column `row`, which comes first, with the number of each row in its file."""
-    return Column("row", (), "int64", attributes={"unit": "1", "frame": "-", "meaning": meaning})
+    return Column("row", (), "int64", meaning=meaning)
 
 
 def is_picture(column: Column) -> bool:

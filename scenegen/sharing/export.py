@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from scenegen.description.specs import DatasetSpec
-from scenegen.files.table import Column
+from scenegen.files.schema import Column
 from scenegen.layout import columns
 from scenegen.rooms.reader import RoomsFile
 from scenegen.sharing.columns import column_name, decoded, row_column

@@ -12,8 +12,8 @@ import numpy as np
 
 from scenegen.common.records import check
 from scenegen.files.new_folder import folder_written_beside
+from scenegen.files.schema import Column
 from scenegen.files.shards import cut, shard_name
-from scenegen.files.table import Column
 from scenegen.sharing.columns import meanings
 
 FORMATS = {"parquet": ".parquet", "webdataset": ".tar"}  # and how the names of their files end

@@ -10,9 +10,10 @@ import numpy as np
 
 from scenegen.common.errors import FileFormatError
 from scenegen.files.content import column_digest, row_digest
+from scenegen.files.rows import RowBlock
 from scenegen.files.shards import cut
 from scenegen.layout import FIELDS
-from scenegen.rooms.reader import RoomsFile, RowBlock
+from scenegen.rooms.reader import RoomsFile
 from scenegen.sharing.columns import decoded
 from scenegen.sharing.description import IndexColumn
 from scenegen.sharing.index_file import write_lines

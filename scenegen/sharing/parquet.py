@@ -8,7 +8,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from scenegen.files.table import Column
+from scenegen.files.schema import Column
 from scenegen.sharing.arrow import HUGGING_FACE, PICTURE, feature, field, nested
 from scenegen.sharing.columns import is_picture, png_bytes
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.files.table import Column
+from scenegen.files.schema import Column
 from scenegen.sharing.columns import is_picture, png_bytes
 
 Array = NDArray[Any]

@@ -16,7 +16,6 @@ def audit_table(
     views: Any = None,
     spec: SplitSpec | None = None,
     split: str = "test",
-    version: str = "2.0",
 ) -> tuple[AuditTable, Shapes]:
     """Return a table of questions without images, and what its cubes say.
 
@@ -27,12 +26,12 @@ def audit_table(
     """
     cubes = np.asarray(cubes, np.int8)
     count, images = cubes.shape[:2]
-    spec = spec or SplitSpec()
+    distance = (spec or SplitSpec()).camera_distance
     truth = {
         "cubes": cubes,
         "distractor_kind": np.asarray(kinds),
         "world_from_shape": np.tile(np.eye(3), (count, images, 1, 1)) if views is None else views,
-        "camera_distance": np.full(count, spec.camera_distance),
+        "camera_distance": np.full(count, distance),
     }
     none = np.zeros((count, images))
     table = AuditTable(
@@ -40,7 +39,6 @@ def audit_table(
         spec=spec,
         split=split,
         fingerprint=None,
-        format_version=version,
         image_dtype="uint8",
         answers=None,
         truth=truth,

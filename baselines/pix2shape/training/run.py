@@ -26,7 +26,7 @@ from baselines.training.rooms import rooms_of
 from baselines.training.run_folder import alone_in, check_new
 from scenegen.common.errors import SceneGenError
 from scenegen.files.new_file import check_writable
-from scenegen.rooms.preview import save_picture
+from scenegen.files.pictures import save_picture
 
 PICTURE, LOGS = "pictures.png", "logs"
 LOG_EVERY = 20  # iterations

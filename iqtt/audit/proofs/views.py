@@ -64,11 +64,10 @@ def lines_of_sight(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Pr
     """Prove that right answers are seen from far enough beside the reference's line of sight.
 
     A line of sight is an axis in the frame of the shape, as the view from behind has the same
-    outline, flipped. Tables before format 2.0 had no such rule.
+    outline, flipped. Released files have no such rule.
     """
     least = [
-        table.spec.min_sight_angle_degrees if table.spec and table.since_format_2 else 0.0
-        for table in tables
+        table.spec.min_sight_angle_degrees if table.spec is not None else 0.0 for table in tables
     ]
     if not any(least):
         return Proof("lines of sight", "skipped", "no smallest angle is specified")

@@ -9,9 +9,9 @@ import h5py
 import numpy as np
 import pytest
 from h5_edits import attribute, claims, gone, grouped, linked
+from iqtt.files.tables import NoImagesError
 
 from iqtt.files.reader import AnswersFile, open_questions, parts
-from iqtt.files.tables import NoImagesError
 from scenegen.common.errors import FileFormatError, SpecError
 
 

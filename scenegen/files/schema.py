@@ -1,0 +1,100 @@
+"""What a kind of file holds: columns with one entry a row, and texts at the root of the file.
+
+Rooms, questions and predictions are each such a schema, and what only they do.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import h5py
+import numpy as np
+
+DIGEST = "[0-9a-f]{64}"  # SHA-256 as hex
+
+
+@dataclass(frozen=True)
+class Column:
+    """A data set with one entry a row.
+
+    Attributes:
+        shape: of a row.
+        dtype: NumPy name, or "text" for UTF-8 strings.
+        unit, frame, meaning: HDF5 attributes.
+        axes: names of a row's axes (`axes.name_axes`), or None; the axis of rows is called "row".
+        own_chunk: whether each row is a compressed chunk of its own, as images are.
+        shuffle: whether own chunks go through HDF5's shuffle filter, if a number has several bytes.
+        within: the range of its values; readers refuse others. None where all may be.
+        more: HDF5 attributes that only this column has.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    dtype: str
+    unit: str = "1"
+    frame: str = "-"
+    meaning: str = ""
+    axes: tuple[str, ...] | None = None
+    own_chunk: bool = False
+    shuffle: bool = True
+    within: tuple[float, float] | None = None
+    more: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """All HDF5 attributes; `shape` names the axes, or else tells their sizes."""
+        row = self.shape if self.axes is None else self.axes
+        shape = f"({', '.join(('row', *map(str, row)))})"
+        told = {"unit": self.unit, "frame": self.frame, "shape": shape, "meaning": self.meaning}
+        return {**told, **self.more}
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of HDF5 file of ours.
+
+    Attributes:
+        name, version: root attributes `format` and `format_version`; files of the same major
+            version can be read.
+        kind: what people call such a file, such as "rooms file".
+        texts: the other root attributes that are texts, each with a pattern that it matches.
+        optional: those of them that a file may lack.
+    """
+
+    name: str
+    version: str
+    kind: str
+    texts: Mapping[str, str]
+    optional: frozenset[str] = frozenset()
+
+
+def column_problems(group: h5py.Group, columns: Sequence[Column], count: int) -> list[str]:
+    """Return a sentence for each column that is missing or has the wrong shape or type."""
+    problems = []
+    for column in columns:
+        dataset = group.get(column.name)
+        if not isinstance(dataset, h5py.Dataset):
+            problems.append(f"dataset {column.name!r} is missing")
+            continue
+        expected = (count, *column.shape)
+        if dataset.shape != expected:
+            problems.append(f"{column.name}: shape {dataset.shape}, expected {expected}")
+        if column.dtype != "text" and dataset.dtype != np.dtype(column.dtype):
+            problems.append(f"{column.name}: type {dataset.dtype}, expected {column.dtype}")
+        if column.dtype == "text" and h5py.check_string_dtype(dataset.dtype) is None:
+            problems.append(f"{column.name}: type {dataset.dtype}, expected strings")
+    return problems
+
+
+def attribute_problems(group: h5py.Group, columns: Sequence[Column]) -> list[str]:
+    """Return a sentence for each attribute of a column that is not as the schema says."""
+    problems = []
+    for column in columns:
+        attributes = column.attributes
+        if column.axes is not None:
+            attributes["DIMENSION_LABELS"] = ["row", *column.axes]
+        for name, expected in attributes.items():
+            stored = group[column.name].attrs.get(name)
+            if stored is None or not np.array_equal(np.asarray(stored), np.asarray(expected)):
+                problems.append(f"{column.name}: attribute {name} is {stored!r:.60}")
+    return problems
