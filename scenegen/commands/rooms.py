@@ -97,7 +97,7 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     checks: list[Check] = []
     for path, manifest in paths:
         with RoomsFile(path) as rooms, progress_bar(len(rooms), "image") as bar:
-            how = (file_objects(rooms.spec, **meshes), items, device, bar.update)
+            how = (items, device, file_objects(rooms.spec, **meshes), bar.update)
             checks += verify_set(rooms, manifest, *how) if manifest else verify_file(rooms, *how)
     ctx.exit(print_checks(file, checks))
 

@@ -28,7 +28,7 @@ from scenegen.files.verify import (
     spread_rows,
 )
 from scenegen.layout import FORMAT_VERSION
-from scenegen.objects.catalogue import Objects
+from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.packing import pack
@@ -60,21 +60,21 @@ TRIED_AT_ONCE = 100  # proposals of a scene that is drawn again
 
 def verify_file(
     rooms: RoomsFile,
-    objects: Objects,
     items: int = 8,
     device: str = "auto",
+    objects: Objects | None = None,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> list[Check]:
     """Check every row's values, and render `items` rows, spread evenly over the file, again.
 
     Args:
-        objects: what its scenes are made of.
+        objects: what its scenes are made of; None where its objects are built in.
         progress: called with the number of rows read since the last call.
 
-    Raises FileFormatError where its attributes cannot be read, and BackendError where the device
-    cannot render here.
+    Raises SpecError where the file shows meshes and `objects` are not given, FileFormatError where
+    its attributes cannot be read, and BackendError where the device cannot render here.
     """
-    fingerprint = Fingerprint(rooms.spec)
+    objects, fingerprint = objects or objects_of(rooms.spec), Fingerprint(rooms.spec)
 
     def look(block: RowBlock, row: int) -> Iterable[tuple[str, str]]:
         if block.read("view_index", row) == 0:
@@ -98,9 +98,9 @@ def verify_file(
 def verify_set(
     rooms: RoomsFile,
     manifest: Manifest,
-    objects: Objects,
     items: int = 8,
     device: str = "auto",
+    objects: Objects | None = None,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> list[Check]:
     """Check the shards of a set against its manifest, and render `items` rows again.
@@ -127,7 +127,7 @@ def verify_set(
         *checks,
         listed_check("layout", f"{len(rooms)} rows", rooms.problems()),
         listed_check("rows", f"each of {count} once, in order", wrong),
-        *_some_again(rooms, items, device, objects),
+        *_some_again(rooms, items, device, objects or objects_of(rooms.spec)),
     ]
 
 

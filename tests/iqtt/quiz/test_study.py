@@ -5,10 +5,9 @@ import shutil
 
 import numpy as np
 import pytest
-from iqtt.files.tables import NoAnswersError
 from PIL import Image
 
-from iqtt.files.reader import QuestionsFile
+from iqtt.files.reader import NoAnswersError, QuestionsFile
 from iqtt.quiz.study import UNTOLD, Study
 from scenegen.common.errors import SpecError
 from scenegen.rooms.preview import srgb_bytes

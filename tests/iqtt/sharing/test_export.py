@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from iqtt import open_questions
+from iqtt.questions.specs import DISTRACTOR_KINDS
 from iqtt.sharing.export import export_questions
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.sharing.folder import ABOUT, FORMATS
@@ -102,7 +103,7 @@ def test_what_files_do_not_tell_is_beside_them(splits, tmp_path):
     assert about["columns"]["reference"]["scale"] == 1 / 255
     assert about["columns"]["depth"]["unit"] == "cube edge"
     with open_questions(path, "labeled") as questions:
-        assert about["columns"]["distractor_kind"]["names"] == questions.kind_names
+        assert about["columns"]["distractor_kind"]["names"] == list(DISTRACTOR_KINDS)
         assert about["attributes"] == questions.attributes
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from click.testing import Result
 from numpy.typing import NDArray
+from verified import checks_of
 
 from scenegen.description.presets import (
     PAPER_VIEWS,
@@ -20,7 +21,6 @@ from scenegen.description.presets import (
 )
 from scenegen.description.specs import DatasetSpec
 from scenegen.rooms.make import make_dataset
-from scenegen.rooms.verify import verify_file
 
 Array = NDArray[Any]
 SMALL = {"height": 40, "width": 48, "min_visible_pixels": 4, "image_dtype": "float32", "seed": 21}
@@ -86,7 +86,7 @@ def test_images_follow_from_the_file_alone(name: str, preset_file: Callable[[str
 @pytest.mark.parametrize("name", PRESETS)
 def test_every_preset_is_verified(name: str, preset_file: Callable[[str], Path]) -> None:
     path = preset_file(name)
-    checks = verify_file(path)
+    checks = checks_of(path)
     assert [check for check in checks if not check.ok] == []
     with h5py.File(path) as file:
         spec = DatasetSpec.from_json(file.attrs["spec"])

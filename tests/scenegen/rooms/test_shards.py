@@ -12,6 +12,7 @@ import time
 import h5py
 import numpy as np
 import pytest
+from verified import checks_of, checks_of_set
 
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.files.manifest import manifest_path, read_manifest
@@ -19,7 +20,6 @@ from scenegen.files.run_lock import run_lock
 from scenegen.files.shards import ROW_DIGESTS, SHARDS
 from scenegen.rooms.merge import merge_rooms
 from scenegen.rooms.reader import RoomsFile
-from scenegen.rooms.verify import verify_file, verify_set
 
 SCENES, SIZE = 11, 4
 LAYOUTS = {"one view": {}, "two views": {"views": (0.0, 40.0)}}
@@ -79,7 +79,7 @@ def test_our_reader_reads_it_as_one_file(made):
         assert len(rooms) == len(one)
         assert (rooms.spec, rooms.fingerprint) == (one.spec, one.fingerprint)
         assert rooms.stored_digests() == one.stored_digests()
-        assert rooms.stored_truth_digest() == one.stored_truth_digest()
+        assert rooms.stored_truth_digest == one.stored_truth_digest
         assert rooms.stored_bytes()["depth"] == one.stored_bytes()["depth"]
         for row in (0, 5, len(one) - 1, -1):
             np.testing.assert_array_equal(rooms[row].depth, one[row].depth)
@@ -97,7 +97,7 @@ def test_merged_it_is_the_one_file(made, tmp_path):
 
 
 def test_a_set_verifies(made):
-    for check in [*verify_set(made[0], 3), *verify_file(made[0], 3)]:
+    for check in [*checks_of_set(made[0], 3), *checks_of(made[0], 3)]:
         assert check.ok, check
 
 
@@ -115,7 +115,7 @@ def test_a_flipped_bit_is_named(copied):
     data = bytearray(shard.read_bytes())
     data[len(data) // 2] ^= 4
     shard.write_bytes(data)
-    (failed,) = [check for check in verify_set(copied) if not check.ok]
+    (failed,) = [check for check in checks_of_set(copied) if not check.ok]
     assert (failed.name, shard.name in failed.detail) == ("checksums", True)
 
 
@@ -216,7 +216,7 @@ def test_a_manifest_names_only_files_beside_it(copied, name, which):
         told["shards"][1]["file"] = name
     manifest_path(copied).write_text(json.dumps(told))
     with pytest.raises(FileFormatError):
-        verify_set(copied)
+        checks_of_set(copied)
 
 
 @pytest.mark.parametrize(
@@ -231,7 +231,7 @@ def test_no_manifest_is_believed(copied, wrong):
     told = json.loads(manifest_path(copied).read_text())
     manifest_path(copied).write_text(json.dumps(told | wrong))
     try:
-        checks = verify_set(copied, 0)
+        checks = checks_of_set(copied, 0)
     except FileFormatError:
         return
     assert not all(check.ok for check in checks)

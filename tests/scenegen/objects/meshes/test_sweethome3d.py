@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 import trimesh
 from shape_checks import first_hits, unit_triangles
+from verified import checks_of
 
 from scenegen.description.presets import preset_spec
 from scenegen.objects.meshes.check import check_models
@@ -30,7 +31,6 @@ from scenegen.objects.meshes.store import MeshStore
 from scenegen.objects.solids import Array
 from scenegen.objects.sources import object_source
 from scenegen.rooms.make import make_dataset
-from scenegen.rooms.verify import verify_file
 
 PACKAGE = "sweethome3d-furniture"
 MODELS = 820
@@ -179,7 +179,7 @@ def test_scenes_of_furniture_made_by_others(roots: tuple[Path, Path], tmp_path: 
         spec = preset_spec("shapes", objects=(2, 3), **source.settings)
         path = tmp_path / f"{spec.source}.h5"
         make_dataset(path, spec, 60, objects=source.objects)
-        failed = [c for c in verify_file(path, 6, objects=source.objects) if not c.ok]
+        failed = [c for c in checks_of(path, 6, objects=source.objects) if not c.ok]
         assert failed == []
         with h5py.File(path) as file:
             depths.append(file["depth"][()])

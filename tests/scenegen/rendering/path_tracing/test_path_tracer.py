@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
+from verified import checks_of
 
 from scenegen.camera import Camera
 from scenegen.description.scenes import FAMILY_NAMES, Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import launch_fields, render
-from scenegen.rooms.verify import verify_file
 
 Array = NDArray[Any]
 Scenes = Callable[[DatasetSpec, int], list[SceneSpec]]
@@ -89,7 +89,7 @@ def test_the_same_request_gives_the_same_bytes_in_any_batch(
         for batch in (1, 4, 64)
     ]
     assert len({path.read_bytes() for path in files}) == 1
-    checks = verify_file(files[0], items=3)
+    checks = checks_of(files[0], items=3)
     assert [check for check in checks if not check.ok] == []
 
 

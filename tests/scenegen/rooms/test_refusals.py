@@ -1,0 +1,171 @@
+"""Everything that can be wrong with a file of rooms, and what the reader, commands and verify say.
+
+The rules of `row_rules` have a table of their own in `test_verify.py`.
+"""
+
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from h5_edits import attribute, damaged_chunk, gone, grouped, linked, put, replaced
+
+from scenegen import open_rooms
+from scenegen.common.errors import FileFormatError
+
+READERS = {
+    "info": (),
+    "preview": ("--out", "sheet.png"),
+    "verify": ("--items", "2"),
+    "export": ("--items", "5", "--format", "exr"),
+    "card": ("--creator", "A", "--date", "2026-01-31", "--out", "card"),
+}
+
+
+def emptied(file):
+    """No rows at all, consistently."""
+    names = []
+    file.visititems(lambda name, item: names.append(name) if hasattr(item, "dtype") else None)
+    for name in names:
+        shape, dtype = (0, *file[name].shape[1:]), file[name].dtype
+        del file[name]
+        file.create_dataset(name, shape, dtype)
+
+
+# Edits of a good file, and words of the error.
+REFUSED = {
+    "no attributes": (lambda file: [file.attrs.pop(k) for k in list(file.attrs)], "'format'"),
+    "other format": (attribute("format", "other"), "'other'", "pix2shape-bench/rooms"),
+    "format is a number": (attribute("format", 7), "'format'", "a text"),
+    "format is an array": (attribute("format", np.arange(3)), "'format'", "a text"),
+    "older": (attribute("format_version", "0.9"), "0.9", "1.x", "release that wrote it"),
+    "newer": (attribute("format_version", "2.3"), "2.3", "1.x", "release that wrote it"),
+    "much newer": (attribute("format_version", "11.0"), "11.0", "1.x"),
+    "version without a minor one": (attribute("format_version", "1.x"), "1.x"),
+    "no version": (gone("format_version"), "'format_version'"),
+    "version is a number": (attribute("format_version", 10.5), "'format_version'"),
+    "no spec": (gone("spec"), "'spec'"),
+    "no fingerprint": (gone("fingerprint"), "'fingerprint'"),
+    "fingerprint is a list": (attribute("fingerprint", ["a", "b"]), "'fingerprint'", "(2,)"),
+    "fingerprint is empty": (attribute("fingerprint", h5py.Empty("S1")), "'fingerprint'"),
+    "fingerprint is no digest": (attribute("fingerprint", "x" * 64), "'fingerprint'"),
+    "writer is long": (attribute("writer", "x" * 2000), "'writer'", "1,000"),
+    "no writer": (gone("writer"), "'writer'"),
+    "other variant": (attribute("variant", "opengl"), "'variant'"),
+    "other conventions": (attribute("conventions", "y down"), "'conventions'"),
+    "release is an array": (attribute("mitsuba_version", np.arange(3)), "'mitsuba_version'"),
+    "no release": (gone("llvm_version"), "'llvm_version'"),
+    "command is a number": (attribute("creation_command", 3), "'creation_command'"),
+    "command is long": (attribute("creation_command", "x" * 4_000_001), "'creation_command'"),
+    "no content digest": (gone("content_digest"), "'content_digest'"),
+    "no digest of truth": (gone("truth_digest"), "'truth_digest'"),
+    "spec is garbage": (attribute("spec", "garbage"), "'spec'"),
+    "spec is bytes": (attribute("spec", np.void(b"\xff\xfe")), "'spec'"),
+    "spec is a list": (attribute("spec", "[]"), "'spec'", "[]"),
+    "spec is deep": (attribute("spec", "[" * 9000), "'spec'"),
+    "spec of the future": (attribute("spec", '{"fog":1}'), "'spec'", "fog"),
+    "spec with a bad value": (attribute("spec", '{"spp":0}'), "'spec'", "spp"),
+    "spec of another size": (attribute("spec", "{}"), "image", "(8, 32, 32, 3)", "128"),
+    "no rows": (emptied, "image"),
+    "no image": (gone("image"), "image"),
+    "no lights": (gone("light"), "'light/count' is missing"),
+    "no scene": (gone("scene"), "'scene' is missing"),
+    "depth is a group": (grouped("depth"), "depth"),
+    "image is a group": (grouped("image"), "image"),
+    "image is one number": (replaced("image", lambda v: 3), "image"),
+    "wrong type": (replaced("depth", lambda v: v.astype("f8")), "float64", "expected float32"),
+    "wrong shape": (replaced("normal", lambda v: v[..., :2]), "2)", "expected (8, 32, 32, 3)"),
+    "rows missing": (replaced("normal", lambda v: v[:5]), "(5, 32", "expected (8, 32, 32, 3)"),
+    "text is numbers": (replaced("scene", lambda v: np.arange(8)), "scene", "expected strings"),
+    "text is floats": (replaced("scene_index", lambda v: v / 2), "float64", "expected int64"),
+    "a dead link": (linked("depth", h5py.SoftLink("/nothing")), "depth", "a link"),
+}
+
+
+def refused(path, *words, row=0):
+    """Check that the reader refuses a file, or one of its rows, in one line."""
+    with pytest.raises(FileFormatError) as caught, open_rooms(path) as rooms:
+        rooms[row]
+    assert caught.value.where.startswith(str(path))
+    text = str(caught.value)
+    assert [word for word in words if word not in text] == [], text
+    assert text.count(str(path)) == 1
+    assert "errno" not in text
+
+
+def ask(refuses, command, path, *words):
+    """Run a command; its line must name the file first, and only once."""
+    line = refuses(command, path, *READERS[command], words=(path.name, *words))
+    assert line.startswith(f"Error: {path}: "), "which file, first of all"
+    assert line.count(str(path)) == 1
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_what_is_no_file_of_rooms_is_refused_by_all(damaged, refuses, kind):
+    edit, *words = REFUSED[kind]
+    path = damaged(edit)
+    refused(path, *words)
+    for command in ("info", "verify"):
+        ask(refuses, command, path, *words)
+
+
+@pytest.mark.parametrize("command", READERS)
+def test_each_command_refuses_what_is_no_hdf5(refuses, tmp_path, rooms_path, command, damaged):
+    ask(refuses, command, tmp_path / "none.h5", "no such file")
+    (tmp_path / "folder.h5").mkdir()
+    ask(refuses, command, tmp_path / "folder.h5", "is a folder")
+    data, path = rooms_path.read_bytes(), tmp_path / "x.h5"
+    for content in (b"", b"hello\n" * 50, b"\x89HDF\r\n\x1a\n" + bytes(500), data[:-1]):
+        path.write_bytes(content)
+        refused(path, "HDF5")
+        ask(refuses, command, path, "HDF5")
+    ask(refuses, command, damaged(attribute("format", "other")), "pix2shape-bench/rooms")
+
+
+@pytest.mark.parametrize("part", [0.0001, 0.01, 0.3, 0.5, 0.9])
+def test_a_file_that_was_cut_is_not_kept_open(tmp_path, rooms_path, part):
+    data, path = rooms_path.read_bytes(), tmp_path / "x.h5"
+    path.write_bytes(data[: int(len(data) * part)])
+    refused(path, "HDF5")
+    path.write_bytes(data)
+    with open_rooms(path) as rooms:
+        assert len(rooms) == 8
+
+
+# Edits of row 5: words of the error of whoever reads it, and a check of verify that fails.
+DAMAGED_ROWS = {
+    **{
+        f"chunk of {name}": (damaged_chunk(name, 5), name, name)
+        for name in ("image", "depth", "normal", "object_id")
+    },
+    **{
+        f"scene {text[:9]!r}": (put("scene", 5, text), "scene", "description")
+        for text in ("{", "", "null", "{}", '"x"', "[1]", b"\xff\xfe", '{"index":5}', "[" * 9000)
+    },
+}
+
+
+@pytest.mark.parametrize("kind", DAMAGED_ROWS)
+def test_a_damaged_row_spoils_itself_only(damaged, refuses, verdict, kind):
+    edit, word, check = DAMAGED_ROWS[kind]
+    path = damaged(edit)
+    refused(path, word, "row 5", row=5)
+    with open_rooms(path) as rooms:
+        assert (rooms[4].index, rooms[6].index) == (4, 6)
+    for command in ("info", "preview", "export"):
+        ask(refuses, command, path, word, "row 5")
+    code, checks, output = verdict(path, "--items", "2")
+    assert (code, checks[check]) == (1, "FAIL")
+    assert "row 5" in output
+
+
+def test_in_a_process_of_its_own(tmp_path, check_refusal, damaged):
+    """As a shell sees it: nothing of HDF5's own errors, nothing at exit."""
+    path = damaged(damaged_chunk("depth", 0))
+    done = subprocess.run(
+        [sys.executable, "-c", "import cli; cli.scenegen()", "export", path.name,
+         "--items", "0", "--format", "ply"],
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    check_refusal(done.returncode, done.stdout, done.stderr, (path.name,))
