@@ -86,7 +86,7 @@ def content_digest(file: h5py.File) -> str:
     """Return the SHA-256, as hex, of every name, type, shape and attribute of a file but its own.
 
     The values of the data sets count through their attribute `sha256`, which
-    `row_file.digest_problems` checks. Raises whatever HDF5 raises on a damaged file
+    `rows.content_problems` checks. Raises whatever HDF5 raises on a damaged file
     (`input_file.HDF5_ERRORS`).
     """
     lines = []

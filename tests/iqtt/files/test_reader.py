@@ -21,7 +21,7 @@ from iqtt.files.reader import (
 )
 from iqtt.shapes.polycube import canonical, set_ids
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.files.shards import open_with_shards
+from scenegen.files.shards import OpenFile
 
 TABLES = [  # of the tiny split: file, part, answers told, truth told
     ("iqtt-train.h5", "labeled", True, True),
@@ -287,9 +287,9 @@ def test_each_process_opens_the_file_once(split_folder, monkeypatch):
 
     def counting(*arguments):
         opened.append(os.getpid())
-        return open_with_shards(*arguments)
+        return OpenFile(*arguments)
 
-    monkeypatch.setattr("iqtt.files.tables.open_with_shards", counting)
+    monkeypatch.setattr("iqtt.files.reader.OpenFile", counting)
     for process in (1, 1, 2, 2):
         monkeypatch.setattr("os.getpid", lambda process=process: process)
         data[0], data[1]

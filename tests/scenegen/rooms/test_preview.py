@@ -8,14 +8,8 @@ from PIL import Image
 
 from scenegen import open_rooms
 from scenegen.common.errors import SpecError
-from scenegen.rooms.preview import (
-    contact_sheet,
-    depth_bytes,
-    pick_rows,
-    save_picture,
-    srgb_bytes,
-    tiles,
-)
+from scenegen.files.pictures import pick_rows, save_picture
+from scenegen.rooms.preview import contact_sheet, depth_bytes, srgb_bytes, tiles
 
 BACKGROUND = 250
 TILE = 128  # images of 32 pixels are shown four times as large
