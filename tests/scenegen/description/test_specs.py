@@ -23,7 +23,7 @@ COLOR = st.tuples(UNIT, UNIT, UNIT)
 INSIDE = st.floats(0.01, 0.99)
 
 
-def rising(values: st.SearchStrategy[Any]) -> st.SearchStrategy[tuple[Any, Any]]:
+def rising(values):
     return st.tuples(values, values).map(lambda pair: (min(pair), max(pair)))
 
 
@@ -118,7 +118,7 @@ SHOWN = {"height": "size", "width": "size", "fov_degrees": "fov"}  # where not t
 
 @settings(deadline=None)
 @given(scene=SCENES)
-def test_scene_json_keeps_every_bit(scene: SceneSpec) -> None:
+def test_scene_json_keeps_every_bit(scene):
     again = SceneSpec.from_json(scene.to_json())
     assert again == scene
     assert again.to_json() == scene.to_json()
@@ -128,7 +128,7 @@ def test_scene_json_keeps_every_bit(scene: SceneSpec) -> None:
 
 @settings(deadline=None)
 @given(spec=DATASETS)
-def test_request_json_keeps_every_bit(spec: DatasetSpec) -> None:
+def test_request_json_keeps_every_bit(spec):
     again = DatasetSpec.from_json(spec.to_json())
     assert again == spec
     assert hash(again) == hash(spec)
@@ -138,7 +138,7 @@ def test_request_json_keeps_every_bit(spec: DatasetSpec) -> None:
 @pytest.mark.parametrize(
     ("field", "value"), [(field, value) for field, some in OUT_OF_RANGE.items() for value in some]
 )
-def test_a_setting_out_of_range_is_named(field: str, value: Any) -> None:
+def test_a_setting_out_of_range_is_named(field, value):
     name = SHOWN.get(field, field.replace("_", " "))
     with pytest.raises(SpecError) as caught:
         DatasetSpec(**{field: value})
@@ -166,7 +166,7 @@ def test_a_setting_out_of_range_is_named(field: str, value: Any) -> None:
     ],
     ids=lambda settings: str(settings)[:50],
 )
-def test_settings_that_contradict_one_another_are_refused(settings: dict[str, Any]) -> None:
+def test_settings_that_contradict_one_another_are_refused(settings):
     with pytest.raises(SpecError) as caught:
         DatasetSpec(**settings)
     assert caught.value.where in (*settings, "classes")
@@ -191,7 +191,7 @@ def test_settings_that_contradict_one_another_are_refused(settings: dict[str, An
     ],
     ids=str,
 )
-def test_what_no_scene_can_be_is_refused(change: dict[str, Any]) -> None:
+def test_what_no_scene_can_be_is_refused(change):
     scene = sample_scene(DatasetSpec(objects=(1, 1)), 0)
     assert scene is not None
     raw = json.loads(scene.to_json())
@@ -205,7 +205,7 @@ def test_what_no_scene_can_be_is_refused(change: dict[str, Any]) -> None:
     assert caught.value.where in (key, "camera")
 
 
-def test_every_setting_with_a_range_is_tried_above() -> None:
+def test_every_setting_with_a_range_is_tried_above():
     assert {f.name for f in fields(DatasetSpec)} - set(OUT_OF_RANGE) == {
         "shadows",
         "allow_cropped",
@@ -214,21 +214,21 @@ def test_every_setting_with_a_range_is_tried_above() -> None:
     }
 
 
-def test_slots_hold_the_most_and_are_never_none() -> None:
+def test_slots_hold_the_most_and_are_never_none():
     full = DatasetSpec(objects=(1, 5), lights=(0, 4))
     assert (full.object_slots, full.light_slots) == (5, 4)
     empty = DatasetSpec(objects=(0, 0), lights=(0, 0))
     assert (empty.object_slots, empty.light_slots) == (1, 1)
 
 
-def fingerprint(spec: DatasetSpec, *lines: str) -> str:
+def fingerprint(spec, *lines):
     found = Fingerprint(spec)
     for line in lines:
         found.add(line.encode())
     return found.hex
 
 
-def test_fingerprints_are_what_files_hold_today() -> None:
+def test_fingerprints_are_what_files_hold_today():
     """SHA-256 over sorted, compact JSON and one line a scene; another definition breaks files."""
     settings_by_name = {f.name: getattr(DatasetSpec(), f.name) for f in fields(DatasetSpec)}
     request = json.dumps(settings_by_name, sort_keys=True, separators=(",", ":"))
@@ -236,7 +236,7 @@ def test_fingerprints_are_what_files_hold_today() -> None:
     assert fingerprint(DatasetSpec(), "one", "two") == expected
 
 
-def test_fingerprints_notice_scenes_and_their_borders() -> None:
+def test_fingerprints_notice_scenes_and_their_borders():
     lines: list[list[str]] = [[], ["a"], ["b"], ["a", "b"], ["b", "a"], ["ab"], ["a", ""]]
     assert len({fingerprint(DatasetSpec(), *scenes) for scenes in lines}) == len(lines)
 
@@ -249,7 +249,5 @@ def test_fingerprints_notice_scenes_and_their_borders() -> None:
         ({"ambient": (0.0, -0.0, 0.0)}, {"ambient": (0.0, 0.0, 0.0)}),
     ],
 )
-def test_equal_requests_have_equal_fingerprints(
-    settings: dict[str, Any], alike: dict[str, Any]
-) -> None:
+def test_equal_requests_have_equal_fingerprints(settings, alike):
     assert fingerprint(DatasetSpec(**settings)) == fingerprint(DatasetSpec(**alike))

@@ -1,57 +1,64 @@
 """The kernel against Embree, on whole scenes and through the numpy renderer."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from model_rooms import folder_objects, folder_spec, some_scenes
 from other_engines import cast_whole_scene, near_silhouettes
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from scenegen.camera import Camera, pixel_directions
+from scenegen.description.presets import preset_spec
 from scenegen.description.scenes import SHAPE_NAMES, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
-from scenegen.rendering.ground_truth import GroundTruth
-from scenegen.rendering.numpy_renderer import Cast, render_in_numpy
+from scenegen.objects.catalogue import objects_of
+from scenegen.rendering.numpy_renderer import render_in_numpy
 from scenegen.rendering.packing import pack
 from scenegen.rendering.pixel_samples import sample_positions
 from scenegen.rendering.renderer import render
 
-Array = NDArray[Any]
-Scenes = Callable[[DatasetSpec, int], list[SceneSpec]]
 FLOAT = DatasetSpec(image_dtype="float32", seed=11)
 SMALL = replace(FLOAT, height=47, width=61, objects=(2, 3), min_visible_pixels=0)
 
 
-def check_against_whole_scenes(spec: DatasetSpec, scenes: list[SceneSpec]) -> None:
-    truth = render(pack(spec, scenes))
-    cast = [cast_whole_scene(scene, spec) for scene in scenes]
+def check_against_whole_scenes(spec, scenes, objects=None):
+    """Check that depth and ids are those of another ray caster, but for silhouettes."""
+    objects = objects or objects_of(spec)
+    truth = render(pack(spec, scenes, objects=objects))
+    cast = [cast_whole_scene(scene, spec, objects.shape) for scene in scenes]
     depth, object_id, normal = (np.stack(part) for part in zip(*cast, strict=True))
     off = ~(abs(truth.depth - depth) <= 1e-4)
-    assert off.mean() <= 1e-3
-    edges = near_silhouettes(truth.object_id)
+    steps = np.stack([maximum_filter(d, 3) - minimum_filter(d, 3) for d in depth])
+    edges = near_silhouettes(truth.object_id) | (steps > 0.02)  # of an object's own parts, too
+    assert off.mean() <= 2e-3
     assert not (off & ~edges).any(), "depth disagrees away from silhouettes"
     assert not ((truth.object_id != object_id) & ~edges).any()
     facing = abs((truth.normal * normal).sum(axis=-1))  # faces of curved shapes and of open ones
-    assert np.quantile(facing, 1e-3) > 0.97, "but for pixels on creases"
-    assert set(np.unique(truth.object_id)) == set(range(spec.objects[1] + 1))
+    assert np.quantile(facing, 0.01) > 0.9, "smooth normals are near the faces'"
+    assert (truth.object_id > 0).mean() > 0.02
 
 
-def test_whole_scenes_agree_with_another_engine(scenes_of: Scenes) -> None:
-    check_against_whole_scenes(FLOAT, scenes_of(FLOAT, 12))
+@pytest.mark.parametrize("name", ["shapes", "shapenet", "furniture-256", "folder"])
+def test_whole_scenes_agree_with_another_engine(name, model_folder):
+    if name == "folder":
+        spec, objects = folder_spec(model_folder), folder_objects(model_folder)
+    else:
+        spec = replace(preset_spec(name), image_dtype="float32", seed=11)
+        objects = objects_of(spec)
+    check_against_whole_scenes(spec, some_scenes(spec, objects, 4), objects)
 
 
 @pytest.mark.slow
-def test_a_hundred_whole_scenes_agree_with_another_engine(scenes_of: Scenes) -> None:
+def test_a_hundred_whole_scenes_agree_with_another_engine(scenes_of):
     spec = replace(FLOAT, seed=0, pose="any")
     check_against_whole_scenes(spec, scenes_of(spec, 50))
     spec = replace(FLOAT, seed=1, width=160, height=96, allow_cropped=True, objects=(1, 5))
     check_against_whole_scenes(spec, scenes_of(spec, 50))
 
 
-def compare(ours: GroundTruth, theirs: GroundTruth) -> None:
+def compare(ours, theirs):
     """Check that all pixels agree except on silhouettes, and there more than 99.9%."""
     edges = near_silhouettes(ours.object_id)
     same = ours.object_id == theirs.object_id
@@ -66,9 +73,7 @@ def compare(ours: GroundTruth, theirs: GroundTruth) -> None:
 
 
 @pytest.mark.parametrize("name", SHAPE_NAMES)
-def test_each_shape_agrees_in_depth_normal_and_image(
-    name: str, scenes_of: Scenes, embree_cast: Cast
-) -> None:
+def test_each_shape_agrees_in_depth_normal_and_image(name, scenes_of, embree_cast):
     spec = replace(SMALL, shapes=(name,), pose="any", shadows=True)
     batch = pack(spec, scenes_of(spec, 3))
     truth = render(batch)
@@ -76,7 +81,7 @@ def test_each_shape_agrees_in_depth_normal_and_image(
     compare(truth, render_in_numpy(batch, embree_cast))
 
 
-def test_normals_face_the_viewer_inside_open_shapes_too(embree_cast: Cast) -> None:
+def test_normals_face_the_viewer_inside_open_shapes_too(embree_cast):
     """Into a teapot's spout from above, where its inside is seen, and along its coarse outline."""
     camera = Camera((0.7, 2.0, 0.5), (0.5, 0.5, 0.5), 22.0)
     teapot = PlacedObject("teapot", (0.5, 0.5, 0.5), (1.0, 0.0, 0.0, 0.0), 0.5, (0.8, 0.8, 0.8))
@@ -93,9 +98,7 @@ def test_normals_face_the_viewer_inside_open_shapes_too(embree_cast: Cast) -> No
     assert (abs(truth.normal[0] - expected).max(axis=-1)[inside] < 1e-3).mean() > 0.95
 
 
-def test_scenes_without_a_room_agree_and_show_their_background(
-    scenes_of: Scenes, embree_cast: Cast
-) -> None:
+def test_scenes_without_a_room_agree_and_show_their_background(scenes_of, embree_cast):
     sky = (0.2, 0.3, 0.4)
     floating = [
         replace(scene, room_reflectance=None, background=sky) for scene in scenes_of(SMALL, 4)
@@ -110,7 +113,7 @@ def test_scenes_without_a_room_agree_and_show_their_background(
     np.testing.assert_array_equal(truth.image[missed], np.float32(sky) * np.ones((missed.sum(), 1)))
 
 
-def test_shadows_agree_and_are_there(scenes_of: Scenes, embree_cast: Cast) -> None:
+def test_shadows_agree_and_are_there(scenes_of, embree_cast):
     scenes = scenes_of(SMALL, 5)
     lit, shadowed = (render(pack(replace(SMALL, shadows=s), scenes)) for s in (False, True))
     dark = (lit.image - shadowed.image).max(axis=-1) > 0.01
@@ -122,7 +125,7 @@ def test_shadows_agree_and_are_there(scenes_of: Scenes, embree_cast: Cast) -> No
     assert wrong.mean() < 2e-3, "but for some pixels on the shadows' borders"
 
 
-def test_samples_start_at_the_centre_and_cover_the_pixel() -> None:
+def test_samples_start_at_the_centre_and_cover_the_pixel():
     assert sample_positions(1).tolist() == [[0.5, 0.5]]
     many = sample_positions(256)
     np.testing.assert_array_equal(many[:16], sample_positions(16))
@@ -130,12 +133,12 @@ def test_samples_start_at_the_centre_and_cover_the_pixel() -> None:
     assert np.bincount(cells, minlength=64).min() >= 2, "four a cell on average"
 
 
-def test_supersampling_agrees_sample_by_sample(scenes_of: Scenes, embree_cast: Cast) -> None:
+def test_supersampling_agrees_sample_by_sample(scenes_of, embree_cast):
     batch = pack(replace(SMALL, spp=5), scenes_of(SMALL, 2))
     compare(render(batch), render_in_numpy(batch, embree_cast))
 
 
-def test_supersampling_converges_and_leaves_the_truth_alone(scenes_of: Scenes) -> None:
+def test_supersampling_converges_and_leaves_the_truth_alone(scenes_of):
     """To the mean of 8 x 8 pixels of an image eight times as large."""
     spec = replace(SMALL, height=32, width=48)
     scenes = scenes_of(spec, 4)

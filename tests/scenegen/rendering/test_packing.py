@@ -28,7 +28,7 @@ BARE = replace(FULL, index=5, objects=(), lights=(), room_reflectance=None)
 LAST = replace(FULL, index=6, objects=(CONE,), lights=(LAMP,))
 
 
-def test_every_number_is_in_its_slot() -> None:
+def test_every_number_is_in_its_slot():
     batch = pack(SPEC, [FULL, BARE, LAST])
     assert len(batch) == 3
     assert batch.object_count.tolist() == [2, 0, 1]
@@ -53,14 +53,14 @@ def test_every_number_is_in_its_slot() -> None:
 
 
 @pytest.mark.parametrize("view", [0, 1])
-def test_the_view_asked_for_is_the_one_packed(view: int) -> None:
+def test_the_view_asked_for_is_the_one_packed(view):
     batch = pack(SPEC, [FULL, LAST], (view,))
     expected = VIEWS[view].world_from_camera
     np.testing.assert_array_equal(batch.world_from_camera, [expected, expected])
     assert batch.fov_y_degrees.tolist() == [VIEWS[view].fov_y_degrees] * 2
 
 
-def test_several_views_follow_scene_after_scene() -> None:
+def test_several_views_follow_scene_after_scene():
     shiny = replace(LAST, objects=(replace(CONE, specular=0.25, shininess=7.0),))
     batch = pack(SPEC, [FULL, BARE, shiny], (1, 0))
     assert len(batch) == 6
@@ -78,7 +78,7 @@ def test_several_views_follow_scene_after_scene() -> None:
 
 @pytest.mark.parametrize("start", range(4))
 @pytest.mark.parametrize("count", [1, 2, 5])
-def test_rows_are_a_part_of_every_array(start: int, count: int) -> None:
+def test_rows_are_a_part_of_every_array(start, count):
     batch = pack(SPEC, [FULL, BARE, LAST], (0, 1))
     some = batch.rows(start, start + count)
     rows = slice(start, start + count)
@@ -98,7 +98,7 @@ def test_rows_are_a_part_of_every_array(start: int, count: int) -> None:
 
 
 @pytest.mark.parametrize("views", [(2,), (0, 2), (-1,), (0, -1), (1, 5)])
-def test_views_that_a_scene_lacks_are_refused(views: tuple[int, ...]) -> None:
+def test_views_that_a_scene_lacks_are_refused(views):
     """-1 must not mean the last view."""
     with pytest.raises(SpecError) as refused:
         pack(SPEC, [FULL], views)
@@ -107,7 +107,7 @@ def test_views_that_a_scene_lacks_are_refused(views: tuple[int, ...]) -> None:
     assert error.expected == "views from 0 to 1"
 
 
-def test_models_are_known_by_class_and_number() -> None:
+def test_models_are_known_by_class_and_number():
     spec = replace(SPEC, source="families", shapes=("mug", "can"))
     mug, can = replace(CONE, shape="mug/0007"), replace(BOX, shape="can/0001")
     batch = pack(spec, [replace(FULL, objects=(mug, can, mug)), replace(LAST, objects=(can,))])
@@ -118,7 +118,7 @@ def test_models_are_known_by_class_and_number() -> None:
         pack(spec, [replace(FULL, objects=(replace(CONE, shape="bowl/0001"),))])
 
 
-def test_a_folders_models_need_the_folder() -> None:
+def test_a_folders_models_need_the_folder():
     spec = replace(SPEC, source="folder", shapes=("mug",), listing="0" * 64)
     for source, option in (("folder", "--objects-root"), ("shapenet-v1", "--shapenet-root")):
         with pytest.raises(SpecError) as refused:
@@ -127,7 +127,7 @@ def test_a_folders_models_need_the_folder() -> None:
         assert option in refused.value.expected
 
 
-def test_empty_rooms_alone_can_be_packed() -> None:
+def test_empty_rooms_alone_can_be_packed():
     batch = pack(replace(SPEC, objects=(0, 0), lights=(0, 0)), [BARE])
     assert batch.world_from_object.shape == (1, 1, 4, 4)
     assert batch.light_position.shape == (1, 1, 3)
@@ -142,14 +142,12 @@ def test_empty_rooms_alone_can_be_packed() -> None:
         ({"objects": (replace(BOX, shape="torus"),)}, "scene shapes", "['torus']"),
     ],
 )
-def test_a_scene_beyond_the_request_is_refused(
-    change: dict[str, object], where: str, found: str
-) -> None:
+def test_a_scene_beyond_the_request_is_refused(change, where, found):
     with pytest.raises(SpecError) as refused:
         pack(SPEC, [BARE, replace(FULL, **change)])
     assert (refused.value.where, refused.value.found) == (where, found)
 
 
-def test_pixel_size_at_depth_one() -> None:
+def test_pixel_size_at_depth_one():
     sizes = [pixel_size(10, fov) for fov in (90.0, 60.0)]
     np.testing.assert_allclose(sizes, [0.2, 0.2 / 3**0.5])

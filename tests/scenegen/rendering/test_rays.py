@@ -6,20 +6,16 @@ cosine of 0.02 depth is held to 2e-7 / cosine, beyond 0.2 normals are held to 2e
 """
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from scenegen.camera import Camera, pixel_directions
 from scenegen.description.scenes import PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
-from scenegen.rendering.ground_truth import GroundTruth
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import render
 
-Array = NDArray[Any]
 SPEC = DatasetSpec(
     height=48, width=64, objects=(0, 3), lights=(0, 0), shapes=("cone", "sphere"),
     min_visible_pixels=0, image_dtype="float32",
@@ -27,12 +23,12 @@ SPEC = DatasetSpec(
 GREY = (0.8, 0.8, 0.8)
 
 
-def point(values: Any) -> tuple[float, float, float]:
+def point(values):
     x, y, z = (float(v) for v in values)
     return x, y, z
 
 
-def random_scene(index: int) -> SceneSpec:
+def random_scene(index):
     """Up to three spheres, which may intersect each other and the walls, from any viewpoint."""
     rng = np.random.default_rng(index)
     around = abs(rng.standard_normal(3))
@@ -50,7 +46,7 @@ def random_scene(index: int) -> SceneSpec:
     return SceneSpec(index, (camera,), tuple(spheres), (), (0.1,) * 3, (0.5, 0.5), GREY)
 
 
-def closed_form(scene: SceneSpec, height: int, width: int) -> tuple[Array, Array, Array, Array]:
+def closed_form(scene, height, width):
     """Depth, camera-frame normal, object id and cosine of incidence of all pixels."""
     camera = scene.cameras[0]
     matrix = camera.world_from_camera
@@ -78,16 +74,16 @@ def closed_form(scene: SceneSpec, height: int, width: int) -> tuple[Array, Array
 
 
 @pytest.fixture(scope="module")
-def scenes() -> list[SceneSpec]:
+def scenes():
     return [random_scene(index) for index in range(60)]
 
 
 @pytest.fixture(scope="module")
-def truth(scenes: list[SceneSpec]) -> GroundTruth:
+def truth(scenes):
     return render(pack(SPEC, scenes))
 
 
-def test_spheres_and_planes_are_exact(scenes: list[SceneSpec], truth: GroundTruth) -> None:
+def test_spheres_and_planes_are_exact(scenes, truth):
     lengths = np.linalg.norm(truth.normal[truth.object_id >= 0], axis=-1)
     np.testing.assert_allclose(lengths, 1.0, atol=1e-6)
     pixels = {-1: 0, 0: 0, 1: 0}

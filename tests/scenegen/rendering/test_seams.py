@@ -1,40 +1,34 @@
 """No ray slips through the edges between triangles, wherever a model is placed."""
 
 import importlib
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from types import ModuleType
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from scenegen.objects import cast_meshes
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.catalogue import built_in_shape
-from scenegen.objects.solids import UnitShape
 
-Array = NDArray[Any]
 RAYS = 40_000
 BASIC = ("box", "torus", "teapot", "icosahedron", "cone")
 MODELS = ("mug/0001", "chair/0002", "bottle/0003", "bag/0004", "table/0005")
 
 
 @pytest.fixture(scope="module")
-def unit(variant: str) -> ModuleType:
+def unit(variant):
     """Return the module of unit scenes, whose import needs the variant to be chosen."""
     return importlib.import_module("scenegen.rendering.unit_scene")
 
 
 @pytest.fixture(scope="module")
-def models(variant: str) -> ModuleType:
+def models(variant):
     """Return the module of models' scenes, whose import needs it, too."""
     return importlib.import_module("scenegen.rendering.model_scene")
 
 
-def slips(unit: Any, i: int, shape: UnitShape, seed: int = 0) -> int:
+def slips(unit, i, shape, seed=0):
     """Count rays that pass a point of an edge of a triangle that faces them."""
     import mitsuba as mi
 
@@ -60,13 +54,11 @@ def slips(unit: Any, i: int, shape: UnitShape, seed: int = 0) -> int:
     return int((late & (abs(cosine) > 0.2)).sum())
 
 
-def test_no_ray_slips_through_basic_shapes_and_without_overlap_some_do(
-    variant: str, unit: ModuleType, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_ray_slips_through_basic_shapes_and_without_overlap_some_do(variant, unit, monkeypatch):
     """Cast as meshes, as the teapot is."""
     meshes = tuple(replace(unit_shape(name), surface=None) for name in BASIC)
 
-    def count(build: Callable[..., Any]) -> list[int]:
+    def count(build):
         scene = build(variant, meshes)
         return [slips(scene, i, unit_shape(name)) for i, name in enumerate(BASIC)]
 
@@ -77,14 +69,11 @@ def test_no_ray_slips_through_basic_shapes_and_without_overlap_some_do(
 
 @pytest.mark.parametrize("names", [BASIC, MODELS], ids=["basic", "families"])
 def test_no_ray_slips_through_models_and_without_overlap_some_do(
-    names: tuple[str, ...],
-    variant: str,
-    models: ModuleType,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    names, variant, models, monkeypatch
+):
     """At the middle of a lattice of 5 x 5 x 5, and at either end."""
 
-    def count() -> int:
+    def count():
         own = partial(built_in_shape)  # models are kept by where they come from
         others = names[:1] * 50
         scene = models.model_scene(variant, own, [*names, *others, *names, *others, *names])
@@ -97,9 +86,7 @@ def test_no_ray_slips_through_models_and_without_overlap_some_do(
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 9, 700, "most"])
-def test_places_of_models_are_exact_in_single_precision(
-    count: Any, variant: str, models: ModuleType
-) -> None:
+def test_places_of_models_are_exact_in_single_precision(count, variant, models):
     """Coordinates stay below 16, so that every point of the grid is a float32."""
     count = models.MOST_MODELS if count == "most" else count
     found = models.model_scene(variant, unit_shape, ["tetrahedron"] * count)

@@ -7,7 +7,7 @@ import pytest
 
 
 @pytest.mark.parametrize("width", [1, 3, 4, 5, 12, 29])
-def test_rows_are_gathered_as_they_were_uploaded(width: int, variant: str) -> None:
+def test_rows_are_gathered_as_they_were_uploaded(width, variant):
     import mitsuba as mi
 
     tables = importlib.import_module("scenegen.rendering.tables")

@@ -18,7 +18,7 @@ DIRECTIONS = rounded(DIRECTIONS / np.linalg.norm(DIRECTIONS, axis=1)[:, None], D
 
 
 @pytest.mark.parametrize("coarse", [False, True])
-def test_reach_is_the_support_of_each_shape(coarse: bool) -> None:
+def test_reach_is_the_support_of_each_shape(coarse):
     found = BODIES.reach(KIND, TURN, DIRECTIONS, coarse)
     expected = [SHAPES[k].support(DIRECTIONS @ turn) for k, turn in zip(KIND, TURN, strict=True)]
     more = found - np.array(expected)
@@ -29,7 +29,7 @@ def test_reach_is_the_support_of_each_shape(coarse: bool) -> None:
     assert len(SHAPES[SHAPE_NAMES.index("teapot")].hull_points) > 4 * COARSE_CORNERS
 
 
-def test_sums_of_rounded_products_are_exact_in_any_order() -> None:
+def test_sums_of_rounded_products_are_exact_in_any_order():
     """So that libraries which add in other orders, or fuse, find the same bits."""
     points = rounded(RNG.uniform(-1, 1, (3, 5000)), 2.0**-26)
     some = points * DIRECTIONS[:50].T[:, :, None].repeat(100, axis=1).reshape(3, 5000)
@@ -40,7 +40,7 @@ def test_sums_of_rounded_products_are_exact_in_any_order() -> None:
     assert ((loose[0] + loose[1]) + loose[2] != loose[0] + (loose[1] + loose[2])).any()
 
 
-def test_the_nearest_resting_side() -> None:
+def test_the_nearest_resting_side():
     down = Rotation.random(200, rng=RNG).as_matrix()[:, 0]
     for k, one, side in zip(KIND, down, BODIES.resting_side(KIND, down), strict=True):
         sides = SHAPES[k].resting_directions

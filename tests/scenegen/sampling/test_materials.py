@@ -1,26 +1,20 @@
 """Colours of objects, room and lights, as requested, as stored and as seen."""
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.stats import kstest
 
-from scenegen.description.scenes import Light, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.sampling.scenes import sample_scene
 
-Array = NDArray[Any]
 SPARSE = DatasetSpec(objects=(1, 4), object_radius=(0.03, 0.04), seed=6)
 
 
-def scenes(spec: DatasetSpec, count: int) -> list[SceneSpec]:
+def scenes(spec, count):
     found = [sample_scene(spec, index) for index in range(count)]
     return [scene for scene in found if scene is not None]
 
@@ -34,9 +28,7 @@ def scenes(spec: DatasetSpec, count: int) -> list[SceneSpec]:
     ],
     ids=["two-tone", "albedo", "albedo of models"],
 )
-def test_under_ambient_light_an_image_shows_the_stored_reflectance(
-    settings: dict[str, Any], make_rooms: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_under_ambient_light_an_image_shows_the_stored_reflectance(settings, make_rooms, tmp_path):
     path = make_rooms(tmp_path / "x.h5", 4, lights=(0, 0), ambient=(0.25, 0.5, 1.0), objects=(2, 3),
                       image_dtype="float32", specular=(0.5, 0.5), **settings)  # fmt: skip
     with h5py.File(path) as file:
@@ -53,7 +45,7 @@ def test_under_ambient_light_an_image_shows_the_stored_reflectance(
             ].tolist()
 
 
-def test_random_reflectance_is_uniform_and_each_objects_own() -> None:
+def test_random_reflectance_is_uniform_and_each_objects_own():
     spec = replace(SPARSE, random_reflectance=True)
     found = np.array([o.reflectance for s in scenes(spec, 200) for o in s.objects])
     assert len(found) > 300
@@ -65,7 +57,7 @@ def test_random_reflectance_is_uniform_and_each_objects_own() -> None:
     assert {s.room_reflectance for s in scenes(spec, 5)} == {spec.room_reflectance}
 
 
-def test_specular_and_shininess_are_uniform_in_their_ranges_and_independent() -> None:
+def test_specular_and_shininess_are_uniform_in_their_ranges_and_independent():
     spec = replace(SPARSE, specular=(0.2, 0.6), shininess=(5.0, 45.0))
     found = np.array([(o.specular, o.shininess) for s in scenes(spec, 200) for o in s.objects])
     assert kstest(found[:, 0], "uniform", (0.2, 0.4)).pvalue > 0.01
@@ -73,7 +65,7 @@ def test_specular_and_shininess_are_uniform_in_their_ranges_and_independent() ->
     assert abs(np.corrcoef(found.T)[0, 1]) < 4 / len(found) ** 0.5
 
 
-def test_materials_change_nothing_else() -> None:
+def test_materials_change_nothing_else():
     """Other attempts at a scene do not change its materials, either."""
     glossy = replace(SPARSE, random_reflectance=True, specular=(0.2, 0.6), shininess=(5.0, 45.0))
     for plain, painted in zip(scenes(SPARSE, 8), scenes(glossy, 8), strict=True):
@@ -88,13 +80,13 @@ def test_materials_change_nothing_else() -> None:
             assert looks[0] == looks[1]
 
 
-def lights(saturation: float, count: int = 150, **settings: Any) -> list[Light]:
+def lights(saturation, count=60, **settings):
     spec = DatasetSpec(objects=(0, 0), light_saturation=saturation, **settings)
     return [light for scene in scenes(spec, count) for light in scene.lights]
 
 
-def test_saturation_is_how_far_channels_may_fall_below_the_brightest() -> None:
-    def ratios(saturation: float) -> Array:
+def test_saturation_is_how_far_channels_may_fall_below_the_brightest():
+    def ratios(saturation):
         colors = np.array([light.color for light in lights(saturation)])
         return np.sort(colors / colors.max(axis=1, keepdims=True), axis=1)
 
@@ -107,7 +99,7 @@ def test_saturation_is_how_far_channels_may_fall_below_the_brightest() -> None:
 
 
 @pytest.mark.parametrize("saturation", [0.0, 0.7, 1.0])
-def test_saturation_moves_no_light_and_keeps_the_level(saturation: float) -> None:
+def test_saturation_moves_no_light_and_keeps_the_level(saturation):
     """On a white surface at the target, facing all lights, the brightest channels add up to it."""
     some = {"lights": (1, 5), "light_level": 0.6, "attenuation": (0.2, 0.9), "light_radius": 3.0}
     found = lights(saturation, 20, **some)

@@ -1,7 +1,6 @@
 """Which models scenes show: drawn uniformly, split by split, each by a stream of its own."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -11,7 +10,7 @@ from scenegen.objects.catalogue import built_in_shape, objects_of
 from scenegen.rooms.make import make_dataset
 
 
-def test_splits_of_families_share_no_model(tmp_path: Path) -> None:
+def test_splits_of_families_share_no_model(tmp_path):
     by_split = {}
     for split in ("train", "val", "test", "all"):
         spec = replace(FAMILIES, object_split=split, objects=(2, 3), object_radius=(0.06, 0.1))
@@ -31,17 +30,17 @@ def test_splits_of_families_share_no_model(tmp_path: Path) -> None:
     assert len(train) > len(by_split["all"]) / 2
 
 
-def test_classes_and_models_are_drawn_uniformly() -> None:
+def test_classes_and_models_are_drawn_uniformly():
     spec = replace(FAMILIES, objects=(3, 3), object_radius=(0.02, 0.03), shapes=("mug", "can"))
-    names = [o.shape for s in some_scenes(spec, objects_of(spec), 150) for o in s.objects]
+    names = [o.shape for s in some_scenes(spec, objects_of(spec), 40) for o in s.objects]
     mugs = [name for name in names if name.startswith("mug/")]
     assert abs(len(mugs) - len(names) / 2) < 3 * (len(names) / 4) ** 0.5
-    assert len(set(names)) > 0.8 * len(names), "of 1000 each, two seldom alike"
+    assert len(set(names)) > 0.9 * len(names), "of 1000 each, two seldom alike"
     numbers = np.array([int(name.split("/")[1]) for name in names])
-    assert np.bincount(numbers // 250, minlength=4).min() > len(names) / 8
+    assert np.bincount(numbers // 250, minlength=4).min() > len(names) / 10
 
 
-def test_drawing_another_class_for_one_object_changes_no_other() -> None:
+def test_drawing_another_class_for_one_object_changes_no_other():
     """The k-th object's model has a stream of its own."""
     spec = replace(FAMILIES, objects=(3, 3), object_radius=(0.02, 0.03))
     wide, one = (some_scenes(replace(spec, shapes=s), objects_of(replace(spec, shapes=s)), 5)
@@ -51,7 +50,7 @@ def test_drawing_another_class_for_one_object_changes_no_other() -> None:
             assert a.shape.split("/")[1] == b.shape.split("/")[1]
 
 
-def test_scene_descriptions_of_models_name_the_file_behind_them(model_folder: Path) -> None:
+def test_scene_descriptions_of_models_name_the_file_behind_them(model_folder):
     objects = folder_objects(model_folder)
     scenes = some_scenes(folder_spec(model_folder), objects, 6)
     for item in (o for scene in scenes for o in scene.objects):

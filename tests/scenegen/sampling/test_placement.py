@@ -1,12 +1,9 @@
 """Places and poses: true must be a proof, and every draw uniform where it says so."""
 
 import math
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import chisquare, kstest
 
@@ -27,30 +24,27 @@ from scenegen.sampling.placement import (
 )
 from scenegen.sampling.poses import random_rotations
 
-Array = NDArray[Any]
 CAMERA = Camera((1.2, 1.1, 1.3), (0.3, 0.3, 0.3), 30.0)
 
 
-def supports(name: str, rotation: Array, scale: float) -> Array:
+def supports(name, rotation, scale):
     """Along SEPARATORS, (1, 80)."""
     bodies = Bodies([unit_shape(name)])
     return scale * bodies.reach(np.zeros(1, int), rotation[None], SEPARATORS, coarse=True)
 
 
-def numbers(count: int, each: int, seed: int = 0) -> Array:
+def numbers(count, each, seed=0):
     return item_numbers(seed, np.arange(count), Purpose.POSES, count=each)
 
 
-def frustums(cameras: list[Camera], height: int = 9, width: int = 9) -> Frustums:
+def frustums(cameras, height=9, width=9):
     poses = np.array([camera.world_from_camera for camera in cameras]).reshape(1, -1, 4, 4)
     fov = cameras[0].fov_y_degrees if cameras else 30.0
     turns = poses[..., :3, :3].swapaxes(-1, -2)
     return Frustums(poses[..., :3, 3], turns, border_normals(fov, height, width))
 
 
-def places_of_boxes(
-    count: int, scale: float, cameras: list[Camera], placed: list[Array], seed: int = 0
-) -> tuple[Array, Array]:
+def places_of_boxes(count, scale, cameras, placed, seed=0):
     """Look for places of upright boxes, with their centres in the image."""
     reach = np.repeat(supports("box", np.eye(3), scale), count, axis=0)
     border = np.zeros((count, len(cameras), 4))
@@ -61,7 +55,7 @@ def places_of_boxes(
     return find_places(rows, reach, down, border, frustums(cameras), others, draws)
 
 
-def test_separators_are_unit_directions_all_around() -> None:
+def test_separators_are_unit_directions_all_around():
     np.testing.assert_allclose(np.linalg.norm(SEPARATORS, axis=1), 1.0, atol=1e-7)
     upright = SEPARATORS[abs(SEPARATORS[:, 1]) < 1e-12]
     azimuth = np.sort(np.degrees(np.arctan2(upright[:, 2], upright[:, 0])))
@@ -69,9 +63,7 @@ def test_separators_are_unit_directions_all_around() -> None:
     assert len(upright) == 48
 
 
-def test_apart_is_a_proof_and_seldom_missed(
-    gap_between: Callable[[Array, Array], float], unit_corners: Callable[[str], Array]
-) -> None:
+def test_apart_is_a_proof_and_seldom_missed(gap_between, unit_corners):
     """Random pairs about to touch. The proof: a linear program over all the corners."""
     rng = np.random.default_rng(5)
     names = ("box", "cone", "tetrahedron", "teapot", "cylinder", "pyramid")
@@ -97,7 +89,7 @@ def test_apart_is_a_proof_and_seldom_missed(
     assert missed <= 15
 
 
-def test_apart_keeps_the_gap() -> None:
+def test_apart_keeps_the_gap():
     """Two upright unit cubes face to face along x."""
     cube = supports("box", np.eye(3), 3**0.5)
     for x, apart in ((2 + GAP - 1e-6, False), (2 + GAP + 1e-6, True), (-2 - GAP - 1e-6, True)):
@@ -105,7 +97,7 @@ def test_apart_keeps_the_gap() -> None:
         assert are_apart(place, cube, cube[:, None]).tolist() == [apart]
 
 
-def test_frustum_normals_hold_exactly_what_the_image_shows() -> None:
+def test_frustum_normals_hold_exactly_what_the_image_shows():
     height, width = 30, 50
     normals = border_normals(CAMERA.fov_y_degrees, height, width)
     half_y = math.tan(math.radians(CAMERA.fov_y_degrees) / 2)
@@ -121,7 +113,7 @@ def test_frustum_normals_hold_exactly_what_the_image_shows() -> None:
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-7)
 
 
-def test_no_place_where_there_is_none() -> None:
+def test_no_place_where_there_is_none():
     behind = Camera((0.5, 0.5, 5.0), (0.5, 0.5, 9.0), 20.0)
     filling = 0.5 * SEPARATORS.sum(axis=1) + supports("box", np.eye(3), 3**0.5 / 2)[0]
     for scale, cameras, placed, found in (
@@ -133,7 +125,7 @@ def test_no_place_where_there_is_none() -> None:
         assert places_of_boxes(1, scale, cameras, placed)[0].tolist() == [found]
 
 
-def test_places_are_uniform_over_the_floor() -> None:
+def test_places_are_uniform_over_the_floor():
     """Over 100 seeds the 200 p-values are uniform themselves: the least is 0.0025."""
     side = 0.1 / 3**0.5
     found, places = places_of_boxes(2000, 0.1, [], [])
@@ -144,7 +136,7 @@ def test_places_are_uniform_over_the_floor() -> None:
     assert abs(np.corrcoef(places[:, 0], places[:, 2])[0, 1]) < 0.06
 
 
-def test_the_first_free_candidate_is_taken() -> None:
+def test_the_first_free_candidate_is_taken():
     """Its other side of the room being full, a box stands where the first draw in the free one."""
     full = SEPARATORS @ [0.25, 0.1, 0.5] + supports("box", np.eye(3), 0.5)[0]
     found, places = places_of_boxes(200, 0.1, [], [full], seed=2)
@@ -159,7 +151,7 @@ def test_the_first_free_candidate_is_taken() -> None:
 
 
 @pytest.mark.parametrize("name", SHAPE_NAMES)
-def test_resting_puts_a_resting_side_down(name: str, unit_corners: Callable[[str], Array]) -> None:
+def test_resting_puts_a_resting_side_down(name, unit_corners):
     shape = unit_shape(name)
     turns = random_rotations(Bodies([shape]), np.zeros(20, int), "resting", numbers(20, 4))
     for w, x, y, z in turns.tolist():
@@ -173,7 +165,7 @@ def test_resting_puts_a_resting_side_down(name: str, unit_corners: Callable[[str
         assert lowest >= (1 if name == "sphere" else 2 if name == "capsule" else 3)
 
 
-def test_resting_sides_come_up_as_often_as_they_are_met_and_turned_evenly() -> None:
+def test_resting_sides_come_up_as_often_as_they_are_met_and_turned_evenly():
     """A dropped cube: each of its faces a sixth of the time, and any heading."""
     box, none = unit_shape("box"), np.zeros(3000, int)
     turns = rotation_matrix(random_rotations(Bodies([box]), none, "resting", numbers(3000, 4)).T)
@@ -187,7 +179,7 @@ def test_resting_sides_come_up_as_often_as_they_are_met_and_turned_evenly() -> N
     assert kstest(heading, "uniform", (-np.pi, 2 * np.pi)).pvalue > 0.01
 
 
-def test_any_pose_is_uniform_over_all_rotations() -> None:
+def test_any_pose_is_uniform_over_all_rotations():
     """Then the angle has density (1 - cos a) / pi, and the axis and all images are uniform."""
     box, none = unit_shape("box"), np.zeros(4000, int)
     wxyz = random_rotations(Bodies([box]), none, "any", numbers(4000, 4))

@@ -1,14 +1,10 @@
 """Path-traced images: the same ground truth bit for bit, and light with known answers."""
 
 import importlib
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 from verified import checks_of
 
@@ -18,8 +14,6 @@ from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import launch_fields, render
 
-Array = NDArray[Any]
-Scenes = Callable[[DatasetSpec, int], list[SceneSpec]]
 PATH = DatasetSpec(
     height=24, width=32, shading="path", spp=4, image_dtype="float32", min_visible_pixels=0,
     objects=(1, 2), lights=(0, 3), seed=3,
@@ -33,7 +27,7 @@ BLACK = (0.0, 0.0, 0.0)
 OPEN = SceneSpec(0, (CAMERA,), (BALL,), (LAMP,), BLACK, (0.0, 1.0), None)
 
 
-def images(scene: SceneSpec, **settings: Any) -> tuple[Array, Array, Array]:
+def images(scene, **settings):
     """Return the traced image, the shading equation's, and a mask inside the first object."""
     spec = replace(PATH, **{"spp": 64, **settings})
     traced = render(pack(spec, [scene])).image[0]
@@ -46,7 +40,7 @@ def images(scene: SceneSpec, **settings: Any) -> tuple[Array, Array, Array]:
     [{}, {"specular": (0.1, 0.5)}, {"source": "families", "shapes": FAMILY_NAMES}],
     ids=["matte", "glossy", "models"],
 )
-def test_only_the_colour_is_traced(settings: dict[str, Any], scenes_of: Scenes) -> None:
+def test_only_the_colour_is_traced(settings, scenes_of):
     spec = replace(PATH, **settings)
     scenes = scenes_of(replace(spec, shading="paper"), 3)
     traced = render(pack(spec, scenes))
@@ -60,7 +54,7 @@ def test_only_the_colour_is_traced(settings: dict[str, Any], scenes_of: Scenes) 
     assert (traced.image != paper.image).mean() > 0.5
 
 
-def test_models_kept_from_other_batches_are_let_go(scenes_of: Scenes) -> None:
+def test_models_kept_from_other_batches_are_let_go(scenes_of):
     """Dr.Jit traces paths through every mesh that is alive: with hundreds, for minutes."""
     spec = replace(PATH, source="families", shapes=FAMILY_NAMES, spp=1)
     kept = importlib.import_module("scenegen.rendering.model_scene").MODELS.kept
@@ -71,7 +65,7 @@ def test_models_kept_from_other_batches_are_let_go(scenes_of: Scenes) -> None:
     assert len(kept) == 0
 
 
-def test_fields_may_be_asked_for_one_by_one(scenes_of: Scenes) -> None:
+def test_fields_may_be_asked_for_one_by_one(scenes_of):
     batch = pack(PATH, scenes_of(PATH, 2))
     whole = render(batch)
     assert set(launch_fields(batch, ["depth"])()) == {"depth"}
@@ -80,9 +74,7 @@ def test_fields_may_be_asked_for_one_by_one(scenes_of: Scenes) -> None:
     assert only["image"].tobytes() == whole.image.tobytes()
 
 
-def test_the_same_request_gives_the_same_bytes_in_any_batch(
-    make_rooms: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_the_same_request_gives_the_same_bytes_in_any_batch(make_rooms, tmp_path):
     settings = {"shading": "path", "spp": 3, "views": (0.0, 30.0), "object_radius": (0.08, 0.15)}
     files = [
         make_rooms(tmp_path / f"{batch}.h5", 3, {"batch": batch}, **settings)
@@ -93,7 +85,7 @@ def test_the_same_request_gives_the_same_bytes_in_any_batch(
     assert [check for check in checks if not check.ok] == []
 
 
-def test_noise_is_another_for_every_seed_scene_and_view() -> None:
+def test_noise_is_another_for_every_seed_scene_and_view():
     """The images show the same scene, each with different noise."""
     views = (CAMERA, CAMERA)
     room = replace(OPEN, cameras=views, room_reflectance=(0.7,) * 3, ambient=(0.1,) * 3)
@@ -109,9 +101,7 @@ def test_noise_is_another_for_every_seed_scene_and_view() -> None:
 
 @pytest.mark.parametrize("gloss", [(0.0, 1.0), (0.5, 6.0)], ids=["matte", "glossy"])
 @pytest.mark.parametrize("shape", ["sphere", "cylinder"])
-def test_direct_light_of_an_open_convex_object_is_the_shading_equation(
-    shape: str, gloss: tuple[float, float]
-) -> None:
+def test_direct_light_of_an_open_convex_object_is_the_shading_equation(shape, gloss):
     """With k_l = 0 light falls off with the inverse square, and nothing else reflects light."""
     item = replace(BALL, shape=shape, specular=gloss[0], shininess=gloss[1])
     traced, paper, inside = images(replace(OPEN, objects=(item,)), specular=(0.0, 1.0))
@@ -123,16 +113,14 @@ def test_direct_light_of_an_open_convex_object_is_the_shading_equation(
     assert np.quantile(off, 0.8) < 0.03, "up to noise and outlines"
 
 
-def test_several_lights_add_up() -> None:
+def test_several_lights_add_up():
     others = (LAMP, Light((-1.0, 1.5, 2.0), (0.5, 1.0, 4.0)), Light((0.3, 2.5, 0.3), (1.0,) * 3))
     traced, paper, inside = images(replace(OPEN, lights=others), spp=256, lights=(3, 3))
     assert traced[inside].mean(axis=0) == pytest.approx(paper[inside].mean(axis=0), rel=0.02)
 
 
 @pytest.mark.parametrize("attenuation", [(0.5, 0.5), (1.0, 0.0), (0.0, 2.0)])
-def test_at_the_target_a_light_is_as_bright_as_in_the_shading_equation(
-    attenuation: tuple[float, float],
-) -> None:
+def test_at_the_target_a_light_is_as_bright_as_in_the_shading_equation(attenuation):
     """A tiny ball at the target, where both fall-offs agree."""
     tiny = replace(BALL, scale=0.004)
     camera = Camera(CAMERA.position, TARGET, 0.4)
@@ -142,7 +130,7 @@ def test_at_the_target_a_light_is_as_bright_as_in_the_shading_equation(
     assert traced[inside].mean(axis=0) == pytest.approx(paper[inside].mean(axis=0), rel=0.01)
 
 
-def test_ambient_light_alone_leaves_an_open_object_its_reflectance() -> None:
+def test_ambient_light_alone_leaves_an_open_object_its_reflectance():
     """The furnace test: every point of a convex object sees L_a all around."""
     scene = replace(OPEN, lights=(), ambient=(0.5, 0.25, 0.125), background=(0.25, 0.5, 1.0))
     traced, _, inside = images(scene, spp=256)
@@ -151,7 +139,7 @@ def test_ambient_light_alone_leaves_an_open_object_its_reflectance() -> None:
     assert (traced[0] == np.float32(scene.background)).all(), "what lies beyond is no light"
 
 
-def test_a_glossy_object_in_the_furnace_reflects_both_lobes() -> None:
+def test_a_glossy_object_in_the_furnace_reflects_both_lobes():
     """Facing the viewer, rho + 2 k_s / (m + 1); towards the outline the lobe is cut off."""
     item = replace(BALL, specular=0.6, shininess=5.0, scale=0.2)
     camera = Camera((0.3, 0.3 + 1e-3, 1.8), TARGET, 2.0)
@@ -162,7 +150,7 @@ def test_a_glossy_object_in_the_furnace_reflects_both_lobes() -> None:
     np.testing.assert_allclose(traced.mean(axis=(0, 1)), expected, rtol=0.02)
 
 
-def test_rooms_have_shadows_and_light_in_them() -> None:
+def test_rooms_have_shadows_and_light_in_them():
     """The floor behind a ball, seen from the light, is lit by indirect light only."""
     ball = replace(BALL, position=(0.5, 0.3, 0.5), scale=0.15)
     camera, lamp = (
@@ -182,7 +170,7 @@ def test_rooms_have_shadows_and_light_in_them() -> None:
     assert (traced[lit] > 0.97 * hard.image[0][lit]).mean() > 0.95, "light only adds up"
 
 
-def test_a_glossy_room_scene_is_the_same_picture_as_the_papers(scenes_of: Scenes) -> None:
+def test_a_glossy_room_scene_is_the_same_picture_as_the_papers(scenes_of):
     """The image is upright, and the lights are in their places.
 
     Light that bounced is in one alone: over 32 scenes of seeds 3 to 6 the correlation is 0.75 to
@@ -199,10 +187,8 @@ def test_a_glossy_room_scene_is_the_same_picture_as_the_papers(scenes_of: Scenes
         assert match > max(flipped)
 
 
-@pytest.mark.parametrize("spp", [1, 2, 3, 5, 7, 10, 13])
-def test_any_number_of_samples_will_do(
-    spp: int, capfd: pytest.CaptureFixture[str], variant: str
-) -> None:
+@pytest.mark.parametrize("spp", [1, 3, 10])
+def test_any_number_of_samples_will_do(spp, capfd, variant):
     scene = replace(OPEN, room_reflectance=(0.5,) * 3, ambient=(0.2,) * 3)
     image = render(pack(replace(PATH, spp=spp, height=8, width=8), [scene])).image
     assert np.isfinite(image).all()
@@ -211,9 +197,7 @@ def test_any_number_of_samples_will_do(
 
 
 @pytest.mark.parametrize("spp", [16, 19])
-def test_samples_in_several_goes_make_the_same_picture(
-    spp: int, monkeypatch: pytest.MonkeyPatch, variant: str
-) -> None:
+def test_samples_in_several_goes_make_the_same_picture(spp, monkeypatch, variant):
     """Samples are split if they do not fit into memory; none is drawn twice."""
     scene = replace(OPEN, room_reflectance=(0.5,) * 3, ambient=(0.2,) * 3)
     batch = pack(replace(PATH, spp=spp), [scene])

@@ -1,22 +1,19 @@
 """The kernel's exact surfaces against numpy's, which are solved by other formulas in float64."""
 
 import importlib
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from scenegen.description.scenes import SHAPE_NAMES
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.rendering.surfaces.in_numpy import cast_at_surface
 
-Array = NDArray[Any]
 EXACT = tuple(name for name in SHAPE_NAMES if name != "teapot")
 RAYS = 100_000
 
 
-def cast(names: tuple[str, ...], which: int, start: Array, u: Array) -> tuple[Array, Array]:
+def cast(names, which, start, u):
     """Return distances and unit normals by the kernel, which is made for all the shapes."""
     import mitsuba as mi
 
@@ -32,7 +29,7 @@ def cast(names: tuple[str, ...], which: int, start: Array, u: Array) -> tuple[Ar
     return np.asarray(x), normals / np.where(length > 0, length, 1.0)  # misses may have none
 
 
-def unit_rays(radius: float, seed: int) -> tuple[Array, Array]:
+def unit_rays(radius, seed):
     """Return points at this distance, and unit directions to points of the ball; float32 exact."""
     rng = np.random.default_rng(seed)
     start, target = rng.standard_normal((2, RAYS, 3))
@@ -45,7 +42,7 @@ def unit_rays(radius: float, seed: int) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("radius", [1.0001, 0.3, 0.05], ids=["outside", "inside", "center"])
 @pytest.mark.parametrize("name", EXACT)
-def test_hits_are_exact_to_a_millionth(name: str, radius: float, variant: str) -> None:
+def test_hits_are_exact_to_a_millionth(name, radius, variant):
     surface = unit_shape(name).surface
     assert surface is not None
     start, u = unit_rays(radius, seed=1)
@@ -64,7 +61,7 @@ def test_hits_are_exact_to_a_millionth(name: str, radius: float, variant: str) -
 
 
 @pytest.mark.parametrize("name", EXACT)
-def test_rays_along_the_axes_are_like_their_neighbours(name: str, variant: str) -> None:
+def test_rays_along_the_axes_are_like_their_neighbours(name, variant):
     """Parallel to caps, slabs and the axis of revolution, where a division by 0 lurks."""
     surface = unit_shape(name).surface
     assert surface is not None
@@ -84,7 +81,7 @@ def test_rays_along_the_axes_are_like_their_neighbours(name: str, variant: str) 
     assert abs(ours[both] - expected[both]).max() < 2e-6
 
 
-def test_shapes_of_other_kinds_do_not_change_a_bit(variant: str) -> None:
+def test_shapes_of_other_kinds_do_not_change_a_bit(variant):
     start, u = unit_rays(1.0, seed=3)
     for name in ("torus", "prism", "capsule", "cone"):
         alone = cast((name,), 0, start, u)[0]

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from trimesh import Trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
@@ -10,14 +9,13 @@ from scenegen.description.scenes import SHAPE_NAMES
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.rendering.surfaces.in_numpy import cast_at_surface
 
-Array = NDArray[np.float64]
 EXACT = tuple(name for name in SHAPE_NAMES if name != "teapot")
 POLYHEDRA = set(EXACT) - {"sphere", "cone", "torus", "cylinder", "capsule"}
 RAYS = 10_000
 TESSELLATION = 4.5e-5  # how far a mesh may lie off its surface
 
 
-def rays(distance: float, seed: int) -> tuple[Array, Array]:
+def rays(distance, seed):
     """Return rays from this distance towards points of the unit ball, directions of any length."""
     rng = np.random.default_rng(seed)
     origins, targets = rng.standard_normal((2, RAYS, 3))
@@ -28,7 +26,7 @@ def rays(distance: float, seed: int) -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("distance", [3.0, 0.2], ids=["outside", "inside"])
 @pytest.mark.parametrize("name", EXACT)
-def test_hits_are_those_of_the_mesh_within_its_tessellation(name: str, distance: float) -> None:
+def test_hits_are_those_of_the_mesh_within_its_tessellation(name, distance):
     shape = unit_shape(name)
     assert shape.surface is not None
     origins, directions = rays(distance, seed=1)
@@ -52,7 +50,7 @@ def test_hits_are_those_of_the_mesh_within_its_tessellation(name: str, distance:
     assert np.quantile(aligned, 1 - some) > (1 - 1e-14 if name in POLYHEDRA else 0.9999)
 
 
-def test_nothing_behind_a_ray_is_hit() -> None:
+def test_nothing_behind_a_ray_is_hit():
     origins, directions = rays(3.0, seed=2)
     for name in EXACT:
         surface = unit_shape(name).surface
