@@ -19,7 +19,7 @@ class SceneArrays:
     """S scenes with V cameras, K object slots and L light slots; unused slots hold zeros.
 
     Attributes:
-        names: names of models, as in `scenes.PlacedObject.shape`, which `shape` counts.
+        names: names of models, as in `scenes.PlacedObject.shape`; `shape` is an index into them.
         index: numbers of the scenes in their data set, (S,) int64.
         camera_position, camera_target: world, (S, V, 3).
         fov_y_degrees: (S, V).
@@ -65,19 +65,12 @@ class SceneArrays:
 
     def scene(self, row: int) -> SceneSpec:
         """Return one scene as a record of its own."""
-        found = self._described(row)
-        parts: dict[str, Any] = {
-            name: tuple(value) if isinstance(value, list) else value
-            for name, value in found.items()
-        }
+        parts = self._described(row)
         kinds: dict[str, Callable[..., Any]]
         kinds = {"cameras": Camera, "objects": PlacedObject, "lights": Light}
         for name, kind in kinds.items():
-            parts[name] = tuple(
-                kind(**{k: tuple(v) if isinstance(v, list) else v for k, v in one.items()})
-                for one in found[name]
-            )
-        return SceneSpec(**parts)
+            parts[name] = [kind(**_with_tuples(part)) for part in parts[name]]
+        return SceneSpec(**_with_tuples(parts))
 
     def to_json(self, row: int) -> str:
         """Return what `SceneSpec.to_json` gives for one scene, without the records."""
@@ -129,6 +122,10 @@ class SceneArrays:
 
 
 _ARRAYS = tuple(field.name for field in fields(SceneArrays) if field.name != "names")
+
+
+def _with_tuples(values: dict[str, Any]) -> dict[str, Any]:
+    return {name: tuple(v) if isinstance(v, list) else v for name, v in values.items()}
 
 
 def joined(parts: Sequence[SceneArrays]) -> SceneArrays:

@@ -1,4 +1,4 @@
-"""Description of one scene, as JSON and back: all that the renderer needs, nothing left to chance.
+"""Description of one scene, as JSON and back: everything that the renderer needs.
 
 Lengths are in scene units (the room's edge), frames as in `camera.py`.
 """
@@ -48,8 +48,8 @@ class PlacedObject:
     mesh: str = ""
 
     def __post_init__(self) -> None:
-        known = self.shape in SHAPE_NAMES or "/" in self.shape[1:-1]
-        check(known, "shape", repr(self.shape), f"class/model, or one of {SHAPE_NAMES}")
+        is_shape = self.shape in SHAPE_NAMES or "/" in self.shape[1:-1]
+        check(is_shape, "shape", repr(self.shape), f"class/model, or one of {SHAPE_NAMES}")
         check(self.scale > 0, "scale", self.scale, "a positive number")
         check(self.specular >= 0, "specular", self.specular, "0 or more")
         check(self.shininess > 0, "shininess", self.shininess, "a positive number")

@@ -1,4 +1,4 @@
-"""Description of a data set, as JSON and back: what is asked for. `SceneSpec` describes a scene.
+"""The request for a data set, as JSON and back. `SceneSpec` describes one scene of it.
 
 Lengths are in scene units (the room's edge), frames as in `camera.py`.
 """
@@ -171,9 +171,9 @@ def _check_limits(spec: DatasetSpec) -> None:
             check_range(shown, value, low, high)
         else:
             check(low <= value <= high, shown, value, f"from {low:g} to {high:g}")
-    for name, known in CHOICES.items():
+    for name, choices in CHOICES.items():
         value = getattr(spec, name)
-        check(value in known, name.replace("_", " "), value, f"one of {', '.join(known)}")
+        check(value in choices, name.replace("_", " "), value, f"one of {', '.join(choices)}")
     for name in ("ambient", "reflectance", "room_reflectance"):
         color = getattr(spec, name)
         ok = len(color) == 3 and all(0.0 <= c <= 1.0 for c in color)
@@ -194,13 +194,13 @@ def _check_image(spec: DatasetSpec) -> None:
 
 def _check_objects(spec: DatasetSpec) -> None:
     what = "shapes" if spec.source == "shapes" else "classes"
-    known = BUILT_IN.get(spec.source)
-    some = f"some of {', '.join(known)}" if known else "names of classes"
-    check(len(spec.shapes) > 0, what, "none", some)
+    names = BUILT_IN.get(spec.source)
+    expected = f"some of {', '.join(names)}" if names else "names of classes"
+    check(len(spec.shapes) > 0, what, "none", expected)
     check(len(spec.shapes) <= MAX_CLASSES, what, len(spec.shapes), f"at most {MAX_CLASSES:,}")
     for name in spec.shapes:
-        ok = name in known if known else name != "" and "/" not in name
-        check(ok, what, repr(name), some)
+        ok = name in names if names else name != "" and "/" not in name
+        check(ok, what, repr(name), expected)
     check(len(set(spec.shapes)) == len(spec.shapes), what, spec.shapes, "each name once")
     if spec.source == "shapes":
         check(spec.object_split == "all", "object split", spec.object_split, "'all' for shapes")

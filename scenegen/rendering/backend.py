@@ -74,7 +74,7 @@ def find_llvm() -> str | None:
     """Return the first LLVM that works: the user's own choice, the wheel's, the system's."""
     chosen = os.environ.get(LLVM_VARIABLE)
     candidates = [chosen] if chosen else [*wheel_libraries(), *system_libraries()]
-    return next((some for some in candidates if llvm_version(some)[0] >= OLDEST_LLVM), None)
+    return next((path for path in candidates if llvm_version(path)[0] >= OLDEST_LLVM), None)
 
 
 def versions() -> dict[str, str]:
@@ -88,8 +88,8 @@ def versions() -> dict[str, str]:
     library = None if drjit else find_llvm()
     numbers = drjit.detail.llvm_version() if drjit else llvm_version(library) if library else (0,)
     llvm = ".".join(map(str, numbers)) if numbers[0] > 0 else UNKNOWN
-    found = (_release("mitsuba"), _release("drjit"), llvm)
-    return dict(zip(VERSION_ATTRIBUTES, found, strict=True))
+    releases = (_release("mitsuba"), _release("drjit"), llvm)
+    return dict(zip(VERSION_ATTRIBUTES, releases, strict=True))
 
 
 def _release(package: str) -> str:
@@ -117,8 +117,8 @@ def wheel_libraries() -> list[str]:
         files = importlib.metadata.files(LLVM_WHEEL) or []
     except importlib.metadata.PackageNotFoundError:
         return []
-    found = [Path(str(f.locate())).resolve() for f in files if f.name.startswith("libLLVM.so")]
-    return sorted(str(path) for path in found if path.exists())
+    paths = [Path(str(f.locate())).resolve() for f in files if f.name.startswith("libLLVM.so")]
+    return sorted(str(path) for path in paths if path.exists())
 
 
 def system_libraries() -> list[str]:
@@ -129,9 +129,9 @@ def system_libraries() -> list[str]:
         "/usr/lib64/libLLVM*.so*",
         "/usr/lib/llvm*/lib/libLLVM.so",
     )
-    found = [path for pattern in patterns for path in glob.glob(pattern)]
+    packaged = [path for pattern in patterns for path in glob.glob(pattern)]
     brew = glob.glob("/opt/homebrew/opt/llvm*/lib/libLLVM.dylib")
-    newest = sorted(found + brew, key=lambda p: int((re.findall(r"[0-9]+", p) or ["0"])[-1]))
+    newest = sorted(packaged + brew, key=lambda p: int((re.findall(r"[0-9]+", p) or ["0"])[-1]))
     return ([named] if named else []) + newest[::-1]
 
 

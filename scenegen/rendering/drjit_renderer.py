@@ -50,12 +50,12 @@ def launch_pixels(
 
     def pixels(name: str) -> Array:
         # Vectors are fetched by component: to interleave them on the device takes scattered writes.
-        planes = [one.numpy().reshape(count, -1) for one in components[name]]
-        found = np.empty((count, spec.height * spec.width, len(planes)), planes[0].dtype)
+        planes = [channel.numpy().reshape(count, -1) for channel in components[name]]
+        values = np.empty((count, spec.height * spec.width, len(planes)), planes[0].dtype)
         for i, plane in enumerate(planes):
-            found[..., i] = plane[:, : found.shape[1]]
+            values[..., i] = plane[:, : values.shape[1]]
         channels = (len(planes),) if len(planes) > 1 else ()
-        return found.reshape(count, spec.height, spec.width, *channels)
+        return values.reshape(count, spec.height, spec.width, *channels)
 
     return lambda: {name: pixels(name) for name in fields}
 

@@ -48,8 +48,8 @@ class SceneBatch:
         background: radiance of rays that hit nothing, (B, 3).
         attenuation: (k_l, k_q), (B, 2).
         cubes_only: whether each image shows only boxes of one size and orientation, and no room.
-            They are then cast faster, with the same result within rounding. The caller sets it, so
-            that an image's bits cannot depend on the rest of its batch.
+            They are then cast faster, with the same result within rounding. The caller sets it:
+            an image's bits must not depend on the rest of its batch.
     """
 
     spec: DatasetSpec
@@ -103,11 +103,11 @@ def pack(
     """
     for scene in scenes:
         for name, most in (("objects", spec.objects[1]), ("lights", spec.lights[1])):
-            found = len(getattr(scene, name))
-            check(found <= most, f"scene {scene.index}", f"{found} {name}", f"at most {most}")
+            count = len(getattr(scene, name))
+            check(count <= most, f"scene {scene.index}", f"{count} {name}", f"at most {most}")
         if not 0 <= min(views) <= max(views) < len(scene.cameras):
-            known = f"views from 0 to {len(scene.cameras) - 1}"
-            raise SpecError(f"scene {scene.index}", ", ".join(map(str, views)), known)
+            possible = f"views from 0 to {len(scene.cameras) - 1}"
+            raise SpecError(f"scene {scene.index}", ", ".join(map(str, views)), possible)
     unknown = {item.name for scene in scenes for item in scene.objects} - set(spec.shapes)
     if unknown:
         raise SpecError("scene shapes", sorted(unknown), f"some of {spec.shapes}")
@@ -190,10 +190,10 @@ def _arrays(spec: DatasetSpec, scenes: Sequence[SceneSpec], views: Sequence[int]
     return SceneArrays(
         names=names,
         index=np.array([scene.index for scene in scenes], np.int64),
-        camera_position=np.array([[c.position for c in some] for some in cameras], float),
-        camera_target=np.array([[c.target for c in some] for some in cameras], float),
-        fov_y_degrees=np.array([[c.fov_y_degrees for c in some] for some in cameras], float),
-        object_count=np.array([len(some) for some in objects], np.int32),
+        camera_position=np.array([[c.position for c in row] for row in cameras], float),
+        camera_target=np.array([[c.target for c in row] for row in cameras], float),
+        fov_y_degrees=np.array([[c.fov_y_degrees for c in row] for row in cameras], float),
+        object_count=np.array([len(row) for row in objects], np.int32),
         shape=shape.astype(np.int32),
         mesh=mesh.astype(object),
         position=position,
@@ -201,7 +201,7 @@ def _arrays(spec: DatasetSpec, scenes: Sequence[SceneSpec], views: Sequence[int]
         scale=scale,
         reflectance=reflectance,
         gloss=gloss,
-        light_count=np.array([len(some) for some in lights], np.int32),
+        light_count=np.array([len(row) for row in lights], np.int32),
         light_position=light_position,
         light_color=light_color,
         ambient=np.array([scene.ambient for scene in scenes], float),

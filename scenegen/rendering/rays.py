@@ -117,7 +117,7 @@ def occluded(scenes: Scenes, item: Any, o: Any, d: Any, active: Any) -> Any:
 
 @dr.syntax
 def _first_hit(scenes: Scenes, row: Any, start: Any, u: Any, reach: Any) -> tuple[Any, Any, Any]:
-    """Return how far from `start` a ray meets an object, inf for never, its face, barycentrics."""
+    """Return distance of the hit from `start` (inf for none), face and barycentrics."""
     record = gather_packet(scenes.objects, row * OBJECT + 4)
     distance, face = first_on_surface(scenes.surfaces, record, start, u, reach)
     uv = mi.Point2f(0)
@@ -204,7 +204,7 @@ def _about_scene(scenes: Scenes, item: Any) -> tuple[Any, Any]:
 
 
 def _bounding_interval(scenes: Scenes, row: Any, o: Any, d: Any) -> tuple[Any, Any, Any]:
-    """Return the ray parameters where it enters and leaves the bounding sphere, and if it does."""
+    """Return where a ray enters and leaves the bounding sphere, and whether it meets it."""
     x, y, z, radius = gather_packet(scenes.objects, row * OBJECT)
     to_center = mi.Vector3f(x, y, z) - o
     squared = dr.dot(d, d)
@@ -219,7 +219,7 @@ def _bounding_interval(scenes: Scenes, row: Any, o: Any, d: Any) -> tuple[Any, A
 def _to_object(scenes: Scenes, row: Any, p: Any, d: Any) -> tuple[Any, Any]:
     """Return a point and a direction in the frame of an object's unit shape."""
     table = [gather_packet(scenes.objects, row * OBJECT + 1 + i) for i in range(3)]
-    linear = [mi.Vector3f(one.x, one.y, one.z) for one in table]
+    linear = [mi.Vector3f(axis.x, axis.y, axis.z) for axis in table]
     point = mi.Point3f(*(dr.dot(linear[i], p) + table[i].w for i in range(3)))
     return point, mi.Vector3f(*(dr.dot(linear[i], d) for i in range(3)))
 
@@ -230,5 +230,5 @@ def _to_world(scenes: Scenes, row: Any, n: Any) -> Any:
     The map into the unit shape's frame is a similarity, so its transpose turns a normal back.
     """
     table = [gather_packet(scenes.objects, row * OBJECT + 1 + i) for i in range(3)]
-    rows = (mi.Vector3f(one.x, one.y, one.z) * n[i] for i, one in enumerate(table))
-    return sum(rows, mi.Vector3f(0))
+    parts = (mi.Vector3f(axis.x, axis.y, axis.z) * n[i] for i, axis in enumerate(table))
+    return sum(parts, mi.Vector3f(0))

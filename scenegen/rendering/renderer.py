@@ -85,9 +85,9 @@ def launch_fields(
         return fetch_first
 
     def fetch_all() -> dict[str, Array]:
-        found = [fetch_first()]
-        found += [launch_pixels(part, variant, names)() for part in others]
-        return {name: np.concatenate([one[name] for one in found]) for name in names}
+        pixels = [fetch_first()]
+        pixels += [launch_pixels(part, variant, names)() for part in others]
+        return {name: np.concatenate([part[name] for part in pixels]) for name in names}
 
     return fetch_all
 
@@ -103,9 +103,9 @@ def _with_traced_image(
     fetch = launch_fields(batch, [name for name in names if name != "image"], device)
 
     def fetch_all() -> dict[str, Array]:
-        found = fetch()
+        pixels = fetch()
         MODELS.clear()  # otherwise Dr.Jit compiles every one of them into the path kernel
-        return {**found, "image": trace_images(batch, variant)}
+        return {**pixels, "image": trace_images(batch, variant)}
 
     return fetch_all
 

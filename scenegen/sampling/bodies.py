@@ -30,11 +30,11 @@ def along(points: Array, directions: Array) -> Array:
     In blocks so small that BLAS keeps to one thread: its threads would wait for each other, and the
     renderer needs the other cores.
     """
-    found = np.empty((len(points), len(directions)))
+    products = np.empty((len(points), len(directions)))
     for start in range(0, len(points), BLOCK):
-        some = slice(start, start + BLOCK)
-        np.matmul(points[some], directions.T, out=found[some])
-    return found
+        block = slice(start, start + BLOCK)
+        np.matmul(points[block], directions.T, out=products[block])
+    return products
 
 
 def rounded(values: Array, step: float) -> Array:
@@ -48,13 +48,14 @@ class Bodies:
     def __init__(self, shapes: Sequence[UnitShape]) -> None:
         """Collect the hulls and the resting directions of shapes, which are then known by place."""
         # Hulls and sides come from libraries whose last bits differ between machines.
-        hulls = [rounded(_corners(one), POINT_STEP) for one in shapes]
-        coarse = [_coarse(one) if len(hull) > MOST_CORNERS else (hull, 0.0)
-                  for one, hull in zip(shapes, hulls, strict=True)]  # fmt: skip
+        hulls = [rounded(_corners(shape), POINT_STEP) for shape in shapes]
+        coarse = [_coarse(shape) if len(hull) > MOST_CORNERS else (hull, 0.0)
+                  for shape, hull in zip(shapes, hulls, strict=True)]  # fmt: skip
         self._hulls = _groups(hulls, 8)
         self._coarse = _groups([hull for hull, _ in coarse], 8)
-        self._sides = _groups([rounded(one.resting_directions, POINT_STEP) for one in shapes], 32)
-        self._rounding = np.array([one.rounding for one in shapes])
+        sides = [rounded(shape.resting_directions, POINT_STEP) for shape in shapes]
+        self._sides = _groups(sides, 32)
+        self._rounding = np.array([shape.rounding for shape in shapes])
         self._growth = np.array([growth for _, growth in coarse])
 
     def reach(self, kind: Array, rotation: Array, directions: Array, coarse: bool = False) -> Array:
@@ -67,7 +68,7 @@ class Bodies:
             coarse: whether bodies with very many corners may be larger than they are, by a few
                 thousandths.
         """
-        found = np.empty((len(kind), len(directions)))
+        reaches = np.empty((len(kind), len(directions)))
         for rows, corners in _members(self._coarse if coarse else self._hulls, kind):
             turned = _turned(rotation[rows, None], corners[..., :3])
             reach = along(turned.reshape(-1, 3), directions).reshape(*turned.shape[:2], -1)
@@ -76,24 +77,23 @@ class Bodies:
                 flat = rounded(rotation[rows], POINT_STEP)
                 ahead, across = along(flat[:, :, 0], directions), along(flat[:, :, 2], directions)
                 reach += radius * np.sqrt(ahead * ahead + across * across)[:, None]
-            found[rows] = reach.max(axis=1)
+            reaches[rows] = reach.max(axis=1)
         more = self._rounding + self._growth if coarse else self._rounding
-        return np.asarray(found + more[kind, None])
+        return np.asarray(reaches + more[kind, None])
 
     def resting_side(self, kind: Array, down: Array) -> Array:
         """Return the resting direction next to `down`, (N, 3), object frame: (N, 3).
 
         NaN for shapes that rest on any side.
         """
-        found = np.full((len(kind), 3), np.nan)
+        nearest_sides = np.full((len(kind), 3), np.nan)
         for rows, sides in _members(self._sides, kind):
             x, y, z = np.moveaxis(sides, -1, 0)
             dx, dy, dz = down[rows, :, None].swapaxes(0, 1)
             nearest = (x * dx + y * dy + z * dz).argmax(axis=1)
-            found[rows] = np.broadcast_to(sides, (len(rows), *sides.shape[1:]))[
-                np.arange(len(rows)), nearest
-            ]
-        return found
+            every_side = np.broadcast_to(sides, (len(rows), *sides.shape[1:]))
+            nearest_sides[rows] = every_side[np.arange(len(rows)), nearest]
+        return nearest_sides
 
 
 @lru_cache(maxsize=4)
@@ -151,9 +151,9 @@ def _members(groups: list[_Group], kind: Array) -> Any:
     """Yield, for each group, which of `kind` belong to it, and their rows, (n, V, ...)."""
     for places, rows in groups:
         place = places[kind]
-        found = np.flatnonzero(place >= 0)
-        if len(found):
-            yield found, rows if len(rows) == 1 else rows[place[found]]
+        members = np.flatnonzero(place >= 0)
+        if len(members):
+            yield members, rows if len(rows) == 1 else rows[place[members]]
 
 
 def _turned(rotation: Array, points: Array) -> Array:

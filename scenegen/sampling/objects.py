@@ -24,8 +24,8 @@ class Unplaced:
     """The objects of N items before they have sizes, orientations and places.
 
     Attributes:
-        names: of all models of the classes that are drawn from, which `model` counts.
-        outlines: of the models that come up, without triangles: what placement needs.
+        names: all models of all classes; `model` is an index into them.
+        outlines: the drawn models without triangles, as placement needs them.
         count: of objects of each item, (N,) int32.
         model: (N, K) int32; -1 in unused slots.
         outline: index into `outlines`, (N, K); 0 in unused slots.
@@ -80,12 +80,12 @@ def sample_objects(spec: DatasetSpec, index: Array, objects: Objects) -> Unplace
                 spec.seed, index[rows], Purpose.MODELS, columns, start=2 * draw, count=1
             )
             number += np.floor(numbers[:, 0] * models[chosen]).astype(np.int64)
-        for one in np.unique(number).tolist():
-            if one not in outlines and one not in problems:
+        for i in np.unique(number).tolist():
+            if i not in outlines and i not in problems:
                 try:
-                    outlines[one] = outline(objects.shape, names[one])
+                    outlines[i] = outline(objects.shape, names[i])
                 except BadMeshError as error:
-                    problems[one] = str(error)
+                    problems[i] = str(error)
         model[rows, columns] = np.where(np.isin(number, list(problems)), -1, number)
     else:
         row, column = np.argwhere(used & (model < 0))[0].tolist()
@@ -94,12 +94,12 @@ def sample_objects(spec: DatasetSpec, index: Array, objects: Objects) -> Unplace
             f" used, the last one since {list(problems.values())[-1]}",
             hint="`scenegen check-objects` tells of all",
         )
-    known = sorted(outlines)
-    digests = np.array(["", *(objects.digest(names[one]) for one in known)], object)
-    place = np.where(used, np.searchsorted(known, model), -1)
+    drawn = sorted(outlines)
+    digests = np.array(["", *(objects.digest(names[i]) for i in drawn)], object)
+    place = np.where(used, np.searchsorted(drawn, model), -1)
     return Unplaced(
         names=names,
-        outlines=tuple(outlines[one] for one in known),
+        outlines=tuple(outlines[i] for i in drawn),
         count=count,
         model=model,
         outline=np.maximum(place, 0),

@@ -34,10 +34,10 @@ def _separators() -> Array:
 
 
 SEPARATORS = _separators()
-_OPPOSITE = np.array([np.flatnonzero((-one == SEPARATORS).all(axis=1))[0] for one in SEPARATORS])
+_OPPOSITE = np.array([np.flatnonzero((-row == SEPARATORS).all(axis=1))[0] for row in SEPARATORS])
 _WEST, _EAST, _NORTH, _SOUTH = (
-    int(np.flatnonzero((np.array(one) == SEPARATORS).all(axis=1))[0])
-    for one in ((-1, 0, 0), (1, 0, 0), (0, 0, -1), (0, 0, 1))
+    int(np.flatnonzero((np.array(direction) == SEPARATORS).all(axis=1))[0])
+    for direction in ((-1, 0, 0), (1, 0, 0), (0, 0, -1), (0, 0, 1))
 )
 
 
@@ -67,8 +67,8 @@ class Frustums:
         frames = np.concatenate([seen, rotation], axis=1)
         directions = np.concatenate([self.normals, [[0.0, -1.0, 0.0]]])
         each = np.repeat(kind, frames.shape[1])
-        found = bodies.reach(each, frames.reshape(-1, 3, 3), directions)
-        return found.reshape(*frames.shape[:2], 5)
+        reach = bodies.reach(each, frames.reshape(-1, 3, 3), directions)
+        return reach.reshape(*frames.shape[:2], 5)
 
     def hold(self, rows: Array, places: Array, border: Array) -> Array:
         """Return at which places all images of a scene show a body whole.

@@ -44,7 +44,7 @@ class ProposalQueue:
             scenes, row = self._scenes[item].popleft()
             rows[id(scenes)].append(row)
             drawn[id(scenes)] = scenes
-        return joined([drawn[key].take(some) for key, some in rows.items()]) if rows else None
+        return joined([drawn[key].take(chosen) for key, chosen in rows.items()]) if rows else None
 
     def accept(self, item: int) -> None:
         """Forget an item: it has its scene."""

@@ -47,15 +47,19 @@ def sample_scenes(
 ) -> tuple[Array, SceneArrays]:
     """Propose scenes of items, many at once.
 
-    Pure: an (index, attempt) gives the same scene, on any machine, in any order and company. The
-    caller renders a proposal, and asks for the next attempt if some object is not visible enough.
+    Pure: a pair (index, attempt) gives the same scene on any machine, in any order, alone or among
+    others. The caller renders a proposal, and asks for the next attempt if an object shows too few
+    pixels.
 
     Args:
         index, attempt: integers, (N,), of which each pair is a proposal.
         objects: those of the spec by default.
 
-    Returns: whether each proposal found room for its objects, (N,) bool, and the scenes of those
-    that did. Raises SpecError where no model of a class can be used.
+    Returns:
+        Whether each proposal found room for its objects, (N,) bool; and the scenes of those that
+        did.
+
+    Raises SpecError where no model of a class can be used.
     """
     index, attempt = np.asarray(index, np.int64), np.asarray(attempt, np.int64)
     unplaced = sample_objects(spec, index, objects or objects_of(spec))
@@ -103,19 +107,24 @@ def sample_scene(
 def refusal(
     spec: DatasetSpec, index: int, placed_but_hidden: int, attempts: int = MAX_ATTEMPTS
 ) -> PlacementError:
-    """Return why item `index` got no scene, `placed_but_hidden` of its proposals being rendered."""
-    wanted = int(sample_counts(spec, np.array([index]))[0])
+    """Return the error for item `index`, which got no scene.
+
+    Args:
+        placed_but_hidden: how many of its proposals found room and were rendered.
+        attempts: how many were made.
+    """
+    objects = int(sample_counts(spec, np.array([index]))[0])
     if placed_but_hidden:
         return PlacementError(
             f"item {index}",
-            f"{attempts} proposals with {wanted} objects, {placed_but_hidden} of which were"
+            f"{attempts} proposals with {objects} objects, {placed_but_hidden} of which were"
             " rendered, each with an object that shows too few pixels",
             f"{spec.min_visible_pixels} pixels or more of every object",
             "try fewer --objects, a larger --object-radius or fewer --min-visible-pixels",
         )
     return PlacementError(
         f"item {index}",
-        f"no room for its {wanted} objects in {attempts} proposals",
+        f"no room for its {objects} objects in {attempts} proposals",
         "room for all of them inside the walls and the image, touching nothing",
         "try fewer --objects, a smaller --object-radius or --allow-cropped",
     )
@@ -161,13 +170,13 @@ def _place_objects(
             reach = size[:, None] * bodies.reach(kind, matrix, SEPARATORS, coarse=True) + MARGIN
             ends = size[:, None, None] * frustums.reach(bodies, kind, matrix, rows) + MARGIN
             border = 0.0 * ends[:, :-1, :4] if spec.allow_cropped else ends[:, :-1, :4]
-            found, place = find_places(
+            free, place = find_places(
                 rows, reach, ends[:, -1, 4], border, frustums, placed[:, :slot],
                 numbers[:, _POSE_NUMBERS:].reshape(-1, CANDIDATES, 2),
             )  # fmt: skip
-            found = found.reshape(-1, tries)
-            best = np.arange(len(looking)) * tries + found.argmax(axis=1)
-            done = found.any(axis=1)
+            free = free.reshape(-1, tries)
+            best = np.arange(len(looking)) * tries + free.argmax(axis=1)
+            done = free.any(axis=1)
             who, best, looking = looking[done], best[done], looking[~done]
             position[who, slot], rotation[who, slot] = place[best], turn[best]
             scale[who, slot] = size[best]

@@ -53,8 +53,8 @@ def _trace_one(batch: SceneBatch, b: int, integrator: Any) -> Array:
     total = np.zeros((pixels, 3))
     at_once = max(1, RAYS_AT_ONCE // pixels)
     for start in range(0, spec.spp, at_once):
-        some = places[start : start + at_once]
-        count = len(some)
+        positions = places[start : start + at_once]
+        count = len(positions)
         # Multi-jittered samples are less noisy, but need a count that fills a rectangle.
         kind = "independent" if count % math.isqrt(count) else "multijitter"
         sampler = mi.load_dict({"type": kind, "sample_count": count})
@@ -62,8 +62,8 @@ def _trace_one(batch: SceneBatch, b: int, integrator: Any) -> Array:
         sampler.seed((seed + start) % 2**32, pixels * count)
         index = dr.arange(mi.UInt32, pixels * count)
         pixel, sample = index // count, index % count
-        x = mi.Float(pixel % spec.width) + dr.gather(mi.Float, mi.Float(some[:, 0]), sample)
-        y = mi.Float(pixel // spec.width) + dr.gather(mi.Float, mi.Float(some[:, 1]), sample)
+        x = mi.Float(pixel % spec.width) + dr.gather(mi.Float, mi.Float(positions[:, 0]), sample)
+        y = mi.Float(pixel // spec.width) + dr.gather(mi.Float, mi.Float(positions[:, 1]), sample)
         d = right * ((x - spec.width / 2) * size) + up * ((spec.height / 2 - y) * size) - back
         ray = mi.RayDifferential3f(mi.Point3f(origin), dr.normalize(d))
         radiance, valid, _ = integrator.sample(scene, sampler, ray)

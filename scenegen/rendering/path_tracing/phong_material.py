@@ -79,15 +79,15 @@ def _phong_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
             glossy = mi.Frame3f(mirrored).to_world(mi.Vector3f(sine * c, sine * s, cosine))
             diffuse = mi.warp.square_to_cosine_hemisphere(sample2)
             wo = dr.select(sample1 < self.lobe_share, glossy, diffuse)
-            found = dr.zeros(mi.BSDFSample3f)
-            found.wo = mi.Vector3f(wo.x, wo.y, wo.z * side)
-            found.pdf = self.pdf(ctx, si, found.wo, active)
-            found.eta = 1.0
-            found.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
-            found.sampled_component = 0
-            active = active & (found.pdf > 0)
-            value = self.eval(ctx, si, found.wo, active) / found.pdf
-            return found, dr.select(active, value, 0)
+            drawn = dr.zeros(mi.BSDFSample3f)
+            drawn.wo = mi.Vector3f(wo.x, wo.y, wo.z * side)
+            drawn.pdf = self.pdf(ctx, si, drawn.wo, active)
+            drawn.eta = 1.0
+            drawn.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
+            drawn.sampled_component = 0
+            active = active & (drawn.pdf > 0)
+            value = self.eval(ctx, si, drawn.wo, active) / drawn.pdf
+            return drawn, dr.select(active, value, 0)
 
         def traverse(self, callback: Any) -> None:
             """Expose the parameters."""

@@ -38,7 +38,7 @@ class Surfaces:
     """The exact surfaces of a batch's shapes.
 
     Attributes:
-        kinds: which kinds there are; the kernel treats no other.
+        kinds: the kinds that occur; the kernel treats no other.
         record: kind, first row and number of rows of each shape, (S, 3) integers.
         rows: table of what the surfaces are, WIDTH floats a row, on the device.
     """
@@ -68,7 +68,7 @@ def upload_surfaces(surfaces: Sequence[Surface | None]) -> Surfaces:
 def first_on_surface(
     surfaces: Surfaces, record: Any, start: Any, u: Any, reach: Any
 ) -> tuple[Any, Any]:
-    """Return how far from `start` a ray meets a surface, inf for never, and on which face.
+    """Return the distance from `start` to the first hit, inf for none, and its face.
 
     Args:
         record: kind, first row and number of rows, as floats.
@@ -125,7 +125,7 @@ def normal_on_surface(surfaces: Surfaces, record: Any, p: Any, face: Any) -> Any
 
 @dr.syntax
 def _polyhedron(surfaces: Surfaces, first: Any, last: Any, c: Any, u: Any) -> Any:
-    """Return where a ray enters and leaves all slabs, and the rows of the slabs that decide it."""
+    """Return where a ray enters and leaves the polyhedron, and the rows of those two slabs."""
     near = mi.Float(-dr.inf)
     far = mi.Float(dr.inf)
     near_face = mi.UInt32(first)
@@ -146,8 +146,8 @@ def _polyhedron(surfaces: Surfaces, first: Any, last: Any, c: Any, u: Any) -> An
 def _slab(at: Any, slope: Any, low: Any, high: Any) -> tuple[Any, Any]:
     """Return the least and the largest x with low <= at + slope x <= high."""
     inverse = 1 / _away_from_zero(slope)
-    one, other = (low - at) * inverse, (high - at) * inverse
-    return dr.minimum(one, other), dr.maximum(one, other)
+    first, second = (low - at) * inverse, (high - at) * inverse
+    return dr.minimum(first, second), dr.maximum(first, second)
 
 
 def _turned(row: Sequence[Any], c: Any, u: Any) -> tuple[Any, Any, Any, Any]:
@@ -159,8 +159,8 @@ def _turned(row: Sequence[Any], c: Any, u: Any) -> tuple[Any, Any, Any, Any]:
     q0 = c.x * c.x + c.z * c.z - (constant + (linear + square * c.y) * c.y)
     inside = q1 * q1 - q2 * q0
     stable = -(q1 + dr.copysign(dr.sqrt(dr.maximum(inside, 0)), q1))
-    one, other = stable / q2, q0 / _away_from_zero(stable)
-    enter, leave = dr.minimum(one, other), dr.maximum(one, other)
+    first, second = stable / q2, q0 / _away_from_zero(stable)
+    enter, leave = dr.minimum(first, second), dr.maximum(first, second)
     # A ray steeper than a cone is inside before and behind the roots, in one of its two halves
     # each; the cone is the lower one.
     steep, down = q2 < 0, u.y < 0
@@ -182,7 +182,7 @@ def _capsule(half: Any, radius: Any, c: Any, u: Any) -> tuple[Any, Any]:
     inside = squared * radius * radius - across * across
     root = dr.sqrt(dr.maximum(inside, 0))
     meets = inside > 0
-    found = []
+    ends = []
     for sign in (-1, 1):
         x = (sign * root - along) / squared
         center = dr.clip(c.y + x * u.y, -half, half)
@@ -193,8 +193,8 @@ def _capsule(half: Any, radius: Any, c: Any, u: Any) -> tuple[Any, Any]:
         at_end = dr.abs(center) >= half
         meets &= ~at_end | (inside > 0)
         on_ball = middle + sign * dr.sqrt(dr.maximum(inside, 0))
-        found.append(dr.select(at_end, on_ball, x))
-    return dr.select(meets, found[0], dr.inf), found[1]
+        ends.append(dr.select(at_end, on_ball, x))
+    return dr.select(meets, ends[0], dr.inf), ends[1]
 
 
 @dr.syntax

@@ -34,13 +34,13 @@ def _roots(surface: Surface, c: Array, d: Array) -> list[Array]:
         return _torus(surface, c, d)
     if isinstance(surface, Capsule):
         half, radius = surface.half, surface.radius
-        ball = Turned(radius**2 - half**2, 2 * half, -1.0, -FAR, FAR)  # about y = half
-        other = Turned(ball.a, -ball.b, -1.0, -FAR, FAR)
-        parts = [ball, other, Turned(radius**2, 0.0, 0.0, -half, half)]
-        found = [_turned(part, c, d) for part in parts]
-        found = [(np.where(e < x, e, np.inf), np.where(e < x, x, -np.inf)) for e, x in found]
-        enter = np.minimum.reduce([e for e, _ in found])
-        leave = np.maximum.reduce([x for _, x in found])
+        top = Turned(radius**2 - half**2, 2 * half, -1.0, -FAR, FAR)  # a ball about y = half
+        bottom = Turned(top.a, -top.b, -1.0, -FAR, FAR)
+        parts = [top, bottom, Turned(radius**2, 0.0, 0.0, -half, half)]
+        spans = [_turned(part, c, d) for part in parts]
+        spans = [(np.where(e < x, e, np.inf), np.where(e < x, x, -np.inf)) for e, x in spans]
+        enter = np.minimum.reduce([e for e, _ in spans])
+        leave = np.maximum.reduce([x for _, x in spans])
     elif isinstance(surface, Turned):
         enter, leave = _turned(surface, c, d)
     else:
@@ -48,8 +48,8 @@ def _roots(surface: Surface, c: Array, d: Array) -> list[Array]:
     return [np.where(enter <= leave, x, np.inf) for x in (enter, leave)]
 
 
-def _both(one: Interval, other: Interval) -> Interval:
-    return np.maximum(one[0], other[0]), np.minimum(one[1], other[1])
+def _both(a: Interval, b: Interval) -> Interval:
+    return np.maximum(a[0], b[0]), np.minimum(a[1], b[1])
 
 
 def _slab(slab: Array, c: Array, d: Array) -> Interval:
@@ -64,7 +64,7 @@ def _turned(surface: Turned, c: Array, d: Array) -> Interval:
     slab = _slab(np.array([0.0, 1.0, 0.0, surface.low, surface.high]), c, d)
     square = np.array([1.0, -surface.c, 1.0])
     pairs = (d, d), (c, d), (c, c)
-    q2, q1, q0 = (np.einsum("ri,i,ri->r", one, square, other) for one, other in pairs)
+    q2, q1, q0 = (np.einsum("ri,i,ri->r", a, square, b) for a, b in pairs)
     q1, q0 = q1 - surface.b / 2 * d[:, 1], q0 - surface.a - surface.b * c[:, 1]
     q2 = np.where(abs(q2) < 1e-14, 1e-14, q2)
     root = np.sqrt(np.maximum(q1 * q1 - q2 * q0, 0.0))
@@ -81,7 +81,7 @@ def _torus(surface: Torus, c: Array, d: Array) -> list[Array]:
     flat = np.array([1.0, 0.0, 1.0])
     pairs = (d, d), (2 * c, d), (c, c)
     p2, p1, p0 = (np.einsum("ri,ri->r", *pair) for pair in pairs)
-    r2, r1, r0 = (np.einsum("ri,i,ri->r", one, flat, other) for one, other in pairs)
+    r2, r1, r0 = (np.einsum("ri,i,ri->r", a, flat, b) for a, b in pairs)
     m, f = p0 + ring**2 - tube**2, 4 * ring**2
     lower = np.stack(
         [2 * p2 * p1, p1**2 + 2 * p2 * m - f * r2, 2 * p1 * m - f * r1, m**2 - f * r0], axis=1
