@@ -43,8 +43,7 @@ class ResNet(nn.Module):
 
     def forward(self, images: Tensor) -> Tensor:
         """Return the features, averaged over the image."""
-        found: Tensor = self.layers(images)
-        return found.mean(dim=(2, 3))
+        return self.layers(images).mean(dim=(2, 3))
 
 
 class _Block(nn.Module):

@@ -5,8 +5,7 @@ moments of each optimiser with its name.
 """
 
 import errno
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -23,7 +22,7 @@ from scenegen.common.records import LARGEST, check, from_json, normalise, to_jso
 from scenegen.files.new_file import written_beside
 
 CHECKPOINT, WEIGHTS = "checkpoint.safetensors", "weights.safetensors"
-VERSION = "1"
+CONTENTS = ("weights 1", "checkpoint 1")  # by version; one note, as their order is not kept
 NETWORK = "network."
 MOMENTS = ("exp_avg", "exp_avg_sq", "step")  # of Adam
 OTHER_CARD = "these are weights of another configuration than the card's"
@@ -130,7 +129,7 @@ def save_weights(
     for name, value in _kept(method, network.state_dict()).items():
         short = value.to(dtype) if value.is_floating_point() else value
         kept[name] = short if torch.isfinite(short).all() else value
-    save_tensors(path, kept, _notes("weights", card))
+    save_tensors(path, kept, {CONTENTS[0]: to_json(card)})
 
 
 def load_weights(path: str | Path, method: Method[CardT, NetworkT]) -> tuple[NetworkT, CardT]:
@@ -138,20 +137,20 @@ def load_weights(path: str | Path, method: Method[CardT, NetworkT]) -> tuple[Net
 
     Raises OSError; FileFormatError where the file is damaged or holds something else.
     """
-    tensors, card, _ = _load(path, method, "weights")
-    return _network(path, method, card, tensors, method.kept).eval(), card
+    tensors, card = _load(path, method, CONTENTS[0])
+    with torch.device("meta"):  # so that a hostile card costs no memory
+        expected = _kept(method, method.network(card).state_dict())
+    check_tensors(path, tensors, expected)
+    network = method.network(card)
+    network.load_state_dict(tensors, strict=False)
+    return network.eval(), card
 
 
 def save_checkpoint(folder: Path, state: State[CardT, NetworkT]) -> None:
     """Write the folder's checkpoint; the old one stays until this one is complete."""
     tensors = {NETWORK + name: value for name, value in state.network.state_dict().items()}
-    notes = _notes("checkpoint", state.card)
-    for kind, optimiser in state.optimisers.items():
-        moments = optimiser.state_dict()["state"]
-        notes[kind] = str(len(moments))  # parameters with moments: no loss may train some
-        for index, values in moments.items():
-            tensors |= {f"{kind}.{index}.{name}": value for name, value in values.items()}
-    save_tensors(folder / CHECKPOINT, tensors, notes)
+    tensors |= moments_of(state.optimisers)
+    save_tensors(folder / CHECKPOINT, tensors, {CONTENTS[1]: to_json(state.card)})
 
 
 def load_checkpoint(folder: Path, method: Method[CardT, NetworkT]) -> State[CardT, NetworkT]:
@@ -159,23 +158,31 @@ def load_checkpoint(folder: Path, method: Method[CardT, NetworkT]) -> State[Card
     path = folder / CHECKPOINT
     if not path.is_file():
         raise FileNotFoundError(errno.ENOENT, "holds no checkpoint to resume", str(folder))
-    tensors, card, notes = _load(path, method, "checkpoint")
-    network = _network(path, method, card, _beginning(NETWORK, tensors), ("",))
+    tensors, card = _load(path, method, CONTENTS[1])
+    with torch.device("meta"):
+        like = method.network(card)
+        expected = {NETWORK + name: value for name, value in like.state_dict().items()}
+        expected |= moments_of(method.optimisers(card, like))
+    check_tensors(path, tensors, expected)
+    network = method.network(card)
+    network.load_state_dict({name: tensors[NETWORK + name] for name in network.state_dict()})
     state = State(card, network, method.optimisers(card, network))
-    read = sum(name.startswith(NETWORK) for name in tensors)
     for kind, optimiser in state.optimisers.items():
-        moments = _beginning(f"{kind}.", tensors)
-        _load_moments(f"{path}: {kind}", optimiser, moments, notes.get(kind, "no count"))
-        read += len(moments)
-    if read != len(tensors):
-        raise FileFormatError(path, "tensors that are neither weights nor moments", "a checkpoint")
+        numbers = range(len(optimiser.param_groups[0]["params"]))
+        moments = {i: {name: tensors[f"{kind}.{i}.{name}"] for name in MOMENTS} for i in numbers}
+        optimiser.load_state_dict({**optimiser.state_dict(), "state": moments})
     return state
 
 
-def load_card(path: str | Path, method: Method[CardT, NetworkT]) -> CardT:
-    """Read the card of a checkpoint alone. Raises OSError, FileFormatError."""
-    with _opened(Path(path)) as file:
-        return _card(path, file.metadata() or {}, method, "checkpoint")
+def moments_of(optimisers: Mapping[str, Adam]) -> dict[str, Tensor]:
+    """Return the moments of all parameters by name; zeros where no loss has trained one yet."""
+    moments: dict[str, Tensor] = {}
+    for kind, optimiser in optimisers.items():
+        for number, weights in enumerate(optimiser.param_groups[0]["params"]):
+            zeros = torch.zeros_like(weights), torch.zeros_like(weights), torch.zeros(())
+            state = optimiser.state.get(weights) or dict(zip(MOMENTS, zeros, strict=True))
+            moments |= {f"{kind}.{number}.{name}": state[name] for name in MOMENTS}
+    return moments
 
 
 def save_tensors(path: str | Path, tensors: Mapping[str, Tensor], notes: dict[str, str]) -> None:
@@ -187,8 +194,16 @@ def save_tensors(path: str | Path, tensors: Mapping[str, Tensor], notes: dict[st
 
 def load_tensors(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     """Read tensors and notes. Raises OSError, FileFormatError."""
-    with _opened(Path(path)) as file:
-        return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118
+    path = Path(path)
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise FileFormatError(path, "a pipe or a device", "a regular file")  # it may have no end
+    with path.open("rb"):  # raises Python's own errors for a missing file or a folder
+        pass
+    try:
+        with safe_open(path, "pt") as file:
+            return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118
+    except SafetensorError as error:
+        raise FileFormatError(path, f"no safetensors file, or a damaged one ({error})") from error
 
 
 def check_tensors(
@@ -202,8 +217,8 @@ def check_tensors(
         expected: made on torch's device "meta", so that a hostile card costs no memory.
     """
     for name in sorted(expected.keys() ^ tensors.keys()):
-        found, wanted = ("nothing", "a tensor") if name in expected else ("a tensor", "nothing")
-        raise FileFormatError(f"{path}: {name}", found, wanted, OTHER_CARD)
+        pair = ("nothing", "a tensor") if name in expected else ("a tensor", "nothing")
+        raise FileFormatError(f"{path}: {name}", *pair, OTHER_CARD)
     for name, like in expected.items():
         value, place = tensors[name], f"{path}: {name}"
         if value.shape != like.shape:
@@ -218,98 +233,23 @@ def check_tensors(
             raise FileFormatError(place, "NaN, infinity, or below 0 where that cannot be")
 
 
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    """Open a safetensors file for the block. Raises OSError, FileFormatError."""
-    if path.exists() and not path.is_file() and not path.is_dir():
-        raise FileFormatError(path, "a pipe or a device", "a regular file")  # it may have no end
-    with path.open("rb"):  # raises Python's own errors for a missing file or a folder
-        pass
-    try:
-        with safe_open(path, "pt") as file:
-            yield file
-    except SafetensorError as error:
-        raise FileFormatError(path, f"no safetensors file, or a damaged one ({error})") from error
-
-
-def _notes(content: str, card: Card) -> dict[str, str]:
-    return {"content": content, "version": VERSION, "card": to_json(card)}
-
-
 def _kept(method: Method[CardT, NetworkT], tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
     return {name: value for name, value in tensors.items() if name.startswith(method.kept)}
 
 
-def _beginning(start: str, tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    return {k.removeprefix(start): v for k, v in tensors.items() if k.startswith(start)}
-
-
 def _load(
     path: str | Path, method: Method[CardT, NetworkT], content: str
-) -> tuple[dict[str, Tensor], CardT, dict[str, str]]:
-    """Return tensors, card and notes of a file. Raises OSError, FileFormatError."""
+) -> tuple[dict[str, Tensor], CardT]:
+    """Return tensors and card of a file. Raises OSError, FileFormatError."""
     tensors, notes = load_tensors(path)
-    return tensors, _card(path, notes, method, content), notes
-
-
-def _card(
-    path: str | Path, notes: Mapping[str, str], method: Method[CardT, NetworkT], content: str
-) -> CardT:
-    """Return the card in a file's notes. Raises FileFormatError."""
-    expected = f"{content} of {method.name}"
-    if notes.get("content") != content or "card" not in notes:
-        hint = f"name {WEIGHTS} beside it" if notes.get("content") == "checkpoint" else ""
-        raise FileFormatError(path, notes.get("content", "no card")[:40], expected, hint)
-    if notes.get("version") != VERSION:
-        found = f"format version {notes.get('version')!s:.20}"
-        raise FileFormatError(path, found, VERSION, "use the release that wrote it")
+    if content not in notes:
+        hint = f"name {WEIGHTS} beside it" if CONTENTS[1] in notes else ""
+        stored = ", ".join(notes) or "no card"
+        raise FileFormatError(path, f"{stored:.40}", f"{content} of {method.name}", hint)
     try:
-        card = from_json(method.card, notes["card"], "card")
+        card = from_json(method.card, notes[content], "card")
         check(card.method == method.name, "method", f"{card.method:.40}", method.name)
     except SpecError as error:
         wrong = error.inside(path)
         raise FileFormatError(wrong.where, wrong.found, wrong.expected, wrong.hint) from error
-    return card
-
-
-def _network(
-    path: str | Path,
-    method: Method[CardT, NetworkT],
-    card: CardT,
-    tensors: Mapping[str, Tensor],
-    parts: tuple[str, ...],
-) -> NetworkT:
-    """Return the network of a card with a file's weights.
-
-    Shapes are compared before anything is allocated, so that a hostile card costs no memory.
-    """
-    with torch.device("meta"):
-        names = method.network(card).state_dict()
-    check_tensors(path, tensors, {k: v for k, v in names.items() if k.startswith(parts)})
-    network = method.network(card)
-    network.load_state_dict(dict(tensors), strict=False)
-    return network
-
-
-def _load_moments(place: str, optimiser: Adam, tensors: Mapping[str, Tensor], count: str) -> None:
-    """Set the moments of an optimiser. Raises FileFormatError where they do not suit its weights.
-
-    Args:
-        count: how many parameters have moments. Each of these has all of MOMENTS.
-    """
-    parameters = optimiser.param_groups[0]["params"]
-    indices = {name.partition(".")[0] for name in tensors}
-    if strange := sorted(indices - {str(index) for index in range(len(parameters))}):
-        raise FileFormatError(place, f"moments of parameter {strange[0]!r:.40}", "of its weights")
-    if str(len(indices)) != count:
-        raise FileFormatError(place, f"moments of {len(indices)} parameters", f"{count:.20}")
-    moments: dict[int, dict[str, Tensor]] = {}
-    expected = {}
-    for index in sorted(map(int, indices)):
-        for name in MOMENTS:
-            shape = () if name == "step" else parameters[index].shape
-            expected[f"{index}.{name}"] = torch.empty(shape, device="meta")
-            moments.setdefault(index, {})[name] = tensors.get(f"{index}.{name}", torch.empty(0))
-    check_tensors(place, tensors, expected)
-    groups = optimiser.state_dict()["param_groups"]
-    optimiser.load_state_dict({"state": moments, "param_groups": groups})
+    return tensors, card

@@ -18,7 +18,7 @@ from baselines.pix2shape.training.beginnings import ModelState, new_run, resumed
 from baselines.pix2shape.training.iterations import Iterations, check_request
 from baselines.pix2shape.training.logs import Logs, opened_logs
 from baselines.pix2shape.weights import METHOD
-from baselines.training.checkpoint import CHECKPOINT, WEIGHTS, load_card
+from baselines.training.checkpoint import CHECKPOINT, WEIGHTS
 from baselines.training.fit import Progress, falling_late, fit
 from baselines.training.launch import Machine, check_agreement, launched
 from baselines.training.processes import summed
@@ -65,6 +65,7 @@ def train_run(
     LostProcessError where another process ended; FileFormatError, OSError.
     """
     folder = Path(folder)
+    checkpoint = _written(folder)
     if config is None:
         state, sources = resumed_run(folder, data, precision)
     else:
@@ -85,7 +86,7 @@ def train_run(
     first = fabric.is_global_zero
     with alone_in(folder) if first else nullcontext(), readers_kept():
         if first:
-            _check_folder(folder, state, resumed=config is None)
+            _check_folder(folder, checkpoint)
         if isinstance(sources.images, RoomImages) and settings.matching:
             _match(sources.images, folder, state, fabric, progress)
         state.to(fabric.device)
@@ -120,16 +121,20 @@ def learning_rate(config: ModelConfig, iteration: int) -> float:
     return falling_late(config, iteration) if config.decay else config.learning_rate
 
 
-def _check_folder(folder: Path, state: ModelState, resumed: bool) -> None:
+def _written(folder: Path) -> tuple[int, int] | None:
+    """Return what tells the folder's checkpoint from every other one; None without one."""
+    path = folder / CHECKPOINT
+    return (path.stat().st_ino, path.stat().st_mtime_ns) if path.exists() else None
+
+
+def _check_folder(folder: Path, checkpoint: tuple[int, int] | None) -> None:
     """Raise OSError where the files of a run cannot be written.
 
-    Another run may have ended in the folder before it was locked: raise FileExistsError where a new
-    run finds files of it, and SceneGenError where the checkpoint is another one now.
+    Raises SceneGenError where another run has written there since the checkpoint was looked at.
     """
-    if not resumed:
-        check_new(folder)
-    elif load_card(folder / CHECKPOINT, METHOD) != state.card:
-        raise SceneGenError(folder, "that another run went on meanwhile", hint="say --resume again")
+    if _written(folder) != checkpoint:
+        message = "that another run trained there in the meantime"
+        raise SceneGenError(folder, message, hint="say --resume, or name another folder")
     for name in (CHECKPOINT, PICTURE, WEIGHTS):
         check_writable(folder / name, overwrite=True)
 

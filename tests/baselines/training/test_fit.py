@@ -17,6 +17,7 @@ from baselines.training.checkpoint import (  # noqa: E402
     Method,
     load_checkpoint,
     load_weights,
+    moments_of,
     new_state,
 )
 from baselines.training.fit import Loss, TrainingError, falling_late, fit  # noqa: E402
@@ -82,11 +83,7 @@ def run(folder: Path, state: Any, spoil: Spoil | None = None, **how: Any) -> lis
 
 
 def bits(state: Any) -> dict[str, Any]:
-    found = dict(state.network.state_dict())
-    for kind, optimiser in state.optimisers.items():
-        moments = optimiser.state_dict()["state"].get(0, {})
-        found |= {f"{kind} {name}": value for name, value in moments.items()}
-    return found
+    return {**state.network.state_dict(), **moments_of(state.optimisers)}
 
 
 def assert_same(one: dict[str, Any], other: dict[str, Any]) -> None:

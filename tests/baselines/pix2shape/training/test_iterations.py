@@ -23,7 +23,7 @@ from baselines.pix2shape.training.iterations import Iterations, check_request  #
 from baselines.pix2shape.training.run import learning_rate  # noqa: E402
 from baselines.pix2shape.training.turning import turned  # noqa: E402
 from baselines.pix2shape.weights import METHOD  # noqa: E402
-from baselines.training.checkpoint import load_checkpoint  # noqa: E402
+from baselines.training.checkpoint import load_checkpoint, moments_of  # noqa: E402
 from baselines.training.fit import TrainingError, fit  # noqa: E402
 
 TINY = tiny(mutual_information=0.0, questions=0.0)
@@ -38,11 +38,9 @@ class Stop(Exception):
 
 def bits(state: Any) -> dict[str, Any]:
     """Return all that training changes, by name."""
-    found = {f"model.{name}": value.clone() for name, value in state.network.state_dict().items()}
-    for kind, optimiser in state.optimisers.items():
-        for index, values in optimiser.state_dict()["state"].items():
-            found |= {f"{kind}.{index}.{name}": value.clone() for name, value in values.items()}
-    return found
+    weights = {f"model.{name}": value for name, value in state.network.state_dict().items()}
+    everything = {**weights, **moments_of(state.optimisers)}
+    return {name: value.clone() for name, value in everything.items()}
 
 
 def assert_same(one: dict[str, Any], other: dict[str, Any]) -> None:

@@ -12,6 +12,7 @@ import pytest
 from h5_edits import attribute
 from PIL import Image
 from pix2shape_models import edited, room_source, tiny
+from refusals import refused
 
 from scenegen.common.errors import SceneGenError, SpecError
 
@@ -243,8 +244,8 @@ def test_a_picture_that_cannot_be_written_leaves_the_checkpoint(rooms_path, fold
     assert weights_of(folder)[1].iteration == 4
 
 
-@pytest.mark.parametrize(("config", "kind"), [(CONFIG, FileExistsError), (None, SceneGenError)])
-def test_a_run_that_ended_meanwhile_is_kept(config, kind, rooms_path, folder, monkeypatch):
+@pytest.mark.parametrize("config", [CONFIG, None], ids=["new", "resumed"])
+def test_a_run_that_ended_meanwhile_is_kept(config, rooms_path, folder, monkeypatch):
     """It trained in the folder between the first look at it and the lock."""
     if config is None:
         with pytest.raises(Killed):
@@ -257,7 +258,7 @@ def test_a_run_that_ended_meanwhile_is_kept(config, kind, rooms_path, folder, mo
         return launched(*given)
 
     monkeypatch.setattr(module, "launched", meanwhile)
-    with pytest.raises(kind):
+    with refused(SceneGenError, str(folder), hint="--resume"):
         train_run(folder, rooms_path, config, HERE)
     assert load_checkpoint(folder, METHOD).card.iteration == 4
 
