@@ -26,7 +26,7 @@ class RowScores:
     """Scores of some rows of a submission.
 
     Attributes:
-        rows: of the truth, (N,).
+        rows: of the truth, ascending, (N,).
         values: (N,) by name of the score; NaN where a row has no such score.
     """
 
@@ -35,7 +35,7 @@ class RowScores:
 
     def of(self, row: int) -> dict[str, float]:
         """Return the scores of a row by name."""
-        i = int(np.flatnonzero(self.rows == row)[0])
+        i = int(np.searchsorted(self.rows, row))
         return {name: float(column[i]) for name, column in self.values.items()}
 
 
@@ -69,18 +69,17 @@ def shown_scores(
         SpecError: a row that is not predicted or has no score.
     """
     refuse(predictions.path, size_problems(predictions, truth))
-    known = truth.path, truth.fingerprint, len(truth)
-    answered = matched_rows([predictions], *known, partial=True)
+    answered = matched_rows([predictions], truth.path, truth.fingerprint, len(truth), partial=True)
     if scores_path is not None:
         stored = _stored_scores(scores_path, predictions, truth)
         rows = _chosen(items, np.intersect1d(answered, stored.rows), scores_path)
-        here = [int(np.flatnonzero(stored.rows == row)[0]) for row in rows]
+        here = np.searchsorted(stored.rows, rows)
         return RowScores(rows, {name: column[here] for name, column in stored.values.items()})
     rows = answered[:MOST_SCORED] if items is None else _chosen(items, answered, predictions.path)
     settings = Settings(allow_partial=True, non_finite="penalise")
     alignment = predictions.alignment
-    found = score_rows([predictions], truth.path, rows, alignment, settings, progress)
-    return RowScores(rows, {name: runs[0] for name, runs in found.scores.items()})
+    scored = score_rows([predictions], truth.path, rows, alignment, settings, progress)
+    return RowScores(rows, {name: runs[0] for name, runs in scored.scores.items()})
 
 
 def _chosen(items: Sequence[int] | None, there: Array, path: str | Path) -> Array:
@@ -98,12 +97,12 @@ def _stored_scores(path: str | Path, predictions: RoomPredictions, truth: RoomsF
     scores = read_scores(path)
     if scores.task != "rooms" or scores.meta.truth_fingerprint != truth.fingerprint:
         expected = f"those of {truth.path}, fingerprint {truth.fingerprint:.12}"
-        told = f"scores of {scores.task} with fingerprint {scores.meta.truth_fingerprint:.12}"
-        raise ScoringError(path, told, expected)
-    if predictions.sha256 not in {one.sha256 for one in scores.meta.submissions}:
-        names = ", ".join(one.path for one in scores.meta.submissions)
-        told, expected = f"scores of {names}", f"those of {predictions.path} as it is now"
-        raise ScoringError(path, told, expected, "score it again, or leave out --scores")
+        found = f"scores of {scores.task} with fingerprint {scores.meta.truth_fingerprint:.12}"
+        raise ScoringError(path, found, expected)
+    if predictions.sha256 not in {run.sha256 for run in scores.meta.submissions}:
+        found = f"scores of {', '.join(run.path for run in scores.meta.submissions)}"
+        expected = f"those of {predictions.path} as it is now"
+        raise ScoringError(path, found, expected, "score it again, or leave out --scores")
     columns = {name: column for name, column in scores.items.items() if column.dtype == np.float64}
     return RowScores(scores.ids, columns)
 
@@ -131,8 +130,8 @@ def worst_first(
     value = dict(zip(scores.rows.tolist(), (sign * scores.values[name]).tolist(), strict=True))
 
     def place(rows: Sequence[int]) -> float:
-        known = [value[row] for row in rows if np.isfinite(value[row])]
-        return float(np.mean(known)) if known else np.inf
+        finite = [value[row] for row in rows if np.isfinite(value[row])]
+        return float(np.mean(finite)) if finite else np.inf
 
     inside = [tuple(sorted(rows, key=lambda row: place([row]))) for rows in scenes]
     return sorted(inside, key=place)

@@ -9,26 +9,20 @@ from numpy.typing import NDArray
 from metrics.measures.normals import angular_errors_degrees
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.submissions.reader import RoomPredictions
-from metrics.viewing.colors import error_colors, legend
 from metrics.viewing.order import RowScores, sortable, worst_first
 from scenegen.camera import transform_vectors
 from scenegen.rooms.preview import normal_bytes
 from scenegen.rooms.reader import Room, RoomsFile
-from scenegen.viewing.contents import (
+from scenegen.viewing.geometry import ShapeOf, Surfels, has_surfel, pixel_colors, surfels_of
+from scenegen.viewing.page import (
+    LAYERS,
     Cloud,
-    Contents,
-    Place,
-    about_scene,
-    object_name,
+    ScenePage,
     paragraph,
     scene_rows,
-    start_at_view,
     table,
-    truth_cloud,
     view_label,
 )
-from scenegen.viewing.geometry import ShapeOf, Surfels, has_surfel, pixel_colors, surfels_of
-from scenegen.viewing.page import ScenePage
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -47,9 +41,11 @@ UNITS = {  # as words behind a number; other units stand as they are
     "scene unit": "scene units",
     "scene unit squared": "scene units squared",
 }
+TOO_NEAR, RIGHT, TOO_FAR = (0, 80, 200), (222, 222, 222), (200, 30, 0)
+UNKNOWN = (120, 0, 140)  # the truth has no depth there
 
 
-class PredictionPage:
+class PredictionPage(ScenePage):
     """The page on a running server.
 
     Args:
@@ -58,10 +54,10 @@ class PredictionPage:
         predictions: of the rows of `scores`, or more.
         scores: rows to show, and what to sort them by.
         shape_of: from `scenegen.viewing.geometry.shapes_of`.
-
-    Attributes:
-        page: it is drawn on.
     """
+
+    scene_label = "Scene, 0 is the worst"
+    layers = LAYERS | {"cameras": ("Cameras", False)}
 
     def __init__(
         self,
@@ -73,90 +69,98 @@ class PredictionPage:
     ) -> None:
         self._predictions, self._scores = predictions, scores
         self._entries = {row: i for i, row in enumerate(predictions.rows.tolist())}
-        self._scenes = scene_rows(rooms, sorted(scores.rows.tolist()))
         self._names = sortable(scores)
-        gui = server.gui
-        names = HEADLINE["rooms"]
+        self._by_file = scene_rows(rooms, scores.rows.tolist())
+        gui, names = server.gui, HEADLINE["rooms"]
         first = next((title for title, name in self._names.items() if name in names), None)
-        self._sort: Any = gui.add_dropdown("Sort by", list(self._names), initial_value=first)
-        contents = Contents(
-            self._order, view_label, self._clouds, self._about, self._start,
-            "Scene, 0 is the worst", cameras=False,
-        )  # fmt: skip
-        self.page = ScenePage(server, rooms, shape_of, contents)
+        sort = gui.add_dropdown("Sort by", list(self._names), initial_value=first)
+        by_score = worst_first(scores, self._names[sort.value], self._by_file)
+        super().__init__(server, rooms, shape_of, by_score)
         with gui.add_folder("Predicted surfels"):
-            self._where = self.page.add("place", gui.add_dropdown("Place", (BESIDE, SAME, ALONE)))
+            self.add("place", gui.add_dropdown("Place", (BESIDE, SAME, ALONE)))
             colorings = (ERROR, *([NORMAL] if predictions.has_normals else []), TRUTHS)
-            self._colored = self.page.add("error", gui.add_dropdown("Colour", colorings))
-            full = gui.add_number(
-                "Full colour at", 0.05, min=0.001, max=10.0, step=0.001,
-                hint="Error of depth, in scene units, that has the full colour.",
-            )  # fmt: skip
-            self._full = self.page.add("full", full)
+            self.add("error", gui.add_dropdown("Colour", colorings))
+            hint = "Error of depth, in scene units, that has the full colour."
+            full = gui.add_number("Full colour at", 0.05, min=0.001, max=10, step=0.001, hint=hint)
+            self.add("full", full)
             self._legend = gui.add_html("")
-        self._sort.on_update(lambda _: self.page.restart())
-        self.page.add("sort", self._sort)
-        self.page.show()
+        self.controls["sort"] = sort
+        sort.on_update(lambda _: self._sort())
+        self.show()
 
-    def _order(self) -> list[tuple[int, ...]]:
-        return worst_first(self._scores, self._names[self._sort.value], self._scenes)
+    def _sort(self) -> None:
+        """Put the scenes in the order of the chosen score, and go to the first one."""
+        name = self._names[self.controls["sort"].value]
+        self.scenes = worst_first(self._scores, name, self._by_file)
+        self.controls["scene"].value = 0
+        self.show()
 
-    def _clouds(self, shown: Sequence[Room], coloring: str) -> list[Cloud]:
-        self._legend.content = legend(self._full.value)
-        self._legend.visible = self._colored.value == ERROR
+    def make_clouds(self, shown: Sequence[Room]) -> list[Cloud]:
+        """Return the predicted surfels of these views, and the true ones."""
+        full, place = self.controls["full"].value, self.controls["place"].value
+        self._legend.content = legend(full)
+        self._legend.visible = self.controls["error"].value == ERROR
         clouds = list[Cloud]()
         for room in shown:
-            depth, normal = self._predicted(room)
-            truth = truth_cloud(room, coloring, lambda i: "")
-            camera = room.world_from_camera
-            predicted = surfels_of(depth, room.fov_y_degrees, camera)
-            shift = aside(room) if self._where.value == BESIDE else np.zeros(3)
-            predicted = predicted.moved(shift)
-            tells = [_teller(room, depth, normal, one) for one in (truth.surfels, predicted)]
-            colors = self._colors(room, depth, normal, predicted, coloring)
-            name = f"/prediction/{room.index}"
-            partners = _points_of(truth.surfels, predicted, room.depth.shape)
-            clouds.append(Cloud(name, predicted, colors, tells[1], partners))
-            if self._where.value != ALONE:
-                partners = _points_of(predicted, truth.surfels, room.depth.shape)
-                args = truth.name, truth.surfels, truth.colors, tells[0], partners
-                clouds.append(Cloud(*args))
+            depth = self._depth(room)
+            surfels = surfels_of(room, depth)
+            surfels = surfels.moved(aside(room)) if place == BESIDE else surfels
+            colors = self._colors(room, depth, surfels)
+            clouds.append(Cloud(f"/prediction/{room.index}", room, surfels, colors))
+            clouds += [] if place == ALONE else [self.truth_cloud(room)]
         return clouds
 
-    def _predicted(self, room: Room) -> tuple[Array, Array | None]:
-        i = self._entries[room.index]
-        has_normals = self._predictions.has_normals
-        return self._predictions.depth(i), self._predictions.normal(i) if has_normals else None
+    def _depth(self, room: Room) -> Array:
+        return self._predictions.depth(self._entries[room.index])
 
-    def _colors(
-        self, room: Room, depth: Array, normal: Array | None, surfels: Surfels, coloring: str
-    ) -> Array:
-        if self._colored.value == NORMAL and normal is not None:
+    def _normal(self, room: Room) -> Array | None:
+        if not self._predictions.has_normals:
+            return None
+        return self._predictions.normal(self._entries[room.index])
+
+    def _colors(self, room: Room, depth: Array, surfels: Surfels) -> Array:
+        coloring, normal = self.controls["error"].value, self._normal(room)
+        if coloring == NORMAL and normal is not None:
             length = np.linalg.norm(normal, axis=-1, keepdims=True)
             unit = np.nan_to_num(normal / np.where(length > 0, length, 1.0))
-            world = transform_vectors(room.world_from_camera, unit)
-            return surfels.of_pixels(normal_bytes(world))
-        if self._colored.value == TRUTHS:
-            return surfels.of_pixels(pixel_colors(room, coloring))
-        return error_colors(surfels.of_pixels(depth - room.depth), self._full.value)
+            return surfels.of_pixels(normal_bytes(transform_vectors(room.world_from_camera, unit)))
+        if coloring == TRUTHS:
+            return surfels.of_pixels(pixel_colors(room, self.controls["colour"].value))
+        return error_colors(surfels.of_pixels(depth - room.depth), self.controls["full"].value)
 
-    def _about(self, shown: Sequence[Room]) -> str:
-        text = about_scene(shown)
+    def describe(self, shown: Sequence[Room]) -> str:
+        """Return what to say of these views, as HTML: the scene, and the scores of each."""
+        text = super().describe(shown)
+        chosen = self._names[self.controls["sort"].value]
         for room in shown:
-            found = self._scores.of(room.index)
-            chosen = self._names[self._sort.value]
-            names = dict.fromkeys((chosen, *SHOWN_SCORES))
-            values = {metric(n).title: _score(n, found[n]) for n in names if n in found}
-            depth, _ = self._predicted(room)
-            absent = depth.size - np.count_nonzero(has_surfel(depth))
+            scores = self._scores.of(room.index)
+            names = [n for n in dict.fromkeys((chosen, *SHOWN_SCORES)) if n in scores]
+            lines = {metric(name).title: _score(name, scores[name]) for name in names}
+            absent = np.count_nonzero(~has_surfel(self._depth(room)))
             if absent:
-                values["Not shown"] = f"{absent} pixels whose depth is no place in view"
-            text += paragraph(view_label(room)) + table(**values)
+                lines["Not shown"] = f"{absent} pixels whose depth is no place in view"
+            text += paragraph(view_label(room)) + table(lines)
         return text
 
-    def _start(self, room: Room) -> Place:
-        position, target = start_at_view(room)
-        if self._where.value != BESIDE:
+    def describe_surfel(self, cloud: Cloud, i: int) -> dict[str, str]:
+        """Return both depths of a surfel's pixel, and the angle between its normals."""
+        room, (y, x) = cloud.room, cloud.surfels.pixels[i]
+        true, predicted = float(room.depth[y, x]), float(self._depth(room)[y, x])
+        lines = {
+            "true depth": f"{true:.5f}",
+            "predicted depth": f"{predicted:.5f}",
+            "difference": f"{predicted - true:+.5f}",
+        }
+        normal = self._normal(room)
+        if normal is not None and np.isfinite(normal[y, x]).all() and normal[y, x].any():
+            (angle,) = angular_errors_degrees(normal[y, x : x + 1], room.normal[y, x : x + 1])
+            lines["angle of normals"] = f"{angle:.1f}°"
+        return lines
+
+    def start(self, room: Room) -> tuple[Array, Array]:
+        """Return where to look from and at: farther back where both are beside each other."""
+        position, target = super().start(room)
+        if self.controls["place"].value != BESIDE:
             return position, target
         middle = target + aside(room) / 2
         return middle + BACK * (position - target), middle
@@ -167,40 +171,36 @@ def aside(room: Room) -> Array:
 
     World frame, scene units: a little more than the width of what the view shows.
     """
-    points = surfels_of(room.depth, room.fov_y_degrees, room.world_from_camera).points
     right = room.world_from_camera[:3, 0]
-    across = points @ right
+    across = surfels_of(room).points @ right
     width = float(np.ptp(across)) if len(across) else 1.0
     return np.asarray(GAP * width * right)
 
 
-def _points_of(of: Surfels, like: Surfels, shape: tuple[int, ...]) -> Array:
-    """Return the points of the pixels that `like` has, (N, 3); NaN where there is none."""
-    points = np.full((*shape, 3), np.nan, np.float32)
-    points[of.pixels[:, 0], of.pixels[:, 1]] = of.points
-    return like.of_pixels(points)
+def error_colors(error: Array, full: float) -> Array:
+    """Return colours, (N, 3) uint8, of predicted minus true depths, (N,), NaN where not known.
+
+    Blue is too near, grey is right, red is too far. Errors of `full` scene units and more have the
+    full colour.
+    """
+    finite = np.isfinite(error)
+    place = np.clip(np.where(finite, error, 0.0) / full, -1.0, 1.0)
+    channels = zip(TOO_NEAR, RIGHT, TOO_FAR, strict=True)
+    colors = np.stack([np.interp(place, (-1, 0, 1), channel) for channel in channels], axis=-1)
+    colors[~finite] = UNKNOWN
+    return np.rint(colors).astype(np.uint8)
 
 
-def _teller(room: Room, depth: Array, normal: Array | None, surfels: Surfels) -> Any:
-    """Return the function that says what is known of the i-th surfel."""
-
-    def tell(i: int) -> str:
-        y, x = surfels.pixels[i]
-        true, predicted = float(room.depth[y, x]), float(depth[y, x])
-        lines = {
-            "view": view_label(room),
-            "pixel": f"row {y}, column {x}",
-            "true depth": f"{true:.5f}",
-            "predicted depth": f"{predicted:.5f}",
-            "difference": f"{predicted - true:+.5f}",
-            "object": object_name(room, int(room.object_id[y, x])),
-        }
-        if normal is not None and np.isfinite(normal[y, x]).all() and normal[y, x].any():
-            (angle,) = angular_errors_degrees(normal[y, x : x + 1], room.normal[y, x : x + 1])
-            lines["angle of normals"] = f"{angle:.1f}°"
-        return table(**lines)
-
-    return tell
+def legend(full: float) -> str:
+    """Return a bar of the colours of errors with its limits, as HTML."""
+    stops = ", ".join(f"rgb{color}" for color in (TOO_NEAR, RIGHT, TOO_FAR))
+    return (
+        '<div style="margin:0.4em 0.8em;font-size:0.85em">'
+        f'<div style="height:0.8em;background:linear-gradient(to right, {stops})"></div>'
+        '<div style="display:flex;justify-content:space-between">'
+        f"<span>{full:g} too near</span><span>right</span><span>{full:g} too far</span>"
+        "</div></div>"
+    )
 
 
 def _score(name: str, value: float) -> str:

@@ -61,17 +61,16 @@ def view(
     needs("scenegen view", ("viser",), "view")
     from scenegen.common.web_hosts import hosts_of
     from scenegen.rooms.reader import RoomsFile
-    from scenegen.viewing.contents import rooms_contents
     from scenegen.viewing.geometry import shapes_of
-    from scenegen.viewing.page import ScenePage
+    from scenegen.viewing.page import ScenePage, scene_rows
     from scenegen.viewing.server import serve, started
 
     hosts = hosts_of(host, public, names)
     with RoomsFile(file) as rooms:
-        contents = rooms_contents(rooms, items)
+        scenes = scene_rows(rooms, items)
         shape_of = shapes_of(rooms.spec, **meshes)
         with started(file, hosts, port) as server:
-            ScenePage(server, rooms, shape_of, contents).show()
+            ScenePage(server, rooms, shape_of, scenes).show()
             serve(server, hosts, print_line, open_browser)
 
 

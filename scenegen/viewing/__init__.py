@@ -1,9 +1,5 @@
-"""Scenes in 3D, in the browser: what `scenegen view` and `bench view` show.
+"""Rooms in 3D, in the browser: what `scenegen view` and `bench view` show.
 
-`geometry` has what is drawn as plain arrays: surfels, meshes, and which surfel a click hits.
-`contents` says what a page shows of a file of rooms; that of predictions is in `metrics.viewing`.
-`server` starts and ends the web server, `drawing` puts arrays on it, and `page` joins scenes and
-controls; only these three know viser, which is imported when they are called.
-
-It may import everything in `scenegen` but the commands and `sharing`. Start reading in `page`.
+`geometry` makes plain arrays of a room: surfels, their colours, meshes, and what a click hits.
+`page` draws them on a `server` of viser, with the controls beside. Start reading in `page`.
 """

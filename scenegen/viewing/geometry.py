@@ -41,9 +41,6 @@ class Surfels:
     pixels: Array
     spacing: float
 
-    def __len__(self) -> int:
-        return len(self.points)
-
     def of_pixels(self, values: Array) -> Array:
         """Return the values, (H, W, ...), of the points' pixels, (N, ...)."""
         return np.asarray(values[self.pixels[:, 0], self.pixels[:, 1]])
@@ -61,13 +58,15 @@ def has_surfel(depth: Array) -> Array:
     return np.asarray(np.isfinite(depth) & (depth > 0) & (depth <= FARTHEST))
 
 
-def surfels_of(depth: Array, fov_y_degrees: float, world_from_camera: Array) -> Surfels:
-    """Return the surfels of a planar depth map, (H, W), scene units."""
+def surfels_of(room: Room, depth: Array | None = None) -> Surfels:
+    """Return the surfels of a view, or of another planar depth map, (H, W), scene units."""
+    depth = room.depth if depth is None else depth
     seen = has_surfel(depth)
-    points = transform_points(world_from_camera, back_project(depth, fov_y_degrees)[seen])
+    points = back_project(depth, room.fov_y_degrees)[seen]
     middle = float(np.median(depth[seen])) if len(points) else 0.0
-    spacing = pixel_size(len(depth), fov_y_degrees) * middle
-    return Surfels(points.astype(np.float32), np.argwhere(seen), spacing)
+    spacing = pixel_size(len(depth), room.fov_y_degrees) * middle
+    points = transform_points(room.world_from_camera, points).astype(np.float32)
+    return Surfels(points, np.argwhere(seen), spacing)
 
 
 def check_camera(room: Room) -> None:
@@ -108,7 +107,6 @@ class Mesh:
         color: (3,) uint8, sRGB: its reflectance.
     """
 
-    name: str
     object_id: int
     triangles: Array
     color: Array
@@ -117,20 +115,20 @@ class Mesh:
 def shapes_of(spec: DatasetSpec, **folder: Any) -> ShapeOf:
     """Return the function that finds the triangles, (F, 3, 3), of an object's unit shape.
 
-    `folder` are the options of `file_objects`. Where the objects are meshes and no folder is told,
-    the function raises SpecError, and so it does for a model whose file has changed; BadMeshError
-    for one that cannot be used.
+    `folder` are the options of `file_objects`. The function raises SpecError where the objects are
+    meshes without a folder, or a model's file has changed, and BadMeshError for a model that cannot
+    be used.
 
-    Raises as `file_objects` where a folder is told.
+    Raises as `file_objects` where there is a folder.
     """
-    told = any(folder.get(name) for name in ("shapenet_root", "objects_root"))
-    if spec.source not in BUILT_IN and not told:
+    has_folder = any(folder.get(name) for name in ("shapenet_root", "objects_root"))
+    if spec.source not in BUILT_IN and not has_folder:
 
-        def untold(_item: PlacedObject) -> Array:
+        def without_folder(_item: PlacedObject) -> Array:
             option = "--objects-root" if spec.source == "folder" else "--shapenet-root"
             raise SpecError("objects", f"meshes ({spec.source})", f"their folder, by {option}")
 
-        return untold
+        return without_folder
     objects = file_objects(spec, **folder)
     drawn = lru_cache(MESHES_KEPT)(lambda name: thinned(objects.shape(name).triangles))
 
@@ -153,13 +151,13 @@ def thinned(triangles: Array) -> Array:
     corners = triangles.reshape(-1, 3)
     # Corners that differ by rounding alone, as where a turned profile closes, are in one cell.
     cell = np.floor(np.round((corners + 1.0) * (CELLS / 2), 6)).astype(np.int64)
-    number = (cell[:, 0] * 2 * CELLS + cell[:, 1]) * 2 * CELLS + cell[:, 2]
+    number = cell @ (4 * CELLS * CELLS, 2 * CELLS, 1)
     _, place, count = np.unique(number, return_inverse=True, return_counts=True)
-    sums = [np.bincount(place, weights=axis) for axis in corners.T]
-    means = np.stack(sums, axis=1) / count[:, None]
+    means = np.stack([np.bincount(place, axis) for axis in corners.T], axis=1) / count[:, None]
     faces = place.reshape(-1, 3)
     a, b, c = faces.T
     faces = faces[(a != b) & (b != c) & (c != a)]
+    # Each face begins at its lowest corner, so that equal faces are found.
     turned = np.take_along_axis(faces, (faces.argmin(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
     return np.asarray(means[np.unique(turned, axis=0)])
 
@@ -169,21 +167,20 @@ def scene_meshes(scene: SceneSpec, shape_of: ShapeOf) -> tuple[list[Mesh], list[
 
     An object is left out where `shape_of` raises SceneGenError; each reason is told once.
     """
-    meshes, missing = list[Mesh](), list[str]()
+    meshes, reasons = list[Mesh](), dict[str, None]()
     if scene.room_reflectance is not None:
         color = srgb_bytes(np.array(scene.room_reflectance))
-        meshes.append(Mesh("room", 0, np.asarray(room_mesh().triangles), color))
+        meshes.append(Mesh(0, np.asarray(room_mesh().triangles), color))
     for k, item in enumerate(scene.objects, start=1):
         try:
             triangles = shape_of(item)
         except SceneGenError as error:
-            if str(error) not in missing:
-                missing.append(str(error))
+            reasons[str(error)] = None
             continue
         place = world_from_object(item.position, item.rotation, item.scale)
         color = srgb_bytes(np.array(item.reflectance))
-        meshes.append(Mesh(item.shape, k, transform_points(place, triangles), color))
-    return meshes, missing
+        meshes.append(Mesh(k, transform_points(place, triangles), color))
+    return meshes, list(reasons)
 
 
 def hit_by(
@@ -192,7 +189,8 @@ def hit_by(
     """Return which surfel a ray from (3,) along the unit vector (3,) hits first, and how far off.
 
     A surfel is hit where the ray passes it by less than the side of a pixel, or by less than
-    `angle` radians, seen from the ray's origin. None where no surfel is hit.
+    `angle` radians, seen from the ray's origin. None where no surfel is hit. viser picks meshes by
+    itself, but no points of a cloud.
     """
     towards = surfels.points - origin
     along = towards @ direction

@@ -23,13 +23,12 @@ SAME = 0.9  # intersection over union of two drawings of one view, at least
 def served(rooms):
     """Serve a page of a file of rooms; give it and its server."""
     from scenegen.common.web_hosts import Hosts
-    from scenegen.viewing.contents import rooms_contents
     from scenegen.viewing.geometry import shapes_of
-    from scenegen.viewing.page import ScenePage
+    from scenegen.viewing.page import ScenePage, scene_rows
     from scenegen.viewing.server import started
 
     with started("test", Hosts(), 0) as server:
-        page = ScenePage(server, rooms, shapes_of(rooms.spec), rooms_contents(rooms))
+        page = ScenePage(server, rooms, shapes_of(rooms.spec), scene_rows(rooms))
         page.show()
         yield page, server
 

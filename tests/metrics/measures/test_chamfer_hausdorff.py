@@ -132,7 +132,7 @@ import os, sys
 import numpy as np
 import metrics.measures.chamfer_hausdorff, metrics.measures.image_search
 import metrics.measures.depth, metrics.measures.normals
-import metrics.measures.answers, metrics.measures.statistics, metrics.comparison.statistics
+import metrics.measures.answers, metrics.measures.statistics
 assert not {"scipy", "pykdtree"} & set(sys.modules), "a tree was loaded before it was needed"
 metrics.measures.chamfer_hausdorff.nearest_distances(np.zeros((1, 3)), np.ones((1, 3)))
 assert {"scipy", "pykdtree"} & set(sys.modules)

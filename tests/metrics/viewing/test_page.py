@@ -1,6 +1,7 @@
 """The page of predictions: where its surfels are, and what a click tells of them."""
 
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,9 +12,19 @@ from views_in_3d import click_pixel, eventually, picture, switch, visited
 
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.submissions.reader import open_predictions
-from metrics.viewing.colors import RIGHT, TOO_FAR, TOO_NEAR
 from metrics.viewing.order import shown_scores
-from metrics.viewing.page import ALONE, BESIDE, SAME, PredictionPage, aside
+from metrics.viewing.page import (
+    ALONE,
+    BESIDE,
+    RIGHT,
+    SAME,
+    TOO_FAR,
+    TOO_NEAR,
+    UNKNOWN,
+    PredictionPage,
+    aside,
+    error_colors,
+)
 from scenegen import open_rooms
 from scenegen.common.web_hosts import Hosts
 from scenegen.viewing.geometry import shapes_of
@@ -41,28 +52,45 @@ def served(truths, tmp_path):
             file["depth"][1, 0, :3] = np.nan, np.inf, -1
         with open_predictions(path) as found, started("test", Hosts(), 0) as server:
             scores = shown_scores(found, rooms)
-            made = PredictionPage(server, rooms, found, scores, shapes_of(rooms.spec))
-            yield rooms, made.page, server
+            page = PredictionPage(server, rooms, found, scores, shapes_of(rooms.spec))
+            yield rooms, page, server
 
 
 def clouds(page):
-    return {cloud.name: cloud for cloud in page._clouds}
+    return {cloud.name: cloud for cloud in page.clouds}
+
+
+def test_colours_of_errors_tell_sign_and_size():
+    colors = error_colors(np.array([-9.0, -0.1, 0.0, 0.05, 0.1, np.inf, np.nan]), 0.1)
+    half = np.rint(np.add(RIGHT, TOO_FAR) / 2 + 1e-9)
+    assert np.abs(colors[3] - half).max() <= 1
+    others = [TOO_NEAR, TOO_NEAR, RIGHT, TOO_FAR, UNKNOWN, UNKNOWN]
+    assert colors[[0, 1, 2, 4, 5, 6]].tolist() == [list(color) for color in others]
 
 
 def test_surfels_are_beside_the_truth(served):
-    rooms, page, _ = served
+    rooms, page, server = served
     switch(page, sort="AbsRel", place=BESIDE)
-    assert f"row {WORST}" in page.told
-    assert "3 pixels" in page.told
+    assert f"row {WORST}" in page.text
+    assert "3 pixels" in page.text
     made = clouds(page)
     truth, predicted = made[f"/truth/{WORST}"], made[f"/prediction/{WORST}"]
-    assert len(predicted.surfels) == SIZE**2 - 3
+    assert len(predicted.surfels.points) == SIZE**2 - 3
     room = rooms[WORST]
     right = room.world_from_camera[:3, 0]
     gap = (predicted.surfels.points @ right).min() - (truth.surfels.points @ right).max()
     assert gap > -0.1, "hardly any overlap"
-    np.testing.assert_array_equal(truth.partners[:3], np.full((3, 3), np.nan))
-    np.testing.assert_array_equal(truth.partners[3:], predicted.surfels.points)
+    eye = room.world_from_camera[:3, 3]
+    for i, marks in ((0, 1), (40, 2)):  # the first pixels have no prediction
+        way = truth.surfels.points[i] - eye
+        camera = SimpleNamespace(fov=1.0, image_height=10_000)
+        client = SimpleNamespace(camera=camera)
+        ray = {"ray_origin": eye, "ray_direction": way / np.linalg.norm(way)}
+        page._click(SimpleNamespace(client=client, **ray))
+        names = [f"/mark/{k}" for k in range(3)]
+        handles = [server.scene.get_handle_by_name(name) for name in names]
+        assert sum(handle is not None for handle in handles) == marks
+        assert np.allclose(handles[0].position, truth.surfels.points[i])
     switch(page, place=SAME)
     moved = predicted.surfels.points - clouds(page)[f"/prediction/{WORST}"].surfels.points
     np.testing.assert_allclose(moved, np.broadcast_to(aside(room), moved.shape), atol=1e-5)
@@ -71,7 +99,7 @@ def test_surfels_are_beside_the_truth(served):
     colors = predicted.colors[predicted.surfels.pixels[:, 1] >= SIZE // 2]
     assert {tuple(color) for color in colors.tolist()} == {TOO_FAR}
     switch(page, scene=2)
-    assert "row 3" in page.told
+    assert "row 3" in page.text
     assert np.abs(clouds(page)["/prediction/3"].colors - np.array(RIGHT, float)).max() < 12
     switch(page, sort="delta 1")
     assert page.controls["scene"].value == 0

@@ -29,7 +29,7 @@ def rooms(rooms_path):
 
 def surfels(room, depth=None):
     depth = room.depth if depth is None else depth
-    return surfels_of(depth, room.fov_y_degrees, room.world_from_camera)
+    return surfels_of(room, depth)
 
 
 def test_pixels_without_a_depth_in_view_have_no_surfel(rooms):
@@ -37,19 +37,19 @@ def test_pixels_without_a_depth_in_view_have_no_surfel(rooms):
     depth[0, :6] = np.nan, np.inf, 0, -1, FARTHEST * 1.1, FARTHEST
     found = surfels(rooms[0], depth)
     assert found.pixels[0].tolist() == [0, 5]
-    assert len(found) == depth.size - 5
+    assert len(found.points) == depth.size - 5
     assert np.isfinite(found.points).all()
     np.testing.assert_allclose(
         found.points[1:], rooms[0].points_world.reshape(-1, 3)[6:], atol=1e-6
     )
-    assert len(surfels(rooms[0], depth * np.nan)) == 0
+    assert len(surfels(rooms[0], depth * np.nan).points) == 0
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.001])
 def test_a_click_hits_the_surfel_of_its_pixel(rooms, angle):
     room = rooms[0]
     found, eye = surfels(room), room.world_from_camera[:3, 3]
-    for i in range(0, len(found), 97):
+    for i in range(0, len(found.points), 97):
         way = found.points[i] - eye
         length = np.linalg.norm(way)
         hit = hit_by(found, eye, way / length, angle)
@@ -57,7 +57,7 @@ def test_a_click_hits_the_surfel_of_its_pixel(rooms, angle):
         assert hit[1] == pytest.approx(length, abs=found.spacing)
         assert hit_by(found, eye, -way / length, angle) is None
     both = replace(found, points=np.concatenate([found.points, eye + 0.5 * (found.points - eye)]))
-    assert hit_by(both, eye, way / length)[0] == len(found) + i, "the nearer of two surfaces"
+    assert hit_by(both, eye, way / length)[0] == len(found.points) + i, "the nearer of two surfaces"
 
 
 def test_normals_have_one_colour_in_all_views(make_rooms, tmp_path):
@@ -97,7 +97,7 @@ def test_meshes_that_are_not_there_are_named_once(meshes, make_rooms, tmp_path):
     path = make_rooms(tmp_path / "x.h5", 2, how, objects=(2, 2), **source.settings)
     with open_rooms(path) as rooms:
         found, missing = scene_meshes(rooms[0].scene, shapes_of(rooms.spec))
-        assert ([mesh.name for mesh in found], len(missing)) == (["room"], 1)
+        assert ([mesh.object_id for mesh in found], len(missing)) == ([0], 1)
         assert "--objects-root" in missing[0]
         found, missing = scene_meshes(rooms[0].scene, shapes_of(rooms.spec, **told))
         assert (len(found), missing) == (3, [])

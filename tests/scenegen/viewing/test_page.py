@@ -72,8 +72,8 @@ def test_a_scene_that_cannot_be_read(damaged):
         file["camera/fov_y_degrees"][0] = 0
 
     with open_rooms(damaged(no_angle)) as file, served(file) as (page, _):
-        assert "row 0: fov_y_degrees" in page.told
+        assert "row 0: fov_y_degrees" in page.text
         switch(page, scene=1)
-        assert "Scene 1:" in page.told
+        assert "Scene 1:" in page.text
         switch(page, scene=0)
-        assert "cannot be shown" in page.told
+        assert "cannot be shown" in page.text
