@@ -58,17 +58,15 @@ def _people(path: Path) -> None:
     from iqtt.quiz.schema import open_answers
     from iqtt.quiz.study import Study
 
-    key = b"key"
     with Study("iqtt/iqtt-test.h5", questions=4, calibrations=1) as study:
         db = open_answers(path, study.settings)
-        for number, count in enumerate((5, 5, 2)):
-            token = sessions.begin(db, study.draw, 3)
+        for count in (5, 5, 2):
+            name = sessions.begin(db, study.draw, 3)
             for position in range(count):
-                form = sessions.form_name(key, number, position)
-                sessions.show(db, token)
-                sessions.answer(db, token, form, position % 3, 0.0, key)
+                sessions.show(db, name)
+                sessions.answer(db, name, position, position % 3, 0.0)
                 if position == 0:
-                    sessions.go_on(db, token, form, key)
+                    sessions.go_on(db, name, position)
     db.execute("PRAGMA journal_mode = DELETE")
     db.close()
 

@@ -64,7 +64,7 @@ def test_help_loads_nothing_heavy(tmp_path):
 
 
 def test_the_tab_key_opens_no_file_and_loads_nothing_heavy(rooms_path, tmp_path):
-    words = f"scenegen preview {rooms_path} --sh"
+    words = f"scenegen preview {rooms_path} --se"
     code = f"""
 import os, sys
 os.environ.update(COMP_WORDS={words!r}, COMP_CWORD="3", _SCENEGEN_COMPLETE="bash_complete")
@@ -75,7 +75,7 @@ finally:
     print(*set({HEAVY!r}) & set(sys.modules))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.stdout == "plain,--show\n\n", done.stderr
+    assert done.stdout == "plain,--seed\n\n", done.stderr
 
 
 def test_reading_a_file_loads_no_renderer(rooms_path, tmp_path):

@@ -2,27 +2,32 @@
 
 import csv
 import io
-import math
-import re
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
-from typing import Any
 
 from iqtt.quiz import schema
 from iqtt.quiz.study import Settings
 from scenegen.common.errors import FileFormatError
 
 MOST_ROWS = 2_000_000  # answers of a file
-LARGEST_MS = 2**53
-NAME, KIND, SHAPE = re.compile("[0-9a-f]{16}"), re.compile("[a-z0-9 -]{1,40}"), "[0-9a-f]{12}|"
+ROWS = """
+    SELECT p.name, done = study.questions + study.calibrations, q.calibration, q.position, q.row,
+        q.kind, q.angle_degrees, q.shape, q.place, a.answer, q.place = a.answer,
+        a.response_ms / 1000, max(0, a.answered_ms - q.shown_ms) / 1000.0, q.times_shown, a.sequence
+    FROM study, participant p
+    JOIN (SELECT participant, count(*) AS done FROM answer GROUP BY participant) d
+        ON d.participant = p.number
+    JOIN question q ON q.participant = p.number
+    JOIN answer a ON a.participant = p.number AND a.position = q.position
+    ORDER BY p.number, q.position"""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer that a participant gave; the fields are the columns of the CSV file.
+    """An answer that a participant gave; the fields are the columns of the CSV file, and of `ROWS`.
 
     Attributes:
         participant: a random name.
@@ -75,111 +80,52 @@ def read_answers(path: str | Path) -> Answers:
     """
     path = Path(path)
     schema.check_file(path)
-    with schema.explained(path), _opened(path) as db:
+    with schema.explained(path), _copied(path) as db:
         schema.check_content(db, path)
-        db.execute("BEGIN")  # so that all that follows is of one moment
-        settings = schema.settings_of(db, path)
-        count, least, most = db.execute(
-            "SELECT count(*), min(number), max(number) FROM participant"
-        ).fetchone()
-        if count and (least, most) != (0, count - 1):
-            raise FileFormatError(f"{path}: participant", f"numbers to {most}", f"0 to {count - 1}")
         total = db.execute("SELECT count(*) FROM answer").fetchone()[0]
         if total > MOST_ROWS:
             raise FileFormatError(f"{path}: answer", f"{total:,} rows", f"at most {MOST_ROWS:,}")
-        found = tuple(_rows(db, path, settings))
-        if len(found) != total:
-            expected = "one for a question of a participant"
-            raise FileFormatError(f"{path}: answer", "rows that belong to no question", expected)
-    return Answers(path, settings, count, found)
+        participants = db.execute("SELECT count(*) FROM participant").fetchone()[0]
+        answers = tuple(_answer(row) for row in db.execute(ROWS))
+        return Answers(path, schema.settings_of(db), participants, answers)
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[sqlite3.Connection]:
-    """Open a file for reading, in a way that leaves nothing beside it.
+def _copied(path: Path) -> Iterator[sqlite3.Connection]:
+    """Copy a file, as it is at one moment, into memory; nothing is left beside it.
 
     A quiz that runs has a write-ahead log. Without one nobody writes, and SQLite is told so: else
-    it would make files beside this one, and fail in a folder that cannot be written to.
+    it would make files beside this one, and fail in a folder that cannot be written to. SQLite
+    checks the rules of tables in a copy, but not in a file that is opened for reading.
     """
     log = path.with_name(f"{path.name}-wal")
     fixed = "" if log.exists() and log.stat().st_size else "&immutable=1"
     address = f"{path.absolute().as_uri()}?mode=ro{fixed}"
-    with closing(sqlite3.connect(address, uri=True, timeout=10)) as db:
-        yield db
+    with (
+        closing(sqlite3.connect(address, uri=True, timeout=10)) as file,
+        closing(sqlite3.connect(":memory:")) as copy,
+    ):
+        file.execute("BEGIN")
+        file.execute("SELECT count(*) FROM sqlite_schema").fetchone()  # `backup` waits for ever
+        file.backup(copy)
+        yield copy
 
 
-def _rows(db: sqlite3.Connection, path: Path, settings: Settings) -> Iterator[Answer]:
-    """Yield the answers; everything in them is what a quiz writes."""
-    total = settings.questions + settings.calibrations
-    rows = db.execute(
-        "SELECT p.number, p.name, q.position, calibration, row, kind, angle_degrees, place, shape,"
-        " times_shown, shown_ms, answer, answered_ms, response_ms, sequence,"
-        " (SELECT count(*) FROM answer WHERE participant = p.number)"
-        " FROM participant p JOIN question q ON q.participant = p.number"
-        " JOIN answer a ON a.participant = p.number AND a.position = q.position"
-        " ORDER BY p.number, q.position"
-    )
-    before, place = -1, 0
-    for row in rows:
-        number, name, position, calibration, question, kind, angle, right, shape = row[:9]
-        shown, shown_ms, answer, answered_ms, response_ms, sequence, answered = row[9:]
-        place = place + 1 if number == before else 0
-        before = number
-        choices = range(settings.answers)
-        good = (
-            _matches(NAME, name) and _matches(KIND, kind) and _matches(re.compile(SHAPE), shape)
-            and position == place and position in range(total)
-            and calibration == (position < settings.calibrations)
-            and _whole(question, 2**31) and right in choices and answer in choices
-            and _whole(shown, 2**31) and shown > 0 and _whole(sequence, 2**62)
-            and _whole(shown_ms, LARGEST_MS) and _whole(answered_ms, LARGEST_MS)
-            and (angle is None or _real(angle, 180.0))
-            and (response_ms is None or _real(response_ms, 1e10))
-        )  # fmt: skip
-        if not good:
-            where = f"{path}: participant {number}, position {position}"
-            raise FileFormatError(where[:200], "values that no quiz writes", "an answer")
-        yield Answer(
-            participant=name,
-            finished=answered == total,
-            calibration=bool(calibration),
-            position=position,
-            question=question,
-            kind=kind,
-            angle_degrees=angle,
-            shape=shape,
-            right_answer=right,
-            answer=answer,
-            correct=right == answer,
-            response_seconds=None if response_ms is None else response_ms / 1000,
-            server_seconds=max(0, answered_ms - shown_ms) / 1000,
-            times_shown=shown,
-            order=sequence,
-        )
+def _answer(row: tuple[object, ...]) -> Answer:
+    """Return a row of `ROWS` as an answer; SQLite has 0 and 1 for truth."""
+    columns = zip(fields(Answer), row, strict=True)
+    values = {f.name: bool(value) if f.type is bool else value for f, value in columns}
+    return Answer(**values)  # type: ignore[arg-type]
 
 
-def _matches(pattern: re.Pattern[str], value: Any) -> bool:
-    return isinstance(value, str) and pattern.fullmatch(value) is not None
-
-
-def _whole(value: Any, beyond: int) -> bool:
-    return type(value) is int and 0 <= value < beyond
-
-
-def _real(value: Any, most: float) -> bool:
-    return type(value) in (int, float) and math.isfinite(value) and 0 <= value <= most
-
-
-def to_csv(found: Answers) -> str:
+def to_csv(answers_file: Answers) -> str:
     """Return all answers as CSV: a head with the names of `Answer`'s fields, lines that end in LF.
 
     Truth is 0 or 1, and what is not known is empty.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    names = tuple(Answer.__dataclass_fields__)
-    writer.writerow(names)
-    for one in found.answers:
-        values = (getattr(one, name) for name in names)
-        writer.writerow(int(value) if isinstance(value, bool) else value for value in values)
+    writer.writerow(field.name for field in fields(Answer))
+    for answer in answers_file.answers:
+        writer.writerow(int(v) if isinstance(v, bool) else v for v in astuple(answer))
     return out.getvalue()

@@ -29,48 +29,45 @@ HEADERS = {
     "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
     "Cache-Control": "no-store",
 }
+KEPT = {**HEADERS, "Cache-Control": "max-age=600"}  # of what is the same for everybody
 
 
-class Guard:
-    """ASGI middleware: refuses requests of other sites, and adds `HEADERS` to every response.
+class FixedHeaders:
+    """Middleware that adds `HEADERS` to every response, `KEPT` to files under `/static/`."""
 
-    A response may have its own `Cache-Control`.
-    """
-
-    def __init__(self, app: ASGIApp, hosts: Hosts, refuse: ASGIApp) -> None:
-        """Guard an app; `refuse` answers requests whose scope has a `RefusedError`, "refused"."""
-        self.app, self.hosts, self.refuse = app, hosts, refuse
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request."""
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                for name, value in HEADERS.items():
-                    headers.setdefault(name, value)
+                kept = scope["path"].startswith("/static/")
+                MutableHeaders(scope=message).update(KEPT if kept else HEADERS)
             await send(message)
 
-        try:
-            self.check(scope["method"], Headers(scope=scope))
-        except RefusedError as refused:
-            scope["refused"] = refused
-            await self.refuse(scope, receive, send_with_headers)
-        else:
-            await self.app(scope, receive, send_with_headers)
+        await self.app(scope, receive, send_with_headers)
 
-    def check(self, method: str, headers: Headers) -> None:
-        """Raise RefusedError for a request to another host, or a form that another site sends."""
-        hosts = headers.getlist("host")
-        if len(hosts) != 1 or not self.hosts.allow(hosts[0]):
+
+class OwnPagesOnly:
+    """Middleware that raises RefusedError for other hosts, and for forms of other sites."""
+
+    def __init__(self, app: ASGIApp, hosts: Hosts) -> None:
+        self.app, self.hosts = app, hosts
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+        headers = Headers(scope=scope)
+        names = headers.getlist("host")
+        if len(names) != 1 or not self.hosts.allow(names[0]):
             raise RefusedError(421, "This address is not one of the quiz.")
-        if method in ("GET", "HEAD"):
-            return
-        sender = headers.get("origin") or headers.get("referer")
-        if sender is not None and not is_own_page(sender, hosts[0]):
-            raise RefusedError(403, "Answers are taken from the quiz's own pages only.")
-        if headers.get("sec-fetch-site", "same-origin") not in ("same-origin", "none"):
-            raise RefusedError(403, "Answers are taken from the quiz's own pages only.")
+        if scope["method"] not in ("GET", "HEAD"):
+            sender = headers.get("origin") or headers.get("referer")
+            own = sender is None or is_own_page(sender, names[0])
+            if not own or headers.get("sec-fetch-site", "none") not in ("same-origin", "none"):
+                raise RefusedError(403, "Answers are taken from the quiz's own pages only.")
+        await self.app(scope, receive, send)
 
 
 async def read_form(request: Request, names: tuple[str, ...]) -> Mapping[str, str]:
@@ -90,12 +87,8 @@ async def read_form(request: Request, names: tuple[str, ...]) -> Mapping[str, st
     except TimeoutError as error:
         raise RefusedError(408, "The form did not arrive in time.") from error
     try:
-        pairs = parse_qsl(
-            body.decode("ascii"),
-            keep_blank_values=True,
-            errors="strict",
-            max_num_fields=MOST_FIELDS,
-        )
+        text = body.decode("ascii")
+        pairs = parse_qsl(text, keep_blank_values=True, errors="strict", max_num_fields=MOST_FIELDS)
     except ValueError as error:
         raise RefusedError(400, "The form cannot be read.") from error
     if sorted(name for name, _ in pairs) != sorted(names):

@@ -1,15 +1,13 @@
 """The pages as HTML, from the templates of this folder; they load nothing but their own files."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 FOLDER = Path(__file__).parent
-TYPES = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+STATIC = FOLDER / "static"
 _PAGES = Environment(
     loader=FileSystemLoader(FOLDER / "templates", encoding="utf-8"),
     autoescape=True,
@@ -41,18 +39,3 @@ class Bar:
 def page(template: str, **values: Any) -> str:
     """Return a page: `templates/<template>.html`, filled with these values, which are escaped."""
     return _PAGES.get_template(f"{template}.html").render(**values)
-
-
-def result_page(right: int, count: int, bars: Sequence[Bar]) -> str:
-    """Return the page at the end, with the own score beside others."""
-    return page("result", right=right, count=count, bars=bars, own=bars[0])
-
-
-@cache
-def static_files() -> dict[str, tuple[bytes, str]]:
-    """Return content and type of each file that pages load, by its name: there are no others."""
-    return {
-        path.name: (path.read_bytes(), TYPES[path.suffix])
-        for path in sorted((FOLDER / "static").iterdir())
-        if path.suffix in TYPES
-    }

@@ -1,64 +1,86 @@
 """The SQLite file of answers: its tables, how it is made, opened and checked, and its errors.
 
-study        name, value: the format's version, `study.Settings`, and the key of secret names
-participant  a row each; of the session's token only the SHA-256 is kept
+study        the settings, and the key that signs cookies; one row
+participant  a row each, with a random name
 question     what each participant is asked, in order, with the right answer
 answer       what was answered; never changed and never deleted
+
+The rules for values stand in the tables, so that SQLite keeps them when a quiz writes and checks
+them when a stranger's file is read. `CONTRADICTIONS` adds those between several rows.
 """
 
 import errno
 import os
-import re
 import secrets
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import asdict, fields
+from dataclasses import astuple, fields
 from pathlib import Path
-from typing import Any
 
-from iqtt.quiz.study import Settings
+from iqtt.quiz.study import MOST_QUESTIONS, Settings
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.files.new_file import written_beside
 
-FORMAT = "pix2shape-bench/quiz"
 VERSION = 1
 APPLICATION_ID = 0x71756971  # in the file's header, so that no other SQLite file is taken for one
 MAGIC = b"SQLite format 3\0"
+TIME = "BETWEEN 0 AND 9007199254740991"  # milliseconds since 1970
 TABLES = {
-    "study": "CREATE TABLE study (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID",
-    "participant": """CREATE TABLE participant (
-        number INTEGER PRIMARY KEY,
-        name TEXT NOT NULL UNIQUE,
-        token_sha256 BLOB NOT NULL UNIQUE,
-        started_ms INTEGER NOT NULL,
-        feedback_seen INTEGER NOT NULL DEFAULT 0)""",
-    "question": """CREATE TABLE question (
+    "study": f"""CREATE TABLE study (
+        fingerprint TEXT NOT NULL
+            CHECK (length(fingerprint) = 64 AND fingerprint NOT GLOB '*[^0-9a-f]*'),
+        calibration_fingerprint TEXT NOT NULL CHECK (length(calibration_fingerprint) = 64
+            AND calibration_fingerprint NOT GLOB '*[^0-9a-f]*'),
+        answers INTEGER NOT NULL CHECK (answers IN (2, 3)),
+        questions INTEGER NOT NULL CHECK (questions BETWEEN 1 AND {MOST_QUESTIONS}),
+        calibrations INTEGER NOT NULL CHECK (calibrations BETWEEN 0 AND {MOST_QUESTIONS}),
+        seed INTEGER NOT NULL CHECK (seed >= 0),
+        secret TEXT NOT NULL CHECK (length(secret) = 64)) STRICT""",
+    "participant": f"""CREATE TABLE participant (
+        number INTEGER PRIMARY KEY CHECK (number >= 0),
+        name TEXT NOT NULL UNIQUE CHECK (length(name) = 16 AND name NOT GLOB '*[^0-9a-f]*'),
+        started_ms INTEGER NOT NULL CHECK (started_ms {TIME}),
+        feedback_seen INTEGER NOT NULL DEFAULT 0) STRICT""",
+    "question": f"""CREATE TABLE question (
         participant INTEGER NOT NULL REFERENCES participant,
-        position INTEGER NOT NULL,
-        calibration INTEGER NOT NULL,
-        row INTEGER NOT NULL,
-        kind TEXT NOT NULL,
-        angle_degrees REAL,
-        place INTEGER NOT NULL,
-        shape TEXT NOT NULL,
-        times_shown INTEGER NOT NULL DEFAULT 0,
-        shown_ms INTEGER,
-        PRIMARY KEY (participant, position)) WITHOUT ROWID""",
-    "answer": """CREATE TABLE answer (
-        sequence INTEGER PRIMARY KEY,
+        position INTEGER NOT NULL CHECK (position >= 0),
+        calibration INTEGER NOT NULL CHECK (calibration IN (0, 1)),
+        row INTEGER NOT NULL CHECK (row BETWEEN 0 AND 2147483647),
+        kind TEXT NOT NULL
+            CHECK (length(kind) BETWEEN 1 AND 40 AND kind NOT GLOB '*[^a-z0-9 -]*'),
+        angle_degrees REAL CHECK (angle_degrees BETWEEN 0 AND 180),
+        place INTEGER NOT NULL CHECK (place BETWEEN 0 AND 2),
+        shape TEXT NOT NULL CHECK (length(shape) IN (0, 12) AND shape NOT GLOB '*[^0-9a-f]*'),
+        times_shown INTEGER NOT NULL DEFAULT 0 CHECK (times_shown BETWEEN 0 AND 2147483647),
+        shown_ms INTEGER CHECK (shown_ms {TIME}),
+        PRIMARY KEY (participant, position)) STRICT, WITHOUT ROWID""",
+    "answer": f"""CREATE TABLE answer (
+        sequence INTEGER PRIMARY KEY CHECK (sequence > 0),
         participant INTEGER NOT NULL,
         position INTEGER NOT NULL,
-        answer INTEGER NOT NULL,
-        answered_ms INTEGER NOT NULL,
-        response_ms REAL,
+        answer INTEGER NOT NULL CHECK (answer BETWEEN 0 AND 2),
+        answered_ms INTEGER NOT NULL CHECK (answered_ms {TIME}),
+        response_ms REAL CHECK (response_ms BETWEEN 0 AND 1e10),
         UNIQUE (participant, position),
-        FOREIGN KEY (participant, position) REFERENCES question)""",
+        FOREIGN KEY (participant, position) REFERENCES question) STRICT""",
 }
-SECRET = "secret"
-LONGEST_VALUE = 100_000  # bytes
+CONTRADICTIONS = {  # by what is wrong, queries that find nothing in a file that a quiz wrote
+    "rows that belong to nothing": "PRAGMA foreign_key_check",
+    "questions that are not those of the settings": "SELECT 1 FROM question JOIN study"
+    " WHERE place >= answers OR calibration <> (position < calibrations)"
+    " OR position >= calibrations + questions",
+    "answers that are not offered, or to what was not shown": "SELECT 1 FROM study, answer a"
+    " JOIN question q ON q.participant = a.participant AND q.position = a.position"
+    " WHERE answer >= answers OR shown_ms IS NULL OR times_shown = 0",
+    "answers out of turn": "SELECT 1 FROM answer GROUP BY participant"
+    " HAVING count(*) <> max(position) + 1",
+}
+MOST_BYTES = 2**30  # of a file
 MOST_STEPS = 1_000_000  # of a thousand instructions each, that checking a file may take
+SPLIT_HINT = "these are answers to another split; name another --db"
 SETTINGS_HINT = "repeat the settings that it was begun with, or name another --db"
+EXPECTED = "a file of answers that `iqtt quiz` wrote"
 
 
 class AnswersError(SceneGenError):
@@ -82,13 +104,13 @@ def open_answers(path: str | Path, settings: Settings) -> sqlite3.Connection:
         db = sqlite3.connect(path, isolation_level=None, check_same_thread=False, timeout=10)
         try:
             check_content(db, path)
-            _require_same(path, settings_of(db, path), settings)
+            _require_same(path, settings_of(db), settings)
             if db.execute("PRAGMA journal_mode = WAL").fetchone()[0] != "wal":
                 raise AnswersError(path, "a disk without write-ahead log", "a local disk")
             db.execute("PRAGMA synchronous = FULL")
             db.execute("PRAGMA foreign_keys = ON")
             # A write that changes nothing shows now whether the file can be written at all.
-            db.execute("UPDATE study SET value = value")
+            db.execute("UPDATE study SET seed = seed")
         except BaseException:
             db.close()
             raise
@@ -97,39 +119,42 @@ def open_answers(path: str | Path, settings: Settings) -> sqlite3.Connection:
 
 def _make(path: Path, settings: Settings) -> None:
     os.close(os.open(path, os.O_CREAT | os.O_WRONLY, 0o600))
-    values = {"format": FORMAT, **asdict(settings), SECRET: secrets.token_hex(32)}
     with closing(sqlite3.connect(path)) as db, db:
         db.execute(f"PRAGMA application_id = {APPLICATION_ID}")
         db.execute(f"PRAGMA user_version = {VERSION}")
         for statement in TABLES.values():
             db.execute(statement)
-        pairs = [(name, str(value)) for name, value in values.items()]
-        db.executemany("INSERT INTO study VALUES (?, ?)", pairs)
+        values = (*astuple(settings), secrets.token_hex(32))
+        db.execute("INSERT INTO study VALUES (?, ?, ?, ?, ?, ?, ?)", values)
 
 
 def check_file(path: Path) -> None:
-    """Raise OSError or FileFormatError unless a path is a regular file that begins as SQLite's."""
+    """Raise OSError or FileFormatError unless a path is a regular file that begins as SQLite's.
+
+    A file above MOST_BYTES is refused, as it is read into memory.
+    """
     if path.is_dir():
         raise OSError(errno.EISDIR, "is a folder; name a file in it", str(path))
     if path.is_symlink() or (path.exists() and not path.is_file()):
         raise OSError(errno.EINVAL, "is not a regular file", str(path))
     with path.open("rb") as file:
-        start = file.read(72)
+        start, size = file.read(72), path.stat().st_size
+    if size > MOST_BYTES:
+        raise FileFormatError(path, f"{size:,} bytes", f"at most {MOST_BYTES:,}")
     if not start.startswith(MAGIC):
-        raise FileFormatError(path, "no SQLite file", "a file of answers that `iqtt quiz` wrote")
+        raise FileFormatError(path, "no SQLite file", EXPECTED)
     if start[68:72] != APPLICATION_ID.to_bytes(4, "big"):
-        expected = "a file of answers that `iqtt quiz` wrote"
-        raise FileFormatError(path, "an SQLite file of something else", expected)
+        raise FileFormatError(path, "an SQLite file of something else", EXPECTED)
 
 
 def check_content(db: sqlite3.Connection, path: Path) -> None:
-    """Raise FileFormatError unless an open file has our tables, and nothing else in its schema.
+    """Raise FileFormatError unless an open file holds what a quiz writes, and nothing else.
 
-    So no view, trigger or generated column of a stranger's file is ever asked. A file that makes
+    No view, trigger or generated column of a stranger's file is ever asked. A file that makes
     SQLite work for too long is refused as well.
     """
     for limit, most in (
-        (sqlite3.SQLITE_LIMIT_LENGTH, LONGEST_VALUE * 10),
+        (sqlite3.SQLITE_LIMIT_LENGTH, 1_000_000),
         (sqlite3.SQLITE_LIMIT_ATTACHED, 0),
         (sqlite3.SQLITE_LIMIT_TRIGGER_DEPTH, 1),
     ):
@@ -142,50 +167,40 @@ def check_content(db: sqlite3.Connection, path: Path) -> None:
         version = db.execute("PRAGMA user_version").fetchone()[0]
         if version != VERSION:
             raise FileFormatError(path, f"version {version}", f"version {VERSION}")
-        found = dict(db.execute("SELECT name, sql FROM sqlite_schema WHERE sql IS NOT NULL"))
-        if found != TABLES:
-            other = sorted(str(name) for name in found.items() ^ TABLES.items())[0]
+        schema = dict(db.execute("SELECT name, sql FROM sqlite_schema WHERE sql IS NOT NULL"))
+        if schema != TABLES:
+            other = sorted(str(name) for name in schema.items() ^ TABLES.items())[0]
             raise FileFormatError(path, f"another schema, such as {other:.60}", ", ".join(TABLES))
-        trouble = db.execute("PRAGMA quick_check(1)").fetchone()[0]
+        trouble = db.execute("PRAGMA quick_check(1)").fetchone()[0]  # of the tables' rules, too
         if trouble != "ok":
             raise FileFormatError(path, f"damage: {trouble:.200}", "a whole file")
+        if db.execute("SELECT count(*) FROM study").fetchone() != (1,):
+            raise FileFormatError(f"{path}: study", "no settings, or several", "one row")
+        for problem, query in CONTRADICTIONS.items():
+            if db.execute(query).fetchone() is not None:
+                raise FileFormatError(path, problem, EXPECTED)
     finally:
         db.set_progress_handler(None, 0)
 
 
-def settings_of(db: sqlite3.Connection, path: Path) -> Settings:
-    """Return the settings that a checked file was made with. Raises FileFormatError."""
-    values = stored_values(db)
-    found: dict[str, Any] = {}
-    for field in fields(Settings):
-        text, number = values.get(field.name), field.type in (int, "int")
-        pattern = "[0-9]{1,19}" if number else "[0-9a-f]{64}"
-        if not isinstance(text, str) or not re.fullmatch(pattern, text):
-            raise FileFormatError(f"{path}: {field.name}", f"{text!r:.60}", "a setting of a study")
-        found[field.name] = int(text) if number else text
-    try:
-        if found["answers"] not in (2, 3):
-            raise SpecError("answers", found["answers"], "2 or 3")
-        return Settings(**found)
-    except SpecError as error:
-        raise FileFormatError(f"{path}: {error.where}", error.found, error.expected) from error
+def settings_of(db: sqlite3.Connection) -> Settings:
+    """Return the settings that a checked file was made with."""
+    names = ", ".join(field.name for field in fields(Settings))
+    return Settings(*db.execute(f"SELECT {names} FROM study").fetchone())
 
 
-def stored_values(db: sqlite3.Connection) -> dict[str, Any]:
-    """Return the table `study`."""
-    return dict(db.execute("SELECT name, value FROM study LIMIT 100"))
+def secret_of(db: sqlite3.Connection) -> str:
+    """Return the key of a checked file, which signs the cookies of its participants."""
+    return str(db.execute("SELECT secret FROM study").fetchone()[0])
 
 
-def _require_same(path: Path, found: Settings, expected: Settings) -> None:
+def _require_same(path: Path, begun: Settings, asked: Settings) -> None:
     """Raise SpecError where a file was begun with other settings than those of now."""
-    if found.fingerprint != expected.fingerprint:
-        what = f"answers to another split, of fingerprint {found.fingerprint:.12}"
-        told = f"answers to the split of fingerprint {expected.fingerprint:.12}"
-        raise SpecError(path, what, told, "name another --db")
     for field in fields(Settings):
-        one, other = (f"{getattr(each, field.name)!s:.20}" for each in (found, expected))
-        if one != other:
-            raise SpecError(f"{path}: {field.name}", one, other, SETTINGS_HINT)
+        stored, expected = (f"{getattr(each, field.name)!s:.20}" for each in (begun, asked))
+        if stored != expected:
+            hint = SPLIT_HINT if field.name == "fingerprint" else SETTINGS_HINT
+            raise SpecError(f"{path}: {field.name}", stored, expected, hint)
 
 
 @contextmanager

@@ -12,15 +12,15 @@ import numpy as np
 from iqtt.files.reader import NoAnswersError, QuestionsFile, answers_beside
 from iqtt.questions.specs import question_kind
 from iqtt.quiz.draw import Cell, cells_of, draw_rows
-from iqtt.quiz.pictures import KeptPictures, png
-from scenegen.common.errors import SpecError
+from iqtt.quiz.pictures import png
+from scenegen.common.recent import Recent
 from scenegen.common.records import check
 
 QUESTIONS, CALIBRATIONS = 20, 2  # of each participant; the paper asked one calibration question
 MOST_QUESTIONS = 1000
 HASHED = 100  # questions of a released file, that tell it from others with its answers
 UNTOLD = "not told"  # the kind of questions whose file does not tell it
-FROM_TEST, FROM_VALIDATION = "test", "val"
+KEPT_BYTES = 256 * 2**20  # of encoded images
 
 
 @dataclass(frozen=True)
@@ -71,10 +71,16 @@ class Question:
 
 
 class Pool:
-    """An open table of questions whose right answers are known."""
+    """An open table of questions whose right answers are known.
+
+    Attributes:
+        file: the table; with the file of answers beside it, if it has none of its own.
+        right, kinds, angles, shapes: of each row, as in `Question`.
+        fingerprint: as in `Settings`.
+    """
 
     def __init__(self, path: str | Path, part: str | None = None) -> None:
-        """Open a file, and the file of answers beside it where it has none of its own.
+        """Open a file, with the file of answers beside it where it has none of its own.
 
         Raises OSError, FileFormatError and SpecError as `QuestionsFile`, and NoAnswersError.
         """
@@ -84,8 +90,7 @@ class Pool:
                 self.file.close()
                 beside = answers_beside(path)
                 if beside is None:
-                    name = Path(path)
-                    expected = f"{name.stem}-answers{name.suffix} beside it"
+                    expected = f"{Path(path).stem}-answers{Path(path).suffix} beside it"
                     raise NoAnswersError(path, "questions but no answers", expected)
                 self.file = QuestionsFile(path, part, beside)
             self._read_labels()
@@ -93,7 +98,7 @@ class Pool:
             self.file.close()
             raise
         self._lock = Lock()
-        self._pictures = KeptPictures()
+        self._pictures: Recent[Sequence[bytes]] = Recent(KEPT_BYTES)
 
     def _read_labels(self) -> None:
         file, every = self.file, slice(None)
@@ -102,9 +107,8 @@ class Pool:
         self.angles: Sequence[float | None] = [None] * len(file)
         self.fingerprint = file.fingerprint or ""
         if file.has_truth:
-            self.kinds = [
-                question_kind(row) for row in file.read("distractor_kind", every).tolist()
-            ]
+            kinds = file.read("distractor_kind", every).tolist()
+            self.kinds = [question_kind(row) for row in kinds]
             self.angles = [round(a, 6) for a in file.read("angle_degrees", every).tolist()]
             references = np.asarray(file.read("class_id", every))[:, 0]
             self.shapes = [hashlib.sha256(row.tobytes()).hexdigest()[:12] for row in references]
@@ -116,13 +120,15 @@ class Pool:
 
     def question(self, row: int, calibration: bool) -> Question:
         """Return what is known of a row."""
-        at = row
-        return Question(
-            calibration, row, self.kinds[at], self.angles[at], self.right[at], self.shapes[at]
-        )
+        kind, angle, shape = self.kinds[row], self.angles[row], self.shapes[row]
+        return Question(calibration, row, kind, angle, self.right[row], shape)
+
+    def cells(self, rows: Sequence[int]) -> dict[Cell, list[int]]:
+        """Return these rows by the cells that draws are balanced over."""
+        return cells_of([self.kinds[r] for r in rows], [self.right[r] for r in rows], rows)
 
     def kept_images(self, row: int) -> Sequence[bytes] | None:
-        """Return the images of a row if they are at hand."""
+        """Return as `images`, at once; None where the file would have to be read."""
         return self._pictures.get(row)
 
     def images(self, row: int) -> Sequence[bytes]:
@@ -130,13 +136,13 @@ class Pool:
 
         Raises FileFormatError where the row is damaged.
         """
-        found = self.kept_images(row)
-        if found is None:
+        images = self.kept_images(row)
+        if images is None:
             with self._lock:
                 record = self.file[row]
-            found = [png(image) for image in record.radiance]
-            self._pictures.put(row, found)
-        return found
+            images = [png(image) for image in record.radiance]
+            self._pictures.put(row, images, sum(map(len, images)))
+        return images
 
 
 class Study:
@@ -145,6 +151,10 @@ class Study:
     Those of the calibration come from the validation file beside a test file, where there is one:
     shapes of a test set are in no validation set. Otherwise a few rows of the file are kept for it,
     which nobody is asked later. So feedback tells no answer of a question that counts.
+
+    Attributes:
+        pool, calibration: the tables of questions that count, and of those of the calibration,
+            which may be the same.
     """
 
     def __init__(
@@ -156,55 +166,47 @@ class Study:
         seed: int = 0,
     ) -> None:
         """Open the files. Raises as `Pool`, and SpecError where there are too few questions."""
-        self.path = Path(path)
         self.pool = self.calibration = Pool(path, part)
         try:
             beside = self._validation(Path(path), calibrations)
             if beside is not None:
                 self.calibration = Pool(beside)
-            self._share(questions, calibrations, seed)
+            marks = self.pool.fingerprint, self.calibration.fingerprint
+            count = self.pool.file.answers
+            self.settings = Settings(*marks, count, questions, calibrations, seed)
+            self._share_rows(Path(path))
         except BaseException:
             self.close()
             raise
 
-    def _share(self, questions: int, calibrations: int, seed: int) -> None:
-        """Say which rows are asked, and which are for the calibration."""
-        pool, kept = self.pool, self.calibration
-        self.settings = Settings(
-            pool.fingerprint, kept.fingerprint, pool.file.answers, questions, calibrations, seed
-        )
-        other: Sequence[int] = range(len(kept.file))
+    def _share_rows(self, path: Path) -> None:
+        """Divide the rows into those that count and those for the calibration."""
+        pool, settings = self.pool, self.settings
+        shared = self.calibration is pool
         rows: Sequence[int] = range(len(pool.file))
-        needed = questions + (calibrations if kept is pool else 0)
-        if len(rows) < needed:
-            raise SpecError(f"{self.path}: questions", len(rows), f"at least {needed}")
-        if kept is pool:
-            everything = cells_of(pool.kinds, pool.right, rows)
-            other = draw_rows(everything, calibrations, seed, 0, attempt=1)
-            rows = sorted(set(rows) - set(other))
-        self._cells, self._calibration_cells = (
-            _cells(p, r) for p, r in ((pool, rows), (kept, other))
-        )
+        practice: Sequence[int] = range(len(self.calibration.file))
+        needed = settings.questions + (settings.calibrations if shared else 0)
+        check(len(rows) >= needed, f"{path}: questions", len(rows), f"at least {needed}")
+        if shared:
+            every = pool.cells(rows)
+            practice = draw_rows(every, settings.calibrations, settings.seed, 0, attempt=1)
+            rows = sorted(set(rows) - set(practice))
+        self._cells = pool.cells(rows)
+        self._calibration_cells = self.calibration.cells(practice)
 
     def draw(self, participant: int) -> list[Question]:
         """Return a participant's questions in their order, those of the calibration first."""
-        settings, first = self.settings, self.calibration
-        told = draw_rows(
-            self._calibration_cells, settings.calibrations, settings.seed, participant, attempt=2
-        )
-        asked = draw_rows(self._cells, settings.questions, settings.seed, participant)
+        settings, cells = self.settings, self._calibration_cells
+        first = draw_rows(cells, settings.calibrations, settings.seed, participant, attempt=2)
+        rows = draw_rows(self._cells, settings.questions, settings.seed, participant)
         return [
-            *(first.question(row, calibration=True) for row in told),
-            *(self.pool.question(row, calibration=False) for row in asked),
+            *(self.calibration.question(row, calibration=True) for row in first),
+            *(self.pool.question(row, calibration=False) for row in rows),
         ]
 
-    def images(self, row: int, calibration: bool) -> Sequence[bytes]:
-        """Return the images of a question, as `Pool.images`."""
-        return (self.calibration if calibration else self.pool).images(row)
-
-    def kept_images(self, row: int, calibration: bool) -> Sequence[bytes] | None:
-        """Return as `images`, at once; None where the file would have to be read."""
-        return (self.calibration if calibration else self.pool).kept_images(row)
+    def pool_of(self, question: Question) -> Pool:
+        """Return the table that a question is in."""
+        return self.calibration if question.calibration else self.pool
 
     def close(self) -> None:
         """Close the files; idempotent."""
@@ -219,7 +221,7 @@ class Study:
 
     def _validation(self, path: Path, calibrations: int) -> Path | None:
         """Return the validation file of the same split beside a test file, if it has enough."""
-        beside = path.with_name(path.name.replace(FROM_TEST, FROM_VALIDATION))
+        beside = path.with_name(path.name.replace("test", "val"))
         spec = self.pool.file.spec
         if beside == path or not beside.is_file() or spec is None:
             return None
@@ -227,7 +229,3 @@ class Study:
             same = file.spec is not None and file.spec.public() == spec.public()
             enough = file.has_answers and len(file) >= calibrations > 0
             return beside if same and enough else None
-
-
-def _cells(pool: Pool, rows: Sequence[int]) -> dict[Cell, list[int]]:
-    return cells_of([pool.kinds[r] for r in rows], [pool.right[r] for r in rows], rows)

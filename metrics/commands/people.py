@@ -68,10 +68,10 @@ def _serve(
     questions: int, calibrations: int, participants: int, seed: int, part: str | None,
     contact: str, **_: Any,
 ) -> None:
-    needs("iqtt quiz", ("starlette", "uvicorn"), "quiz")
+    needs("iqtt quiz", ("itsdangerous", "starlette", "uvicorn"), "quiz")
     from iqtt.quiz.app import Quiz, make_app
     from iqtt.quiz.commits import Commits
-    from iqtt.quiz.schema import SECRET, open_answers, stored_values
+    from iqtt.quiz.schema import open_answers, secret_of
     from iqtt.quiz.serve import serve
     from iqtt.quiz.study import Study
     from metrics.views.people.references import compare
@@ -83,7 +83,7 @@ def _serve(
         listen(hosts, port) as listening,
     ):
         connection = open_answers(db, study.settings)
-        key = bytes.fromhex(stored_values(connection)[SECRET])
+        key = secret_of(connection)
         with Commits(connection) as commits:
             shown = partial(compare, study.settings.answers)
             tell = partial(print_line, err=True)

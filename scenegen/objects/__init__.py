@@ -3,7 +3,7 @@
 - `solids.UnitShape` is what every object is made of: a surface and a convex body, of radius 1.
 - `basic_shapes` makes boxes, spheres, teapots and the like, `families` makes everyday objects, and
   `meshes` reads models from files.
-- `cache` keeps what takes long to make, on disk and in memory.
+- `cache` keeps on disk what takes long to make.
 - `cast_meshes` turns shapes into what the ray caster takes.
 - `catalogue` says which models a data set draws from; `sources` turns the command line's options
   on objects into such a catalogue.

@@ -14,7 +14,7 @@ import numpy as np
 from iqtt.quiz import sessions
 from iqtt.quiz.app import Quiz, make_app
 from iqtt.quiz.commits import Commits
-from iqtt.quiz.schema import SECRET, open_answers, stored_values
+from iqtt.quiz.schema import open_answers, secret_of
 from iqtt.quiz.serve import server_of
 from iqtt.quiz.study import Question, Settings
 from metrics.views.people.references import compare
@@ -60,20 +60,21 @@ class Site:
         assert status == 200
         return text.decode()
 
-    def answer(self, cookie, choice=1, ms="1.5", form=None):
-        """Send an answer to what is asked now, or to the form with another name; return status."""
-        form = form or form_of(self.page(cookie))
-        fields = {"form": form, "answer": str(choice), "ms": ms}
+    def answer(self, cookie, choice=1, ms="1.5", position=None):
+        """Send an answer to what is asked now, or at another position; return the status."""
+        position = position_of(self.page(cookie)) if position is None else position
+        fields = {"position": position, "answer": str(choice), "ms": ms}
         return self.ask("POST", "/answer", fields, cookie)[0]
 
     def go_on(self, cookie):
         """Read the right answer; return the status."""
-        return self.ask("POST", "/next", {"form": form_of(self.page(cookie))}, cookie)[0]
+        fields = {"position": position_of(self.page(cookie))}
+        return self.ask("POST", "/next", fields, cookie)[0]
 
 
-def form_of(page):
-    """Return the name of a page's form."""
-    return re.search('name="form" value="([^"]+)"', page)[1]
+def position_of(page):
+    """Return the position of the question that a page's form belongs to."""
+    return re.search('name="position" value="([^"]+)"', page)[1]
 
 
 def images_of(page):
@@ -85,11 +86,11 @@ def images_of(page):
 def served(study, path, most=100, public=False, names=()):
     """Serve a study from a thread."""
     db = open_answers(path, study.settings)
-    key, told = bytes.fromhex(stored_values(db)[SECRET]), []
+    told = []
     hosts = hosts_of(None, public, names)
     with listen(Hosts(), 0) as listening, Commits(db) as commits:
         shown = partial(compare, study.settings.answers)
-        quiz = Quiz(study, commits, key, shown, told.append, "A <b>lab</b>", most)
+        quiz = Quiz(study, commits, secret_of(db), shown, told.append, "A <b>lab</b>", most)
         server = server_of(make_app(quiz, hosts))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
         thread.start()
@@ -115,23 +116,21 @@ def made_answers(path, participants=5, unfinished=1, skill=0.7, seed=1, settings
     """Write a file of answers of made-up people whose times grow by 0.02 s per degree."""
     rng = np.random.default_rng(seed)
     db = open_answers(path, settings)
-    key = b"key"
     with closing(db):
         db.execute("BEGIN")
         for number in range(participants + unfinished):
-            token = sessions.begin(db, partial(made_draw, settings=settings), 10**6)
+            name = sessions.begin(db, partial(made_draw, settings=settings), 10**6)
             asked = made_draw(number, settings)
             for i, q in enumerate(asked[: None if number < participants else 3]):
                 choice = q.right if rng.random() < skill else (q.right + 1) % settings.answers
-                sessions.show(db, token)
+                sessions.show(db, name)
                 seconds = 1.0 + 0.02 * q.angle_degrees + 0.3 * number + rng.normal(0, 0.1)
-                form = sessions.form_name(key, number, i)
-                sessions.answer(db, token, form, choice, None, key)
+                sessions.answer(db, name, i, choice, None)
                 db.execute(
                     "UPDATE answer SET response_ms = ? WHERE participant = ? AND position = ?",
                     (1000 * seconds, number, i),
                 )
                 if q.calibration:
-                    sessions.go_on(db, token, form, key)
+                    sessions.go_on(db, name, i)
         db.execute("COMMIT")
     return path

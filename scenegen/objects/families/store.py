@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 import scenegen
-from scenegen.objects.cache import DiskCache, Recent
+from scenegen.common.recent import Recent
+from scenegen.objects.cache import DiskCache
 from scenegen.objects.cast_meshes import CastMesh, cast_mesh
 from scenegen.objects.families.members import check_member, make_member
 from scenegen.objects.families.parts.assembly import UPRIGHT

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from scenegen.objects.cache import DiskCache, Recent
+from scenegen.common.recent import Recent
+from scenegen.objects.cache import DiskCache
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFolder
 from scenegen.objects.meshes.models import Model, load_model

@@ -24,7 +24,7 @@ def test_questions_are_those_of_the_file(study, split_folder):
                 record.answer,
                 pytest.approx(record.truth.angle_degrees),
             )
-            shown = [np.asarray(Image.open(io.BytesIO(one))) for one in study.images(q.row, False)]
+            shown = [np.asarray(Image.open(io.BytesIO(one))) for one in study.pool.images(q.row)]
             np.testing.assert_array_equal(shown, srgb_bytes(record.radiance))
 
 

@@ -1,4 +1,4 @@
-"""The cache on disk: damage, full disks, kills, several processes; and what memory keeps."""
+"""The cache on disk: damage, full disks, kills, several processes."""
 
 import multiprocessing
 import os
@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from scenegen.objects import cache
-from scenegen.objects.cache import DiskCache, Recent, default_cache_dir
+from scenegen.objects.cache import DiskCache, default_cache_dir
 from scenegen.objects.solids import Array
 
 NAMES = ("points", "text")
@@ -154,16 +154,3 @@ def test_where_the_cache_lies(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
         monkeypatch.setenv("XDG_CACHE_HOME", unset)
         assert default_cache_dir() == tmp_path / "home/.cache/pix2shape-bench/meshes"
     assert list(tmp_path.iterdir()) == [], "nothing is made before it is needed"
-
-
-def test_values_used_last_are_kept() -> None:
-    recent: Recent[str] = Recent(3)
-    for key in "abc":
-        recent.put(key, key.upper(), 1)
-    recent.put("c", "new", 1)
-    assert [recent.get(key) for key in "abcd"] == ["A", "B", "new", None]
-    recent.get("a")
-    recent.put("d", "D", 1)
-    assert [recent.get(key) for key in "abcd"] == ["A", None, "new", "D"]
-    recent.put("large", "L", 100)
-    assert [recent.get(key) for key in ("a", "c", "d", "large")] == [None, None, None, "L"]
