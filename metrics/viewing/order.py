@@ -108,14 +108,10 @@ def _stored_scores(path: str | Path, predictions: RoomPredictions, truth: RoomsF
 
 
 def sortable(scores: RowScores) -> dict[str, str]:
-    """Return titles of scores, unlike one another, with the names of the scores."""
+    """Return titles of scores that some row has, with the names of the scores."""
     names = in_order(name for name, column in scores.values.items() if np.isfinite(column).any())
-    names = [name for name in names if not name.startswith((EMPTY_ROOM, OTHER_SCENE))]
-    titles = [metric(name).title for name in names]
-    return {
-        title if titles.count(title) == 1 else f"{title} ({name})": name
-        for title, name in zip(titles, names, strict=True)
-    }
+    of_others = (EMPTY_ROOM, OTHER_SCENE)
+    return {metric(name).title: name for name in names if not name.startswith(of_others)}
 
 
 def worst_first(

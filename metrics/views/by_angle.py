@@ -70,9 +70,10 @@ def _with_paper(chart: Chart, name: str) -> Chart:
         for f in table.figures:
             if f.metric == name and f.method == PAPER and f.view_angle is not None:
                 columns.setdefault(f"{PAPER} †, {f.data}", {})[str(f.view_angle)] = f.text
+    numbers = chart.table
+    assert numbers is not None
     rows: list[Sequence[Cell | str]] = [
         (*row.cells, *(texts.get(row.cells[0].value, "-") for texts in columns.values()))
-        for row in chart.table.rows
+        for row in numbers.rows
     ]
-    head = (*chart.table.head, *columns)
-    return replace(chart, table=make_table(chart.table.title, head, rows))
+    return replace(chart, table=make_table(numbers.title, (*numbers.head, *columns), rows))

@@ -15,17 +15,16 @@ from metrics.views.score_tables import (
     GROUP_TITLES,
     INTERVAL,
     SKILL,
-    as_shown,
+    floor_cell,
     floor_text,
     interval_cells,
     kind_skill,
     labels_of,
-    references,
     score_cell,
     what_the_floor_is,
 )
 from metrics.views.table import Cell, Table, make_table
-from scenegen.common.text_table import by_number, number, plain
+from scenegen.common.text_table import by_number, number
 
 PAPER_NOTE = f"† {SOURCE.split(',')[0]}), {REPORTED}, so it only tells the order of magnitude."
 KINDS_REMARK = (
@@ -43,7 +42,7 @@ def answer(scores: ScoreFile) -> Lead:
     if name in scores.skills:
         skill = scores.skills[name]
         value, interval = interval_cells(skill)
-        text = f"skill of {title}: {_verdict(skill)} (floor: {_floor_name(scores, name)})"
+        text = f"skill of {title}: {_verdict(skill)} (floor: {floor_text(scores, name)})"
     else:
         value, interval = interval_cells(scores.metrics[name])
         text = f"{title} ({metric(name).unit}, {metric(name).direction}); no floor is known"
@@ -66,20 +65,19 @@ def _verdict(skill: Skill) -> str:
     return "worse than the floor" if skill.high < 0.0 else "not told apart from the floor"
 
 
-def headline_section(files: Sequence[ScoreFile], title: str = "") -> Section:
+def headline_section(files: Sequence[ScoreFile]) -> Section:
     """Return a row for each main score of the first file: skill, value, floor, paper, the others.
 
     Columns in which no score has anything are left out, but for the paper's.
     """
     scores, *beside = files
-    head = ("score", "skill", labels_of(files)[0], "on its scale", "floor", "paper †")
+    label, *labels = labels_of(files)
+    head = ("score", "skill", label, "on its scale", "floor", "paper †", *labels)
     rows = [_headline_row(scores, beside, name) for name in _main_scores(scores)]
     empty = {i for i in (1, 4) if all(row[i] == Cell() for row in rows)}
-    kept = [i for i in range(len(head) + len(beside)) if i not in empty]
-    heads = (*head, *labels_of(files)[1:])
-    table = make_table(
-        "Headline", [heads[i] for i in kept], [[row[i] for i in kept] for row in rows]
-    )
+    kept = [i for i in range(len(head)) if i not in empty]
+    cells = ([row[i] for i in kept] for row in rows)
+    table = make_table("Headline", [head[i] for i in kept], cells)
     over = "scenes" if scores.task == "rooms" else "shapes or questions"
     notes = [f"{SKILL} {what_the_floor_is(scores)}"] if scores.skills else []
     notes += [
@@ -87,7 +85,7 @@ def headline_section(files: Sequence[ScoreFile], title: str = "") -> Section:
         " interval, the solid line its floor, and dashed lines are the methods beside it.",
         PAPER_NOTE,
     ]
-    return Section(title, tables=[table], notes=notes)
+    return Section("", tables=[table], notes=notes)
 
 
 def _headline_row(scores: ScoreFile, beside: Sequence[ScoreFile], name: str) -> list[Cell]:
@@ -100,7 +98,7 @@ def _headline_row(scores: ScoreFile, beside: Sequence[ScoreFile], name: str) -> 
         score_cell(skill),
         score_cell(score),
         _strip_cell(score, others, marks, (definition.smallest, definition.largest)),
-        _floor_cell(scores, name),
+        floor_cell(scores, name),
         paper_cell(name),
         *map(score_cell, others),
     ]
@@ -123,25 +121,6 @@ def _strip_cell(
     farther = [end for point in points for end in (point.low, point.high)]
     drawing, scale = strip(score_point(score), shown, [*farther, *ends], limits)
     return Cell("", scale, drawing=drawing)
-
-
-def _floor_cell(scores: ScoreFile, name: str) -> Cell:
-    """Return the floor of a score, and what chance or noise gives."""
-    label, value = references(scores).get(name, ("", 0.0))
-    like = as_shown(scores.metrics[name])
-    if name not in scores.skills:
-        return Cell(number(value, like), label) if label else Cell()
-    names = [_floor_name(scores, name)]
-    if label and label not in names[0]:
-        names.append(f"{label} {number(value, like)}")
-    return Cell(number(scores.skills[name].floor, like), "; ".join(names))
-
-
-def _floor_name(scores: ScoreFile, name: str) -> str:
-    """Return the name of the floor; several kinds of questions have one each."""
-    if len(scores.by_distractor) > 1:
-        return "the mean of the floors of these kinds of questions"
-    return plain(floor_text(scores, name))
 
 
 def paper_cell(name: str) -> Cell:

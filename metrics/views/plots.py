@@ -1,4 +1,4 @@
-"""Charts of pages, drawn by matplotlib as SVG, each with the table of the numbers that it shows.
+"""Charts of pages, drawn by matplotlib as SVG.
 
 Names of methods come from strangers' files and may be long, so they stand in the page's legend and
 tables and never in a drawing. The same numbers give the same bytes.
@@ -72,17 +72,18 @@ class Series:
 
 @dataclass(frozen=True)
 class Chart:
-    """A drawing and its numbers.
+    """A drawing.
 
     Attributes:
         picture: an SVG image, as a data URL.
         legend: kind and name of each series; empty where the title says enough.
+        table: the numbers that are drawn; None where they stand elsewhere on the page.
     """
 
     title: str
     picture: str
-    table: Table
     legend: Sequence[tuple[str, str]] = ()
+    table: Table | None = None
 
 
 def kind_of(place: int) -> str:
@@ -110,11 +111,7 @@ def histogram(values: Array, title: str, unit: str) -> Chart | None:
         axes.locator_params(axis="x", nbins=6)
         figure.legend(loc="outside upper left", ncols=2, frameon=False)
         picture = _svg(figure)
-    rows = [
-        (f"{number(a, edges[-1])} to {number(b, edges[-1])}", str(n))
-        for a, b, n in zip(edges[:-1], edges[1:], counts.tolist(), strict=True)
-    ]
-    return Chart(title, picture, make_table(f"Numbers of {title}", (unit, "images"), rows))
+    return Chart(title, picture)
 
 
 def curves(series: Sequence[Series], title: str, unit: str) -> Chart | None:
@@ -143,7 +140,7 @@ def curves(series: Sequence[Series], title: str, unit: str) -> Chart | None:
     ]
     head = ("degrees", *(line.label for line in series))
     legend = [(line.kind, line.label) for line in series]
-    return Chart(title, picture, make_table(f"Numbers of {title}", head, rows), legend)
+    return Chart(title, picture, legend, make_table(f"Numbers of {title}", head, rows))
 
 
 def _draw_curve(axes: "Axes", line: Series, aside: float) -> None:
@@ -188,8 +185,7 @@ def bars(counts: Sequence[int], title: str, unit: str, counted: str) -> Chart:
         axes.set(xlabel=unit, ylabel=counted)
         axes.locator_params(integer=True)
         picture = _svg(figure)
-    rows = [(str(i), str(n)) for i, n in enumerate(counts)]
-    return Chart(title, picture, make_table(f"Numbers of {title}", (unit, counted), rows))
+    return Chart(title, picture)
 
 
 def strip(

@@ -46,7 +46,7 @@ class BesideError(SceneGenError):
 
 def text_report(scores: ScoreFile, as_markdown: bool = False) -> str:
     """Return the headline, all scores, and the main ones by group, as aligned text or Markdown."""
-    tables = [headline_rows(scores), all_scores(scores), *(t for _, t in group_tables(scores))]
+    tables = [headline_rows(scores), all_scores(scores), *group_tables(scores)]
     return (to_markdown if as_markdown else to_text)(title_of(scores), tables, notes_of(scores))
 
 
@@ -158,7 +158,7 @@ def _distributions(scores: ScoreFile) -> Iterator[Chart]:
 def _all_numbers(scores: ScoreFile) -> Iterator[Section]:
     """Yield what is folded at the end: all scores, their definitions, and where they come from."""
     yield Section("All numbers")
-    for _, table in group_tables(scores) if scores.task == "rooms" else ():
+    for table in group_tables(scores) if scores.task == "rooms" else ():
         yield Section(table.title.capitalize(), tables=[table], folded=True)
     title = f"All scores ({len(scores.metrics)})"
     yield Section(title, tables=[all_scores(scores)], folded=True)

@@ -41,7 +41,10 @@ def headline_rows(scores: ScoreFile) -> Table:
         for n in names
         if n in scores.skills
     ]
-    rows += [(n, *interval_cells(scores.metrics[n]), _floors_beside(scores, n)) for n in names]
+    for name in names:
+        floor = floor_cell(scores, name)
+        text = f"{floor.value}: {floor.rest}" if floor.rest else floor.value
+        rows.append((name, *interval_cells(scores.metrics[name]), text))
     return make_table("", ("headline", "value", INTERVAL, "floor"), rows)
 
 
@@ -52,15 +55,16 @@ def floor_text(scores: ScoreFile, name: str) -> str:
     return scores.skills[name].floor_name
 
 
-def _floors_beside(scores: ScoreFile, name: str) -> str:
-    """Return the floor of a score, and what chance or noise gives, each with its name."""
-    like, texts = as_shown(scores.metrics[name]), []
-    if name in scores.skills:
-        texts.append(f"{number(scores.skills[name].floor, like)}: {floor_text(scores, name)}")
+def floor_cell(scores: ScoreFile, name: str) -> Cell:
+    """Return the floor of a score with its name, and what chance or noise gives."""
     label, value = references(scores).get(name, ("", 0.0))
-    if label and not any(f": {label}" in text for text in texts):
-        texts.append(f"{label} {number(value, like)}")
-    return "; ".join(texts) or "-"
+    reference = number(value, as_shown(scores.metrics[name]))
+    if name not in scores.skills:
+        return Cell(reference, label) if label else Cell()
+    floor, texts = scores.skills[name].floor, [floor_text(scores, name)]
+    if label and not texts[0].startswith(label):
+        texts.append(f"{label} {reference}")
+    return Cell(number(floor, as_shown(scores.metrics[name])), "; ".join(texts))
 
 
 def references(scores: ScoreFile) -> dict[str, tuple[str, float]]:
@@ -89,8 +93,8 @@ def all_scores(scores: ScoreFile) -> Table:
     return make_table("all scores", head, rows)
 
 
-def group_tables(scores: ScoreFile) -> Iterator[tuple[str, Table]]:
-    """Yield each grouping that the scores have, and its table: a row for each group."""
+def group_tables(scores: ScoreFile) -> Iterator[Table]:
+    """Yield a table for each grouping that the scores have: a row for each group."""
     for grouping in GROUPINGS[scores.task]:
         groups = getattr(scores, grouping)
         if not groups:
@@ -105,7 +109,7 @@ def group_tables(scores: ScoreFile) -> Iterator[tuple[str, Table]]:
             n = str(max(score.n for score in group.values()))
             rows.append((key, *cells, n, *(_kind_cells(scores, key) if with_floors else ())))
         head = ("", *names, "n", *(("skill", "floor") if with_floors else ()))
-        yield grouping, make_table(GROUP_TITLES[grouping], head, rows)
+        yield make_table(GROUP_TITLES[grouping], head, rows)
 
 
 def _group_cell(score: Score | None) -> Cell:

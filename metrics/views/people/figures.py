@@ -5,6 +5,7 @@ the reference and of the right answer.
 """
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -129,93 +130,65 @@ def compute(answers_file: Answers, model: str | Path | None = None) -> Figures:
     Raises FileFormatError where nobody finished, and as `open_predictions`; SpecError where the
     submission is for another split or lacks a question.
     """
-    answers = counted(answers_file)
-    people = np.unique([answer.participant for answer in answers], return_inverse=True)[1]
-    order = np.unique(people, return_index=True)[1]
+    answers, settings = counted(answers_file), answers_file.settings
+    numbers = {name: i for i, name in enumerate(dict.fromkeys(a.participant for a in answers))}
+    people = np.array([numbers[answer.participant] for answer in answers])
     right = np.array([answer.correct for answer in answers], np.float64)
-    questions, offered = answers_file.settings.questions, answers_file.settings.answers
-    scores = np.bincount(people, right)[people[np.sort(order)]].astype(int)
-    shares = scores / questions
-    tests = [_test("chance", 1 / offered, shares - 1 / offered)]
+    angles = np.array([answer.angle_degrees for answer in answers], np.float64)  # NaN for None
+    seconds = np.array([_usable_seconds(answer) for answer in answers])
+    kinds = np.array([answer.kind for answer in answers])
+    is_timed = (right == 1.0) & np.isfinite(seconds)
+
+    def line(chosen: Array) -> Line | None:
+        """Shepard and Metzler's line: the times of right answers over the angle."""
+        used = chosen & is_timed & np.isfinite(angles)
+        return line_within_people(angles[used], seconds[used], people[used])
+
+    def group(name: str, chosen: Array, is_kind: bool) -> Group:
+        timed = chosen & is_timed
+        return Group(
+            name=name,
+            answers=int(chosen.sum()),
+            accuracy=within(mean_of_people(right[chosen], people[chosen])),
+            floor=floor_of_kind(name, settings.answers)[0] if is_kind else None,
+            seconds=mean_of_people(seconds[timed], people[timed]) if timed.any() else None,
+            line=line(chosen) if is_kind else None,
+        )
+
+    scores = np.bincount(people, right).astype(int)
+    shares = scores / settings.questions
+    tests = [_test("chance", 1 / settings.answers, shares - 1 / settings.answers)]
     if model is not None:
         tests.append(_model_test(answers_file, answers, people, right, model))
-    usable = [i for i, answer in enumerate(answers) if _timed(answer)]
-
-    def groups(names: Sequence[str | None], order: Sequence[str], floors: bool) -> list[Group]:
-        return [
-            _group(
-                name,
-                [i for i, n in enumerate(names) if n == name],
-                answers,
-                people,
-                offered if floors else None,
-            )
-            for name in order
-            if name in names
-        ]
-
-    kinds = [answer.kind for answer in answers]
+    span = np.clip(np.digitize(angles, ANGLE_BINS) - 1, 0, len(ANGLE_BINS) - 2)
+    span = np.where(np.isfinite(angles), span, -1)
     spans = [f"{a}-{b}" for a, b in itertools.pairwise(ANGLE_BINS)]
     return Figures(
         begun=answers_file.participants,
         finished=len(scores),
-        questions=questions,
+        questions=settings.questions,
         distinct=len({answer.question for answer in answers}),
-        candidates=offered,
+        candidates=settings.answers,
         scores=scores.tolist(),
         accuracy=within(mean_estimate(shares)),
         crossed=crossed_estimate(right, people, [answer.question for answer in answers]),
         deviation=float(shares.std(ddof=1)) if len(shares) > 1 else None,
-        histogram=np.bincount(scores, minlength=questions + 1).tolist(),
+        histogram=np.bincount(scores, minlength=settings.questions + 1).tolist(),
         shapiro=_shapiro(shares),
         tests=tests,
-        by_kind=groups(kinds, sorted(set(kinds)), floors=True),
-        by_angle=groups([_span(answer, spans) for answer in answers], spans, floors=False),
-        line=_line(answers, people, range(len(answers))),
-        timed=len(usable),
-        references=references(kinds, offered),
+        by_kind=[group(kind, kinds == kind, True) for kind in sorted(set(kinds.tolist()))],
+        by_angle=[group(spans[i], span == i, False) for i in np.unique(span[span >= 0])],
+        line=line(np.ones(len(answers), bool)),
+        timed=int(np.isfinite(seconds).sum()),
+        references=references(kinds.tolist(), settings.answers),
     )
 
 
-def _timed(answer: Answer) -> bool:
-    """Return whether an answer's time is known and from one uninterrupted look at the question."""
-    return answer.response_seconds is not None and answer.times_shown == 1
-
-
-def _span(answer: Answer, spans: Sequence[str]) -> str | None:
-    if answer.angle_degrees is None:
-        return None
-    place = int(np.digitize(answer.angle_degrees, ANGLE_BINS)) - 1
-    return spans[min(max(place, 0), len(spans) - 1)]
-
-
-def _group(
-    name: str, chosen: Sequence[int], answers: Sequence[Answer], people: Array, offered: int | None
-) -> Group:
-    """Return the figures of the chosen answers; with `offered`, name is a kind that has a floor."""
-    right = [answers[i].correct for i in chosen]
-    timed = [i for i in chosen if _timed(answers[i]) and answers[i].correct]
-    seconds = [answers[i].response_seconds or 0.0 for i in timed]
-    return Group(
-        name=name,
-        answers=len(chosen),
-        accuracy=within(mean_of_people(right, people[list(chosen)])),
-        floor=floor_of_kind(name, offered)[0] if offered else None,
-        seconds=mean_of_people(seconds, people[timed]) if timed else None,
-        line=_line(answers, people, chosen) if offered else None,
-    )
-
-
-def _line(answers: Sequence[Answer], people: Array, chosen: Sequence[int]) -> Line | None:
-    """Return Shepard and Metzler's line: the times of right answers over the angle."""
-    used = [
-        i
-        for i in chosen
-        if answers[i].correct and _timed(answers[i]) and answers[i].angle_degrees is not None
-    ]
-    angles = [answers[i].angle_degrees or 0.0 for i in used]
-    seconds = [answers[i].response_seconds or 0.0 for i in used]
-    return line_within_people(angles, seconds, people[used])
+def _usable_seconds(answer: Answer) -> float:
+    """Return an answer's time if it is from one uninterrupted look at the question, else NaN."""
+    if answer.response_seconds is None or answer.times_shown != 1:
+        return math.nan
+    return answer.response_seconds
 
 
 def _shapiro(shares: Array) -> tuple[float, float] | None:

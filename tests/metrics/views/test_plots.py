@@ -8,6 +8,7 @@ import pytest
 from pages import cells_of
 
 from metrics.views.plots import LINE, Point, Series, bars, curves, histogram, strip
+from scenegen.common.text_table import number
 
 MINE = Series("<mine>", [Point(5, 0.00677, 0.006, 0.007), Point(80, 0.004)], "s0")
 FLOOR = Series("floor", [Point(5, 0.01)], LINE)
@@ -26,9 +27,7 @@ HARD = [[1.0], [2.0, 2.0], [0.0, 0.0], [1e-9, 1.0, np.nan], [-1, 1e7], [1e99, -1
 @pytest.mark.parametrize("values", HARD)
 def test_histograms_of_hard_values_are_whole(values):
     chart = histogram(np.array(values, float), "a<b", "unit")
-    svg_of(chart.picture)
-    assert sum(int(cells[0]) for cells in cells_of(chart.table).values()) <= len(values)
-    assert sum(int(row.cells[1].value) for row in chart.table.rows) == np.isfinite(values).sum()
+    assert f"mean {number(np.nanmean(values))}" in svg_of(chart.picture)
     assert histogram(np.array([np.nan]), "t", "u") is None
 
 
@@ -71,5 +70,4 @@ def test_a_strip_holds_its_values_from_zero_within_their_limits(point, marks, ot
 
 def test_bars_count():
     chart = bars([0, 3, 10], "t", "right answers", "participants")
-    assert cells_of(chart.table) == {"0": ["0"], "1": ["3"], "2": ["10"]}
-    svg_of(chart.picture)
+    assert ">10<" in svg_of(chart.picture)

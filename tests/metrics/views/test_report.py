@@ -50,7 +50,7 @@ def test_questions_have_the_floor_of_their_kind(monkeypatch):
     assert head["skill of iqtt_accuracy"][-1] == "0: outline"
     assert head["iqtt_accuracy"][-1] == "0.5000: outline; chance 0.3333"
     assert cells_of(all_scores(scores))["  chance"][0] == "0.3333"
-    ((_, kinds),) = group_tables(scores)
+    (kinds,) = group_tables(scores)
     assert cells_of(kinds) == {"mirror": ["0.3333", "2", "-0.3333", "0.5000: outline"]}
 
 
