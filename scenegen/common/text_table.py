@@ -6,7 +6,7 @@ cannot be shown in it becomes an escape.
 
 import math
 import unicodedata
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 DIGITS = 4  # significant digits of a score
 LONGEST = 60  # characters of a name
@@ -53,10 +53,10 @@ def distinct(names: Sequence[str], hints: Sequence[str]) -> list[str]:
 
     Equal names get their hints in brackets; names that are equal even then are numbered.
     """
-    found = [plain(name) for name in names]
+    shown = [plain(name) for name in names]
     hinted = [
-        f"{name} [{plain(hint)}]" if found.count(name) > 1 else name
-        for name, hint in zip(found, hints, strict=True)
+        f"{name} [{plain(hint)}]" if shown.count(name) > 1 else name
+        for name, hint in zip(shown, hints, strict=True)
     ]
     return [f"{name} #{i + 1}" if hinted.count(name) > 1 else name for i, name in enumerate(hinted)]
 
@@ -112,15 +112,3 @@ def piped(rows: Rows) -> list[str]:
     """
     head, *rest = ["| " + " | ".join(row) + " |" for row in rows]
     return [head, "| " + " | ".join("---" for _ in rows[0]) + " |", *rest]
-
-
-def laid_out(tables: Iterable[tuple[str, Rows]], as_markdown: bool) -> Iterator[str]:
-    """Yield the lines of tables, each after an empty line and its title, which may be empty.
-
-    Titles and cells have to be escaped already where they are Markdown.
-    """
-    for title, rows in tables:
-        yield ""
-        if title:
-            yield from (f"**{title}**", "") if as_markdown else (title,)
-        yield from piped(rows) if as_markdown else ("  " + line for line in aligned(rows))

@@ -12,7 +12,6 @@ from scenegen.common.text_table import (
     aligned,
     by_number,
     distinct,
-    laid_out,
     markdown,
     number,
     plain,
@@ -52,11 +51,6 @@ def test_names_in_one_line(name, shown):
 def test_what_a_terminal_would_obey_is_shown(text, shown):
     assert printable(text) == shown
     assert printable(text, keep=text) == text
-
-
-@given(ANY_TEXT)
-def test_any_text_is_one_line(text):
-    assert len(f"x{printable(text)}".splitlines()) == 1
 
 
 @given(ANY_TEXT)
@@ -115,14 +109,6 @@ def test_columns_are_aligned_by_what_terminals_show():
         "abcde  y",
         "e\u0301      z",
     ]
-
-
-def test_tables_stand_below_their_titles():
-    tables = [("", [("a", "b"), ("c", "d")]), ("t", [("e",)])]
-    assert list(laid_out(tables, as_markdown=False)) == ["", "  a  b", "  c  d", "", "t", "  e"]
-    first = ["", "| a | b |", "| --- | --- |", "| c | d |"]
-    second = ["", "**t**", "", "| e |", "| --- |"]
-    assert list(laid_out(tables, as_markdown=True)) == first + second
 
 
 def test_keys_are_sorted_by_their_first_number():
