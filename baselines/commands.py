@@ -43,24 +43,23 @@ UNTRAINED = {
     "pix2shape-views": "questions: the same, with an encoder of its own",
 }
 REFERENCE = ("pix2shape", "pix2shape-compact", "pix2shape-rays", "pix2shape-views")
-# Baselines that are trained with `bench train NAME`. A new one is a line here and one in HOMES: a
-# module with a dataclass `Settings`, and functions `train` and `write_submission`.
-TRAINED = {
-    "cnn": "questions: ResNets and a softmax over the answers",
-    "depth-supervised": "rooms: a network trained with true depth, as a ceiling",
-    "ptn": "rooms and questions: voxels, learned from silhouettes",
-    "rezende": "questions: meshes, by a renderer without gradients",
-    "siamese": "questions: the answer whose features are nearest",
-    "view-pairs": "rooms: a network trained with pairs of images, no depth",
-}
+# Baselines that are trained with `bench train NAME`: their modules, see `baselines.training`, and
+# what they are. A new one is a line here.
 HOMES = {
-    "cnn": "resnets.cnn",
-    "depth-supervised": "relief.depth_supervised",
-    "ptn": "ptn",
-    "rezende": "rezende",
-    "siamese": "resnets.siamese",
-    "view-pairs": "relief.view_pairs",
+    "cnn": ("resnets.cnn", "questions: ResNets and a softmax over the answers"),
+    "depth-supervised": (
+        "relief.depth_supervised",
+        "rooms: a network trained with true depth, as a ceiling",
+    ),
+    "ptn": ("ptn", "rooms and questions: voxels, learned from silhouettes"),
+    "rezende": ("rezende", "questions: meshes, by a renderer without gradients"),
+    "siamese": ("resnets.siamese", "questions: the answer whose features are nearest"),
+    "view-pairs": (
+        "relief.view_pairs",
+        "rooms: a network trained with pairs of images, no depth",
+    ),
 }
+TRAINED = {name: text for name, (_, text) in HOMES.items()}
 ALL = {**UNTRAINED, **TRAINED}
 
 
@@ -230,7 +229,7 @@ def train_baseline(
 def _module(name: str) -> Any:
     """Return the module of a trained baseline. Raises UserError where torch is missing."""
     needs_torch(name, ("torch", "safetensors"))
-    return import_module(f"baselines.{HOMES[name]}")
+    return import_module(f"baselines.{HOMES[name][0]}")
 
 
 COMMANDS = (baseline, train_baseline)

@@ -5,9 +5,7 @@ where the occupancy along a pixel's ray first exceeds a half; elsewhere the empt
 the method is told, as its volume holds objects alone.
 """
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
@@ -19,19 +17,17 @@ from baselines.ptn.projection import first_hit, outward
 from baselines.ptn.rooms import SWAPPED, RoomImages
 from baselines.training.checkpoint import load_weights
 from baselines.training.images import Array
-from baselines.training.questions import each_question, is_question_file, open_test
+from baselines.training.questions import Progress, each_question, is_question_file, open_test
 from metrics.measures.empty_room import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from scenegen import open_rooms
 from scenegen.common.errors import SpecError
-from scenegen.common.records import check
 from scenegen.files.new_file import check_writable
 
 FILES = Path(__file__).with_name("files")
 SAMPLES = 96  # places along each ray, closer than in training
 AT_ONCE = 16  # questions
-COMPARED = {"volumes": (1.0, 0.0), "codes": (0.0, 1.0)}  # weights of `matching.FEATURES`
-Progress = Callable[[int, int], Any]  # rows done since the last call, rows in all
+VOLUMES_ALONE = (1.0, 0.0)  # weights of `matching.FEATURES`
 
 
 def write_submission(
@@ -39,19 +35,12 @@ def write_submission(
     out: str | Path,
     weights: str | Path | None = None,
     *,
-    compare: str | None = None,
-    run: str = "",
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> None:
-    """Write a submission for rooms or questions.
+    """Write a submission for rooms or questions, as `baselines.training` says.
 
-    Args:
-        weights: a file that `train` wrote; by default the one of the package that suits the data.
-        compare: for questions, "volumes" or "codes" of images; by default what the labels of
-            training weigh, or volumes where there were none.
-
-    Raises SpecError where weights and data do not fit; OSError, FileFormatError.
+    Answers are scored by what the labels of training weigh, or by volumes where there were none.
     """
     task = "questions" if is_question_file(data) else "rooms"
     model, card = load_weights(weights or FILES / f"ptn-{task}.safetensors", METHOD)
@@ -59,33 +48,26 @@ def write_submission(
         raise SpecError(weights, f"weights for {card.task}", f"some for {task}")
     check_writable(Path(out), overwrite)
     if task == "rooms":
-        check(compare is None, "compare", compare, "none, as rooms ask no questions")
-        _predict_rooms(model, data, out, run, overwrite, progress)
+        _predict_rooms(model, data, out, overwrite, progress)
         return
-    check(compare is None or compare in COMPARED, "compare", compare, " or ".join(COMPARED))
-    head = torch.tensor(
-        COMPARED[compare] if compare else card.head or COMPARED["volumes"], dtype=torch.double
-    )
+    head = torch.tensor(card.head or VOLUMES_ALONE, dtype=torch.double)
 
     def scores(images: Tensor) -> Tensor:
         return features(model, images).double() @ head
 
     with open_test(data, card.settings.size) as questions:
         values = each_question(questions, card.settings.size, scores, AT_ONCE, progress=progress)
-    how: dict[str, Any] = {"run": run, "overwrite": overwrite}
-    method = f"ptn {compare}" if compare else "ptn"
-    write_answers(out, data, method=method, scores=values.numpy(), **how)
+    write_answers(out, data, method="ptn", scores=values.numpy(), overwrite=overwrite)
 
 
 @torch.inference_mode()
 def _predict_rooms(
-    model: Ptn, data: str | Path, out: str | Path, run: str, overwrite: bool, progress: Progress
+    model: Ptn, data: str | Path, out: str | Path, overwrite: bool, progress: Progress
 ) -> None:
     method = "ptn" if model.settings.silhouettes == "image" else "ptn, silhouettes from ids"
     with open_rooms(data) as rooms:
         images = RoomImages(rooms, model.settings.size)
-        how: dict[str, Any] = {"method": method, "run": run, "overwrite": overwrite}
-        with RoomPredictionWriter(out, data, **how) as file:
+        with RoomPredictionWriter(out, data, method=method, overwrite=overwrite) as file:
             for rows in images.rows_of:
                 source = int(rows[0])
                 image = torch.from_numpy(images.image(source))[None]

@@ -50,22 +50,13 @@ def train(
     resume: bool = False,
     progress: Progress = lambda done, total, losses: None,
 ) -> Path:
-    """Train on a file of rooms or of questions; return the path of the weights.
+    """Train on a file of rooms of several views or of questions, as `baselines.training` says.
 
     Args:
-        data: rooms of several views, or a training file such as iqtt-train.h5.
-        run_folder: gets checkpoint and weights.
         labels: how many answers to learn from, the first ones; they weigh what tells answers apart
             (`matching.FEATURES`) and do not change the networks.
         networks: weights of another run, whose networks are taken as they are: only `labels` are
             learnt from then.
-        resume: go on from the folder's checkpoint, with the run's own settings and labels.
-        progress: called after each iteration.
-
-    The same arguments give the same weights on one machine, however often a run is resumed.
-
-    Raises SpecError where settings and data do not fit; FileExistsError where a new run finds a
-    checkpoint; TrainingError; FileFormatError; OSError.
     """
     folder = Path(run_folder)
     with alone_in(folder), ExitStack() as files:

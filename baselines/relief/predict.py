@@ -33,7 +33,7 @@ def write_submission(
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> None:
-    """Write depth and normals of every view of a file of rooms.
+    """Write depth and normals of every view of a file of rooms, as `baselines.training` says.
 
     A network "unet" predicts each view from its own image; one of "code" each scene from one image
     alone, view 0 or the first that the file holds, under the name "NAME-code". The submission's
@@ -41,11 +41,6 @@ def write_submission(
 
     Args:
         name: of the method.
-        weights: as `bench train NAME` writes them; None for those of the package.
-        progress: called with the number of rows done and of all, a batch at a time.
-
-    Raises OSError, FileFormatError for either file, also where a camera is not known; SpecError
-    where images cannot be reduced to the network's size.
     """
     check_writable(Path(out), overwrite)
     method = Method(name, Card, relief_network)

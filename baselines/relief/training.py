@@ -50,7 +50,7 @@ def train(
     resume: bool = False,
     progress: Progress = lambda done, total, losses: None,
 ) -> Path:
-    """Train a relief network on a file of rooms; return the path of the weights.
+    """Train a relief network on a file of rooms, as `baselines.training` says.
 
     The loss is the mean absolute difference of relief: in contrast to the squared one it lets a
     pixel be either floor or object, rather than something between them.
@@ -60,12 +60,6 @@ def train(
         teach: finds the relief to learn; it gets the rooms, the settings, the run's folder and a
             function to call with the images done and in all.
         with_depth: whether the rooms' depth is read.
-        run_folder: gets checkpoint and weights.
-        resume: go on from the folder's checkpoint, with its settings.
-        progress: called after each iteration with its number, how many there will be, and losses.
-
-    Raises SpecError where settings and data do not fit; FileExistsError where a new run finds a
-    checkpoint; TrainingError; OSError, FileFormatError.
     """
     folder, method = Path(run_folder), Method(name, Card, relief_network)
     with alone_in(folder):

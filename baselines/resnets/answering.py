@@ -27,14 +27,10 @@ def write_submission(
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> None:
-    """Write answers to the questions of a file, and the score of each answer.
+    """Write answers to the questions of a file, and their scores, as `baselines.training` says.
 
     Args:
-        data: a file such as iqtt-test.h5; its answers are not read.
-        weights: None for those that come with the package.
         device: "auto", "cpu" or "cuda".
-
-    Raises OSError, FileFormatError, and SpecError where the weights do not suit the questions.
     """
     name = kind.method.name
     network, card = load_weights(weights or FILES / f"{name}.safetensors", kind.method)

@@ -39,18 +39,13 @@ def train(
     resume: bool = False,
     progress: Progress = lambda done, total, numbers: None,
 ) -> Path:
-    """Train on the labelled questions of a file; return the path of the weights.
+    """Train on the labelled questions of a file, as `baselines.training` says.
 
     Args:
-        run_folder: gets checkpoints and weights.
         labels: how many of the labelled questions to use, the first ones; None for all.
         device: "auto", "cpu" or "cuda".
-        resume: whether to go on from the folder's checkpoint, with the run's own settings.
-        progress: called after each iteration with its number, how many there will be, and the loss;
-            once more at the end, with the accuracy on iqtt-val.h5 if it lies beside `data`.
-
-    Raises SpecError for settings or data that do not fit; FileExistsError where a new run finds a
-    checkpoint; TrainingError; OSError, FileFormatError.
+        progress: called once more at the end, with the accuracy on iqtt-val.h5 if it lies beside
+            `data`.
     """
     folder, method = Path(run_folder), kind.method
     with alone_in(folder), open_training(data, LABELED) as questions:

@@ -3,10 +3,9 @@
     sphere.py       the mesh that is deformed, and the smoothing of its offsets
     rasteriser.py   pictures of meshes, in numpy: the renderer, which can only be sampled
     estimator.py    gradients of an expected loss by sampling it
-    network.py      encoder and decoder of the variational model, and the head that labels train
+    network.py      settings, card, encoder and decoder, and the head that labels train
     images.py       what it learns from: the images of question files
     primitives.py   single basic shapes, rendered by scenegen, on which it works or fails
-    card.py         settings, and the card of weights
     head.py         training on labels
     training.py     training on images; start reading here
     reconstruct.py  meshes and pictures of trained weights
@@ -18,5 +17,5 @@ alone, centred and without background.
 
 from scenegen.common.lazy_names import lazy_names
 
-HOMES = {"card": "Settings", "training": "train", "answers": "write_submission"}
+HOMES = {"network": "Settings", "training": "train", "answers": "write_submission"}
 __getattr__ = lazy_names(__name__, HOMES)

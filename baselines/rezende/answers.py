@@ -7,9 +7,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from baselines.rezende.card import METHOD
 from baselines.rezende.head import codes_of
-from baselines.rezende.network import Model
+from baselines.rezende.network import METHOD, Model
 from baselines.rezende.reconstruct import meshes_of
 from baselines.training.checkpoint import load_weights
 from baselines.training.images import Array
@@ -33,18 +32,10 @@ def write_submission(
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> None:
-    """Write answers to the questions of a file, and the score of each, from images alone.
+    """Write answers to the questions of a file, and their scores, as `baselines.training` says.
 
     With weights that saw no labels, an answer's score is minus the distance of its mesh from the
     reference's, under the best rotation; else it is the head's.
-
-    Args:
-        data: a file such as iqtt-test.h5; its answers are not read.
-        weights: by default those of the package, trained without labels.
-        progress: called with the number of questions done since the last call, and of all.
-
-    Raises SpecError for rooms, which the method cannot do, and where images do not suit the
-    weights; FileFormatError, OSError.
     """
     if not is_question_file(data):
         hint = "it reconstructs single objects without background; docs/baselines.md says why"

@@ -22,11 +22,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from baselines.rezende.card import METHOD, Card, Settings
 from baselines.rezende.estimator import sampled_gradient, with_gradient
 from baselines.rezende.head import codes_of, train_head
 from baselines.rezende.images import Pictures, read_question_pictures
-from baselines.rezende.network import Model, divergence
+from baselines.rezende.network import METHOD, Card, Model, Settings, divergence
 from baselines.rezende.rasteriser import project, rasterise
 from baselines.training.checkpoint import WEIGHTS, State, load_weights, save_weights
 from baselines.training.fit import Loss, Progress, falling_late, fit
@@ -58,19 +57,14 @@ def train(
     resume: bool = False,
     progress: Progress = lambda done, total, numbers: None,
 ) -> Path:
-    """Train on the images of a question file, then the head on its labels; return the weights.
+    """Train on the images of a question file, as `baselines.training` says, then the head.
+
+    The unlabelled questions give the images.
 
     Args:
-        data: a file such as iqtt-train.h5; its unlabelled questions give the images.
-        run_folder: gets checkpoints and weights.
-        labels: how many of the labelled questions' answers to use, the first ones.
+        labels: how many of the labelled questions' answers the head is trained on, the first ones.
         start: weights of an earlier run, whose encoder and decoder are kept as they are; only the
             head is trained. So runs with different labels can share them.
-        resume: whether to go on from the folder's checkpoint, with the run's own settings.
-        progress: called after each iteration with its number, how many there will be, and numbers.
-
-    Raises SpecError for settings or data that do not fit; FileExistsError where a new run finds a
-    checkpoint; TrainingError; OSError, FileFormatError.
     """
     folder = Path(run_folder)
     check(start is None or not resume, "start", start, "none, as --resume goes on with a run")

@@ -5,10 +5,24 @@
     processes.py    a batch that several processes share
     launch.py       how Lightning Fabric starts these processes
     fit.py          the training loop; start reading here
-    images.py       images as networks take them
+    images.py       images as networks take them, and the order of rows
     rooms.py        images and cameras of rooms
     questions.py    images and answers of questions
-    submissions.py  the loops that write submissions
+    rotations.py    rotations spread evenly
 
-A baseline adds its networks, its batches and its losses.
+A baseline adds its networks, its batches and its losses. Its module has a dataclass `Settings` and
+two functions:
+
+`train(data, run_folder, settings, *, resume, progress, ...)` trains on a file of rooms or questions
+and returns the path of the weights. The folder gets checkpoint and weights. `resume` goes on from
+the checkpoint, with the run's own settings. `progress` is called after each iteration with its
+number, how many there will be, and losses by name. The same arguments give the same weights on one
+machine, however often a run is resumed. It raises SpecError where settings and data do not fit;
+FileExistsError where a new run finds files of another; `fit.TrainingError`; FileFormatError;
+OSError.
+
+`write_submission(data, out, weights, *, overwrite, progress)` predicts rooms or answers questions.
+`weights` is a file that `train` wrote; None for those of the package. `progress` is called with the
+rows done since the last call, and those in all. It raises SpecError where weights and data do not
+fit; FileFormatError; OSError.
 """

@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from baselines.rezende.card import METHOD, Card, Settings
+from baselines.rezende.network import METHOD, Card, Settings
 from baselines.rezende.primitives import PRIMITIVE_SETS, render_primitives
 from baselines.rezende.reconstruct import errors, reconstruct, sheet, untrained
 from baselines.rezende.training import train_pictures

@@ -50,8 +50,8 @@ def data(turned_path: Path, truths: Any) -> dict[str, Path]:
 def train(case: str, data: dict[str, Path], tmp_path: Path, monkeypatch: Any) -> Train:
     """Train a case into a folder; settings are those of the case unless it goes on."""
     name, kind, settings, how = CASES[case]
-    module = import_module(f"baselines.{HOMES[name]}")
-    package = HOMES[name].partition(".")[0]
+    module = import_module(f"baselines.{HOMES[name][0]}")
+    package = HOMES[name][0].partition(".")[0]
     monkeypatch.setattr(f"baselines.{package}.training.EVERY", 2)
 
     def run(folder: str, path: Path | None = None, **more: Any) -> Path:
@@ -160,7 +160,7 @@ def test_labels_alone_are_learned_from_weights_of_another_run(
     name, settings, keyword, data, tmp_path
 ):
     """The networks stay as they are stored, and the card says what is new."""
-    module, path = import_module(f"baselines.{HOMES[name]}"), data["questions"]
+    module, path = import_module(f"baselines.{HOMES[name][0]}"), data["questions"]
     plain = module.train(path, tmp_path / "plain", module.Settings(**settings, iterations=2))
     later = module.train(path, tmp_path / "later", labels=3, **{keyword: str(plain)})
     (_, before), (tensors, card) = content(plain), content(later)

@@ -12,9 +12,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from baselines.training.checkpoint import check_numbers
 from baselines.training.processes import BatchNorm1d, BatchNorm2d
 from scenegen.common.errors import SpecError
-from scenegen.common.records import check, normalise
+from scenegen.common.records import check
 
 SIZES = (32, 64, 128, 256)  # pixels a side
 ENCODERS = ("paper", "polar")
@@ -64,12 +65,11 @@ class NetworkSpec:
     encoder: str = "paper"
 
     def __post_init__(self) -> None:
-        normalise(self)
+        ranges: dict[str, tuple[float, float]] = {
+            "width": (0.01, 4), "z_scene": (1, MOST), "z_view": (0, MOST), "classes": (0, MOST),
+        }  # fmt: skip
+        check_numbers(self, ranges)
         check(self.size in SIZES, "size", self.size, f"one of {', '.join(map(str, SIZES))}")
-        check(0.01 <= self.width <= 4, "width", self.width, "from 0.01 to 4")
-        check(1 <= self.z_scene <= MOST, "z scene", self.z_scene, f"1 to {MOST}")
-        check(0 <= self.z_view <= MOST, "z view", self.z_view, f"0 to {MOST}")
-        check(0 <= self.classes <= MOST, "classes", self.classes, f"0 to {MOST}")
         if self.rays:
             check(self.camera, "camera", self.camera, "true, as rays are those of a known camera")
         expected = "false for networks without rays, which give no relief"

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from baselines.pix2shape.network.architecture import NetworkSpec
+from baselines.training.checkpoint import check_numbers
 from scenegen.common.errors import SpecError
-from scenegen.common.records import LARGEST, check, from_json, normalise, to_json
+from scenegen.common.records import LARGEST, check, from_json, to_json
 
 PAPER_NETWORKS = NetworkSpec()
 CONFIGS: dict[str, dict[str, Any]] = {
@@ -67,6 +68,7 @@ LOSSES = (
 METHOD = "pix2shape"
 TAUGHT_DEPTH = f"{METHOD}-depth"
 MOST_LIGHTS = 64
+TINY = 1e-12  # stands for "above 0"
 MOST_ITEMS = 1_000_000  # images or questions in a batch
 
 
@@ -144,38 +146,23 @@ class ModelConfig:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        normalise(self)
-        check(0 < self.depth_reach < 1, "depth reach", self.depth_reach, "between 0 and 1")
-        check(self.depth_middle > 0, "depth middle", self.depth_middle, "a positive number")
-        iterations = self.iterations
-        check(1 <= iterations <= LARGEST, "iterations", iterations, f"1 to {LARGEST:g}")
-        check(2 <= self.batch <= MOST_ITEMS, "batch", self.batch, f"2 to {MOST_ITEMS}")
         least = 8 if self.contrast else 2  # a quarter of them may be labelled
-        asked = self.question_batch
-        needed = f"{least} or more" + (", as contrast is on" if self.contrast else "")
-        check(asked >= least, "question batch", asked, needed)
-        check(asked <= MOST_ITEMS, "question batch", asked, f"at most {MOST_ITEMS}")
-        labelled = self.labelled_batch
-        check(0 <= labelled <= MOST_ITEMS, "labelled batch", labelled, f"0 to {MOST_ITEMS}")
-        check(self.temperature > 0, "temperature", self.temperature, "a positive number")
-        check(self.hard_negatives >= 0, "hard negatives", self.hard_negatives, "0 or more")
-        check(self.easy_negatives >= 0, "easy negatives", self.easy_negatives, "0 or more")
+        ranges: dict[str, tuple[float, float]] = {
+            "depth_reach": (TINY, 1 - TINY), "depth_middle": (TINY, LARGEST),
+            "iterations": (1, LARGEST), "batch": (2, MOST_ITEMS),
+            "question_batch": (least, MOST_ITEMS), "labelled_batch": (0, MOST_ITEMS),
+            "temperature": (TINY, LARGEST), "hard_negatives": (0, LARGEST),
+            "easy_negatives": (0, LARGEST), "critic_steps": (1, MOST_ITEMS),
+            "learning_rate": (TINY, LARGEST), "lights": (0, MOST_LIGHTS), "seed": (0, 2**63),
+        }  # fmt: skip
+        check_numbers(self, ranges | dict.fromkeys(LOSSES, (0, LARGEST)))
         negatives = self.hard_negatives + self.easy_negatives
-        check(
-            not self.contrast or negatives > 0, "negatives", negatives, "one above 0, for contrast"
-        )
-        steps = self.critic_steps
-        check(1 <= steps <= MOST_ITEMS, "critic steps", steps, f"1 to {MOST_ITEMS}")
-        check(self.learning_rate > 0, "learning rate", self.learning_rate, "a positive number")
+        expected = "one above 0, for contrast"
+        check(not self.contrast or negatives > 0, "negatives", negatives, expected)
         in_range = len(self.betas) == 2 and all(0 <= beta < 1 for beta in self.betas)
         check(in_range, "betas", self.betas, "two numbers from 0 to below 1")
-        check(0 <= self.lights <= MOST_LIGHTS, "lights", self.lights, f"0 to {MOST_LIGHTS}")
-        check(self.seed >= 0, "seed", self.seed, "0 or more")
         if self.matching:
             check(self.networks.rays, "matching", self.matching, "0 for networks without rays")
-        for name in LOSSES:
-            weight = getattr(self, name)
-            check(0 <= weight < LARGEST, name.replace("_", " "), weight, "0 or a positive number")
 
     @property
     def method(self) -> str:
@@ -195,9 +182,9 @@ class ModelConfig:
             return f"{METHOD}-rays"
         both = self.reconstruction and self.code_reconstruction and not self.absolute_differences
         ours = (self.consistency, self.contrast, self.matching, self.swap)
-        told = self.networks.camera or self.disentangles
+        view = self.networks.camera or self.disentangles
         others = self.networks.spherical or self.turned
-        faithful = self.adversarial and both and told and not (any(ours) or others)
+        faithful = self.adversarial and both and view and not (any(ours) or others)
         return METHOD if faithful else f"{METHOD}-compact"
 
     @property

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from baselines.rezende import write_submission
 from baselines.rezende.answers import WEIGHTS, mesh_distance, mesh_scores, refined, rotations
-from baselines.rezende.card import METHOD, Card, Settings
+from baselines.rezende.network import METHOD, Card, Settings
 from baselines.rezende.sphere import icosphere
 from baselines.training.checkpoint import load_weights, new_state, save_weights
 from baselines.training.questions import question_images

@@ -3,8 +3,8 @@
 import numpy as np
 import torch
 
-from baselines.rezende.card import METHOD, Card, Settings
 from baselines.rezende.head import codes_of, train_head
+from baselines.rezende.network import METHOD, Card, Settings
 from baselines.training.checkpoint import new_state
 
 

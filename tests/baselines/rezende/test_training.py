@@ -8,7 +8,7 @@ import torch
 from refusals import refused
 
 from baselines.rezende import training
-from baselines.rezende.card import METHOD, Card, Settings
+from baselines.rezende.network import METHOD, Card, Settings
 from baselines.rezende.reconstruct import errors, reconstruct, untrained
 from baselines.rezende.training import bound, near_vertices, pixel_errors, train_pictures, windows
 from baselines.training.checkpoint import new_state
