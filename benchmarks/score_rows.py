@@ -1,10 +1,10 @@
 """Milliseconds that `bench score` takes for one row, in test sets of more and more rows.
 
-    OMP_NUM_THREADS=1 python -m benchmarks.score_rows [--rows 1000 10000 100000] [--side 8]
+    OMP_NUM_THREADS=1 python -m benchmarks.score_rows [--rows 1000 10000 50000]
 
 The cost of a row should not depend on how many other rows the test set has. Images are as small as
 the format allows, so that the work around the measures shows beside the measures themselves. The
-truth repeats a few rendered rooms; the predictions are the truth with noise.
+predictions are the truth with noise.
 
 One process scores 1,000 rows of each test set, spread evenly. Opening the files is so divided among
 fewer rows than in real use: for large test sets the figures are rather too high. Processor time
@@ -23,25 +23,11 @@ from metrics.scoring.rows import score_rows
 from metrics.scoring.runs import Settings
 from metrics.submissions.reader import open_predictions
 from scenegen.description.specs import DatasetSpec
-from scenegen.files.row_file import new_file
-from scenegen.files.table import Table
-from scenegen.layout import columns
 from scenegen.rooms.make import make_dataset
 from scenegen.rooms.reader import RoomsFile
 
-ROOMS = 8  # rendered, and repeated as often as needed
+SPEC = DatasetSpec(height=8, width=8, min_visible_pixels=1)
 SCORED = 1000  # rows of each test set
-
-
-def write_truth(path: Path, rendered: Path, count: int) -> None:
-    """Write a rooms file of `count` rows, each a scene of its own, by repeating rendered rows."""
-    with RoomsFile(rendered) as rooms, new_file(path) as file:
-        file.attrs.update({**rooms.attributes, "count": count})
-        fields = columns(rooms.spec)
-        rows = [{field.name: rooms.read(field.name, i) for field in fields} for i in range(ROOMS)]
-        table = Table(file, fields, count, "none")
-        for i in range(count):
-            table.append({**rows[i % ROOMS], "scene_index": i})
 
 
 def write_predictions(path: Path, truth: Path) -> None:
@@ -56,25 +42,20 @@ def write_predictions(path: Path, truth: Path) -> None:
 def main() -> None:
     """Print a line for each number of rows."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--rows", type=int, nargs="+", default=[1_000, 10_000, 100_000])
-    parser.add_argument("--side", type=int, default=8, help="pixels")
-    arguments = parser.parse_args()
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        spec = DatasetSpec(height=arguments.side, width=arguments.side, min_visible_pixels=1)
-        make_dataset(folder / "rendered.h5", spec, ROOMS, command="benchmark")
-        print(f"{'rows':>8}  {'ms a row':>8}  {'of processor time':>17}")
-        for count in arguments.rows:
-            truth, predictions = folder / f"rooms-{count}.h5", folder / f"predictions-{count}.h5"
-            write_truth(truth, folder / "rendered.h5", count)
+    parser.add_argument("--rows", type=int, nargs="+", default=[1_000, 10_000, 50_000])
+    print(f"{'rows':>8}  {'ms a row':>8}  {'of processor time':>17}")
+    for count in parser.parse_args().rows:
+        with tempfile.TemporaryDirectory() as folder:
+            truth, predictions = Path(folder) / "rooms.h5", Path(folder) / "predictions.h5"
+            make_dataset(truth, SPEC, count, command="benchmark")
             write_predictions(predictions, truth)
             rows = np.unique(np.linspace(0, count - 1, SCORED).astype(np.int64))
             with open_predictions(predictions) as file:
                 start, cpu = time.perf_counter(), time.process_time()
                 score_rows([file], truth, rows, "none", Settings(processes=1))
             spent = (time.perf_counter() - start, time.process_time() - cpu)
-            wall, own = (1e3 * seconds / len(rows) for seconds in spent)
-            print(f"{count:8d}  {wall:8.2f}  {own:17.2f}", flush=True)
+            clock, processor = (1e3 * seconds / len(rows) for seconds in spent)
+            print(f"{count:8d}  {clock:8.2f}  {processor:17.2f}", flush=True)
 
 
 if __name__ == "__main__":
