@@ -4,15 +4,19 @@ VENV ?= .venv
 BIN = $(VENV)/bin
 WORKERS ?= 2
 
-# Tests of pages need Chromium. It is installed where that can be done, and they are skipped where not.
-define FIND_BROWSER
-@for name in chromium chromium-browser google-chrome google-chrome-stable; do \
+PIP = $(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt
+
+# Tests of pages need Chromium. It is installed where that can be done, while pip installs packages,
+# and they are skipped where it cannot. Libraries are compiled when they are first imported.
+define INSTALL_WITH_BROWSER
+@{ for name in chromium chromium-browser google-chrome google-chrome-stable; do \
   command -v $$name > /dev/null && exit 0; \
 done; \
 if [ "$$(id -u)" = 0 ] && command -v apt-get > /dev/null; then \
   { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends chromium; } > /dev/null 2>&1; \
 fi; \
-command -v chromium > /dev/null || echo "No Chromium: tests of pages are skipped, or fail with CI=true."
+command -v chromium > /dev/null || echo "No Chromium: tests of pages are skipped, or fail with CI=true."; } & \
+$(PIP) --no-compile -e '.[$(1)]'; status=$$?; wait; exit $$status
 endef
 
 .PHONY: demo demo-summary demo-model docs test test-all check bench bench-gpu results fuzz torture clean
@@ -124,23 +128,21 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.runtime: $(BIN)/python pyproject.toml constraints.txt
-	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e .
+	$(PIP) -e .
 	touch $@
 
 $(VENV)/.docs: $(BIN)/python pyproject.toml constraints.txt
-	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	$(PIP) -e '.[docs]'
 	touch $@ $(VENV)/.runtime
 
 $(VENV)/.model: $(BIN)/python pyproject.toml constraints.txt
-	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[model]'
+	$(PIP) -e '.[model]'
 	touch $@ $(VENV)/.runtime
 
 $(VENV)/.test: $(BIN)/python pyproject.toml constraints.txt
-	$(FIND_BROWSER)
-	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[test]'
+	$(call INSTALL_WITH_BROWSER,test)
 	touch $@ $(VENV)/.runtime $(VENV)/.model
 
 $(VENV)/.dev: $(BIN)/python pyproject.toml constraints.txt
-	$(FIND_BROWSER)
-	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	$(call INSTALL_WITH_BROWSER,dev)
 	touch $@ $(VENV)/.runtime $(VENV)/.model $(VENV)/.docs $(VENV)/.test
