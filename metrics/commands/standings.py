@@ -142,7 +142,6 @@ def leaderboard(
     """
     from metrics.score_file import read_scores
     from metrics.views.leaderboard.ranking import leaderboard as rank
-    from metrics.views.leaderboard.site import to_html, write_site
     from metrics.views.table import to_latex, to_markdown
     from scenegen.files.new_file import check_writable, write_text
 
@@ -151,12 +150,16 @@ def leaderboard(
     files = [read_scores(path) for path in scores]
     shown: Any = "none" if no_paper else paper
     if folder is not None:
+        from metrics.views.leaderboard.site import write_site
+
         write_site(files, folder, metrics or None, paper=shown, overwrite=overwrite)
         print_line(f"{folder}: {len(scores)} score files; open {Path(folder) / 'index.html'}")
         if out is None:
             return
     tables = rank(files, metrics or None, paper=shown)
     if form == "html":
+        from metrics.views.leaderboard.site import to_html
+
         text = to_html(tables)
     else:
         text = to_latex(tables) if form == "latex" else to_markdown("", tables)

@@ -89,7 +89,7 @@ def score(
     from metrics.scoring.runs import Settings, scorer_versions
     from metrics.submissions.reader import open_predictions
     from metrics.submissions.truths import find_truth
-    from metrics.views.report import text_report, write_csv
+    from metrics.views.score_tables import text_report, write_csv
     from scenegen.files.new_file import check_writable, write_text
 
     outputs = [Path(path) for path in (json_path, csv_path, html_path) if path]

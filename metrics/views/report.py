@@ -1,6 +1,5 @@
-"""Scores of one submission for people: text, Markdown, CSV, and a page that answers first."""
+"""Scores of one submission as a page that answers first."""
 
-import csv
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -19,15 +18,11 @@ from metrics.views.plots import Chart, histogram
 from metrics.views.score_tables import (
     all_scores,
     group_tables,
-    headline_rows,
     labels_of,
-    notes_of,
     source_text,
-    title_of,
 )
-from metrics.views.table import make_table, to_markdown, to_text
+from metrics.views.table import make_table
 from scenegen.common.errors import SceneGenError
-from scenegen.files.new_file import written_beside
 
 ROOMS_REMARK = (
     "Depth is black at the truth's nearest and white at its farthest point. The error goes from"
@@ -42,24 +37,6 @@ CURVES_REMARK = (
 
 class BesideError(SceneGenError):
     """A score file that cannot stand beside others."""
-
-
-def text_report(scores: ScoreFile, as_markdown: bool = False) -> str:
-    """Return the headline, all scores, and the main ones by group, as aligned text or Markdown."""
-    tables = [headline_rows(scores), all_scores(scores), *group_tables(scores)]
-    return (to_markdown if as_markdown else to_text)(title_of(scores), tables, notes_of(scores))
-
-
-def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> None:
-    """Write a line with the scores of each item. Raises OSError as `new_file.written_beside`."""
-    with (
-        written_beside(path, overwrite) as temporary,
-        temporary.open("w", newline="", encoding="utf-8") as file,
-    ):
-        out = csv.writer(file)
-        out.writerow(scores.items)
-        columns = [np.asarray(column).tolist() for column in scores.items.values()]
-        out.writerows(zip(*columns, strict=True))
 
 
 def html_report(

@@ -1,7 +1,9 @@
-"""Tables of one score file: its headline, all scores, and the main ones by group."""
+"""Tables of one score file, as text, Markdown and CSV: headline, all scores, main ones by group."""
 
+import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -16,8 +18,9 @@ from metrics.scoring.metric_names import (
     metric,
 )
 from metrics.scoring.records import GROUPINGS, Meta, Score, ScoreFile, Skill
-from metrics.views.table import Cell, Table, make_table
+from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
 from scenegen.common.text_table import by_number, distinct, number, plain
+from scenegen.files.new_file import written_beside
 
 INTERVAL = f"{CONFIDENCE:.0%} interval"
 SKILL = "Skill: 1 is perfect, 0 is as good as the floor, below 0 is worse than the floor."
@@ -31,6 +34,24 @@ GROUP_TITLES = {
     "by_position": "by place of the right answer",
 }
 GROUP_SCORES = {"rooms": HEADLINE["rooms"], "iqtt": ("iqtt_accuracy",)}
+
+
+def text_report(scores: ScoreFile, as_markdown: bool = False) -> str:
+    """Return the headline, all scores, and the main ones by group, as aligned text or Markdown."""
+    tables = [headline_rows(scores), all_scores(scores), *group_tables(scores)]
+    return (to_markdown if as_markdown else to_text)(title_of(scores), tables, notes_of(scores))
+
+
+def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> None:
+    """Write a line with the scores of each item. Raises OSError as `new_file.written_beside`."""
+    with (
+        written_beside(path, overwrite) as temporary,
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
+        out = csv.writer(file)
+        out.writerow(scores.items)
+        columns = [np.asarray(column).tolist() for column in scores.items.values()]
+        out.writerows(zip(*columns, strict=True))
 
 
 def headline_rows(scores: ScoreFile) -> Table:

@@ -1,12 +1,13 @@
 """Tests for paired differences: are two methods different on the same scenes or questions?"""
 
 import math
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
 
 from metrics.measures.checks import as_float64, require, require_finite, require_some
+from metrics.measures.statistics import normal_quantile
 
 Array = NDArray[np.float64]
 
@@ -66,7 +67,11 @@ def mcnemar_exact(first_right: ArrayLike, second_right: ArrayLike) -> float:
     require_some(len(a), "answers")
     only_a, only_b = int(np.count_nonzero(a & ~b)), int(np.count_nonzero(b & ~a))
     trials = only_a + only_b
-    return float(stats.binomtest(only_a, trials).pvalue) if trials else 1.0
+    if trials == 0:
+        return 1.0
+    from scipy.stats import binomtest  # slow to import, and rankings need no test
+
+    return float(binomtest(only_a, trials).pvalue)
 
 
 def holm(p_values: ArrayLike) -> Array:
@@ -99,7 +104,7 @@ def smallest_detectable_difference(
     values = _require_differences(differences)
     require(len(values) >= 2, "differences", len(values), "at least 2, to know their spread")
     require(0.5 <= power < 1.0, "power", power, "at least 0.5 and below 1")
-    reach = stats.norm.isf(alpha / 2.0) + stats.norm.ppf(power)
+    reach = normal_quantile(1.0 - alpha) + NormalDist().inv_cdf(power)
     return float(reach * values.std(ddof=1) / math.sqrt(len(values)))
 
 

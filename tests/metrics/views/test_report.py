@@ -16,8 +16,16 @@ from metrics.scoring.evaluate import score
 from metrics.scoring.floors import Floor
 from metrics.scoring.records import Submission
 from metrics.views.headline import headline_section, kinds_sections
-from metrics.views.report import BesideError, html_report, text_report, write_csv
-from metrics.views.score_tables import all_scores, group_tables, headline_rows, notes_of, title_of
+from metrics.views.report import BesideError, html_report
+from metrics.views.score_tables import (
+    all_scores,
+    group_tables,
+    headline_rows,
+    notes_of,
+    text_report,
+    title_of,
+    write_csv,
+)
 from scenegen.common.text_table import number
 from scenegen.rooms.reader import RoomsFile
 
