@@ -18,9 +18,7 @@ GROWTH, ROOM = 1.05, 20  # by how much memory may grow: a factor, and MB
 # Read a row of each shard, twice, and print the largest number of open files.
 READER = """
 import os, sys
-from scenegen.files import trial
 from scenegen.rooms.reader import RoomsFile
-trial.try_file("rooms.h5")  # as commands do, so that the shards are tried too
 most = 0
 with RoomsFile("rooms.h5") as rooms:
     for row in [*range(0, len(rooms), 2), *range(0, len(rooms), 2)]:

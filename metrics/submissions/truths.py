@@ -73,12 +73,14 @@ def find_truth(predictions: Predictions, given: str | Path | None = None) -> Fou
     for place in places:
         if os.path.isfile(place):  # so neither a pipe nor a device is ever opened
             source: Literal["given", "submission"] = "submission" if given is None else "given"
-            trial.try_file(place)
-            if predictions.task == "rooms":
-                return FoundTruth(place, source)
-            from iqtt.files.reader import answers_beside
+            answers = None
+            if predictions.task != "rooms":
+                from iqtt.files.reader import answers_beside
 
-            return FoundTruth(answers_beside(place) or place, source)
+                answers = answers_beside(place)
+            if given is None:  # whoever made the submission may have chosen the file
+                trial.try_file(answers or place)
+            return FoundTruth(answers or place, source)
     looked = " and ".join(dict.fromkeys(str(place) for place in places))
     raise FileFormatError(
         f"{predictions.path}: truth", f"no file at {looked}", "the file that is predicted", advice

@@ -52,19 +52,13 @@ class InputPath(_Completed):
         self.within, self.beside = within, beside
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Compare a path with the outputs that are known; keep it for those that follow.
-
-        What is HDF5 is tried in another process first.
-        """
+        """Compare a path with the outputs that are known; keep it for those that follow."""
         paths = _command_paths(self, value, param, ctx)
         if ctx is not None and ctx.resilient_parsing:  # a shell asks how a line may go on
             return value
         read = [Path(value), *self.beside(Path(value))]
         paths.inputs += [(path, self.within) for path in read]
         refuse_inputs(paths.outputs, read, self.within)
-        from scenegen.files import trial
-
-        trial.try_file(value)
         return value
 
 

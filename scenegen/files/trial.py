@@ -1,19 +1,16 @@
-"""A file is tried in another process first, as broken HDF5 files can hang or crash the library.
+"""Files of strangers are tried in another process first: broken ones can hang or crash HDF5.
 
 HDF5 follows addresses that the file states. Where these lead in circles it never returns, and no
 Python code can stop it; so a process that may be killed looks at everything that is not checked in
-`input_file` before: names, attributes, texts, where chunks lie, and what virtual data sets show.
+`input_file` before: names, attributes, texts, and where chunks lie.
 """
 
-import json
 import math
 import os
 import signal
 import subprocess
 import sys
-import threading
 import time
-from contextlib import closing, suppress
 from pathlib import Path
 
 from scenegen.common.errors import FileFormatError
@@ -24,7 +21,6 @@ PATIENCE = 10  # by how much longer it may take by the clock, on a busy machine 
 MEMORY = 2**31  # bytes of address space, beyond what Python takes
 BLOCK_ROWS = 1024  # of texts, read at once
 OUT_OF_MEMORY = 3  # exit code
-DONE = b"."  # what the other process answers
 _Identity = tuple[int, int, int, int]
 _ACCEPTED: set[_Identity] = set()  # by this process
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -36,86 +32,38 @@ def try_file(path: str | Path) -> None:
     That its content is right is not said. Raises FileFormatError where HDF5 crashes, does not end
     in time, or takes more memory than honest files need.
     """
-    with closing(Trials()) as trials:
-        trials.try_file(path)
-
-
-def was_tried(path: str | Path) -> bool:
-    """Return whether this process has tried the file, as commands do with all that they read."""
-    return _identity(path) in _ACCEPTED
-
-
-class Trials:
-    """Another process that tries files, one after the other; it is started for the first of them.
-
-    So the many shards of a set do not need a process each.
-    """
-
-    def __init__(self) -> None:
-        self._process: subprocess.Popen[bytes] | None = None
-
-    def try_file(self, path: str | Path) -> None:
-        """Do and raise as the function of this name."""
-        if not os.path.isfile(path) or was_tried(path) or not _is_hdf5(path):
-            return
-        identity = _identity(path)
-        limit = SECONDS + os.path.getsize(path) / BYTES_A_SECOND
-        process = self._process = self._process or _started()
-        assert process.stdin is not None
-        assert process.stdout is not None
-        answered, begun = False, time.monotonic()
-        late = threading.Timer(PATIENCE * limit, process.kill)
-        late.start()
-        try:
-            with suppress(BrokenPipeError):
-                asked = [os.path.abspath(path), MEMORY, limit]
-                process.stdin.write(json.dumps(asked).encode() + b"\n")
-                process.stdin.flush()
-            answered = process.stdout.read(len(DONE)) == DONE
-            if not answered:
-                in_time = time.monotonic() - begun < PATIENCE * limit
-                raise _refusal(path, process.wait(), limit, in_time)
-        finally:
-            late.cancel()
-            if not answered:
-                self.close()
-        _ACCEPTED.add(identity)
-
-    def close(self) -> None:
-        """End the other process."""
-        process, self._process = self._process, None
-        if process is not None:
-            process.kill()
-            process.communicate()
-
-
-def _started() -> subprocess.Popen[bytes]:
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    if not os.path.isfile(path) or _identity(path) in _ACCEPTED or not _is_hdf5(path):
+        return
+    identity = _identity(path)
+    limit = SECONDS + os.path.getsize(path) / BYTES_A_SECOND
     # -P: a file h5py.py in the working directory must not be imported.
-    return subprocess.Popen(
-        [sys.executable, "-P", "-m", __name__],
-        env=environment,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-    )
-
-
-def _refusal(path: str | Path, code: int, limit: float, in_time: bool) -> FileFormatError:
-    """Return what to say of a file on which the other process ended with an exit code."""
-    hint = "the file is broken"
-    if not in_time:
+    command = [sys.executable, "-P", "-m", __name__, os.path.abspath(path), f"{MEMORY}", f"{limit}"]
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    none = subprocess.DEVNULL
+    try:
+        done = subprocess.run(
+            command, env=environment, stdin=none, stdout=none, stderr=none,
+            timeout=PATIENCE * limit, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
         found = f"a structure that HDF5 had not read after {PATIENCE * limit:.0f} s"
         hint = "broken, or the machine is very busy"
-    elif hasattr(signal, "SIGXCPU") and code == -signal.SIGXCPU:
-        found = f"a structure that HDF5 had not read after {math.ceil(limit)} s of a processor"
-    elif code == OUT_OF_MEMORY:
-        found = "texts or attributes that take more than 2 GiB of memory"
-    elif code < 0:
-        found = f"a structure on which HDF5 crashes (signal {-code})"
-    else:
-        found = f"a structure that h5py cannot look at (exit code {code})"
-    return FileFormatError(path, found, "a file as h5py writes it", hint)
+        raise FileFormatError(path, found, "a file as h5py writes it", hint) from None
+    if done.returncode != 0:
+        found = _what_happened(done.returncode, limit)
+        raise FileFormatError(path, found, "a file as h5py writes it", "the file is broken")
+    _ACCEPTED.add(identity)
+
+
+def _what_happened(code: int, limit: float) -> str:
+    """Say what an exit code of the other process tells of the file."""
+    if hasattr(signal, "SIGXCPU") and code == -signal.SIGXCPU:
+        return f"a structure that HDF5 had not read after {math.ceil(limit)} s of a processor"
+    if code == OUT_OF_MEMORY:
+        return "texts or attributes that take more than 2 GiB of memory"
+    if code < 0:
+        return f"a structure on which HDF5 crashes (signal {-code})"
+    return f"a structure that h5py cannot look at (exit code {code})"
 
 
 def _identity(path: str | Path) -> _Identity:
@@ -179,14 +127,5 @@ def _limit(memory: int, seconds: float) -> None:
             resource.setrlimit(kind, (most, resource.getrlimit(kind)[1]))
 
 
-def _try_as_told() -> None:
-    """Try the files that the standard input names, one on each line, and answer for each."""
-    for line in sys.stdin.buffer:
-        _read_structure(*json.loads(line))
-        if hasattr(signal, "alarm"):
-            signal.alarm(0)  # the next file may come much later
-        os.write(1, DONE)
-
-
 if __name__ == "__main__":
-    _try_as_told()
+    _read_structure(sys.argv[1], int(sys.argv[2]), float(sys.argv[3]))
