@@ -1,8 +1,5 @@
 """Question files read with the reading API, and beside it with plain h5py."""
 
-import hashlib
-import os
-import pickle
 import subprocess
 import sys
 
@@ -14,14 +11,12 @@ from iqtt.files.layout import NO_CUBE
 from iqtt.files.reader import (
     AnswersFile,
     QuestionsDataset,
-    QuestionsFile,
     answers_beside,
     open_questions,
     parts,
 )
 from iqtt.shapes.polycube import canonical, set_ids
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.files.shards import OpenFile
 
 TABLES = [  # of the tiny split: file, part, answers told, truth told
     ("iqtt-train.h5", "labeled", True, True),
@@ -37,31 +32,6 @@ with open_questions(sys.argv[1]) as file:
 QuestionsDataset(sys.argv[1])[0]
 heavy = {"mitsuba", "drjit", "trimesh", "scipy", "PIL", "tqdm", "click", "torch"}
 print(sorted(heavy & set(sys.modules)))
-"""
-# Reads a file in other processes, after it was read here.
-PROCESSES = """
-import multiprocessing, sys, warnings
-from iqtt.files.reader import QuestionsDataset
-warnings.simplefilter("ignore", DeprecationWarning)  # 3.12 on: forking a process with threads
-
-def total(i):
-    return int(data[i]["questions"].sum()), int(data[i]["answers"])
-
-def from_pickle(pair):
-    questions, i = pair
-    return int(questions[i]["questions"].sum()), int(questions[i]["answers"])
-
-if __name__ == "__main__":
-    data = QuestionsDataset(sys.argv[1], answers=sys.argv[2])
-    here = [total(i) for i in range(len(data))]
-    with multiprocessing.get_context("fork").Pool(3) as pool:
-        for _ in range(5):
-            assert pool.map(total, range(len(data)), chunksize=1) == here, "fork"
-    pairs = [(data, i) for i in range(len(data))]
-    with multiprocessing.get_context("spawn").Pool(2) as pool:
-        assert pool.map(from_pickle, pairs, chunksize=1) == here, "spawn"
-    assert [total(i) for i in range(len(data))] == here, "here again"
-    print("equal", len(set(here)))
 """
 
 
@@ -194,56 +164,10 @@ def test_an_empty_table(released):
             questions[0]
 
 
-def test_indices_and_closing(split_folder):
-    with open_questions(split_folder / "iqtt-val.h5") as questions:
-        assert questions[-1].index == questions[5].index == 5
-        for index in (6, -7, 10**12):
-            with pytest.raises(IndexError):
-                questions[index]
-        for index in (6, 10**12):
-            with pytest.raises(IndexError):
-                questions.read("answers", index)
-        with pytest.raises(SpecError) as error:
-            questions.read("cube", 0)
-        assert (error.value.where, error.value.found) == ("field", "'cube'")
-    questions.close()
-    with pytest.raises(ValueError, match=r"iqtt-val\.h5"):
-        questions[0]
-
-
-def test_sizes_on_disk(split_folder):
-    path, answers = split_folder / "iqtt-test.h5", split_folder / "iqtt-test-answers.h5"
-    with QuestionsFile(path, answers=answers) as questions, h5py.File(answers) as known:
-        sizes = questions.stored_bytes()
-        assert list(sizes) == list(questions.fields)
-        assert sizes["questions"][1] == 6 * 4 * 32 * 32 * 3
-        assert 0 < sizes["questions"][0] < sizes["questions"][1]
-        assert sizes["answers"] == (6, 6)
-        depth = known["truth/depth"]
-        assert sizes["depth"] == (depth.id.get_storage_size(), depth.nbytes)
-
-
 def test_reading_loads_no_renderer(split_folder):
     command = [sys.executable, "-c", READ, str(split_folder / "iqtt-val.h5")]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
-
-
-def test_items_of_the_data_set(split_folder):
-    path = split_folder / "iqtt-train.h5"
-    data = QuestionsDataset(path, "labeled")
-    with open_questions(path, "labeled") as questions:
-        assert len(data) == 6
-        assert (data.spec, data.fingerprint) == (questions.spec, questions.fingerprint)
-        for i in (0, 5, -1):
-            item = data[i]
-            assert list(item) == ["questions", "answers"]
-            np.testing.assert_array_equal(item["questions"], questions[i].images)
-            assert item["answers"] == questions[i].answer
-    for index in (6, -7):
-        with pytest.raises(IndexError):
-            data[index]
-    assert sum(1 for _ in data) == 6, "the old iteration protocol ends at IndexError"
 
 
 def test_fields_are_what_there_is(split_folder, released):
@@ -268,60 +192,3 @@ def test_what_the_data_set_refuses(split_folder):
         with pytest.raises((SpecError, FileFormatError)) as error:
             QuestionsDataset(split_folder / name, **arguments)
         assert error.value.where == where
-
-
-def test_the_data_set_pickles_as_its_path(split_folder):
-    data = QuestionsDataset(split_folder / "iqtt-train.h5", "unlabeled", ("questions", "cubes"))
-    first = data[0]
-    again = pickle.loads(pickle.dumps(data))
-    assert list(again[0]) == ["questions", "cubes"]
-    for name, values in again[0].items():
-        np.testing.assert_array_equal(values, first[name])
-    assert (again.fingerprint, len(again)) == (data.fingerprint, 6)
-    assert len(pickle.dumps(data)) < 3000
-
-
-def test_each_process_opens_the_file_once(split_folder, monkeypatch):
-    opened = []
-    data = QuestionsDataset(split_folder / "iqtt-val.h5")
-
-    def counting(*arguments):
-        opened.append(os.getpid())
-        return OpenFile(*arguments)
-
-    monkeypatch.setattr("iqtt.files.reader.OpenFile", counting)
-    for process in (1, 1, 2, 2):
-        monkeypatch.setattr("os.getpid", lambda process=process: process)
-        data[0], data[1]
-    assert opened == [1, 2]
-
-
-def test_reading_in_several_processes(split_folder, tmp_path):
-    script = tmp_path / "read.py"
-    script.write_text(PROCESSES)
-    paths = [str(split_folder / name) for name in ("iqtt-test.h5", "iqtt-test-answers.h5")]
-    command = [sys.executable, str(script), *paths]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-    assert done.stdout == "equal 6\n", done.stderr
-
-
-@pytest.mark.slow
-def test_torch_loader_with_workers(split_folder):
-    torch = pytest.importorskip("torch")
-    data = QuestionsDataset(split_folder / "iqtt-val.h5")
-    data[0]  # open here, before the workers are forked
-    loader = torch.utils.data.DataLoader(data, batch_size=4, num_workers=2)
-    images = torch.cat([batch["questions"] for batch in loader])
-    with open_questions(split_folder / "iqtt-val.h5") as questions:
-        np.testing.assert_array_equal(images.numpy(), questions.read("questions", slice(0, 6)))
-
-
-def test_a_released_truth_is_its_answers_alone(released):
-    answers = np.array([2, 0, 1, 1, 0], np.uint8)
-    path = released("a.h5", {"": (5, answers.astype("i8")[:, None])})
-    rows = (hashlib.sha256(bytes([one])).digest() for one in answers)
-    digest = hashlib.sha256(b"".join(rows)).hexdigest()
-    with AnswersFile(path) as file:
-        expected = hashlib.sha256(f"answers {digest}\n".encode()).hexdigest()
-        assert file.truth_digest() == expected
-        assert file.stored_truth_digest is file.stored_content_digest is None
