@@ -59,7 +59,7 @@ def _checked(
     path: Path, found: Mapping[str, str], stored: str | None, own: Mapping[str, str]
 ) -> str:
     digest = joint_digest(found)
-    if stored is None or stored == digest:  # files of older formats have none
+    if stored is None or stored == digest:  # released files have none
         return digest
     changed = [name for name in own if own[name] != found.get(name, own[name])]
     raise ScoringError(

@@ -8,11 +8,12 @@ from scenegen.common.text_table import aligned
 from scenegen.files.rows import RowFile
 
 LONGEST = 24  # characters of a unit
+LONGEST_FACT = 1000  # and of a fact, such as the command that made a file
 
 
 def fact_lines(facts: Mapping[str, str], width: int = 15) -> list[str]:
     """Return a line for each fact, the names in a column of so many characters."""
-    return [f"{name:{width}} {text}" for name, text in facts.items()]
+    return [f"{name:{width}} {_shortened(text, LONGEST_FACT)}" for name, text in facts.items()]
 
 
 def setting_lines(spec: Any) -> list[str]:
@@ -31,18 +32,21 @@ def column_lines(file: RowFile) -> list[str]:
     rows = [("dataset", "row", "type", "unit", f"{'stored':>9}", f"{'ratio':>6}")]
     for name, (stored, raw) in file.stored_bytes().items():
         values = file.read(name, slice(0, 0))
-        unit = file.unit(name)
         rows.append(
             (
                 name,
                 f"({', '.join(map(str, values.shape[1:]))})",
                 "text" if values.dtype.kind == "O" else str(values.dtype),
-                unit if len(unit) <= LONGEST else unit[: LONGEST - 3] + "...",
+                _shortened(file.unit(name), LONGEST),
                 f"{size_text(stored):>9}",
                 f"{raw / stored:6.1f}" if stored else f"{'-':>6}",
             )
         )
     return aligned(rows)
+
+
+def _shortened(text: str, most: int) -> str:
+    return text if len(text) <= most else text[: most - 3] + "..."
 
 
 def size_text(count: int) -> str:

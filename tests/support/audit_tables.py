@@ -14,7 +14,7 @@ def audit_table(
     cubes: Any,
     kinds: Any,
     views: Any = None,
-    spec: SplitSpec | None = None,
+    spec: SplitSpec | None = SplitSpec(),
     split: str = "test",
 ) -> tuple[AuditTable, Shapes]:
     """Return a table of questions without images, and what its cubes say.

@@ -114,3 +114,15 @@ def swap_rows(a, b, *names):
             file[name][:] = rows
 
     return edit
+
+
+def told_again(file):
+    """New digests of what a file of rooms holds now, as if it had been written so."""
+    from scenegen.files.content import SHA256, dataset_digest, datasets, seal
+    from scenegen.layout import TRUTH_DIGEST
+    from scenegen.rooms.reader import truth_digest
+
+    for _, dataset in datasets(file):
+        dataset.attrs[SHA256] = dataset_digest(dataset)
+    file.attrs[TRUTH_DIGEST] = truth_digest(file)
+    seal(file)

@@ -78,7 +78,6 @@ def test_nothing_may_be_added_taken_away_or_renamed(damaged):
         "an attribute more": attribute("note", "mine"),
         "a dataset more": lambda file: file.create_dataset("x", data=1),
         "a name more": lambda file: file.__setitem__("zz", file["questions"]),
-        "an attribute less": gone("conventions"),
         "no digest of a dataset": lambda file: file["answers"].attrs.__delitem__("sha256"),
         "a group renamed": lambda file: file.move("truth", "lies"),
     }
@@ -99,7 +98,7 @@ def test_a_forger_who_seals_again_has_another_digest_of_truth(damaged):
     assert table.truth_changed
     assert len(content_problems([table])) == 1
     with AnswersFile(path) as answers:
-        assert answers.truth_digest() != answers.stored_truth_digest
+        assert len(answers.problems()) == 1
 
 
 def test_what_changed_in_a_file_of_two_tables_is_told_once(damaged):
@@ -108,17 +107,12 @@ def test_what_changed_in_a_file_of_two_tables_is_told_once(damaged):
     assert (len(tables), len(content_problems(tables))) == (2, 1)
 
 
-def test_files_without_digests_are_not_judged(split_folder, released, damaged):
-    def older(file):
-        file.attrs["format_version"] = "1.1"
-        for name in ("content_digest", "truth_digest"):
-            del file.attrs[name]
-
-    old = damaged(older)
-    assert judged(old).status == judged(released("x.h5")).status == "skipped"
-    both = judged(old, split_folder / "iqtt-train.h5")
+def test_released_files_have_no_digests_and_are_not_judged(split_folder, released):
+    without = released("x.h5")
+    assert judged(without).status == "skipped"
+    both = judged(without, split_folder / "iqtt-train.h5")
     assert both.status == "ok"
-    assert old.name in both.detail
+    assert without.name in both.detail
 
 
 def test_new_files_must_have_their_digests(damaged):

@@ -44,7 +44,7 @@ def test_no_split(splits, released, tmp_path):
     released("iqtt-val.h5")
     with pytest.raises(FileFormatError) as error:
         published_split(tmp_path)
-    assert error.value.found == "a released file"
+    assert error.value.found == "no attribute 'format'"
     shutil.copy(splits["whole"] / "iqtt-test.h5", tmp_path / "iqtt-val.h5")
     with pytest.raises(FileFormatError) as error:
         published_split(tmp_path)
