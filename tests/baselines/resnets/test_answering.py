@@ -6,13 +6,13 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from pix2shape_models import edited, released
+from pix2shape_models import edited
 
 from iqtt import open_questions
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.scoring.evaluate import score
-from scenegen.common.errors import SceneGenError, SpecError
+from scenegen.common.errors import SpecError
 
 torch = pytest.importorskip("torch")
 from baselines.resnets import cnn, siamese  # noqa: E402
@@ -56,42 +56,6 @@ def test_a_submission_is_valid_and_holds_the_networks_scores(name, run_folders, 
     val = truths.iqtt.with_name("iqtt-val.h5")
     assert 0 <= right <= 1
     assert card.validation == accuracy(network, val, 16, 3)
-
-
-@each
-def test_labels_and_answers_of_the_questions_are_not_read(name, run_folders, truths, tmp_path):
-    """The same images in a file of the authors' layout, which holds nothing else."""
-    weights = run_folders[name] / WEIGHTS
-    bare = released(tmp_path / "bare.h5", [0] * 6, 32)
-    with h5py.File(bare, "r+") as file, h5py.File(truths.iqtt) as questions:
-        file["questions"][:] = questions["questions"][:] / np.float32(255)
-    found = []
-    for data in (bare, truths.iqtt):
-        MODULES[name].write_submission(data, tmp_path / "x.h5", weights, overwrite=True)
-        with h5py.File(tmp_path / "x.h5") as file:
-            found.append(file["scores"][:])
-    assert found[0] == pytest.approx(found[1], abs=1e-4)
-
-
-def test_other_weights_and_data_are_refused(run_folders, truths, train_questions, tmp_path):
-    folder = run_folders["cnn"]
-    (tmp_path / "text.safetensors").write_text("none")
-    out = tmp_path / "x.h5"
-    cases = [
-        (truths.iqtt, run_folders["siamese"] / WEIGHTS, "weights.safetensors"),
-        (truths.iqtt, folder / "checkpoint.safetensors", "checkpoint.safetensors"),
-        (truths.iqtt, tmp_path / "text.safetensors", "text.safetensors"),
-        (train_questions, folder / WEIGHTS, "iqtt-train.h5"),
-        (truths.rooms, folder / WEIGHTS, "rooms.h5"),
-        (released(tmp_path / "odd.h5", [0], 24), folder / WEIGHTS, "odd.h5"),
-    ]
-    for data, weights, where in cases:
-        with pytest.raises(SceneGenError) as error:
-            cnn.write_submission(data, out, weights)
-        assert where in error.value.where
-    assert not out.exists()
-    with pytest.raises(FileNotFoundError):
-        cnn.write_submission(truths.iqtt, out, tmp_path / "none.safetensors")
 
 
 def test_questions_of_two_answers(run_folders, tmp_path):

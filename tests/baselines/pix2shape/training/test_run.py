@@ -114,11 +114,9 @@ def test_the_logs_tell_every_loss_and_picture(unbroken):
     assert [event.step for event in logs.Images("pictures")] == [2, 4]
 
 
-@pytest.mark.parametrize("last", [2, 3])
-def test_a_killed_run_goes_on_as_if_it_had_not_been(last, rooms_path, folder, unbroken):
-    """From the checkpoint of iteration 2, whatever came after it."""
+def test_a_killed_run_goes_on_as_if_it_had_not_been(rooms_path, folder, unbroken):
     with pytest.raises(Killed):
-        train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(last))
+        train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(3))
     assert names(folder) == FILES
     assert load_checkpoint(folder, METHOD).card.iteration == 2
     steps: list[int] = []
@@ -128,24 +126,6 @@ def test_a_killed_run_goes_on_as_if_it_had_not_been(last, rooms_path, folder, un
         assert same(folder / name, unbroken / name), name
     (_, again), (_, card) = weights_of(folder), weights_of(unbroken)
     assert again == replace(card, seconds=again.seconds)
-
-
-def test_a_kill_before_the_first_checkpoint(rooms_path, folder, unbroken):
-    with pytest.raises(Killed):
-        train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(1))
-    with pytest.raises(FileNotFoundError, match="checkpoint"):
-        train_run(folder, rooms_path, None, HERE)
-    train_run(folder, rooms_path, CONFIG, HERE)
-    assert same(folder / "weights.safetensors", unbroken / "weights.safetensors")
-
-
-def test_a_kill_between_the_last_checkpoint_and_its_weights(rooms_path, folder, unbroken):
-    with pytest.raises(Killed):
-        train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(3))
-    shutil.copy(unbroken / CHECKPOINT, folder)
-    assert weights_of(folder)[1].iteration == 2
-    train_run(folder, rooms_path, None, HERE)
-    assert (folder / WEIGHTS).read_bytes() == (unbroken / WEIGHTS).read_bytes()
 
 
 def test_a_run_goes_on_in_the_precision_that_it_began_with(rooms_path, folder, unbroken):

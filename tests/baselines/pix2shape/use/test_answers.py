@@ -6,16 +6,12 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from h5_edits import gone, put
-from pix2shape_models import edited, made, of_questions, released
+from pix2shape_models import made, of_questions, released
 
-from iqtt.files.make import make_split
 from iqtt.files.reader import open_questions
-from iqtt.questions.specs import SplitSpec
 from metrics.scoring.evaluate import score
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
-from scenegen.common.errors import SceneGenError
 from scenegen.rendering.ground_truth import decode_image
 
 torch = pytest.importorskip("torch")
@@ -33,18 +29,6 @@ def answerer(train_questions: Path) -> Any:
 def few_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Questions take several batches."""
     monkeypatch.setattr(module, "BATCH", 4)
-
-
-def test_no_questions_are_refused(train_questions, tmp_path):
-    path = released(tmp_path / "none.h5", [0])
-    with h5py.File(path, "r+") as file:
-        for name in list(file):
-            kept = file[name][:0]
-            del file[name]
-            file[name] = kept
-    with pytest.raises(SceneGenError) as error:
-        answer_file(made(of_questions(train_questions)), path, tmp_path / "a.h5")
-    assert error.value.where == str(path)
 
 
 def answered(answerer: Any, path: Path, out: Path, **how: Any) -> tuple[list[int], np.ndarray]:
@@ -81,16 +65,6 @@ def test_the_nearest_scene_is_the_answer(answerer, truths, tmp_path):
     assert score([tmp_path / "a.h5"]).method == "pix2shape"
 
 
-def test_questions_may_have_two_answers(answerer, tmp_path):
-    numbers = {"train": 0, "labeled": 0, "val": 0, "test": 5, "min_cube_pixels": 3}
-    spec = SplitSpec(**numbers, height=64, width=64, distractors="mirror-pair", answers=2)
-    make_split(tmp_path / "two", spec)
-    path = tmp_path / "two" / "iqtt-test.h5"
-    _, scores = answered(answerer, path, tmp_path / "a.h5")
-    np.testing.assert_allclose(scores, -distances(answerer, path), rtol=1e-4)
-    assert scores.shape == (5, 2)
-
-
 def test_the_view_has_no_say(answerer, truths, tmp_path):
     before = answered(answerer, truths.iqtt, tmp_path / "a.h5")
     spec = answerer.config.networks
@@ -114,25 +88,3 @@ def test_the_same_image_is_the_answer_and_a_tie_abstains(answerer, tmp_path, siz
     assert scores[3, 0] == scores[3, 2] > scores[3, 1]
     with h5py.File(tmp_path / "a.h5") as file:
         assert file.attrs["truth_fingerprint"] == ""
-
-
-def test_neither_answers_nor_lights_are_needed(answerer, truths, tmp_path):
-    folder = Path(truths.iqtt).parent
-    with h5py.File(truths.iqtt) as file:
-        assert "answers" not in file
-        assert "truth" not in file
-    expected = answered(answerer, folder / "iqtt-val.h5", tmp_path / "a.h5")
-    path = edited(folder / "iqtt-val.h5", tmp_path / "bare.h5", gone("answers", "truth"))
-    found = answered(answerer, path, tmp_path / "a.h5")
-    assert found[0] == expected[0]
-    np.testing.assert_array_equal(found[1], expected[1])
-    wrong = put("answers", slice(None), 0)
-    path = edited(folder / "iqtt-val.h5", tmp_path / "wrong.h5", wrong)
-    np.testing.assert_array_equal(answered(answerer, path, tmp_path / "a.h5")[1], expected[1])
-
-
-def test_training_questions_are_not_answered(answerer, train_questions, tmp_path):
-    with pytest.raises(SceneGenError) as error:
-        answer_file(answerer, train_questions, tmp_path / "a.h5")
-    assert (error.value.where, error.value.found) == (str(train_questions), "training questions")
-    assert not (tmp_path / "a.h5").exists()

@@ -1,0 +1,90 @@
+"""Untrained weights of every baseline, and how their submissions are written."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import torch
+from pix2shape_models import card_of as reference_card
+from pix2shape_models import of_questions, tiny, written
+from ptn_models import card_of
+
+from baselines import ptn, rezende
+from baselines.pix2shape.use.predict import predict_file
+from baselines.pix2shape.weights import METHOD as REFERENCE
+from baselines.ptn.network import METHOD as PTN
+from baselines.relief import depth_supervised
+from baselines.relief.network import Card as ReliefCard
+from baselines.relief.network import Settings as ReliefSettings
+from baselines.relief.network import relief_network
+from baselines.resnets import cnn, siamese
+from baselines.resnets.card import Card as ResnetCard
+from baselines.rezende.network import METHOD as REZENDE
+from baselines.rezende.network import Card as RezendeCard
+from baselines.rezende.network import Settings as RezendeSettings
+from baselines.training.checkpoint import Method, new_state, save_weights
+
+Write = Callable[..., None]  # (data, out, **how)
+
+
+def stored(folder: Path, method: Any, card: Any, change: Any = lambda network: None) -> Path:
+    """Write untrained weights, changed so that predictions differ from image to image."""
+    network = new_state(method, card).network
+    with torch.no_grad():
+        change(network)
+    path = folder / f"{method.name}.safetensors"
+    save_weights(path, method, network, card)
+    return path
+
+
+def stand_out(network: Any) -> None:
+    """Let something stand out of a room."""
+    if hasattr(network, "volume"):
+        network.volume[-1].weight.mul_(20)
+        network.volume[-1].bias.fill_(0.1)
+        return
+    last = network.last if hasattr(network, "last") else network.decoder.last
+    last.weight.mul_(10)
+    last.bias.fill_(0.1)
+
+
+def of_reference(weights: Path) -> Write:
+    return partial(predict_file, weights, device="cpu")
+
+
+def of_module(module: Any, weights: Path) -> Write:
+    return partial(module.write_submission, weights=weights)
+
+
+def room_writers(folder: Path) -> dict[str, Write]:
+    """Return writers of submissions for rooms of 32x32 pixels or a multiple, by method."""
+    relief = Method("depth-supervised", ReliefCard, relief_network)
+    writers = {
+        "pix2shape": of_reference(written(folder / "p.safetensors", tiny())),
+        "pix2shape-rays": of_reference(
+            stored(folder, REFERENCE, reference_card(tiny(rays=True)), stand_out)
+        ),
+        "ptn": of_module(ptn, stored(folder, PTN, card_of(), stand_out)),
+    }
+    for name, kind in (("depth-supervised", "unet"), ("depth-supervised-code", "code")):
+        (folder / kind).mkdir()
+        card = ReliefCard("depth-supervised", ReliefSettings(kind, 32, 0.1))
+        writers[name] = of_module(depth_supervised, stored(folder / kind, relief, card, stand_out))
+    return writers
+
+
+def answer_writers(folder: Path, train: Path) -> dict[str, Write]:
+    """Return writers of answers to questions of 32x32 pixels or a multiple, by method."""
+    writers = {"pix2shape": of_reference(written(folder / "p.safetensors", of_questions(train)))}
+    for module, method in ((cnn, cnn.KIND.method), (siamese, siamese.KIND.method)):
+        card = ResnetCard(method.name, module.Settings(width=4, size=16), labels=1)
+        writers[method.name] = of_module(module, stored(folder, method, card))
+    writers["ptn"] = of_module(ptn, stored(folder, PTN, card_of("questions")))
+    for labels in (0, 5):
+        place = folder / str(labels)
+        place.mkdir()
+        card = RezendeCard("rezende", RezendeSettings(size=16, code=4), labels=labels)
+        weights = stored(place, REZENDE, card)
+        writers[f"rezende, {labels} labels"] = of_module(rezende, weights)
+    return writers
