@@ -13,7 +13,7 @@ import asyncio
 import re
 import sqlite3
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -37,7 +37,6 @@ from scenegen.common.errors import SceneGenError
 from scenegen.common.web_hosts import Hosts
 
 COOKIE_SECONDS = 30 * 24 * 3600
-MOST_ASKED = 4096  # participants whose state is remembered
 POSITION = re.compile(r"[0-9]{1,4}")
 MILLISECONDS = re.compile(r"[0-9]{1,9}(\.[0-9]{1,6})?")
 Compare = Callable[[Sequence[tuple[Question, bool]]], Sequence[Bar]]
@@ -55,7 +54,6 @@ class Quiz:
         contact: who answers for the study; may be empty.
         most: how many participants there may be.
         tell: prints a line for whoever runs the server.
-        asked: what participants were asked last, so that images need no look at the disk.
     """
 
     study: Study
@@ -65,7 +63,6 @@ class Quiz:
     tell: Callable[[str], None]
     contact: str = ""
     most: int = sessions.MOST_PARTICIPANTS
-    asked: dict[str, State] = field(default_factory=dict)
 
 
 def make_app(quiz: Quiz, hosts: Hosts) -> ASGIApp:
@@ -130,7 +127,6 @@ async def _quiz(quiz: Quiz, request: Request) -> Response:
         right = sum(is_right for _, is_right in now.results)
         values = {"right": right, "count": len(now.results), "bars": bars, "own": bars[0]}
         return HTMLResponse(page("result", **values))
-    _remember(quiz, _name(request), now)
     values = {
         "position": now.position,
         "answers": quiz.study.settings.answers,
@@ -171,15 +167,11 @@ async def _leave(quiz: Quiz, request: Request) -> Response:
 
 async def _image(quiz: Quiz, request: Request) -> Response:
     position, k = request.path_params["position"], request.path_params["k"]
-    now = quiz.asked.get(_name(request))
-    if now is None or now.position != position:
-        now = await _state(quiz, request)
-    asked = now is not None and now.question is not None and now.position == position
-    if not asked or k > quiz.study.settings.answers:
+    now = await _state(quiz, request)
+    question = now.question if now is not None and now.position == position else None
+    if question is None or k > quiz.study.settings.answers:
         raise RefusedError(404, "There is no such image.")
-    assert now is not None
-    assert now.question is not None
-    pool, row = quiz.study.pool_of(now.question), now.question.row
+    pool, row = quiz.study.pool_of(question), question.row
     images = pool.kept_images(row)
     if images is None:
         images = await asyncio.to_thread(pool.images, row)
@@ -224,19 +216,11 @@ def _name(request: Request) -> str:
     return str(request.session.get("participant", ""))
 
 
-def _remember(quiz: Quiz, name: str, now: State) -> None:
-    """Keep what a participant is asked, and forget the one who was remembered first."""
-    quiz.asked[name] = now
-    if len(quiz.asked) > MOST_ASKED:
-        del quiz.asked[next(iter(quiz.asked))]
-
-
 async def _go(quiz: Quiz, request: Request, form: Any, operation: Callable[..., None]) -> Response:
     """Take a step from the question that a form belongs to."""
     if not POSITION.fullmatch(form["position"]):
         raise RefusedError(422, "There is no such question.")
     await _run(quiz, operation, name=_name(request), position=int(form["position"]))
-    quiz.asked.pop(_name(request), None)
     return _see("/quiz")
 
 
