@@ -1,6 +1,7 @@
 """The commands that hand on questions: a data card of a split, and files for data loaders."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -8,7 +9,7 @@ from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import OVERWRITE
 from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputFolder, refuse_command_inputs
-from scenegen.commands.sharing import publication_options, source_date
+from scenegen.commands.sharing import SHARE, publication_of, publication_options
 
 
 # fmt: off
@@ -26,13 +27,8 @@ def card(
     folder: str,
     out: str | None,
     with_answers: bool,
-    creators: tuple[str, ...],
-    title: str | None,
-    date: str | None,
-    license_: str | None,
-    data_version: str,
-    url: str,
     overwrite: bool,
+    **options: Any,
 ) -> None:
     """Write a data card of the split in FOLDER: a page, Croissant metadata and an index.
 
@@ -41,30 +37,22 @@ def card(
     among them, and nothing in the card tells an answer of a test question. All values are read and
     must be those that were written.
     """
-    needs("iqtt card", ("pyarrow",), "share")
-    from iqtt.sharing.make import make_questions_card
+    needs("iqtt card", SHARE, "share")
     from iqtt.sharing.published import published_split
-    from scenegen.sharing.description import Publication
-    from scenegen.sharing.make import NAMES
+    from iqtt.sharing.questions import make_questions_card
+    from scenegen.sharing.card import NAMES
 
     name = Path(folder).resolve().name
-    publication = Publication(
-        title=name if title is None else title,
-        creators=creators,
-        date=source_date() if date is None else date,
-        license="CC-BY-4.0" if license_ is None else license_,
-        version=data_version,
-        url=url,
-    )
-    made = f"{name}-card" if out is None else out
-    refuse_command_inputs(Path(made) / one for one in NAMES)
+    publication = publication_of(options, name, lambda: "CC-BY-4.0")
+    out = out or f"{name}-card"
+    refuse_command_inputs(Path(out) / file for file in NAMES)
     count = published_split(folder, with_answers).count
     with progress_bar(count, "question") as bar:
         make_questions_card(
-            folder, made, publication,
+            folder, out, publication,
             with_answers=with_answers, overwrite=overwrite, progress=bar.update,
         )
-    print_line(f"{made}: {', '.join(NAMES)} of {count} questions")
+    print_line(f"{out}: {', '.join(NAMES)} of {count} questions")
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt export iqtt-split/iqtt-val.h5 --format parquet")
@@ -87,9 +75,9 @@ def export(
     not written.
     """
     if form == "parquet":
-        needs("iqtt export --format parquet", ("pyarrow",), "share")
+        needs("iqtt export --format parquet", SHARE, "share")
     from iqtt.files.reader import open_questions
-    from iqtt.sharing.export import export_questions
+    from iqtt.sharing.questions import export_questions
 
     with open_questions(file, part) as questions:
         count = len(questions)

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from iqtt.files.layout import FORMAT
 from iqtt.files.reader import QuestionsFile, parts
 from iqtt.files.shards import ANSWERS, FILES, MANIFEST
-from iqtt.questions.specs import SPLITS, SplitSpec
+from iqtt.questions.specs import SPLITS
 from iqtt.sharing.withheld import check_withheld
 from scenegen.common.errors import FileFormatError
-from scenegen.common.records import check
 from scenegen.files.shards import OpenFile
 
 
@@ -22,7 +22,6 @@ class PublishedTable:
         part: "labeled" or "unlabeled" of a training file, else "".
         answers: the file of the answers, if that is handed out with the questions.
         count: number of questions.
-        pieces: names of the files that hold the rows, each with its number of rows, in their order.
     """
 
     path: Path
@@ -30,7 +29,6 @@ class PublishedTable:
     part: str
     answers: Path | None
     count: int
-    pieces: tuple[tuple[str, int], ...]
 
     @property
     def name(self) -> str:
@@ -49,16 +47,12 @@ class PublishedSplit:
     Attributes:
         tables: of questions, those of training first.
         files: each file, and what it holds, in words of ours.
-        spec: the settings, without the seed.
-        with_test: whether there are test questions.
-        with_answers: whether their answers are handed out too.
+        answers: the file of the test answers, if it is handed out too.
     """
 
     tables: tuple[PublishedTable, ...]
     files: tuple[tuple[Path, str], ...]
-    spec: SplitSpec
-    with_test: bool
-    with_answers: bool
+    answers: Path | None
 
     @property
     def count(self) -> int:
@@ -87,44 +81,32 @@ def published_split(folder: str | Path, with_answers: bool = False) -> Published
     tables: list[PublishedTable] = []
     files: list[tuple[Path, str]] = []
     for split, path in paths.items():
-        files += _pieces_listed(path, f"questions: {split}")
-        if answers is None:
-            for one, _ in _pieces_listed(path, ""):
-                check_withheld(one, split == "test")
+        pieces = _with_shards(path, f"questions: {split}")
+        for piece, _ in pieces if answers is None else ():
+            check_withheld(piece, split == "test")
         tables += _tables(path, split, answers if split == "test" else None)
+        files += pieces
     if answers is not None:
-        files += _pieces_listed(answers, "answers to the test questions")
+        files += _with_shards(answers, "answers to the test questions")
         files += [(folder / MANIFEST, "manifest")] if (folder / MANIFEST).is_file() else []
-    with tables[0].open() as first:
-        assert first.spec is not None  # `_tables` refuses released files
-        spec = first.spec.public()
-    return PublishedSplit(tuple(tables), tuple(files), spec, "test" in paths, with_answers)
+    return PublishedSplit(tuple(tables), tuple(files), answers)
 
 
-def _pieces_listed(path: Path, meaning: str) -> list[tuple[Path, str]]:
-    """Return a file and, if it shows shards as one, these."""
-    with OpenFile(path, "question file") as opened:
+def _with_shards(path: Path, meaning: str) -> list[tuple[Path, str]]:
+    """Return a file and, if it shows shards as one, these, and what each of them holds."""
+    with OpenFile(path, FORMAT.kind) as opened:
         names = [shard.file for shard in opened.shards]
-    listed = [(path.with_name(name), f"shard of {path.name}") for name in names]
-    return [(path, f"{meaning}; shows its shards as one file" if names else meaning), *listed]
+    shards = [(path.with_name(name), f"shard of {path.name}") for name in names]
+    return [(path, f"{meaning}; shows its shards as one file" if names else meaning), *shards]
 
 
 def _tables(path: Path, split: str, answers: Path | None) -> list[PublishedTable]:
     tables = []
     for part in parts(path):
         with QuestionsFile(path, part, answers) as table:
-            expected = "one that iqtt make-split wrote"
             if table.spec is None:
-                raise FileFormatError(path, "a released file", expected)
+                raise FileFormatError(path, "a released file", "one that iqtt make-split wrote")
             if table.split != split:
                 raise FileFormatError(path, f"questions for {table.split}", split)
-            pieces = tuple((piece.name, rows) for piece, rows in table.parts)
-            one = PublishedTable(path, split, part, answers, len(table), pieces)
-        check(
-            sum(rows for _, rows in one.pieces) == one.count,
-            one.name,
-            f"{one.count} questions",
-            "as many as its shards have",
-        )
-        tables.append(one)
+            tables.append(PublishedTable(path, split, part, answers, len(table)))
     return tables

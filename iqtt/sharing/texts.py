@@ -32,35 +32,35 @@ test questions. Whoever knows the seed can make the answers again, so no file te
 GIVEN = """**The answers to the test questions are part of this data**, in `iqtt-test-answers.h5`
 and in the index. Nothing keeps a method from having been chosen by them."""
 RESPONSIBLE: dict[str, str | list[str]] = {
-    "dataCollection": "Nothing was collected. Shapes are drawn by a program from settings and a"
+    "data_collection": "Nothing was collected. Shapes are drawn by a program from settings and a"
     " seed, turned and lit at random, and rendered by ray casting. The page README.md has all"
     " settings.",
-    "dataCollectionType": ["Software Collection"],
-    "dataCollectionMissingData": "Questions of `unlabeled` and of the test have no answers beside"
-    " them. Where depth is stored it is NaN on the background. Nothing is filled in.",
-    "dataPreprocessingProtocol": [
+    "data_collection_type": ["Software Collection"],
+    "data_collection_missing_data": "Questions of `unlabeled` and of the test have no answers"
+    " beside them. Where depth is stored it is NaN on the background. Nothing is filled in.",
+    "data_preprocessing_protocol": [
         "None: values are stored as they were rendered. Images of 8 bits are linear radiance from"
         " 0 to 1, rounded to 255 steps."
     ],
-    "dataAnnotationProtocol": [
+    "data_annotation_protocol": [
         "No person labelled anything. The right answer shows the reference's own shape, and the"
         " wrong ones shapes that no rotation takes to it. `iqtt audit` recomputes both from the"
         " stored cubes, with code that shares nothing with the program that made them."
     ],
-    "dataUseCases": [
+    "data_use_cases": [
         "Training and testing methods that tell whether two pictures show the same shape, with few"
         " labels or none.",
         "Comparing such methods under one protocol, with bench score of pix2shape-bench.",
         "Not for measuring mental rotation in people, and not for deciding how well a method does"
         " on photographs.",
     ],
-    "dataLimitations": [
+    "data_limitations": [
         "One kind of shape, unit cubes face to face, before an empty background: no texture, no"
         " shadows, no noise of a sensor, no clutter.",
         "Views that hide a cube are refused, so that most views of a shape never occur.",
         "Three answers at most: a guess is right in a third or half of the questions.",
     ],
-    "dataBiases": [
+    "data_biases": [
         "Questions of the kind `other`, and some of `near`, can be answered from outlines alone."
         " Report `matched` and `mirror-pair`, where outlines tell little or nothing.",
         "In `mirror-pair` with three answers the right one is the odd one out, and can be found"
@@ -68,11 +68,11 @@ RESPONSIBLE: dict[str, str | list[str]] = {
         "Each number of cubes is asked for equally often, though there are far more shapes of many"
         " cubes; shapes of few cubes recur, seen from other sides.",
     ],
-    "personalSensitiveInformation": [
+    "personal_sensitive_information": [
         "None: no people, no places, no text in the images. The recorded command, where the page"
         " has it, holds names of files of those who made the data."
     ],
-    "dataSocialImpact": "None is expected: the images show no people, and nothing that exists.",
-    "dataReleaseMaintenancePlan": "A file is not changed after it is published; a correction gets a"
-    " new version and new SHA-256s.",
+    "data_social_impact": "None is expected: the images show no people, and nothing that exists.",
+    "data_release_maintenance_plan": "A file is not changed after it is published; a correction"
+    " gets a new version and new SHA-256s.",
 }

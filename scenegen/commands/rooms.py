@@ -160,9 +160,9 @@ def _export_many(
 ) -> None:
     """Write rows, or all, to a folder of a few large files."""
     if form == "parquet":
-        needs("scenegen export --format parquet", ("pyarrow",), "share")
+        needs("scenegen export --format parquet", ("datasets", "pyarrow"), "share")
     from scenegen.rooms.reader import RoomsFile
-    from scenegen.sharing.export import export_rows
+    from scenegen.sharing.rooms import export_rows
 
     with RoomsFile(file) as rooms:
         count = len(rooms if items is None else items)

@@ -1,25 +1,49 @@
-"""Write rows of rooms to a folder of Parquet or WebDataset files, each value as it is stored."""
+"""Write the rows of a file, as they are stored, to a folder of Parquet or WebDataset files."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import partial
+import json
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scenegen.description.specs import DatasetSpec
+from scenegen.common.records import check
+from scenegen.files.new_folder import folder_written_beside
+from scenegen.files.rows import RowFile
 from scenegen.files.schema import Column
-from scenegen.layout import columns
-from scenegen.rooms.reader import RoomsFile
-from scenegen.sharing.columns import column_name, decoded, row_column
-from scenegen.sharing.folder import ROWS_PER_FILE, ExportedTable, write_folder
+from scenegen.files.shards import cut, shard_name
+from scenegen.sharing.stored import as_text, stored_blocks
 
-ROW = row_column("row of the file of rooms")
+FORMATS = {"parquet": ".parquet", "webdataset": ".tar"}  # and how the names of their files end
+ROWS_PER_FILE = 1000
+MOST_FILES = 100_000  # as many as their numbers of five digits can tell apart
+ABOUT = "config.json"  # a name that `datasets` never takes for data
+ROW = Column("row", (), "int64", meaning="row of the file that the rows come from")
 
 
-def export_rows(
-    path: str | Path,
+@dataclass(frozen=True)
+class ExportedTable:
+    """Rows to write.
+
+    Attributes:
+        stem: how the names of the files begin.
+        what: what the rows are, in words of ours.
+        file: where they are stored.
+        columns: of each row, besides `ROW`.
+        values: returns the values of these columns from those that are stored, of one row.
+    """
+
+    stem: str
+    what: str
+    file: RowFile
+    columns: Sequence[Column]
+    values: Callable[[Mapping[str, Any]], Mapping[str, Any]]
+
+
+def write_export(
+    table: ExportedTable,
     form: str,
     folder: str | Path,
     rows: Sequence[int] | None = None,
@@ -28,57 +52,95 @@ def export_rows(
     overwrite: bool = False,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> list[Path]:
-    """Write rows of a file of rooms, or of a set of shards, as `write_folder`; return its files.
+    """Write rows of a table to a folder, which appears when it is complete; return its files.
 
-    Files are called `rooms-00000-of-00003.parquet` after `rooms.h5`.
+    Files are called `rooms-00000-of-00003.parquet` after the stem; ABOUT has the root attributes
+    of the file that the rows come from, and what each column means. The same rows give the same
+    bytes with the same versions of Pillow and, for Parquet, pyarrow and `datasets`.
 
-    Raises as `write_folder`; and OSError where there is no such file, FileFormatError where it is
-    not one of rooms, or a row is damaged.
+    Args:
+        form: one of FORMATS.
+        folder: to make; with `overwrite`, an older one of such files is replaced.
+        rows: which to write, in this order; all by default.
+        rows_per_file: the most rows of one file.
+        progress: is told the number of rows that were written since the last call.
+
+    Raises:
+        OSError: as `folder_written_beside`.
+        SpecError: no rows, rows out of range or twice; too many files.
+        FileFormatError: a row is damaged.
     """
-    with RoomsFile(path) as rooms:
-        table = ExportedTable(
-            stem=Path(path).stem,
-            what=f"rows of {rooms.path.name}, a file of rooms of pix2shape-bench",
-            columns=exported_columns(rooms.spec),
-            count=len(rooms),
-            read=partial(read_rows, rooms),
-            attributes=rooms.attributes,
-        )
-        return write_folder(
-            table,
-            form,
-            folder,
-            rows,
-            rows_per_file=rows_per_file,
-            overwrite=overwrite,
-            progress=progress,
-        )
+    count = len(table.file)
+    check(form in FORMATS, "format", repr(form), f"one of {', '.join(FORMATS)}")
+    check(rows_per_file >= 1, "rows per file", rows_per_file, "1 or more")
+    check(count > 0, table.what, "no rows", "at least one")
+    chosen = list(range(count) if rows is None else rows)
+    good = len(chosen) > 0 and min(chosen) >= 0 and max(chosen) < count
+    check(good, "items", f"{len(chosen)} rows", f"some from 0 to {count - 1}")
+    check(len(set(chosen)) == len(chosen), "items", "a row twice", "each row once")
+    parts = cut(len(chosen), rows_per_file)
+    check(len(parts) <= MOST_FILES, "rows per file", rows_per_file, "fewer files than 100,000")
+    ending = FORMATS[form]
+    names = [shard_name(f"{table.stem}{ending}", i, len(parts)) for i in range(len(parts))]
+    ours = {*names, ABOUT, *_older_files(folder, table.stem, ending)}
+    write = _writer(form)
+    with folder_written_beside(folder, ours, overwrite) as made:
+        for name, part in zip(names, parts, strict=True):
+            blocks = _blocks(table, [chosen[i] for i in part], progress)
+            write(made / name, (ROW, *table.columns), blocks)
+        (made / ABOUT).write_text(_about(table, form, names), encoding="utf-8")
+    return [Path(folder) / name for name in (*names, ABOUT)]
 
 
-def exported_columns(spec: DatasetSpec) -> list[Column]:
-    """Return the columns of rows that answer a request: `row`, then a column for each dataset."""
-    return [ROW, *(replace(c, name=column_name(c.name)) for c in columns(spec))]
+def _older_files(folder: str | Path, stem: str, ending: str) -> list[str]:
+    """Return the names of files that an older export left in a folder, of however many files."""
+    pattern = re.compile(rf"{re.escape(stem)}-\d{{5}}-of-\d{{5}}{re.escape(ending)}")
+    if not Path(folder).is_dir():
+        return []
+    return [path.name for path in Path(folder).iterdir() if pattern.fullmatch(path.name)]
 
 
-def read_rows(rooms: RoomsFile, rows: Sequence[int]) -> dict[str, Any]:
-    """Read some rows; return their values by name of the column, in the order of `rows`.
+def _writer(form: str) -> Callable[..., None]:
+    """Return the writer of a format; only Parquet needs libraries of its own."""
+    if form == "parquet":
+        from scenegen.sharing.parquet import write_parquet
 
-    Numbers are arrays (rows, ...) of the types that are stored, texts are `str`, or lists of them.
+        return write_parquet
+    from scenegen.sharing.webdataset import write_tar
 
-    Raises IndexError, and FileFormatError where a row is damaged.
-    """
-    in_order = list(rows) == list(range(rows[0], rows[0] + len(rows)))
-    found: dict[str, Any] = {ROW.name: np.array(rows, np.int64)}
-    for column in columns(rooms.spec):
-        if in_order and not column.own_chunk:
-            values = rooms.read(column.name, slice(rows[0], rows[0] + len(rows)))
-        else:
-            values = [rooms.read(column.name, row) for row in rows]
-        if column.dtype == "text":
-            place = f"{rooms.path}: {column.name}"
-            pairs = zip(rows, values, strict=True)
-            texts = [decoded(value, f"{place}, row {row}") for row, value in pairs]
-            found[column_name(column.name)] = texts
-        else:
-            found[column_name(column.name)] = np.asarray(values)
-    return found
+    return write_tar
+
+
+def _blocks(
+    table: ExportedTable, rows: Sequence[int], progress: Callable[[int], Any]
+) -> Iterator[dict[str, list[Any]]]:
+    """Yield the values of rows as lists, by name of the column."""
+    file = table.file
+    for numbers, stored in stored_blocks(file, rows):
+        block: dict[str, list[Any]] = {ROW.name: numbers}
+        for row, values in zip(numbers, stored, strict=True):
+            texts = {name: as_text(value, file.place(name, row)) for name, value in values.items()}
+            exported = table.values(texts)
+            for column in table.columns:
+                block.setdefault(column.name, []).append(exported[column.name])
+        yield block
+        progress(len(numbers))
+
+
+def _about(table: ExportedTable, form: str, names: Sequence[str]) -> str:
+    """Return what the files do not tell themselves, as JSON."""
+    columns = {
+        c.name: {
+            "type": c.dtype,
+            "row_shape": list(c.shape),
+            **{key: value for key, value in c.attributes.items() if key != "shape"},
+        }
+        for c in (ROW, *table.columns)
+    }
+    about = {
+        "what": f"{table.what}, as {form}",
+        "files": list(names),
+        "columns": columns,
+        "attributes": dict(sorted(table.file.attributes.items())),
+    }
+    return json.dumps(about, indent=1, default=lambda value: np.asarray(value).tolist()) + "\n"

@@ -1,104 +1,92 @@
-"""What a data card tells of files of rooms: facts that were counted, and texts on their use."""
+"""Files of rooms, handed on: exported rows, and a data card."""
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from scenegen.common.records import check
-from scenegen.common.text_table import printable
 from scenegen.description.specs import BUILT_IN
 from scenegen.files.manifest import manifest_path
-from scenegen.layout import markdown_table
-from scenegen.rendering.backend import VERSION_ATTRIBUTES
+from scenegen.files.schema import Column
+from scenegen.layout import columns, markdown_table
 from scenegen.rooms.reader import RoomsFile
-from scenegen.sharing.description import (
+from scenegen.sharing.card import (
     HDF5,
     JSON,
-    PARQUET,
+    NAMES,
     DataDescription,
     Publication,
     SharedFile,
     shared_file,
+    tool,
+    write_card,
 )
-from scenegen.sharing.index import COLUMNS, Tally
-
-Facts = dict[str, list[tuple[str, ...]]]
-MOST_SHOWN = 200  # different values of a count
-KEYWORDS = (
-    "synthetic", "3d", "depth-estimation", "surface-normals", "single-image-3d",
-    "inverse-graphics", "ground-truth", "pix2shape-bench",
-)  # fmt: skip
-SUMMARY = (
-    "Synthetic images of a room's corner that holds a few objects, rendered by a program, with the"
-    " exact ground truth of each pixel (depth, surface normal, object id) and of each scene"
-    " (camera, lights, materials, objects and their poses)."
-)
-READING = """The HDF5 files are read by any HDF5 library. In Python:
-
-    import h5py
-
-    with h5py.File(name) as f:
-        depth = f["depth"][row]  # (H, W) float32, planar, scene units
-        radiance = f["image"][row] * f["image"].attrs["scale"]  # (H, W, 3) linear RGB
-
-`datasets.load_dataset(folder, "index")` reads the index, and so does `mlcroissant` by
-`croissant.json`. Lengths are in scene units: the room's edge is 1. World frame: right-handed, y up,
-the floor at y = 0, walls at x = 0 and z = 0. Camera frame: x right, y up, looks along -z. Images
-are linear: no gamma is applied."""
-RESPONSIBLE: dict[str, str | list[str]] = {
-    "dataCollection": "Nothing was collected. Scenes are drawn by a program from a specification"
-    " and a seed, and rendered by ray casting; the ground truth is what the rays hit. The page"
-    " README.md has the commands and all settings.",
-    "dataCollectionType": ["Software Collection"],
-    "dataCollectionMissingData": "Depth is NaN, the normal zero and the object id -1 where a"
-    " pixel's ray meets nothing. Nothing else is missing and nothing is filled in.",
-    "dataPreprocessingProtocol": [
-        "None: values are stored as they were rendered. Images of 8 bits are linear radiance from"
-        " 0 to 1, clipped and rounded to 255 steps."
-    ],
-    "dataAnnotationProtocol": [
-        "No person labelled anything. Depth, normals and object ids are computed for the one ray"
-        " through each pixel's centre, from the same scene that gives the image."
-    ],
-    "dataUseCases": [
-        "Training and testing methods that estimate depth, normals, objects or new views from a"
-        " single image, where exact ground truth is needed.",
-        "Comparing such methods under one protocol, with bench score of pix2shape-bench.",
-        "Not for deciding how well a method does on photographs, and not for uses that concern"
-        " people: no data of this kind is in the files.",
-    ],
-    "dataLimitations": [
-        "Rooms are a floor and two walls, without texture, windows or clutter, and hold a few"
-        " objects. The camera looks at a fixed point from a fixed distance.",
-        "With the paper's shading equation there are no shadows and no indirect light, unless the"
-        " settings say so; there is no noise of a sensor, no blur and no distortion of a lens.",
-        "Depth belongs to the ray through a pixel's centre; at silhouettes it is not the mean over"
-        " the pixel.",
-    ],
-    "dataBiases": [
-        "All images are synthetic, and of one kind of room. Shapes or classes are drawn with equal"
-        " probability, not as often as they occur in homes.",
-        "Objects that would show too few pixels, or that the border would cut, are drawn again"
-        " unless the settings say otherwise; so large and central objects are favoured.",
-        "The built-in everyday objects are of nine classes, in proportions that a program draws.",
-    ],
-    "personalSensitiveInformation": [
-        "None: no people, no places, no text. The recorded commands hold names of files of those"
-        " who made the data."
-    ],
-    "dataSocialImpact": "None is expected: the images show no people, and nothing that exists.",
-    "dataReleaseMaintenancePlan": "A file is not changed after it is published; a correction gets a"
-    " new version and new SHA-256s.",
-}
+from scenegen.sharing.export import ExportedTable, write_export
+from scenegen.sharing.index import IndexKind, Line, Tally, counts_table, write_index
+from scenegen.sharing.rooms_texts import KEYWORDS, READING, RESPONSIBLE, SUMMARY
 
 
-def check_names(files: Sequence[str | Path], taken: Sequence[str]) -> None:
-    """Raise SpecError where two files would have one name beside the card."""
-    names = [Path(file).name for file in files]
-    for name in (*names, *taken):
-        twice = (*names, *taken).count(name) > 1
-        check(not twice, "files", f"{name} twice", "different names, as all lie beside the card")
+def export_rows(
+    path: str | Path, form: str, folder: str | Path, rows: Sequence[int] | None = None, **how: Any
+) -> list[Path]:
+    """Write rows of a file of rooms, or of a set of shards, as `write_export`; return its files.
+
+    Files are called `rooms-00000-of-00003.parquet` after `rooms.h5`. Data sets become columns:
+    `camera/fov_y_degrees` is `camera_fov_y_degrees`.
+
+    Args:
+        how: `rows_per_file`, `overwrite` and `progress` of `write_export`.
+
+    Raises as `write_export`; and OSError where there is no such file, FileFormatError where it is
+    not one of rooms.
+    """
+    with RoomsFile(path) as rooms:
+        table = ExportedTable(
+            stem=Path(path).stem,
+            what=f"rows of {rooms.path.name}, a file of rooms of pix2shape-bench",
+            file=rooms,
+            columns=[replace(c, name=c.name.replace("/", "_")) for c in columns(rooms.spec)],
+            values=lambda stored: {name.replace("/", "_"): v for name, v in stored.items()},
+        )
+        return write_export(table, form, folder, rows, **how)
+
+
+def make_rooms_card(
+    files: Sequence[str | Path],
+    folder: str | Path,
+    publication: Publication,
+    *,
+    overwrite: bool = False,
+    progress: Callable[[int], Any] = lambda done: None,
+) -> list[Path]:
+    """Write the data card of some files of rooms, or sets of shards, to a folder; return its files.
+
+    The same files and the same publication give the same bytes with the same versions of pyarrow,
+    `datasets` and mlcroissant. All values of the files are read once, for the digests in the index.
+
+    Args:
+        files: each one a file of rooms, or the file of a set of shards.
+        folder: to make; with `overwrite`, an older card is replaced.
+        publication: what only the person who publishes the data knows.
+        progress: is told the number of rows that were read since the last call.
+
+    Raises:
+        OSError: as `write_card`, or there is no such file of rooms.
+        FileFormatError: a file is not one of rooms, or is damaged.
+        SpecError: two files have one name.
+    """
+    names = [*(Path(file).name for file in files), *NAMES]
+    for name in names:
+        expected = "different names, as all lie beside the card"
+        check(names.count(name) == 1, "files", f"{name} twice", expected)
+
+    def describe(index: Path) -> DataDescription:
+        tables = [partial(RoomsFile, file) for file in files]
+        return _description(files, write_index(index, ROOMS, tables, progress))
+
+    return write_card(folder, publication, describe, overwrite)
 
 
 def default_license(files: Sequence[str | Path]) -> str:
@@ -115,49 +103,98 @@ def default_license(files: Sequence[str | Path]) -> str:
     return "CC-BY-4.0"
 
 
-def describe_rooms(
-    files: Sequence[str | Path], tallies: Sequence[Tally], index: Path, publication: Publication
-) -> DataDescription:
-    """Return what is to be told of files, given their tallies and the index that was written.
-
-    Every byte of the files is read, for their SHA-256. Raises as `RoomsFile`, and OSError.
-    """
-    listed: list[SharedFile] = []
-    facts: Facts = {
-        "Files": [("file", "images", "scenes", "image", "seed", "objects from", "fingerprint")],
-        "What they hold": _counts(tallies),
-        "Versions": [("file", "written by", "Mitsuba", "Dr.Jit", "LLVM", "variant")],
+def _line(rooms: RoomsFile, stored: Mapping[str, Any]) -> Line:
+    """Return what a row's small data sets tell, in the columns of the index."""
+    objects, lights = int(stored["object/count"]), int(stored["light/count"])
+    return {
+        "scene_index": int(stored["scene_index"]),
+        "view_index": int(stored["view_index"]),
+        "view_angle_degrees": float(stored["view_angle_degrees"]),
+        "height": rooms.spec.height,
+        "width": rooms.spec.width,
+        "object_count": objects,
+        "object_shapes": stored["object/model"][:objects],
+        "object_visible_pixels": stored["object/visible_pixels"][:objects].tolist(),
+        "camera_world_from_camera": stored["camera/world_from_camera"].tolist(),
+        "camera_fov_y_degrees": float(stored["camera/fov_y_degrees"]),
+        "light_count": lights,
+        "light_position": stored["light/position"][:lights].tolist(),
+        "light_color": stored["light/color"][:lights].tolist(),
     }
-    commands, requests, tools = {}, {}, set()
+
+
+def _of_scene(keys: Callable[[Line], Sequence[Any]]) -> Callable[[Line], Sequence[Any]]:
+    """Count a scene once: its first view stands for it."""
+    return lambda line: keys(line) if line["view_index"] == 0 else ()
+
+
+# fmt: off
+ROOMS = IndexKind(
+    columns=(
+        Column("scene_index", (), "int64",
+               meaning="which scene of its file the image shows, from 0"),
+        Column("view_index", (), "int32", meaning="which view of that scene, from 0"),
+        Column("view_angle_degrees", (), "float64",
+               meaning="degrees about the vertical axis from the scene's view 0"),
+        Column("height", (), "int32", meaning="pixels"),
+        Column("width", (), "int32", meaning="pixels"),
+        Column("object_count", (), "int32", meaning="number of objects in the scene"),
+        Column("object_shapes", (-1,), "text", meaning="basic shape, or class and model as"
+               " class/model, of each object; object id k is entry k - 1"),
+        Column("object_visible_pixels", (-1,), "int32", meaning="pixels that show each object"),
+        Column("camera_world_from_camera", (4, 4), "float64", meaning="rigid transform from the"
+               " camera frame (x right, y up, looks along -z) to the world frame (y up), lengths in"
+               " scene units"),
+        Column("camera_fov_y_degrees", (), "float64", meaning="vertical field of view, degrees"),
+        Column("light_count", (), "int32", meaning="number of point lights"),
+        Column("light_position", (-1, 3), "float64",
+               meaning="of each light, world frame, scene units"),
+        Column("light_color", (-1, 3), "float64", meaning="of each light, linear RGB radiance"),
+    ),
+    digested=("image", "depth", "normal", "object_id", "scene"),
+    line=_line,
+    counts={
+        "scenes by number of objects": _of_scene(lambda line: [line["object_count"]]),
+        "scenes by number of lights": _of_scene(lambda line: [line["light_count"]]),
+        "objects by shape or class": _of_scene(
+            lambda line: [name.partition("/")[0] for name in line["object_shapes"]]
+        ),
+        "images by angle of the view, degrees": lambda line: [line["view_angle_degrees"]],
+    },
+    same="scene_sha256",
+    verify="scenegen verify",
+)
+# fmt: on
+
+
+def _description(files: Sequence[str | Path], tallies: Sequence[Tally]) -> DataDescription:
+    """Return what is to be told of files, of which every byte is read, for their SHA-256."""
+    shared: list[SharedFile] = []
+    head = ("file", "images", "scenes", "image", "seed", "objects from", "fingerprint")
+    facts, names, commands, requests, tools = [head], [], {}, {}, set()
     for file, tally in zip(files, tallies, strict=True):
         with RoomsFile(file) as rooms:
-            spec, name = rooms.spec, rooms.path.name
-            told = {key: str(value) for key, value in rooms.attributes.items()}
-            versions = [told.get(key, "unknown") for key in VERSION_ATTRIBUTES]
-            source = f"{spec.source}, {spec.object_split}"
+            spec, texts, name = rooms.spec, rooms.attributes, rooms.path.name
+            names.append(name)
+            counts = str(tally.rows), str(len(tally.digests))
             size = f"{spec.height}x{spec.width}, {spec.image_dtype}"
-            counts = (str(tally.rows), str(tally.scenes), size, str(spec.seed))
-            facts["Files"].append((name, *counts, source, rooms.fingerprint))
-            writer, variant = told.get("writer", ""), told.get("variant", "")
-            facts["Versions"].append((name, writer, *versions, variant))
-            commands[name] = told.get("creation_command", "")
-            requests[name] = spec.to_json()
-            tools.add(printable(f"{writer}, Mitsuba {versions[0]}"))
-            listed += _files_of(rooms)
-    listed.append(shared_file(index, PARQUET, "a line for each row, without pixels"))
+            source = f"{spec.source}, {spec.object_split}"
+            facts.append((name, *counts, size, str(spec.seed), source, rooms.fingerprint))
+            commands[name], requests[name] = texts["creation_command"], spec.to_json()
+            tools.add(tool(texts))
+            shared += _files_of(rooms)
     return DataDescription(
-        publication=publication,
         summary=SUMMARY,
         keywords=KEYWORDS,
-        files=tuple(listed),
-        index=COLUMNS,
-        index_file=index.name,
+        files=shared,
+        columns=ROOMS.all_columns,
+        key=("file", "row"),
         rows=sum(tally.rows for tally in tallies),
-        facts=facts,
+        facts={"Files": facts, "What they hold": counts_table("images", names, tallies)},
         commands=commands,
         requests=requests,
         layout=markdown_table(),
-        responsible={**RESPONSIBLE, "machineAnnotationTools": sorted(tools)},
+        responsible={**RESPONSIBLE, "machine_annotation_tools": sorted(tools)},
         notes={"Reading": READING, "Splits": _splits(tallies)},
     )
 
@@ -167,35 +204,17 @@ def _files_of(rooms: RoomsFile) -> list[SharedFile]:
     parts = [path for path, _ in rooms.parts]
     if parts == [rooms.path]:
         return [shared_file(rooms.path, HDF5, "rooms with ground truth")]
-    found = [shared_file(rooms.path, HDF5, "shows its shards as one file")]
-    found += [shared_file(path, HDF5, f"shard of {rooms.path.name}") for path in parts]
+    files = [shared_file(rooms.path, HDF5, "shows its shards as one file")]
+    files += [shared_file(path, HDF5, f"shard of {rooms.path.name}") for path in parts]
     manifest = manifest_path(rooms.path)
     if manifest.is_file():
-        found.append(shared_file(manifest, JSON, f"manifest of {rooms.path.name}"))
-    return found
-
-
-def _counts(tallies: Sequence[Tally]) -> list[tuple[str, ...]]:
-    def joined(counters: Sequence[Counter[Any]]) -> str:
-        total: Counter[Any] = sum(counters, Counter())
-        shown = [f"{key}: {number}" for key, number in sorted(total.items())]
-        more = [f"and {len(shown) - MOST_SHOWN} more"] if len(shown) > MOST_SHOWN else []
-        return ", ".join(shown[:MOST_SHOWN] + more) or "none"
-
-    return [
-        ("what", "how many"),
-        ("images", str(sum(t.rows for t in tallies))),
-        ("scenes", str(sum(t.scenes for t in tallies))),
-        ("scenes by number of objects", joined([t.objects for t in tallies])),
-        ("scenes by number of lights", joined([t.lights for t in tallies])),
-        ("objects by shape or class", joined([t.shapes for t in tallies])),
-        ("images by angle of the view, degrees", joined([t.views for t in tallies])),
-    ]
+        files.append(shared_file(manifest, JSON, f"manifest of {rooms.path.name}"))
+    return files
 
 
 def _splits(tallies: Sequence[Tally]) -> str:
     """Return how the files may be used as splits, and whether they share scenes."""
-    every: set[bytes] = set().union(*(tally.digests for tally in tallies))
+    every: set[str] = set().union(*(tally.digests for tally in tallies))
     shared = sum(len(tally.digests) for tally in tallies) - len(every)
     apart = "Views of one scene are in one file, next to each other: split by scene, never by row."
     if len(tallies) == 1:

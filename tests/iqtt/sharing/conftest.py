@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from iqtt.files.make import make_split
-from scenegen.sharing.description import Publication
+from scenegen.sharing.card import Publication
 from tests.support.loaders import loader
 from tests.support.made_splits import TINY
 

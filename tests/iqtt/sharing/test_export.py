@@ -8,9 +8,9 @@ import pytest
 
 from iqtt import open_questions
 from iqtt.questions.specs import DISTRACTOR_KINDS
-from iqtt.sharing.export import export_questions
+from iqtt.sharing.questions import export_questions
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.sharing.folder import ABOUT, FORMATS
+from scenegen.sharing.export import ABOUT, FORMATS
 
 TABLES = (("train", "labeled"), ("train", "unlabeled"), ("val", None), ("test", None))
 

@@ -10,11 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from iqtt import open_questions
-from iqtt.sharing.index import COLUMNS
-from iqtt.sharing.make import make_questions_card
+from iqtt.sharing.questions import QUESTIONS, make_questions_card
 from scenegen.common.errors import FileFormatError
 from scenegen.files.content import row_digest
-from scenegen.sharing.make import NAMES
+from scenegen.sharing.card import NAMES
 from tests.support.loaders import faultless_croissant, validate
 
 TRUTH = ("answer", "cube_count", "camera_distance", "angle_degrees", "distractor_kinds")
@@ -82,7 +81,7 @@ def test_records_are_the_questions(kind, answers, cards, splits):
     keys = set()
     for record in found.records("rows"):
         line = {key.removeprefix("rows/"): texts(value) for key, value in record.items()}
-        assert set(line) == {c.name for c in COLUMNS}
+        assert set(line) == {c.name for c in QUESTIONS.all_columns}
         keys.add((line["file"], line["part"], line["row"]))
         beside = splits[kind] / "iqtt-test-answers.h5"
         with_key = answers and line["split"] == "test"

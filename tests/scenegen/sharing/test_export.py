@@ -11,8 +11,8 @@ import pytest
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.layout import FIELDS
-from scenegen.sharing.export import export_rows
-from scenegen.sharing.folder import ABOUT, FORMATS
+from scenegen.sharing.export import ABOUT, FORMATS
+from scenegen.sharing.rooms import export_rows
 
 
 @pytest.fixture(params=["8 bits", "floats"])
@@ -159,7 +159,9 @@ def test_refused(how, where, rooms_path, tmp_path):
 
 
 def test_no_more_rows_are_in_memory_than_fit(rooms_path, tmp_path, monkeypatch):
-    monkeypatch.setattr("scenegen.sharing.folder.BLOCK_BYTES", 3 * 32 * 32 * (3 + 4 + 12 + 1))
+    with open_rooms(rooms_path) as rooms:
+        size = sum(np.asarray(rooms.read(name, 0)).nbytes for name in rooms.fields)
+    monkeypatch.setattr("scenegen.sharing.stored.BLOCK_BYTES", 3 * size)
     steps = []
     made = export_rows(rooms_path, "parquet", tmp_path / "out", progress=steps.append)
     import pyarrow.parquet as pq

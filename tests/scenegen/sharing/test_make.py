@@ -12,9 +12,8 @@ from markdown_it import MarkdownIt
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.files.content import row_digest
-from scenegen.sharing.description import Publication
-from scenegen.sharing.index import COLUMNS
-from scenegen.sharing.make import NAMES, make_rooms_card
+from scenegen.sharing.card import NAMES, Publication
+from scenegen.sharing.rooms import ROOMS, make_rooms_card
 from tests.support.loaders import faultless_croissant, validate
 
 TOLD = Publication("Two rooms", ("A. Person", "B. Person"), "2026-01-31", "CC-BY-4.0")
@@ -78,15 +77,15 @@ def test_records_are_the_rows(croissant, holey_set, float_path):
         {key.removeprefix("rows/"): value for key, value in record.items()}
         for record in croissant.records("rows")
     ]
-    assert [set(record) for record in records] == [{c.name for c in COLUMNS}] * 19
+    assert [set(record) for record in records] == [{c.name for c in ROOMS.all_columns}] * 19
     for path, some in ((holey_set, records[:14]), (float_path, records[14:])):
         with open_rooms(path) as rooms:
             assert len(some) == len(rooms)
             for row, record in enumerate(some):
                 room = rooms[row]
                 assert (record["file"], record["row"]) == (path.name.encode(), row)
-                with h5py.File(path.parent / record["part"].decode()) as part:
-                    depth = part["depth"][record["part_row"]]
+                with h5py.File(path.parent / record["shard"].decode()) as part:
+                    depth = part["depth"][record["shard_row"]]
                 np.testing.assert_array_equal(depth, room.depth)
                 pose = np.array(record["camera_world_from_camera"])
                 np.testing.assert_array_equal(pose, room.world_from_camera)
@@ -100,7 +99,7 @@ def test_records_are_the_rows(croissant, holey_set, float_path):
 
 def test_index_and_images_in_datasets(made, holey_set, load, tmp_path):
     """The index names the rows of an export: joined, they give the pixels of the file."""
-    from scenegen.sharing.export import export_rows
+    from scenegen.sharing.rooms import export_rows
 
     index = load(str(made), "index").filter(lambda line: line["file"] == "set.h5")
     assert len(index) == 14
@@ -122,8 +121,8 @@ def test_the_page_has_a_header_and_all_sections(made):
     assert header["configs"] == [{"config_name": "index", "data_files": "index.parquet"}]
     titles = {line[3:] for line in page.splitlines() if line.startswith("## ")}
     assert {"Intended use", "Limits", "Known biases", "Splits", "Licence", "Citation"} < titles
-    assert "| images | 19 |" in page
-    assert "| scenes | 12 |" in page
+    assert "| images | 14 | 5 |" in page
+    assert "| set.h5 | 14 | 7 |" in page
 
 
 def test_the_same_bytes_again(made, holey_set, float_path, tmp_path):
