@@ -97,9 +97,10 @@ def _serve(
 def _tally(db: str) -> str:
     from iqtt.quiz.answers import read_answers
 
-    found = read_answers(db)
-    finished = len({one.participant for one in found.answers if one.finished})
-    return f"{found.participants} participants, {finished} finished, {len(found.answers)} answers"
+    stored = read_answers(db)
+    finished = len({answer.participant for answer in stored.answers if answer.finished})
+    count = len(stored.answers)
+    return f"{stored.participants} participants, {finished} finished, {count} answers"
 
 
 def _export(db: str, file: str | None, path: str, overwrite: bool) -> None:
@@ -107,36 +108,36 @@ def _export(db: str, file: str | None, path: str, overwrite: bool) -> None:
     from scenegen.files.new_file import write_text
 
     refuse_inputs([path], [db])
-    found = read_answers(db)
+    stored = read_answers(db)
     if file is not None:
-        _require_split(found, file)
-    write_text(path, to_csv(found), overwrite)
-    print_line(f"{path}: {len(found.answers)} answers of {found.participants} participants")
+        _require_split(stored, file)
+    write_text(path, to_csv(stored), overwrite)
+    print_line(f"{path}: {len(stored.answers)} answers of {stored.participants} participants")
 
 
 def _submit(db: str, file: str, path: str, settings: dict[str, Any]) -> None:
     from iqtt.quiz.answers import read_answers
     from metrics.views.people.submission import write_submission
 
-    found = read_answers(db)
-    total = _require_split(found, file)
+    stored = read_answers(db)
+    total = _require_split(stored, file)
     overwrite = settings["overwrite"]
-    count = write_submission(found, file, path, settings["whose"], settings["seed"], overwrite)
+    count = write_submission(stored, file, path, settings["whose"], settings["seed"], overwrite)
     left = "" if count == total else "; score it with bench score --allow-partial"
     print_line(f"{path}: answers to {count} of {total} questions{left}")
 
 
-def _require_split(found: Any, file: str) -> int:
-    """Return how many questions a file has. Raises SpecError where `found` belongs to another."""
+def _require_split(stored: Any, file: str) -> int:
+    """Return how many questions a file has. Raises SpecError where `stored` belongs to another."""
     from iqtt.quiz.study import Pool
     from scenegen.common.errors import SpecError
 
     pool = Pool(file)
     pool.file.close()
-    own = found.settings.fingerprint
-    if pool.fingerprint != own:
-        told = f"answers to the split of fingerprint {own:.12}"
-        raise SpecError(found.path, told, f"{pool.fingerprint:.12}, that of {file}")
+    fingerprint = stored.settings.fingerprint
+    if pool.fingerprint != fingerprint:
+        found = f"answers to the split of fingerprint {fingerprint:.12}"
+        raise SpecError(stored.path, found, f"{pool.fingerprint:.12}, that of {file}")
     return len(pool.right)
 
 

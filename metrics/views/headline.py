@@ -176,7 +176,7 @@ def _kinds_table(files: Sequence[ScoreFile], grouping: str) -> Table:
         rows.append(
             (key, score_cell(score), drawing, f"{score.n:,}", number(chance), *cells, *beside_it)
         )
-    own, *others_heads = labels_of(files)
+    label, *labels = labels_of(files)
     more = ("skill", "floor", "people †") if by_kind else ()
-    head = ("", own, "on its scale", "questions", "chance", *more, *others_heads)
+    head = ("", label, "on its scale", "questions", "chance", *more, *labels)
     return make_table(f"Accuracy {GROUP_TITLES[grouping]}", head, rows)

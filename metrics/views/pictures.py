@@ -42,15 +42,15 @@ def view_pictures(
         fov_y_degrees: with which normals of the predicted depth are made where there are no others.
         predicted_normal: camera frame, (H, W, 3), of any length.
     """
-    known = np.isfinite(true)
-    near, far = (true[known].min(), true[known].max()) if known.any() else (0.0, 1.0)
+    scored = np.isfinite(true)
+    near, far = (true[scored].min(), true[scored].max()) if scored.any() else (0.0, 1.0)
     span = max(float(far - near), 1e-9)
     drawn = np.clip(np.nan_to_num(predicted.astype(np.float64)), -FARTHEST, FARTHEST)
     error = np.clip(np.abs(predicted_or_far(predicted) - true) / (0.1 * span), 0, 1)
     stops = np.linspace(0, 1, len(ERROR_RAMP))
     ramp = [np.interp(np.nan_to_num(error, nan=1.0), stops, ERROR_RAMP[:, c]) for c in range(3)]
     if predicted_normal is None:
-        name, normal = DERIVED_NORMALS, normals_from_depth(drawn, fov_y_degrees, known)[0]
+        name, normal = DERIVED_NORMALS, normals_from_depth(drawn, fov_y_degrees, scored)[0]
     else:
         name, normal = NORMALS, predicted_normal
     pictures = {
@@ -61,7 +61,7 @@ def view_pictures(
         name: _normals(normal),
     }
     for picture in pictures.values():
-        picture[~known] = NOTHING
+        picture[~scored] = NOTHING
     shown = {IMAGE: srgb_bytes(np.nan_to_num(radiance)), **pictures}
     return {caption: data_url(pixels) for caption, pixels in shown.items()}
 

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 BINS = 30
-FARTHEST = 1e30  # larger numbers are drawn there, as matplotlib computes with their squares
 LINE = "line"  # kind of what is no method
 # Colour and marker by the kind of a series, as in templates/style.css.
 KINDS = {
@@ -96,7 +95,7 @@ def histogram(values: Array, title: str, unit: str) -> Chart | None:
 
     Values that are not finite are left out; there is no chart without any other.
     """
-    finite = np.clip(values[np.isfinite(values)], -FARTHEST, FARTHEST)
+    finite = values[np.isfinite(values)]
     if not finite.size:
         return None
     limits = (min(0.0, float(finite.min())), max(0.0, float(finite.max())))
@@ -146,9 +145,7 @@ def curves(series: Sequence[Series], title: str, unit: str) -> Chart | None:
 def _draw_curve(axes: "Axes", line: Series, aside: float) -> None:
     """Draw a series a little aside, so that no interval hides another."""
     color, marker = KINDS[line.kind]
-    at, value, low, high = np.clip(
-        [(p.at, p.value, p.low, p.high) for p in line.points], -FARTHEST, FARTHEST
-    ).T
+    at, value, low, high = np.array([(p.at, p.value, p.low, p.high) for p in line.points]).T
     at = at + (0.6 * aside if line.kind != LINE else 0.0)
     style = "--" if line.kind == LINE else "-"
     axes.plot(at, value, style, color=color, marker=marker, markersize=4, linewidth=1.2)
@@ -205,7 +202,7 @@ def strip(
     from matplotlib.ticker import MaxNLocator
 
     ends = [point.value, point.low, point.high, *others, *(at for _, at in marks)]
-    shown = [min(max(end, -FARTHEST), FARTHEST) for end in ends if math.isfinite(end)]
+    shown = [end for end in ends if math.isfinite(end)]
     ticks = MaxNLocator(4).tick_values(min(0.0, *shown), max(0.0, *shown))
     low, high = max(float(ticks[0]), limits[0]), min(float(ticks[-1]), limits[1])
     with _drawing(1.6, 0.22, layout=None) as (figure, axes):

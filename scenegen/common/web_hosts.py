@@ -67,8 +67,8 @@ def hosts_of(host: str | None, public: bool, names: tuple[str, ...] = ()) -> Hos
         advice = "with --public, everyone who can reach the address sees the pages"
         raise SpecError("host", f"{host!r:.100}", "127.0.0.1, ::1 or localhost", advice)
     machine = [socket.gethostname()] if public else []
-    known = frozenset(map(str.lower, (*LOCAL_NAMES, host, *names, *machine)))
-    return Hosts(HERE if host.lower() in LOCAL_NAMES else host, known, public)
+    allowed = frozenset(map(str.lower, (*LOCAL_NAMES, host, *names, *machine)))
+    return Hosts(HERE if host.lower() in LOCAL_NAMES else host, allowed, public)
 
 
 def _is_local(host: str) -> bool:

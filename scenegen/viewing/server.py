@@ -56,9 +56,9 @@ def _refusing_others(hosts: Hosts) -> Iterator[None]:
 
     def guarded(*arguments: Any, process_request: Any, **options: Any) -> Any:
         def answer(connection: Any, request: Any) -> Any:
-            asked, sender = request.headers.get_all("Host"), request.headers.get("Origin")
-            allowed = len(asked) == 1 and hosts.allow(asked[0])
-            if not allowed or not (sender is None or is_own_page(sender, asked[0])):
+            names, sender = request.headers.get_all("Host"), request.headers.get("Origin")
+            allowed = len(names) == 1 and hosts.allow(names[0])
+            if not allowed or not (sender is None or is_own_page(sender, names[0])):
                 return connection.respond(403, "This address is not one of the viewer.\n")
             return process_request(connection, request)
 

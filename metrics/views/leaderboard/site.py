@@ -95,7 +95,7 @@ def _sections(ranking: Ranking) -> Iterator[Section]:
         charts = list(view_curves(compared, [labels[id(file)] for file in compared]))
     yield Section(
         ranking.title,
-        leads=[_lead(ranking)],
+        leads=[lead_of(ranking)],
         remarks=[_how_made(ranking.files[0])],
         tables=ranking.tables,
         charts=charts,
@@ -112,7 +112,7 @@ def _sections(ranking: Ranking) -> Iterator[Section]:
         yield Section(f"Paired tests: {ranking.title}", tables=[table], folded=True)
 
 
-def _lead(ranking: Ranking) -> Lead:
+def lead_of(ranking: Ranking) -> Lead:
     """Return what the first row of a ranking is, and its first score."""
     row, entry = ranking.tables[0].rows[0], ranking.entries[0]
     first = row.cells[2]

@@ -35,12 +35,12 @@ def surfels(room, depth=None):
 def test_pixels_without_a_depth_in_view_have_no_surfel(rooms):
     depth = rooms[0].depth.copy()
     depth[0, :6] = np.nan, np.inf, 0, -1, FARTHEST * 1.1, FARTHEST
-    found = surfels(rooms[0], depth)
-    assert found.pixels[0].tolist() == [0, 5]
-    assert len(found.points) == depth.size - 5
-    assert np.isfinite(found.points).all()
+    shown = surfels(rooms[0], depth)
+    assert shown.pixels[0].tolist() == [0, 5]
+    assert len(shown.points) == depth.size - 5
+    assert np.isfinite(shown.points).all()
     np.testing.assert_allclose(
-        found.points[1:], rooms[0].points_world.reshape(-1, 3)[6:], atol=1e-6
+        shown.points[1:], rooms[0].points_world.reshape(-1, 3)[6:], atol=1e-6
     )
     assert len(surfels(rooms[0], depth * np.nan).points) == 0
 
@@ -48,16 +48,16 @@ def test_pixels_without_a_depth_in_view_have_no_surfel(rooms):
 @pytest.mark.parametrize("angle", [0.0, 0.001])
 def test_a_click_hits_the_surfel_of_its_pixel(rooms, angle):
     room = rooms[0]
-    found, eye = surfels(room), room.world_from_camera[:3, 3]
-    for i in range(0, len(found.points), 97):
-        way = found.points[i] - eye
+    shown, eye = surfels(room), room.world_from_camera[:3, 3]
+    for i in range(0, len(shown.points), 97):
+        way = shown.points[i] - eye
         length = np.linalg.norm(way)
-        hit = hit_by(found, eye, way / length, angle)
+        hit = hit_by(shown, eye, way / length, angle)
         assert hit[0] == i
-        assert hit[1] == pytest.approx(length, abs=found.spacing)
-        assert hit_by(found, eye, -way / length, angle) is None
-    both = replace(found, points=np.concatenate([found.points, eye + 0.5 * (found.points - eye)]))
-    assert hit_by(both, eye, way / length)[0] == len(found.points) + i, "the nearer of two surfaces"
+        assert hit[1] == pytest.approx(length, abs=shown.spacing)
+        assert hit_by(shown, eye, -way / length, angle) is None
+    both = replace(shown, points=np.concatenate([shown.points, eye + 0.5 * (shown.points - eye)]))
+    assert hit_by(both, eye, way / length)[0] == len(shown.points) + i, "the nearer of two surfaces"
 
 
 def test_normals_have_one_colour_in_all_views(make_rooms, tmp_path):
@@ -96,11 +96,11 @@ def test_meshes_that_are_not_there_are_named_once(meshes, make_rooms, tmp_path):
     how = {"objects": source.objects}
     path = make_rooms(tmp_path / "x.h5", 2, how, objects=(2, 2), **source.settings)
     with open_rooms(path) as rooms:
-        found, missing = scene_meshes(rooms[0].scene, shapes_of(rooms.spec))
-        assert ([mesh.object_id for mesh in found], len(missing)) == ([0], 1)
+        shown, missing = scene_meshes(rooms[0].scene, shapes_of(rooms.spec))
+        assert ([mesh.object_id for mesh in shown], len(missing)) == ([0], 1)
         assert "--objects-root" in missing[0]
-        found, missing = scene_meshes(rooms[0].scene, shapes_of(rooms.spec, **told))
-        assert (len(found), missing) == (3, [])
+        shown, missing = scene_meshes(rooms[0].scene, shapes_of(rooms.spec, **told))
+        assert (len(shown), missing) == (3, [])
         with pytest.raises(SceneGenError):
             shapes_of(rooms.spec, objects_root=str(tmp_path), cache_dir=told["cache_dir"])
 

@@ -34,13 +34,13 @@ def three_methods(views=2, scenes=8):
 
 def test_distances_by_brute_force():
     files = three_methods()
-    found = compare(files, ["chamfer", "f_score_0.05"], seed=5)
-    assert (found.reference, found.methods) == ("first", ("worse", "same"))
-    assert (found.items, found.clusters, found.comparable) == (16, 8, True)
+    comparison = compare(files, ["chamfer", "f_score_0.05"], seed=5)
+    assert (comparison.reference, comparison.methods) == ("first", ("worse", "same"))
+    assert (comparison.items, comparison.clusters, comparison.comparable) == (16, 8, True)
     expected = itertools.product(("chamfer", "f_score_0.05"), ("worse", "same"))
-    assert [(d.metric, d.method) for d in found.differences] == list(expected)
-    for d in found.differences:
-        pair = (files[1 + found.methods.index(d.method)], files[0])
+    assert [(d.metric, d.method) for d in comparison.differences] == list(expected)
+    for d in comparison.differences:
+        pair = (files[1 + comparison.methods.index(d.method)], files[0])
         a, b = (file.items[d.metric].reshape(8, 2) for file in pair)
         apart, a, b = ((a - b).mean(axis=1), a.mean(axis=1), b.mean(axis=1))
         patterns = np.array(list(itertools.product([1, -1], repeat=8)))
@@ -53,9 +53,14 @@ def test_distances_by_brute_force():
         assert (d.wins, d.losses, d.ties) == (better.sum(), (~better).sum(), 0)
         reach = norm.ppf(1 - 0.05 / 4 / 2) + norm.ppf(0.8)
         assert d.smallest == pytest.approx(reach * apart.std(ddof=1) / np.sqrt(8), rel=1e-6)
-    expected = holm([d.p_value for d in found.differences])
-    assert [d.p_holm for d in found.differences] == expected.tolist()
-    assert [d.verdict for d in found.differences] == ["worse", "not shown", "worse", "not shown"]
+    expected = holm([d.p_value for d in comparison.differences])
+    assert [d.p_holm for d in comparison.differences] == expected.tolist()
+    assert [d.verdict for d in comparison.differences] == [
+        "worse",
+        "not shown",
+        "worse",
+        "not shown",
+    ]
 
 
 def test_the_correction_goes_over_every_score_and_file():
@@ -112,12 +117,12 @@ def test_answers_averaged_over_runs_go_by_sign_flips():
     one = (rng.random(60) < 0.5).astype(float)
     mean = np.clip(one + rng.integers(0, 2, 60) / 3, 0.0, 1.0)
     files = [iqtt_scores("one", one), iqtt_scores("three", mean, runs=3)]
-    found = compare(files)
-    (d,) = found.differences
+    comparison = compare(files)
+    (d,) = comparison.differences
     assert d.test == "sign flips"
     assert d.difference == pytest.approx((mean - one).mean())
     assert d.verdict == "better"
-    assert any("three" in note and "3 training runs" in note for note in found.notes)
+    assert any("three" in note and "3 training runs" in note for note in comparison.notes)
     # Even where all runs agree, so that every mean is 0 or 1.
     agreeing = iqtt_scores("three", one, runs=3)
     assert compare([files[0], agreeing]).differences[0].test == "sign flips"
@@ -154,24 +159,24 @@ def test_rows_in_another_order_are_paired_by_number():
 @pytest.mark.parametrize(("scenes", "may"), [(1, False), (5, False), (6, True)])
 def test_too_few_scenes_can_show_nothing(scenes, may):
     files = three_methods(views=3, scenes=scenes)[:2]
-    found = compare(files, ["chamfer"])
-    (d,) = found.differences
+    comparison = compare(files, ["chamfer"])
+    (d,) = comparison.differences
     assert d.p_value == least_p_value(scenes)
     assert (d.smallest is not None, d.verdict == "worse") == (may, may)
     assert (d.low is None) == (scenes == 1)
-    assert (len(found.notes) == 0) == may
+    assert (len(comparison.notes) == 0) == may
 
 
 def test_methods_of_one_name_are_told_apart_and_one_submission_noticed():
     first, other, _ = three_methods()
     files = [replace(f, method="m", path=Path(f"{f.method}.json")) for f in (first, other)]
-    found = compare(files, ["chamfer"])
-    assert (found.reference, found.methods) == ("m [first]", ("m [worse]",))
+    comparison = compare(files, ["chamfer"])
+    assert (comparison.reference, comparison.methods) == ("m [first]", ("m [worse]",))
     again = compare([first, replace(other, meta=first.meta)], ["chamfer"])
     assert any("worse and first" in note for note in again.notes)
     claimed = compare([first, replace(other, alignment="scale")], ["chamfer"])
     assert any("worse" in note and "scaled" in note for note in claimed.notes)
-    assert found.notes == ()
+    assert comparison.notes == ()
 
 
 def test_the_same_numbers_every_time_and_others_with_another_seed():
@@ -191,8 +196,8 @@ def test_rows_without_the_score_are_left_out():
         replace(file, columns={**file.columns, "relief_correlation": column})
         for file, column in zip(files, (theirs, ours), strict=True)
     ]
-    (found,) = compare(files, ["relief_correlation"]).differences
-    assert (found.wins, found.losses, found.ties) == (2, 0, 1)
-    assert found.difference == pytest.approx(np.mean([0.25, 0.0, 0.125]))
-    assert found.value == pytest.approx(np.mean([-0.5, 0.375, 0.4375]))
-    assert found.low <= found.difference <= found.high
+    (difference,) = compare(files, ["relief_correlation"]).differences
+    assert (difference.wins, difference.losses, difference.ties) == (2, 0, 1)
+    assert difference.difference == pytest.approx(np.mean([0.25, 0.0, 0.125]))
+    assert difference.value == pytest.approx(np.mean([-0.5, 0.375, 0.4375]))
+    assert difference.low <= difference.difference <= difference.high

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import binomtest, permutation_test
+from scipy.stats import permutation_test
 
 from metrics.measures.checks import EmptyError, MeasureError, NonFiniteError
 from metrics.views.compare.paired_tests import (
@@ -20,18 +20,12 @@ def detectable(differences, _):
     return smallest_detectable_difference(differences)
 
 
-def test_identical_methods_differ_by_nothing():
-    a = np.random.default_rng(0).random(30)
-    assert sign_flip_test(a - a, seed=0) == 1.0
-    assert mcnemar_exact(a > 0.5, a > 0.5) == 1.0
-
-
 def test_sign_flips_by_hand():
     # Of the 8 sign patterns of 1, 2, 3 only +++ and --- reach a sum of 6.
     assert sign_flip_test([1.0, 2.0, 3.0], seed=0) == 0.25
     # The sums are +-6, +-4, +-2 and twice 0; half of them reach the observed 4.
     assert sign_flip_test([-1.0, 2.0, 3.0], seed=0) == 0.5
-    assert sign_flip_test([5.0], seed=0) == 1.0
+    assert sign_flip_test([5.0], seed=0) == sign_flip_test([0.0] * 30, seed=0) == 1.0
     assert sign_flip_test([0.1] * 3, seed=0) == sign_flip_test([1e90] * 3, seed=0) == 0.25
 
 
@@ -55,18 +49,12 @@ def test_sign_flips_reject_five_percent_where_nothing_differs():
     assert p.min() >= 1 / 200
 
 
-@given(st.integers(0, 60), st.integers(0, 60), st.integers(0, 5), st.integers(1, 5))
-def test_mcnemar_agrees_with_the_binomial_test(only_a, only_b, both, neither):
-    a = np.repeat([True, False, True, False], [only_a, only_b, both, neither])
-    b = np.repeat([False, True, True, False], [only_a, only_b, both, neither])
-    trials = only_a + only_b
-    expected = binomtest(only_a, trials).pvalue if trials else 1.0
-    assert mcnemar_exact(a, b) == pytest.approx(expected, rel=1e-9)
-
-
-def test_mcnemar_stays_exact_on_many_questions():
-    a = np.arange(20000) < 10400
-    assert mcnemar_exact(a, ~a) == pytest.approx(binomtest(10400, 20000).pvalue, rel=1e-9)
+def test_mcnemar_by_hand():
+    """Of ten discordant questions nine or more go one way in 2 (1 + 10) of 2^10 cases."""
+    a, b = np.arange(100) < 9, np.arange(100) == 50
+    assert mcnemar_exact(a, b) == pytest.approx(22 / 1024)
+    assert mcnemar_exact(b, a) == mcnemar_exact(a, b)
+    assert mcnemar_exact(a, a) == 1.0
     assert mcnemar_exact(np.ones(5000, dtype=bool), np.zeros(5000, dtype=bool)) == 0.0
 
 

@@ -28,14 +28,14 @@ def figures(answers_db):
 def lines(answers_db):
     """Return the lines of the CSV file that count."""
     rows = csv.DictReader(io.StringIO(to_csv(read_answers(answers_db))))
-    return [one for one in rows if one["finished"] == "1" and one["calibration"] == "0"]
+    return [line for line in rows if line["finished"] == "1" and line["calibration"] == "0"]
 
 
 def by_person(lines, value):
-    found = defaultdict(list)
+    people = defaultdict(list)
     for line in lines:
-        found[line["participant"]].append(value(line))
-    return {name: statistics.mean(values) for name, values in found.items()}
+        people[line["participant"]].append(value(line))
+    return {name: statistics.mean(values) for name, values in people.items()}
 
 
 def student(values):
@@ -63,19 +63,19 @@ def test_tests(figures, lines):
 
 
 def test_groups(figures, lines):
-    assert [one.name for one in figures.by_kind] == ["mirror", "near"]
+    assert [group.name for group in figures.by_kind] == ["mirror", "near"]
     spans = {"30-60": (30, 60), "60-90": (60, 90), "90-120": (90, 120)}
     for group in (*figures.by_kind, *figures.by_angle):
         low, high = spans.get(group.name, (0, 0))
         chosen = [
-            one
-            for one in lines
-            if one["kind"] == group.name or low <= float(one["angle_degrees"]) < high
+            line
+            for line in lines
+            if line["kind"] == group.name or low <= float(line["angle_degrees"]) < high
         ]
         assert group.answers == len(chosen)
         shares = by_person(chosen, lambda line: int(line["correct"]))
         assert group.accuracy.value == pytest.approx(statistics.mean(shares.values()))
-        right = [one for one in chosen if one["correct"] == "1"]
+        right = [line for line in chosen if line["correct"] == "1"]
         seconds = list(by_person(right, lambda line: float(line["response_seconds"])).values())
         assert (group.seconds is None) == (not seconds)
         if len(seconds) < 2:
@@ -83,17 +83,17 @@ def test_groups(figures, lines):
         assert group.seconds.value == pytest.approx(statistics.mean(seconds))
         assert (group.seconds.low, group.seconds.high) == pytest.approx(student(seconds))
     assert figures.by_kind[0].floor == floor_of_kind("mirror", 3)[0]
-    assert sum(one.answers for one in figures.by_angle) == len(lines)
+    assert sum(group.answers for group in figures.by_angle) == len(lines)
 
 
 def test_the_line_of_shepard_and_metzler(figures, lines):
-    right = [one for one in lines if one["correct"] == "1"]
+    right = [line for line in lines if line["correct"] == "1"]
     angle = by_person(right, lambda line: float(line["angle_degrees"]))
     second = by_person(right, lambda line: float(line["response_seconds"]))
     pairs = [
-        (float(one["angle_degrees"]) - angle[one["participant"]],
-         float(one["response_seconds"]) - second[one["participant"]])
-        for one in right
+        (float(line["angle_degrees"]) - angle[line["participant"]],
+         float(line["response_seconds"]) - second[line["participant"]])
+        for line in right
     ]  # fmt: skip
     slope = sum(x * y for x, y in pairs) / sum(x * x for x, _ in pairs)
     assert figures.line.slope.value == pytest.approx(slope)
@@ -112,7 +112,7 @@ def test_times_after_a_reload_do_not_count(tmp_path):
 
 
 def test_a_model_on_the_same_questions(answers_db, lines, tmp_path, monkeypatch):
-    truth = {int(one["question"]): int(one["right_answer"]) for one in lines}
+    truth = {int(line["question"]): int(line["right_answer"]) for line in lines}
     given = {row: right if row % 3 else (right + 1) % 3 for row, right in truth.items()}
     content = {"method": "mine", "answers": given}
     (tmp_path / "model.json").write_text(json.dumps(content))
@@ -145,9 +145,9 @@ def test_a_model_of_another_split(answers_db, quiz_split, tmp_path):
 
 @pytest.mark.parametrize(("people", "skill"), [(1, 1.0), (2, 1.0), (3, 0.0)])
 def test_few_people_and_people_who_do_not_differ(tmp_path, people, skill):
-    found = compute(read_answers(made_answers(tmp_path / "a.db", people, 0, skill)))
-    assert (found.shapiro, found.tests[0].p) == (None, None)
-    assert found.accuracy.value == skill
+    figures = compute(read_answers(made_answers(tmp_path / "a.db", people, 0, skill)))
+    assert (figures.shapiro, figures.tests[0].p) == (None, None)
+    assert figures.accuracy.value == skill
 
 
 def test_nobody_finished(tmp_path):
@@ -157,12 +157,17 @@ def test_nobody_finished(tmp_path):
 
 
 def test_references():
-    found = {one.name: one.value for one in references(["mirror", "near", "near", "near"], 3)}
+    values = {
+        other.name: other.value for other in references(["mirror", "near", "near", "near"], 3)
+    }
     floors = [floor_of_kind(kind, 3)[0] for kind in ("mirror", "near")]
-    assert found["Outlines alone"] == pytest.approx(0.25 * floors[0] + 0.75 * floors[1])
-    assert found["People in the paper"] == 0.7329
-    assert (found["Pix2Shape, no labels"], found["Pix2Shape, 1,000 labels"]) == (0.5519, 0.7012)
-    assert [one.name for one in references(["mirror-pair-2"], 2)] == ["Chance", "Outlines alone"]
+    assert values["Outlines alone"] == pytest.approx(0.25 * floors[0] + 0.75 * floors[1])
+    assert values["People in the paper"] == 0.7329
+    assert (values["Pix2Shape, no labels"], values["Pix2Shape, 1,000 labels"]) == (0.5519, 0.7012)
+    assert [other.name for other in references(["mirror-pair-2"], 2)] == [
+        "Chance",
+        "Outlines alone",
+    ]
     from iqtt.quiz.study import Question
 
     asked = Question(False, 0, "near", 50.0, 0, "")

@@ -17,9 +17,9 @@ RNG = np.random.default_rng(3)
 
 def test_student_s_interval_is_scipy_s():
     values = RNG.normal(0.7, 0.1, 15)
-    found = mean_estimate(values)
+    estimate = mean_estimate(values)
     expected = stats.ttest_1samp(values, 0).confidence_interval()
-    assert (found.low, found.high) == pytest.approx(tuple(expected))
+    assert (estimate.low, estimate.high) == pytest.approx(tuple(expected))
     assert mean_estimate([0.5]).low is None
     assert within(mean_estimate([0.0, 1.0])).low == 0.0
 
@@ -40,8 +40,8 @@ def test_crossed_variance_by_plain_loops():
 
     parts = variance(people.tolist()), variance(questions.tolist())
     error = max(*parts, sum(parts) - variance(list(range(60)))) ** 0.5
-    found = crossed_estimate(values, people, questions)
-    assert found.high - found.value == pytest.approx(stats.t.ppf(0.975, 5) * error)
+    estimate = crossed_estimate(values, people, questions)
+    assert estimate.high - estimate.value == pytest.approx(stats.t.ppf(0.975, 5) * error)
 
 
 def test_crossed_intervals_hold_the_truth_where_questions_differ():
@@ -65,18 +65,18 @@ def test_the_line_is_least_squares_with_a_height_for_each_person():
     people = np.repeat(np.arange(8), 12)
     angles = RNG.uniform(30, 180, 96)
     seconds = 1 + 0.02 * angles + RNG.normal(0, 2, 8)[people] + RNG.normal(0, 0.3, 96)
-    found = line_within_people(angles, seconds, people)
+    line = line_within_people(angles, seconds, people)
     dummies = (people[:, None] == np.arange(8)).astype(float)
     expected = np.linalg.lstsq(np.column_stack([angles, dummies]), seconds, rcond=None)[0][0]
-    assert found.slope.value == pytest.approx(expected)
-    assert found.slope.low < 0.02 < found.slope.high
-    assert found.intercept + found.slope.value * angles.mean() == pytest.approx(seconds.mean())
+    assert line.slope.value == pytest.approx(expected)
+    assert line.slope.low < 0.02 < line.slope.high
+    assert line.intercept + line.slope.value * angles.mean() == pytest.approx(seconds.mean())
     residuals = seconds - dummies @ (dummies.T @ seconds / 12)
     x = angles - dummies @ (dummies.T @ angles / 12)
-    residuals -= found.slope.value * x
+    residuals -= line.slope.value * x
     scores = [(x[people == g] @ residuals[people == g]) ** 2 for g in range(8)]
     error = (8 / 7 * sum(scores)) ** 0.5 / (x @ x)
-    assert found.slope.high - found.slope.value == pytest.approx(stats.t.ppf(0.975, 7) * error)
+    assert line.slope.high - line.slope.value == pytest.approx(stats.t.ppf(0.975, 7) * error)
 
 
 def test_lines_that_cannot_be_drawn():

@@ -38,7 +38,7 @@ def test_one_of_those_who_were_asked(people, quiz_split, tmp_path):
     given, different = {}, set()
     for one in counted(people):
         given.setdefault(one.question, set()).add(one.answer)
-    found = []
+    scored = []
     for seed in range(30):
         path = tmp_path / f"{seed}.h5"
         count = write_submission(people, split, path, "one", seed)
@@ -48,10 +48,10 @@ def test_one_of_those_who_were_asked(people, quiz_split, tmp_path):
         different.add(tuple(answers))
         assert all(answer in given[row] for row, answer in zip(rows, answers, strict=True))
         scores = score([path], truth, Settings(allow_partial=True, processes=1))
-        found.append(scores.metrics["iqtt_accuracy"].value)
+        scored.append(scores.metrics["iqtt_accuracy"].value)
         assert scores.metrics["iqtt_accuracy"].n == count
     shares = [mean(one.correct for one in counted(people) if one.question == row) for row in given]
-    assert mean(found) == pytest.approx(mean(shares), abs=0.04)
+    assert mean(scored) == pytest.approx(mean(shares), abs=0.04)
     assert len(different) == 30
     assert write_submission(people, split, tmp_path / "again.h5", "one", 3) == count
     assert (tmp_path / "again.h5").read_bytes() == (tmp_path / "3.h5").read_bytes()
@@ -60,12 +60,12 @@ def test_one_of_those_who_were_asked(people, quiz_split, tmp_path):
 def test_what_most_answered(people, quiz_split, tmp_path):
     write_submission(people, quiz_split / "iqtt-test.h5", tmp_path / "m.h5", "majority")
     with open_predictions(tmp_path / "m.h5") as predictions:
-        found = dict(zip(predictions.rows.tolist(), predictions.answers.tolist(), strict=True))
-    for row, answer in found.items():
+        scored = dict(zip(predictions.rows.tolist(), predictions.answers.tolist(), strict=True))
+    for row, answer in scored.items():
         votes = Counter(one.answer for one in counted(people) if one.question == row)
         best = [place for place, n in votes.items() if n == max(votes.values())]
         assert answer == (best[0] if len(best) == 1 else -1)
-    assert -1 in found.values(), "a tie is among the made-up answers"
+    assert -1 in scored.values(), "a tie is among the made-up answers"
 
 
 @pytest.mark.parametrize("rows", [[0, 0], [-1, 0], [0, 24], [0.5, 1.0], []])
