@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.files.reader import AnswersFile, QuestionsFile, TableFile, answers_beside, open_tables
+from iqtt.files.reader import QuestionsFile, answers_beside, open_tables
 from iqtt.questions.specs import DISTRACTOR_KINDS
 from scenegen.common.text_table import printable
 from scenegen.files.content import CONTENT_DIGEST
@@ -39,7 +39,7 @@ def describe(path: str | Path) -> str:
     return "\n".join(map(printable, lines))
 
 
-def _facts_of_file(path: Path, tables: Sequence[TableFile]) -> dict[str, str]:
+def _facts_of_file(path: Path, tables: Sequence[QuestionsFile]) -> dict[str, str]:
     first, texts = tables[0], tables[0].attributes
     facts = {"answers": _answers_told(path, tables)}
     if first.spec is None:
@@ -63,10 +63,10 @@ def _size(path: Path) -> int:
     return sum(file.stat().st_size for file in (path, *shards))
 
 
-def _answers_told(path: Path, tables: Sequence[TableFile]) -> str:
+def _answers_told(path: Path, tables: Sequence[QuestionsFile]) -> str:
     total = sum(map(len, tables))
     labelled = sum(len(table) for table in tables if table.has_answers)
-    if isinstance(tables[0], AnswersFile):
+    if not tables[0].has_images:
         return "to all of them; the images lie in another file"
     if labelled:
         return f"to {labelled} of them ({labelled / total:.1%})"
@@ -74,23 +74,23 @@ def _answers_told(path: Path, tables: Sequence[TableFile]) -> str:
     return f"in {beside.name}" if beside else "none"
 
 
-def _heading(table: TableFile) -> str:
+def _heading(table: QuestionsFile) -> str:
     heading = f"{table.part}: " if table.part else ""
     heading += f"{len(table)} questions"
-    if isinstance(table, QuestionsFile):
+    if table.has_images:
         size = f"{table.height}x{table.width}, {table.image_dtype}"
         heading += f" of {1 + table.answers} images of {size}"
     return heading
 
 
-def _facts(table: TableFile) -> dict[str, str]:
+def _facts(table: QuestionsFile) -> dict[str, str]:
     """Return counts and ranges of the values of a table, by name."""
     identity = {"fingerprint": table.fingerprint, "truth digest": table.stored_truth_digest}
     facts = {name: text for name, text in identity.items() if text}
     if len(table) == 0:
         return facts
     everything = slice(0, len(table))
-    if isinstance(table, QuestionsFile):
+    if table.has_images:
         rows = spread_rows(len(table), SAMPLED)
         images = [decode_image(table.read("questions", row)) for row in rows]
         low, high = min(i.min() for i in images), max(i.max() for i in images)

@@ -14,7 +14,7 @@ from iqtt.files.layout import (
     truth_attributes,
     truth_columns,
 )
-from iqtt.files.reader import TableFile, open_tables
+from iqtt.files.reader import QuestionsFile, open_tables
 from scenegen.common.errors import FileFormatError
 from scenegen.files.content import CONTENT_DIGEST, SHA256, seal
 from scenegen.files.row_file import new_file
@@ -52,7 +52,7 @@ def merge_questions(
         return sum(map(len, tables))
 
 
-def _copy(table: TableFile, file: h5py.File, progress: Callable[[int], Any]) -> None:
+def _copy(table: QuestionsFile, file: h5py.File, progress: Callable[[int], Any]) -> None:
     """Write one table, in the order in which `QuestionsWriter` makes data sets."""
     assert table.spec is not None
     places = []

@@ -23,16 +23,10 @@ from iqtt.files.layout import (
     truth_columns,
 )
 from iqtt.files.truth import QuestionTruth, question_truth
-from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec
+from iqtt.questions.specs import SplitSpec
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.specs import IMAGE_DTYPES
-from scenegen.files.attributes import (
-    check_attribute,
-    read_digest,
-    read_names,
-    read_root,
-    read_text,
-)
+from scenegen.files.attributes import read_digest, read_root, read_text
 from scenegen.files.input_file import checking
 from scenegen.files.rows import RowDataset, RowFile, describing
 from scenegen.files.shards import OpenFile
@@ -83,13 +77,13 @@ def open_questions(
     return QuestionsFile(path, part, answers)
 
 
-def open_tables(path: str | Path) -> "list[TableFile]":
+def open_tables(path: str | Path) -> "list[QuestionsFile]":
     """Open a file once for all its tables: those of questions, or else of answers without images.
 
     Closing one table closes all. Raises as `QuestionsFile`.
     """
     opened = OpenFile(path, FORMAT.kind)
-    kind: type[TableFile] = QuestionsFile
+    kind = QuestionsFile
     with checking(opened.file):
         try:
             names = table_names(opened, kind.CONTENT)
@@ -126,152 +120,25 @@ def answers_beside(path: str | Path) -> Path | None:
     return beside if beside.is_file() else None
 
 
-class TableFile(RowFile):
-    """An open file and one of its tables. Use it as a context manager, or close it.
+class QuestionsFile(RowFile):
+    """An open question file: one of its tables, a sequence of `QuestionRecord`s.
 
     Attributes, besides those of `RowFile`:
-        part: which of its tables: "labeled" or "unlabeled", or "" for the only one.
-        tables: all of them.
+        part: "labeled" or "unlabeled", or "" for the only table of a file.
+        tables: the names of all tables of the file.
         spec: the settings it was made with, without the seed unless it is a file of answers; None
             for a released file.
         split: "train", "val" or "test"; None for a released file.
         answers: how many answers a question has, 2 or 3.
         fingerprint: SHA-256 of settings, shapes, views and answers of this table; None for a
             released file.
-    """
-
-    CONTENT: ClassVar[str]  # the column that every table has
-    SCORED = SCORED
-
-    def __init__(self, path: str | Path | OpenFile, part: str | None = None) -> None:
-        """Open a file, or take an open one, and check the layout of one of its tables.
-
-        Raises:
-            OSError: no such file, or a folder.
-            FileFormatError: not HDF5, without such a table, of another format, or damaged.
-            SpecError: `part` is not given where there are two, or names none of them.
-        """
-        self.spec: SplitSpec | None = None
-        self.split: str | None = None
-        self.fingerprint: str | None = None
-        self._known_answers: Array | None = None
-        self._part = part
-        super().__init__(path if isinstance(path, OpenFile) else OpenFile(path, FORMAT.kind))
-
-    def _open_columns(self) -> None:
-        file = self.opened.file
-        if "format" in file.attrs:
-            self.attributes = read_root(file, self.path, FORMAT)
-            self.split = self.attributes["split"]
-            with describing(f"{self.path}: attribute 'spec'"):
-                self.spec = SplitSpec.from_json(self.attributes["spec"])
-        self.answers = self.spec.answers if self.spec else RELEASED_ANSWERS
-        self.tables = table_names(self.opened, self.CONTENT)
-        self.part = self._chosen(self._part)
-        self._count_rows(self._named(self.CONTENT))
-        self._open_images()
-        if self._named("answers") in file:
-            self._take_answers()
-        home = f"truth/{self.part}".rstrip("/")
-        if self.spec is None:
-            return
-        if home in file:
-            self._take(home, truth_columns(self.spec))
-            place = f"{self.path}: {home}/distractor_kind"
-            kinds = read_names(self._stored["distractor_kind"].dataset, "names", place)
-            check_attribute(
-                place, "names", kinds, kinds == list(DISTRACTOR_KINDS), ", ".join(DISTRACTOR_KINDS)
-            )
-        self.fingerprint = read_text(file, named("fingerprint", self.part), self.path, needed=True)
-        digest = named(TRUTH_DIGEST, self.part)
-        self.stored_truth_digest = read_digest(file, digest, self.path, self.has_answers)
-
-    def _named(self, name: str) -> str:
-        """Return the name of a data set of this table in its file."""
-        return f"{self.part}/{name}".lstrip("/")
-
-    def _chosen(self, part: str | None) -> str:
-        if part is None and len(self.tables) == 1:
-            return self.tables[0]
-        if part is None or part not in self.tables:
-            expected = " or ".join(self.tables) or "none, as there is one table only"
-            raise SpecError(f"{self.path}: part", part or "none", expected)
-        return part
-
-    def _open_images(self) -> None:
-        """Take the images, if these are the file's content."""
-
-    def _take_answers(self) -> None:
-        """Read all answers, of any type of integers, and check them."""
-        stored = self._stored["answers"] = self.opened.array(self._named("answers"))
-        if stored.shape not in ((len(self),), (len(self), 1)) or stored.dtype.kind not in "iu":
-            found = f"shape {stored.shape}, type {stored.dtype}"
-            expected = f"shape ({len(self)},), whole numbers"
-            raise FileFormatError(f"{self.path}: answers", found, expected)
-        answers = stored[()].reshape(-1)
-        wrong = np.flatnonzero((answers < 0) | (answers >= self.answers))
-        if len(wrong):
-            place, expected = self.place("answers", int(wrong[0])), f"0 to {self.answers - 1}"
-            raise FileFormatError(place, answers[wrong[0]], expected)
-        self._known_answers = answers.astype(np.uint8)
-        if self.spec is not None:
-            self._schema["answers"] = self.opened.file[self.part or "/"], answer_column()
-
-    @property
-    def has_answers(self) -> bool:
-        """Whether the file tells which answers are right."""
-        return self._known_answers is not None
-
-    @property
-    def has_truth(self) -> bool:
-        """Whether the file tells shapes, views and lights."""
-        return "cubes" in self._stored
-
-    def table(self, part: str) -> Self:
-        """Return another table of the same open file; raises as when one is opened."""
-        return type(self)(self.opened, part)
-
-    def read(self, name: str, rows: int | slice) -> Any:
-        """Read rows of one column, such as "questions", "answers" or "cubes", as `RowFile.read`.
-
-        Answers come as uint8, whatever integers the file has.
-        """
-        if name == "answers" and self._known_answers is not None:
-            return self._known_answers[rows]
-        return super().read(name, rows)
-
-    def truth(self, row: int) -> QuestionTruth | None:
-        """Return what the file tells of one question beside images and answer; None if nothing.
-
-        Raises as `read`.
-        """
-        if not self.has_truth:
-            return None
-        assert self.spec is not None  # truth is read only where there is one
-        names = (name for name in self.fields if name not in ("questions", "answers"))
-        return question_truth({name: self.read(name, row) for name in names}, self.spec)
-
-    def reopener(self) -> Callable[[], "TableFile"]:
-        """Return a function, which can be pickled, that opens the same table again."""
-        return partial(type(self), self.path, self.part)
-
-
-class AnswersFile(TableFile):
-    """An open file with answers and what is known of the questions; it may lack the images."""
-
-    CONTENT = "answers"
-
-
-class QuestionsFile(TableFile):
-    """An open question file: a sequence of `QuestionRecord`s.
-
-    Attributes, besides those of `TableFile`:
-        height, width: size of an image, pixels.
-        image_dtype: "uint8", "float16" or "float32".
+        height, width, image_dtype: of an image: pixels, and "uint8", "float16" or "float32"; 0
+            and "" for a file of answers.
         beside: the file with the answers, if it is another one.
     """
 
-    CONTENT = "questions"
+    CONTENT: ClassVar[str] = "questions"  # the column that every table has
+    SCORED = SCORED
 
     def __init__(
         self,
@@ -293,8 +160,13 @@ class QuestionsFile(TableFile):
             SpecError: `part` is not given where there are two, or names none of them; or `answers`
                 is given for a file that has its own.
         """
-        super().__init__(path, part)
+        self.spec: SplitSpec | None = None
+        self.fingerprint: str | None = None
         self.beside: AnswersFile | None = None
+        self.height, self.width, self.image_dtype = 0, 0, ""
+        self._known_answers: Array | None = None
+        self._part = part
+        super().__init__(path if isinstance(path, OpenFile) else OpenFile(path, FORMAT.kind))
         if answers is not None:
             try:
                 self._join(answers)
@@ -302,31 +174,42 @@ class QuestionsFile(TableFile):
                 self.close()
                 raise
 
-    def __getitem__(self, index: int) -> QuestionRecord:
-        """Read one row; negative indices count from the end. Raises IndexError, FileFormatError."""
-        row = range(len(self))[index]
-        return QuestionRecord(
-            index=row,
-            images=self.read("questions", row),
-            answer=int(self.read("answers", row)) if self.has_answers else None,
-            truth=self.truth(row),
-        )
+    def _open_columns(self) -> None:
+        file = self.opened.file
+        if "format" in file.attrs:
+            self.attributes = read_root(file, self.path, FORMAT)
+            with describing(f"{self.path}: attribute 'spec'"):
+                self.spec = SplitSpec.from_json(self.attributes["spec"])
+        self.split = self.attributes.get("split")
+        self.answers = self.spec.answers if self.spec else RELEASED_ANSWERS
+        self.tables = table_names(self.opened, self.CONTENT)
+        self.part = self._chosen(self._part)
+        self._count_rows(self._named(self.CONTENT))
+        if self._named("questions") in file:
+            self._take_images()
+        if self._named("answers") in file:
+            self._take_answers()
+        if self.spec is not None:
+            home = f"truth/{self.part}".rstrip("/")
+            if home in file:
+                self._take(home, truth_columns(self.spec))
+            mark, digest = (named(name, self.part) for name in ("fingerprint", TRUTH_DIGEST))
+            self.fingerprint = read_text(file, mark, self.path, needed=True)
+            self.stored_truth_digest = read_digest(file, digest, self.path, self.has_answers)
 
-    def __iter__(self) -> Iterator[QuestionRecord]:
-        return (self[i] for i in range(len(self)))
+    def _named(self, name: str) -> str:
+        """Return the name of a data set of this table in its file."""
+        return f"{self.part}/{name}".lstrip("/")
 
-    def reopener(self) -> Callable[[], "QuestionsFile"]:
-        """Return a function, which can be pickled, that opens the same table again."""
-        answers = None if self.beside is None else self.beside.path
-        return partial(QuestionsFile, self.path, self.part, answers)
+    def _chosen(self, part: str | None) -> str:
+        if part is None and len(self.tables) == 1:
+            return self.tables[0]
+        if part is None or part not in self.tables:
+            expected = " or ".join(self.tables) or "none, as there is one table only"
+            raise SpecError(f"{self.path}: part", part or "none", expected)
+        return part
 
-    def close(self) -> None:
-        """Close the file, and the file of its answers; idempotent."""
-        super().close()
-        if self.beside is not None:
-            self.beside.close()
-
-    def _open_images(self) -> None:
+    def _take_images(self) -> None:
         if self.spec is not None:
             self._take(self.part, question_columns(self.spec))
         else:
@@ -351,6 +234,22 @@ class QuestionsFile(TableFile):
                 found = f"values from {low:g} to {high:g}"
                 raise FileFormatError(self.place("questions", 0), found, "0 to 1")
 
+    def _take_answers(self) -> None:
+        """Read all answers, of any type of integers, and check them."""
+        stored = self._stored["answers"] = self.opened.array(self._named("answers"))
+        if stored.shape not in ((len(self),), (len(self), 1)) or stored.dtype.kind not in "iu":
+            found = f"shape {stored.shape}, type {stored.dtype}"
+            expected = f"shape ({len(self)},), whole numbers"
+            raise FileFormatError(f"{self.path}: answers", found, expected)
+        answers = stored[()].reshape(-1)
+        wrong = np.flatnonzero((answers < 0) | (answers >= self.answers))
+        if len(wrong):
+            place, expected = self.place("answers", int(wrong[0])), f"0 to {self.answers - 1}"
+            raise FileFormatError(place, answers[wrong[0]], expected)
+        self._known_answers = answers.astype(np.uint8)
+        if self.spec is not None:
+            self._schema["answers"] = self.opened.file[self.part or "/"], answer_column()
+
     def _join(self, answers: str | Path) -> None:
         """Add answers and truth of another file, if they belong to the questions of this one."""
         if self.has_answers:
@@ -363,6 +262,75 @@ class QuestionsFile(TableFile):
         self._schema |= beside._schema
         self._known_answers = beside._known_answers
         self.stored_truth_digest = beside.stored_truth_digest
+
+    @property
+    def has_images(self) -> bool:
+        """Whether the file holds images; a file of answers may lack them."""
+        return "questions" in self._stored
+
+    @property
+    def has_answers(self) -> bool:
+        """Whether the file tells which answers are right."""
+        return self._known_answers is not None
+
+    @property
+    def has_truth(self) -> bool:
+        """Whether the file tells shapes, views and lights."""
+        return "cubes" in self._stored
+
+    def table(self, part: str) -> Self:
+        """Return another table of the same open file; raises as when one is opened."""
+        return type(self)(self.opened, part)
+
+    def __getitem__(self, index: int) -> QuestionRecord:
+        """Read one row; negative indices count from the end. Raises IndexError, FileFormatError."""
+        row = range(len(self))[index]
+        return QuestionRecord(
+            index=row,
+            images=self.read("questions", row),
+            answer=int(self.read("answers", row)) if self.has_answers else None,
+            truth=self.truth(row),
+        )
+
+    def __iter__(self) -> Iterator[QuestionRecord]:
+        return (self[i] for i in range(len(self)))
+
+    def read(self, name: str, rows: int | slice) -> Any:
+        """Read rows of one column, such as "questions", "answers" or "cubes", as `RowFile.read`.
+
+        Answers come as uint8, whatever integers the file has.
+        """
+        if name == "answers" and self._known_answers is not None:
+            return self._known_answers[rows]
+        return super().read(name, rows)
+
+    def truth(self, row: int) -> QuestionTruth | None:
+        """Return what the file tells of one question beside images and answer; None if nothing.
+
+        Raises as `read`.
+        """
+        if not self.has_truth:
+            return None
+        assert self.spec is not None  # truth is read only where there is one
+        names = (name for name in self.fields if name not in ("questions", "answers"))
+        return question_truth({name: self.read(name, row) for name in names}, self.spec)
+
+    def reopener(self) -> "Callable[[], QuestionsFile]":
+        """Return a function, which can be pickled, that opens the same table again."""
+        answers = None if self.beside is None else self.beside.path
+        return partial(type(self), self.path, self.part, answers)
+
+    def close(self) -> None:
+        """Close the file, and the file of its answers; idempotent."""
+        super().close()
+        if self.beside is not None:
+            self.beside.close()
+
+
+class AnswersFile(QuestionsFile):
+    """An open file with answers and what is known of the questions; it may lack the images."""
+
+    CONTENT = "answers"
 
 
 class QuestionsDataset(RowDataset):
@@ -415,6 +383,6 @@ def table_names(opened: OpenFile, content: str) -> tuple[str, ...]:
     raise FileFormatError(path, "no question file", expected)
 
 
-def _identity(file: TableFile) -> str:
+def _identity(file: QuestionsFile) -> str:
     mark = f"fingerprint {file.fingerprint[:12]}" if file.fingerprint else "no fingerprint"
     return f"{len(file)} questions, {mark}"

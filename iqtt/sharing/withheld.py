@@ -10,10 +10,11 @@ import h5py
 from iqtt.files.layout import FORMAT, ROOT_TEXTS, named
 from iqtt.questions.specs import SplitSpec
 from scenegen.common.errors import SpecError
-from scenegen.files.attributes import read_names, read_root
+from scenegen.files.attributes import read_root
 from scenegen.files.content import SHA256
 from scenegen.files.input_file import checking
 from scenegen.files.rows import and_more, describing
+from scenegen.files.schema import other_attributes
 from scenegen.files.shards import ROW_DIGESTS, SHARDS, OpenFile
 
 COMMAND = "creation_command"  # which may name the seed
@@ -36,20 +37,20 @@ def check_withheld(path: Path, is_test: bool) -> None:
             spec = SplitSpec.from_json(read_root(file, path, FORMAT)["spec"])
         found = ["the seed"] if spec.seed is not None else []
         found += ["the command that made it"] if COMMAND in file.attrs else []
-        found += _beside_images(file, path) if is_test else []
+        found += _beside_images(file) if is_test else []
     if found:
         expected = "a file that does not tell the test answers, or --with-answers"
         raise SpecError(path, and_more(found), expected)
 
 
-def _beside_images(file: h5py.File, path: Path) -> list[str]:
+def _beside_images(file: h5py.File) -> list[str]:
     """Return the names of what a file of test questions must not hold."""
     strange = [name for name in sorted(file) if name not in DATA]
     strange += [f"attribute {name}" for name in sorted(file.attrs) if name not in ATTRIBUTES]
     for name in sorted(DATA & set(file)):
         strange += [f"{name}@{key}" for key in sorted(file[name].attrs) if key not in TOLD]
     if isinstance(digests := file.get(ROW_DIGESTS), h5py.Dataset):
-        names = read_names(digests, "names", f"{path}: {ROW_DIGESTS}")
-        if names != ["questions"] or digests.shape[1:] != (1, 32):
+        strange += other_attributes(digests, ROW_DIGESTS, {"names": ["questions"]})
+        if digests.shape[1:] != (1, 32):
             strange.append(f"{ROW_DIGESTS} of more than the questions")
     return strange

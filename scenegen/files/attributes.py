@@ -11,7 +11,6 @@ from scenegen.files.schema import DIGEST, Format
 
 LONGEST = 1_000  # characters of a text, but for these:
 LONGER = ("spec", "creation_command")
-MOST_NAMES = 100  # in a list
 
 
 def read_root(file: h5py.File, place: object, kind: Format) -> dict[str, str]:
@@ -49,7 +48,7 @@ def read_text(item: Any, name: str, place: object, needed: bool = False) -> str 
         check_attribute(place, name, None, not needed, "a text")
         return None
     most = LONGEST_JSON if name in LONGER else LONGEST
-    (text,) = _texts(item, name, place, (), most)
+    text = _checked_text(item, name, place, most)
     check_attribute(
         place, name, text, name in LONGER or text.isprintable(), "one line that can be printed"
     )
@@ -64,34 +63,17 @@ def read_digest(item: Any, name: str, place: object, needed: bool = False) -> st
     return text
 
 
-def read_names(item: Any, name: str, place: object) -> list[str]:
-    """Return an attribute that holds a list of names. Raises as `read_text`."""
-    check_attribute(place, name, None, name in item.attrs, "names")
-    names = _texts(item, name, place, (slice(None),), LONGEST)
-    check_attribute(
-        place, name, names, all(map(str.isprintable, names)), "names that can be printed"
-    )
-    return names
-
-
-def _texts(item: Any, name: str, place: object, shape: tuple[Any, ...], most: int) -> list[str]:
-    """Return the texts of an attribute that has as many dimensions as `shape`."""
+def _checked_text(item: Any, name: str, place: object, most: int) -> str:
+    """Return an attribute, of which type and size are looked at before it is read."""
     kind = item.attrs.get_id(name)
-    found = f"{kind.dtype} {kind.shape}"
-    texts = h5py.check_string_dtype(kind.dtype) is not None and kind.dtype.itemsize <= most
-    size = kind.get_space().get_simple_extent_npoints()
-    ok = texts and len(kind.shape or ()) == len(shape) and 0 < size <= MOST_NAMES
-    check_attribute(place, name, found, ok, "texts" if shape else "a text")
+    is_text = h5py.check_string_dtype(kind.dtype) is not None and kind.dtype.itemsize <= most
+    ok = is_text and kind.shape == ()
+    check_attribute(place, name, f"{kind.dtype} {kind.shape}", ok, "a text")
     value = item.attrs[name]
-    values = value.reshape(-1).tolist() if shape else [value]
-    lines = [v.decode(errors="surrogateescape") if isinstance(v, bytes) else v for v in values]
-    good = all(len(line) <= most and _is_unicode(line) for line in lines)
+    text = value.decode(errors="surrogateescape") if isinstance(value, bytes) else str(value)
+    good = len(text) <= most and not re.search("[\ud800-\udfff]", text)
     check_attribute(place, name, "another one", good, f"UTF-8 of at most {most:,} characters")
-    return lines
-
-
-def _is_unicode(text: str) -> bool:
-    return not re.search("[\ud800-\udfff]", text)
+    return text
 
 
 def check_attribute(place: object, name: str, found: object, ok: bool, expected: str) -> None:

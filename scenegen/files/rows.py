@@ -187,7 +187,7 @@ class RowFile:
             problems = [
                 problem
                 for group, column in self._schema.values()
-                for problem in attribute_problems(group, [column])
+                for problem in attribute_problems(group, column)
             ]
             if self.stored_truth_digest is not None:
                 scored = [name for name in self.SCORED if name in self._stored]

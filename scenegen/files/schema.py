@@ -69,7 +69,10 @@ class Format:
 
 
 def column_problems(group: h5py.Group, columns: Sequence[Column], count: int) -> list[str]:
-    """Return a sentence for each column that is missing or has the wrong shape or type."""
+    """Return a sentence for each column that is missing or whose values mean something else.
+
+    These are its shape, its type, and the attributes that it alone has.
+    """
     problems = []
     for column in columns:
         dataset = group.get(column.name)
@@ -83,18 +86,24 @@ def column_problems(group: h5py.Group, columns: Sequence[Column], count: int) ->
             problems.append(f"{column.name}: type {dataset.dtype}, expected {column.dtype}")
         if column.dtype == "text" and h5py.check_string_dtype(dataset.dtype) is None:
             problems.append(f"{column.name}: type {dataset.dtype}, expected strings")
+        problems += other_attributes(dataset, column.name, column.more)
     return problems
 
 
-def attribute_problems(group: h5py.Group, columns: Sequence[Column]) -> list[str]:
+def attribute_problems(group: h5py.Group, column: Column) -> list[str]:
     """Return a sentence for each attribute of a column that is not as the schema says."""
+    attributes = column.attributes
+    if column.axes is not None:
+        attributes["DIMENSION_LABELS"] = ["row", *column.axes]
+    return other_attributes(group[column.name], column.name, attributes)
+
+
+def other_attributes(dataset: h5py.Dataset, name: str, expected: Mapping[str, Any]) -> list[str]:
+    """Return a sentence for each of these attributes that a data set lacks, or has otherwise."""
     problems = []
-    for column in columns:
-        attributes = column.attributes
-        if column.axes is not None:
-            attributes["DIMENSION_LABELS"] = ["row", *column.axes]
-        for name, expected in attributes.items():
-            stored = group[column.name].attrs.get(name)
-            if stored is None or not np.array_equal(np.asarray(stored), np.asarray(expected)):
-                problems.append(f"{column.name}: attribute {name} is {stored!r:.60}")
+    for key, value in expected.items():
+        # The shape is compared first, so that no attribute of any size is read.
+        there = key in dataset.attrs and dataset.attrs.get_id(key).shape == np.shape(value)
+        if not (there and np.array_equal(np.asarray(dataset.attrs[key]), np.asarray(value))):
+            problems.append(f"{name}: attribute {key!r} is not {value!s:.60}")
     return problems

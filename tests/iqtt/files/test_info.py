@@ -42,7 +42,7 @@ def test_header_and_settings(split_folder):
     for name, setting in json.loads(root["spec"]).items():
         told = ", ".join(map(str, setting)) if isinstance(setting, list) else str(setting)
         if name == "answers":  # there are two lines of this name
-            assert "  answers       to 6 of them (50.0%)\n" in header
+            assert "  answers         to 6 of them (50.0%)\n" in header
             continue
         assert value(header, name) == ("not told" if name == "seed" else told)
     changed = set(re.findall(r"^ +\* (\w+) ", header, re.MULTILINE))

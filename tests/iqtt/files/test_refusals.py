@@ -44,7 +44,7 @@ def named(names):
 
 
 IMAGES, ONE = np.zeros((6, 4, 32, 32, 3), np.uint8), np.zeros(6, np.uint8)
-NAMES = "truth/distractor_kind: attribute 'names'"
+NAMES = "truth: distractor_kind: attribute 'names'"
 # Edits of a good validation file, and the place that the error names.
 REFUSED = {
     "other format": (attribute("format", "other"), ""),
@@ -72,6 +72,7 @@ REFUSED = {
     "no truth digest": (gone("truth_digest"), "attribute 'truth_digest'"),
     "no hexadecimal digest": (attribute("truth_digest", "x" * 64), "attribute 'truth_digest'"),
     "questions is a group": (grouped("questions"), "questions"),
+    "another scale": (lambda f: f["questions"].attrs.update(scale=1.0), "questions"),
     "three images": (put("questions", IMAGES[:, :3]), "questions"),
     "questions of floats": (put("questions", IMAGES.astype("f4")), "questions"),
     "fewer answers": (put("answers", ONE[:5]), "answers"),
@@ -145,7 +146,6 @@ def test_a_damaged_chunk_spoils_its_row_only(damaged, tmp_path):
 @pytest.mark.parametrize(
     ("where", "key", "value"),
     [
-        ("questions", "scale", 1.0),
         ("truth/cubes", "unit", "metre"),
         ("truth/angle_degrees", "meaning", "nothing"),
         ("/", "truth_digest", "0" * 64),

@@ -69,6 +69,8 @@ REFUSED = {
     "spec of another size": (attribute("spec", "{}"), "image", "(8, 32, 32, 3)", "128"),
     "no rows": (emptied, "image"),
     "no image": (gone("image"), "image"),
+    "another scale": (lambda f: f["image"].attrs.update(scale=1.0), "image", "'scale'"),
+    "fewer shapes": (lambda f: f["object/shape"].attrs.update(names=["box"]), "'names'"),
     "no lights": (gone("light"), "'light/count' is missing"),
     "no scene": (gone("scene"), "'scene' is missing"),
     "depth is a group": (grouped("depth"), "depth"),

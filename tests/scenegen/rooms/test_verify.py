@@ -393,8 +393,6 @@ def test_every_attribute_of_a_dataset_counts(small, tmp_path):
     ("name", "key", "value"),
     [
         ("/", "truth_digest", "0" * 64),
-        ("image", "scale", 1.0),
-        ("object/shape", "names", ["cone", "box"]),
         ("depth", "unit", "metre"),
         ("normal", "frame", "world"),
         ("scene_index", "meaning", "nothing"),
