@@ -5,7 +5,6 @@ cubes nor rotations. What they reach on a kind of questions is its floor.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,17 +25,7 @@ CHUNK = 64  # questions in memory at once
 ENSEMBLE = 3  # sets of trees
 
 
-@dataclass(frozen=True, eq=False)
-class Outlines:
-    """The outlines of Q questions with K answers each.
-
-    Attributes:
-        features: (Q, 1 + K, D), as `iqtt.audit.features.outlines.outlines` gives them.
-        distances: between any two images of a question, (Q, 1 + K, 1 + K, P).
-    """
-
-    features: Array
-    distances: Array
+Outlines = tuple[Array, Array]  # features and distances, as `iqtt.audit.features.outlines` has them
 
 
 def write_outline(
@@ -89,7 +78,10 @@ def write_outline_trees(
 def read_outlines(
     questions: QuestionsFile, count: int, progress: Progress = lambda done, total: None
 ) -> Outlines:
-    """Return the outlines of the first questions of a file.
+    """Return the outlines of the first questions of a file, Q of them with K answers each.
+
+    That are features of each image, (Q, 1 + K, D), and distances between any two images of a
+    question, (Q, 1 + K, 1 + K, P).
 
     Args:
         progress: called with the questions read since the last call, and the questions in all.
@@ -103,12 +95,12 @@ def read_outlines(
         parts.append(outlines(silhouettes(images, background)))
         progress(len(images), count)
     features, distances = map(np.concatenate, zip(*parts, strict=True))
-    return Outlines(features, distances)
+    return features, distances
 
 
 def nearest_scores(seen: Outlines) -> Array:
     """Return a score of each answer, (Q, K): the nearer its outline, the higher."""
-    return -nearest_outline(seen.distances)[:, 0, 1:].astype(np.float64)
+    return -nearest_outline(seen[1])[:, 0, 1:].astype(np.float64)
 
 
 def tree_scores(learned: Outlines, right: Array, seen: Outlines) -> Array:
@@ -118,7 +110,7 @@ def tree_scores(learned: Outlines, right: Array, seen: Outlines) -> Array:
         right: the right answers of the questions to learn from, (N,).
     """
     columns, questions = (
-        next_to_reference(part.features, part.distances[:, 0, 1:]) for part in (learned, seen)
+        next_to_reference(features, distances[:, 0, 1:]) for features, distances in (learned, seen)
     )
     return AnswerTrees(ENSEMBLE).fit(columns, right).scores(questions)
 

@@ -91,7 +91,7 @@ class Ptn(nn.Module):
         """Make the layers. The arguments are those of a `Card`."""
         super().__init__()
         self.settings, self._box = settings, box
-        width, told = settings.width, 3 * (task == "rooms")
+        width, camera = settings.width, 3 * (task == "rooms")
         channels = (3, width, 2 * width, 4 * width)
         layers: list[nn.Module] = []
         for a, b in pairwise(channels):
@@ -99,13 +99,13 @@ class Ptn(nn.Module):
         self.pixels = nn.Sequential(*layers, nn.Flatten())
         last, wide = 4 * width * (settings.size // 8) ** 2, 16 * width
         self.code = nn.Sequential(
-            *(nn.Linear(last + told, wide), nn.ReLU()),
+            *(nn.Linear(last + camera, wide), nn.ReLU()),
             *(nn.Linear(wide, wide), nn.ReLU()),
             *(nn.Linear(wide, 8 * width), nn.ReLU()),
         )
         first, middle, thin = 8 * width, 4 * width, 3 * width // 2
         self.volume = nn.Sequential(
-            nn.Linear(8 * width + told, 27 * first),
+            nn.Linear(8 * width + camera, 27 * first),
             nn.ReLU(),
             nn.Unflatten(1, (first, 3, 3, 3)),
             nn.ConvTranspose3d(first, middle, 4),  # 3 -> 6

@@ -73,10 +73,12 @@ def relief_network(card: Card) -> nn.Module:
     return CodeNetwork(settings) if settings.network == "code" else UNet(settings)
 
 
-def predicted_depth(network: nn.Module, image: Tensor, own: Cameras, asked: Cameras) -> Tensor:
+def predicted_depth(
+    network: nn.Module, image: Tensor, cameras: Cameras, targets: Cameras
+) -> Tensor:
     """Return planar depth, (B, S, S), scene units: what the network gives, before the walls."""
-    relief = network(image, own, asked)
-    walls, entry, _ = empty_rooms(asked.world_from_camera, asked.fov_y_degrees, image.shape[-1])
+    relief = network(image, cameras, targets)
+    walls, entry, _ = empty_rooms(targets.world_from_camera, targets.fov_y_degrees, image.shape[-1])
     return torch.maximum(walls - torch.where(relief > FLAT, relief, 0), entry)
 
 
@@ -113,11 +115,11 @@ class UNet(nn.Module):
         self.join = nn.Conv2d(2 * fine, fine, 3, padding=1)
         self.last = nn.Conv2d(fine, 1, 3, padding=1)
 
-    def forward(self, image: Tensor, own: Cameras, asked: Cameras) -> Tensor:
+    def forward(self, image: Tensor, cameras: Cameras, targets: Cameras) -> Tensor:
         """As `relief_network` says; only the image's own camera can be asked for."""
-        if asked is not own:
+        if targets is not cameras:
             raise ValueError("a unet gives the relief at the image's own camera alone")
-        channels = torch.cat([image, contrast(image), planes_of(own, image.shape[-1])], dim=1)
+        channels = torch.cat([image, contrast(image), planes_of(cameras, image.shape[-1])], dim=1)
         channels = channels.contiguous(memory_format=torch.channels_last)
         full = functional.relu(self.full(channels))
         values, kept = functional.relu(self.halve(full)), []
@@ -141,7 +143,7 @@ class CodeNetwork(nn.Module):
         networks = NetworkSpec(size=settings.size, width=settings.width)
         self.encoder, self.decoder = Encoder(networks), Decoder(networks)
 
-    def forward(self, image: Tensor, own: Cameras, asked: Cameras) -> Tensor:
+    def forward(self, image: Tensor, cameras: Cameras, targets: Cameras) -> Tensor:
         """As `relief_network` says."""
-        code = self.encoder(image, own.world_from_camera[:, :3, 3])
-        return self.decoder(code, asked.world_from_camera[:, :3, 3])[:, 0]
+        code = self.encoder(image, cameras.world_from_camera[:, :3, 3])
+        return self.decoder(code, targets.world_from_camera[:, :3, 3])[:, 0]

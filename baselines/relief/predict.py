@@ -56,10 +56,10 @@ def write_submission(
 
         def depth(rows: Array) -> Tensor:
             image = room_images(rooms, source[rows], size)
-            own = asked = Cameras(poses[source[rows]], fov)
+            cameras = target_cameras = Cameras(poses[source[rows]], fov)
             if kind == "code":
-                asked = Cameras(poses[rows], fov)
-            return predicted_depth(network, image, own, asked)
+                target_cameras = Cameras(poses[rows], fov)
+            return predicted_depth(network, image, cameras, target_cameras)
 
         full_name = name if kind == "unet" else f"{name}-{kind}"
         how = {"method": full_name, "notes": f"{FROM[kind]}; {TOLD}", "overwrite": overwrite}

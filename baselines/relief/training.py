@@ -15,6 +15,7 @@ from baselines.training.fit import Loss, Progress, fit
 from baselines.training.images import Draws
 from baselines.training.rooms import Rooms, read_rooms
 from baselines.training.run_folder import alone_in, begun, earlier_state
+from scenegen import open_rooms
 from scenegen.common.random.seeding import Purpose, item_rng
 
 EVERY = 100  # iterations between checkpoints
@@ -62,10 +63,10 @@ def train(
         with_depth: whether the rooms' depth is read.
     """
     folder, method = Path(run_folder), Method(name, Card, relief_network)
-    with alone_in(folder):
+    with alone_in(folder), open_rooms(data) as file:
         earlier = earlier_state(folder, method, resume)
         settings = settings if earlier is None else earlier.card.settings
-        rooms = read_rooms(data, settings.size, depth=with_depth)
+        rooms = read_rooms(file, settings.size, depth=with_depth)
         card = Card(name, settings, data=rooms.data, fingerprint=rooms.fingerprint)
         state = begun(method, card, earlier, data)
         at, last = state.card.iteration, settings.iterations
@@ -97,14 +98,15 @@ def _loss(
     network: nn.Module, rooms: Rooms, rows: Tensor, lessons: Lessons, seed: int, number: int
 ) -> Tensor:
     fov, image = rooms.fov_y_degrees, rooms.image[rows]
-    own = asked = Cameras(rooms.world_from_camera[rows], fov)
+    cameras = target_cameras = Cameras(rooms.world_from_camera[rows], fov)
     if lessons.views is not None:
         share = item_rng(seed, number, Purpose.TRAINING).random(len(rows))
         views = [lessons.views[row] for row in rows.tolist()]
-        rows = torch.stack([own[int(s * len(own))] for own, s in zip(views, share, strict=True)])
-        asked = Cameras(rooms.world_from_camera[rows], fov)
+        chosen = zip(views, share, strict=True)
+        rows = torch.stack([others[int(place * len(others))] for others, place in chosen])
+        target_cameras = Cameras(rooms.world_from_camera[rows], fov)
     with torch.autocast(image.device.type, torch.bfloat16):  # twice as fast
-        relief = network(image.float(), own, asked)
+        relief = network(image.float(), cameras, target_cameras)
     target, weight = lessons.target(rows)
     differences = (relief.float() - target).abs() * weight
     return differences.sum() / weight.sum().clamp(min=1)

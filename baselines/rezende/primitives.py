@@ -74,7 +74,7 @@ def render_primitives(name: str, count: int, size: int, seed: int = 0, first: in
     images, depths = [], []
     for start in range(0, count, BATCH):
         truth = render(pack(spec, scenes[start : start + BATCH]))
-        images += [channels_first(decode_image(one), size) for one in truth.image.clip(0, 1)]
+        images += [channels_first(decode_image(image), size) for image in truth.image.clip(0, 1)]
         depth = np.where(truth.object_id > 0, truth.depth, np.inf)
         depths.append(depth[:, FINER // 2 :: FINER, FINER // 2 :: FINER])
     return Pictures(
@@ -125,8 +125,8 @@ def _views(scenes: list[SceneSpec], size: int) -> Views:
     camera = first.cameras[0]
 
     def seen(scene: SceneSpec, point: Vector3) -> Array:
-        own = scene.cameras[0]
-        return np.subtract(point, own.target) @ own.world_from_camera[:3, :3]
+        view = scene.cameras[0]
+        return np.subtract(point, view.target) @ view.world_from_camera[:3, :3]
 
     return Views(
         size=size,

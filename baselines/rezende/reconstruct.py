@@ -34,11 +34,11 @@ class Reconstruction:
 @torch.no_grad()
 def meshes_of(model: Model, image: Array) -> Array:
     """Return the meshes of images (N, 3, S, S) by the codes' means, (N, V, 3), sphere radius 1."""
-    found = [
+    meshes = [
         model.vertices(model.offsets(model.encode(torch.from_numpy(part))[0])).numpy()
         for part in np.split(image, range(BATCH, len(image), BATCH))
     ]
-    return np.concatenate(found)
+    return np.concatenate(meshes)
 
 
 def reconstruct(model: Model, pictures: Pictures) -> Reconstruction:
@@ -54,7 +54,7 @@ def untrained(pictures: Pictures) -> Reconstruction:
     return Reconstruction(vertices, *rasterise(vertices, faces, pictures.views))
 
 
-def errors(found: Reconstruction, pictures: Pictures) -> dict[str, float]:
+def errors(made: Reconstruction, pictures: Pictures) -> dict[str, float]:
     """Return means over pictures of known depth.
 
     `radiance` is the root mean squared difference of all pixels; `silhouette_iou` the intersection
@@ -62,15 +62,13 @@ def errors(found: Reconstruction, pictures: Pictures) -> dict[str, float]:
     both silhouettes, in radii of the starting sphere. NaN where no picture has such pixels.
     """
     assert pictures.depth is not None
-    mine, true = np.isfinite(found.depth), np.isfinite(pictures.depth)
+    mine, true = np.isfinite(made.depth), np.isfinite(pictures.depth)
     both, either = mine & true, mine | true
-    difference = np.where(both, found.depth, 0) - np.where(both, pictures.depth, 0)
+    difference = np.where(both, made.depth, 0) - np.where(both, pictures.depth, 0)
     pixels = both.sum(axis=(1, 2))
     depth = np.abs(difference).sum(axis=(1, 2))[pixels > 0] / pixels[pixels > 0]
     overlap = pixels / np.maximum(either.sum(axis=(1, 2)), 1)
-    radiance = np.sqrt(
-        ((found.image - np.moveaxis(pictures.image, 1, 3)) ** 2).mean(axis=(1, 2, 3))
-    )
+    radiance = np.sqrt(((made.image - np.moveaxis(pictures.image, 1, 3)) ** 2).mean(axis=(1, 2, 3)))
     return {
         "radiance": float(radiance.mean()),
         "silhouette_iou": float(overlap.mean()),
@@ -78,14 +76,14 @@ def errors(found: Reconstruction, pictures: Pictures) -> dict[str, float]:
     }
 
 
-def sheet(found: Reconstruction, pictures: Pictures, rows: range) -> Image.Image:
+def sheet(made: Reconstruction, pictures: Pictures, rows: range) -> Image.Image:
     """Return a picture: inputs, their reconstructions, and those meshes turned by 90 degrees."""
-    turned = found.vertices[rows][:, :, [2, 1, 0]] * np.array([-1.0, 1.0, 1.0], np.float32)
+    turned = made.vertices[rows][:, :, [2, 1, 0]] * np.array([-1.0, 1.0, 1.0], np.float32)
     _, faces = icosphere()
     beside, _ = rasterise(turned, faces, pictures.views_of(np.array(rows)))
     inputs = np.moveaxis(pictures.image[rows], 1, 3)
     strips = []
-    for images in (inputs, found.image[rows], beside):
+    for images in (inputs, made.image[rows], beside):
         framed = np.pad(images, ((0, 0), (0, GAP), (0, GAP), (0, 0)), constant_values=0.5)
         strips.append(np.concatenate(list(framed), axis=1))
     pixels = np.rint(255 * np.concatenate(strips).clip(0, 1) ** (1 / 2.2)).astype(np.uint8)

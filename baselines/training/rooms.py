@@ -2,7 +2,6 @@
 
 import warnings
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ import torch
 from torch import Tensor
 
 from baselines.training.images import Array, channels_first, check_reducible, reduced
-from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
@@ -47,13 +45,7 @@ class Rooms:
         return len(self.image)
 
 
-def read_rooms(path: str | Path, size: int, *, depth: bool = False) -> Rooms:
-    """Read a file of rooms; raises as `rooms_of` and `open_rooms`."""
-    with open_rooms(path) as rooms:
-        return rooms_of(rooms, size, depth=depth)
-
-
-def rooms_of(rooms: RoomsFile, size: int, *, depth: bool = False) -> Rooms:
+def read_rooms(rooms: RoomsFile, size: int, *, depth: bool = False) -> Rooms:
     """Read all rooms of a file, their images reduced to size x size pixels.
 
     Raises FileFormatError where a camera or an image is not known or, if depth is asked for, an

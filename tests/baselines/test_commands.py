@@ -1,6 +1,5 @@
 """`bench train` and `bench baseline` with trained baselines, as a user types them, and mistakes."""
 
-import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -144,17 +143,6 @@ def test_who_interrupts_is_told_how_to_go_on(folder, fake, monkeypatch):
     monkeypatch.setattr(module, "train", train)
     result = bench(*f"train cnn {DATA} --out run".split())
     assert (result.exit_code, "--resume" in result.stdout) == (1, True)
-
-
-@pytest.mark.parametrize("line", ["train cnn --data x.h5 --out y", "baseline siamese --data x.h5"])
-@pytest.mark.parametrize("gone", ["torch", "safetensors"])
-def test_without_the_optional_packages(line, gone, tmp_path, monkeypatch, check_refusal):
-    find, util = importlib.util.find_spec, importlib.util
-    monkeypatch.setattr(util, "find_spec", lambda name: None if name == gone else find(name))
-    monkeypatch.chdir(tmp_path)
-    result = bench(*line.split())
-    words = (line.split()[1], gone, "pip install '.[model]'")
-    check_refusal(result.exit_code, result.stdout, result.stderr, words)
 
 
 def test_every_trained_baseline_has_a_module():

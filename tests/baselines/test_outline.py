@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from baselines.outline import (
-    Outlines,
     nearest_scores,
     tree_scores,
     write_outline,
@@ -49,12 +48,12 @@ def test_a_turned_or_flipped_outline_is_the_same():
 
 def test_nearest_outlines_and_trees_find_turned_boxes():
     masks, right = boxes()
-    seen = Outlines(*outlines(masks))
+    seen = outlines(masks)
     assert (nearest_scores(seen).argmax(axis=1) == right).mean() > 0.95
     other, answers = boxes(seed=1)
-    scores = tree_scores(seen, right, Outlines(*outlines(other)))
+    scores = tree_scores(seen, right, outlines(other))
     assert (scores.argmax(axis=1) == answers).mean() > 0.8
-    again = tree_scores(seen, right, Outlines(*outlines(other)))
+    again = tree_scores(seen, right, outlines(other))
     assert (scores == again).all()
 
 

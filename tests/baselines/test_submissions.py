@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 from h5_edits import damaged_chunk, gone, put, values
 from pix2shape_models import edited, released
+from untrained import Write, answer_writers, room_writers
 
 from iqtt import SplitSpec, make_split
 from metrics.scoring.evaluate import score
 from metrics.submissions.validation import validate
 from scenegen.common.errors import SceneGenError
-
-pytest.importorskip("torch")
-from untrained import Write, answer_writers, room_writers
 
 TRUTH = (
     "depth", "normal", "object_id", "object/shape", "object/world_from_object", "object/scale",

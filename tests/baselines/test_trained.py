@@ -12,14 +12,13 @@ from typing import Any
 
 import h5py
 import pytest
+import torch
 from h5_edits import attribute
 from pix2shape_models import edited
 
 from baselines.commands import HOMES
+from baselines.training.checkpoint import CHECKPOINT, WEIGHTS, load_tensors
 from scenegen.common.errors import SceneGenError, SpecError
-
-torch = pytest.importorskip("torch")
-from baselines.training.checkpoint import CHECKPOINT, WEIGHTS, load_tensors  # noqa: E402
 
 RELIEF = {"size": 32, "width": 0.25, "batch": 4}
 RESNET = {"size": 16, "width": 4, "batch": 2}

@@ -28,6 +28,15 @@ def tiny(size: int = SIZE, **settings: Any) -> Any:
     return ModelConfig(networks=networks, **{**plain, **settings})
 
 
+def in_memory(path: Path, size: int, **how: Any) -> Any:
+    """Return the rooms of a file in memory."""
+    from baselines.training.rooms import read_rooms
+    from scenegen import open_rooms
+
+    with open_rooms(path) as rooms:
+        return read_rooms(rooms, size, **how)
+
+
 def room_source(path: Path, config: Any) -> Any:
     """Return the images of a rooms file as a model of this configuration is shown them."""
     from baselines.pix2shape.rooms import RoomImages

@@ -101,75 +101,59 @@ def readers_kept() -> Iterator[None]:
         raise LostProcessError("training", message, hint=hint) from error
 
 
-@dataclass(frozen=True)
-class Loading:
-    """How batches are read.
+def image_batches(
+    sources: Sources, config: ModelConfig, first: int, workers: int
+) -> Iterator[Batch]:
+    """Yield batches of images without end, beginning with those of iteration `first`.
 
-    Attributes:
-        config: of the run.
-        device: gets the batches.
-        first: the iteration to begin with.
-        workers: processes that read images; as many again read the questions that are compared.
+    Where no loss is of them, they are for pictures, and every process gets them whole.
     """
+    source, size = sources.images, sources.batch_size(config)
+    rows = share(size) if config.uses_images else slice(None)
+    draws = Draws(len(source), size, config.seed, first * config.batches_per_iteration, rows)
+    for items in _loaded(source, draws, workers):
+        yield source.as_batch(items)
 
-    config: ModelConfig
-    device: torch.device
-    first: int
-    workers: int
+
+def question_batches(
+    sources: Sources, config: ModelConfig, first: int, workers: int
+) -> Iterator[tuple[Batch, Tensor]]:
+    """Yield the questions whose codes are compared, and their answers, as `image_batches`.
+
+    The answer is -1 for a question without a label. Of each batch, labelled questions first, this
+    process gets its share, which may hold questions of one kind only.
+    """
+    source, labelled = sources.images, sources.labelled
+    with_label, without = sources.question_sizes(config)
+    rows = share(with_label + without)
+    answered = slice(min(rows.start, with_label), min(rows.stop, with_label))
+    others = slice(max(rows.start - with_label, 0), max(rows.stop - with_label, 0))
+    streams = []
+    if labelled is not None and answered.start < answered.stop:
+        draws = Draws(sources.labels, with_label, config.seed, first, answered)
+        streams.append(_loaded(labelled, draws, workers if config.labelled_batch else 0))
+    if others.start < others.stop:
+        draws = Draws(len(source), without, config.seed, first, others)
+        streams.append(
+            {**items, "answer": torch.full((len(items["image"]),), -1)}
+            for items in _loaded(source, draws, workers)
+        )
+    for parts in zip(*streams, strict=False):
+        items = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
+        yield source.as_batch(items), items["answer"]
 
 
 def _loaded(
-    source: RoomImages | QuestionImages, draws: Draws, how: Loading, workers: int
+    source: RoomImages | QuestionImages, draws: Draws, workers: int
 ) -> Iterator[dict[str, Tensor]]:
-    """Yield batch after batch without end."""
+    """Yield batch after batch without end, read by so many processes."""
     loader = DataLoader(
         _Catching(source),
         batch_sampler=draws,
         num_workers=workers,
         collate_fn=_collated,
-        pin_memory=how.device.type == "cuda",
     )
     for items in loader:
         if isinstance(items, Exception):
             raise items
         yield items
-
-
-def image_batches(sources: Sources, how: Loading) -> Iterator[Batch]:
-    """Yield batches of images without end.
-
-    Where no loss is of them, they are for pictures, and every process gets them whole.
-    """
-    config, source = how.config, sources.images
-    size, first = sources.batch_size(config), how.first * config.batches_per_iteration
-    rows = share(size) if config.uses_images else slice(None)
-    draws = Draws(len(source), size, config.seed, first, rows)
-    for items in _loaded(source, draws, how, how.workers):
-        yield source.as_batch(items).to(how.device)
-
-
-def question_batches(sources: Sources, how: Loading) -> Iterator[tuple[Batch, Tensor]]:
-    """Yield the questions whose codes are compared, and their answers.
-
-    The answer is -1 for a question without a label. Of each batch, labelled questions first, this
-    process gets its share, which may hold questions of one kind only.
-    """
-    config, source, labelled = how.config, sources.images, sources.labelled
-    with_label, without = sources.question_sizes(config)
-    mine, seed = share(with_label + without), config.seed
-    first = slice(min(mine.start, with_label), min(mine.stop, with_label))
-    others = slice(max(mine.start - with_label, 0), max(mine.stop - with_label, 0))
-    streams = []
-    if labelled is not None and first.start < first.stop:
-        draws = Draws(sources.labels, with_label, seed, how.first, first)
-        streams.append(_loaded(labelled, draws, how, how.workers if config.labelled_batch else 0))
-    if others.start < others.stop:
-        unlabelled = _loaded(
-            source, Draws(len(source), without, seed, how.first, others), how, how.workers
-        )
-        streams.append(
-            {**items, "answer": torch.full((len(items["image"]),), -1)} for items in unlabelled
-        )
-    for parts in zip(*streams, strict=False):
-        items = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
-        yield source.as_batch(items).to(how.device), items["answer"].to(how.device)

@@ -12,7 +12,7 @@ from torch import nn
 from baselines.pix2shape.batch import Batch
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.questions import QuestionImages
-from baselines.pix2shape.training.batches import Loading, Sources, image_batches, question_batches
+from baselines.pix2shape.training.batches import Sources, image_batches, question_batches
 from baselines.pix2shape.training.steps import critic_step, draw, generator_step
 from baselines.pix2shape.training.turning import turned
 from baselines.training.fit import Loss
@@ -35,29 +35,37 @@ class Iterations:
         self,
         model: Pix2Shape,
         sources: Sources,
-        how: Loading,
+        first: int,
+        workers: int,
         autocast: Callable[[], AbstractContextManager[None]] = nullcontext,
     ) -> None:
-        """Begin with the iteration that `how` says; `autocast` sets the networks' precision."""
-        self._model, self._device, self._autocast = model, how.device, autocast
-        self._images = image_batches(sources, how)
-        self._questions = question_batches(sources, how)
+        """Begin with iteration `first`.
+
+        Args:
+            workers: processes that read images; as many again read questions that are compared.
+            autocast: sets the networks' precision.
+        """
+        self._model, self._autocast = model, autocast
+        self._images = image_batches(sources, model.config, first, workers)
+        self._questions = question_batches(sources, model.config, first, workers)
 
     def __call__(self, number: int) -> Iterator[Loss]:
         """Yield the loss of each step of the critic, if there is one, and of the generator."""
         model, config = self._model, self._model.config
+        device = next(model.parameters()).device
         questions = next(self._questions, None)
         count, each = 0, 0  # questions that all processes compare, and images in each
         if questions is not None:
-            answers = len(questions[1])
-            count, each = answers * processes(), len(questions[0].image) // answers
+            images, answers = questions[0].to(device), questions[1].to(device)
+            questions = images, answers
+            count, each = len(answers) * processes(), len(images.image) // len(answers)
         for turn in range(config.batches_per_iteration):
-            batch = self.batch = next(self._images)
+            batch = self.batch = next(self._images).to(device)
             seed = item_seed(
                 config.seed, number * config.batches_per_iteration + turn, Purpose.TRAINING
             )
             whole = len(batch.image) * (processes() if config.uses_images else 1)
-            noise = draw(whole, config.networks.z, seed, count, each).to(self._device)
+            noise = draw(whole, config.networks.z, seed, count, each).to(device)
             compared = questions
             if config.turned and questions is not None:
                 compared = turned(questions[0], noise.turn, noise.mirror), questions[1]

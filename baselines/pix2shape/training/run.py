@@ -13,7 +13,7 @@ from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.pictures import training_sheet
 from baselines.pix2shape.rooms import RoomImages
-from baselines.pix2shape.training.batches import Loading, Sources, readers_kept
+from baselines.pix2shape.training.batches import Sources, readers_kept
 from baselines.pix2shape.training.beginnings import ModelState, new_run, resumed_run
 from baselines.pix2shape.training.iterations import Iterations, check_request
 from baselines.pix2shape.training.logs import Logs, opened_logs
@@ -22,7 +22,7 @@ from baselines.training.checkpoint import CHECKPOINT, WEIGHTS
 from baselines.training.fit import Progress, falling_late, fit
 from baselines.training.launch import Machine, check_agreement, launched
 from baselines.training.processes import summed
-from baselines.training.rooms import rooms_of
+from baselines.training.rooms import read_rooms
 from baselines.training.run_folder import alone_in, check_new
 from scenegen.common.errors import SceneGenError
 from scenegen.files.new_file import check_writable
@@ -90,8 +90,7 @@ def train_run(
         if isinstance(sources.images, RoomImages) and settings.matching:
             _match(sources.images, folder, state, fabric, progress)
         state.to(fabric.device)
-        loading = Loading(settings, fabric.device, began, machine.workers)
-        iterations = Iterations(model, sources, loading, fabric.autocast)
+        iterations = Iterations(model, sources, began, machine.workers, fabric.autocast)
         with opened_logs(folder / LOGS, began + 1) if first else nullcontext() as logs:
 
             def show(done: int, total: int, losses: Mapping[str, float]) -> None:
@@ -147,7 +146,7 @@ def _match(
     Raises SpecError, before the search, where the views of the rooms do not suit.
     """
     card = state.card
-    rooms = rooms_of(source.opened.file, card.settings.networks.size)
+    rooms = read_rooms(source.opened.file, card.settings.networks.size)
     source.pick_views(matching.matched_rows(rooms).numpy())
 
     def show(done: int, total: int) -> None:

@@ -7,8 +7,6 @@ from typing import Any
 import pytest
 from pix2shape_models import made, tiny
 
-pytest.importorskip("torch")
-
 
 @pytest.fixture(scope="session")
 def model() -> Any:

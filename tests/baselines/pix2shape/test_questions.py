@@ -9,18 +9,16 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import torch
 from h5_edits import put
 from pix2shape_models import edited, question_source, released, suited, tiny
 from refusals import refused
+from torch.utils.data import default_collate
 
+from baselines.pix2shape.network.surfels import render
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from scenegen.common.errors import FileFormatError, SpecError
-
-torch = pytest.importorskip("torch")
-from torch.utils.data import default_collate  # noqa: E402
-
-from baselines.pix2shape.network.surfels import render  # noqa: E402
 
 SPEC = SplitSpec(
     seed=5, train=7, labeled=4, val=2, test=1, cubes=(5, 7), lights=(1, 3), height=64, width=64,

@@ -5,8 +5,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-
-pytest.importorskip("torch")
 import torch
 
 from baselines.pix2shape.network.empty_rooms import Cameras

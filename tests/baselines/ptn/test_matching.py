@@ -2,19 +2,17 @@
 
 import numpy as np
 import pytest
+import torch
+from ptn_models import cubes_volume, tiny
 
-torch = pytest.importorskip("torch")
-
-from ptn_models import cubes_volume, tiny  # noqa: E402
-
-from baselines.ptn.matching import (  # noqa: E402
+from baselines.ptn.matching import (
     best_fits,
     features,
     fitted_head,
     small_turns,
 )
-from baselines.ptn.questions import uniform_rotation  # noqa: E402
-from iqtt.shapes.polycube import mirror  # noqa: E402
+from baselines.ptn.questions import uniform_rotation
+from iqtt.shapes.polycube import mirror
 
 CHAIN = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 2, 0], [2, 2, 1], [2, 2, 2]])
 OTHER = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 2, 0], [1, 2, 0], [1, 2, 1]])

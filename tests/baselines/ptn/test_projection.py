@@ -4,11 +4,10 @@ import math
 
 import numpy as np
 import pytest
+import torch
 
-torch = pytest.importorskip("torch")
-
-from baselines.ptn.projection import crossing, first_hit, outward, sampled, silhouettes  # noqa: E402
-from scenegen.camera import Camera, pixel_directions  # noqa: E402
+from baselines.ptn.projection import crossing, first_hit, outward, sampled, silhouettes
+from scenegen.camera import Camera, pixel_directions
 
 torch.set_num_threads(1)
 BOX = torch.tensor([[-1.0, -0.5, -1.0], [1.0, 0.5, 1.0]])  # voxels that are no cubes

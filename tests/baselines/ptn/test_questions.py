@@ -6,19 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
+from ptn_models import cubes_volume, tiny
 from refusals import refused
 
-torch = pytest.importorskip("torch")
-
-from ptn_models import cubes_volume, tiny  # noqa: E402
-
-from baselines.ptn.projection import silhouettes  # noqa: E402
-from baselines.ptn.questions import TrainingShapes, meets_cubes  # noqa: E402
-from iqtt.files.make import make_split  # noqa: E402
-from iqtt.files.reader import open_questions  # noqa: E402
-from iqtt.questions.specs import SplitSpec  # noqa: E402
-from scenegen.camera import pixel_directions  # noqa: E402
-from scenegen.common.errors import SpecError  # noqa: E402
+from baselines.ptn.projection import silhouettes
+from baselines.ptn.questions import TrainingShapes, meets_cubes
+from iqtt.files.make import make_split
+from iqtt.files.reader import open_questions
+from iqtt.questions.specs import SplitSpec
+from scenegen.camera import pixel_directions
+from scenegen.common.errors import SpecError
 
 
 @pytest.fixture(scope="module")

@@ -2,17 +2,13 @@
 
 import h5py
 import numpy as np
-import pytest
+from ptn_models import tiny, volume_of, voxel_centres
 from refusals import refused
 
-torch = pytest.importorskip("torch")
-
-from ptn_models import tiny, volume_of, voxel_centres  # noqa: E402
-
-from baselines.ptn.projection import silhouettes  # noqa: E402
-from baselines.ptn.rooms import RoomImages, TrainingRooms, room_box  # noqa: E402
-from scenegen.common.errors import FileFormatError, SpecError  # noqa: E402
-from scenegen.rooms.reader import RoomsFile  # noqa: E402
+from baselines.ptn.projection import silhouettes
+from baselines.ptn.rooms import RoomImages, TrainingRooms, room_box
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.rooms.reader import RoomsFile
 
 BALL = {"shapes": ("sphere",), "objects": (1, 1), "views": (0.0, 35.0, 80.0), "seed": 4}
 BIG = {"height": 64, "width": 64, "object_radius": (0.12, 0.16)}

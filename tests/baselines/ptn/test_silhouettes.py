@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-pytest.importorskip("torch")
-
 from baselines.ptn.rooms import RoomImages
 from baselines.ptn.silhouettes import Silhouettes
 from scenegen.common.errors import SpecError

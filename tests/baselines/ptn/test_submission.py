@@ -3,21 +3,18 @@
 import h5py
 import numpy as np
 import pytest
+from ptn_models import TINY, card_of, tiny, volume_of, voxel_centres
 
-torch = pytest.importorskip("torch")
-
-from ptn_models import TINY, card_of, tiny, volume_of, voxel_centres  # noqa: E402
-
-from baselines.ptn.network import METHOD, Settings  # noqa: E402
-from baselines.ptn.rooms import RoomImages  # noqa: E402
-from baselines.ptn.submission import FILES, seen, write_submission  # noqa: E402
-from baselines.ptn.training import train  # noqa: E402
-from baselines.training.checkpoint import new_state, save_weights  # noqa: E402
-from iqtt.files.make import make_split  # noqa: E402
-from iqtt.questions.specs import SplitSpec  # noqa: E402
-from metrics.measures.empty_room import empty_room  # noqa: E402
-from metrics.scoring.evaluate import score  # noqa: E402
-from scenegen.rooms.reader import RoomsFile  # noqa: E402
+from baselines.ptn.network import METHOD, Settings
+from baselines.ptn.rooms import RoomImages
+from baselines.ptn.submission import FILES, seen, write_submission
+from baselines.ptn.training import train
+from baselines.training.checkpoint import new_state, save_weights
+from iqtt.files.make import make_split
+from iqtt.questions.specs import SplitSpec
+from metrics.measures.empty_room import empty_room
+from metrics.scoring.evaluate import score
+from scenegen.rooms.reader import RoomsFile
 
 VIEWS = {"views": (0.0, 80.0), "objects": (1, 1), "shapes": ("sphere",)}
 

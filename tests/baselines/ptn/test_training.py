@@ -2,17 +2,15 @@
 
 import numpy as np
 import pytest
+import torch
+from ptn_models import TINY, tiny
 from refusals import refused
 
-torch = pytest.importorskip("torch")
-
-from ptn_models import TINY, tiny  # noqa: E402
-
-from baselines.ptn.network import Settings  # noqa: E402
-from baselines.ptn.rooms import TrainingRooms  # noqa: E402
-from baselines.ptn.training import projection_loss, train  # noqa: E402
-from scenegen import open_rooms  # noqa: E402
-from scenegen.common.errors import SpecError  # noqa: E402
+from baselines.ptn.network import Settings
+from baselines.ptn.rooms import TrainingRooms
+from baselines.ptn.training import projection_loss, train
+from scenegen import open_rooms
+from scenegen.common.errors import SpecError
 
 VIEWS = {"views": (0.0, 80.0), "objects": (1, 1), "shapes": ("sphere",)}
 

@@ -8,14 +8,11 @@ import numpy as np
 import pytest
 from refusals import refused
 
+from baselines.relief import depth_supervised, view_pairs
+from baselines.relief.predict import FILES
 from metrics.measures.empty_room import empty_room
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
-
-pytest.importorskip("torch")
-
-from baselines.relief import depth_supervised, view_pairs
-from baselines.relief.predict import FILES
 
 
 @pytest.fixture(scope="module")

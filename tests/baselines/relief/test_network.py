@@ -1,14 +1,13 @@
 """What each network may be asked, and that depth stays between the room's walls and open sides."""
 
 import pytest
+import torch
 from refusals import refused
 
+from baselines.pix2shape.network.architecture import contrast
+from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms
+from baselines.relief.network import Card, Settings, predicted_depth, relief_network
 from scenegen.common.errors import SpecError
-
-torch = pytest.importorskip("torch")
-from baselines.pix2shape.network.architecture import contrast  # noqa: E402
-from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms  # noqa: E402
-from baselines.relief.network import Card, Settings, predicted_depth, relief_network  # noqa: E402
 
 
 def cameras(*positions: tuple[float, float, float]) -> Cameras:

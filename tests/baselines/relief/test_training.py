@@ -4,24 +4,20 @@ from dataclasses import replace
 
 import h5py
 import numpy as np
-import pytest
+import torch
 from h5_edits import put, values
-from pix2shape_models import edited
+from pix2shape_models import edited, in_memory
 from refusals import refused
+from safetensors.torch import load_file
 
+from baselines.pix2shape.matching.labels import FOLDER
+from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms
+from baselines.relief import depth_supervised, training, view_pairs
+from baselines.relief.depth_supervised import views_of_scenes
+from baselines.relief.network import Card, Settings, predicted_depth, relief_network
+from baselines.relief.training import learning_rate
+from baselines.training.checkpoint import Method, load_weights
 from scenegen.common.errors import FileFormatError, SpecError
-
-torch = pytest.importorskip("torch")
-from safetensors.torch import load_file  # noqa: E402
-
-from baselines.pix2shape.matching.labels import FOLDER  # noqa: E402
-from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms  # noqa: E402
-from baselines.relief import depth_supervised, training, view_pairs  # noqa: E402
-from baselines.relief.depth_supervised import views_of_scenes  # noqa: E402
-from baselines.relief.network import Card, Settings, predicted_depth, relief_network  # noqa: E402
-from baselines.relief.training import learning_rate  # noqa: E402
-from baselines.training.checkpoint import Method, load_weights  # noqa: E402
-from baselines.training.rooms import read_rooms  # noqa: E402
 
 SMALL = Settings(size=32, width=0.25, iterations=2, batch=4)
 UNSEEN = (
@@ -41,7 +37,7 @@ def test_a_unet_learns_nine_images_by_heart(turned_path, tmp_path, monkeypatch):
     settings = replace(SMALL, iterations=80, batch=9, learning_rate=0.01)
     path = depth_supervised.train(turned_path, tmp_path, settings)
     network, card = load_weights(path, Method("depth-supervised", Card, relief_network))
-    rooms = read_rooms(turned_path, 32, depth=True)
+    rooms = in_memory(turned_path, 32, depth=True)
     cameras = Cameras(rooms.world_from_camera, rooms.fov_y_degrees)
     with torch.no_grad():
         depth = predicted_depth(network, rooms.image.float(), cameras, cameras)
@@ -84,7 +80,7 @@ def test_view_pairs_reads_nothing_but_images_and_cameras(near_path, tmp_path):
 
 
 def test_each_row_is_seen_from_the_cameras_of_its_own_scene(turned_path):
-    rooms = read_rooms(turned_path, 32)
+    rooms = in_memory(turned_path, 32)
     assert rooms.depth is None
     assert rooms.rounded
     found = [rows.tolist() for rows in views_of_scenes(rooms)]

@@ -6,19 +6,18 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import torch
 from pix2shape_models import edited
 
+from baselines.resnets import cnn, siamese
+from baselines.resnets.answering import FILES, accuracy
+from baselines.training.checkpoint import WEIGHTS, load_weights
+from baselines.training.questions import question_images
 from iqtt import open_questions
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.scoring.evaluate import score
 from scenegen.common.errors import SpecError
-
-torch = pytest.importorskip("torch")
-from baselines.resnets import cnn, siamese  # noqa: E402
-from baselines.resnets.answering import FILES, accuracy  # noqa: E402
-from baselines.training.checkpoint import WEIGHTS, load_weights  # noqa: E402
-from baselines.training.questions import question_images  # noqa: E402
 
 MODULES = {"cnn": cnn, "siamese": siamese}
 SMALL = {"width": 4, "size": 16, "batch": 2}

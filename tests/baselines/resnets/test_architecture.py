@@ -1,9 +1,9 @@
 """The networks are those of He et al. (2016): as many weights, and sizes of feature maps."""
 
 import pytest
+import torch
 
-torch = pytest.importorskip("torch")
-from baselines.resnets.architecture import ResNet  # noqa: E402
+from baselines.resnets.architecture import ResNet
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,10 @@
 """The classifier: layers as in the paper, and one output for each answer."""
 
 import pytest
+import torch
 
-torch = pytest.importorskip("torch")
-from baselines.resnets.card import Card, Settings  # noqa: E402
-from baselines.resnets.cnn import KIND, AnswerClassifier  # noqa: E402
+from baselines.resnets.card import Card, Settings
+from baselines.resnets.cnn import KIND, AnswerClassifier
 
 
 @pytest.mark.parametrize("answers", [2, 3])

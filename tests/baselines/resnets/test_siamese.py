@@ -1,10 +1,10 @@
 """Distances of features, and the contrastive loss of the paper's appendix."""
 
 import pytest
+import torch
 
-torch = pytest.importorskip("torch")
-from baselines.resnets.card import Card, Settings  # noqa: E402
-from baselines.resnets.siamese import NearestAnswer, contrastive_loss  # noqa: E402
+from baselines.resnets.card import Card, Settings
+from baselines.resnets.siamese import NearestAnswer, contrastive_loss
 
 SMALL = Card("siamese", Settings(width=4, size=16), labels=1)
 

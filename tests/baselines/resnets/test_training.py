@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
+import torch
 from refusals import refused
 
+from baselines.resnets import cnn, siamese
+from baselines.resnets.training import permuted
+from baselines.training.checkpoint import load_weights
 from scenegen.common.errors import SpecError
-
-torch = pytest.importorskip("torch")
-from baselines.resnets import cnn, siamese  # noqa: E402
-from baselines.resnets.training import permuted  # noqa: E402
-from baselines.training.checkpoint import load_weights  # noqa: E402
 
 
 def test_permuted_answers_stay_with_their_questions():

@@ -11,16 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
 from refusals import refused
+from torch.optim import Adam
 
-from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.common.records import check
-
-torch = pytest.importorskip("torch")
-from torch.optim import Adam  # noqa: E402
-
-from baselines.training import checkpoint  # noqa: E402
-from baselines.training.checkpoint import (  # noqa: E402
+from baselines.training import checkpoint
+from baselines.training.checkpoint import (
     CHECKPOINT,
     WEIGHTS,
     Method,
@@ -33,6 +29,8 @@ from baselines.training.checkpoint import (  # noqa: E402
     save_tensors,
     save_weights,
 )
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.records import check
 
 BIAS, VARIANCE = "layers.0.bias", "layers.1.running_var"
 

@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
 from refusals import refused
+from torch.optim import Adam
 
-torch = pytest.importorskip("torch")
-from torch.optim import Adam  # noqa: E402
-
-from baselines.training import checkpoint  # noqa: E402
-from baselines.training.checkpoint import (  # noqa: E402
+from baselines.training import checkpoint
+from baselines.training.checkpoint import (
     WEIGHTS,
     Method,
     load_checkpoint,
@@ -20,8 +19,8 @@ from baselines.training.checkpoint import (  # noqa: E402
     moments_of,
     new_state,
 )
-from baselines.training.fit import Loss, TrainingError, falling_late, fit  # noqa: E402
-from scenegen.common.random.seeding import Purpose, item_rng  # noqa: E402
+from baselines.training.fit import Loss, TrainingError, falling_late, fit
+from scenegen.common.random.seeding import Purpose, item_rng
 
 
 @dataclass(frozen=True)

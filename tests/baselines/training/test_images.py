@@ -11,10 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
 
-from scenegen import open_rooms
-from scenegen.common.errors import FileFormatError, SpecError
-
-pytest.importorskip("torch")
 from baselines.training.images import (
     Draws,
     Opened,
@@ -23,6 +19,8 @@ from baselines.training.images import (
     reduced,
     row_batches,
 )
+from scenegen import open_rooms
+from scenegen.common.errors import FileFormatError, SpecError
 
 
 def test_images_are_means_of_blocks_channels_first():

@@ -10,16 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import shared_training
 from pix2shape_models import tiny
 
+from baselines.pix2shape.weights import METHOD
+from baselines.training.checkpoint import load_checkpoint, moments_of, new_state
+from baselines.training.launch import started_elsewhere
 from scenegen.common.errors import SpecError
-
-torch = pytest.importorskip("torch")
-import shared_training  # noqa: E402
-
-from baselines.pix2shape.weights import METHOD  # noqa: E402
-from baselines.training.checkpoint import load_checkpoint, moments_of, new_state  # noqa: E402
-from baselines.training.launch import started_elsewhere  # noqa: E402
 
 # Seed 2 pairs no image with itself: `consistency` would then be 0, and its slope but rounding.
 ALL = {"seed": 2, "critic_steps": 2, "questions": 0.01, "contrast": 1.0, "question_batch": 8}

@@ -5,14 +5,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+import torch
 from pix2shape_models import released
 from refusals import refused
 
-from iqtt import SplitSpec, make_split, open_questions
-from scenegen.common.errors import FileFormatError, SpecError
-
-torch = pytest.importorskip("torch")
-from baselines.training.questions import (  # noqa: E402
+from baselines.training.questions import (
     LABELED,
     UNLABELED,
     check_labels,
@@ -23,6 +20,8 @@ from baselines.training.questions import (  # noqa: E402
     open_training,
     training_answers,
 )
+from iqtt import SplitSpec, make_split, open_questions
+from scenegen.common.errors import FileFormatError, SpecError
 
 
 def test_rooms_are_told_from_questions(rooms_path, truths, train_questions, tmp_path):

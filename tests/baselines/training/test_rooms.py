@@ -3,18 +3,17 @@
 import h5py
 import numpy as np
 import pytest
-from pix2shape_models import edited, of_rows
+import torch
+from pix2shape_models import edited, in_memory, of_rows
 from refusals import refused
 
+from baselines.training.rooms import input_views, room_images
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError
 
-torch = pytest.importorskip("torch")
-from baselines.training.rooms import input_views, read_rooms, room_images  # noqa: E402
-
 
 def test_rooms_in_memory_are_those_of_the_file(near_path):
-    rooms = read_rooms(near_path, 32, depth=True)
+    rooms = in_memory(near_path, 32, depth=True)
     with h5py.File(near_path) as file:
         depth, images = file["depth"][:], file["image"][:]
         np.testing.assert_array_equal(rooms.scene, file["scene_index"][:])
@@ -37,9 +36,9 @@ def test_an_image_without_a_surface_is_refused_where_depth_is_asked_for(near_pat
         file["depth"][3] = np.nan
 
     path = edited(near_path, tmp_path / "hole.h5", hole)
-    assert read_rooms(path, 32).depth is None
+    assert in_memory(path, 32).depth is None
     with refused(FileFormatError, "depth, row 3", "no surface"):
-        read_rooms(path, 32, depth=True)
+        in_memory(path, 32, depth=True)
 
 
 def test_the_input_of_a_scene_is_its_view_0_or_its_first(turned_path, tmp_path):

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-pytest.importorskip("torch")
 from baselines.training.rotations import rotation_grid
 
 

@@ -5,13 +5,11 @@ from dataclasses import replace
 import pytest
 from refusals import refused
 
-from scenegen.common.errors import SceneGenError, SpecError
-
-pytest.importorskip("torch")
 from baselines.resnets.card import Card, Settings
 from baselines.resnets.cnn import KIND
 from baselines.training.checkpoint import CHECKPOINT, WEIGHTS, new_state, save_checkpoint
 from baselines.training.run_folder import alone_in, begun, check_new, earlier_state
+from scenegen.common.errors import SceneGenError, SpecError
 
 METHOD = KIND.method
 CARD = Card("cnn", Settings(width=4, size=16), labels=1, fingerprint="a" * 64)

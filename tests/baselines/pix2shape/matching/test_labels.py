@@ -5,19 +5,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
+from pix2shape_models import in_memory
 
+from baselines.pix2shape.matching import labels as module
+from baselines.pix2shape.matching.labels import FOLDER, labels, matched_rows, pairs_of
+from baselines.training.checkpoint import load_tensors, save_tensors
 from scenegen.common.errors import FileFormatError, SpecError
-
-torch = pytest.importorskip("torch")
-from baselines.pix2shape.matching import labels as module  # noqa: E402
-from baselines.pix2shape.matching.labels import FOLDER, labels, matched_rows, pairs_of  # noqa: E402
-from baselines.training.checkpoint import load_tensors, save_tensors  # noqa: E402
-from baselines.training.rooms import read_rooms  # noqa: E402
 
 
 @pytest.fixture
 def rooms(near_path: Path) -> Any:
-    return read_rooms(near_path, 64)
+    return in_memory(near_path, 64)
 
 
 def test_neighbours_of_one_scene_are_matched_on_either_side(rooms):

@@ -4,12 +4,11 @@ import math
 
 import numpy as np
 import pytest
+import torch
 
+from baselines.pix2shape.matching.reprojection import reprojected
+from baselines.pix2shape.network.empty_rooms import Cameras
 from scenegen.camera import Camera, pixel_directions
-
-torch = pytest.importorskip("torch")
-from baselines.pix2shape.matching.reprojection import reprojected  # noqa: E402
-from baselines.pix2shape.network.empty_rooms import Cameras  # noqa: E402
 
 FOV, SIZE = 30.0, 64
 POSES = [

@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
+from pix2shape_models import in_memory
 
-from scenegen.rooms.reader import RoomsFile
-
-torch = pytest.importorskip("torch")
-from baselines.pix2shape.matching.labels import matched_relief, pairs_of  # noqa: E402
-from baselines.pix2shape.matching.search import (  # noqa: E402
+from baselines.pix2shape.matching.labels import matched_relief, pairs_of
+from baselines.pix2shape.matching.search import (
     LARGE,
     SMALL,
     STEP,
@@ -22,8 +21,8 @@ from baselines.pix2shape.matching.search import (  # noqa: E402
     matching_cost,
     semi_global,
 )
-from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms  # noqa: E402
-from baselines.training.rooms import read_rooms  # noqa: E402
+from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms
+from scenegen.rooms.reader import RoomsFile
 
 
 def cameras(rooms: Any, rows: Any) -> Cameras:
@@ -33,7 +32,7 @@ def cameras(rooms: Any, rows: Any) -> Cameras:
 @pytest.mark.parametrize("bits", [16, 8])
 def test_objects_are_found_without_depth(bits, many_near_path):
     """Relief within two steps on most object pixels, and none on most of floor and walls."""
-    rooms = read_rooms(many_near_path, 64, depth=True)
+    rooms = in_memory(many_near_path, 64, depth=True)
     assert not rooms.rounded
     if bits == 8:
         image = (rooms.image.float() * 255).round() / 255
@@ -55,7 +54,7 @@ def test_objects_are_found_without_depth(bits, many_near_path):
 
 
 def test_the_true_relief_costs_less_than_the_empty_room(near_path):
-    rooms = read_rooms(near_path, 64, depth=True)
+    rooms = in_memory(near_path, 64, depth=True)
     row, other = torch.tensor([1]), torch.tensor([2])
     views = [rooms.image[i].float() for i in (row, other)]
     cost = matching_cost(views[0], cameras(rooms, row), views[1], cameras(rooms, other))[0]
@@ -71,7 +70,7 @@ def test_the_true_relief_costs_less_than_the_empty_room(near_path):
 
 
 def test_what_the_other_image_does_not_show_costs_the_same_at_every_relief(near_path):
-    rooms = read_rooms(near_path, 64)
+    rooms = in_memory(near_path, 64)
     row, other = torch.tensor([0]), torch.tensor([3])
     turned = cameras(rooms, other)
     away = torch.diag(torch.tensor([-1.0, 1.0, -1.0, 1.0]))

@@ -3,13 +3,13 @@
 import itertools
 
 import pytest
+import torch
 from pix2shape_models import tiny
 
-torch = pytest.importorskip("torch")
-from baselines.pix2shape.network import architecture  # noqa: E402
-from baselines.pix2shape.network.architecture import Critic, Decoder, Encoder, NetworkSpec  # noqa: E402
-from baselines.pix2shape.network.model import Pix2Shape, Surfels, Views, shaded  # noqa: E402
-from baselines.pix2shape.network.surfels import Scene  # noqa: E402
+from baselines.pix2shape.network import architecture
+from baselines.pix2shape.network.architecture import Critic, Decoder, Encoder, NetworkSpec
+from baselines.pix2shape.network.model import Pix2Shape, Surfels, Views, shaded
+from baselines.pix2shape.network.surfels import Scene
 
 SMALL = NetworkSpec(size=32, width=0.05)
 

@@ -1,14 +1,13 @@
 """Configurations: the paper's numbers, JSON both ways, nonsense refused; the model they make."""
 
 import pytest
+import torch
 from pix2shape_models import tiny
 
+from baselines.pix2shape.network.architecture import NetworkSpec
+from baselines.pix2shape.network.config import CONFIGS, ModelConfig, model_config
+from baselines.pix2shape.network.model import Pix2Shape
 from scenegen.common.errors import SpecError
-
-torch = pytest.importorskip("torch")
-from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
-from baselines.pix2shape.network.config import CONFIGS, ModelConfig, model_config  # noqa: E402
-from baselines.pix2shape.network.model import Pix2Shape  # noqa: E402
 
 
 def test_the_paper_and_compact() -> None:

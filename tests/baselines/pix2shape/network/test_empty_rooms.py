@@ -1,13 +1,11 @@
 """Against the baseline empty-room, which numpy computes from the file, and against the truth."""
 
 import numpy as np
-import pytest
+import torch
 
+from baselines.pix2shape.network.empty_rooms import NEAREST, empty_rooms
 from metrics.measures.empty_room import empty_room
 from scenegen.rooms.reader import RoomsFile
-
-torch = pytest.importorskip("torch")
-from baselines.pix2shape.network.empty_rooms import NEAREST, empty_rooms  # noqa: E402
 
 
 def test_depth_is_that_of_the_baseline_and_objects_lie_behind_the_entry(turned_path):

@@ -3,17 +3,16 @@
 from dataclasses import fields, replace
 
 import pytest
+import torch
 from pix2shape_models import made, room_source, tiny
+from torch.utils.data import default_collate
 
-torch = pytest.importorskip("torch")
-from torch.utils.data import default_collate  # noqa: E402
-
-from baselines.pix2shape.batch import Relief  # noqa: E402
-from baselines.pix2shape.network.empty_rooms import empty_rooms  # noqa: E402
-from baselines.pix2shape.network.model import Material, Surfels, shaded  # noqa: E402
-from baselines.pix2shape.network.surfels import render  # noqa: E402
-from baselines.pix2shape.training.steps import draw, generator_step  # noqa: E402
-from scenegen.common.errors import SpecError  # noqa: E402
+from baselines.pix2shape.batch import Relief
+from baselines.pix2shape.network.empty_rooms import empty_rooms
+from baselines.pix2shape.network.model import Material, Surfels, shaded
+from baselines.pix2shape.network.surfels import render
+from baselines.pix2shape.training.steps import draw, generator_step
+from scenegen.common.errors import SpecError
 
 LEARNS = {"material": True, "lights": 2}
 

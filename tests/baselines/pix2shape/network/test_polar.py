@@ -3,11 +3,11 @@
 import math
 
 import pytest
+import torch
 
-torch = pytest.importorskip("torch")
-from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
-from baselines.pix2shape.network.polar import PolarEncoder, polar, standardised  # noqa: E402
-from scenegen.common.errors import SpecError  # noqa: E402
+from baselines.pix2shape.network.architecture import NetworkSpec
+from baselines.pix2shape.network.polar import PolarEncoder, polar, standardised
+from scenegen.common.errors import SpecError
 
 SPEC = NetworkSpec(
     size=32, width=0.02, z_scene=6, z_view=2, camera=False, spherical=True, encoder="polar"

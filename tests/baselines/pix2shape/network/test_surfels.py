@@ -6,18 +6,17 @@ from functools import partial
 
 import numpy as np
 import pytest
+import torch
 from numpy.typing import NDArray
 
+from baselines.pix2shape.network import surfels
+from baselines.pix2shape.network.surfels import Scene, normals_from_depth, render
 from scenegen.camera import pixel_directions, transform_points
 from scenegen.description.presets import PRESETS, preset_spec
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import render as render_rooms
 from scenegen.rendering.shading import shade as shade_in_numpy
 from scenegen.sampling.scenes import sample_scene
-
-torch = pytest.importorskip("torch")
-from baselines.pix2shape.network import surfels  # noqa: E402
-from baselines.pix2shape.network.surfels import Scene, normals_from_depth, render  # noqa: E402
 
 FOV = 30.0
 LIT = ("light_position", "light_color", "ambient", "attenuation", "reflectance")

@@ -5,15 +5,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
 from pix2shape_models import state_of, stored, tiny
 from refusals import refused
 
+from baselines.pix2shape.network.config import model_config
+from baselines.pix2shape.training.beginnings import new_run
 from scenegen.common.errors import SceneGenError, SpecError
-
-torch = pytest.importorskip("torch")
-
-from baselines.pix2shape.network.config import model_config  # noqa: E402
-from baselines.pix2shape.training.beginnings import new_run  # noqa: E402
 
 CONFIG = tiny(seed=3)
 OTHER = replace(CONFIG, adversarial=0.0)

@@ -4,8 +4,6 @@ import errno
 
 import pytest
 
-pytest.importorskip("torch")
-
 from baselines.pix2shape.training.logs import opened_logs
 
 

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
+import torch
 from scipy.spatial.transform import Rotation
 
-torch = pytest.importorskip("torch")
-from baselines.pix2shape.network.architecture import NetworkSpec, Statistics  # noqa: E402
-from baselines.pix2shape.training import losses  # noqa: E402
+from baselines.pix2shape.network.architecture import NetworkSpec, Statistics
+from baselines.pix2shape.training import losses
 
 
 def test_the_critic_raises_real_scores_and_lowers_made_ones() -> None:

@@ -9,27 +9,25 @@ from typing import Any
 
 import h5py
 import pytest
+import torch
 from h5_edits import attribute
 from PIL import Image
 from pix2shape_models import edited, room_source, tiny
 from refusals import refused
+from safetensors.torch import load_file
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+from torch.utils.data import default_collate
 
+from baselines.pix2shape.network.config import LOSSES
+from baselines.pix2shape.network.model import Prior
+from baselines.pix2shape.training import run as module
+from baselines.pix2shape.training.run import train_run
+from baselines.pix2shape.weights import METHOD
+from baselines.training.checkpoint import load_checkpoint, load_weights
+from baselines.training.fit import TrainingError
+from baselines.training.launch import Machine
+from baselines.training.processes import LostProcessError
 from scenegen.common.errors import SceneGenError, SpecError
-
-torch = pytest.importorskip("torch")
-from safetensors.torch import load_file  # noqa: E402
-from tensorboard.backend.event_processing.event_accumulator import EventAccumulator  # noqa: E402
-from torch.utils.data import default_collate  # noqa: E402
-
-from baselines.pix2shape.network.config import LOSSES  # noqa: E402
-from baselines.pix2shape.network.model import Prior  # noqa: E402
-from baselines.pix2shape.training import run as module  # noqa: E402
-from baselines.pix2shape.training.run import train_run  # noqa: E402
-from baselines.pix2shape.weights import METHOD  # noqa: E402
-from baselines.training.checkpoint import load_checkpoint, load_weights  # noqa: E402
-from baselines.training.fit import TrainingError  # noqa: E402
-from baselines.training.launch import Machine  # noqa: E402
-from baselines.training.processes import LostProcessError  # noqa: E402
 
 HERE = Machine("cpu", workers=0, every=2)
 CONFIG = tiny(seed=3)

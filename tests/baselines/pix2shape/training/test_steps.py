@@ -5,15 +5,15 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+import torch
 
-torch = pytest.importorskip("torch")
-from baselines.pix2shape.batch import Batch, Relief  # noqa: E402
-from baselines.pix2shape.network.architecture import NetworkSpec  # noqa: E402
-from baselines.pix2shape.network.config import LOSSES, ModelConfig  # noqa: E402
-from baselines.pix2shape.network.model import Pix2Shape, Surfels, Views, mapped  # noqa: E402
-from baselines.pix2shape.network.surfels import Scene, back_project  # noqa: E402
-from baselines.pix2shape.training import losses as functions  # noqa: E402
-from baselines.pix2shape.training.steps import critic_step, draw, generator_step  # noqa: E402
+from baselines.pix2shape.batch import Batch, Relief
+from baselines.pix2shape.network.architecture import NetworkSpec
+from baselines.pix2shape.network.config import LOSSES, ModelConfig
+from baselines.pix2shape.network.model import Pix2Shape, Surfels, Views, mapped
+from baselines.pix2shape.network.surfels import Scene, back_project
+from baselines.pix2shape.training import losses as functions
+from baselines.pix2shape.training.steps import critic_step, draw, generator_step
 
 NETWORKS = NetworkSpec(size=32, width=0.05, z_scene=6, z_view=2)
 EACH = tuple(name for name in LOSSES if name != "matching")  # which needs other networks

@@ -4,12 +4,12 @@ import math
 from dataclasses import replace
 
 import pytest
+import torch
 
-torch = pytest.importorskip("torch")
-from baselines.pix2shape.batch import Batch  # noqa: E402
-from baselines.pix2shape.network.model import Surfels, Views, shaded  # noqa: E402
-from baselines.pix2shape.network.surfels import Scene  # noqa: E402
-from baselines.pix2shape.training.turning import turned  # noqa: E402
+from baselines.pix2shape.batch import Batch
+from baselines.pix2shape.network.model import Surfels, Views, shaded
+from baselines.pix2shape.network.surfels import Scene
+from baselines.pix2shape.training.turning import turned
 
 
 def surface():

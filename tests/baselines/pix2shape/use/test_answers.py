@@ -6,18 +6,17 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import torch
 from pix2shape_models import made, of_questions, released
 
+from baselines.pix2shape.use import answers as module
+from baselines.pix2shape.use.answers import answer_file
+from baselines.training.images import channels_first
 from iqtt.files.reader import open_questions
 from metrics.scoring.evaluate import score
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
 from scenegen.rendering.ground_truth import decode_image
-
-torch = pytest.importorskip("torch")
-from baselines.pix2shape.use import answers as module  # noqa: E402
-from baselines.pix2shape.use.answers import answer_file  # noqa: E402
-from baselines.training.images import channels_first  # noqa: E402
 
 
 @pytest.fixture

@@ -8,25 +8,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+import torch
 from h5_edits import values
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pix2shape_models import card_of, edited, made, room_source, tiny
+from torch.utils.data import default_collate
 
+from baselines.pix2shape.network.surfels import render
+from baselines.pix2shape.pictures import drawn, image_tiles, sheet
+from baselines.pix2shape.use import explore
+from baselines.pix2shape.use.explore import rotation_frames, sample_sheet, turned
 from scenegen.camera import Camera, look_at
 from scenegen.description.presets import PAPER_VIEWS
 from scenegen.description.specs import DatasetSpec
 from scenegen.rooms.reader import RoomsFile
 from scenegen.sampling.cameras import sample_cameras
 from scenegen.sampling.lights import sample_lights
-
-torch = pytest.importorskip("torch")
-from torch.utils.data import default_collate  # noqa: E402
-
-from baselines.pix2shape.network.surfels import render  # noqa: E402
-from baselines.pix2shape.pictures import drawn, image_tiles, sheet  # noqa: E402
-from baselines.pix2shape.use import explore  # noqa: E402
-from baselines.pix2shape.use.explore import rotation_frames, sample_sheet, turned  # noqa: E402
 
 SPEC = DatasetSpec(height=32, width=32)
 CLASSES = ("bag", "bowl", "mug")
@@ -166,10 +164,11 @@ def test_a_rotation_turns_from_the_reconstructions_to_the_files_other_views(mode
     assert (frames[0] != frames[1]).any()
 
 
-@pytest.mark.parametrize("name", ["light/ambient", "light/attenuation", "material/reflectance"])
-def test_a_rotation_of_other_rooms_is_shaded_with_their_own(model, several_path, tmp_path, name):
+def test_a_rotation_of_other_rooms_is_shaded_with_their_own(model, several_path, tmp_path):
     """Whatever the rooms that the model was trained on were lit with."""
-    path = edited(several_path, tmp_path / "other.h5", values(name, lambda old: old * 0.5))
+    names = ("light/ambient", "light/attenuation", "material/reflectance")
+    edits = (values(name, lambda old: old * 0.5) for name in names)
+    path = edited(several_path, tmp_path / "other.h5", *edits)
     source = room_source(path, model.config)
     (frame,) = rotation_frames(model, source, [0], [0.0])
     expected = pixels(sheet([reconstructions(model, source, [0], [0])[0]]))

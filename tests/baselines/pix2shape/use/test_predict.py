@@ -6,19 +6,17 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+import torch
 from pix2shape_models import edited, made, of_rows, room_source, tiny, written
+from torch.utils.data import default_collate
 
+from baselines.pix2shape.network.empty_rooms import empty_rooms
+from baselines.pix2shape.use import predict
+from baselines.pix2shape.use.predict import enlarged, predict_file, predict_rooms
 from metrics.submissions.reader import open_predictions
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
-
-torch = pytest.importorskip("torch")
-from torch.utils.data import default_collate  # noqa: E402
-
-from baselines.pix2shape.network.empty_rooms import empty_rooms  # noqa: E402
-from baselines.pix2shape.use import predict  # noqa: E402
-from baselines.pix2shape.use.predict import enlarged, predict_file, predict_rooms  # noqa: E402
 
 Fields = dict[str, np.ndarray]
 
