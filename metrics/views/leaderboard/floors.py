@@ -1,7 +1,7 @@
 """Floors beside scores: the empty room, noise, chance, and probes that know nothing of 3D."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from metrics.score_file import SCORE_AGAIN
 from metrics.scoring import floors
@@ -9,12 +9,12 @@ from metrics.scoring.floors import floor_of_kind
 from metrics.scoring.metric_names import EMPTY_ROOM, OTHER_SCENE, SKILLED
 from metrics.scoring.records import ScoreFile
 from metrics.views.by_angle import angle_floors
+from metrics.views.leaderboard.rows import Cells, unranked_rows
 from metrics.views.score_tables import FLOORS_OF_ROOMS, floor_text
-from metrics.views.table import Cell, Row, Table, make_row
+from metrics.views.table import Cell, Table
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import number
 
-FloorRows = dict[str, dict[str, float]]  # by the label of the row, then by the key of the column
 SKILL_OF = "skill of "  # begins the keys of columns of skills
 FLOOR, NOISE, CHANCE = "floor: ", "noise floor", "floor: chance"
 AGREEMENT = 1e-9  # of floors, relative: other releases of libraries add differently
@@ -24,12 +24,12 @@ class FloorError(SceneGenError):
     """Score files of one test set that state different floors."""
 
 
-def floor_rows(file: ScoreFile, names: Sequence[str]) -> FloorRows:
+def floor_cells(file: ScoreFile, names: Sequence[str]) -> Cells:
     """Return what the floors of a file's test set score.
 
     The floor of a relief differs from file to file: its skill has one, 0, the score itself none.
     """
-    rows: FloorRows = {}
+    rows: dict[str, dict[str, float]] = {}
     for name in names:
         if name in file.skills:
             text = floor_text(file, name) if is_shared(name) else FLOORS_OF_ROOMS[EMPTY_ROOM]
@@ -42,18 +42,25 @@ def floor_rows(file: ScoreFile, names: Sequence[str]) -> FloorRows:
         rows[NOISE] = {name: noise[name] for name in names if name in noise}
     if file.task == "iqtt" and not any(label.startswith(CHANCE) for label in rows):
         rows[CHANCE] = {"iqtt_accuracy": 1.0 / file.meta.counts["answers"]}
-    return rows
+    return _shown(rows)
 
 
-def floor_rows_of_groups(file: ScoreFile, name: str, keys: Sequence[str]) -> FloorRows:
+def floor_cells_of_groups(file: ScoreFile, name: str, keys: Sequence[str]) -> Cells:
     """Return the floors of a score by view angle, or by kind of question."""
     if file.task == "rooms":
         values = angle_floors(file, name) if is_shared(name) else {}
-        return {FLOOR + FLOORS_OF_ROOMS[EMPTY_ROOM]: values} if values else {}
+        return _shown({FLOOR + FLOORS_OF_ROOMS[EMPTY_ROOM]: values} if values else {})
     answers = file.meta.counts["answers"]
     best = {kind: floor_of_kind(kind, answers)[0] for kind in keys}
     chance = dict.fromkeys(keys, 1.0 / answers)
-    return {CHANCE: chance} if best == chance else {f"{FLOOR}best": best, CHANCE: chance}
+    return _shown({CHANCE: chance} if best == chance else {f"{FLOOR}best": best, CHANCE: chance})
+
+
+def _shown(rows: Mapping[str, Mapping[str, float]]) -> Cells:
+    return {
+        label: {key: Cell(number(value)) for key, value in row.items()}
+        for label, row in rows.items()
+    }
 
 
 def own_floors(file: ScoreFile) -> dict[str, float]:
@@ -101,10 +108,7 @@ def floors_table(files: Sequence[ScoreFile]) -> Table | None:
     for floor in measured:
         ends = f"[{number(floor.low, floor.accuracy)}, {number(floor.high, floor.accuracy)}]"
         cells.setdefault(floor.name, {})[floor.kind] = Cell(number(floor.accuracy), ends)
-    rows: list[Row] = [
-        make_row(["", name, *(row.get(kind, Cell()) for kind in kinds)], "floor")
-        for name, row in cells.items()
-    ]
+    rows = unranked_rows("floor", cells, kinds)
     note = (
         "Fraction of right answers of methods that know nothing of 3D, with 95% intervals, by kind"
         " of question and number of labelled questions; measured once, as docs/results.md says. The"

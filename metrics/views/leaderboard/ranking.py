@@ -19,8 +19,8 @@ from metrics.views.compare.compare import Comparison, compare
 from metrics.views.compare.pairing import ComparisonError
 from metrics.views.leaderboard.floors import (
     SKILL_OF,
-    floor_rows,
-    floor_rows_of_groups,
+    floor_cells,
+    floor_cells_of_groups,
     floors_table,
     is_shared,
     own_floors,
@@ -32,7 +32,7 @@ from metrics.views.leaderboard.rows import (
     Column,
     Entry,
     build_table,
-    figures_by_row,
+    figure_cells,
     paper_table,
     score_column,
     skill_column,
@@ -221,16 +221,15 @@ def _ranking(
     names = [key for key in columns if not key.startswith(SKILL_OF)]
     notes = [*_notes(ranked), *_same_request_notes(members, files)]
     placed = [f for f in figures if f.view_angle is None and f.metric in columns]
-    tables = []
+    tables, floors = [], floor_cells(first, names)
     for i, part in enumerate(_parts(columns)):
         marked = any(entry.alike & part.keys() for entry in entries)
-        floors = {k: row for k, row in floor_rows(first, names).items() if row.keys() & part.keys()}
         table = build_table(
             f"{title}: scores" if i else title,
             part,
             entries,
-            floors,
-            figures_by_row([f for f in placed if f.metric in part], lambda figure: figure.metric),
+            {k: row for k, row in floors.items() if row.keys() & part.keys()},
+            figure_cells([f for f in placed if f.metric in part], lambda f: f.metric),
             [AS_RANKED] if i else notes,
             ranked=not i,
         )
@@ -330,8 +329,8 @@ def _group_tables(
         f"{title}: {column.head} by {'view angle' if by_angle else 'kind of question'}",
         {key: replace(column, head=f"{key}°" if by_angle else plain(key)) for key in keys},
         rows,
-        floor_rows_of_groups(first, name, keys),
-        figures_by_row(used, lambda figure: str(figure.view_angle)),
+        floor_cells_of_groups(first, name, keys),
+        figure_cells(used, lambda f: str(f.view_angle)),
         [ANGLES if by_angle else KINDS, AS_RANKED],
     )
     yield table, used

@@ -5,11 +5,9 @@ from dataclasses import dataclass, replace
 
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import Score, ScoreFile, Skill
-from metrics.views.leaderboard.floors import FloorRows
 from metrics.views.paper import REPORTED, SOURCE, Figure, PaperTable
 from metrics.views.score_tables import interval_cells, score_cell
 from metrics.views.table import Cell, Row, Table, make_row
-from scenegen.common.text_table import number
 
 REPORTED_MARK, INCOMPARABLE_MARK = "†", "‡"
 ALIKE = "≈"  # stands behind scores that are not told apart from those of the first method
@@ -18,7 +16,7 @@ NOT_COMPARABLE = (
     " values that are not finite were given the worst score, or only the submission named the truth"
     " (score it again with --truth)."
 )
-FigureRows = Mapping[str, Mapping[str, Figure]]  # by the label of the row, then by the column's key
+Cells = Mapping[str, Mapping[str, Cell]]  # by the label of the row, then by the key of the column
 
 
 @dataclass(frozen=True)
@@ -53,8 +51,8 @@ def build_table(
     title: str,
     columns: Mapping[str, Column],
     entries: Sequence[Entry],
-    floors: FloorRows,
-    figures: FigureRows,
+    floors: Cells,
+    figures: Cells,
     notes: Sequence[str],
     ranked: bool = False,
 ) -> Table:
@@ -76,19 +74,24 @@ def build_table(
         )
         for rank, entry in zip(places, entries, strict=True)
     ]
-    for label, values in floors.items():
-        cells = (number(values[key]) if key in values else "-" for key in columns)
-        rows.append(make_row(["", label, *cells], "floor"))
+    for kind, cells in (("floor", floors), ("reported", figures)):
+        rows += unranked_rows(kind, cells, tuple(columns))
     notes = list(notes)
     if not all(entry.file.comparable for entry in entries):
         notes.append(NOT_COMPARABLE)
     if figures:
-        shares = all(f.labels is not None for row in figures.values() for f in row.values())
-        unit = "" if shares else "; it states no unit of length"
+        unit = "; it states no unit of length" if entries[0].file.task == "rooms" else ""
         notes.append(f"{REPORTED_MARK} {SOURCE}, {REPORTED}, so not ranked{unit}.")
-    rows += _figure_rows(figures, tuple(columns))
     head = ("#", "method", *(column.head for column in columns.values()))
     return Table(title, head, tuple(rows), tuple(notes), named_by=1)
+
+
+def unranked_rows(kind: str, cells: Cells, keys: Sequence[str]) -> list[Row]:
+    """Return a row without a rank for each label."""
+    return [
+        make_row(["", label, *(row.get(key, Cell()) for key in keys)], kind)
+        for label, row in cells.items()
+    ]
 
 
 def _ranks(entries: Sequence[Entry], key: str) -> list[str]:
@@ -129,29 +132,16 @@ def skill_column(name: str) -> Column:
     return Column(f"{metric(name).title}: skill ↑")
 
 
-def figures_by_row(
-    figures: Iterable[Figure],
-    key: Callable[[Figure], str],
-    label: Callable[[Figure], str] | None = None,
-) -> dict[str, dict[str, Figure]]:
-    """Return figures of the paper by the label of their row, then by the key of their column."""
-    rows: dict[str, dict[str, Figure]] = {}
-    for figure in figures:
-        row = rows.setdefault(f"{(label or _figure_label)(figure)} {REPORTED_MARK}", {})
-        row[key(figure)] = figure
-    return rows
-
-
-def _figure_label(figure: Figure) -> str:
-    labels = "" if figure.labels is None else f", {figure.labels} labels"
-    return f"{figure.method}, {figure.data}{labels} (Table {figure.table})"
-
-
-def _figure_rows(figures: FigureRows, keys: Sequence[str]) -> list[Row]:
-    rows = []
-    for label, row in figures.items():
-        cells = {key: Cell(f.text, f"± {f.spread}" if f.spread else "") for key, f in row.items()}
-        rows.append(make_row(["", label, *(cells.get(k, Cell()) for k in keys)], "reported"))
+def figure_cells(
+    figures: Iterable[Figure], key: Callable[[Figure], str], place: bool = True
+) -> dict[str, dict[str, Cell]]:
+    """Return figures of the paper as printed; `place` adds table and labels to the row's name."""
+    rows: dict[str, dict[str, Cell]] = {}
+    for f in figures:
+        labels = "" if f.labels is None or not place else f", {f.labels} labels"
+        table = f" (Table {f.table})" if place else ""
+        label = f"{f.method}, {f.data}{labels}{table} {REPORTED_MARK}"
+        rows.setdefault(label, {})[key(f)] = Cell(f.text, f"± {f.spread}" if f.spread else "")
     return rows
 
 
@@ -164,8 +154,7 @@ def paper_table(table: PaperTable) -> Table:
         return metric(figure.metric).title + angle + labels
 
     keys = tuple(dict.fromkeys(map(key, table.figures)))
-    figures = figures_by_row(table.figures, key, lambda figure: f"{figure.method}, {figure.data}")
+    rows = unranked_rows("reported", figure_cells(table.figures, key, place=False), keys)
     title = f"{SOURCE}, {table.kind} {table.number}: {REPORTED}. {table.caption}"
     notes = (f"{REPORTED_MARK} {REPORTED}. Unit: {table.unit}.", table.remark)
-    rows = tuple(_figure_rows(figures, keys))
-    return Table(title, ("#", "method", *keys), rows, notes, named_by=1)
+    return Table(title, ("#", "method", *keys), tuple(rows), notes, named_by=1)

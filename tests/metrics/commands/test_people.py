@@ -143,29 +143,6 @@ def test_without_scripts_the_quiz_works(visit, quiz_split, tmp_path):
     assert {one.response_seconds for one in read_answers(tmp_path / "a.db").answers} == {None}
 
 
-def test_two_answers_fit_a_phone(visit, tmp_path):
-    from iqtt.files.make import make_split
-    from iqtt.questions.specs import SplitSpec
-
-    how = {"distractors": "mirror-pair", "answers": 2, "height": 32, "width": 32}
-    spec = SplitSpec(seed=2, train=0, labeled=0, val=0, test=3, min_cube_pixels=0, **how)
-    make_split(tmp_path / "split", spec, command="tests")
-    options = ("--questions", "2", "--calibration", "1")
-    with started(tmp_path / "split", tmp_path / "a.db", *options) as (_, site):
-        seen = visit(f"http://localhost:{site.port}/", width=360)
-        seen.page.check("#consent")
-        seen.page.click("text=Start")
-        assert seen.page.locator("#answers button").count() == 2
-        sizes = [image.bounding_box()["width"] for image in seen.page.locator("img").all()]
-        assert max(sizes) - min(sizes) < 8, "size must not tell shapes apart"
-        assert seen.violations() == []
-        seen.page.goto(f"http://localhost:{site.port}/nowhere")
-        assert seen.violations() == []
-        assert len(seen.errors) == 1, "the browser logs that the page is not there"
-        seen.errors.clear()
-        seen.page.close()
-
-
 def test_a_kill_loses_no_answer_that_was_acknowledged(quiz_split, tmp_path):
     db = tmp_path / "answers.db"
     options = ("--calibration", "0", "--questions", "24")
