@@ -50,9 +50,9 @@ def main() -> None:
             make_dataset(truth, SPEC, count, command="benchmark")
             write_predictions(predictions, truth)
             rows = np.unique(np.linspace(0, count - 1, SCORED).astype(np.int64))
-            with open_predictions(predictions) as file:
+            with open_predictions(predictions) as file, RoomsFile(truth) as rooms:
                 start, cpu = time.perf_counter(), time.process_time()
-                score_rows([file], truth, rows, "none", Settings(processes=1))
+                score_rows([file], rooms, rows, Settings(processes=1))
             spent = (time.perf_counter() - start, time.process_time() - cpu)
             clock, processor = (1e3 * seconds / len(rows) for seconds in spent)
             print(f"{count:8d}  {clock:8.2f}  {processor:17.2f}", flush=True)

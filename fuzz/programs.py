@@ -28,7 +28,6 @@ TARGETS = {
         "bench leaderboard scores.json other.json answer-scores.json",
         "bench leaderboard scores.json other.json --format html --out new.html",
         "bench leaderboard answer-scores.json --format latex --no-paper",
-        "bench leaderboard scores.json other.json answer-scores.json",
     ),
     "baselines": (
         "bench baseline constant --train train.h5 --data rooms.h5 --out new.h5",

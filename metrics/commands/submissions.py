@@ -84,46 +84,37 @@ def score(
 ) -> None:
     """Score a submission, or several training runs of one method, and print a table."""
     from metrics.score_file import write_scores
-    from metrics.scoring.evaluate import count_rows
-    from metrics.scoring.evaluate import score as score_files
+    from metrics.scoring.evaluate import open_runs, score_runs
     from metrics.scoring.runs import Settings, scorer_versions
-    from metrics.submissions.reader import open_predictions
-    from metrics.submissions.truths import find_truth
+    from metrics.views.report import read_beside
     from metrics.views.score_tables import text_report, write_csv
     from scenegen.files.new_file import check_writable, write_text
 
     outputs = [Path(path) for path in (json_path, csv_path, html_path) if path]
     for path in outputs:
         check_writable(path, overwrite)
-    others: list[Any] = []
-    if beside:
-        from metrics.views.report import read_beside
-
-        if html_path is None:
-            raise click.UsageError("--beside is for the page: give --html, too")
-        others = read_beside(beside, submissions[0])
-    for name in submissions if any(path.exists() for path in outputs) else ():
-        with open_predictions(name) as predictions:
-            refuse_inputs(outputs, [find_truth(predictions, truth).path])
-    workers = settings["processes"] or 0
-    with (
-        on_scheduler(scheduler, workers, scorer_versions) as cluster,
-        progress_bar(count_rows(submissions[0]), "image") as bar,
-    ):
-        chosen = Settings(**settings, cluster=cluster)
-        found = score_files(submissions, truth, chosen, bar.update)
+    if beside and html_path is None:
+        raise click.UsageError("--beside is for the page: give --html, too")
+    with open_runs(submissions, truth) as runs:
+        refuse_inputs(outputs, [runs.truth.path])
+        others = read_beside(beside, runs.files[0]) if beside else []
+        with (
+            on_scheduler(scheduler, settings["processes"] or 0, scorer_versions) as cluster,
+            progress_bar(len(runs.files[0]), "image") as bar,
+        ):
+            scores = score_runs(runs, Settings(**settings, cluster=cluster), bar.update)
     if json_path:
-        write_scores(found, json_path, overwrite)
+        write_scores(scores, json_path, overwrite)
     if csv_path:
-        write_csv(found, csv_path, overwrite)
+        write_csv(scores, csv_path, overwrite)
     try:
         if html_path:
             from metrics.views.report import html_report
 
-            truth_path, runs = Path(found.meta.truth_path), [Path(path) for path in submissions]
-            write_text(html_path, html_report(found, truth_path, runs, others), overwrite)
+            truth_path, paths = Path(scores.meta.truth_path), [Path(path) for path in submissions]
+            write_text(html_path, html_report(scores, truth_path, paths, others), overwrite)
     finally:  # a page that cannot be made loses no score
-        click.echo(text_report(found, markdown))
+        click.echo(text_report(scores, markdown))
 
 
 @click.command(epilog=EXAMPLE + "bench validate predictions.h5 --truth rooms.h5")
@@ -141,8 +132,8 @@ def validate(ctx: click.Context, submission: str, truth: str | None) -> None:
     for problem in problems:
         print_line(f"{'hint' if problem.is_hint else 'wrong':5}  {problem}")
     wrong = sum(not problem.is_hint for problem in problems)
-    told = f"{wrong} problems" if wrong > 1 else "1 problem"
-    print_line(f"{submission}: {told if wrong else 'valid'}")
+    counted = f"{wrong} problems" if wrong > 1 else "1 problem"
+    print_line(f"{submission}: {counted if wrong else 'valid'}")
     ctx.exit(2 if wrong else 0)
 
 

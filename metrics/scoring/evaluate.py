@@ -1,19 +1,36 @@
 """`score` turns submissions into scores with intervals: start reading here."""
 
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 from metrics.scoring.questions import score_questions
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.rooms import score_rooms
 from metrics.scoring.runs import Progress, ScoringError, Settings
 from metrics.submissions.reader import (
+    Predictions,
     QuestionPredictions,
     RoomPredictions,
     open_predictions,
 )
 from metrics.submissions.truths import find_truth
+from scenegen.rooms.reader import RoomsFile
+
+if TYPE_CHECKING:
+    from iqtt.files.reader import AnswersFile
+
+
+class Runs(NamedTuple):
+    """Open submissions, which are runs of one method on one task, and their open truth.
+
+    `truth_given` says whether the person who scores named the truth, and not the submission.
+    """
+
+    files: Sequence[Predictions]
+    truth: "RoomsFile | AnswersFile"
+    truth_given: bool
 
 
 def score(
@@ -41,38 +58,54 @@ def score(
         ScoringError: the wrong truth, or a changed one; rows that are missing or unknown; values
             that are not finite; two copies of one run.
     """
-    settings = settings or Settings()
-    with ExitStack() as stack:
+    with open_runs(paths, truth) as runs:
+        return score_runs(runs, settings or Settings(), progress)
+
+
+@contextmanager
+def open_runs(paths: Sequence[str | Path], truth: str | Path | None = None) -> Iterator[Runs]:
+    """Open and check submissions and their truth for `score_runs`. Raises as `score`."""
+    with ExitStack() as opening:
         files = []
         for path in paths:
             files.append(open_predictions(path))
-            stack.callback(files[-1].close)
+            opening.enter_context(files[-1])
         _check_alike(files)
         found = find_truth(files[0], truth)
-        rooms = [file for file in files if isinstance(file, RoomPredictions)]
-        if rooms:
-            scores = score_rooms(rooms, found, settings, progress)
-        else:
-            answers = [file for file in files if isinstance(file, QuestionPredictions)]
-            scores = score_questions(answers, found, settings, progress)
-        for file in files:
-            file.require_unchanged()
-        return scores
+        opened = _opened_truth(files[0].task, found.path)
+        opening.callback(opened.close)
+        yield Runs(files, opened, found.source == "given")
 
 
-def count_rows(path: str | Path) -> int:
-    """Return how many rows a submission answers. Raises as `open_predictions`."""
-    with open_predictions(path) as predictions:
-        return len(predictions)
+def _opened_truth(task: str, path: Path) -> "RoomsFile | AnswersFile":
+    if task == "rooms":
+        return RoomsFile(path)
+    from iqtt.files.reader import AnswersFile
+
+    return AnswersFile(path)
 
 
-def _check_alike(files: Sequence[RoomPredictions | QuestionPredictions]) -> None:
+def score_runs(runs: Runs, settings: Settings, progress: Progress) -> ScoreFile:
+    """Score open submissions. Raises as `score`."""
+    truth, given = runs.truth, runs.truth_given
+    if isinstance(truth, RoomsFile):
+        rooms = [file for file in runs.files if isinstance(file, RoomPredictions)]
+        scores = score_rooms(rooms, truth, given, settings, progress)
+    else:
+        answers = [file for file in runs.files if isinstance(file, QuestionPredictions)]
+        scores = score_questions(answers, truth, given, settings, progress)
+    for file in runs.files:
+        file.require_unchanged()
+    return scores
+
+
+def _check_alike(files: Sequence[Predictions]) -> None:
     """Raise ScoringError unless the files are runs of one method on one task."""
     first = files[0]
     seen: dict[str, Path] = {}
     for file in files:
         for name in ("task", "method", "alignment"):
-            ours, theirs = (getattr(one, name, None) for one in (first, file))
+            ours, theirs = getattr(first, name), getattr(file, name)
             if ours != theirs:
                 raise ScoringError(
                     f"{file.path}: {name}",

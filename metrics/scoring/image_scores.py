@@ -1,6 +1,6 @@
 """All scores of one image: predicted depth and normals against the true ones."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -22,7 +22,7 @@ from metrics.measures.objects import counted_objects, object_means, single_objec
 from metrics.measures.relief import relief_scores
 from metrics.scoring.metric_names import OF_EMPTY_ROOM, OTHER_SCENE
 from metrics.submissions.problems import PredictionError
-from metrics.submissions.rules import depth_faults, normal_faults, refuse_faults
+from metrics.submissions.rules import Against, broken_rules, refuse_pixels
 from metrics.submissions.truths import TrueView
 from scenegen.camera import back_project, pixel_directions
 
@@ -107,16 +107,16 @@ def score_view(
     ValueError on other shapes than the truth's.
     """
     mask = truth.mask
-    faults = depth_faults(depth, mask)
+    broken = np.zeros_like(mask)
     if non_finite == "error":
-        refuse_faults(faults, PredictionError, "predicted depth")
-    broken = _any(faults, mask)
-    depth = np.where(broken, 0.0, depth)
-    if normal is not None:
-        faults = normal_faults(normal, mask)
-        if non_finite == "error":
-            refuse_faults(faults, PredictionError, "predicted normals")
-        normal = np.where(_any(faults, mask)[..., None], -truth.normal, normal)
+        refuse_pixels(PredictionError, "predicted depth", "depth", depth, mask)
+        if normal is not None:
+            refuse_pixels(PredictionError, "predicted normals", "normal", normal, mask)
+    else:
+        broken = _broken("depth", depth, mask)
+        depth = np.where(broken, 0.0, depth)
+        if normal is not None:
+            normal = np.where(_broken("normal", normal, mask)[..., None], -truth.normal, normal)
     nearest = nearest_distances_on_image(depth, truth.depth, truth.fov_y_degrees, mask)
     scores = point_scores(nearest, F_SCORE_THRESHOLDS)
     pair = compare_depth(depth, truth.depth, mask)
@@ -191,6 +191,7 @@ def _mean(angles: Array) -> float:
     return float(angles.mean()) if len(angles) else np.nan
 
 
-def _any(faults: Mapping[str, Array], mask: Array) -> Array:
-    """Return at which pixels (H, W) any rule is broken."""
-    return np.asarray(np.logical_or.reduce([np.zeros_like(mask), *faults.values()]))
+def _broken(name: str, values: Array, surface: Array) -> Array:
+    """Return at which pixels (H, W) any rule of a column is broken."""
+    wrong = [at for _, at in broken_rules(name, values, Against(surface=surface))]
+    return np.asarray(np.logical_or.reduce([np.zeros_like(surface), *wrong]))

@@ -16,13 +16,10 @@ from metrics.scoring.runs import (
     Settings,
     matched_rows,
     meta_of,
-    refuse,
     refuse_copies,
 )
 from metrics.scoring.truth_digests import answers_digest
-from metrics.submissions.missing_rows import candidate_problems
 from metrics.submissions.reader import QuestionPredictions
-from metrics.submissions.truths import FoundTruth
 from scenegen.common.errors import FileFormatError
 
 if TYPE_CHECKING:
@@ -34,39 +31,39 @@ ANGLE_BINS = (0, 30, 60, 90, 120, 150, 180)  # degrees, of IQTT's rotations
 
 
 def score_questions(
-    files: Sequence[QuestionPredictions], found: FoundTruth, settings: Settings, progress: Progress
+    files: Sequence[QuestionPredictions],
+    truth: "AnswersFile",
+    truth_given: bool,
+    settings: Settings,
+    progress: Progress,
 ) -> ScoreFile:
-    """Score runs of one method on a file of answers; raises as `evaluate.score`."""
-    from iqtt.files.reader import AnswersFile
+    """Score runs of one method on an open file of answers; raises as `evaluate.score`."""
     from iqtt.questions.specs import question_kind
 
-    with AnswersFile(found.path) as truth:
-        names = ("answers", *(LABELS if truth.has_truth else ()))
-        columns = {name: np.asarray(truth.read(name, slice(None))) for name in names}
-        fingerprint, candidates = truth.fingerprint, truth.answers
-        if truth.has_truth:
-            _check_kinds(truth, columns["distractor_kind"], columns["answers"])
-        digest = answers_digest(truth, columns)
-        shape = _shapes(truth)
+    names = ("answers", *(LABELS if truth.has_truth else ()))
+    columns = {name: np.asarray(truth.read(name, slice(None))) for name in names}
+    if truth.has_truth:
+        _check_kinds(truth, columns["distractor_kind"], columns["answers"])
+    digest = answers_digest(truth, columns)
+    rows = matched_rows(files, truth, settings.allow_partial)
     true = columns["answers"].astype(np.int64)
-    rows = matched_rows(files, found.path, fingerprint, len(true), settings.allow_partial)
-    for file in files:
-        refuse(file.path, candidate_problems(file, candidates))
     refuse_copies(files, lambda i, j: _same(files[i], files[j]))
     answers = np.full((len(files), len(true)), ABSTAINED)
     for run, file in zip(answers, files, strict=True):
         run[file.rows] = file.answers
     right = (answers == true)[:, rows].astype(np.float64)
     progress(len(rows))
+    fingerprint = truth.fingerprint
     if not fingerprint:  # that of a truth that has none is SHA-256 of its answers
         fingerprint = hashlib.sha256(true.astype(np.uint8).tobytes()).hexdigest()
     counts = {
         "questions_in_truth": len(true),
-        "answers": candidates,
+        "answers": truth.answers,
         "abstained": int(np.count_nonzero(answers[:, rows] == ABSTAINED)),
     }
-    meta = meta_of(files, found, fingerprint, digest, settings, counts)
-    shapes = rows if shape is None else shape[rows]
+    meta = meta_of(files, truth, truth_given, fingerprint, digest, settings, counts)
+    of_reference = _shapes(truth)
+    shapes = rows if of_reference is None else of_reference[rows]
 
     def grouped(labels: Array) -> dict[str, AnswerGroup]:
         return _answer_groups(right, shapes, labels, Bootstrap(meta.seed, meta.resamples))
@@ -79,7 +76,7 @@ def score_questions(
         groups["by_distractor"] = grouped(np.array([question_kind(row) for row in kinds.tolist()]))
         groups["by_rotation_angle"] = grouped(spans[bins])
     items = {"question": rows, ACCURACY: right}
-    if shape is not None:
+    if of_reference is not None:
         items["shape"] = shapes
     return ScoreFile("iqtt", files[0].method, "none", items, meta, answer_groups=groups)
 

@@ -16,13 +16,11 @@ from metrics.scoring.runs import (
     Settings,
     matched_rows,
     meta_of,
-    refuse,
     refuse_copies,
 )
 from metrics.scoring.truth_digests import rooms_digest
-from metrics.submissions.missing_rows import size_problems
 from metrics.submissions.reader import RoomPredictions
-from metrics.submissions.truths import FoundTruth, read_true_view
+from metrics.submissions.truths import read_true_view
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
@@ -32,20 +30,19 @@ IDS_SHOWN = 8
 
 
 def score_rooms(
-    files: Sequence[RoomPredictions], found: FoundTruth, settings: Settings, progress: Progress
+    files: Sequence[RoomPredictions],
+    truth: RoomsFile,
+    truth_given: bool,
+    settings: Settings,
+    progress: Progress,
 ) -> ScoreFile:
-    """Score runs of one method on a rooms file; raises as `evaluate.score`."""
-    with RoomsFile(found.path) as truth:
-        count, fingerprint = len(truth), truth.fingerprint
-        for file in files:
-            refuse(file.path, size_problems(file, truth))
-    rows = matched_rows(files, found.path, fingerprint, count, settings.allow_partial)
+    """Score runs of one method on an open rooms file; raises as `evaluate.score`."""
+    rows = matched_rows(files, truth, settings.allow_partial)
     for file in files:
         if file.has_normals != files[0].has_normals:
             told, expected = ("normals", "none") if file.has_normals else ("none", "normals")
             raise ScoringError(f"{file.path}: normal", told, f"{expected} as in {files[0].path}")
-    alignment = files[0].alignment
-    scored = score_rows(files, found.path, rows, alignment, settings, progress)
+    scored = score_rows(files, truth, rows, settings, progress)
     scores, bad = scored.scores, scored.bad
     if bad and settings.non_finite == "error":
         first = next(iter(bad.values()))
@@ -58,18 +55,17 @@ def score_rooms(
         return all(np.array_equal(x[i], x[j], equal_nan=True) for x in scores.values())
 
     refuse_copies(files, alike)
-    with RoomsFile(found.path) as truth:
-        digest = rooms_digest(truth, scored.digests)
-        scene = truth.read("scene_index", slice(None))
-        view = truth.read("view_index", slice(None))
-        angle = view_angles(scene, view, truth.read("camera/world_from_camera", slice(None)))[rows]
-        shape = object_shapes(truth, scored.objects["row"], scored.objects["object"])
-        floors = _mean_noise_floors(truth, rows)
-        counts = {
-            "rows_in_truth": count,
-            "rows_penalised": len(bad),
-            "pixels": truth.spec.height * truth.spec.width,
-        }
+    digest = rooms_digest(truth, scored.digests)
+    scene = truth.read("scene_index", slice(None))
+    view = truth.read("view_index", slice(None))
+    angle = view_angles(scene, view, truth.read("camera/world_from_camera", slice(None)))[rows]
+    shape = object_shapes(truth, scored.objects["row"], scored.objects["object"])
+    floors = _mean_noise_floors(truth, rows)
+    counts = {
+        "rows_in_truth": len(truth),
+        "rows_penalised": len(bad),
+        "pixels": truth.spec.height * truth.spec.width,
+    }
     items = {
         "row": rows,
         "scene_index": scene[rows],
@@ -79,9 +75,9 @@ def score_rooms(
         **{EMPTY_ROOM + name: column for name, column in scored.floors.items()},
     }
     objects = {name: scored.objects[name] for name in (*OBJECT_COLUMNS, *OBJECT_SCORES)}
-    meta = meta_of(files, found, fingerprint, digest, settings, counts, floors)
+    meta = meta_of(files, truth, truth_given, truth.fingerprint, digest, settings, counts, floors)
     return ScoreFile(
-        "rooms", files[0].method, alignment, items, meta, {**objects, SHAPE_COLUMN: shape}
+        "rooms", files[0].method, files[0].alignment, items, meta, {**objects, SHAPE_COLUMN: shape}
     )
 
 

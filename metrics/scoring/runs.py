@@ -5,7 +5,7 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,16 @@ from numpy.typing import NDArray
 from metrics.measures.statistics import RESAMPLES
 from metrics.scoring.image_scores import NonFinite
 from metrics.scoring.records import Meta, Submission
-from metrics.submissions.missing_rows import match_problems
 from metrics.submissions.problems import Problem, first_error
 from metrics.submissions.reader import Predictions
-from metrics.submissions.truths import FoundTruth
+from metrics.submissions.truths import match_problems
 from scenegen.common.errors import SceneGenError
 from scenegen.files.cluster import Cluster
 from scenegen.files.row_file import writer_name
+from scenegen.rooms.reader import RoomsFile
+
+if TYPE_CHECKING:
+    from iqtt.files.reader import AnswersFile
 
 Array = NDArray[Any]
 Progress = Callable[[int], Any]
@@ -61,25 +64,21 @@ def _releases() -> dict[str, str]:
 
 
 def matched_rows(
-    files: Sequence[Predictions],
-    truth_path: Path,
-    fingerprint: str | None,
-    count: int,
-    partial: bool,
+    files: Sequence[Predictions], truth: "RoomsFile | AnswersFile", partial: bool
 ) -> Array:
     """Return the rows of the truth that all files answer, in ascending order.
 
     Raises ScoringError for another truth, unknown rows, and missing ones unless `partial`.
     """
-    rows = np.arange(count)
+    rows = np.arange(len(truth))
     for file in files:
-        problems = match_problems(file, truth_path, fingerprint, count)
+        problems = match_problems(file, truth)
         if partial:
             problems = [problem for problem in problems if problem.rule != "complete"]
         refuse(file.path, problems)
         rows = np.intersect1d(rows, file.rows)
     if not rows.size:
-        raise ScoringError(files[0].path, "no row that all runs answer", f"rows of {truth_path}")
+        raise ScoringError(files[0].path, "no row that all runs answer", f"rows of {truth.path}")
     return rows
 
 
@@ -101,7 +100,8 @@ def refuse_copies(files: Sequence[Predictions], same: Callable[[int, int], Any])
 
 def meta_of(
     files: Sequence[Predictions],
-    truth: FoundTruth,
+    truth: "RoomsFile | AnswersFile",
+    truth_given: bool,
     fingerprint: str,
     digest: str,
     settings: Settings,
@@ -114,7 +114,7 @@ def meta_of(
         truth_fingerprint=fingerprint,
         truth_path=str(truth.path),
         truth_digest=digest,
-        truth_given=truth.source == "given",
+        truth_given=truth_given,
         submissions=tuple(Submission(str(file.path), file.sha256, file.run) for file in files),
         writer=writer_name(),
         versions=_releases(),

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from pydantic import ConfigDict
 
-from metrics.submissions.layout import ATTRIBUTES, MOST_ROWS, text_fault
+from metrics.submissions.layout import ATTRIBUTES, text_fault
 from metrics.submissions.problems import JsonError, Problem, first_ids
-from metrics.submissions.rules import Ids, answer_problems, id_problems
+from metrics.submissions.rules import MOST_ROWS, Ids, value_problems
 from metrics.submissions.strict_json import (
     parse_json,
     read_bytes,
@@ -52,12 +52,12 @@ def read_answers(path: Path) -> tuple[dict[str, str], Ids, Ids, list[Problem]]:
             raise JsonError("", f"the scores of a submission: {ADVICE}", "a submission")
         if not isinstance(content, dict) or "answers" not in content:
             content = {"answers": content}
-        found = validated(NamedAnswers, {"method": path.stem, **content})
-        ids, answers = _pairs(found.answers)
+        submission = validated(NamedAnswers, {"method": path.stem, **content})
+        ids, answers = _pairs(submission.answers)
     except JsonError as error:
         what = f"{error.where}: {error.found}" if error.where else error.found
         return {}, nothing, nothing, [Problem("file", "JSON", error.expected, what)]
-    texts = {name: getattr(found, name) for name in ("method", "run", "notes")}
+    texts = {name: getattr(submission, name) for name in ("method", "run", "notes")}
     problems = [
         Problem(a.name, "value", fault[1], fault[0])
         for a in ATTRIBUTES
@@ -70,7 +70,7 @@ def read_answers(path: Path) -> tuple[dict[str, str], Ids, Ids, list[Problem]]:
         at = first_ids(int(ids[i]) for i, good in enumerate(whole) if not good)
         return texts, nothing, nothing, [*problems, Problem("answers", "type", _EXPECTED, what, at)]
     numbers = np.array(answers, np.int64)
-    problems += id_problems(ids, "answers") or answer_problems(numbers, ids, "answers")
+    problems += value_problems("question", ids, ids) or value_problems("answer", numbers, ids)
     return texts, ids, numbers, problems
 
 

@@ -5,7 +5,6 @@ whole, pixels not at all.
 """
 
 import itertools
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,12 +12,22 @@ from typing import Any
 import h5py
 import numpy as np
 
-from metrics.measures.answers import CANDIDATES, answers_from_scores
-from metrics.submissions import layout, rules
+from metrics.measures.answers import answers_from_scores
+from metrics.submissions import layout
 from metrics.submissions.problems import Problem
+from metrics.submissions.rules import (
+    Against,
+    Array,
+    Ids,
+    array_problem,
+    as_doubles,
+    kind_text,
+    shape_text,
+    value_problems,
+)
 from scenegen.common.errors import FileFormatError
-from scenegen.description.specs import MAX_PIXELS
 from scenegen.files.input_file import Fault, StoredArray, faults, reading, slab_bytes
+from scenegen.files.schema import Column
 
 CHUNK_SLOTS = 10_007
 LEAST_CACHE = 1 << 20
@@ -33,104 +42,72 @@ class Inspection:
         texts: its root attributes.
         task: None where it is neither of the two.
         ids: (M,) int64, rows of the truth or indices of questions; None where they are unusable.
-        found: the datasets that can be used, by name.
+        arrays: the data sets that can be used, by name.
         answers: (M,) int64, of an iqtt submission; None where they are unusable.
     """
 
     texts: dict[str, str] = field(default_factory=dict)
     task: str | None = None
-    ids: rules.Ids | None = None
-    found: dict[str, StoredArray] = field(default_factory=dict)
-    answers: rules.Ids | None = None
+    ids: Ids | None = None
+    arrays: dict[str, StoredArray] = field(default_factory=dict)
+    answers: Ids | None = None
     problems: list[Problem] = field(default_factory=list)
 
 
 def inspect(file: h5py.File) -> Inspection:
     """Check attributes, layout, ids and answers of an open file; never raise on its content."""
     result = Inspection()
-    result.texts, result.problems = read_texts(file)
+    _take_texts(file, result)
     result.task = result.texts.get("task")
     if result.task is None:
         return result
-    count, all_faults = None, list(faults(file))
-    for fault in all_faults:
+    file_faults = list(faults(file))
+    for fault in file_faults:
         if fault.rule == "count":  # the objects after these were not looked at
             result.problems.append(Problem("file", fault.rule, fault.expected, fault.found))
             return result
-    for dataset in layout.datasets(result.task):
-        item, problems = open_dataset(file, dataset, count, all_faults)
-        result.problems += problems
-        if item is not None:
-            result.found[dataset.name] = item
-            count = int(item.shape[0]) if dataset.name in layout.ID_NAMES.values() else count
-    if result.task == "iqtt":
-        known = {problem.dataset for problem in result.problems} | set(result.found)
-        if not {"answer", "scores"} & known:
-            found = f"neither; found {names(file)}"
-            result.problems.append(Problem("answer", "present", "answer, or scores", found))
+    _take_arrays(file, result, layout.COLUMNS[result.task], file_faults)
     _take_ids(result, layout.ID_NAMES[result.task])
     if result.task == "iqtt" and result.ids is not None:
         _take_answers(result, result.ids)
     return result
 
 
-def read_texts(file: h5py.File) -> tuple[dict[str, str], list[Problem]]:
-    """Return the root attributes that are as they should be, and what is wrong with the others.
+# ---- root attributes ----
 
-    If the file has another format or version, that is the only problem returned.
+
+def _take_texts(file: h5py.File, result: Inspection) -> None:
+    """Take the root attributes that are as they should be, and what is wrong with the others.
+
+    If the file has another format or version, that alone is told.
     """
-    wrong = _format_problem(file)
-    if wrong is not None:
-        return {}, [wrong]
-    read = {attribute.name: _checked(file, attribute) for attribute in layout.ATTRIBUTES}
-    task = read["task"] if isinstance(read["task"], str) else None
-    theirs = layout.ATTRIBUTES if task is None else layout.attributes(task)
-    found = {attribute.name: read[attribute.name] for attribute in theirs}
-    texts = {name: text for name, text in found.items() if isinstance(text, str)}
-    problems = [problem for problem in found.values() if isinstance(problem, Problem)]
-    if task == "rooms" and texts.get("truth_fingerprint") == "":
+    texts: dict[str, str | None] = {}
+    for attribute in layout.ATTRIBUTES:
+        text = _text(file, attribute)
+        if not isinstance(text, Problem):
+            texts[attribute.name] = text
+        elif attribute.name in ("format", "format_version"):
+            result.problems = [text]
+            return
+        elif texts.get("task") is None or str(texts["task"]) in attribute.tasks:
+            result.problems.append(text)
+    tasks = (texts["task"],) if texts.get("task") else layout.TASKS
+    kept = {a.name for a in layout.ATTRIBUTES if set(tasks) & set(a.tasks)}
+    result.texts = {name: text for name, text in texts.items() if text is not None and name in kept}
+    if texts.get("task") == "rooms" and texts.get("truth_fingerprint") == "":
         expected = "the attribute 'fingerprint' of the rooms file"
-        problems.append(Problem("truth_fingerprint", "value", expected, "an empty text"))
-    return texts, problems
+        result.problems.append(Problem("truth_fingerprint", "value", expected, "an empty text"))
 
 
-def _format_problem(file: h5py.File) -> Problem | None:
-    head = {}
-    for attribute in layout.ATTRIBUTES[:2]:
-        text = _read(file, attribute.name)
-        if isinstance(text, Problem):
-            return text
-        head[attribute.name] = text
-    name, version = head["format"], head["format_version"]
-    if name is None:
-        return Problem("format", "present", repr(layout.FORMAT_NAME), "no such root attribute")
-    if name != layout.FORMAT_NAME:
-        kind = layout.DATA_FORMATS.get(name)
-        what = f", a file of {kind}, not a submission" if kind else ""
-        return Problem("format", "value", repr(layout.FORMAT_NAME), f"{name!r:.60}{what}")
-    major = layout.FORMAT_VERSION.split(".", maxsplit=1)[0]
-    if version is None or version.split(".", maxsplit=1)[0] != major:
-        found = "no such root attribute" if version is None else f"version {version!r:.20}"
-        return Problem("format_version", "value", f"{major}.x", found)
-    return None
-
-
-def _checked(file: h5py.File, attribute: layout.Attribute) -> str | Problem | None:
-    """Return a root attribute; None where there is none and none is needed."""
-    text = _read(file, attribute.name)
-    if isinstance(text, str):
-        fault = layout.text_fault(attribute, text)
-        return text if fault is None else Problem(attribute.name, "value", fault[1], fault[0])
-    if text is None and attribute.required:
-        return Problem(attribute.name, "present", attribute.meaning, "no such root attribute")
-    return text
-
-
-def _read(file: h5py.File, name: str) -> str | Problem | None:
+def _text(file: h5py.File, attribute: layout.Attribute) -> str | Problem | None:
+    """Return a root attribute, or what is wrong with it; None where it may be missing."""
+    name = attribute.name
     try:
         with reading(name):
             if name not in file.attrs:
-                return None
+                expected = " or ".join(map(repr, attribute.choices)) or attribute.meaning
+                missing = Problem(name, "present", expected, "no such root attribute")
+                return missing if attribute.required else None
             stored = file.attrs.get_id(name)
             if stored.shape != () or h5py.check_string_dtype(stored.dtype) is None:
                 return Problem(name, "type", "a text", f"{stored.dtype} of shape {stored.shape}")
@@ -138,83 +115,91 @@ def _read(file: h5py.File, name: str) -> str | Problem | None:
     except FileFormatError as error:
         return _unreadable(name, "a text", error)
     try:
-        return value.decode() if isinstance(value, bytes) else str(value)
+        text = value.decode() if isinstance(value, bytes) else str(value)
     except UnicodeDecodeError:
         return Problem(name, "type", "a text", "bytes that are not UTF-8")
+    fault = layout.text_fault(attribute, text)
+    if fault is None:
+        return text
+    kind = layout.DATA_FORMATS.get(text) if name == "format" else None
+    what = f", a file of {kind}, not a submission" if kind else ""
+    return Problem(name, "value", fault[1], fault[0] + what)
 
 
 def _unreadable(name: str, expected: str, error: FileFormatError) -> Problem:
     return Problem(name, "readable", expected, str(error).removeprefix(f"{name}: "))
 
 
-def open_dataset(
-    file: h5py.File, dataset: layout.Dataset, count: int | None, faults: Sequence[Fault]
-) -> tuple[StoredArray | None, list[Problem]]:
-    """Open a dataset that should have `count` rows, or any number if that is None.
+# ---- data sets ----
 
-    `faults` are those of the whole file. Returns None with what is wrong with it, or without a
-    problem where it is not there and need not be.
-    """
-    name = dataset.name
+
+def _take_arrays(
+    file: h5py.File, result: Inspection, columns: Sequence[Column], file_faults: Sequence[Fault]
+) -> None:
+    """Open the data sets of the layout that can be used; all have as many rows as the first."""
+    count: int | None = None
+    sizes: dict[str, tuple[int, ...]] = dict(layout.SIZES)
+    for column in columns:
+        array, problems = _opened(file, column, count, sizes, file_faults)
+        result.problems += problems
+        if array is None:
+            continue
+        result.arrays[column.name] = array
+        if column is columns[0]:
+            count = array.shape[0]
+        for axis, size in zip(column.axes or (), array.shape[1:], strict=True):
+            sizes[axis] = (size,)
+    told = {problem.dataset for problem in result.problems} | set(result.arrays)
+    if result.task == "iqtt" and not {"answer", "scores"} & told:
+        found = f"neither; found {_names(file)}"
+        result.problems.append(Problem("answer", "present", "answer, or scores", found))
+
+
+def _opened(
+    file: h5py.File,
+    column: Column,
+    count: int | None,
+    sizes: dict[str, tuple[int, ...]],
+    file_faults: Sequence[Fault],
+) -> tuple[StoredArray | None, list[Problem]]:
+    """Open a data set; None with what is wrong with it, or where it may be missing."""
+    name = column.name
     try:
         with reading(name):
-            link = file.get(name, getlink=True)
-            if link is None:
-                expected = f"{dataset.shown_shape} {dataset.kind}"
-                found = f"no such dataset; found {names(file)}"
-                missing = Problem(name, "present", expected, found)
-                return None, [missing] if dataset.required else []
-            own = [fault for fault in faults if fault.name == name]
-            problems = [Problem(name, f.rule, f.expected, f.found) for f in own]
-            if not any(problem.rule == "link" for problem in problems):
-                problems = _problems(file[name], dataset, count) or problems
-            return None if problems else _open_with_cache(file, name), problems
+            if file.get(name, getlink=True) is None:
+                expected = f"{shape_text(column, None, layout.SIZES)} {kind_text(column)}"
+                found = f"no such dataset; found {_names(file)}"
+                needed = layout.NEEDED.get(name) == ""
+                return None, [Problem(name, "present", expected, found)] if needed else []
+            problems = [
+                Problem(name, fault.rule, fault.expected, fault.found)
+                for fault in file_faults
+                if fault.name == name
+            ]
+            if any(problem.rule == "link" for problem in problems):
+                return None, problems
+            problem = _item_problem(file[name], column, count, sizes)
+            problems = [problem] if problem else problems
+            return None if problems else _with_cache(file, name), problems
     except FileFormatError as error:
-        return None, [_unreadable(name, dataset.kind, error)]
+        return None, [_unreadable(name, kind_text(column), error)]
 
 
-def names(file: h5py.File) -> str:
+def _item_problem(
+    item: Any, column: Column, count: int | None, sizes: dict[str, tuple[int, ...]]
+) -> Problem | None:
+    if isinstance(item, h5py.Dataset):
+        return array_problem(column, item, count, sizes)
+    return Problem(column.name, "type", "a dataset", f"a {type(item).__name__.lower()}")
+
+
+def _names(file: h5py.File) -> str:
     """Return the names of the first few objects in a file, for a message."""
     first = [f"{name!r:.40}" for name in itertools.islice(file, 9)]
     return ", ".join(first[:8] + ["..."] * (len(first) > 8)) or "none at all"
 
 
-def _problems(item: Any, dataset: layout.Dataset, count: int | None) -> list[Problem]:
-    """Return what is wrong with type and shape."""
-    name = dataset.name
-    if not isinstance(item, h5py.Dataset):
-        return [Problem(name, "type", "a dataset", f"a {type(item).__name__.lower()}")]
-    problems = []
-    if item.dtype.kind not in dataset.kinds:
-        problems.append(Problem(name, "type", dataset.kind, f"type {_type_name(item.dtype)}"))
-    shape: tuple[int, ...] = item.shape or ()
-    if not _fits(shape, dataset):
-        problems.append(Problem(name, "shape", dataset.shown_shape, f"shape {item.shape}"))
-    elif count is not None and shape[0] != count:
-        problems.append(Problem(name, "count", f"{count}, one for each id", f"{shape[0]} rows"))
-    elif shape[0] > layout.MOST_ROWS:
-        problems.append(Problem(name, "count", f"at most {layout.MOST_ROWS:,}", f"{shape[0]} rows"))
-    elif math.prod(shape[1:3]) > MAX_PIXELS:
-        found = f"images of {shape[1]}x{shape[2]}"
-        problems.append(Problem(name, "shape", f"at most {MAX_PIXELS:,} pixels", found))
-    return problems
-
-
-def _fits(shape: tuple[int, ...], dataset: layout.Dataset) -> bool:
-    """Return whether a shape has the right axes; only the first one may be empty."""
-    sizes = shape[1:]
-    if not shape or len(sizes) != len(dataset.shape) or 0 in sizes:
-        return False
-    pairs = zip(dataset.shape, sizes, strict=True)
-    return all(
-        size in CANDIDATES
-        if expected == layout.TWO_OR_THREE
-        else isinstance(expected, str) or size == expected
-        for expected, size in pairs
-    )
-
-
-def _open_with_cache(file: h5py.File, name: str) -> StoredArray:
+def _with_cache(file: h5py.File, name: str) -> StoredArray:
     """Open a dataset so that chunks of many rows are not unpacked anew for each of them.
 
     It must not be open already: an open dataset keeps the cache that it has.
@@ -227,16 +212,11 @@ def _open_with_cache(file: h5py.File, name: str) -> StoredArray:
     return StoredArray(h5py.Dataset(h5py.h5d.open(file.id, name.encode(), access)))
 
 
-def _type_name(dtype: np.dtype[Any]) -> str:
-    if h5py.check_string_dtype(dtype) is not None:
-        return "text"
-    if h5py.check_ref_dtype(dtype) is not None:
-        return "reference"
-    return "compound" if dtype.names else str(dtype)
+# ---- ids and answers ----
 
 
 def _take_ids(result: Inspection, name: str) -> None:
-    values = _taken(result, name, "integers", lambda item: item[()])
+    values = _values(result, name, lambda array: array[()])
     if values is None:
         return
     if values.dtype == np.uint64 and values.size and values.max() > np.iinfo(np.int64).max:
@@ -244,34 +224,29 @@ def _take_ids(result: Inspection, name: str) -> None:
         result.problems.append(Problem(name, "range", "rows of the truth", found))
         return
     ids = values.astype(np.int64)
-    result.problems += rules.id_problems(ids, name)
+    result.problems += value_problems(name, ids, ids)
     result.ids = ids if len(ids) else None
 
 
-def _take_answers(result: Inspection, ids: rules.Ids) -> None:
+def _take_answers(result: Inspection, ids: Ids) -> None:
     """Read the answers, and those that follow from scores, which must agree."""
     before = len(result.problems)
-    answers = _taken(result, "answer", "numbers", lambda item: item[()])
+    of_scores = _values(result, "scores", lambda scores: _answers(result, scores, ids))
+    answers = _values(result, "answer", lambda array: array[()])
     if answers is not None:
-        result.problems += rules.answer_problems(answers, ids)
-        answers = answers.astype(np.int64)
-    from_scores = None
+        usable = of_scores if len(result.problems) == before else None
+        result.problems += value_problems("answer", answers, ids, Against(of_scores=usable))
     if len(result.problems) == before:
-        from_scores = _taken(result, "scores", "numbers", lambda item: _answers(result, item, ids))
-    if len(result.problems) > before:
-        return
-    if answers is not None and from_scores is not None:
-        result.problems += rules.agreement_problems(answers, from_scores, ids)
-    result.answers = from_scores if answers is None else answers
+        result.answers = of_scores if answers is None else answers.astype(np.int64)
 
 
-def _answers(result: Inspection, scores: StoredArray, ids: rules.Ids) -> rules.Ids:
+def _answers(result: Inspection, scores: StoredArray, ids: Ids) -> Ids:
     """Return the answers (M,) of scores (M, A), up to the first score that is not finite."""
     answers = np.empty(len(ids), np.int64)
     for start in range(0, len(ids), BLOCK_ROWS):
         rows = slice(start, start + BLOCK_ROWS)
-        block = rules.as_doubles(scores[rows])
-        problems = rules.score_problems(block, ids[rows])
+        block = as_doubles(scores[rows])
+        problems = value_problems("scores", block, ids[rows])
         result.problems += problems
         if problems:
             break
@@ -279,13 +254,11 @@ def _answers(result: Inspection, scores: StoredArray, ids: rules.Ids) -> rules.I
     return answers
 
 
-def _taken(
-    result: Inspection, name: str, expected: str, read: Callable[[StoredArray], rules.Array]
-) -> rules.Array | None:
-    """Return what `read` makes of a dataset; None where there is none, or it is damaged."""
+def _values(result: Inspection, name: str, read: Callable[[StoredArray], Array]) -> Array | None:
+    """Return what `read` makes of a data set; None where there is none, or it is damaged."""
     try:
         with reading(name):
-            return read(result.found[name]) if name in result.found else None
+            return read(result.arrays[name]) if name in result.arrays else None
     except FileFormatError as error:
-        result.problems.append(_unreadable(name, expected, error))
+        result.problems.append(_unreadable(name, "numbers", error))
         return None

@@ -6,14 +6,13 @@ from typing import Any, get_args
 
 from metrics.measures.answers import CANDIDATES
 from metrics.measures.depth import Alignment
+from metrics.submissions.rules import RULES, kind_text, shape_text
 from scenegen.files.schema import Column
 
 FORMAT_NAME = "pix2shape-bench/predictions"
-FORMAT_VERSION = "1.1"
+FORMAT_VERSION = "1.0"
 TASKS = ("rooms", "iqtt")
-TWO_OR_THREE = " or ".join(map(str, CANDIDATES))  # the size of an axis with one entry an answer
 ALIGNMENTS: tuple[str, ...] = get_args(Alignment)
-MOST_ROWS = 10_000_000
 LONGEST_NAME = 200  # characters of method and run, which tables and file names repeat
 LONGEST_TEXT = 10_000
 DATA_FORMATS = {"pix2shape-bench/rooms": "rooms", "pix2shape-bench/iqtt": "questions"}
@@ -33,61 +32,9 @@ class Attribute:
     longest: int = LONGEST_TEXT
 
 
-@dataclass(frozen=True)
-class Dataset:
-    """A dataset with one entry for each of the M rows.
-
-    Attributes:
-        shape: of an entry; H and W are the height and width of the truth's images, `TWO_OR_THREE`
-            how many answers its questions offer.
-        kinds: NumPy kinds that a reader accepts: "iu" or "f".
-        dtype: the type that our writer stores.
-    """
-
-    task: str
-    name: str
-    shape: tuple[str | int, ...]
-    kinds: str
-    dtype: str
-    unit: str
-    frame: str
-    meaning: str
-    required: bool = True
-
-    @property
-    def kind(self) -> str:
-        """The kinds in words."""
-        return "integers" if self.kinds == "iu" else "floats"
-
-    @property
-    def shown_shape(self) -> str:
-        """The whole shape, such as (M, H, W, 3)."""
-        return f"({', '.join(['M', *map(str, self.shape)])}{'' if self.shape else ','})"
-
-    def column(self, height: int = 0, width: int = 0) -> Column:
-        """Return the column that our writer stores for images of this size."""
-        sizes: dict[str | int, int] = {"H": height, "W": width}
-        shape = tuple(sizes[s] if isinstance(s, str) else s for s in self.shape)
-        more = {"shape": self.shown_shape}
-        return Column(
-            self.name, shape, self.dtype, self.unit, self.frame, self.meaning,
-            own_chunk=len(shape) > 1, more=more,
-        )  # fmt: skip
-
-    @property
-    def attributes(self) -> dict[str, Any]:
-        """The HDF5 attributes that our writer gives it."""
-        return {
-            "unit": self.unit,
-            "frame": self.frame,
-            "shape": self.shown_shape,
-            "meaning": self.meaning,
-        }
-
-
 ATTRIBUTES = (
     Attribute("format", "what the file is", choices=(FORMAT_NAME,)),
-    Attribute("format_version", f"version of this layout; 1.x is read ({FORMAT_VERSION} now)"),
+    Attribute("format_version", "version of this layout", choices=(FORMAT_VERSION,)),
     Attribute("task", "what is predicted", choices=TASKS),
     Attribute("method", "name of the method; tables show it", longest=LONGEST_NAME),
     Attribute("run", "which training run, such as its seed: runs of one method are averaged",
@@ -102,29 +49,31 @@ ATTRIBUTES = (
     Attribute("writer", "the program that wrote the file", required=False, may_be_empty=True),
     Attribute("notes", "anything else", required=False, may_be_empty=True),
 )  # fmt: skip
-DATASETS = (
-    Dataset("rooms", "row", (), "iu", "int64", "1", "-", "row of the truth file; in any order"),
-    Dataset("rooms", "depth", ("H", "W"), "f", "float32", "scene unit", "camera",
-            "planar depth, -z in the camera frame (not the distance along the ray), of the ray"
-            " through the pixel's centre; finite in float32 wherever the truth shows a surface, and"
-            " above 0 to lie in front of the camera"),
-    Dataset("rooms", "normal", ("H", "W", 3), "f", "float32", "1", "camera",
-            "surface normal, x right, y up, z towards the viewer; faces the viewer; of any length"
-            " but 0 wherever the truth has a normal", required=False),
-    Dataset("iqtt", "question", (), "iu", "int64", "1", "-", "index in the test file; any order"),
-    Dataset("iqtt", "answer", (), "iu", "int8", "1", "-",
-            "which of the answers shows the reference, from 0; -1 abstains, which counts as wrong",
-            required=False),
-    Dataset("iqtt", "scores", (TWO_OR_THREE,), "f", "float64", "1", "-",
-            "one for each answer; the highest wins, a tie for it counts as an abstention; if"
-            " `answer` is there too, both must say the same", required=False),
-)  # fmt: skip
+COLUMNS = {
+    "rooms": (
+        Column("row", (), "int64", meaning="row of the truth file; in any order"),
+        Column("depth", (), "float32", "scene unit", "camera",
+               "planar depth, -z in the camera frame (not the distance along the ray), of the ray"
+               " through the pixel's centre; above 0 to lie in front of the camera",
+               ("y", "x"), own_chunk=True),
+        Column("normal", (), "float32", "1", "camera",
+               "surface normal, x right, y up, z towards the viewer; faces the viewer; of any"
+               " length but 0", ("y", "x", "xyz"), own_chunk=True),
+    ),
+    "iqtt": (
+        Column("question", (), "int64", meaning="index in the test file; in any order"),
+        Column("answer", (), "int8",
+               meaning="which of the answers shows the reference, from 0; -1 abstains, which"
+               " counts as wrong"),
+        Column("scores", (), "float64",
+               meaning="one for each answer; the highest wins, a tie for it counts as an"
+               " abstention; if `answer` is there too, both must say the same", axes=("answer",)),
+    ),
+}  # fmt: skip
+NEEDED = {"row": "", "depth": "", "question": "", "answer": "this, or both; ",
+          "scores": "this, or both; "}  # fmt: skip
+SIZES = {"xyz": (3,), "answer": CANDIDATES}  # of axes that are alike in all files
 ID_NAMES = {"rooms": "row", "iqtt": "question"}
-
-
-def datasets(task: str) -> tuple[Dataset, ...]:
-    """Return the datasets of a task's submissions."""
-    return tuple(dataset for dataset in DATASETS if dataset.task == task)
 
 
 def attributes(task: str) -> tuple[Attribute, ...]:
@@ -164,11 +113,10 @@ def describe_format() -> str:
     ]
     for task, subject in (("rooms", "images"), ("iqtt", "questions")):
         lines += ["", f"Datasets for task {task!r}, M {subject}:"]
-        lines += [_describe_dataset(dataset) for dataset in datasets(task)]
+        lines += [_describe_column(column) for column in COLUMNS[task]]
     lines += [
         "",
-        "Rows may come in any order, each once; all rows of the truth are scored, so a missing one"
-        " is an error.",
+        "Each row of the truth comes once; all are scored, so a missing one is an error.",
         "A submission is one file: links and data outside it are refused, and so are datasets of"
         " which a part was never written.",
         "Datasets are compressed by gzip or lzf, with or without shuffle and fletcher32, or not at"
@@ -180,7 +128,7 @@ def describe_format() -> str:
         "Depth is planar. If a network gives distance along the ray, divide it by the length of"
         " the ray's direction d,",
         "  d = ((c + 0.5 - W/2) s, (H/2 - r - 0.5) s, -1), s = 2 tan(fov_y / 2) / H, in row r,"
-        " column c.",
+        " column c of an H x W image.",
         "metrics.prediction_writer writes such files and checks every row as it comes:",
         '  with RoomPredictionWriter("predictions.h5", "rooms.h5", method="mine") as out:',
         "      out.add(row, depth, normal)",
@@ -195,11 +143,11 @@ def _describe_attribute(attribute: Attribute) -> str:
     return f"  {attribute.name:<18} {notes}{only}{attribute.meaning}{choices}"
 
 
-def _describe_dataset(dataset: Dataset) -> str:
-    notes = "" if dataset.required else "optional; "
-    if dataset.name in ("answer", "scores"):
-        notes = "this, or both; "
-    unit = "" if dataset.unit == "1" else f", {dataset.unit}s"
-    frame = "" if dataset.frame == "-" else f", {dataset.frame} frame"
-    what = f"{dataset.shown_shape} {dataset.kind}{unit}{frame}"
-    return f"  {dataset.name:<9} {what}\n            {notes}{dataset.meaning}"
+def _describe_column(column: Column) -> str:
+    unit = "" if column.unit == "1" else f", {column.unit}s"
+    frame = "" if column.frame == "-" else f", {column.frame} frame"
+    what = f"{shape_text(column, None, SIZES)} {kind_text(column)}{unit}{frame}"
+    notes = NEEDED.get(column.name, "optional; ")
+    rules = "; ".join(rule.expected for rule in RULES if column.name in rule.columns)
+    indent = "\n            "
+    return f"  {column.name:<9} {what}{indent}{notes}{column.meaning}{indent}must be: {rules}"

@@ -46,6 +46,8 @@ class Predictions:
         truth_path: where the truth lay when the submission was written; empty where not recorded.
         rows: (M,) int64: which row of the truth, or which question, each entry answers; every one
             at least 0 and there once.
+        alignment: what the method says it cannot know: "none", "median_scale", "scale" or
+            "scale_shift", as in `metrics.measures.depth.align`; "none" for questions.
         identity: which file it was when it was opened, whatever has its path now.
     """
 
@@ -58,6 +60,7 @@ class Predictions:
         self.method, self.run = texts.get("method", ""), texts.get("run", "")
         self.notes, self.truth_path = texts.get("notes", ""), texts.get("truth_path", "")
         self.truth_fingerprint = texts.get("truth_fingerprint") or None
+        self.alignment = cast(Alignment, texts.get("alignment", "none"))
         self.rows = rows
         self._file = file
         self.identity = _identity(path if file is None else file.id.get_vfd_handle())
@@ -68,12 +71,9 @@ class Predictions:
     @cached_property
     def sha256(self) -> str:
         """SHA-256 of the file, as hex. Raises FileFormatError as `require_unchanged`."""
-        digest = hashlib.sha256()
         with self.path.open("rb") as file:
             self.require(_identity(file.fileno()))
-            while block := file.read(BLOCK_BYTES):
-                digest.update(block)
-        return digest.hexdigest()
+            return hashlib.file_digest(file, "sha256").hexdigest()
 
     def require_unchanged(self) -> None:
         """Raise FileFormatError where the path has another file than the one that was opened."""
@@ -84,7 +84,9 @@ class Predictions:
 
         Numbers that are 0 are not compared.
         """
-        if any(told not in (0, own) for told, own in zip(identity, self.identity, strict=True)):
+        if any(
+            theirs not in (0, ours) for theirs, ours in zip(identity, self.identity, strict=True)
+        ):
             found = "another file than the one that was opened"
             raise FileFormatError(self.path, found, "one that does not change while it is scored")
 
@@ -105,24 +107,20 @@ class RoomPredictions(Predictions):
 
     Attributes, besides those of `Predictions`:
         height, width: of an image, pixels.
-        alignment: what the method says it cannot know: "none", "median_scale", "scale" or
-            "scale_shift", as in `metrics.measures.depth.align`.
     """
 
     task = "rooms"
 
-    def __init__(self, path: Path, found: Inspection, file: h5py.File) -> None:
+    def __init__(self, path: Path, content: Inspection, rows: Ids, file: h5py.File) -> None:
         """Take over an open file whose ids and depth are usable."""
-        assert found.ids is not None, "only usable files are opened"
-        super().__init__(path, found.texts, found.ids, file)
-        self.alignment = cast(Alignment, found.texts.get("alignment", "none"))
-        self._datasets = found.found
-        self.height, self.width = (int(s) for s in self._datasets["depth"].shape[1:3])
+        super().__init__(path, content.texts, rows, file)
+        self._arrays = content.arrays
+        self.height, self.width = self._arrays["depth"].shape[1:3]
 
     @property
     def has_normals(self) -> bool:
         """Whether there are normals."""
-        return "normal" in self._datasets
+        return "normal" in self._arrays
 
     def depth(self, index: int) -> Array:
         """Predicted planar depth (H, W) of entry `index`, scene units, camera frame, as stored.
@@ -142,7 +140,7 @@ class RoomPredictions(Predictions):
 
     def _read(self, name: str, index: int) -> Array:
         with reading(f"{self.path}: {name}, row {self.rows[index]}"):
-            return as_doubles(self._datasets[name][index])
+            return as_doubles(self._arrays[name][index])
 
 
 class QuestionPredictions(Predictions):
@@ -191,7 +189,7 @@ def open_predictions(
 
     Raises:
         OSError: no such file, or a folder.
-        FileFormatError: not a submission, of a newer format, or broken; with the first problem and
+        FileFormatError: not a submission, of another format, or broken; with the first problem and
             how many follow. `metrics.submissions.validation.validate` returns all.
     """
     opened, problems = inspect_predictions(path, tried=tried is not None)
@@ -220,22 +218,22 @@ def inspect_predictions(
     if _looks_like_json(path):
         from metrics.submissions.answers_json import read_answers
 
-        texts, rows, answers, problems = read_answers(path)
-        return QuestionPredictions(path, texts, rows, answers) if len(rows) else None, problems
+        texts, ids, numbers, problems = read_answers(path)
+        return QuestionPredictions(path, texts, ids, numbers) if len(ids) else None, problems
     if not tried:
         trial.try_file(path)
     file = open_unchecked(path, "submission")
     with checking(file):
-        found = inspect(file)
-    opened: RoomPredictions | QuestionPredictions | None = None
-    if found.ids is not None and "depth" in found.found:
-        opened = RoomPredictions(path, found, file)
-    elif found.ids is not None and found.answers is not None:
-        scores = found.found.get("scores")
-        opened = QuestionPredictions(path, found.texts, found.ids, found.answers, scores, file)
-    if opened is None:
-        file.close()
-    return opened, found.problems
+        content = inspect(file)
+    rows, answers = content.ids, content.answers
+    if rows is not None and "depth" in content.arrays:
+        return RoomPredictions(path, content, rows, file), content.problems
+    if rows is not None and answers is not None:
+        scores = content.arrays.get("scores")
+        opened = QuestionPredictions(path, content.texts, rows, answers, scores, file)
+        return opened, content.problems
+    file.close()
+    return None, content.problems
 
 
 def _looks_like_json(path: Path) -> bool:

@@ -1,6 +1,12 @@
-"""What the values of a submission must be: writers, the reader and `validate` ask for the same."""
+"""What a submission must be: the rules that writers, the reader, scoring and `validate` ask for.
 
-from collections.abc import Mapping
+`RULES` are the conditions on values. `array_problem` holds type and shape against the layout. Both
+tell what is wrong as a `Problem`, and `layout.describe_format` prints what they expect.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,97 +16,52 @@ from metrics.measures.answers import ABSTAINED, MOST_CANDIDATES
 from metrics.measures.checks import LARGEST_MAGNITUDE
 from metrics.submissions.problems import Problem, first_ids
 from scenegen.common.errors import SceneGenError
+from scenegen.description.specs import MAX_PIXELS
+from scenegen.files.schema import Column
 
 Array = NDArray[Any]
 Ids = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+MOST_ROWS = 10_000_000
 # Of depths and normals: what single precision holds. All scores of such values are finite, and so
 # are the squares that intervals need of them.
 LARGEST = float(np.finfo(np.float32).max)
-EXPECTED = {
-    "finite": "finite numbers wherever the truth shows a surface",
-    "length": "normals of a length above 0 wherever the truth shows a surface",
-}
-FOUND = {"finite": "NaN, infinite or huge", "length": "length 0"}
 
 
-def depth_faults(depth: Array, mask: Mask) -> dict[str, Mask]:
-    """Return which rules a predicted depth (H, W) breaks, and at which pixels (H, W).
+@dataclass(frozen=True, eq=False)
+class Against:
+    """What values are held against.
 
-    The mask tells where the truth shows a surface; elsewhere any value is allowed.
+    Attributes:
+        count: rows of the truth; None before it is known.
+        answers: how many answers each question offers.
+        of_scores: the answers that scores give, (M,); None where there are no scores.
+        surface: where the truth shows a surface, (H, W); None for other values than pixels.
     """
-    return _broken({"finite": ~_finite(depth) & mask})
+
+    count: int | None = None
+    answers: int = MOST_CANDIDATES
+    of_scores: Ids | None = None
+    surface: Mask | None = None
 
 
-def normal_faults(normal: Array, mask: Mask) -> dict[str, Mask]:
-    """Return which rules predicted normals (H, W, 3) break, and at which pixels (H, W)."""
-    good = _finite(normal).all(axis=-1)
-    return _broken({"finite": ~good & mask, "length": good & ~normal.any(axis=-1) & mask})
+@dataclass(frozen=True)
+class Rule:
+    """A condition on the values of columns.
 
-
-def refuse_faults(faults: Mapping[str, Mask], kind: type[SceneGenError], where: str) -> None:
-    """Raise an error of this kind with the first of the faults, if there are any."""
-    for rule, at in faults.items():
-        first = tuple(np.argwhere(at)[0].tolist())
-        found = f"{FOUND[rule]} at {np.count_nonzero(at)} pixels, the first at {first}"
-        raise kind(where, found, EXPECTED[rule])
-
-
-def faces_away(depth: Array, mask: Mask) -> bool:
-    """Return whether more than half of a depth map (H, W) is at or behind the camera.
-
-    Such values can be scored, so this breaks no rule, but it is the mark of a wrong sign.
+    Attributes:
+        columns: the names of those that it is for.
+        name: in a word, as in `Problem.rule`.
+        expected, found: in words; `found` follows the number of entries that break the rule.
+        broken: returns which entries or pixels break it.
     """
-    return 2 * int(np.count_nonzero(depth[mask] <= 0.0)) > int(np.count_nonzero(mask))
 
-
-def id_problems(ids: Ids, name: str) -> list[Problem]:
-    """Return which ids (M,) are negative or come twice, and whether there are none."""
-    if len(ids) == 0:
-        return [Problem(name, "count", "at least one", "no rows")]
-    problems = []
-    negative = np.unique(ids[ids < 0])
-    if len(negative):
-        found = f"{len(negative)} negative"
-        problems.append(Problem(name, "range", "0 or more", found, first_ids(negative)))
-    values, counts = np.unique(ids, return_counts=True)
-    twice = values[counts > 1]
-    if len(twice):
-        found = f"{len(twice)} given more than once"
-        problems.append(Problem(name, "unique", "each once", found, first_ids(twice)))
-    return problems
-
-
-def answer_problems(
-    answers: Array, ids: Ids, name: str = "answer", candidates: int = MOST_CANDIDATES
-) -> list[Problem]:
-    """Return which answers (M,) are neither -1 nor one of 0 to `candidates` - 1."""
-    wrong = (answers < ABSTAINED) | (answers >= candidates)
-    if not wrong.any():
-        return []
-    found = f"{np.count_nonzero(wrong)} outside -1 to {candidates - 1}, such as {answers[wrong][0]}"
-    expected = f"{', '.join(map(str, range(candidates)))}, or -1"
-    return [Problem(name, "range", expected, found, first_ids(ids[wrong]))]
-
-
-def score_problems(scores: Array, ids: Ids) -> list[Problem]:
-    """Return which scores (M, A) are not finite numbers."""
-    wrong = ~_finite(scores, LARGEST_MAGNITUDE).all(axis=1)
-    if not wrong.any():
-        return []
-    found = f"NaN, infinite or huge at {np.count_nonzero(wrong)} questions"
-    return [Problem("scores", "finite", "finite numbers", found, first_ids(ids[wrong]))]
-
-
-def agreement_problems(answers: Ids, from_scores: Ids, ids: Ids) -> list[Problem]:
-    """Return where answers (M,) are not those of the highest scores."""
-    differs = answers != from_scores
-    if not differs.any():
-        return []
-    found = f"other than scores say at {np.count_nonzero(differs)} questions"
-    expected = "the highest of scores, -1 where it is tied"
-    return [Problem("answer", "agreement", expected, found, first_ids(ids[differs]))]
+    columns: tuple[str, ...]
+    name: str
+    expected: str
+    found: str
+    broken: Callable[[Array, Against], Any]
 
 
 def as_doubles(values: Array) -> NDArray[np.float64]:
@@ -113,5 +74,151 @@ def _finite(values: Array, largest: float = LARGEST) -> Mask:
     return np.asarray(np.abs(as_doubles(values)) <= largest)
 
 
-def _broken(faults: dict[str, Mask]) -> dict[str, Mask]:
-    return {rule: at for rule, at in faults.items() if at.any()}
+def _repeated(ids: Array) -> Mask:
+    _, first, times = np.unique(ids, return_index=True, return_counts=True)
+    repeated = np.zeros(len(ids), bool)
+    repeated[first[times > 1]] = True
+    return repeated
+
+
+def _unknown(ids: Array, against: Against) -> Mask:
+    none = np.zeros(len(ids), bool)
+    return none if against.count is None else np.asarray(ids >= against.count)
+
+
+def _no_answer(answers: Array, against: Against) -> Mask:
+    return np.asarray((answers < ABSTAINED) | (answers >= against.answers))
+
+
+def _other_than_scores(answers: Array, against: Against) -> Mask:
+    if against.of_scores is None:
+        return np.zeros(len(answers), bool)
+    return np.asarray((answers != against.of_scores) & ~_no_answer(answers, against))
+
+
+def _on_surface(wrong: Any, against: Against) -> Any:
+    return wrong if against.surface is None else wrong & against.surface
+
+
+IDS, SURFACE = ("row", "question"), "wherever the truth shows a surface"
+RULES = (
+    Rule(IDS, "range", "0 or more", "negative", lambda ids, _: ids < 0),
+    Rule(IDS, "unique", "each once", "given more than once", lambda ids, _: _repeated(ids)),
+    Rule(IDS, "known", "rows of the truth", "that the truth does not have", _unknown),
+    Rule(
+        ("depth",), "finite", f"finite numbers {SURFACE}", "NaN, infinite or huge",
+        lambda depth, against: _on_surface(~_finite(depth), against),
+    ),
+    Rule(
+        ("normal",), "finite", f"finite numbers {SURFACE}", "NaN, infinite or huge",
+        lambda normal, against: _on_surface(~_finite(normal).all(axis=-1), against),
+    ),
+    Rule(
+        ("normal",), "length", f"normals of a length above 0 {SURFACE}", "of length 0",
+        lambda normal, against: _on_surface(~normal.any(axis=-1), against),
+    ),
+    Rule(
+        ("answer",), "range", "the number of an answer from 0, or -1", "that are no answer",
+        _no_answer,
+    ),
+    Rule(
+        ("scores",), "finite", "finite numbers", "NaN, infinite or huge",
+        lambda scores, _: ~_finite(scores, LARGEST_MAGNITUDE).all(axis=1),
+    ),
+    Rule(
+        ("answer",), "agreement", "the highest of scores, -1 where it is tied",
+        "other than scores say", _other_than_scores,
+    ),
+)  # fmt: skip
+
+
+def broken_rules(name: str, values: Array, against: Against) -> Iterator[tuple[Rule, Mask]]:
+    """Yield the rules that the values of a column break, and which entries or pixels do."""
+    for rule in RULES:
+        if name in rule.columns:
+            wrong = rule.broken(values, against)
+            if wrong.any():
+                yield rule, wrong
+
+
+def value_problems(
+    name: str, values: Array, ids: Ids, against: Against | None = None
+) -> list[Problem]:
+    """Return what is wrong with the M values of a column; their ids, (M,), are told."""
+    if not len(values):
+        return [Problem(name, "count", "at least one", "no rows")]
+    problems = []
+    for rule, wrong in broken_rules(name, values, against or Against()):
+        found = f"{np.count_nonzero(wrong)} {rule.found}"
+        if name == "answer":
+            found += f", such as {values[wrong][0]}"
+        problems.append(Problem(name, rule.name, rule.expected, found, first_ids(ids[wrong])))
+    return problems
+
+
+def refuse_pixels(
+    kind: type[SceneGenError], where: str, name: str, values: Array, surface: Mask
+) -> None:
+    """Raise an error of this kind where an image (H, W, ...) breaks a rule of its column."""
+    for rule, wrong in broken_rules(name, values, Against(surface=surface)):
+        first = tuple(np.argwhere(wrong)[0].tolist())
+        found = f"{rule.found} at {np.count_nonzero(wrong)} pixels, the first at {first}"
+        raise kind(where, found, rule.expected)
+
+
+def faces_away(depth: Array, surface: Mask) -> bool:
+    """Return whether more than half of a depth map (H, W) is at or behind the camera.
+
+    Such values can be scored, so this breaks no rule, but it is the mark of a wrong sign.
+    """
+    return 2 * int(np.count_nonzero(depth[surface] <= 0.0)) > int(np.count_nonzero(surface))
+
+
+def array_problem(
+    column: Column, array: Any, count: int | None, sizes: Mapping[str, Sequence[int]]
+) -> Problem | None:
+    """Return what is wrong with type or shape of an array, or of a data set that is not read.
+
+    Args:
+        column: of the layout; its type says whether floats or integers are expected.
+        array: what has a `dtype` and a `shape`.
+        count: how many rows there must be; None where any number may be.
+        sizes: those that are allowed of each axis, by its name; any where it is not told.
+    """
+    name = column.name
+    shape: tuple[int, ...] = array.shape or ()
+    kinds = "f" if is_float(column) else "iu"
+    axes = [sizes.get(axis, ()) for axis in column.axes or ()]
+    fits = len(shape) == 1 + len(axes) and all(
+        size in allowed if allowed else size > 0
+        for size, allowed in zip(shape[1:], axes, strict=True)
+    )
+    if array.dtype.kind not in kinds:
+        return Problem(name, "type", kind_text(column), f"type {array.dtype!s:.40}")
+    if not fits:
+        return Problem(name, "shape", shape_text(column, count, sizes), f"shape {array.shape}")
+    if count not in (None, shape[0]):
+        return Problem(name, "count", f"{count}, one for each id", f"{shape[0]} rows")
+    if shape[0] > MOST_ROWS:
+        return Problem(name, "count", f"at most {MOST_ROWS:,}", f"{shape[0]} rows")
+    if math.prod(shape[1:3]) > MAX_PIXELS:
+        found = f"images of {shape[1]}x{shape[2]}"
+        return Problem(name, "shape", f"at most {MAX_PIXELS:,} pixels", found)
+    return None
+
+
+def is_float(column: Column) -> bool:
+    """Return whether a column holds floats, and not integers."""
+    return column.dtype.startswith("float")
+
+
+def kind_text(column: Column) -> str:
+    """Return what a column holds, in a word."""
+    return "floats" if is_float(column) else "integers"
+
+
+def shape_text(column: Column, count: int | None, sizes: Mapping[str, Sequence[int]]) -> str:
+    """Return the shape of a column as text, with names for sizes that may be any."""
+    axes = [" or ".join(map(str, sizes.get(axis, (axis,)))) for axis in column.axes or ()]
+    first = "M" if count is None else str(count)
+    return f"({', '.join([first, *axes])}{'' if axes else ','})"

@@ -1,4 +1,4 @@
-"""The truth of a submission: where it lies, who says so, and its views, checked when read.
+"""The truth of a submission: where it lies, whether the submission answers it, and its views.
 
 What is wrong with a truth is an error: left alone, it would change which pixels are scored.
 """
@@ -6,16 +6,21 @@ What is wrong with a truth is an error: left alone, it would change which pixels
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.submissions.reader import Predictions
-from metrics.submissions.rules import as_doubles
+from metrics.submissions.layout import ID_NAMES
+from metrics.submissions.problems import Problem, first_ids
+from metrics.submissions.reader import Predictions, QuestionPredictions, RoomPredictions
+from metrics.submissions.rules import Against, as_doubles, value_problems
 from scenegen.common.errors import FileFormatError
 from scenegen.files import trial
 from scenegen.rooms.reader import RoomsFile
+
+if TYPE_CHECKING:
+    from iqtt.files.reader import AnswersFile, QuestionsFile
 
 Array = NDArray[Any]
 UNIT_TOLERANCE = 1e-3  # by which the squared length of a normal may differ from 1
@@ -58,9 +63,10 @@ def find_truth(predictions: Predictions, given: str | Path | None = None) -> Fou
     """Return where the truth of a submission lies.
 
     That is `given`, or else the path recorded in the submission, taken from the submission's folder
-    and then from the working directory. Only a regular file, or a link to one, is a truth. For a
-    test file without answers it is the file of answers beside it (iqtt-test-answers.h5). Where
-    `given` is there, nothing that the submission names is looked at.
+    and then from the working directory; a file of a stranger's choice is tried in another process.
+    Only a regular file, or a link to one, is a truth. For a test file without answers it is the
+    file of answers beside it (iqtt-test-answers.h5). Where `given` is there, nothing that the
+    submission names is looked at.
 
     Raises FileFormatError where nothing lies there, with the places that were looked at, and as
     `trial.try_file`.
@@ -71,20 +77,63 @@ def find_truth(predictions: Predictions, given: str | Path | None = None) -> Fou
     recorded = Path(predictions.truth_path)
     places = [predictions.path.parent / recorded, recorded] if given is None else [Path(given)]
     for place in places:
-        if os.path.isfile(place):  # so neither a pipe nor a device is ever opened
-            source: Literal["given", "submission"] = "submission" if given is None else "given"
-            answers = None
-            if predictions.task != "rooms":
-                from iqtt.files.reader import answers_beside
+        if not os.path.isfile(place):  # so neither a pipe nor a device is ever opened
+            continue
+        truth = place
+        if predictions.task == "iqtt":
+            from iqtt.files.reader import answers_beside
 
-                answers = answers_beside(place)
-            if given is None:  # whoever made the submission may have chosen the file
-                trial.try_file(answers or place)
-            return FoundTruth(answers or place, source)
+            truth = answers_beside(place) or place
+        if given is None:  # whoever made the submission may have chosen the file
+            trial.try_file(truth)
+        return FoundTruth(truth, "submission" if given is None else "given")
     looked = " and ".join(dict.fromkeys(str(place) for place in places))
     raise FileFormatError(
         f"{predictions.path}: truth", f"no file at {looked}", "the file that is predicted", advice
     )
+
+
+def match_problems(
+    predictions: Predictions, truth: "RoomsFile | AnswersFile | QuestionsFile"
+) -> list[Problem]:
+    """Return why a submission does not answer an open truth: another one, other sizes, rows.
+
+    If the fingerprints differ, that is the only problem returned. For a submission without
+    fingerprint (JSON, or one for the released 3D-IQTT) only the rows and sizes are compared.
+    """
+    fingerprint, count = predictions.truth_fingerprint, len(truth)
+    if fingerprint not in (None, truth.fingerprint):
+        found = f"predictions for the truth with fingerprint {fingerprint:.12}"
+        expected = f"{(truth.fingerprint or 'none'):.12}, that of {truth.path}"
+        return [Problem("truth_fingerprint", "match", expected, found)]
+    problems = []
+    if isinstance(predictions, RoomPredictions) and isinstance(truth, RoomsFile):
+        height, width = truth.spec.height, truth.spec.width
+        if (predictions.height, predictions.width) != (height, width):
+            found = f"images of {predictions.height}x{predictions.width}"
+            problems.append(Problem("depth", "shape", f"{height}x{width}, as the truth", found))
+    name, rows = ID_NAMES[predictions.task], predictions.rows
+    problems += [
+        problem
+        for problem in value_problems(name, rows, rows, Against(count))
+        if problem.rule == "known"
+    ]
+    missing = np.setdiff1d(np.arange(count), rows)
+    if len(missing):
+        found = f"{len(missing)} of {count} missing"
+        problems.append(Problem(name, "complete", "every one", found, first_ids(missing)))
+    if isinstance(predictions, QuestionPredictions) and not isinstance(truth, RoomsFile):
+        problems += _answer_problems(predictions, truth.answers)
+    return problems
+
+
+def _answer_problems(predictions: QuestionPredictions, offered: int) -> list[Problem]:
+    """Return whether a submission chooses among another number of answers than is offered."""
+    if predictions.candidates not in (None, offered):
+        expected = f"(M, {offered}), as each question offers {offered} answers"
+        return [Problem("scores", "shape", expected, f"shape (M, {predictions.candidates})")]
+    against = Against(answers=offered)
+    return value_problems("answer", predictions.answers, predictions.rows, against)
 
 
 def read_true_view(truth: RoomsFile, row: int) -> TrueView:
@@ -114,30 +163,24 @@ def read_true_view(truth: RoomsFile, row: int) -> TrueView:
             first = tuple(np.argwhere(wrong)[0].tolist())
             value = np.asarray(getattr(view, name)[first]).tolist()
             found = f"{value} at pixel {first}, one of {np.count_nonzero(wrong)}"
-            raise FileFormatError(_place(truth, name, row), found, expected)
+            raise FileFormatError(truth.place(name, row), found, expected)
     if not surface.any():
-        raise FileFormatError(_place(truth, "object_id", row), "no surface", "a pixel to be scored")
-    _check_camera(truth, row, view)
+        raise FileFormatError(truth.place("object_id", row), "no surface", "a pixel to be scored")
+    if not 0.0 < view.fov_y_degrees < 180.0:
+        where = truth.place("camera/fov_y_degrees", row)
+        raise FileFormatError(where, view.fov_y_degrees, "between 0 and 180")
+    if not _is_rigid(view.world_from_camera):
+        found = "a matrix that is no rotation and shift"
+        where = truth.place("camera/world_from_camera", row)
+        raise FileFormatError(where, found, "a rigid transform")
     return view
 
 
-def _check_camera(truth: RoomsFile, row: int, view: TrueView) -> None:
-    if not 0.0 < view.fov_y_degrees < 180.0:
-        where = _place(truth, "camera/fov_y_degrees", row)
-        raise FileFormatError(where, view.fov_y_degrees, "between 0 and 180")
-    matrix = view.world_from_camera
+def _is_rigid(matrix: Array) -> bool:
     rotation = np.clip(matrix[:3, :3], -2.0, 2.0)  # beyond which it is none, and squares overflow
-    rigid = (
+    return bool(
         np.isfinite(matrix).all()
         and (matrix[3] == (0.0, 0.0, 0.0, 1.0)).all()
         and (np.abs(rotation.T @ rotation - np.eye(3)) <= RIGID_TOLERANCE).all()
         and np.linalg.det(rotation) > 0.0
     )
-    if not rigid:
-        found = "a matrix that is no rotation and shift"
-        where = _place(truth, "camera/world_from_camera", row)
-        raise FileFormatError(where, found, "a rigid transform")
-
-
-def _place(truth: RoomsFile, name: str, row: int) -> str:
-    return f"{truth.path}: {name}, row {row}"

@@ -1,8 +1,7 @@
 """`validate` returns everything that is wrong with a submission, for `bench validate`."""
 
-from collections import defaultdict
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,23 +9,12 @@ import numpy as np
 
 from metrics.submissions.hints.questions import answer_hints
 from metrics.submissions.hints.rooms import room_hints
-from metrics.submissions.missing_rows import (
-    candidate_problems,
-    match_problems,
-    size_problems,
-)
 from metrics.submissions.problems import HINT, MOST_IDS, Problem
-from metrics.submissions.reader import (
-    QuestionPredictions,
-    RoomPredictions,
-    inspect_predictions,
-)
-from metrics.submissions.rules import EXPECTED, FOUND, Array, depth_faults, normal_faults
-from metrics.submissions.truths import FoundTruth, find_truth, read_true_view
+from metrics.submissions.reader import QuestionPredictions, RoomPredictions, inspect_predictions
+from metrics.submissions.rules import Against, broken_rules
+from metrics.submissions.truths import FoundTruth, find_truth, match_problems, read_true_view
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.rooms.reader import RoomsFile
-
-__all__ = ["Problem", "validate"]
 
 
 def validate(
@@ -59,7 +47,8 @@ def validate(
             if isinstance(predictions, RoomPredictions):
                 problems += _against_rooms(predictions, truth.path, progress)
             else:
-                problems += _against_questions(predictions, truth.path)
+                others = _against_questions(predictions, truth.path)
+                problems += [problem for problem in others if problem not in problems]
             return problems + _hints_on_source(truth)
         except (SceneGenError, OSError) as error:
             found, expected = _short(error, path), "the file that is predicted"
@@ -81,61 +70,61 @@ def _against_rooms(
     predictions: RoomPredictions, truth_path: Path, progress: Callable[[int], Any]
 ) -> list[Problem]:
     with RoomsFile(truth_path) as truth:
-        problems = match_problems(predictions, truth_path, truth.fingerprint, len(truth))
-        if not any(problem.dataset == "truth_fingerprint" for problem in problems):
-            problems += size_problems(predictions, truth)
+        problems = match_problems(predictions, truth)
         if any(problem.rule in ("match", "shape") for problem in problems):
             return problems
-        tallies: dict[tuple[str, str], _Tally] = defaultdict(_Tally)
+        tallies: dict[tuple[str, str], _Tally] = {}
         for i, row in enumerate(predictions.rows.tolist()):
             if 0 <= row < len(truth):
-                for name, rule, pixels, why in _faults(predictions, i, row, truth):
-                    tallies[name, rule].add(row, pixels, why)
+                for problem, pixels in _row_problems(predictions, i, row, truth):
+                    key = problem.dataset, problem.rule
+                    tallies.setdefault(key, _Tally(problem)).add(row, pixels)
             progress(1)
-        counted = [tally.problem(*key) for key, tally in sorted(tallies.items())]
+        counted = [tally.total for _, tally in sorted(tallies.items())]
         return [*problems, *counted, *room_hints(predictions, truth)]
 
 
-def _faults(
+def _row_problems(
     predictions: RoomPredictions, i: int, row: int, truth: RoomsFile
-) -> Iterator[tuple[str, str, int, str]]:
-    """Yield dataset, rule, number of pixels, and why a row cannot be read where that is so."""
-    mask = read_true_view(truth, row).mask
-    rules: list[tuple[str, Callable[[int], Array], Callable[[Array, Array], dict[str, Array]]]]
-    rules = [("depth", predictions.depth, depth_faults)]
+) -> Iterator[tuple[Problem, int]]:
+    """Yield what is wrong with the values of a row, and at how many pixels."""
+    surface = read_true_view(truth, row).mask
+    readers = {"depth": predictions.depth}
     if predictions.has_normals:
-        rules.append(("normal", predictions.normal, normal_faults))
-    for name, read, faults in rules:
+        readers["normal"] = predictions.normal
+    for name, read in readers.items():
         try:
             values = read(i)
         except FileFormatError as error:
-            place = f"{predictions.path}: {name}, row {row}: "
-            yield name, "readable", 1, str(error).removeprefix(place)
+            why = str(error).removeprefix(f"{predictions.path}: {name}, row {row}: ")
+            yield Problem(name, "readable", "rows that can be read", why), 0
             continue
-        for rule, at in faults(values, mask).items():
-            yield name, rule, int(np.count_nonzero(at)), ""
+        for rule, wrong in broken_rules(name, values, Against(surface=surface)):
+            problem = Problem(name, rule.name, rule.expected, rule.found)
+            yield problem, int(np.count_nonzero(wrong))
 
 
 @dataclass
 class _Tally:
     """How often a rule is broken; of the rows only the first few are kept."""
 
+    problem: Problem
     pixels: int = 0
     rows: int = 0
-    why: str = ""
     ids: list[int] = field(default_factory=list)
 
-    def add(self, row: int, pixels: int, why: str) -> None:
-        self.pixels, self.rows, self.why = self.pixels + pixels, self.rows + 1, self.why or why
+    def add(self, row: int, pixels: int) -> None:
+        self.pixels, self.rows = self.pixels + pixels, self.rows + 1
         if self.rows <= MOST_IDS:
             self.ids.append(row)
 
-    def problem(self, dataset: str, rule: str) -> Problem:
-        found, expected = f"{self.rows} rows {self.why}", "rows that can be read"
-        if rule != "readable":
-            found = f"{FOUND[rule]} at {self.pixels} pixels of {self.rows} rows"
-            expected = EXPECTED[rule]
-        return Problem(dataset, rule, expected, found, tuple(self.ids))
+    @property
+    def total(self) -> Problem:
+        """The problem of all rows."""
+        found = f"{self.rows} rows {self.problem.found}"
+        if self.pixels:
+            found = f"{self.problem.found} at {self.pixels} pixels of {self.rows} rows"
+        return replace(self.problem, found=found, ids=tuple(self.ids))
 
 
 def _against_questions(predictions: QuestionPredictions, truth_path: Path) -> list[Problem]:
@@ -146,12 +135,8 @@ def _against_questions(predictions: QuestionPredictions, truth_path: Path) -> li
     except NoAnswersError:  # those who take part have the questions alone
         truth_file = QuestionsFile(truth_path)
     with truth_file as truth:
-        problems = match_problems(predictions, truth_path, truth.fingerprint, len(truth))
-        if any(problem.rule == "match" for problem in problems):
-            return problems
-        wrong = candidate_problems(predictions, truth.answers)
-        problems += wrong
-        if wrong or not truth.has_answers:
+        problems = match_problems(predictions, truth)
+        if not truth.has_answers or any(p.rule in ("match", "shape", "range") for p in problems):
             return problems
         return problems + answer_hints(predictions, truth.read("answers", slice(None)))
 

@@ -1,12 +1,13 @@
 """Writers of submissions that cannot be invalid; `metrics.prediction_writer` is their public door.
 
-Rooms are written row by row, answers to questions all at once; the same rules as in `validate` are
+Rooms are written row by row, answers to questions all at once; the rules that readers ask for are
 checked before anything is written.
 """
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -14,11 +15,12 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike
 
-from metrics.measures.answers import ABSTAINED, answers_from_scores
+from metrics.measures.answers import answers_from_scores
 from metrics.measures.depth import Alignment
 from metrics.submissions import layout, rules
 from metrics.submissions.problems import PredictionError, first_error, first_ids
 from scenegen.files.row_file import new_file, writer_name
+from scenegen.files.schema import Column
 from scenegen.files.table import Table
 from scenegen.rooms.reader import RoomsFile
 
@@ -53,8 +55,8 @@ class RoomPredictionWriter:
         Raises PredictionError where a text does not suit; when the block begins also OSError for
         either path, and FileFormatError for the truth.
         """
-        given = {"method": method, "run": run, "alignment": alignment, "notes": notes}
-        self._texts = _checked_texts("rooms", {**given, "truth_path": str(truth)})
+        texts = {"method": method, "run": run, "alignment": alignment, "notes": notes}
+        self._texts = _checked_texts("rooms", {**texts, "truth_path": str(truth)})
         _check_elsewhere(path, truth)
         self._path, self._truth_path = Path(path), Path(truth)
         self._overwrite, self._allow_partial = overwrite, allow_partial
@@ -86,26 +88,28 @@ class RoomPredictionWriter:
             raise PredictionError(self._path, "not open", "rows to be added inside the with block")
         row = self._checked_row(row)
         where = f"{self._path}: row {row}"
-        mask = np.isfinite(self._truth.read("depth", row))
-        values = {"depth": _checked_floats(depth, mask.shape, f"{where}: depth")}
-        faults = rules.depth_faults(values["depth"], mask)
-        rules.refuse_faults(faults, PredictionError, f"{where}: depth")
-        if self._texts["alignment"] != "scale_shift" and rules.faces_away(values["depth"], mask):
+        surface = np.isfinite(self._truth.read("depth", row))
+        sizes = dict(zip(("y", "x"), ((size,) for size in surface.shape), strict=True))
+        values = {}
+        for column in layout.COLUMNS["rooms"][1:]:
+            image = depth if column.name == "depth" else normal
+            if image is not None:
+                place = f"{where}: {column.name}"
+                array = _checked(column, [_array(image, place)], where, 1, sizes)[0]
+                rules.refuse_pixels(PredictionError, place, column.name, array, surface)
+                values[column.name] = array
+        if self._texts["alignment"] != "scale_shift" and rules.faces_away(values["depth"], surface):
             expected = "planar depth, which is positive in front of the camera"
             raise PredictionError(f"{where}: depth", "most of it at or below 0", expected)
-        if normal is not None:
-            values["normal"] = _checked_floats(normal, (*mask.shape, 3), f"{where}: normal")
-            faults = rules.normal_faults(values["normal"], mask)
-            rules.refuse_faults(faults, PredictionError, f"{where}: normal")
         if self._table is None:
             self._table = self._new_table(values)
-        with_normal = "normal" in self._columns
-        if with_normal != ("normal" in values):
-            found, expected = ("none", "one") if with_normal else ("one", "none")
+        names = [column.name for column in self._table.columns]
+        if names != list(values):
+            found, expected = ("none", "one") if "normal" in names else ("one", "none")
             raise PredictionError(f"{where}: normal", found, f"{expected}, as in the first row")
         self._table.append(values)
         self._rows.append(row)
-        self._given[row] = True
+        self._written[row] = True
 
     @contextmanager
     def _opened(self) -> Iterator[None]:
@@ -113,44 +117,47 @@ class RoomPredictionWriter:
             RoomsFile(self._truth_path) as self._truth,
             new_file(self._path, self._overwrite) as self._file,
         ):
-            self._given = np.zeros(len(self._truth), np.bool_)
+            self._written = np.zeros(len(self._truth), np.bool_)
             self._rows: list[int] = []
             self._table = None
             yield
             self._finish(self._file)
 
     def _new_table(self, values: Mapping[str, rules.Array]) -> Table:
-        height, width = values["depth"].shape
-        columns = [d.column(height, width) for d in layout.datasets("rooms") if d.name in values]
-        self._columns = [column.name for column in columns]
-        return Table(self._file, columns, len(self._given))
+        columns = [
+            # Without axes, which would be data sets of their own: readers go by the shape.
+            replace(column, shape=values[column.name].shape, axes=None, more=_shape(column))
+            for column in layout.COLUMNS["rooms"]
+            if column.name in values
+        ]
+        return Table(self._file, columns, len(self._written))
 
     def _checked_row(self, row: Any) -> int:
-        count = len(self._given)
+        count = len(self._written)
         whole = isinstance(row, int | np.integer) and not isinstance(row, bool)
         if not whole or not 0 <= row < count:
             expected = f"a row of {self._truth_path}, from 0 to {count - 1}"
             raise PredictionError(f"{self._path}: row", f"{row!r:.40}", expected)
-        if self._given[row]:
+        if self._written[row]:
             raise PredictionError(f"{self._path}: row {row}", "it twice", "each row once")
         return int(row)
 
     def _finish(self, file: h5py.File) -> None:
-        missing = np.flatnonzero(~self._given)
+        missing = np.flatnonzero(~self._written)
         if not self._rows or (len(missing) and not self._allow_partial):
             shown = ", ".join(map(str, first_ids(missing)))
             raise PredictionError(
                 f"{self._path}: row",
-                f"{len(missing)} of {len(self._given)} missing, such as {shown}",
+                f"{len(missing)} of {len(self._written)} missing, such as {shown}",
                 "every one" if self._rows else "at least one",
                 "nothing was written",
             )
-        if self._table is not None:
-            self._table.write_packed()
-        for name in self._columns if len(missing) else ():
-            file[name].resize(len(self._rows), axis=0)
+        assert self._table is not None, "a row was written"
+        self._table.write_packed()
+        for column in self._table.columns if len(missing) else ():
+            file[column.name].resize(len(self._rows), axis=0)
         file.attrs.update({**self._texts, "truth_fingerprint": self._truth.fingerprint})
-        _write_columns(file, "rooms", {layout.ID_NAMES["rooms"]: np.array(self._rows)})
+        _write_columns(file, "rooms", {"row": np.array(self._rows)})
 
 
 def write_answers(
@@ -180,59 +187,34 @@ def write_answers(
         PredictionError: naming the questions, what was found and what was expected.
         OSError, FileFormatError, SpecError: either file, as `iqtt.QuestionsFile`.
     """
-    texts = _checked_texts(
-        "iqtt", {"method": method, "run": run, "notes": notes, "truth_path": str(questions_file)}
-    )
+    texts = {"method": method, "run": run, "notes": notes, "truth_path": str(questions_file)}
+    texts = _checked_texts("iqtt", texts)
     _check_elsewhere(path, questions_file)
-    count, candidates, fingerprint = _questions(questions_file)
+    count, offered, fingerprint = _questions(questions_file)
     if count == 0:
         raise PredictionError(questions_file, "no questions", "at least one")
-    ids = np.arange(count) if rows is None else _checked_rows(rows, count, f"{path}")
-    values = _checked_answers(answer, scores, ids, candidates, f"{path}")
+    if answer is None and scores is None:
+        raise PredictionError(path, "neither answer nor scores", "either")
+    ids = np.arange(count) if rows is None else np.asarray(rows)
+    arrays = {"question": ids, "answer": answer, "scores": scores}
+    values: dict[str, rules.Array] = {}
+    for column in layout.COLUMNS["iqtt"]:
+        array = arrays[column.name]
+        if array is not None:
+            many = None if column.name == "question" else len(ids)
+            values[column.name] = _checked(column, array, str(path), many, {"answer": (offered,)})
+    problems = rules.value_problems("question", ids, ids, rules.Against(count))
+    if scores is not None and not problems:
+        problems = rules.value_problems("scores", values["scores"], ids)
+    if answer is not None and not problems:
+        of_scores = None if scores is None else answers_from_scores(values["scores"])
+        against = rules.Against(count, offered, of_scores)
+        problems = rules.value_problems("answer", np.asarray(answer), ids, against)
+    if problems:
+        raise first_error(PredictionError, path, problems)
     with new_file(path, overwrite) as file:
         file.attrs.update({**texts, "truth_fingerprint": fingerprint})
-        _write_columns(file, "iqtt", {layout.ID_NAMES["iqtt"]: ids, **values})
-
-
-def _checked_rows(rows: Sequence[int], count: int, where: str) -> rules.Array:
-    """Return rows of a file of `count` as an array. Raises PredictionError."""
-    found = np.asarray(rows)
-    good = found.ndim == 1 and len(found) > 0 and found.dtype.kind in "iu"
-    if not good or len(np.unique(found)) < len(found) or found.min() < 0 or found.max() >= count:
-        expected = f"different rows of the file, from 0 to {count - 1}, at least one"
-        raise PredictionError(f"{where}: rows", f"{found.tolist()!r:.60}", expected)
-    return found
-
-
-def _checked_answers(
-    answer: ArrayLike | None,
-    scores: ArrayLike | None,
-    ids: rules.Array,
-    candidates: int,
-    where: str,
-) -> dict[str, rules.Array]:
-    """Return the datasets to write, for scores of these questions. Raises PredictionError."""
-    count, shape = len(ids), (len(ids), candidates)
-    values: dict[str, rules.Array] = {}
-    problems = []
-    if scores is not None:
-        values["scores"] = _checked_floats(scores, shape, f"{where}: scores", np.float64)
-        problems += rules.score_problems(values["scores"], ids)
-    if answer is not None:
-        found = values["answer"] = np.asarray(answer)
-        if found.shape != (count,) or found.dtype.kind not in "iu":
-            expected = f"integers of shape ({count},), {ABSTAINED} to {candidates - 1}"
-            what = f"{found.dtype} of shape {found.shape}"
-            raise PredictionError(f"{where}: answer", what, expected)
-        problems += rules.answer_problems(found, ids, candidates=candidates)
-    if not values:
-        raise PredictionError(where, "neither answer nor scores", "either")
-    if len(values) == 2 and not problems:
-        from_scores = answers_from_scores(values["scores"])
-        problems = rules.agreement_problems(values["answer"].astype(np.int64), from_scores, ids)
-    if problems:
-        raise first_error(PredictionError, where, problems)
-    return values
+        _write_columns(file, "iqtt", values)
 
 
 def _questions(path: str | Path) -> tuple[int, int, str]:
@@ -253,42 +235,54 @@ def _check_elsewhere(path: str | Path, truth: str | Path) -> None:
         raise PredictionError(path, "the file that is predicted", "another one to write to")
 
 
-def _checked_texts(task: str, given: Mapping[str, str]) -> dict[str, str]:
+def _checked_texts(task: str, texts: Mapping[str, str]) -> dict[str, str]:
     """Return the root attributes, except for the fingerprint. Raises PredictionError."""
-    for attribute in layout.attributes(task):
-        if attribute.name not in given:
-            continue
-        fault = layout.text_fault(attribute, given[attribute.name])
-        if fault is not None:
-            raise PredictionError(attribute.name, *fault)
     ours = {"format": layout.FORMAT_NAME, "format_version": layout.FORMAT_VERSION, "task": task}
-    texts = {**ours, "writer": writer_name(), **given}
-    return {a.name: texts[a.name] for a in layout.ATTRIBUTES if a.name in texts}
+    texts = {**ours, "writer": writer_name(), **texts}
+    for attribute in layout.attributes(task):
+        if attribute.name in texts:
+            fault = layout.text_fault(attribute, texts[attribute.name])
+            if fault is not None:
+                raise PredictionError(attribute.name, *fault)
+    return texts
 
 
-def _checked_floats(
-    values: ArrayLike, shape: tuple[int, ...], where: str, dtype: type[Any] = np.float32
-) -> rules.Array:
-    """Return the array as it is stored. Raises PredictionError for another shape, or no floats."""
+def _array(values: ArrayLike, where: str) -> rules.Array:
+    """Return values as an array. Raises PredictionError for what is none."""
     try:
-        array = np.asarray(values)
+        return np.asarray(values)
     except Exception as error:
-        what = f"{type(values).__name__}, which is no array ({error!s:.80})"
-        raise PredictionError(where, what, f"floats {shape}") from error
-    if array.shape != shape:
-        raise PredictionError(where, f"shape {array.shape}", str(shape))
-    if array.dtype.kind != "f":
-        raise PredictionError(where, f"type {array.dtype}", "floats")
+        found = f"{type(values).__name__}, which is no array ({error!s:.80})"
+        raise PredictionError(where, found, "an array of numbers") from error
+
+
+def _checked(
+    column: Column,
+    values: Any,
+    where: str,
+    count: int | None,
+    sizes: Mapping[str, tuple[int, ...]],
+) -> rules.Array:
+    """Return the values of a column as they are stored. Raises PredictionError."""
+    array = _array(values, f"{where}: {column.name}")
+    problem = rules.array_problem(column, array, count, {**layout.SIZES, **sizes})
+    if problem is not None:
+        raise first_error(PredictionError, where, [problem])
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused as infinite
-        return array.astype(dtype)
+        return array.astype(column.dtype)
 
 
 def _write_columns(file: h5py.File, task: str, values: Mapping[str, rules.Array]) -> None:
-    """Write datasets that are small enough to be kept in memory."""
-    for dataset in layout.datasets(task):
-        if dataset.name in values:
-            data = values[dataset.name].astype(dataset.dtype)
+    """Write data sets that are small enough to be kept in memory."""
+    for column in layout.COLUMNS[task]:
+        if column.name in values:
+            data = values[column.name].astype(column.dtype)
             stored = file.create_dataset(
-                dataset.name, data=data, compression="gzip", shuffle=data.itemsize > 1
+                column.name, data=data, compression="gzip", shuffle=data.itemsize > 1
             )
-            stored.attrs.update(dataset.attributes)
+            stored.attrs.update(column.attributes | _shape(column))
+
+
+def _shape(column: Column) -> dict[str, str]:
+    """Return the HDF5 attribute that tells the shape of a column."""
+    return {"shape": rules.shape_text(column, None, layout.SIZES)}

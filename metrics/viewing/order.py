@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from metrics.score_file import read_scores
 from metrics.scoring.metric_names import EMPTY_ROOM, OTHER_SCENE, in_order, metric
 from metrics.scoring.rows import score_rows
-from metrics.scoring.runs import Progress, ScoringError, Settings, matched_rows, refuse
-from metrics.submissions.missing_rows import size_problems
+from metrics.scoring.runs import Progress, ScoringError, Settings, matched_rows
 from metrics.submissions.reader import Predictions, RoomPredictions
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
@@ -68,8 +67,7 @@ def shown_scores(
         ScoringError: predictions of another truth, or scores of others.
         SpecError: a row that is not predicted or has no score.
     """
-    refuse(predictions.path, size_problems(predictions, truth))
-    answered = matched_rows([predictions], truth.path, truth.fingerprint, len(truth), partial=True)
+    answered = matched_rows([predictions], truth, partial=True)
     if scores_path is not None:
         stored = _stored_scores(scores_path, predictions, truth)
         rows = _chosen(items, np.intersect1d(answered, stored.rows), scores_path)
@@ -77,8 +75,7 @@ def shown_scores(
         return RowScores(rows, {name: column[here] for name, column in stored.values.items()})
     rows = answered[:MOST_SCORED] if items is None else _chosen(items, answered, predictions.path)
     settings = Settings(allow_partial=True, non_finite="penalise")
-    alignment = predictions.alignment
-    scored = score_rows([predictions], truth.path, rows, alignment, settings, progress)
+    scored = score_rows([predictions], truth, rows, settings, progress)
     return RowScores(rows, {name: runs[0] for name, runs in scored.scores.items()})
 
 

@@ -9,7 +9,7 @@ from metrics.score_file import read_scores
 from metrics.scoring.estimates import CONFIDENCE
 from metrics.scoring.metric_names import HEADLINE, in_order, metric
 from metrics.scoring.records import ScoreFile
-from metrics.submissions.reader import open_predictions
+from metrics.submissions.reader import Predictions
 from metrics.views.by_angle import view_curves
 from metrics.views.examples import examples_of
 from metrics.views.headline import answer, headline_section, kinds_sections
@@ -91,21 +91,20 @@ def curves_section(files: Sequence[ScoreFile]) -> list[Section]:
     return [Section(title, charts=charts, notes=[CURVES_REMARK])] if charts else []
 
 
-def read_beside(paths: Sequence[str | Path], submission: str | Path) -> list[ScoreFile]:
+def read_beside(paths: Sequence[str | Path], predictions: Predictions) -> list[ScoreFile]:
     """Read score files to show beside those of a submission that is about to be scored.
 
     Raises BesideError at once where one is of another task, or of a truth that the submission does
-    not name; else as `read_scores` and `open_predictions`.
+    not name; else as `read_scores`.
     """
     files = [read_scores(path) for path in paths]
-    with open_predictions(submission) as predictions:
-        named = predictions.truth_fingerprint
-        for file in files:
-            scored = file.meta.truth_fingerprint
-            if file.task != predictions.task or (named and named != scored):
-                found = f"scores of {file.task}, truth {scored[:12]}"
-                expected = f"{predictions.task}, truth {(named or 'any')[:12]}, of {submission}"
-                raise BesideError(file.place, found, expected)
+    named = predictions.truth_fingerprint
+    for file in files:
+        scored = file.meta.truth_fingerprint
+        if file.task != predictions.task or (named and named != scored):
+            found = f"scores of {file.task}, truth {scored[:12]}"
+            expected = f"{predictions.task}, truth {(named or 'any')[:12]}, of {predictions.path}"
+            raise BesideError(file.place, found, expected)
     return files
 
 

@@ -7,7 +7,6 @@ import subprocess
 import sys
 
 import pytest
-from broken import CASES
 from click.testing import CliRunner
 
 import cli
@@ -26,30 +25,6 @@ def bench(*arguments):
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-# What only scoring reads, and one of each other kind: `test_validation` goes through them all.
-KINDS = {(case.stage, case.task): case for case in CASES if case.stage != "values"}
-BROKEN = [*KINDS.values(), *(case for case in CASES if case.stage == "values")]
-
-
-@pytest.mark.parametrize("case", BROKEN, ids=str)
-def test_a_broken_submission_is_one_clear_line(case, truths, folder, check_refusal):
-    path = case.build(folder, truths.of(case.task))
-    options = [] if case.names_truth else ["--truth", truths.of(case.task)]
-    result = bench("score", path, *options, "--json", "x.json")
-    if case.stage == "hint":
-        assert result.exit_code == 0, result.output
-        told = bench("validate", path, *options)
-        assert told.exit_code == 0
-        assert all(word in told.stdout for word in case.words), told.stdout
-        return
-    check_refusal(result.exit_code, result.stdout, result.stderr, case.words)
-    assert not (folder / "x.json").exists()
-    if path.is_file():
-        told = bench("validate", path, *options)
-        assert told.exit_code == 2
-        assert "Traceback" not in told.output
 
 
 def test_a_baseline_goes_all_the_way(truths, folder):

@@ -12,6 +12,7 @@ from baselines.trivial import write_room_baseline
 from metrics.scoring import rows as module
 from metrics.scoring.runs import ScoringError, Settings
 from metrics.submissions.reader import open_predictions
+from scenegen.rooms.reader import RoomsFile
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="sends signals")
@@ -24,6 +25,7 @@ def test_a_killed_worker_is_an_error_and_no_traceback(tmp_path, rooms_path, monk
     monkeypatch.setattr(module, "CHUNK", 2)
     with (
         open_predictions(tmp_path / "oracle.h5") as file,
+        RoomsFile(rooms_path) as rooms,
         refused(ScoringError, str(tmp_path / "oracle.h5"), hint="--processes"),
     ):
-        module.score_rows([file], rooms_path, np.arange(8), "none", Settings(processes=2))
+        module.score_rows([file], rooms, np.arange(8), Settings(processes=2))

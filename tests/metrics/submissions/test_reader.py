@@ -14,12 +14,12 @@ from refusals import refused
 from submissions import as_json, edited, good_answers, good_rooms
 
 from metrics.submissions.inspection import inspect
-from metrics.submissions.missing_rows import match_problems, size_problems
 from metrics.submissions.reader import (
     QuestionPredictions,
     RoomPredictions,
     open_predictions,
 )
+from metrics.submissions.truths import match_problems
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
@@ -59,8 +59,7 @@ def test_the_least_that_is_needed(by_hand, truths):
         assert np.array_equal(depth, rooms.read("depth", 3))
         with refused(FileFormatError, "hand.h5: normal"):
             found.normal(0)
-        assert match_problems(found, truths.rooms, rooms.fingerprint, len(rooms)) == []
-        assert size_problems(found, rooms) == []
+        assert match_problems(found, rooms) == []
 
 
 @pytest.mark.parametrize("dtype", ["f2", "f4", "f8", ">f4", ">f8"])
@@ -113,7 +112,7 @@ def test_chunks_of_many_rows_are_unpacked_once(by_hand):
         del file["depth"]
         file.create_dataset("depth", data=values, chunks=(8, 400, 600), compression="gzip")
     with h5py.File(path) as file:
-        stored = inspect(file).found["depth"]
+        stored = inspect(file).arrays["depth"]
         assert stored.dataset.id.get_access_plist().get_chunk_cache()[1] == 8 * 800 * 600 * 4
         assert np.array_equal(stored[7], values[7])
 

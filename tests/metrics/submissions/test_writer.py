@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from refusals import refused
 
+from iqtt.files.reader import AnswersFile
 from metrics.prediction_writer import PredictionError, RoomPredictionWriter, write_answers
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
-from scenegen.common.errors import FileFormatError
+from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.rooms.reader import RoomsFile
 
 SIZE = (32, 32)
@@ -43,29 +44,20 @@ def test_round_trip_in_any_order(writer, truths, tmp_path):
     order = [5, 0, 7, 2, 1, 6, 3, 4]
     depth, normal = noise(1, 8, *SIZE), noise(2, 8, *SIZE, 3)
     settings = {"run": "seed 4", "alignment": "scale", "notes": "a\nb"}
-    fill(writer(**settings), *((row, depth[row], normal[row]) for row in order))
+    fill(writer(**settings), *((np.int64(row), depth[row], normal[row].tolist()) for row in order))
     path = tmp_path / "predictions.h5"
-    with open_predictions(path) as found:
-        assert found.rows.tolist() == order
+    with open_predictions(path) as predictions:
+        assert predictions.rows.tolist() == order
         for i, row in enumerate(order):
-            assert np.array_equal(found.depth(i), depth[row].astype("f4"))
-            assert np.array_equal(found.normal(i), normal[row].astype("f4"))
-        assert (found.method, found.run, found.alignment) == ("mine", "seed 4", "scale")
-        assert found.notes == "a\nb"
-        assert found.truth_path == str(truths.rooms)
+            assert np.array_equal(predictions.depth(i), depth[row].astype("f4"))
+            assert np.array_equal(predictions.normal(i), normal[row].astype("f4"))
     assert [problem for problem in validate(path) if not problem.is_hint] == []
-
-
-def test_what_plain_h5py_sees(writer, truths, tmp_path):
-    with writer() as out:
-        for row in range(8):
-            out.add(np.int64(row), noise(row, *SIZE).astype("f4"), noise(row, *SIZE, 3).tolist())
-    with h5py.File(tmp_path / "predictions.h5") as file, RoomsFile(truths.rooms) as rooms:
+    with h5py.File(path) as file, RoomsFile(truths.rooms) as rooms:
         root = dict(file.attrs)
         assert root.pop("writer").startswith("pix2shape-bench ")
         assert root == {
-            "format": "pix2shape-bench/predictions", "format_version": "1.1", "task": "rooms",
-            "method": "mine", "run": "", "notes": "", "alignment": "none",
+            "format": "pix2shape-bench/predictions", "format_version": "1.0", "task": "rooms",
+            "method": "mine", "run": "seed 4", "notes": "a\nb", "alignment": "scale",
             "truth_path": str(truths.rooms), "truth_fingerprint": rooms.fingerprint,
         }  # fmt: skip
         assert set(file) == {"row", "depth", "normal"}
@@ -79,8 +71,7 @@ def test_what_plain_h5py_sees(writer, truths, tmp_path):
             assert (dataset.attrs["unit"], dataset.attrs["frame"]) == (unit, frame)
             assert dataset.attrs["shape"].startswith("(M,")
             assert len(dataset.attrs["meaning"]) > 10
-        assert file["depth"].chunks == (1, *SIZE)
-        assert file["normal"].chunks == (1, *SIZE, 3)
+        assert (file["depth"].chunks, file["normal"].chunks) == ((1, *SIZE), (1, *SIZE, 3))
 
 
 def test_the_same_rows_give_the_same_bytes(truths, tmp_path):
@@ -107,8 +98,8 @@ REFUSED = {
     "row is true": ((True, DEPTH), "row", "True"),
     "row is a text": (("1", DEPTH), "row", "'1'"),
     "row given": ((0, DEPTH), "row 0", "twice"),
-    "shape": ((1, noise(0, 16, 16)), "row 1: depth", "(16, 16)"),
-    "batch of one": ((1, noise(0, 1, *SIZE)), "row 1: depth", "(1, 32, 32)"),
+    "shape": ((1, noise(0, 16, 16)), "row 1: depth", "16, 16)"),
+    "batch of one": ((1, noise(0, 1, *SIZE)), "row 1: depth", "1, 32, 32)"),
     "whole numbers": ((1, np.ones(SIZE, "u2")), "row 1: depth", "uint16"),
     "objects": ((1, np.full(SIZE, None)), "row 1: depth", "object"),
     "ragged": ((1, [[1.0, 2.0], [3.0]]), "row 1: depth", "no array"),
@@ -117,7 +108,7 @@ REFUSED = {
     "beyond float32": ((1, spoiled(1e39)), "row 1: depth", "(3, 4)"),
     "negative z": ((1, -DEPTH), "row 1: depth", "at or below 0"),
     "all zero": ((1, np.zeros(SIZE)), "row 1: depth", "at or below 0"),
-    "normal shape": ((1, DEPTH, np.ones((3, *SIZE))), "row 1: normal", "(3, 32, 32)"),
+    "normal shape": ((1, DEPTH, np.ones((3, *SIZE))), "row 1: normal", "3, 32, 32)"),
     "normal NaN": ((1, DEPTH, spoiled(np.nan, (5, 6, 0), GOOD_NORMAL)), "row 1: normal", "(5, 6)"),
     "normal zero": ((1, DEPTH, spoiled(0.0, (5, 6), GOOD_NORMAL)), "row 1: normal", "length 0"),
     "no normal": ((1, DEPTH, None), "row 1: normal", "none"),
@@ -158,9 +149,6 @@ def test_anything_goes_where_the_truth_shows_nothing(truths, tmp_path):
         for row, odd in enumerate([np.inf, np.nan, -1.0, -np.inf, 0.0, 1e39, 1e30, 1.0]):
             out.add(row, spoiled(odd), spoiled(odd if row % 2 else 0.0, (3, 4), GOOD_NORMAL))
     assert validate(path, truth) == []
-    other = tmp_path / "other.h5"
-    with pytest.raises(PredictionError), RoomPredictionWriter(other, truth, method="m") as out:
-        out.add(0, spoiled(np.nan, (3, 5)))
 
 
 def test_depth_behind_the_camera(writer):
@@ -183,42 +171,32 @@ def test_missing_rows_are_an_error(writer, tmp_path, partial, rows, found):
 
 
 def test_missing_rows_where_that_is_allowed(writer, truths, tmp_path):
-    with writer(allow_partial=True) as out:
-        for row in (6, 1):
-            out.add(row, noise(row, *SIZE), GOOD_NORMAL)
+    fill(writer(allow_partial=True), *((row, noise(row, *SIZE), GOOD_NORMAL) for row in (6, 1)))
     path = tmp_path / "predictions.h5"
-    with open_predictions(path) as found:
-        assert found.rows.tolist() == [6, 1]
-        assert np.array_equal(found.depth(1), noise(1, *SIZE).astype("f4"))
-        assert found.normal(1).shape == (*SIZE, 3)
+    with open_predictions(path) as predictions:
+        assert predictions.rows.tolist() == [6, 1]
+        assert np.array_equal(predictions.depth(1), noise(1, *SIZE).astype("f4"))
+        assert predictions.normal(1).shape == (*SIZE, 3)
     (problem,) = validate(path, truths.rooms)
     assert (problem.dataset, problem.rule, problem.ids) == ("row", "complete", (0, 2, 3, 4, 5))
 
 
-def test_an_error_of_the_author_leaves_nothing(writer, tmp_path):
+def test_the_block_decides_what_is_left(writer, tmp_path):
     with pytest.raises(KeyboardInterrupt), writer() as out:  # noqa: PT012
         out.add(0, DEPTH)
         raise KeyboardInterrupt
     assert list(tmp_path.iterdir()) == []
-
-
-def test_only_inside_the_block(writer):
     out = writer(allow_partial=True)
-    with pytest.raises(PredictionError):
-        out.add(0, DEPTH)
-    fill(out, (0, DEPTH))
-    with pytest.raises(PredictionError):
-        out.add(1, DEPTH)
-
-
-def test_an_existing_file_is_kept(writer, tmp_path):
-    (tmp_path / "predictions.h5").write_text("precious")
+    for _ in range(2):
+        with pytest.raises(PredictionError):
+            out.add(1, DEPTH)
+        (tmp_path / "predictions.h5").unlink(missing_ok=True)
+        fill(out, (0, DEPTH))
     with pytest.raises(FileExistsError), writer():
         pass
-    assert (tmp_path / "predictions.h5").read_text() == "precious"
-    fill(writer(overwrite=True, allow_partial=True), (0, DEPTH))
-    with open_predictions(tmp_path / "predictions.h5") as found:
-        assert len(found) == 1
+    fill(writer(overwrite=True, allow_partial=True), (3, DEPTH))
+    with open_predictions(tmp_path / "predictions.h5") as predictions:
+        assert predictions.rows.tolist() == [3]
 
 
 @pytest.mark.parametrize(
@@ -272,3 +250,84 @@ def test_a_submission_never_replaces_what_it_is_about(truths, tmp_path):
                 else:
                     RoomPredictionWriter(path, truth, method="m", overwrite=True)
         assert Path(truth).read_bytes() == before
+
+
+# ---- answers ----
+
+
+@pytest.mark.parametrize("name", ["iqtt-test.h5", "iqtt-test-answers.h5", "iqtt-val.h5"])
+def test_answers(truths, tmp_path, name):
+    file = truths.iqtt.with_name(name)
+    scores = noise(3, 6, 3)
+    answer = scores.argmax(axis=1).tolist()
+    path = tmp_path / "answers.h5"
+    write_answers(path, file, method="m", run="1", notes="n", answer=answer, scores=scores)
+    assert validate(path, file) == []
+    truth_name = "iqtt-val.h5" if "val" in name else "iqtt-test-answers.h5"
+    with open_predictions(path) as predictions, AnswersFile(file.with_name(truth_name)) as truth:
+        assert predictions.rows.tolist() == list(range(6))
+        assert predictions.answers.tolist() == answer
+        assert np.array_equal(predictions.scores, scores)
+        assert (predictions.method, predictions.run, predictions.notes) == ("m", "1", "n")
+        assert predictions.truth_path == str(file)
+        assert predictions.truth_fingerprint == truth.fingerprint
+    with h5py.File(path) as stored:
+        assert set(stored) == {"question", "answer", "scores"}
+        assert all(stored[n].attrs["meaning"] and stored[n].attrs["unit"] for n in stored)
+
+
+def test_answers_to_a_file_as_released(truths, tmp_path):
+    """It has no fingerprint, so that only the number of questions is held against it."""
+    file = tmp_path / "iqtt-val.h5"
+    with h5py.File(truths.iqtt.with_name("iqtt-val.h5")) as ours, h5py.File(file, "w") as released:
+        released["questions"], released["answers"] = ours["questions"][()], ours["answers"][()]
+    write_answers(tmp_path / "a.h5", file, method="m", answer=[0, 1, 2, -1, 0, 1])
+    with open_predictions(tmp_path / "a.h5") as predictions:
+        assert predictions.truth_fingerprint is None
+        assert predictions.answers.tolist() == [0, 1, 2, -1, 0, 1]
+    assert validate(tmp_path / "a.h5", file) == []
+
+
+def test_some_of_the_answers(truths, tmp_path):
+    write_answers(tmp_path / "a.h5", truths.iqtt, method="m", answer=[1, 0], rows=[4, 2])
+    with open_predictions(tmp_path / "a.h5") as predictions:
+        assert predictions.rows.tolist() == [4, 2]
+        assert predictions.answers.tolist() == [1, 0]
+
+
+EYE = np.eye(3)[[0, 1, 2, 0, 1, 2]]
+
+
+@pytest.mark.parametrize(
+    ("given", "where", "found"),
+    [
+        ({}, "", "neither answer nor scores"),
+        ({"answer": [0, 1, 2]}, ": answer", "3 rows"),
+        ({"answer": [0.0] * 6}, ": answer", "float64"),
+        ({"answer": [True] * 6}, ": answer", "bool"),
+        ({"answer": [0, 1, 2, 3, 0, 1]}, ": answer", "such as 3 (ids 3)"),
+        ({"answer": [0, 1, 2, 0, -2, 1]}, ": answer", "such as -2 (ids 4)"),
+        ({"answer": np.array([0, 1, 2, 0, 255, 1], "u1")}, ": answer", "such as 255"),
+        ({"scores": np.zeros((6, 4))}, ": scores", "(6, 4)"),
+        ({"scores": np.zeros((6, 3), int)}, ": scores", "int64"),
+        ({"scores": EYE * [1, 1, np.nan]}, ": scores", "(ids 0, 1, 2"),
+        ({"scores": EYE, "answer": [0, 1, 2, 0, 1, 1]}, ": answer", "(ids 5)"),
+        ({"scores": 0 * EYE, "answer": [0] * 6}, ": answer", "6 other"),
+        ({"answer": [0, 0], "rows": [1, 6]}, ": question", "(ids 6)"),
+        ({"answer": [0, 0], "rows": [1, 1]}, ": question", "more than once (ids 1)"),
+        ({"answer": [0, 0], "rows": [1, -1]}, ": question", "negative (ids -1)"),
+        ({"answer": [0], "rows": [1.0]}, ": question", "float64"),
+        ({"answer": [], "rows": []}, ": question", ""),
+    ],
+)
+def test_answers_refused(truths, tmp_path, given, where, found):
+    with refused(PredictionError, f"{tmp_path / 'answers.h5'}{where}", found=found):
+        write_answers(tmp_path / "answers.h5", truths.iqtt, method="m", **given)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_answers_to_no_questions(truths, tmp_path):
+    training = truths.iqtt.with_name("iqtt-train.h5")
+    with pytest.raises(SceneGenError):
+        write_answers(tmp_path / "a.h5", training, method="m", answer=[0])
+    assert list(tmp_path.iterdir()) == []
