@@ -119,9 +119,9 @@ def _launch(spec: SplitSpec, questions: Sequence[Question], device: str) -> Fetc
         shown = visible_pixels(pixels["object_id"], spec.cubes[1])
         result = []
         for i, question in enumerate(questions):
-            own = slice((1 + spec.answers) * i, (1 + spec.answers) * (i + 1))
-            depth = pixels["depth"][own] if spec.with_depth else None
-            result.append(Rendered(question, pixels["image"][own], shown[own], depth))
+            its_images = slice((1 + spec.answers) * i, (1 + spec.answers) * (i + 1))
+            depth = pixels["depth"][its_images] if spec.with_depth else None
+            result.append(Rendered(question, pixels["image"][its_images], shown[its_images], depth))
         return result
 
     return rendered
@@ -131,15 +131,15 @@ def _checked(
     spec: SplitSpec, pools: Pools, split: str, done: list[Rendered], tally: Tally, device: str
 ) -> list[Rendered]:
     """Make questions anew whose full images hide a cube after all."""
-    while hidden := [i for i, one in enumerate(done) if not _shows_all(spec, one)]:
+    while hidden := [i for i, question in enumerate(done) if not _shows_all(spec, question)]:
         again = [done[i].question for i in hidden]
         requests = [(q.index, q.shapes.answer, q.attempt + 1) for q in again]
         anew = sample_questions(spec, pools, split, requests, tally)
-        for i, one in zip(hidden, _launch(spec, anew, device)(), strict=True):
-            done[i] = one
+        for i, question in zip(hidden, _launch(spec, anew, device)(), strict=True):
+            done[i] = question
     return done
 
 
-def _shows_all(spec: SplitSpec, one: Rendered) -> bool:
-    used = one.question.shapes.cubes.shape[1]
-    return bool((one.visible_pixels[:, :used] >= spec.min_cube_pixels).all())
+def _shows_all(spec: SplitSpec, rendered: Rendered) -> bool:
+    used = rendered.question.shapes.cubes.shape[1]
+    return bool((rendered.visible_pixels[:, :used] >= spec.min_cube_pixels).all())

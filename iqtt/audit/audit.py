@@ -98,7 +98,10 @@ class Audit:
 
 def to_json(audits: Sequence[Audit]) -> str:
     """Return the numbers of one or more audits as indented JSON."""
-    passed, records = all(one.passed for one in audits), [one.record() for one in audits]
+    passed, records = (
+        all(audited.passed for audited in audits),
+        [audited.record() for audited in audits],
+    )
     record = {**FORMAT, "writer": writer_name(), "passed": passed, "audits": records}
     return json.dumps(record, indent=2) + "\n"
 
@@ -139,13 +142,13 @@ def audit(
     ]
     shapes = shape_proofs.compare_shapes(tables)
     right = [
-        one.place if table.answers is None else table.answers.astype(np.int64)
-        for table, one in zip(tables, shapes, strict=True)
+        its_shapes.place if table.answers is None else table.answers.astype(np.int64)
+        for table, its_shapes in zip(tables, shapes, strict=True)
     ]
-    found = _prove(tables, shapes, right)
+    proofs = _prove(tables, shapes, right)
     probes = run_probes(_evidence(tables, shapes, right))
     lacks = tuple(lacking(paths))
-    return Audit(tuple(map(_audited, tables, right)), tuple(found), probes, lacks)
+    return Audit(tuple(map(_audited, tables, right)), tuple(proofs), probes, lacks)
 
 
 def _spread(counts: Sequence[int], most: int) -> list[Array]:
@@ -164,7 +167,7 @@ def _prove(
     tables: Sequence[AuditTable], shapes: Sequence[Shapes], right: Sequence[Array]
 ) -> list[Proof]:
     """Run all proofs; right: positions of the right answers, (Q,) each, -1 where unknown."""
-    found = [
+    proofs = [
         images.content(tables),
         images.balance(tables, right),
         images.values(tables),
@@ -172,31 +175,31 @@ def _prove(
         images.distinct_images(tables),
         images.distinct_questions(tables),
     ]
-    told = [table for table in tables if table.truth]
-    shapes = [one for table, one in zip(tables, shapes, strict=True) if table.truth]
-    if not told:
-        return [Proof(name, "skipped", "no shape descriptions") for name in _BY_CUBES] + found
-    counts = [len(table) for table in told]
+    with_cubes = [table for table in tables if table.truth]
+    shapes = [its_shapes for table, its_shapes in zip(tables, shapes, strict=True) if table.truth]
+    if not with_cubes:
+        return [Proof(name, "skipped", "no shape descriptions") for name in _BY_CUBES] + proofs
+    counts = [len(table) for table in with_cubes]
     sample = _spread(counts, CAST)
     by_cubes = [
-        shape_proofs.whole_shapes(told, shapes),
-        shape_proofs.one_right_answer(told, shapes),
-        kinds.answers_differ(told, shapes),
-        kinds.mirror_images(told, shapes),
-        kinds.matched(told, shapes),
-        shape_proofs.stored_ids(told, shapes),
-        splits.splits_share_nothing(told, shapes),
-        splits.splits_for_ever(told, shapes),
-        views.rotations(told),
-        views.angles(told, shapes),
-        views.lines_of_sight(told, shapes),
-        images.visibility(told),
-        views.cast_again(told, shapes, sample),
-        explanations.no_other_explanation(told, shapes, _spread(counts, EXPLAINED)),
+        shape_proofs.whole_shapes(with_cubes, shapes),
+        shape_proofs.one_right_answer(with_cubes, shapes),
+        kinds.answers_differ(with_cubes, shapes),
+        kinds.mirror_images(with_cubes, shapes),
+        kinds.matched(with_cubes, shapes),
+        shape_proofs.stored_ids(with_cubes, shapes),
+        splits.splits_share_nothing(with_cubes, shapes),
+        splits.splits_for_ever(with_cubes, shapes),
+        views.rotations(with_cubes),
+        views.angles(with_cubes, shapes),
+        views.lines_of_sight(with_cubes, shapes),
+        images.visibility(with_cubes),
+        views.cast_again(with_cubes, shapes, sample),
+        explanations.no_other_explanation(with_cubes, shapes, _spread(counts, EXPLAINED)),
     ]
     untold = [table.name for table in tables if not table.truth]
     note = f"; not told of {', '.join(untold)}" if untold else ""
-    return [replace(proof, detail=proof.detail + note) for proof in by_cubes] + found
+    return [replace(proof, detail=proof.detail + note) for proof in by_cubes] + proofs
 
 
 def _evidence(
@@ -205,16 +208,16 @@ def _evidence(
     """Gather the questions that were measured and whose right answer is known."""
     numbers = shape_statistics(
         [table.cubes for table in tables],
-        [one.class_name for one in shapes],
-        [one.whole for one in shapes],
+        [its_shapes.class_name for its_shapes in shapes],
+        [its_shapes.whole for its_shapes in shapes],
     )
     parts = []
-    for table, one, place, described in zip(tables, shapes, right, numbers, strict=True):
-        known = place[table.measured] >= 0
-        rows = table.measured[known]
-        mirrored = _mirror_images(one, place, rows)
-        stored = _frames(table, one, rows)
-        parts.append((table.statistics[known], place[rows], mirrored, described[rows], stored))
+    for table, its_shapes, place, described in zip(tables, shapes, right, numbers, strict=True):
+        answered = place[table.measured] >= 0
+        rows = table.measured[answered]
+        mirrored = _mirror_images(its_shapes, place, rows)
+        stored = _frames(table, its_shapes, rows)
+        parts.append((table.statistics[answered], place[rows], mirrored, described[rows], stored))
     statistics, places, mirrored, cubes, frames = map(np.concatenate, zip(*parts, strict=True))
     return Evidence(
         statistics=statistics,
@@ -248,6 +251,6 @@ def _audited(table: AuditTable, right: Array) -> AuditedTable:
     answers = "from the cubes" if table.truth else "unknown"
     if table.answers is not None:
         answers = "stored"
-    known = int(np.count_nonzero(right[table.measured] >= 0))
+    answered = int(np.count_nonzero(right[table.measured] >= 0))
     path, split, mark = str(table.source.path), table.split, table.fingerprint
-    return AuditedTable(table.name, path, split, mark, len(table), answers, known)
+    return AuditedTable(table.name, path, split, mark, len(table), answers, answered)

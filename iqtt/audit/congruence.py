@@ -134,9 +134,9 @@ def name_shapes(cubes: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         mirrored[others] = congruent_rows(
             distinct[rest[others]] * MIRROR_X, distinct[leads[others]]
         )
-        found = same | mirrored
-        leader[rest[found]] = leads[found]
-        is_mirror[rest[found]] = mirrored[found]
+        joined = same | mirrored
+        leader[rest[joined]] = leads[joined]
+        is_mirror[rest[joined]] = mirrored[joined]
     return (2 * leader + is_mirror)[copy], leader[copy]
 
 

@@ -48,16 +48,16 @@ def markdown(audit: Audit) -> str:
 def _blocks(probes: Sequence[Probe]) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
     """Yield for each kind of probes a title and a table: statistics in rows, rules in columns."""
     for sees, title, rules in _BLOCKS:
-        found = {(p.statistic, p.rule): p for p in probes if p.sees == sees and p.rule in rules}
-        if not found:
+        by_rule = {(p.statistic, p.rule): p for p in probes if p.sees == sees and p.rule in rules}
+        if not by_rule:
             continue
-        names = dict.fromkeys(name for name, _ in found)
-        rows = [(name, *(_cell(found.get((name, rule))) for rule in rules)) for name in names]
-        chance = next(iter(found.values())).chance
-        counts = sorted({p.n for p in found.values()})
+        names = dict.fromkeys(name for name, _ in by_rule)
+        rows = [(name, *(_cell(by_rule.get((name, rule))) for rule in rules)) for name in names]
+        chance = next(iter(by_rule.values())).chance
+        counts = sorted({p.n for p in by_rule.values()})
         may = "sees some shape, so may beat" if sees == OUTLINE else "must not beat"
-        asked = " to ".join(f"{n:,}" for n in dict.fromkeys((counts[0], counts[-1])))
-        full = f"{title}: {may} chance, {100 * chance:.1f}% ({asked} questions)"
+        numbers = " to ".join(f"{n:,}" for n in dict.fromkeys((counts[0], counts[-1])))
+        full = f"{title}: {may} chance, {100 * chance:.1f}% ({numbers} questions)"
         yield full, [("", *rules), *rows]
 
 
@@ -75,8 +75,8 @@ def _conclusion(audit: Audit) -> list[str]:
         lines = ["FAILED: there are no questions."]
     if audit.probes:
         tried = sum(probe.sees != OUTLINE for probe in audit.probes)
-        found = [f"{p.statistic}, {p.rule} ({p.sees})" for p in audit.shortcuts]
-        verdict = f"{len(found)} did: {'; '.join(found)}" if found else "none did"
+        shortcuts = [f"{p.statistic}, {p.rule} ({p.sees})" for p in audit.shortcuts]
+        verdict = f"{len(shortcuts)} did: {'; '.join(shortcuts)}" if shortcuts else "none did"
         lines.append(
             "Percent right with 95% Wilson intervals; * beats chance at the"
             f" {100 * ERROR_RATE:g}% level, corrected for the number of probes (Holm)."

@@ -131,12 +131,12 @@ def find_tables(paths: Sequence[str | Path]) -> list[Source]:
     check(len(paths) > 0, "paths", "none", "question files, or folders of them")
     files: dict[Path, Path] = {}
     for path in map(Path, paths):
-        found = _files(path) if path.is_dir() else [path]
-        if not found:
+        candidates = _files(path) if path.is_dir() else [path]
+        if not candidates:
             raise FileNotFoundError(2, "holds no question files *.h5", str(path))
-        for file in found:
-            asked = file.with_name(file.stem.removesuffix("-answers") + file.suffix)
-            chosen = asked if asked.is_file() else file
+        for file in candidates:
+            questions_file = file.with_name(file.stem.removesuffix("-answers") + file.suffix)
+            chosen = questions_file if questions_file.is_file() else file
             files.setdefault(chosen.resolve(), chosen)
     names = [path.name for path in files.values()]
     sources: list[Source] = []
@@ -164,9 +164,11 @@ def find_splits(paths: Sequence[str | Path]) -> list[list[Path]]:
     splits: list[list[Path]] = []
     single: list[Path] = []
     for path in map(Path, paths):
-        inner = [one for one in sorted(path.iterdir()) if _files(one)] if path.is_dir() else []
+        inner = (
+            [folder for folder in sorted(path.iterdir()) if _files(folder)] if path.is_dir() else []
+        )
         if inner and not _files(path):
-            splits += [[one] for one in inner]
+            splits += [[folder] for folder in inner]
         else:
             single.append(path)
     return [single, *splits] if single or not splits else splits
@@ -215,9 +217,9 @@ def read_table(
         background = border_color(first)
         scans: list[tuple[Array, ...]] = []
         digests_of_images: list[bytes] = []
-        some = chunk if cluster is None else CHUNKS * chunk
+        step = chunk if cluster is None else CHUNKS * chunk
         tasks = [
-            range(start, min(start + some, source.count)) for start in range(0, source.count, some)
+            range(start, min(start + step, source.count)) for start in range(0, source.count, step)
         ]
         scan = partial(_scan_images, source.anywhere(), chunk, background, measured)
         for parts, digest in map(scan, tasks) if cluster is None else cluster.in_order(scan, tasks):
@@ -231,7 +233,7 @@ def read_table(
         digests = {name: dataset_digest(values) for name, values in read.items()}
         digests["questions"] = column_digest(digests_of_images)
         contents = {questions.stored_at(name): digest for name, digest in digests.items()}
-        told = questions.spec is not None  # released files tell no digests
+        has_digests = questions.spec is not None  # released files tell no digests
         scored = joint_digest({name: digests[name] for name in SCORED if name in digests})
         return AuditTable(
             source,
@@ -241,8 +243,8 @@ def read_table(
             questions.image_dtype,
             answers,
             truth,
-            contents if told else {},
-            told and questions.has_answers and scored != questions.stored_truth_digest,
+            contents if has_digests else {},
+            has_digests and questions.has_answers and scored != questions.stored_truth_digest,
             background,
             measured,
             *map(np.concatenate, zip(*scans, strict=True)),
@@ -256,9 +258,9 @@ def content_problems(tables: Sequence[AuditTable]) -> list[str]:
     """
     wrong = "the answers, and what else scores depend on, are not those of its truth_digest"
     problems = [f"{table.name}: {wrong}" for table in tables if table.truth_changed]
-    known = {place: digest for table in tables for place, digest in table.contents.items()}
-    for path in dict.fromkeys(path for path, _ in known):
-        digests = {name: digest for (where, name), digest in known.items() if where == path}
+    contents = {place: digest for table in tables for place, digest in table.contents.items()}
+    for path in dict.fromkeys(path for path, _ in contents):
+        digests = {name: digest for (where, name), digest in contents.items() if where == path}
         with OpenFile(path, "question file") as opened:
             problems += [f"{path.name}: {text}" for text in problems_of_file(opened, digests)]
     return problems

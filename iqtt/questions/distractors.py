@@ -142,8 +142,8 @@ def answer_positions(spec: SplitSpec, split: str, first: int, count: int) -> Arr
     questions are, so that the key of one split tells nothing about that of another, whatever they
     have in common; only the sizes of other tables and how images look make no difference.
     """
-    told = {name: value for name, value in vars(spec).items() if name not in LOOKS_AND_SIZES}
-    text = json.dumps([told, count], sort_keys=True)
+    settings = {name: value for name, value in vars(spec).items() if name not in LOOKS_AND_SIZES}
+    text = json.dumps([settings, count], sort_keys=True)
     key = int.from_bytes(hashlib.sha256(text.encode()).digest())
     rng = item_rng(key, question_key(split, first), Purpose.POSITIONS)
     return np.asarray(rng.permutation(np.arange(count) % spec.answers).astype(np.uint8))
@@ -173,10 +173,10 @@ def draw_shapes(
     for (kind, cubes), waiting in groups.items():
         rows = waiting
         for _ in range(SHAPE_ATTEMPTS):
-            some = [rngs[i] for i in rows]
-            made = _draw(spec, pools, kind, cubes, SPLITS.index(split), some)
-            for i, one in zip(rows, made, strict=True):
-                drawn[i] = one
+            generators = [rngs[i] for i in rows]
+            made = _draw(spec, pools, kind, cubes, SPLITS.index(split), generators)
+            for i, shapes in zip(rows, made, strict=True):
+                drawn[i] = shapes
             rows = [i for i in rows if drawn[i] is None]
             if not rows:
                 break
@@ -187,7 +187,7 @@ def draw_shapes(
                 " distractors that no other split may use",
                 hint="take more --cubes, or another kind of --distractors",
             )
-    return [one for one in drawn if one is not None]
+    return [shapes for shapes in drawn if shapes is not None]
 
 
 def _either_hand(cubes: Array, rng: np.random.Generator) -> Array:
@@ -235,10 +235,10 @@ def _near_questions(
     spec: SplitSpec, kind: str, pool: Array, split: int, rngs: Sequence[np.random.Generator]
 ) -> list[Drawn | None]:
     """Draw the shapes of a question of the kinds `near` or `mirror` with each generator."""
-    found = _moved(spec, pool, split, rngs)
-    chiral = is_chiral(np.stack([shape for shape, _ in found])) if kind == "mirror" else None
+    pairs = _moved(spec, pool, split, rngs)
+    chiral = is_chiral(np.stack([shape for shape, _ in pairs])) if kind == "mirror" else None
     made: list[Drawn | None] = []
-    for i, (rng, (shape, moved)) in enumerate(zip(rngs, found, strict=True)):
+    for i, (rng, (shape, moved)) in enumerate(zip(rngs, pairs, strict=True)):
         if chiral is None:
             shapes, order = [shape, *moved][: spec.answers], rng.permutation(spec.answers)
             kinds = np.array([-1, 1, 1])[: spec.answers]
@@ -271,13 +271,13 @@ def _moved(
     classes = canonical_class(np.concatenate([references, moved]))
     names = [bytes(name) for name in set_ids(classes)]
     owned = split_of(classes[len(rngs) :], spec.shapes == "chain") == split
-    found: list[tuple[Array, list[Array]]] = [(reference, []) for reference in references]
+    pairs: list[tuple[Array, list[Array]]] = [(reference, []) for reference in references]
     seen = [{name} for name in names[: len(rngs)]]
-    for i, cubes, name, own in zip(question, moved, names[len(rngs) :], owned, strict=True):
-        if own and name not in seen[i] and len(found[i][1]) < 2:
-            found[i][1].append(cubes)
+    for i, cubes, name, is_ours in zip(question, moved, names[len(rngs) :], owned, strict=True):
+        if is_ours and name not in seen[i] and len(pairs[i][1]) < 2:
+            pairs[i][1].append(cubes)
             seen[i].add(name)
-    return found
+    return pairs
 
 
 def arrange(drawn: Drawn, answer: int, rng: np.random.Generator) -> Shapes:

@@ -103,12 +103,12 @@ class SplitSpec:
         _check_within("labeled", self.labeled, 0, self.train, " training questions")
         check_range("cubes", self.cubes, 3, MAX_CUBES)
         check_range("lights", self.lights, 1, MAX_LIGHTS)
-        for name, value, known in (
+        for name, value, choices in (
             ("shapes", self.shapes, get_args(Kind)),
             ("distractors", self.distractors, DISTRACTORS),
             ("image dtype", self.image_dtype, IMAGE_DTYPES),
         ):
-            check(value in known, name, repr(value), f"one of {', '.join(known)}")
+            check(value in choices, name, repr(value), f"one of {', '.join(choices)}")
         _check_within("answers", self.answers, 2, 3)
         if self.distractors == "mirror":
             check(self.answers == 3, "answers", self.answers, "3, or the distractors mirror-pair")

@@ -69,9 +69,9 @@ def sample_questions(
                 )
         drawn = draw_shapes(spec, pools, split, [(i, attempt) for i, _, attempt in waiting])
         shapes = []
-        for (index, place, attempt), one in zip(waiting, drawn, strict=True):
+        for (index, place, attempt), unplaced in zip(waiting, drawn, strict=True):
             rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.ANSWERS, attempt)
-            shapes.append(arrange(one, place, rng))
+            shapes.append(arrange(unplaced, place, rng))
         symmetric, distances = shape_symmetries(shapes), camera_distances(spec, shapes)
         turns = find_views(spec, split, waiting, shapes, distances, symmetric, tally)
         again = []
@@ -96,7 +96,7 @@ def camera_distances(spec: SplitSpec, shapes: Sequence[Shapes]) -> Array:
 
     It is that of all images of the question, as a scale of its own would tell shapes apart.
     """
-    radii = [bounding_radius(one.cubes[1:]).max() for one in shapes]
+    radii = [bounding_radius(drawn.cubes[1:]).max() for drawn in shapes]
     return np.array([spec.framing_distance(radius) for radius in radii])
 
 
@@ -123,13 +123,13 @@ def random_frames(shapes: Shapes, turns: Array, rng: np.random.Generator) -> tup
 def shape_symmetries(shapes: Sequence[Shapes]) -> Array:
     """Return which of ROTATIONS leave each shape of each question as it is, (Q, 1 + K, 24)."""
     images = len(shapes[0].cubes) if shapes else 0
-    found = np.zeros((len(shapes), images, len(ROTATIONS)), bool)
-    sizes = np.array([one.cubes.shape[1] for one in shapes])
+    symmetric = np.zeros((len(shapes), images, len(ROTATIONS)), bool)
+    sizes = np.array([drawn.cubes.shape[1] for drawn in shapes])
     for size in np.unique(sizes).tolist():
         rows = np.flatnonzero(sizes == size)
         cubes = np.concatenate([shapes[i].cubes for i in rows.tolist()])
-        found[rows] = symmetries(cubes).reshape(len(rows), images, -1)
-    return found
+        symmetric[rows] = symmetries(cubes).reshape(len(rows), images, -1)
+    return symmetric
 
 
 def find_views(
@@ -157,37 +157,37 @@ def find_views(
     for i, (index, _, attempt) in enumerate(requests):
         rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.VIEW, attempt)
         turns[i] = draw_rotations(rng, (2 * answers, VIEWS))
-    centres = cube_centres([cubes for one in shapes for cubes in one.cubes[1:]], slots)
+    centres = cube_centres([cubes for drawn in shapes for cubes in drawn.cubes[1:]], slots)
     centres = np.tile(centres.reshape(questions, answers, slots, 3), (1, 2, 1, 1))
-    counts = np.array([one.cubes.shape[1] for one in shapes])
-    right = np.array([one.answer for one in shapes])
-    found = np.full((questions, 2 * answers, 3, 3), np.nan)
+    counts = np.array([drawn.cubes.shape[1] for drawn in shapes])
+    right = np.array([drawn.answer for drawn in shapes])
+    views = np.full((questions, 2 * answers, 3, 3), np.nan)
 
-    def choose(some: slice, allowed: Array) -> None:
+    def choose(images: slice, allowed: Array) -> None:
         """Find rotations of some images of all questions; allowed: (Q, K, VIEWS)."""
         chosen = _first_good(
             spec,
-            turns[:, some].reshape(-1, VIEWS, 3, 3),
+            turns[:, images].reshape(-1, VIEWS, 3, 3),
             allowed.reshape(-1, VIEWS),
-            centres[:, some].reshape(-1, slots, 3),
+            centres[:, images].reshape(-1, slots, 3),
             np.repeat(counts, answers),
             np.repeat(distances, answers),
             tally,
         ).reshape(-1, answers)
         question, image = np.nonzero(chosen >= 0)
-        best = turns[question, some.start + image, chosen[question, image]]
-        found[question, some.start + image] = best
+        best = turns[question, images.start + image, chosen[question, image]]
+        views[question, images.start + image] = best
 
     as_references, as_answers = slice(0, answers), slice(answers, 2 * answers)
     needed = (np.arange(answers) == right[:, None]) | (counts >= CROWDED)[:, None]
     choose(as_references, np.repeat(needed[..., None], VIEWS, axis=2))
-    seen = np.isfinite(found[:, as_references]).all(axis=(2, 3))
+    seen = np.isfinite(views[:, as_references]).all(axis=(2, 3))
     allowed = np.repeat((seen | ~needed).all(axis=1)[:, None], answers, axis=1)[..., None]
     mirrored, related = relations(shapes)
     for reference in range(answers):
         far = far_enough(
             spec,
-            found[:, reference],
+            views[:, reference],
             turns[:, as_answers],
             symmetric[:, 1:],
             mirrored[:, reference],
@@ -198,11 +198,11 @@ def find_views(
     step = before.sum(axis=2)
     for now in range(answers):
         choose(as_answers, allowed & (step == now)[..., None])
-        first = found[:, answers + now]
+        first = views[:, answers + now]
         far = far_enough(spec, first, turns[:, as_answers], symmetric[:, 1:], mirrored[:, now])
         allowed = allowed & (far | ~before[:, :, now, None])
     rows = np.arange(questions)
-    return np.concatenate([found[rows, right][:, None], found[:, as_answers]], axis=1)
+    return np.concatenate([views[rows, right][:, None], views[:, as_answers]], axis=1)
 
 
 def relations(shapes: Sequence[Shapes]) -> tuple[Array, Array]:
@@ -213,7 +213,7 @@ def relations(shapes: Sequence[Shapes]) -> tuple[Array, Array]:
     """
     answers = len(shapes[0].cubes) - 1 if shapes else 0
     mirrored, related = np.zeros((2, len(shapes), answers, answers), bool)
-    counts = np.array([one.cubes.shape[1] for one in shapes])
+    counts = np.array([drawn.cubes.shape[1] for drawn in shapes])
     for count in np.unique(counts).tolist():
         rows = np.flatnonzero(counts == count)
         cubes = np.stack([shapes[i].cubes[1:] for i in rows.tolist()]).astype(np.int32)

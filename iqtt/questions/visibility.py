@@ -31,13 +31,13 @@ def _outline_edges() -> Array:
     """
     edges = np.zeros((3, 2, 2, 3, 3), np.intp)
     for axis, *eye in itertools.product(range(3), *2 * [range(3)]):
-        one, other = (4 >> k for k in range(3) if k != axis)
-        found = [
-            (i * one + j * other, i * one + j * other + (4 >> axis))
+        first, second = (4 >> k for k in range(3) if k != axis)
+        sides = [
+            (i * first + j * second, i * first + j * second + (4 >> axis))
             for i, j in itertools.product((0, 1), repeat=2)
             if (eye[0] == 2 * i) != (eye[1] == 2 * j)
         ]
-        for place, ends in enumerate(found):
+        for place, ends in enumerate(sides):
             edges[axis, place, :, eye[0], eye[1]] = ends
     return edges
 
@@ -69,14 +69,14 @@ def cube_pixels(
     at_once = max(1, VIEWS_AT_ONCE * BITS // (height * -(-width // BITS)))
     shown = np.zeros(centres.shape[:2], np.int32)
     for start in range(0, len(centres), at_once):
-        some = slice(start, start + at_once)
-        shown[some] = _cube_pixels(
+        part = slice(start, start + at_once)
+        shown[part] = _cube_pixels(
             size,
             fov_y_degrees,
-            centres[some],
-            counts[some],
-            world_from_shape[some],
-            distances[some],
+            centres[part],
+            counts[part],
+            world_from_shape[part],
+            distances[part],
         )
     return shown
 
@@ -144,6 +144,6 @@ def _cube_pixels(
             before = covered[at[:, k]]
             covered[at[:, k]] = before | runs[:, k]
             shown[k] += np.bitwise_count(runs[:, k] & ~before).sum(axis=0, dtype=np.int32)
-    found = np.zeros((views, slots), np.int32)
-    np.put_along_axis(found, order, shown.T, axis=1)
-    return found
+    result = np.zeros((views, slots), np.int32)
+    np.put_along_axis(result, order, shown.T, axis=1)
+    return result

@@ -53,19 +53,19 @@ class Commits:
         while not ending:
             batch, ending = self._next_batch()
             if batch and not self._done(batch):
-                for one in batch:  # so that one who fails is no harm to the others
-                    self._done([one], last=True)
+                for waiting in batch:  # so that one who fails is no harm to the others
+                    self._done([waiting], last=True)
 
     def _next_batch(self) -> tuple[list[Waiting], bool]:
         """Wait for something to do; return all that waits, and whether the end has come."""
         batch: list[Waiting] = []
         try:
             while len(batch) < MOST_AT_ONCE:
-                one = self._waiting.get(block=not batch)
-                if one is None:
+                waiting = self._waiting.get(block=not batch)
+                if waiting is None:
                     return batch, True
-                if one[1].set_running_or_notify_cancel():  # else nobody waits for it any more
-                    batch.append(one)
+                if waiting[1].set_running_or_notify_cancel():  # else nobody waits for it any more
+                    batch.append(waiting)
         except queue.Empty:
             pass
         return batch, False

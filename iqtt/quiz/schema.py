@@ -194,10 +194,10 @@ def secret_of(db: sqlite3.Connection) -> str:
     return str(db.execute("SELECT secret FROM study").fetchone()[0])
 
 
-def _require_same(path: Path, begun: Settings, asked: Settings) -> None:
+def _require_same(path: Path, begun: Settings, now: Settings) -> None:
     """Raise SpecError where a file was begun with other settings than those of now."""
     for field in fields(Settings):
-        stored, expected = (f"{getattr(each, field.name)!s:.20}" for each in (begun, asked))
+        stored, expected = (f"{getattr(each, field.name)!s:.20}" for each in (begun, now))
         if stored != expected:
             hint = SPLIT_HINT if field.name == "fingerprint" else SETTINGS_HINT
             raise SpecError(f"{path}: {field.name}", stored, expected, hint)

@@ -69,8 +69,8 @@ def matched_rows(cubes: Cubes) -> NDArray[np.intp]:
     exact = np.column_stack([edges, contacts(cubes)])
     _, group = np.unique(exact, axis=0, return_inverse=True)
     places = np.column_stack([moments(cubes), _APART * group.reshape(-1)])
-    found = cKDTree(places).query(places, 1 + PARTNERS, distance_upper_bound=TOLERANCE)
-    far, rows = map(np.asarray, found)
+    neighbours = cKDTree(places).query(places, 1 + PARTNERS, distance_upper_bound=TOLERANCE)
+    far, rows = map(np.asarray, neighbours)
     # A shape with a twin of equal moments may come second in its own row: it is put first.
     far[rows == np.arange(len(cubes))[:, None]] = -1
     order = np.lexsort((rows, far.round(6)), axis=1)

@@ -107,8 +107,8 @@ def is_chiral(cubes: Cubes) -> NDArray[np.bool_]:
 
     Raises ValueError as `canonical`.
     """
-    own, mirrored = _least_keys(cubes, ROTATIONS), _least_keys(cubes, _REFLECTIONS)
-    return np.asarray((own != mirrored).any(axis=1))
+    turned, mirrored = _least_keys(cubes, ROTATIONS), _least_keys(cubes, _REFLECTIONS)
+    return np.asarray((turned != mirrored).any(axis=1))
 
 
 def symmetries(cubes: Cubes) -> NDArray[np.bool_]:
@@ -177,8 +177,8 @@ def _least_keys(cubes: Cubes, matrices: NDArray[np.int8]) -> NDArray[np.uint16]:
     best = np.empty((low.shape[1], low.shape[2]), dtype=np.uint16)
     axes, flipped = np.abs(matrices).argmax(axis=2), matrices.sum(axis=2) < 0
     for start in range(0, len(best), _CHUNK):
-        some = slice(start, start + _CHUNK)
-        box = extent[:, some][axes]
+        part = slice(start, start + _CHUNK)
+        box = extent[:, part][axes]
         # Only orientations with a descending box compete: for most a sixth of the sorting.
         shape, matrix = np.nonzero(((box[:, 0] >= box[:, 1]) & (box[:, 1] >= box[:, 2])).T)
         keys = np.zeros((len(shape), best.shape[1]), dtype=np.uint16)
@@ -189,7 +189,7 @@ def _least_keys(cubes: Cubes, matrices: NDArray[np.int8]) -> NDArray[np.uint16]:
             along[back] = extent[axis[back], start + shape[back], None] - along[back]
             keys = (keys << 4) | along
         keys.sort(axis=1)
-        best[some] = keys[_first_of_each(keys, shape)]
+        best[part] = keys[_first_of_each(keys, shape)]
     return best
 
 

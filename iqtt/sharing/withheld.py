@@ -35,12 +35,12 @@ def check_withheld(path: Path, is_test: bool) -> None:
         file = opened.file
         with describing(f"{path}: attribute 'spec'"):
             spec = SplitSpec.from_json(read_root(file, path, FORMAT)["spec"])
-        found = ["the seed"] if spec.seed is not None else []
-        found += ["the command that made it"] if COMMAND in file.attrs else []
-        found += _beside_images(file) if is_test else []
-    if found:
+        leaks = ["the seed"] if spec.seed is not None else []
+        leaks += ["the command that made it"] if COMMAND in file.attrs else []
+        leaks += _beside_images(file) if is_test else []
+    if leaks:
         expected = "a file that does not tell the test answers, or --with-answers"
-        raise SpecError(path, and_more(found), expected)
+        raise SpecError(path, and_more(leaks), expected)
 
 
 def _beside_images(file: h5py.File) -> list[str]:

@@ -48,7 +48,7 @@ def objects_of(spec: DatasetSpec) -> Objects:
 
 def mesh_objects(store: MeshStore) -> Objects:
     """Return the objects of a folder of meshes."""
-    models = {name: [one.name for one in some] for name, some in store.folder.models.items()}
+    models = {name: [file.name for file in files] for name, files in store.folder.models.items()}
     return Objects(models, store.shape, store.digest, store.problems)
 
 

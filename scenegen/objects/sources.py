@@ -121,9 +121,11 @@ def file_objects(
         SpecError: they are meshes, and no folder is told, or one that holds others.
         MeshFolderError: a folder without such models.
     """
-    told = mesh_folder(shapenet_root, objects_root, up)
-    if spec.source in BUILT_IN and told:
-        raise SpecError("objects", f"the folder {told}", "none: the file's objects are built in")
+    folder_option = mesh_folder(shapenet_root, objects_root, up)
+    if spec.source in BUILT_IN and folder_option:
+        raise SpecError(
+            "objects", f"the folder {folder_option}", "none: the file's objects are built in"
+        )
     root = objects_root if spec.source == "folder" else shapenet_root
     if root is None:
         MEMBER_STORE.use(cache_dir or default_cache_dir())

@@ -31,7 +31,7 @@ def stored_frames(cubes: Array, world_from_shape: Array, whole: Array) -> Array:
     reference, answers = world_from_shape[:, :1], world_from_shape[:, 1:]
     between = answers @ reference.swapaxes(2, 3)
     within = reference.swapaxes(2, 3) @ answers
-    angle, own = _angle(between), _angle(answers)
+    angle, answer_angle = _angle(between), _angle(answers)
     order = _order(cubes)
     used = (cubes[:, 1:] != NO_CUBE).all(axis=3)
     same = np.count_nonzero((order[:, 1:] == order[:, :1]) & used, axis=2)
@@ -41,7 +41,7 @@ def stored_frames(cubes: Array, world_from_shape: Array, whole: Array) -> Array:
         for i, j in itertools.combinations_with_replacement(range(3), 2)
     ]
     flat = between.reshape(*between.shape[:2], 9)
-    numbers = [angle, same, own, place, *np.moveaxis(flat, 2, 0), *symmetric]
+    numbers = [angle, same, answer_angle, place, *np.moveaxis(flat, 2, 0), *symmetric]
     return np.where(whole[:, None, None], np.stack(numbers, axis=2), np.nan)
 
 

@@ -111,10 +111,10 @@ def _distances(signature: Array) -> Array:
     for a, b in itertools.combinations(range(images), 2):
         for k, rows in enumerate(_SIGNATURE_PARTS):
             norm = (signature[:, [a, b], rows] ** 2).sum(axis=(1, 2, 3))
-            one, other = waves[:, a, rows], waves[:, b, rows]
+            first, second = waves[:, a, rows], waves[:, b, rows]
             # The correlation at all turns at once; without the conjugate, with the mirror image.
-            same = np.fft.irfft((one * other.conj()).sum(axis=1), DIRECTIONS).max(axis=1)
-            mirrored = np.fft.irfft((one * other).sum(axis=1), DIRECTIONS).max(axis=1)
+            same = np.fft.irfft((first * second.conj()).sum(axis=1), DIRECTIONS).max(axis=1)
+            mirrored = np.fft.irfft((first * second).sum(axis=1), DIRECTIONS).max(axis=1)
             apart = np.sqrt(np.maximum(norm - 2 * np.maximum(same, mirrored), 0))
             result[:, a, b, k] = result[:, b, a, k] = apart
     return result

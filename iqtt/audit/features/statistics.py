@@ -95,7 +95,7 @@ def measure(images: Array, shown: NDArray[np.bool_]) -> Array:
     deviation = (grey - brightness[:, None, None]) * mask
     thumbnails = _averages(height) @ grey @ _averages(width).T
     extent, offset = _boxes(mask)
-    found = {
+    columns = {
         "area": mask.mean(axis=(1, 2)),
         "extent": extent,
         "offset": offset,
@@ -107,7 +107,7 @@ def measure(images: Array, shown: NDArray[np.bool_]) -> Array:
         "moments": _moments(mask),
         "thumbnails": thumbnails,
     }
-    for name, values in found.items():
+    for name, values in columns.items():
         result[name] = values.reshape(result[name].shape)
     return result
 
@@ -186,7 +186,7 @@ def shape_statistics(
     everything = np.concatenate([names[:, 1:].reshape(-1) for names in class_names])
     names, times = np.unique(everything, return_counts=True)
     results = []
-    for stored, own, good in zip(cubes, class_names, whole, strict=True):
+    for stored, its_names, good in zip(cubes, class_names, whole, strict=True):
         answers = stored[:, 1:]
         used = (answers != NO_CUBE).all(axis=3)
         contacts, spread = np.zeros((2, *used.shape[:2]))
@@ -197,8 +197,8 @@ def shape_statistics(
             contacts += np.count_nonzero(both & (apart.sum(axis=3) == 1), axis=2) / 2
             spread += ((apart**2).sum(axis=3) * both).sum(axis=2)
         spread /= 2 * np.maximum(used.sum(axis=2), 1) ** 2
-        here = (own[:, 1:, None] == own[:, None, 1:]).sum(axis=2)
-        elsewhere = times[np.searchsorted(names, own[:, 1:])] - here
+        here = (its_names[:, 1:, None] == its_names[:, None, 1:]).sum(axis=2)
+        elsewhere = times[np.searchsorted(names, its_names[:, 1:])] - here
         numbers = np.stack([contacts, spread, elsewhere], axis=2)
         results.append(np.where(good[:, None, None], numbers, np.nan))
     return results

@@ -177,12 +177,12 @@ def _by_rule(evidence: Evidence) -> Iterator[_Guess]:
     apart = nearest_outline(statistics["outline_distance"])
     yield from _by_distance("whole outline, turned or flipped", OUTLINE, apart, right)
     for title, values in evidence.cubes.items():
-        told = np.isfinite(values).all(axis=1)
-        yield from _by_cost(title, WITHOUT, _SIZE, -values[told], right[told])
-        yield from _by_company(title, _distances(values[told]), right[told])
-    told = np.isfinite(evidence.frames).all(axis=(1, 2))
-    turns = evidence.frames[told, :, 0]
-    yield from _by_cost("stored rotation", FRAMES, _NEARNESS, turns, right[told])
+        whole = np.isfinite(values).all(axis=1)
+        yield from _by_cost(title, WITHOUT, _SIZE, -values[whole], right[whole])
+        yield from _by_company(title, _distances(values[whole]), right[whole])
+    whole = np.isfinite(evidence.frames).all(axis=(1, 2))
+    turns = evidence.frames[whole, :, 0]
+    yield from _by_cost("stored rotation", FRAMES, _NEARNESS, turns, right[whole])
 
 
 def _by_cost(
@@ -241,10 +241,10 @@ def _learned(evidence: Evidence) -> Iterator[_Guess]:
         ("answers' cubes", cubes, WITHOUT),
         ("rotations and order of cubes", evidence.frames, FRAMES),
     ):
-        told = np.isfinite(values).all(axis=(1, 2))
-        if np.count_nonzero(told) >= LEAST_QUESTIONS:
-            chosen = choose(among_others(values[told]), right[told])
-            yield (title, "learned", sees, chosen == right[told])
+        whole = np.isfinite(values).all(axis=(1, 2))
+        if np.count_nonzero(whole) >= LEAST_QUESTIONS:
+            chosen = choose(among_others(values[whole]), right[whole])
+            yield (title, "learned", sees, chosen == right[whole])
 
 
 def _by_patterns(statistics: Array, right: Array) -> Array:
@@ -258,11 +258,11 @@ def _by_patterns(statistics: Array, right: Array) -> Array:
 
 def _by_place(places: Sequence[Array], answers: int) -> list[_Guess]:
     def hits(context: Callable[[Array], Array]) -> Array:
-        right = [likely_places(one, context(one), answers) == one for one in places]
+        right = [likely_places(table, context(table), answers) == table for table in places]
         return np.concatenate([np.zeros(0, np.bool_), *right])
 
-    def before(one: Array) -> Array:
-        return np.concatenate([[answers], one[:-1]]) if len(one) else one
+    def before(table: Array) -> Array:
+        return np.concatenate([[answers], table[:-1]]) if len(table) else table
 
     return [
         ("place", "commonest", WITHOUT, hits(np.zeros_like)),
@@ -286,8 +286,8 @@ def _least(costs: Array) -> Array:
     count = costs.shape[1]
     row = np.arange(len(costs))
     order = ((row * 2_654_435_761 >> 9)[:, None] + np.arange(count)) % count
-    found = np.take_along_axis(costs, order, axis=1).argmin(axis=1)
-    return np.asarray(order[row, found])
+    least = np.take_along_axis(costs, order, axis=1).argmin(axis=1)
+    return np.asarray(order[row, least])
 
 
 def components(thumbnails: Array) -> Array:
@@ -296,8 +296,8 @@ def components(thumbnails: Array) -> Array:
     flat = flat - flat.mean(axis=0)
     with one_thread():
         _, axes = np.linalg.eigh(flat.T @ flat)
-        found = flat @ axes[:, ::-1][:, :COMPONENTS]
-    return np.asarray(found.reshape(*thumbnails.shape[:2], -1))
+        projected = flat @ axes[:, ::-1][:, :COMPONENTS]
+    return np.asarray(projected.reshape(*thumbnails.shape[:2], -1))
 
 
 def likely_places(right: Array, context: Array, answers: int) -> Array:

@@ -67,9 +67,9 @@ def choose(columns: Array, right: Array) -> Array:
     fold = np.arange(len(right)) % FOLDS
     chosen = np.zeros(len(right), np.int64)
     for k in range(FOLDS):
-        known, asked = fold != k, fold == k
-        trees = AnswerTrees().fit(columns[known], right[known])
-        chosen[asked] = trees.scores(columns[asked]).argmax(axis=1)
+        learned, answered = fold != k, fold == k
+        trees = AnswerTrees().fit(columns[learned], right[learned])
+        chosen[answered] = trees.scores(columns[answered]).argmax(axis=1)
     return chosen
 
 

@@ -41,25 +41,25 @@ def no_other_explanation(
     Args:
         sample: for each table the rows to look at, in rising order.
     """
-    found, tried, hiding = [], 0, 0
-    for table, one, rows in zip(tables, shapes, sample, strict=True):
+    wrong, tried, hiding = [], 0, 0
+    for table, its_shapes, rows in zip(tables, shapes, sample, strict=True):
         explained = np.zeros(len(table), np.bool_)
         if table.spec is not None:
-            for n in np.unique(one.count[rows[one.whole[rows]]]).tolist():
-                some = rows[one.whole[rows] & (one.count[rows] == n)]
-                question, cubes = _laid_on(table, one, some, n)
+            for n in np.unique(its_shapes.count[rows[its_shapes.whole[rows]]]).tolist():
+                chosen = rows[its_shapes.whole[rows] & (its_shapes.count[rows] == n)]
+                question, cubes = _laid_on(table, its_shapes, chosen, n)
                 alike, shown = _looks_alike(table, question, cubes, n)
                 explained[question[alike & shown]] = True
                 tried += len(question)
                 hiding += len(np.unique(question[alike & ~shown]))
-        found.append(explained)
+        wrong.append(explained)
     note = f"; {hiding:,} would, if cubes could hide" if hiding else ""
     return judge(
         "one explanation",
         "no wrong answer laid on the reference gives its picture and shows every cube"
         f" ({tried:,} were tried{note})",
         tables,
-        found,
+        wrong,
         lambda t, row: "a wrong answer looks like the reference",
         sum(map(len, sample)),
     )
@@ -103,35 +103,36 @@ def _laid_on(table: AuditTable, shapes: Shapes, rows: Array, n: int) -> tuple[Ar
 
 def _looks_alike(table: AuditTable, question: Array, cubes: Array, n: int) -> tuple[Array, Array]:
     """Return which candidates give the reference's picture, and which show all cubes, (M,) each."""
-    spec, found = table.spec, np.zeros((2, len(question)), np.bool_)
+    spec, verdict = table.spec, np.zeros((2, len(question)), np.bool_)
     if spec is None:
-        return found[0], found[1]
+        return verdict[0], verdict[1]
     for start in range(0, len(question), _CANDIDATES):
         row, candidate = (values[start : start + _CANDIDATES] for values in (question, cubes))
         reference = table.cubes[row, 0, :n].astype(np.int64)
         eye, axes = _camera(table, row)
         centre = (reference.min(axis=1) + reference.max(axis=1) + 1) / 2
-        own, other = (
+        shown, other = (
             (c + 0.5 - centre[:, None]).astype(np.float32) for c in (reference, candidate)
         )
         differing = np.maximum(
-            _pixels_apart(own, other, eye, axes, spec), _pixels_apart(other, own, eye, axes, spec)
+            _pixels_apart(shown, other, eye, axes, spec),
+            _pixels_apart(other, shown, eye, axes, spec),
         )
         for k in np.flatnonzero(differing < ROUGH * spec.min_cube_pixels).tolist():
             rays = (_pixel_rays(spec) @ axes[k])[None].astype(np.float32)
-            _, face = _first_hits(own[k : k + 1], eye[k : k + 1], rays)
+            _, face = _first_hits(shown[k : k + 1], eye[k : k + 1], rays)
             cube, other_face = _first_hits(other[k : k + 1], eye[k : k + 1], rays)
             least = np.bincount(cube[cube >= 0], minlength=n).min()
-            found[0, start + k] = np.count_nonzero(face != other_face) < spec.min_cube_pixels
-            found[1, start + k] = least >= spec.min_cube_pixels
-    return found[0], found[1]
+            verdict[0, start + k] = np.count_nonzero(face != other_face) < spec.min_cube_pixels
+            verdict[1, start + k] = least >= spec.min_cube_pixels
+    return verdict[0], verdict[1]
 
 
-def _pixels_apart(own: Array, other: Array, eye: Array, axes: Array, spec: SplitSpec) -> Array:
+def _pixels_apart(shape: Array, other: Array, eye: Array, axes: Array, spec: SplitSpec) -> Array:
     """Return roughly how many pixels of cubes that the other shape lacks it shows in another way.
 
     Args:
-        own, other: centres of the cubes of two shapes in one frame, (M, n, 3).
+        shape, other: centres of the cubes of two shapes in one frame, (M, n, 3).
         eye, axes: as `_camera` gives them.
 
     Returns (M,) pixels, of which a ray of the grid stands for several.
@@ -139,17 +140,17 @@ def _pixels_apart(own: Array, other: Array, eye: Array, axes: Array, spec: Split
     step = ((np.arange(GRID) + 0.5) / GRID * 2 - 1) * REACH
     s, t = (v.reshape(-1, 1) for v in np.meshgrid(step, step))
     square = (s * axes[:, None, 0] + t * axes[:, None, 1]).astype(np.float32)
-    result = np.zeros(len(own))
+    result = np.zeros(len(shape))
     focal = min(spec.height, spec.width) / 2 / math.tan(math.radians(spec.fov_degrees) / 2)
-    lacks = (np.abs(own[:, :, None] - other[:, None]) > 0.5).any(axis=3).all(axis=2)
-    for i in range(own.shape[1]):
-        some = np.flatnonzero(lacks[:, i])
-        rays = own[some, i, None] + square[some] - eye[some, None]
-        cube, face = _first_hits(own[some], eye[some], rays)
-        _, other_face = _first_hits(other[some], eye[some], rays)
-        depth = -((own[some, i] - eye[some]) * axes[some, 2]).sum(axis=1)
+    lacks = (np.abs(shape[:, :, None] - other[:, None]) > 0.5).any(axis=3).all(axis=2)
+    for i in range(shape.shape[1]):
+        lacking = np.flatnonzero(lacks[:, i])
+        rays = shape[lacking, i, None] + square[lacking] - eye[lacking, None]
+        cube, face = _first_hits(shape[lacking], eye[lacking], rays)
+        _, other_face = _first_hits(other[lacking], eye[lacking], rays)
+        depth = -((shape[lacking, i] - eye[lacking]) * axes[lacking, 2]).sum(axis=1)
         pixels = (2 * REACH / GRID * focal / depth) ** 2
-        result[some] += np.count_nonzero((cube == i) & (face != other_face), axis=1) * pixels
+        result[lacking] += np.count_nonzero((cube == i) & (face != other_face), axis=1) * pixels
     return result
 
 

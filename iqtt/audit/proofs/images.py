@@ -24,10 +24,10 @@ def balance(tables: Sequence[AuditTable], right: Sequence[Array]) -> Proof:
         np.bincount(places[places >= 0], minlength=table.images - 1)
         for table, places in zip(tables, right, strict=True)
     ]
-    known = [i for i in range(len(tables)) if counts[i].sum()]
-    shown = [f"{tables[i].name}: {'/'.join(map(str, counts[i]))}" for i in known]
-    uneven = [text for i, text in zip(known, shown, strict=True) if np.ptp(counts[i]) > 1]
-    if not known:
+    answered = [i for i in range(len(tables)) if counts[i].sum()]
+    shown = [f"{tables[i].name}: {'/'.join(map(str, counts[i]))}" for i in answered]
+    uneven = [text for i, text in zip(answered, shown, strict=True) if np.ptp(counts[i]) > 1]
+    if not answered:
         return Proof("answer places", "skipped", "no answers")
     if uneven:
         detail = f"{'; '.join(uneven)} at places 0/1/...; expected: counts differ by at most 1"

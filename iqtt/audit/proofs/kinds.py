@@ -25,7 +25,7 @@ GYRATION = 0.12
 
 def answers_differ(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     """Prove that no two answers show the same shape, but for a mirror-pair's wrong ones."""
-    same = [_twins(table, one) for table, one in zip(tables, shapes, strict=True)]
+    same = [_twins(table, its_shapes) for table, its_shapes in zip(tables, shapes, strict=True)]
     return judge(
         "answers differ",
         "no two answers congruent to each other, but for two mirror images of the right one",
@@ -45,10 +45,10 @@ def _twins(table: AuditTable, shapes: Shapes) -> Array:
     """Return which pairs of answers are congruent though they must not be, (Q, pairs) bool."""
     mirror = np.column_stack([np.zeros(len(table), np.bool_), _is_kind(table, "mirror")])
     names = shapes.shape_name
-    found = [
+    twins = [
         (names[:, a] == names[:, b]) & ~(mirror[:, a] & mirror[:, b]) for a, b in _pairs(table)
     ]
-    return np.stack(found, axis=1) & shapes.whole[:, None]
+    return np.stack(twins, axis=1) & shapes.whole[:, None]
 
 
 def _is_kind(table: AuditTable, kind: str) -> Array:
@@ -64,18 +64,18 @@ def mirror_images(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Pro
     them must show it from two sides: rotations that the shape's own symmetry hides do not count.
     """
     wrong = []
-    for table, one in zip(tables, shapes, strict=True):
-        told = _is_kind(table, "mirror")
-        names, classes = one.shape_name, one.class_name
+    for table, its_shapes in zip(tables, shapes, strict=True):
+        is_mirror = _is_kind(table, "mirror")
+        names, classes = its_shapes.shape_name, its_shapes.class_name
         # (Q, answer, answer): of one class and not congruent.
         mirrors = classes[:, 1:, None] == classes[:, None, 1:]
         mirrors &= names[:, 1:, None] != names[:, None, 1:]
-        bad = (told & ~mirrors.any(axis=2)).any(axis=1)
-        alone = told.sum(axis=1) == table.images - 2
+        bad = (is_mirror & ~mirrors.any(axis=2)).any(axis=1)
+        alone = is_mirror.sum(axis=1) == table.images - 2
         of_right = (classes[:, 1:] == classes[:, :1]) & (names[:, 1:] != names[:, :1])
-        bad |= alone & (told & ~of_right).any(axis=1)
-        bad |= alone & (_angle_between(table, one, told) < _least_angle(table))
-        wrong.append(bad & one.whole)
+        bad |= alone & (is_mirror & ~of_right).any(axis=1)
+        bad |= alone & (_angle_between(table, its_shapes, is_mirror) < _least_angle(table))
+        wrong.append(bad & its_shapes.whole)
     return judge(
         "mirror images",
         "told mirror images are; where they are the only wrong answers, they are the right one's,"
@@ -90,18 +90,18 @@ def _least_angle(table: AuditTable) -> float:
     return 0.0 if table.spec is None else table.spec.min_angle_degrees - 1e-6
 
 
-def _angle_between(table: AuditTable, shapes: Shapes, told: Array) -> Array:
+def _angle_between(table: AuditTable, shapes: Shapes, mirrors: Array) -> Array:
     """Return how far apart two mirror images are seen, degrees, (Q,); infinite if not two."""
     result = np.full(len(table), np.inf)
-    rows = np.flatnonzero((told.sum(axis=1) == 2) & shapes.whole)
+    rows = np.flatnonzero((mirrors.sum(axis=1) == 2) & shapes.whole)
     if table.images != 4 or not len(rows):
         return result
     views = table.truth["world_from_shape"]
-    order = np.argsort(~told[rows], axis=1, kind="stable")[:, :2]
-    one, other = 1 + order[:, 0], 1 + order[:, 1]
+    order = np.argsort(~mirrors[rows], axis=1, kind="stable")[:, :2]
+    first_place, second_place = 1 + order[:, 0], 1 + order[:, 1]
     for n in np.unique(shapes.count[rows]).tolist():
-        some = shapes.count[rows] == n
-        here, a, b = rows[some], one[some], other[some]
+        of_size = shapes.count[rows] == n
+        here, a, b = rows[of_size], first_place[of_size], second_place[of_size]
         first, second = (table.cubes[here, k, :n].astype(np.int64) for k in (a, b))
         target = cube_codes(second)
         for turn in cube_rotations():
@@ -115,7 +115,7 @@ def _angle_between(table: AuditTable, shapes: Shapes, told: Array) -> Array:
 
 def matched(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     """Prove that matched shapes are alike: boxes and contacts equal, radii of gyration close."""
-    gaps = [_gaps(table, one) for table, one in zip(tables, shapes, strict=True)]
+    gaps = [_gaps(table, its_shapes) for table, its_shapes in zip(tables, shapes, strict=True)]
     return judge(
         "matched",
         "matched wrong answers have the right one's bounding box and number of touching faces, and"
@@ -135,8 +135,8 @@ def _gaps(table: AuditTable, shapes: Shapes) -> Array:
 
     It is infinite where box or contacts differ, and 0 for questions without matched answers.
     """
-    told = _is_kind(table, "matched") & shapes.whole[:, None]
-    rows = np.flatnonzero(told.any(axis=1))
+    is_matched = _is_kind(table, "matched") & shapes.whole[:, None]
+    rows = np.flatnonzero(is_matched.any(axis=1))
     result = np.zeros(len(table))
     for n in np.unique(shapes.count[rows]).tolist():
         here = rows[shapes.count[rows] == n]
@@ -148,7 +148,7 @@ def _gaps(table: AuditTable, shapes: Shapes) -> Array:
         radii = gyration_radii(cubes)
         far = np.linalg.norm(radii - radii[:, :1], axis=2)
         far = np.where(alike, far, np.inf)[:, 1:]
-        result[here] = np.where(told[here], far, 0).max(axis=1)
+        result[here] = np.where(is_matched[here], far, 0).max(axis=1)
     return result
 
 

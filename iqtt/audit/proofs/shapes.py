@@ -65,8 +65,11 @@ def compare_shapes(tables: Sequence[AuditTable]) -> list[Shapes]:
         names = name_shapes(np.concatenate(alike))
         ends = np.cumsum([len(rows) for rows in chosen])[:-1]
         shape, mirrored = (np.split(v.reshape(-1, images) * MOST_CUBES + n, ends) for v in names)
-        for i, one in enumerate(results):
-            one.shape_name[chosen[i]], one.class_name[chosen[i]] = shape[i], mirrored[i]
+        for i, its_shapes in enumerate(results):
+            its_shapes.shape_name[chosen[i]], its_shapes.class_name[chosen[i]] = (
+                shape[i],
+                mirrored[i],
+            )
     return results
 
 
@@ -112,17 +115,17 @@ def whole_shapes(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proo
 def one_right_answer(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     """Prove that exactly one answer is congruent to the reference: the one that the file names."""
     wrong = []
-    for table, found in zip(tables, shapes, strict=True):
+    for table, its_shapes in zip(tables, shapes, strict=True):
         named = table.truth["distractor_kind"] == -1
-        bad = (named != found.right).any(axis=1) | (found.place < 0)
-        wrong.append(bad if table.answers is None else bad | (table.answers != found.place))
+        bad = (named != its_shapes.right).any(axis=1) | (its_shapes.place < 0)
+        wrong.append(bad if table.answers is None else bad | (table.answers != its_shapes.place))
 
     def found_instead(t: int, row: int) -> str:
         congruent = np.flatnonzero(shapes[t].right[row]).tolist()
         answers = tables[t].answers
-        told = "" if answers is None else f", answer {answers[row]}"
+        stored = "" if answers is None else f", answer {answers[row]}"
         kinds = tables[t].truth["distractor_kind"][row].tolist()
-        return f"congruent to the reference: {congruent or 'none'}{told}, kinds {kinds}"
+        return f"congruent to the reference: {congruent or 'none'}{stored}, kinds {kinds}"
 
     rule = "exactly one answer congruent to the reference, the one that is told"
     return judge("one right answer", rule, tables, wrong, found_instead)
@@ -135,11 +138,11 @@ def stored_ids(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     ends = np.cumsum([len(table) for table in tables])[:-1]
     for stored, names in (("shape_id", "shape_name"), ("class_id", "class_name")):
         ids = np.concatenate([table.truth[stored] for table in tables])[whole]
-        own = np.concatenate([getattr(s, names) for s in shapes])[whole].reshape(-1)
-        keys = row_keys(ids.reshape(own.size, ids.shape[2]))
-        _, given = np.unique(keys, return_inverse=True)
+        computed = np.concatenate([getattr(s, names) for s in shapes])[whole].reshape(-1)
+        keys = row_keys(ids.reshape(computed.size, ids.shape[2]))
+        _, stored_id = np.unique(keys, return_inverse=True)
         bad = np.zeros(len(whole), np.bool_)
-        clash = _not_one_to_one(given, own) | _not_one_to_one(own, given)
+        clash = _not_one_to_one(stored_id, computed) | _not_one_to_one(computed, stored_id)
         bad[whole] = clash.reshape(-1, tables[0].images).any(axis=1)
         wrong = [a | b for a, b in zip(wrong, np.split(bad, ends), strict=True)]
     rule = "shape_id and class_id equal just where the cubes say so"

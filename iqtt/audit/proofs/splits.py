@@ -55,11 +55,13 @@ def splits_for_ever(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> P
     if not any(by_hash):
         return Proof("splits for ever", "skipped", "released files have other splits")
     wrong = [np.zeros(len(table), np.bool_) for table in tables]
-    for t, (table, one) in enumerate(zip(tables, shapes, strict=True)):
+    for t, (table, its_shapes) in enumerate(zip(tables, shapes, strict=True)):
         chains = table.spec is not None and table.spec.shapes == "chain"
-        for n in np.unique(one.count[one.whole]).tolist() if by_hash[t] else ():
-            rows = np.flatnonzero(one.whole & (one.count == n))
-            _, first, copy = np.unique(one.class_name[rows], return_index=True, return_inverse=True)
+        for n in np.unique(its_shapes.count[its_shapes.whole]).tolist() if by_hash[t] else ():
+            rows = np.flatnonzero(its_shapes.whole & (its_shapes.count == n))
+            _, first, copy = np.unique(
+                its_shapes.class_name[rows], return_index=True, return_inverse=True
+            )
             distinct = table.cubes[rows, :, :n].reshape(-1, n, 3)[first]
             owner = class_splits(distinct, chains)[copy.reshape(len(rows), -1)]
             wrong[t][rows] = (owner != SPLITS.index(table.split or "test")).any(axis=1)
@@ -130,12 +132,12 @@ def splits_share_nothing(tables: Sequence[AuditTable], shapes: Sequence[Shapes])
     owned: dict[str, Array] = dict.fromkeys(sorted(set(names)), np.zeros(0, np.int64))
     if len(owned) < 2:
         return Proof("splits apart", "skipped", f"one split alone: {', '.join(owned)}")
-    for split, one in zip(names, shapes, strict=True):
-        owned[split] = np.union1d(owned[split], one.class_name[one.whole])
+    for split, its_shapes in zip(names, shapes, strict=True):
+        owned[split] = np.union1d(owned[split], its_shapes.class_name[its_shapes.whole])
     every, times = np.unique(np.concatenate(list(owned.values())), return_counts=True)
     shared = every[times > 1]
     rule = "no shape, nor its mirror image, in two splits"
-    number = ", ".join(f"{split} {len(own):,}" for split, own in owned.items())
+    number = ", ".join(f"{split} {len(classes):,}" for split, classes in owned.items())
     return judge(
         "splits apart",
         f"{rule} (classes: {number})",
@@ -149,5 +151,7 @@ def splits_share_nothing(tables: Sequence[AuditTable], shapes: Sequence[Shapes])
 
 def _elsewhere(owned: dict[str, Array], classes: Array, split: str) -> str:
     return " and ".join(
-        name for name, own in owned.items() if name != split and np.isin(classes, own).any()
+        name
+        for name, its_classes in owned.items()
+        if name != split and np.isin(classes, its_classes).any()
     )

@@ -26,7 +26,7 @@ def judge(
     rule: str,
     tables: Sequence[AuditTable],
     wrong: Sequence[ArrayLike],
-    found: Callable[[int, int], str],
+    problem: Callable[[int, int], str],
     looked: int | None = None,
 ) -> Proof:
     """Return the verdict on a rule that each question must keep.
@@ -34,7 +34,7 @@ def judge(
     Args:
         rule: what is expected, in words.
         wrong: for each table which questions break the rule, (Q,) bool.
-        found: returns, for a (table, row) that breaks it, what was found there, in words.
+        problem: returns, for a (table, row) that breaks it, what is wrong there, in words.
         looked: number of questions that were looked at, if not all.
     """
     total = f"{sum(map(len, tables)):,}"
@@ -42,7 +42,7 @@ def judge(
     broken = [(t, row) for t, mask in enumerate(wrong) for row in np.flatnonzero(mask).tolist()]
     if not broken:
         return Proof(name, "ok", f"{rule} ({total} questions)")
-    named = [f"{tables[t].name} row {row}: {found(t, row)}" for t, row in broken[:SHOWN]]
+    named = [f"{tables[t].name} row {row}: {problem(t, row)}" for t, row in broken[:SHOWN]]
     more = f" and {len(broken) - SHOWN:,} more" if len(broken) > SHOWN else ""
     text = "; ".join(named) + more
     return Proof(

@@ -43,18 +43,18 @@ def rotations(tables: Sequence[AuditTable]) -> Proof:
 def angles(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     """Prove that right answers are turned far enough from the reference, and as far as stored."""
     least = [table.spec.min_angle_degrees if table.spec else 0.0 for table in tables]
-    found = [_apart(table, s)[0] for table, s in zip(tables, shapes, strict=True)]
+    turned = [_apart(table, s)[0] for table, s in zip(tables, shapes, strict=True)]
     wrong = []
-    for table, s, angle, low in zip(tables, shapes, found, least, strict=True):
-        told = np.abs(angle - table.truth["angle_degrees"]) <= STORED_DEGREES
-        wrong.append((s.place >= 0) & ~(told & (angle >= low - LEAST_DEGREES)))
+    for table, s, angle, low in zip(tables, shapes, turned, least, strict=True):
+        as_stored = np.abs(angle - table.truth["angle_degrees"]) <= STORED_DEGREES
+        wrong.append((s.place >= 0) & ~(as_stored & (angle >= low - LEAST_DEGREES)))
     return judge(
         "angles",
         f"right answers turned by {max(least):g} degrees or more, and as far as told",
         tables,
         wrong,
         lambda t, row: (
-            f"turned by {found[t][row]:.4f} degrees,"
+            f"turned by {turned[t][row]:.4f} degrees,"
             f" {tables[t].truth['angle_degrees'][row]:.4f} stored"
         ),
     )
@@ -71,7 +71,7 @@ def lines_of_sight(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Pr
     ]
     if not any(least):
         return Proof("lines of sight", "skipped", "no smallest angle is specified")
-    found = [_apart(table, s)[1] for table, s in zip(tables, shapes, strict=True)]
+    apart = [_apart(table, s)[1] for table, s in zip(tables, shapes, strict=True)]
     return judge(
         "lines of sight",
         f"right answers seen from {max(least):g} degrees or more beside the reference's view,"
@@ -79,9 +79,9 @@ def lines_of_sight(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Pr
         tables,
         [
             (s.place >= 0) & ~(angle >= low - LEAST_DEGREES)
-            for s, angle, low in zip(shapes, found, least, strict=True)
+            for s, angle, low in zip(shapes, apart, least, strict=True)
         ],
-        lambda t, row: f"{found[t][row]:.4f} degrees beside it",
+        lambda t, row: f"{apart[t][row]:.4f} degrees beside it",
     )
 
 
@@ -103,12 +103,12 @@ def _apart(table: AuditTable, shapes: Shapes) -> Array:
             # between the views is: back by the reference's own, this turn, the answer's own. It
             # leaves the camera's axis, which is z, where it is if both see the shape along a line.
             fits = (cube_codes(reference @ turn.T) == target).all(axis=1)
-            some = rows[fits]
-            between = views[some, place[fits]] @ turn @ views[some, 0].swapaxes(1, 2)
+            fitting = rows[fits]
+            between = views[fitting, place[fits]] @ turn @ views[fitting, 0].swapaxes(1, 2)
             far = np.linalg.norm(between - np.eye(3), axis=(1, 2)) / (2 * math.sqrt(2))
             angle = 2 * np.arcsin(np.minimum(far, 1))
             sight = np.arccos(np.minimum(np.abs(between[:, 2, 2]), 1))
-            result[:, some] = np.fmin(result[:, some], np.degrees([angle, sight]))
+            result[:, fitting] = np.fmin(result[:, fitting], np.degrees([angle, sight]))
     return result
 
 
@@ -121,11 +121,11 @@ def cast_again(
         sample: for each table the rows to look at, in rising order.
     """
     problems: list[dict[int, str]] = []
-    for table, one, rows in zip(tables, shapes, sample, strict=True):
+    for table, its_shapes, rows in zip(tables, shapes, sample, strict=True):
         problems.append({})
         with table.source.open() as questions:
-            for row in rows[one.whole[rows]].tolist():
-                problem = _difference(questions, row, int(one.count[row]))
+            for row in rows[its_shapes.whole[rows]].tolist():
+                problem = _difference(questions, row, int(its_shapes.count[row]))
                 if problem:
                     problems[-1][row] = problem
     return judge(

@@ -126,8 +126,8 @@ def _rucksack(rng: Generator) -> list[Part]:
     far = span(rng, 0.25, 0.6)
     start, end = (-0.6 * depth, 0.88 * height - 0.5 * dome), (-0.8 * depth, 0.15 * height)
     back = bezier(start, (-depth - 1.3 * far, start[1] + 0.1), (-depth - far, end[1]), end, 10)
-    one = tube(back, 0.12, 0.035, across=(0.0, 0.0, 1.0), corner=0.03, thin=True)
-    parts += [moved(one, (x, 0.0, 0.0)) for x in (0.45, -0.45)]
+    strap = tube(back, 0.12, 0.035, across=(0.0, 0.0, 1.0), corner=0.03, thin=True)
+    parts += [moved(strap, (x, 0.0, 0.0)) for x in (0.45, -0.45)]
     return parts
 
 

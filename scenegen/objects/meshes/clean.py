@@ -54,11 +54,11 @@ def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
     check_most("faces", len(faces), limits.MOST_FACES)
     if not len(faces):
         raise BadMeshError("faces", f"none, but {len(vertices)} vertices")
-    found: dict[str, int] = {}
+    mended: dict[str, int] = {}
 
     def keep(good: Any, name: str) -> None:
         nonlocal faces
-        found[name] = found.get(name, 0) + int(len(good) - good.sum())
+        mended[name] = mended.get(name, 0) + int(len(good) - good.sum())
         faces = faces[good]
 
     keep(((faces >= 0) & (faces < len(vertices))).all(axis=1), "faces_out_of_range")
@@ -70,8 +70,8 @@ def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
     points = np.empty((0, 3), np.float32)
     for _ in range(_ROUNDS):  # dropping a sliver that stuck out changes the size
         if not len(faces):
-            told = ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in found.items() if n)
-            raise BadMeshError("faces", f"none with an area ({told})")
+            counts = ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in mended.items() if n)
+            raise BadMeshError("faces", f"none with an area ({counts})")
         points = _normalised(turned, faces)
         wide = _heights(points[faces].astype(np.float64), NARROWEST) > 0
         keep(wide, "degenerate_faces")
@@ -85,12 +85,12 @@ def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
         )
     used = np.zeros(len(points), bool)
     used[faces] = True
-    found["unused_vertices"] = int(len(used) - used.sum())
+    mended["unused_vertices"] = int(len(used) - used.sum())
     points, number = _merged(points, used)
-    found["merged_vertices"] = int(used.sum()) - len(points)
+    mended["merged_vertices"] = int(used.sum()) - len(points)
     faces = number[faces]
     keep(_first_copies(faces), "double_faces")
-    return CleanMesh(points, faces.astype(np.int32), found)
+    return CleanMesh(points, faces.astype(np.int32), mended)
 
 
 def _normalised(vertices: Array, faces: Array) -> Array:

@@ -48,14 +48,14 @@ def _coarser(points: Array, floor: float) -> Array:
     blocks = np.array_split(points, 1 + len(points) // _BLOCK)
     # Scaled by the extents, so that a long body gets as many points on its sides as at its ends.
     directions = _even_directions(_DIRECTIONS) / np.maximum(np.ptp(points, axis=0), 1e-9)
-    some = _extreme(blocks, directions)
-    middle = some.mean(axis=0)
-    hull = ConvexHull(some - middle)
+    extreme = _extreme(blocks, directions)
+    middle = extreme.mean(axis=0)
+    hull = ConvexHull(extreme - middle)
     outward = hull.equations[:, :3] / -hull.equations[:, 3:]  # 1 on the hull, less inside
     growth = max(float((outward @ (block - middle).T).max()) for block in blocks)
     if growth > _MOST_GROWTH:
         return points
-    corners = middle + (some - middle) * max(growth, 1.0) * (1 + 1e-12)
+    corners = middle + (extreme - middle) * max(growth, 1.0) * (1 + 1e-12)
     edges = np.concatenate([hull.simplices[:, [i, (i + 1) % 3]] for i in range(3)])
     low, high = corners[edges[:, 0]], corners[edges[:, 1]]
     cut = (low[:, 1] < floor) != (high[:, 1] < floor)

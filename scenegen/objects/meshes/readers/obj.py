@@ -18,7 +18,7 @@ def read_obj(data: bytes) -> tuple[Array, Array]:
 
 def obj_polygons(data: bytes) -> Polygons:
     """Return the vertices and polygons of a file. Raises BadMeshError if there are too many."""
-    found = PolygonList()
+    polygons = PolygonList()
     held: list[bytes] = []  # words of a line that continues on the next one
     for line in chain(lines(data), (b"",)):  # even the last line may end with a backslash
         if line.startswith((b"vt", b"vn")):  # half of the lines of most files
@@ -35,21 +35,22 @@ def obj_polygons(data: bytes) -> Polygons:
             if not held[-1]:
                 held.pop()
         elif words[0] == b"v":
-            found.add_vertex(words[1:4])
+            polygons.add_vertex(words[1:4])
         else:
-            found.add_face(_face(words[1:], found.vertex_count))
-    return found.polygons()
+            polygons.add_face(_face(words[1:], polygons.vertex_count))
+    return polygons.polygons()
 
 
-def _face(words: list[bytes], known: int) -> list[int]:
+def _face(words: list[bytes], vertex_count: int) -> list[int]:
     """Return vertex indices of `3`, `3/1`, `3//2` or `-1`; negative ones count from the last."""
     try:
         numbers = [int(word.partition(b"/")[0]) for word in words]
     except ValueError:
         comment = next((i for i, word in enumerate(words) if word.startswith(b"#")), None)
-        return [NOWHERE] if comment is None else _face(words[:comment], known)
+        return [NOWHERE] if comment is None else _face(words[:comment], vertex_count)
     if numbers and (min(numbers) < 1 or max(numbers) > FAR):
         return [
-            min(n, FAR) - 1 if n > 0 else known + n if -known <= n < 0 else NOWHERE for n in numbers
+            min(n, FAR) - 1 if n > 0 else vertex_count + n if -vertex_count <= n < 0 else NOWHERE
+            for n in numbers
         ]
     return [n - 1 for n in numbers]

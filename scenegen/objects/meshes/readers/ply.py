@@ -85,9 +85,9 @@ def _read_header(data: bytes) -> tuple[str, list[Element], bytes]:
             elif words[:1] == ["property"]:
                 *types, name = words[2:] if words[1] == "list" else words[1:]
                 types = [_TYPES[word] for word in types]
-                one = Property(name, types[-1], types[0] if words[1] == "list" else None)
+                column = Property(name, types[-1], types[0] if words[1] == "list" else None)
                 last = elements[-1]
-                elements[-1] = Element(last.name, last.rows, (*last.properties, one))
+                elements[-1] = Element(last.name, last.rows, (*last.properties, column))
         except (IndexError, KeyError, ValueError):
             raise BadMeshError("PLY file's header", f"a broken line, {line[:80]!r}") from None
     if order is None or any(not 0 <= e.rows <= len(data) for e in elements):
@@ -116,15 +116,15 @@ def _text_rows(body: bytes) -> TakeTable:
                 taken, words[:count] = words[:count], []
                 return taken
 
-            for column, one in enumerate(element.properties):
-                count = int(take_words(1)[0]) if one.count_type else 1
+            for column, kind in enumerate(element.properties):
+                count = int(take_words(1)[0]) if kind.count_type else 1
                 values[column].extend(map(float, take_words(count)))
                 sizes[column].append(count)
         return {
-            one.name: (np.array(sizes[i], np.int64), np.array(values[i]).astype(np.int64))
-            if one.count_type
+            kind.name: (np.array(sizes[i], np.int64), np.array(values[i]).astype(np.int64))
+            if kind.count_type
             else np.array(values[i])
-            for i, one in enumerate(element.properties)
+            for i, kind in enumerate(element.properties)
         }
 
     def guarded(element: Element) -> dict[str, Any]:
@@ -166,54 +166,54 @@ def _binary_columns(
     """Read a whole table at once if all its lists are as long as in its first row, else by rows."""
     lengths, _ = _binary_row(body, at, order, element) if element.rows else ({}, at)
     fields: list[Any] = []
-    for i, one in enumerate(element.properties):
-        if one.count_type:
-            fields.append((f"count{i}", order + one.count_type))
-        fields.append((f"value{i}", order + one.type, (len(lengths.get(i, (0,))),)))
+    for i, kind in enumerate(element.properties):
+        if kind.count_type:
+            fields.append((f"count{i}", order + kind.count_type))
+        fields.append((f"value{i}", order + kind.type, (len(lengths.get(i, (0,))),)))
     table_type = np.dtype(fields)
     if at + element.rows * table_type.itemsize <= len(body):
         table = np.frombuffer(body, table_type, element.rows, at)
         if all(
             (table[f"count{i}"] == len(lengths[i])).all()
-            for i, one in enumerate(element.properties)
-            if one.count_type and lengths
+            for i, kind in enumerate(element.properties)
+            if kind.count_type and lengths
         ):
             columns = {}
-            for i, one in enumerate(element.properties):
+            for i, kind in enumerate(element.properties):
                 values = table[f"value{i}"]
-                columns[one.name] = _column(one, np.full(len(values), values.shape[1]), values)
+                columns[kind.name] = _column(kind, np.full(len(values), values.shape[1]), values)
             return columns, at + element.rows * table_type.itemsize
     rows = []
     for _ in range(element.rows):
         row, at = _binary_row(body, at, order, element)
         rows.append(row)
     return {
-        one.name: _column(
-            one,
+        kind.name: _column(
+            kind,
             np.array([len(row[i]) for row in rows], np.int64),
             np.array([value for row in rows for value in row[i]]),
         )
-        for i, one in enumerate(element.properties)
+        for i, kind in enumerate(element.properties)
     }, at
 
 
-def _column(one: Property, sizes: Array, values: Array) -> Any:
+def _column(kind: Property, sizes: Array, values: Array) -> Any:
     values = values.reshape(-1)
-    return (sizes, values.astype(np.int64)) if one.count_type else values
+    return (sizes, values.astype(np.int64)) if kind.count_type else values
 
 
 def _binary_row(
     body: bytes, at: int, order: str, element: Element
 ) -> tuple[dict[int, tuple[Any, ...]], int]:
     row = {}
-    for i, one in enumerate(element.properties):
+    for i, kind in enumerate(element.properties):
         count = 1
-        if one.count_type:
-            (count,) = struct.unpack_from(order + _CODES[one.count_type], body, at)
-            at += struct.calcsize(order + _CODES[one.count_type])
+        if kind.count_type:
+            (count,) = struct.unpack_from(order + _CODES[kind.count_type], body, at)
+            at += struct.calcsize(order + _CODES[kind.count_type])
             if not 0 <= count <= len(body):
                 raise ValueError(f"a list of {count} values")
-        form = f"{order}{int(count)}{_CODES[one.type]}"
+        form = f"{order}{int(count)}{_CODES[kind.type]}"
         row[i] = struct.unpack_from(form, body, at)
         at += struct.calcsize(form)
     return row, at

@@ -39,8 +39,8 @@ class Polygons:
         """
         check_most("faces", int(np.maximum(self.sizes - 2, 1).sum()), limits.MOST_FACES)
         start = np.cumsum(self.sizes) - self.sizes
-        known = (self.corners >= 0) & (self.corners < len(self.vertices))
-        corners = np.where(known, self.corners, NOWHERE)
+        in_range = (self.corners >= 0) & (self.corners < len(self.vertices))
+        corners = np.where(in_range, self.corners, NOWHERE)
         parts = [np.empty((0, 3), np.int64)]
         work = 0.0
         for size in np.unique(self.sizes):
