@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
@@ -84,6 +85,35 @@ def truths(tmp_path_factory: pytest.TempPathFactory) -> Any:
     from submissions import make_truths
 
     return make_truths(tmp_path_factory.mktemp("truths"))
+
+
+@pytest.fixture
+def released(tmp_path: Path) -> Callable[..., Path]:
+    """Return a function that writes a file as released, with nothing but images and answers.
+
+    Arguments: for each part its number of questions, and its answers or None. Options: of
+    `create_dataset` for the questions.
+    """
+
+    def write(
+        name: str = "iqtt-val.h5",
+        tables: dict[str, tuple[int, Any]] | None = None,
+        dtype: str = "float32",
+        size: tuple[int, int] = (20, 24),
+        **options: Any,
+    ) -> Path:
+        rng = np.random.default_rng(3)
+        with h5py.File(tmp_path / name, "w") as file:
+            for part, (count, answers) in (tables or {"": (5, np.arange(5) % 3)}).items():
+                images = rng.random((count, 4, *size, 3))
+                values = np.rint(images * 255) if dtype == "uint8" else images
+                group = file.require_group(part or "/")
+                group.create_dataset("questions", data=values.astype(dtype), **options)
+                if answers is not None:
+                    group["answers"] = answers
+        return tmp_path / name
+
+    return write
 
 
 @pytest.fixture

@@ -207,13 +207,6 @@ def test_show_needs_answers_to_show_them(run, split, tmp_path, check_refusal):
     check_refusal(result.exit_code, result.stdout, result.stderr, ("no answers",))
 
 
-def test_info_describes_every_file(run, split):
-    for name in FILES:
-        result = run("info", split / name)
-        assert result.exit_code == 0, result.output
-        assert "pix2shape-bench/iqtt 2.0" in result.stdout
-
-
 def test_audit_passes_and_writes_json(run, split, tmp_path, check_refusal):
     result = run("audit", split, "--json", "audit.json")
     assert result.exit_code == 0, result.output
@@ -247,14 +240,6 @@ def test_audit_exits_with_1_when_a_proof_fails(run, split, tmp_path):
     assert "one right answer" in result.stdout
 
 
-@pytest.mark.parametrize("command", ["show", "info", "audit"])
-def test_files_of_other_kinds_are_one_line(run, command, tmp_path, rooms_path, check_refusal):
-    (tmp_path / "text.h5").write_text("hello")
-    for path in (tmp_path / "none.h5", tmp_path / "text.h5", rooms_path):
-        result = run(command, path)
-        check_refusal(result.exit_code, result.stdout, result.stderr, (path.name,))
-
-
 def test_reading_and_auditing_need_no_renderer(split, tmp_path):
     """Only the audit's own ray caster is used; Mitsuba is not even imported."""
     code = (
@@ -266,18 +251,6 @@ def test_reading_and_auditing_need_no_renderer(split, tmp_path):
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ
     )
     assert done.stdout.split() == ["0", "False", "False"]
-
-
-def test_splits_made_in_other_batches_have_equal_bytes(run, monkeypatch, tmp_path):
-    found = []
-    for batch in ("--batch 2", "--batch=5"):
-        shutil.rmtree(tmp_path / "x", ignore_errors=True)
-        words = ["make-split", *TINY.removesuffix("--batch 4").split(), "--out", "x"]
-        words += batch.split()
-        monkeypatch.setattr(sys, "argv", ["iqtt", *words])
-        assert run(*words).exit_code == 0
-        found.append({path.name: path.read_bytes() for path in (tmp_path / "x").iterdir()})
-    assert found[0] == found[1]
 
 
 def test_a_picture_is_replaced_only_when_told(run, split, tmp_path, check_refusal):

@@ -1,0 +1,169 @@
+"""`info` tells what is in a file of rooms or of questions, and tells it truly."""
+
+import json
+import re
+
+import h5py
+import numpy as np
+import pytest
+
+from iqtt.files import info as of_questions
+from iqtt.files.make import make_split
+from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec
+from scenegen import open_rooms
+from scenegen.rooms import info as of_rooms
+
+
+def value(text, name):
+    """Return what the first line tells that starts with a name."""
+    return re.findall(rf"^\W*{re.escape(name)} {{2,}}(.+)$", text, re.MULTILINE)[0].strip()
+
+
+def told_settings(text):
+    """Return the settings that a text tells by name, and those marked as changed."""
+    lines = text.split("spec (* differs from the default)\n")[1].split("\n\n")[0].splitlines()
+    rows = [re.fullmatch(r"  ([* ]) (\w+) +(.*)", line).groups() for line in lines]
+    return {name: shown for _, name, shown in rows}, {name for mark, name, _ in rows if mark == "*"}
+
+
+@pytest.fixture(scope="module")
+def split(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("info") / "split"
+    spec = SplitSpec(seed=5, train=9, labeled=3, val=2, test=3, cubes=(5, 7), height=32, width=32,
+                     min_cube_pixels=2, with_depth=True)  # fmt: skip
+    make_split(folder, spec, command="tests")
+    return folder
+
+
+@pytest.fixture(params=["rooms", "questions", "answers"])
+def file(request, float_path, split):
+    """Return a file, and what is told of it."""
+    if request.param == "rooms":
+        return float_path, of_rooms.describe(float_path)
+    name = {"questions": "iqtt-train.h5", "answers": "iqtt-test-answers.h5"}[request.param]
+    return split / name, of_questions.describe(split / name)
+
+
+def test_facts_and_settings_are_those_of_the_file(file):
+    path, text = file
+    with h5py.File(path) as raw:
+        root = dict(raw.attrs)
+    releases = [root[f"{name}_version"] for name in ("mitsuba", "drjit", "llvm")]
+    for name, expected in {
+        "format": f"{root['format']} 1.0",
+        "written by": f"{root['writer']}, {root['variant']}",
+        "rendered by": "Mitsuba {}, Dr.Jit {}, LLVM {}".format(*releases),
+        "command": root.get("creation_command", "-"),
+        "conventions": root["conventions"],
+    }.items():
+        assert value(text, name) == expected
+    for name in ("content_digest", *(x for x in root if re.match("fingerprint|truth_digest", x))):
+        assert f" {root[name]}\n" in text
+    spec, (settings, changed) = json.loads(root["spec"]), told_settings(text)
+    for name, setting in spec.items():
+        shown = ", ".join(map(str, setting)) if isinstance(setting, list) else str(setting)
+        assert settings[name] == ("not told" if setting is None else shown)
+    assert {"height", "width"} <= changed
+    assert "fov_degrees" not in changed
+
+
+def test_every_column_with_row_type_unit_and_size(file):
+    path, text = file
+    with h5py.File(path) as raw:
+        for table in re.split(r" dataset .*\n", text)[1:]:
+            for line in table.split("\n\n")[0].splitlines():
+                name, row, kind, rest = re.fullmatch(r" +(\S+) +(\(.*\)) +(\w+)(.*)", line).groups()
+                group = "labeled" if "iqtt-train" in path.name else ""
+                places = (name, f"{group}/{name}", f"truth/{group}/{name}".replace("//", "/"))
+                dataset = raw[next(place for place in places if place in raw)]
+                assert row == "(" + ", ".join(map(str, dataset.shape[1:])) + ")"
+                if kind == "text":
+                    continue  # HDF5 does not tell the size of the heaps that hold texts
+                assert (kind, dataset.attrs["unit"][:20] in rest) == (str(dataset.dtype), True)
+                if not group:
+                    stored = dataset.id.get_storage_size()
+                    assert f"{stored / 1e3:.1f} kB" in rest or f"{stored / 1e6:.1f} MB" in rest
+                    assert rest.endswith(f" {dataset.nbytes / stored:.1f}")
+
+
+def test_ranges_of_rooms(float_path):
+    """Few rows, so that all of them are read."""
+    text = of_rooms.describe(float_path)
+    with h5py.File(float_path) as raw:
+        expected = {
+            "radiance": raw["image"][:],
+            "depth": raw["depth"][:],
+            "n_z": raw["normal"][..., 2],
+            "object_id": raw["object_id"][:],
+        }
+        texts = sum(map(len, raw["scene"].asstr()[:]))
+    for name, array in expected.items():
+        low, high = map(float, re.findall(rf"^ +{name} +(\S+) to (\S+)$", text, re.MULTILINE)[0])
+        assert (low, high) == pytest.approx((array.min(), array.max()), rel=1e-3, abs=1e-3)
+    with open_rooms(float_path) as rooms:
+        shapes = [item.shape for room in rooms for item in room.scene.objects]
+    assert all(f"{name} {shapes.count(name)}" in text for name in set(shapes))
+    [(size, unit)] = re.findall(r"([\d.]+) (kB|MB)", value(text, "scene"))
+    assert float(size) * {"kB": 1e3, "MB": 1e6}[unit] > texts / 2, "not only pointers to texts"
+
+
+def test_counts_of_questions(split):
+    text = of_questions.describe(split / "iqtt-train.h5")
+    assert text.startswith(f"{split / 'iqtt-train.h5'}: 9 questions, ")
+    assert value(text, "answers") == "to 3 of them (33.3%)"
+    _, *tables = re.split(r"^  (?=\w+: \d+ questions)", text, flags=re.MULTILINE)
+    for table, part, count in zip(tables, ("labeled", "unlabeled"), (3, 6), strict=True):
+        assert table.startswith(f"{part}: {count} questions of 4 images of 32x32, uint8")
+        assert ("answers  " in table) == (part == "labeled")
+        with h5py.File(split / "iqtt-train.h5") as raw:
+            truth, images = raw["truth"][part], raw[part]["questions"][:]
+            for k, name in enumerate(DISTRACTOR_KINDS):
+                kinds = (truth["distractor_kind"][:] == k).sum()
+                assert (f"{name}: {kinds}" in value(table, "distractors")) == (kinds > 0)
+            quartiles = np.quantile(truth["angle_degrees"][:], np.linspace(0, 1, 5))
+            assert re.findall(r"\d+", value(table, "angle")) == [f"{q:.0f}" for q in quartiles]
+            sizes = truth["cube_count"][:].tolist()
+            expected = ", ".join(f"{n}: {sizes.count(n)}" for n in sorted(set(sizes)))
+            assert value(table, "cubes a shape") == expected
+            low, high = map(float, re.findall(r"[\d.]+", value(table, "radiance"))[:2])
+            ends = (images.min() / 255, images.max() / 255)
+            assert (low, high) == pytest.approx(ends, rel=1e-3)
+
+
+def test_where_the_answers_are(split, released, tmp_path):
+    text = of_questions.describe(split / "iqtt-test.h5")
+    assert value(text, "answers") == "in iqtt-test-answers.h5"
+    assert not re.search("distractors|angle|cubes", text.split(" questions of ")[1])
+    known = of_questions.describe(split / "iqtt-test-answers.h5")
+    assert (value(known, "seed"), value(known, "command")) == ("5", "tests")
+    assert value(known, "fingerprint") == value(text, "fingerprint")
+    assert not re.search(r"^ +radiance ", known, re.MULTILINE)
+    path = released("a.h5", {"labeled": (2, [2, 0]), "unlabeled": (6, None)})
+    text = of_questions.describe(path)
+    assert value(text, "answers") == "to 2 of them (25.0%)"
+    assert "fingerprint" not in text
+    assert "over 6 questions" in text
+    empty = released("b.h5", {"labeled": (0, np.zeros(0, int)), "unlabeled": (1, None)})
+    assert value(of_questions.describe(empty), "answers") == "none"
+    assert ": 0 questions, " in of_questions.describe(released("c.h5", {"": (0, None)}))
+
+
+def test_unknown_pixels_do_not_spoil_the_ranges(damaged):
+    def edit(file):
+        file["depth"][0, :4] = np.nan
+        file["object_id"][0, :4] = -1
+
+    text = of_rooms.describe(damaged(edit))
+    assert "nan" not in text
+    assert re.search(r"object_id +-1 to", text)
+
+
+@pytest.mark.parametrize(
+    ("command", "line"),
+    [("a\x1b[31m\nb", r"a\x1b[31m\nb"), ("x" * 60_000, "x" * 997 + "...")],
+    ids=["controls", "long"],
+)
+def test_a_command_is_shown_on_one_short_line(damaged, command, line):
+    text = of_rooms.describe(damaged(lambda file: file.attrs.update(creation_command=command)))
+    assert value(text, "command") == line
+    assert all(one.isprintable() for one in text.split("\n"))
