@@ -21,6 +21,7 @@ from scenegen.command_line.paths import (
 )
 
 SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
+MOST_NAMED = 20  # exported rows whose files are listed
 SHARED = ("parquet", "webdataset")  # and of files of many
 
 
@@ -107,15 +108,46 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
 )
 @click.argument("file", type=InputPath())
 @click.option(
-    "--items", type=Items(), help="Rows to export; without it parquet and webdataset take all."
+    "--items", type=Items(), help="Rows to export; parquet and webdataset take all without it."
 )
+@click.option("--all", "every", is_flag=True, help="Export all rows.")
 @click.option(
     "--format",
     "form",
     type=click.Choice([*SINGLE, *SHARED]),
     required=True,
-    help="exr has all channels; png 16 bits a channel; ply the surfels; obj the scene's mesh;"
-    " parquet and webdataset all values of many rows, for data loaders.",
+    help="exr has all channels; png a picture of each, and a JSON file that says how to decode"
+    " them; ply the surfels; obj the scene's mesh; parquet and webdataset all values of many rows,"
+    " for data loaders.",
+)
+@click.option(
+    "--encoding",
+    "curve",
+    type=click.Choice(["srgb", "linear"]),
+    default="srgb",
+    show_default=True,
+    help="Encoding of colours in png and ply.",
+)
+@click.option(
+    "--bits",
+    type=click.Choice(["8", "16"]),
+    default="8",
+    show_default=True,
+    help="Bits of images and normals in png. Depth always has 16.",
+)
+@click.option(
+    "--exposure",
+    type=click.FloatRange(0, min_open=True),
+    default=1.0,
+    show_default=True,
+    help="Factor of radiance in png and ply, so that bright images fit.",
+)
+@click.option(
+    "--depth-unit",
+    type=click.FloatRange(0, min_open=True),
+    default=1e-4,
+    show_default=True,
+    help="Scene units for each of the 65,535 steps of depth in png.",
 )
 @click.option(
     "--out",
@@ -134,20 +166,31 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
 def export(
     file: str,
     items: list[int] | None,
+    every: bool,
     form: str,
+    curve: str,
+    bits: str,
+    exposure: float,
+    depth_unit: float,
     out: str | None,
     rows_per_file: int,
     overwrite: bool,
     **meshes: Any,
 ) -> None:
-    """Write rows of a file in the formats of other tools."""
+    """Write rows of a file in the formats of other tools.
+
+    A value that does not fit into png or ply is refused. The message names the option that helps.
+    """
+    if every and items is not None:
+        raise click.UsageError("--all and --items exclude each other: use one of them")
     if form in SHARED:
         folder = out or f"{Path(file).stem}-{form}"
         _export_many(file, items, form, folder, rows_per_file, overwrite)
-    elif items is None:
-        raise click.UsageError(f"--items: found none, expected rows for --format {form}")
+    elif items is None and not every:
+        raise click.UsageError(f"--format {form} needs rows: use --items 0-9, or --all")
     else:
-        _export_single(file, items, form, out or ".", overwrite, meshes)
+        how = (curve, int(bits), exposure, depth_unit)
+        _export_single(file, items, form, out or ".", overwrite, meshes, how)
 
 
 def _export_many(
@@ -181,36 +224,46 @@ def _export_many(
 
 
 def _export_single(
-    file: str, items: list[int], form: str, out: str, overwrite: bool, meshes: dict[str, Any]
+    file: str,
+    items: list[int] | None,
+    form: str,
+    out: str,
+    overwrite: bool,
+    meshes: dict[str, Any],
+    how: tuple[str, int, float, float],
 ) -> None:
-    """Write each row to files of its own."""
+    """Write each row, or all rows, to files of their own; `how` are the fields of `Encoding`."""
     from scenegen.common.errors import SpecError
     from scenegen.files.new_file import check_writable
     from scenegen.files.pictures import pick_rows
     from scenegen.objects.catalogue import changed_meshes
     from scenegen.objects.sources import file_objects, mesh_folder
-    from scenegen.rooms.export import export_paths, export_room
+    from scenegen.rooms.export import Encoding, export_paths, export_room
     from scenegen.rooms.reader import RoomsFile
 
     mesh_folder(meshes["shapenet_root"], meshes["objects_root"], meshes["up"])
     with RoomsFile(file) as rooms:
         objects = file_objects(rooms.spec, **meshes) if form == "obj" else None
-        rows = pick_rows(len(rooms), items)
+        rows = list(range(len(rooms))) if items is None else pick_rows(len(rooms), items)
         for row in rows:
             changed = changed_meshes(objects, rooms.scene(row)) if objects else []
             if changed:
                 found = f"models that changed in the folder: {', '.join(changed)}"
                 raise SpecError(f"{file}: row {row}", found, "the files it was made from")
         paths = {row: export_paths(row, out, Path(file).stem, form) for row in rows}
-        refuse_command_inputs(path for some in paths.values() for path in some)
-        with _folder_made(Path(out)):
-            for some in paths.values():
-                for path in some:
+        refuse_command_inputs(path for files in paths.values() for path in files)
+        with _folder_made(Path(out)), progress_bar(len(rows), "image") as bar:
+            for files in paths.values():
+                for path in files:
                     check_writable(path, overwrite)
-            for row, some in paths.items():
-                export_room(rooms[row], some, form, overwrite, objects)
-    for some in paths.values():
-        for path in some:
+            for row, files in paths.items():
+                export_room(rooms[row], files, form, overwrite, objects, Encoding(*how))
+                bar.update(1)
+    if len(rows) > MOST_NAMED:
+        print_line(f"{out}: {len(rows)} images in {sum(map(len, paths.values()))} files")
+        return
+    for files in paths.values():
+        for path in files:
             print_line(str(path))
 
 

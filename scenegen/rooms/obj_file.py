@@ -24,14 +24,17 @@ def write_obj(
     shape_of: Callable[[str], UnitShape] = built_in_shape,
 ) -> None:
     """Write room and objects as triangles in the world frame; `materials` names their library."""
-    lines = [f"# scene {scene.index}: world frame, y up, scene units", f"mtllib {materials}"]
+    lines = [
+        f"# scene {scene.index}: world frame, y up, scene units",
+        f"mtllib {one_word(materials)}",
+    ]
     vertices = normals = 0  # before this part; OBJ counts from 1
     for part in scene_parts(scene, shape_of):
         unique, number = np.unique(
             part.normals.reshape(-1, 3).round(8), axis=0, return_inverse=True
         )
         corners = np.stack([part.mesh.faces.reshape(-1) + vertices, number.reshape(-1) + normals])
-        lines += [f"o {_word(part.name)}", f"usemtl {_material(part.object_id)}"]
+        lines += [f"o {one_word(part.name)}", f"usemtl {_material(part.object_id)}"]
         lines += _lines("v %.8f %.8f %.8f", part.mesh.vertices)
         lines += _lines("vn %.8f %.8f %.8f", unique + 0.0)  # + 0.0: no minus before a zero
         lines += _lines("f %d//%d %d//%d %d//%d", corners.T.reshape(-1, 6) + 1)
@@ -57,7 +60,7 @@ def _material(object_id: int) -> str:
     return f"object_{object_id}" if object_id else "room"
 
 
-def _word(name: str) -> str:
+def one_word(name: str) -> str:
     """Return a name without blanks and control characters, which would end it."""
     return re.sub(r"[^\w./+-]+", "_", name)
 

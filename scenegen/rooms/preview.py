@@ -63,11 +63,17 @@ def tiles(room: Room) -> list[NDArray[np.uint8]]:
     return pictures
 
 
-def srgb_bytes(radiance: Array) -> NDArray[np.uint8]:
-    """Encode linear radiance for the eye: sRGB (IEC 61966-2-1), 8 bits, clipped at 1."""
+def srgb(radiance: Array) -> Array:
+    """Encode linear radiance for the eye, clipped to 0..1: sRGB (IEC 61966-2-1), 0..1."""
     linear = np.clip(radiance, 0.0, 1.0)
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.asarray(np.rint(encoded * 255).astype(np.uint8))
+    return np.asarray(
+        np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    )
+
+
+def srgb_bytes(radiance: Array) -> NDArray[np.uint8]:
+    """Encode linear radiance as `srgb`, in 8 bits."""
+    return np.asarray(np.rint(srgb(radiance) * 255).astype(np.uint8))
 
 
 def depth_bytes(depth: Array) -> NDArray[np.uint8]:

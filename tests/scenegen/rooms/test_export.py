@@ -1,5 +1,8 @@
 """Single rooms as other tools read them: here OpenEXR, pypng, trimesh and Embree."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import OpenEXR
 import png
@@ -8,9 +11,10 @@ import trimesh
 
 from scenegen import open_rooms
 from scenegen.camera import pixel_directions, transform_vectors
+from scenegen.common.errors import SpecError
 from scenegen.description.scenes import SHAPE_NAMES
 from scenegen.objects.scene_mesh import scene_parts
-from scenegen.rooms.export import PNG_DEPTH_UNIT, export_paths, export_room
+from scenegen.rooms.export import PICTURES, PLAIN, Encoding, export_paths, export_room
 
 
 @pytest.fixture(scope="module")
@@ -22,8 +26,6 @@ def room(float_path):
 @pytest.fixture
 def holey(room):
     """The room with a corner where nothing was hit."""
-    from dataclasses import replace
-
     hole = np.zeros(room.depth.shape, bool)
     hole[:5, :7] = True
     return replace(
@@ -34,10 +36,10 @@ def holey(room):
     )
 
 
-def export(room, folder, form, overwrite=False):
+def export(room, folder, form, overwrite=False, encoding=PLAIN):
     """Write a room as row 7 of "a.h5"; return the files written."""
     paths = export_paths(7, folder, "a", form)
-    export_room(room, paths, form, overwrite)
+    export_room(room, paths, form, overwrite, encoding=encoding)
     return paths
 
 
@@ -58,27 +60,71 @@ def test_exr_has_the_standard_channels(tmp_path, holey):
     np.testing.assert_array_equal(channels["id"], holey.object_id)
 
 
-def test_png_has_16_bits(tmp_path, holey):
-    paths = export(holey, tmp_path, "png")
-    assert [p.name for p in paths] == [
-        f"a-000007-{kind}.png" for kind in ("image", "depth", "normal", "object_id")
-    ]
+def read_png(path):
+    """Return pixels and bits of a PNG file, by pypng."""
+    width, height, rows, about = png.Reader(bytes=path.read_bytes()).read()
+    values = np.array([list(row) for row in rows]).reshape(height, width, about["planes"])
+    return values.squeeze(), about["bitdepth"]
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize("curve", ["srgb", "linear"])
+def test_png_files_are_decoded_as_their_json_says(tmp_path, holey, curve, bits):
+    *paths, about = export(holey, tmp_path, "png", encoding=Encoding(curve, bits, 0.9, 2e-4))
+    assert [p.name for p in paths] == [f"a-000007-{name}.png" for name in PICTURES]
+    about = json.loads(about.read_text())
     pictures = {}
-    for path, planes in zip(paths, (3, 1, 3, 1), strict=True):
-        width, height, rows, info = png.Reader(bytes=path.read_bytes()).read()
-        assert (width, height, info["bitdepth"], info["planes"]) == (40, 48, 16, planes)
-        values = np.array([list(row) for row in rows]).reshape(height, width, planes)
-        pictures[path.stem[9:]] = values.squeeze()
-    assert PNG_DEPTH_UNIT == 1e-4
+    for name, path in zip(PICTURES, paths, strict=True):
+        pictures[name], stored = read_png(path)
+        assert stored == about[name]["bits"]
+    step = 1 / (2**bits - 1)
     hit = holey.object_id >= 0
-    depth = pictures["depth"]
-    assert np.abs(depth * 1e-4 - holey.depth)[hit].max() <= 0.5e-4 + 1e-7
-    assert (depth[~hit] == 0).all()
-    image = np.clip(holey.radiance, 0, 1)
-    assert np.abs(pictures["image"] / 65535 - image).max() <= 0.5 / 65535 + 1e-7
-    normal = pictures["normal"] / 65535 * 2 - 1
-    assert np.abs(normal - holey.normal).max() <= 1 / 65535 + 1e-7
-    np.testing.assert_array_equal(pictures["object_id"].astype(int) - 1, holey.object_id)
+    depth = pictures["depth"] * about["depth"]["unit"]
+    assert np.abs(depth - holey.depth)[hit].max() <= 1e-4 + 1e-6
+    assert (pictures["depth"] == about["depth"]["nothing"])[~hit].all()
+    normal = pictures["normal"] * about["normal"]["scale"] + about["normal"]["offset"]
+    assert np.abs(normal - holey.normal).max() <= step + 1e-6
+    ids = pictures["object_id"].astype(int) + about["object_id"]["offset"]
+    np.testing.assert_array_equal(ids, holey.object_id)
+    image = pictures["image"] * step
+    if about["image"]["encoding"] == "srgb":
+        slope = np.where(
+            image <= 0.04045, 1 / 12.92, 2.4 / 1.055 * ((image + 0.055) / 1.055) ** 1.4
+        )
+        step = step * np.maximum(slope, 0.1)
+        image = np.where(image <= 0.04045, image / 12.92, ((image + 0.055) / 1.055) ** 2.4)
+    radiance = image / about["image"]["exposure"]
+    assert (np.abs(radiance - holey.radiance) <= 0.56 * step + 1e-6).all(), "within half a step"
+    np.testing.assert_array_equal(about["world_from_camera"], holey.world_from_camera)
+
+
+def test_what_does_not_fit_is_refused_before_a_file_is_written(tmp_path, holey):
+    far = replace(holey, depth=holey.depth + np.float32(6))
+    bright = replace(holey, image=holey.image * np.float32(9))
+    for form, room, field in [
+        ("png", far, "depth"),
+        ("png", bright, "radiance"),
+        ("ply", bright, "radiance"),
+    ]:
+        with pytest.raises(SpecError) as refused:
+            export(room, tmp_path, form)
+        assert field in refused.value.where
+        option, number = refused.value.hint.split()[1:3]
+        assert list(tmp_path.iterdir()) == []
+        change = {"--depth-unit": "depth_unit", "--exposure": "exposure"}[option]
+        export(
+            room, tmp_path, form, encoding=replace(Encoding(), **{change: float(number.strip(","))})
+        )
+        for path in tmp_path.iterdir():
+            path.unlink()
+
+
+def test_names_inside_files_have_no_blanks(tmp_path, holey):
+    paths = export_paths(7, tmp_path, "my rooms (2)", "obj")
+    export_room(holey, paths, "obj")
+    (name,) = words(paths[0], "mtllib")
+    assert (tmp_path / name[0]).is_file()
+    assert {path.name for path in paths} == {path.name for path in tmp_path.iterdir()}
 
 
 def test_ply_has_the_surfels(tmp_path, holey):
