@@ -17,11 +17,17 @@ MOST_BYTES = 2**35  # of the entries in a folder
 ENDING = ".npz"
 
 
-def default_cache_dir() -> Path:
-    """Return `pix2shape-bench/meshes` in XDG_CACHE_HOME or, if that is not set, in ~/.cache."""
+def default_cache_dir() -> Path | None:
+    """Return `pix2shape-bench/meshes` in XDG_CACHE_HOME or, if that is not set, in ~/.cache.
+
+    None where the user has no home folder, as in containers that run as a foreign user.
+    """
     base = Path(os.environ.get("XDG_CACHE_HOME", ""))
     if not base.is_absolute():  # the XDG specification says to ignore relative paths
-        base = Path("~/.cache").expanduser()
+        try:
+            base = Path("~/.cache").expanduser()
+        except RuntimeError:
+            return None
     return base / "pix2shape-bench" / "meshes"
 
 

@@ -49,7 +49,11 @@ class Encoding:
             hint = f"use --exposure {0.9 * self.exposure / brightest:.2g}, or --format exr"
             where = f"row {room.index}: radiance"
             raise SpecError(where, f"{brightest:.4g} with this exposure", "at most 1", hint)
-        return srgb(radiance) if self.curve == "srgb" else np.asarray(np.clip(radiance, 0, 1))
+        return (
+            np.asarray(srgb(radiance))
+            if self.curve == "srgb"
+            else np.asarray(np.clip(radiance, 0, 1))
+        )
 
     def depth_steps(self, room: Room) -> Array:
         """Return the depth in steps of `depth_unit`, 0 where nothing is hit. Raises SpecError."""
@@ -59,7 +63,7 @@ class Encoding:
             hint = f"use --depth-unit {1.1 * farthest / 65535:.2g}, or --format exr"
             expected = f"at most {65535 * self.depth_unit:.5g} scene units in 16 bits"
             raise SpecError(f"row {room.index}: depth", f"{farthest:.5g}", expected, hint)
-        return steps
+        return np.asarray(steps)
 
     def description(self, room: Room) -> str:
         """Return, as JSON, how the PNG files of a room are decoded, and its camera."""

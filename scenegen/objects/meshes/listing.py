@@ -163,13 +163,16 @@ def _valid(name: str) -> str:
 
 def existing(root: str | Path) -> Path:
     """Return the path of a folder. Raises MeshFolderError where there is none."""
-    path = Path(root).expanduser()
+    path = Path(root)
     try:
+        path = path.expanduser()
         if path.is_dir():
             return path
         problem = "is not a folder" if path.exists() else "no such folder"
     except OSError as error:
         problem = f"cannot be reached ({error.strerror})"
+    except RuntimeError:  # "~name/x"
+        problem = "there is no such user, or no home folder"
     raise MeshFolderError(f"{path}: {problem}", hint="name the folder that holds the models")
 
 

@@ -154,3 +154,5 @@ def test_where_the_cache_lies(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
         monkeypatch.setenv("XDG_CACHE_HOME", unset)
         assert default_cache_dir() == tmp_path / "home/.cache/pix2shape-bench/meshes"
     assert list(tmp_path.iterdir()) == [], "nothing is made before it is needed"
+    monkeypatch.setattr(Path, "expanduser", Mock(side_effect=RuntimeError("no home")))
+    assert default_cache_dir() is None

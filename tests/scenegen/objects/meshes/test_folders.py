@@ -203,6 +203,7 @@ def test_refusals(shapenet: Callable[..., Path], make: Make) -> None:
     other = next(s for s in ("train", "val", "test") if s != object_split("a"))
     cases: list[tuple[Callable[..., ModelFolder], tuple[Any, ...], str, str]] = [
         (open_models, (net / "none",), "none: no such folder", ""),
+        (open_models, ("~no_such_user/x",), "no home folder", ""),
         (open_objects, (empty / "x.txt",), "x.txt: is not a folder", ""),
         (open_shapenet, (net / "none",), "none: no such folder", ""),
         (open_shapenet, (plain,), "plain", "no ShapeNet"),
