@@ -112,6 +112,9 @@ def _one_line_errors() -> Iterator[None]:
     except MemoryError as error:
         raise UserError(": ".join(filter(None, ("not enough memory", str(error))))) from error
     except RuntimeError as error:  # of torch and Dr.Jit, which have no narrower one in common
+        if "start new thread" in str(error):
+            hint = "raise the limit on processes and threads (ulimit -u), or use fewer --workers"
+            raise UserError(f"the system starts no more threads; {hint}") from error
         told = [line for line in str(error).splitlines() if NO_MEMORY.search(line)]
         if not told:
             raise

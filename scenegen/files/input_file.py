@@ -38,6 +38,20 @@ FILTERS = {
     LZF: ("lzf", 1),
     h5z.FILTER_FLETCHER32: ("fletcher32", 2),
 }
+_LOCKED = "another process is writing to it. Wait until it ends"
+_AGAIN = "Try again, or copy the file to another disk"
+_OF_SYSTEM = {
+    errno.EAGAIN: _LOCKED,
+    errno.EACCES: "it may not be read. Give yourself read permission",
+    errno.EPERM: "it may not be read. Give yourself read permission",
+    errno.EIO: f"the disk reported an error while it was read. {_AGAIN}",
+    errno.ESTALE: "the network disk has replaced or removed it meanwhile. Open it again",
+    errno.ENOLCK: "this disk cannot lock files. Set HDF5_USE_FILE_LOCKING=FALSE",
+    errno.EMFILE: "too many files are open. Raise the limit: ulimit -n 4096",
+    errno.ENFILE: "the machine has too many files open. Try again later",
+    errno.ETIMEDOUT: f"the network disk did not answer. {_AGAIN}",
+    errno.ENOTCONN: f"the network disk is not connected. {_AGAIN}",
+}  # errors that say nothing of the file's content
 CHECKSUM_BYTES = 4  # that fletcher32 adds to a chunk
 TEXT_BYTES = 16  # of a text of any length, where it is stored: its length and where it lies
 
@@ -86,6 +100,7 @@ def open_unchecked(path: str | Path, kind: str) -> h5py.File:
     try:
         return h5py.File(path, "r")
     except OSError as error:
+        _raise_if_of_system(error, path)
         raise FileFormatError(f"{path}: not a readable HDF5 file ({reason(error)})") from error
 
 
@@ -94,13 +109,15 @@ def reading(where: object) -> Iterator[None]:
     """Turn whatever HDF5 raises on a damaged file into a FileFormatError of one line.
 
     `where` names the file, the data set and the row as far as they are known.
-    An IndexError passes: a row beyond the end is the caller's mistake, not the file's.
+    An IndexError passes: a row beyond the end is the caller's mistake, not the file's. An error of
+    the system, such as a lost network disk, is an OSError: the file may be whole.
     """
     try:
         yield
     except SceneGenError:
         raise
     except HDF5_ERRORS as error:
+        _raise_if_of_system(error, where)
         raise FileFormatError(f"{where}: cannot be read ({reason(error)})") from error
 
 
@@ -110,14 +127,21 @@ def checking(file: h5py.File) -> Iterator[None]:
     try:
         with reading(file.filename):
             yield
-    except SceneGenError:
+    except (SceneGenError, OSError):
         file.close()
         raise
 
 
+def _raise_if_of_system(error: BaseException, where: object) -> None:
+    """Raise an OSError that says what happened and what to do, if it was not the file's fault."""
+    number = error.errno if isinstance(error, OSError) else None
+    if number in _OF_SYSTEM:
+        raise OSError(number, _OF_SYSTEM[number], str(where)) from error
+
+
 def reason(error: BaseException) -> str:
     """Return what an error of HDF5 says in its innermost parentheses, on one line."""
-    text = str(error.args[0]) if error.args else type(error).__name__
+    text = str(error.args[-1]) if error.args else type(error).__name__
     inside = text[text.find("(") + 1 : text.rfind(")")] if "(" in text else text
     return inside.split("\n")[0]
 

@@ -13,7 +13,7 @@ import sys
 import time
 from pathlib import Path
 
-from scenegen.common.errors import FileFormatError
+from scenegen.common.errors import FileFormatError, SceneGenError
 
 SECONDS = 8.0  # of a processor, for any file
 BYTES_A_SECOND = 20e6  # that honest content takes beyond that
@@ -49,6 +49,9 @@ def try_file(path: str | Path) -> None:
         found = f"a structure that HDF5 had not read after {PATIENCE * limit:.0f} s"
         hint = "broken, or the machine is very busy"
         raise FileFormatError(path, found, "a file as h5py writes it", hint) from None
+    except OSError as error:
+        what = f"No process can be started to try {path} ({error.strerror})"
+        raise SceneGenError(what, hint="raise the limit on processes (ulimit -u)") from error
     if done.returncode != 0:
         found = _what_happened(done.returncode, limit)
         raise FileFormatError(path, found, "a file as h5py writes it", "the file is broken")

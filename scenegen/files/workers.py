@@ -1,5 +1,6 @@
 """Work in threads and processes; processes end with the one that started them, however it ends."""
 
+import math
 import multiprocessing
 import os
 import threading
@@ -8,9 +9,10 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing.context import SpawnContext, SpawnProcess
+from pathlib import Path
 from typing import Any, TypeVar
 
 from scenegen.common.errors import SceneGenError
@@ -24,10 +26,46 @@ AHEAD = 2  # tasks for each process that are begun, or done and not yet taken
 
 
 def processors() -> int:
-    """Return how many processors this process may use."""
+    """Return how many processors this process may use: its affinity and its cgroup limit both."""
+    count = os.cpu_count() or 1
     if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+        count = len(os.sched_getaffinity(0))
+    return max(1, math.ceil(min(count, _cgroup_processors())))
+
+
+def _cgroup_processors(
+    root: Path = Path("/sys/fs/cgroup"), self_file: str = "/proc/self/cgroup"
+) -> float:
+    """Return the least limit on processor time of this process's cgroups, v2 or v1; inf for none.
+
+    `docker --cpus 1.5` sets 1.5. A container may see its own cgroup at `root`, too.
+    """
+    limits = [math.inf]
+    try:
+        lines = Path(self_file).read_text().splitlines()
+    except OSError:
+        return math.inf
+    for line in lines:
+        _, kinds, path = line.split(":", 2)
+        home = root if not kinds else root / "cpu"
+        if kinds and "cpu" not in kinds.split(","):
+            continue
+        place = home / path.lstrip("/")
+        for folder in (place, *place.parents):
+            limits.append(_limit_in(folder))
+            if folder == home:
+                break
+    return min(limits)
+
+
+def _limit_in(folder: Path) -> float:
+    with suppress(OSError, ValueError):
+        quota, period = (folder / "cpu.max").read_text().split()
+        return int(quota) / int(period)  # "max" is none
+    with suppress(OSError, ValueError):
+        quota, period = ((folder / f"cpu.cfs_{n}_us").read_text() for n in ("quota", "period"))
+        return int(quota) / int(period) if int(quota) > 0 else math.inf
+    return math.inf
 
 
 def in_threads(
@@ -95,7 +133,8 @@ def in_processes(function: Callable[[Task], T], tasks: Iterable[Task], count: in
                 return result
 
             for task in tasks:
-                running.append(pool.submit(_do, task))
+                with _processes_to_be_had():
+                    running.append(pool.submit(_do, task))
                 if len(running) >= AHEAD * count:
                     yield oldest()
                     done = True
@@ -129,7 +168,8 @@ def worker_pool(
 
     The block waits for them at its end. Where it ends by an error, they are killed instead.
     """
-    pool = ProcessPoolExecutor(count, _Spawning(), _begin, (function,))
+    with _processes_to_be_had():
+        pool = ProcessPoolExecutor(count, _Spawning(), _begin, (function,))
     try:
         yield pool
     except BaseException:
@@ -142,6 +182,17 @@ def worker_pool(
             process.join(PATIENCE)
         raise
     pool.shutdown()
+
+
+@contextmanager
+def _processes_to_be_had() -> Iterator[None]:
+    """Turn an error of the system about processes into one that does not blame the output."""
+    try:
+        yield
+    except (OSError, ImportError, NotImplementedError) as error:
+        what = f"Worker processes cannot be started here ({error})"
+        hint = "use --workers 1; in a container, let /dev/shm be written to"
+        raise SceneGenError(what, hint=hint) from error
 
 
 _Warning = tuple[str, type[Warning]]

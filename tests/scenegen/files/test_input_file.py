@@ -1,9 +1,13 @@
 """Files that lead elsewhere, or take more than they say, are refused before anything is read."""
 
+import errno
 import os
 import pickle
+import subprocess
+import sys
 import tracemalloc
 import zlib
+from unittest.mock import Mock
 
 import h5py
 import numpy as np
@@ -231,3 +235,31 @@ def test_what_is_said_of_a_damaged_chunk_can_be_sent_to_another_process(path):
     while link is not None:
         pickle.dumps(type(link))
         link = link.__cause__ or link.__context__
+
+
+@pytest.mark.parametrize("number", [errno.EAGAIN, errno.EACCES, errno.EIO, errno.ESTALE])
+def test_errors_of_the_system_are_named_and_do_not_blame_the_file(path, monkeypatch, number):
+    """As from a file that another process writes to, or a network disk that went away."""
+    with h5py.File(path, "w") as file:
+        file["depth"] = VALUES
+    error = OSError(number, f"Unable to synchronously open file (errno = {number})")
+    monkeypatch.setattr(h5py, "File", Mock(side_effect=error))
+    with pytest.raises(OSError, match=r"\. ") as refused:
+        open_file(path, "file of rooms")
+    assert not isinstance(refused.value, FileFormatError)
+    assert (refused.value.errno, refused.value.filename) == (number, str(path))
+    assert str(number) not in refused.value.strerror
+    with pytest.raises(OSError, match="row 3") as refused, reading("row 3"):
+        raise error
+    assert refused.value.errno == number
+
+
+def test_a_file_held_by_a_writer_is_refused_as_such(path):
+    code = f"import h5py; f = h5py.File({str(path)!r}, 'w'); f['x'] = 1; print(flush=True); input()"
+    command = [sys.executable, "-c", code]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as writer:
+        writer.stdout.readline()
+        with pytest.raises(OSError) as refused:
+            open_file(path, "file of rooms")
+        writer.communicate(b"\n")
+    assert refused.value.errno == errno.EAGAIN

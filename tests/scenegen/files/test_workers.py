@@ -1,5 +1,6 @@
 """Worker processes after the process that started them: killed, or stopped by Ctrl-C."""
 
+import errno
 import functools
 import math
 import os
@@ -7,10 +8,12 @@ import signal
 import subprocess
 import sys
 import warnings
+from unittest.mock import Mock
 
 import pytest
 
 from scenegen.common.errors import SceneGenError
+from scenegen.files import workers
 from scenegen.files.workers import in_order, in_processes, in_threads
 
 BUSY = """
@@ -103,3 +106,31 @@ def test_a_process_that_ends_by_itself_is_told():
     with pytest.raises(SceneGenError) as refused:
         list(in_processes(os._exit, [1, 2, 3], 2))
     assert "worker process" in refused.value.where
+
+
+def test_processors_are_those_of_the_cgroup(tmp_path):
+    """Version 2 with a limit above and none here; version 1; a limit that is no number."""
+    cgroup, root = tmp_path / "cgroup", tmp_path / "fs"
+    for line, file, text, limit in [
+        ("0::/pod/box", "pod/cpu.max", "150000 100000", 1.5),
+        ("0::/pod/box", "pod/box/cpu.max", "max 100000", 1.5),
+        ("0::/", "cpu.max", "50000 100000", 0.5),
+        ("4:memory:/x\n3:cpu,cpuacct:/box", "cpu/box/cpu.cfs_quota_us", "300000", math.inf),
+        ("4:memory:/x\n3:cpu,cpuacct:/box", "cpu/box/cpu.cfs_period_us", "100000", 3.0),
+        ("3:cpu:/", "cpu/cpu.cfs_quota_us", "-1", math.inf),
+    ]:
+        cgroup.write_text(line + "\n")
+        (root / file).parent.mkdir(parents=True, exist_ok=True)
+        (root / file).write_text(text + "\n")
+        assert workers._cgroup_processors(root, str(cgroup)) == limit
+    assert workers._cgroup_processors(root, str(tmp_path / "none")) == math.inf
+    assert 1 <= workers.processors() <= os.cpu_count()
+
+
+@pytest.mark.parametrize("error", [OSError(errno.EROFS, "Read-only"), NotImplementedError("few")])
+def test_where_no_processes_are_to_be_had_workers_are_named(monkeypatch, error):
+    """As where /dev/shm cannot be written to; the output is not blamed."""
+    monkeypatch.setattr(workers, "ProcessPoolExecutor", Mock(side_effect=error))
+    with pytest.raises(SceneGenError) as refused:
+        list(workers.in_processes(abs, [1], 2))
+    assert "--workers" in refused.value.hint
