@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.specs import IMAGE_DTYPES
 from scenegen.files.attributes import read_digest, read_root, read_text
 from scenegen.files.input_file import checking
-from scenegen.files.rows import RowDataset, RowFile, describing
+from scenegen.files.rows import RowDataset, RowFile, chosen_rows, describing
 from scenegen.files.shards import OpenFile
 from scenegen.layout import TRUTH_DIGEST
 from scenegen.rendering.ground_truth import decode_image
@@ -282,9 +282,21 @@ class QuestionsFile(RowFile):
         """Return another table of the same open file; raises as when one is opened."""
         return type(self)(self.opened, part)
 
-    def __getitem__(self, index: int) -> QuestionRecord:
-        """Read one row; negative indices count from the end. Raises IndexError, FileFormatError."""
-        row = range(len(self))[index]
+    @overload
+    def __getitem__(self, index: int) -> QuestionRecord: ...
+    @overload
+    def __getitem__(self, index: slice | Sequence[int] | Array) -> list[QuestionRecord]: ...
+    def __getitem__(self, index: Any) -> QuestionRecord | list[QuestionRecord]:
+        """Read a row, or several by a slice or a list; negative numbers count from the end.
+
+        Raises as `rows.chosen_rows`, and FileFormatError.
+        """
+        rows = chosen_rows(index, len(self))
+        if isinstance(rows, int):
+            return self._record(rows)
+        return [self._record(row) for row in rows]
+
+    def _record(self, row: int) -> QuestionRecord:
         return QuestionRecord(
             index=row,
             images=self.read("questions", row),

@@ -1,5 +1,6 @@
 """Options that several commands have, and the types of options that click lacks."""
 
+import csv
 import re
 from collections.abc import Callable
 from typing import Any
@@ -84,12 +85,16 @@ class Items(_Parsed):
 
 
 class Names(_Parsed):
-    """`mug,bowl`, as a tuple of texts."""
+    """`mug,bowl`, as a tuple of texts; a name with a comma stands in double quotes."""
 
     name, expected = "NAME,NAME", "names such as mug,bowl"
 
     def _parse(self, text: str) -> tuple[str, ...]:
-        return tuple(part.strip() for part in text.split(","))
+        try:
+            (names,) = csv.reader([text], skipinitialspace=True, strict=True)
+        except csv.Error as error:
+            raise ValueError(str(error)) from error
+        return tuple(name.strip() for name in names) or ("",)
 
 
 class Numbers(_Parsed):

@@ -9,7 +9,6 @@ from scenegen.description.specs import DatasetSpec
 VESSELS = ("bag", "bottle", "bowl", "can", "cap", "lamp", "mug")
 HOUSEHOLD = {"source": "families", "shapes": VESSELS}
 PAPER_VIEWS = (0.0, 5.0, 35.0, 55.0, 80.0)  # degrees, as in the paper's table of unseen views
-VISIBLE_SHARE = 0.003  # least share of the image's pixels that show an object, by default
 VIEWS_SHRINK = 0.75  # factor on object radii where several views must show objects whole
 PATH_SAMPLES = 64  # colour samples per pixel of the path tracer, by default
 
@@ -61,17 +60,15 @@ PRESETS = {
 def preset_spec(preset: str, **settings: Any) -> DatasetSpec:
     """Return the request of a preset, with `settings` in place of the preset's own.
 
-    Some settings that are not given follow from others: `min_visible_pixels` is VISIBLE_SHARE of
-    the image, `object_radius` is smaller by VIEWS_SHRINK with several views, `spp` is PATH_SAMPLES
-    for the path tracer, and `room_reflectance` is `reflectance` if that is given.
+    Some settings that are not given follow from others: `object_radius` is smaller by VIEWS_SHRINK
+    with several views, `spp` is PATH_SAMPLES for the path tracer, and `room_reflectance` is
+    `reflectance` if that is given.
 
     Raises SpecError for an unknown preset, and for settings that are out of range or contradict
     one another.
     """
     check(preset in PRESETS, "preset", preset, f"one of {', '.join(PRESETS)}")
     chosen = {**PRESETS[preset].settings, **settings}
-    pixels = chosen.get("height", DatasetSpec.height) * chosen.get("width", DatasetSpec.width)
-    chosen.setdefault("min_visible_pixels", max(1, round(VISIBLE_SHARE * pixels)))
     if len(chosen.get("views", ())) > 1 and "object_radius" not in settings:
         low, high = chosen.get("object_radius", DatasetSpec.object_radius)
         chosen["object_radius"] = (VIEWS_SHRINK * low, VIEWS_SHRINK * high)

@@ -20,6 +20,8 @@ MAX_CLASSES = 4000  # their names are an attribute, of which HDF5 allows 64 kB
 MAX_LIGHTS = 16
 MAX_PIXELS = 4096 * 4096
 MAX_VIEWS = 64
+VISIBLE_SHARE = 0.003  # least share of the pixels of an image that show an object, by default
+FROM_SIZE = -(2**62)  # stands for the number that follows from the size of the image
 MOST_TURN = 80.0  # degrees between two views; at 90 all input views would be the same
 LIMITS: dict[str, tuple[float, float]] = {  # of settings that are a number or a range of numbers
     "spp": (1, 1024),
@@ -64,7 +66,8 @@ class DatasetSpec:
         shadows: whether lights are occluded (the paper's shading equation has no visibility term).
         spp: colour samples per pixel; 1 shades the ground-truth hit itself.
         image_dtype: "uint8" (linear radiance 0..1 as 0..255), "float16" or "float32" (radiance).
-        min_visible_pixels: every object shows at least so many pixels in every view.
+        min_visible_pixels: every object shows at least so many pixels in every view; by default
+            VISIBLE_SHARE of the image's, at least 1.
         allow_cropped: let the image's border cut objects (their centres stay in the image).
         fov_degrees: field of view of a square image; others have its diagonal.
         camera_radius: distance from camera to target, scene units.
@@ -95,7 +98,7 @@ class DatasetSpec:
     shadows: bool = False
     spp: int = 1
     image_dtype: str = "uint8"
-    min_visible_pixels: int = 49
+    min_visible_pixels: int = FROM_SIZE
     allow_cropped: bool = False
     fov_degrees: float = 28.0
     camera_radius: float = 1.5
@@ -113,6 +116,9 @@ class DatasetSpec:
 
     def __post_init__(self) -> None:
         normalise(self)
+        if self.min_visible_pixels == FROM_SIZE:
+            least = max(1, round(VISIBLE_SHARE * self.height * self.width))
+            object.__setattr__(self, "min_visible_pixels", least)
         check(0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2**63 - 1")
         _check_limits(self)
         _check_image(self)

@@ -3,6 +3,7 @@
 `RowFile` is what the readers of rooms and of questions are made of.
 """
 
+import operator
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -130,7 +131,7 @@ class RowFile:
     def parts(self) -> list[tuple[Path, int]]:
         """Path and number of rows of each file that holds values: this one, or its shards."""
         shards = [shard for shard in self.opened.shards if shard.part == self.part]
-        return [(self.path.parent / shard.file, shard.rows) for shard in shards] or [
+        return [(self.opened.folder / shard.file, shard.rows) for shard in shards] or [
             (self.path, len(self))
         ]
 
@@ -211,6 +212,29 @@ class RowFile:
         self.close()
 
 
+def chosen_rows(index: Any, count: int) -> int | list[int]:
+    """Return a row, or a list of rows for a slice, a list or an array, as numpy indexes an axis.
+
+    Raises IndexError for a row beyond the file, and TypeError for what is no index.
+    """
+    rows = range(count)
+    if isinstance(index, slice):
+        return list(rows[index])
+    if isinstance(index, (list, tuple, np.ndarray)):
+        numbers = np.asarray(index if len(index) else np.empty(0, int))
+        if numbers.dtype == bool and numbers.shape == (count,):
+            numbers = np.flatnonzero(numbers)
+        if numbers.ndim == 1 and numbers.dtype.kind in "iu":
+            return [rows[number] for number in numbers.tolist()]
+        message = f"rows are chosen by whole numbers, not by an array of {numbers.dtype}"
+        raise IndexError(f"{message} with the shape {numbers.shape}")
+    try:
+        return rows[operator.index(index)]
+    except TypeError:
+        message = f"a row is a whole number, a slice or a list of them, not {type(index).__name__}"
+        raise TypeError(message) from None
+
+
 class RowBlock:
     """Some rows in a row of a file, each column read at once.
 
@@ -248,23 +272,50 @@ class RowDataset:
         for name in fields:
             rows.check_field(name)
         self.fields, self._length = tuple(fields), len(rows)
-        self._reopen = rows.reopener()
+        self._reopen, self._content = rows.reopener(), _content_of(rows)
         self._open: tuple[int, RowFile] | None = os.getpid(), rows
 
     def __len__(self) -> int:
         return self._length
 
-    def __getitem__(self, index: int) -> dict[str, Any]:
-        """Return the fields of one row, by name; image values are as stored."""
-        row = range(self._length)[index]
+    def __getitem__(self, index: Any) -> dict[str, Any]:
+        """Return the fields of a row, by name; image values are as stored.
+
+        A slice or a list of rows gives each field with an axis of rows before its own.
+
+        Raises as `chosen_rows`, and FileFormatError where rows are damaged, or the file was
+        replaced by another since this data set was made.
+        """
+        rows, file = chosen_rows(index, self._length), self._file()
+        if isinstance(rows, int):
+            return {name: file.read(name, rows) for name in self.fields}
+        return {name: _stacked(file, name, rows) for name in self.fields}
+
+    def _file(self) -> RowFile:
+        """Return the file, open in this process."""
         process = os.getpid()
         if self._open is None or self._open[0] != process or not self._open[1].opened.is_open:
-            self._open = process, self._reopen()
-        file = self._open[1]
-        return {name: file.read(name, row) for name in self.fields}
+            file = self._reopen()
+            if _content_of(file) != self._content:
+                file.close()
+                message = f"{file.path}: the file was replaced since this data set was made"
+                raise FileFormatError(message, hint="make the data set again")
+            self._open = process, file
+        return self._open[1]
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_open": None}
+
+
+def _content_of(file: RowFile) -> Any:
+    """Return what tells a file from another: its digest, or size and time where it has none."""
+    about = os.stat(file.path)
+    return file.opened.file.attrs.get(CONTENT_DIGEST) or (about.st_size, about.st_mtime_ns)
+
+
+def _stacked(file: RowFile, name: str, rows: list[int]) -> Array:
+    values = [file.read(name, row) for row in rows]
+    return np.stack(values) if values else np.asarray(file.read(name, slice(0, 0)))
 
 
 def content_problems(opened: OpenFile, known: Mapping[str, str]) -> list[str]:

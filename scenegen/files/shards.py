@@ -9,6 +9,7 @@ Each shard has a data set `row_sha256` with the digest of every row of each data
 digests of the set follow from those of its shards, and a damaged row can be named.
 """
 
+import glob
 import json
 import re
 from collections import OrderedDict
@@ -101,6 +102,13 @@ def opened(place: Path) -> Iterator[h5py.File]:
         yield stack.enter_context(h5py.File(source, "r"))
 
 
+def _place_of_set(path: Path) -> Path:
+    """Return the path beside which the shards of a set lie: its own, or what a link leads to."""
+    if not path.is_symlink() or any(path.parent.glob(f"{glob.escape(path.stem)}-00000-of-*")):
+        return path
+    return path.resolve()
+
+
 class OpenFile:
     """An open HDF5 file of which every object is safe to open, and its shards if it is a set.
 
@@ -111,6 +119,7 @@ class OpenFile:
         path: of the file.
         file: what h5py opened. Its virtual data sets are read by `array` only.
         shards: of a set; empty for a whole file.
+        folder: where the shards lie: beside the file, or beside the file that a link leads to.
     """
 
     def __init__(self, path: str | Path, kind: str) -> None:
@@ -121,6 +130,8 @@ class OpenFile:
         than to the shards beside it, or of which a shard is missing.
         """
         self.path, self._kind = Path(path), kind
+        place = _place_of_set(self.path)
+        self.folder = place.parent
         self.file = open_unchecked(path, kind)
         self.shards: list[Shard] = []
         self._open: OrderedDict[int, h5py.File] = OrderedDict()
@@ -134,7 +145,7 @@ class OpenFile:
                 fault = min(unsafe, key=lambda fault: fault.virtual)
                 raise FileFormatError(f"{path}: {fault.name}", fault.found, fault.expected)
             if unsafe:
-                self.shards = _read_list(self.file[SHARDS], self.path)
+                self.shards = _read_list(self.file[SHARDS], place)
                 for fault in unsafe:
                     self._check_sources(self.file[fault.name])
                 self._check_shards()
@@ -151,7 +162,7 @@ class OpenFile:
             raise FileFormatError(where, found, "all rows of its shards, in their order")
 
     def _check_shards(self) -> None:
-        missing = [s.file for s in self.shards if not (self.path.parent / s.file).is_file()]
+        missing = [s.file for s in self.shards if not (self.folder / s.file).is_file()]
         if missing:
             more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
             hint = "copy all files of the set together, or run the command that made it again"
@@ -175,7 +186,7 @@ class OpenFile:
         """Return an open shard. Raises FileFormatError where it is not the one that was made."""
         if number not in self._open:
             shard = self.shards[number]
-            place = self.path.parent / shard.file
+            place = self.folder / shard.file
             file = open_file(place, self._kind)
             found = file.attrs.get(CONTENT_DIGEST)
             if found != shard.content_digest:

@@ -5,7 +5,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import h5py
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.files.attributes import read_root
 from scenegen.files.content import SHA256, joint_digest
-from scenegen.files.rows import RowDataset, RowFile, describing
+from scenegen.files.rows import RowDataset, RowFile, chosen_rows, describing
 from scenegen.files.shards import OpenFile
 from scenegen.layout import FIELDS, FORMAT, SCORED, TRUTH_DIGEST, columns
 from scenegen.rendering.ground_truth import decode_image
@@ -90,9 +90,19 @@ class RoomsFile(RowFile):
             raise FileFormatError(f"{self.path}: image", "no rows", "at least one")
         self._take("", columns(self.spec))
 
-    def __getitem__(self, index: int) -> Room:
-        """Read one row; negative indices count from the end. Raises IndexError, FileFormatError."""
-        return self.room(range(len(self))[index], self.read)
+    @overload
+    def __getitem__(self, index: int) -> Room: ...
+    @overload
+    def __getitem__(self, index: slice | Sequence[int] | Array) -> list[Room]: ...
+    def __getitem__(self, index: Any) -> Room | list[Room]:
+        """Read a row, or several by a slice or a list; negative numbers count from the end.
+
+        Raises as `rows.chosen_rows`, and FileFormatError.
+        """
+        rows = chosen_rows(index, len(self))
+        if isinstance(rows, int):
+            return self.room(rows, self.read)
+        return [self.room(row, self.read) for row in rows]
 
     def __iter__(self) -> Iterator[Room]:
         return (self[i] for i in range(len(self)))

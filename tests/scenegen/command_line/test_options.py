@@ -25,6 +25,7 @@ READ = [
     (Items(), "0-99999999999", list(range(MOST_ITEMS + 1))),
     (Names(), "mug, bowl", ("mug", "bowl")),
     (Names(), "", ("",)),
+    (Names(), '"tables, round", mug', ("tables, round", "mug")),
     (Numbers(), "0,5, 35", (0.0, 5.0, 35.0)),
     (Numbers(), "1e999", (float("inf"),)),
     (Color(), "White", (1.0, 1.0, 1.0)),

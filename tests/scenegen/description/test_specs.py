@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from scenegen.camera import Camera
 from scenegen.common.errors import SpecError
+from scenegen.description.presets import preset_spec
 from scenegen.description.scenes import SHAPE_NAMES, Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec, Fingerprint
 from scenegen.sampling.scenes import sample_scene
@@ -251,3 +252,9 @@ def test_fingerprints_notice_scenes_and_their_borders():
 )
 def test_equal_requests_have_equal_fingerprints(settings, alike):
     assert fingerprint(DatasetSpec(**settings)) == fingerprint(DatasetSpec(**alike))
+
+
+def test_a_size_means_what_the_option_means() -> None:
+    assert DatasetSpec(height=64, width=64) == preset_spec("shapes", height=64, width=64)
+    assert DatasetSpec(height=64, width=64).min_visible_pixels == 12
+    assert DatasetSpec(height=64, width=64, min_visible_pixels=0).min_visible_pixels == 0

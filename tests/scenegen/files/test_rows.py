@@ -332,3 +332,43 @@ def test_torch_loader_with_workers(whole, task):
     images = torch.cat([batch[IMAGES[task]] for batch in loader])
     with READERS[task](whole) as file:
         np.testing.assert_array_equal(images.numpy(), file.read(IMAGES[task], slice(None)))
+
+
+@pytest.mark.parametrize("as_index", [list, tuple, np.array])
+def test_rows_are_chosen_as_numpy_does(whole, task, as_index):
+    """By slices, lists and arrays of numbers or of truth values; what is no index says so."""
+    data = DATASETS[task](whole, fields=(NUMBERS[task],))
+    every = np.stack([item[NUMBERS[task]] for item in data])
+    choose = [True] + [False] * (len(data) - 2) + [True]
+    for index in (slice(0, 2), slice(None, None, -2), [2, 0, -1], choose):
+        given = index if isinstance(index, slice) else as_index(index)
+        np.testing.assert_array_equal(data[given][NUMBERS[task]], every[index])
+    assert data[5:5][NUMBERS[task]].shape == (0, *every.shape[1:])
+    with READERS[task](whole) as rows:
+        assert [row.index for row in rows[1:3]] == [1, 2]
+        assert [row.index for row in rows[as_index([2, 0])]] == [2, 0]
+        for reader in (rows, data):
+            for wrong in ([0.5], [99], [True], ["0"], [[0]]):
+                with pytest.raises(IndexError):
+                    reader[as_index(wrong)]
+            for wrong in ("0", 1.0, None):
+                with pytest.raises(TypeError):
+                    reader[wrong]
+
+
+@pytest.mark.parametrize("task", ["rooms"])
+def test_a_file_replaced_by_another_is_noticed(copied, task):
+    """By workers, which open it for themselves."""
+    data = pickle.dumps(RoomsDataset(copied))
+    assert len(pickle.loads(data)[0]) == 4
+    with h5py.File(copied, "r+") as file:
+        file.attrs["content_digest"] = "0" * 64
+    with pytest.raises(FileFormatError, match="replaced"):
+        pickle.loads(data)[0]
+
+
+def test_a_link_to_the_file_of_a_set_reads_the_set(sets, task, tmp_path):
+    path = sets[task][1]
+    (tmp_path / "link.h5").symlink_to(path)
+    data, linked = DATASETS[task](path), DATASETS[task](tmp_path / "link.h5")
+    np.testing.assert_array_equal(linked[3][IMAGES[task]], data[3][IMAGES[task]])
