@@ -154,7 +154,7 @@ def make_split(
     test, whatever the settings. Where a run with shards was ended, the same command goes on.
     """
     from iqtt.files import make
-    from iqtt.files.shards import ALL_FILES
+    from iqtt.files.split import ALL_FILES
     from iqtt.questions import specs
     from scenegen.common.errors import SpecError
     from scenegen.files.places import as_place
@@ -216,7 +216,7 @@ def make_split(
 def merge(file: str, out: str, overwrite: bool) -> None:
     """Make one file of questions that were written to several."""
     from iqtt.audit.table import find_tables
-    from iqtt.files.merge import merge_questions
+    from iqtt.files.make import merge_questions
 
     with progress_bar(sum(one.count for one in find_tables([file])), "question") as bar:
         count = merge_questions(file, out, overwrite, bar.update)

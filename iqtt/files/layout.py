@@ -5,6 +5,7 @@ files have one, at the root. `truth` tells what is known of the questions of eac
 """
 
 import re
+from collections.abc import Mapping
 from typing import Any
 
 from numpy.typing import NDArray
@@ -121,7 +122,7 @@ def truth_columns(spec: SplitSpec) -> list[Column]:
     return columns
 
 
-def root_attributes(spec: SplitSpec, renderer: dict[str, str], command: str) -> dict[str, Any]:
+def root_attributes(spec: SplitSpec, renderer: Mapping[str, str], command: str) -> dict[str, Any]:
     """Return the root attributes of a file.
 
     Args:

@@ -1,33 +1,29 @@
-"""Make the files of a split of questions, whole or in shards."""
+"""Make the files of a split of questions, or of a suite of splits; merge shards to one file."""
 
 import errno
-import os
-from collections.abc import Callable
-from contextlib import closing, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from iqtt.files.layout import root_attributes
-from iqtt.files.shards import (
-    ALL_FILES,
-    MANIFEST,
-    SplitFiles,
-    complete_split,
-    file_tasks,
-    is_own,
-)
-from iqtt.files.work import Work
+from iqtt.files.layout import FORMAT
+from iqtt.files.reader import QuestionsFile, open_tables
+from iqtt.files.split import MANIFEST, split_part, split_plan
+from iqtt.files.work import QuestionsWork
 from iqtt.questions.distractors import make_pools
 from iqtt.questions.specs import SUITE, SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import DEFAULT_BATCH
+from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
 from scenegen.files.cluster import Cluster
+from scenegen.files.making import make_set
 from scenegen.files.new_file import EXISTS
-from scenegen.files.new_folder import check_folder, folder_written_beside
+from scenegen.files.new_folder import check_place
 from scenegen.files.places import as_place, check_store, is_remote
-from scenegen.files.shards import MOST_SHARDS, opened
+from scenegen.files.plan import Part
+from scenegen.files.sets import merge_file
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.renderer import useful_workers
 
@@ -49,20 +45,19 @@ def make_split(
     cluster: Cluster | None = None,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> Tally:
-    """Write the files of a split to a folder; it appears when all of them are complete.
+    """Write the files of a split to a folder, each of which appears when it is complete.
 
-    Where one of them has more than `shard_size` questions, the folder is there from the start, and
-    the same call goes on where an earlier one was killed.
-
-    Seed and command would reveal the test answers, so only the file of the test answers has them.
-    `new_folder.folder_written_beside` says how an older split is replaced.
+    The same call goes on where an earlier one was killed. Seed and command would reveal the test
+    answers, so only the file of the test answers has them.
 
     Args:
+        folder: is made if it is not there; other files in it are left alone.
         batch: questions in one wavefront; bounds the memory, never changes a byte of the files.
         workers: processes that render, as in `rooms.make.make_dataset`.
         shard_size: files with more questions are cut into shards of so many, which the file shows
             as one.
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
+        overwrite: replace older files of a split.
         command: what to record as the command that made the files.
         secret: keep the seed out of the file of the test answers too.
         cluster: whose workers make the files; all of them must see the folder, or it is a URL.
@@ -73,72 +68,30 @@ def make_split(
     Raises:
         SpecError, TooFewShapesError: a setting, before anything is rendered.
         PlacementError: the bounded search found no question that meets the spec.
-        OSError: the folder, or the disk.
+        Others as `making.make_set`.
     """
     count = spec.train + spec.val + spec.test
     check(count > 0, "train, val and test", count, "at least 1 question in all")
-    check(shard_size >= 1, "shard-size", shard_size, "at least 1")
     variant = select_variant(device)
-    workers = workers or useful_workers(count * (1 + spec.answers), variant)
-    place, tally = as_place(folder), Tally()
-    least = -(-max(spec.train, spec.test, spec.val) // (MOST_SHARDS - 1))  # two parts of training
-    check(least <= shard_size, "shard-size", shard_size, f"at least {least} for so many questions")
-    tasks = file_tasks(spec, shard_size)
-    in_shards = bool(cluster) or is_remote(place) or any(task.is_shard for task in tasks)
-    if not is_remote(place):
-        _check_folder(place, overwrite, in_shards)
-    renderer = {"variant": variant, **versions()}
-    public = root_attributes(spec.public(), renderer, "")
-    private = root_attributes(spec.public() if secret else spec, renderer, command)
-    work = Work(spec, make_pools(spec), batch, workers, device, compression)
-    if in_shards:
-        if not is_remote(place):
-            place.mkdir(exist_ok=True)
-        if cluster:
-            place = place.absolute()  # workers are in other folders
-        files = SplitFiles(place, work, public, private, shard_size)
-        complete_split(
-            files, tasks, tally,
-            cluster=cluster, overwrite=overwrite, progress=progress,
+    plan = split_plan(spec, {"variant": variant, **versions()}, compression, command, secret)
+    tally = Tally()
+    with _folder(as_place(folder)) as place:
+        work = QuestionsWork(spec, make_pools(spec), batch, device, compression)
+        make_set(
+            place / MANIFEST, plan, work, shard_size,
+            workers=workers or useful_workers(count * (1 + spec.answers), variant),
+            cluster=cluster, overwrite=overwrite, progress=progress, note=tally.add,
         )  # fmt: skip
-        return tally
-    with folder_written_beside(place, _own_files(place), overwrite) as temporary:
-        files = SplitFiles(temporary, work, public, private, shard_size)
-        blocks = [block for task in tasks for block in task.blocks]
-        with closing(work.in_order(blocks, tally)) as made:
-            for task in tasks:
-                files.write(task, made, progress)
-            next(made, None)  # there is none; so workers end by themselves
     return tally
 
 
-def _check_folder(folder: Path, overwrite: bool, in_shards: bool) -> None:
-    """Raise OSError where a split cannot be written to a folder.
-
-    One in shards may have been begun by an earlier run.
-    """
-    empty = folder.is_dir() and not any(folder.iterdir())
-    begun = in_shards and (empty or (folder / MANIFEST).exists())
-    check_folder(folder, _own_files(folder), overwrite or begun)
-
-
-def _own_files(folder: Path) -> list[str]:
-    """Return the names that files of a split have in a folder."""
-    found = os.listdir(folder) if folder.is_dir() else []
-    return [*ALL_FILES, *(name for name in found if is_own(name))]
-
-
 def make_suite(
-    folder: str | Path,
-    spec: SplitSpec,
-    *,
-    overwrite: bool = False,
-    **options: Any,
+    folder: str | Path, spec: SplitSpec, *, overwrite: bool = False, **options: Any
 ) -> Tally:
     """Write a split of each kind of questions to a folder of its own in `folder`: see `SUITE`.
 
-    Each split is complete when it appears, and what could stop one of them is checked before the
-    first one is made. Splits that an earlier run of the same request completed are kept.
+    What could stop one of the splits is checked before the first one is made. Splits that an
+    earlier run of the same request completed are kept.
 
     Args:
         spec: the settings of each split but its kind and number of answers.
@@ -150,53 +103,62 @@ def make_suite(
         name: replace(spec, distractors=kind, answers=answers)
         for name, (kind, answers) in SUITE.items()
     }
-    home, device = as_place(folder), options.get("device", "auto")
-    if is_remote(home):
-        check_store(home / MANIFEST)
-    waiting = {
-        name: own
-        for name, own in specs.items()
-        if overwrite or not _is_made(home / name, own, device)
-    }
-    if not is_remote(home):
-        for name in waiting if home.exists() else ():
-            begun = (home / name / MANIFEST).exists()
-            check_folder(home / name, _own_files(home / name), overwrite or begun)
-    for own in waiting.values():
-        make_pools(own)
-    if waiting and not is_remote(home):
-        home.mkdir(exist_ok=True)
-    total, made = Tally(), 0
-    try:
-        for name, own in waiting.items():
+    tally, complete = Tally(), 0
+    with _folder(as_place(folder)) as home:
+        for of_split in specs.values():
+            make_pools(of_split)
+        for name, of_split in specs.items():
             try:
-                total.add(make_split(home / name, own, overwrite=overwrite, **options))
-                made += 1
-            except FileExistsError:  # in shards, and complete
-                if overwrite or not (home / name / MANIFEST).exists():
-                    raise
+                tally.add(make_split(home / name, of_split, overwrite=overwrite, **options))
+            except FileExistsError:
+                complete += 1
+        if complete == len(specs):
+            raise FileExistsError(errno.EEXIST, EXISTS, str(home))
+    return tally
+
+
+@contextmanager
+def _folder(folder: Path) -> Iterator[Path]:
+    """Make a folder unless it is there; it goes again if nothing is in it when the block ends."""
+    if is_remote(folder):
+        check_store(folder / MANIFEST)
+        yield folder
+        return
+    check_place(folder)
+    was_there = folder.exists()
+    folder.mkdir(exist_ok=True)
+    try:
+        yield folder
     finally:
-        if not is_remote(home):
-            with suppress(OSError):  # it stays if anything is in it
-                home.rmdir()
-    if not made:
-        raise FileExistsError(errno.EEXIST, EXISTS, str(home))
-    return total
+        if not was_there:
+            with suppress(OSError):
+                folder.rmdir()
 
 
-def _is_made(folder: Path, spec: SplitSpec, device: str) -> bool:
-    """Return whether an earlier run of the suite completed this split, without shards.
+def merge_questions(
+    path: str | Path,
+    out: str | Path,
+    overwrite: bool = False,
+    progress: Callable[[int], Any] = lambda done: None,
+) -> int:
+    """Write the tables of a question file, or of a set of shards, to one file.
 
-    Raises SpecError where another seed made it.
+    Returns the number of questions; `progress` is called with the number written since the last
+    call. Raises as `QuestionsFile` and `sets.merge_file`, and FileFormatError for a released file.
     """
-    files = [folder / name for name in ALL_FILES]
-    if (folder / MANIFEST).exists() or not all(file.is_file() for file in files):
-        return False
-    for path in files[:-1]:  # the last one may tell the seed
-        with opened(path) as file:
-            if file.attrs.get("spec") != spec.public().to_json():
-                return False
-    work = Work(spec, make_pools(spec), 1, 1, device, "gzip")
-    size = spec.train + spec.val + spec.test
-    SplitFiles(folder, work, {}, {}, size).confirm(file_tasks(spec, size))
-    return True
+    tables = open_tables(path)
+    with tables[0] as first:
+        if first.spec is None or first.split is None:
+            raise FileFormatError(path, "a released file", "one that iqtt make-split wrote")
+        parts = [_stored_part(table, first.spec, first.split) for table in tables]
+        compression = max(tables, key=len).compression()  # a table without rows has none
+        merge_file(Path(path), out, FORMAT.kind, parts, compression, overwrite, progress)
+        return sum(map(len, tables))
+
+
+def _stored_part(table: QuestionsFile, spec: SplitSpec, split: str) -> Part:
+    """Return the part of a split that a table holds; a file of images lacks some of its sheets."""
+    part = split_part(spec, split, table.part, len(table), 0)
+    columns = set(table.fields)
+    sheets = [s for s in part.sheets if columns.issuperset(column.name for column in s.columns)]
+    return replace(part, sheets=sheets, marks=())

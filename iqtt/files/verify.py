@@ -9,13 +9,14 @@ import numpy as np
 
 from iqtt.files.layout import FORMAT_VERSION
 from iqtt.files.reader import QuestionsFile, open_tables
-from iqtt.files.shards import ALL_FILES, FILES, MANIFEST
+from iqtt.files.split import ALL_FILES, FILES, MANIFEST
 from iqtt.questions.distractors import make_pools
 from iqtt.questions.specs import SPLITS, SplitSpec
 from iqtt.render import groups, render_question
 from scenegen.common.errors import FileFormatError
 from scenegen.files.manifest import Manifest, read_manifest
 from scenegen.files.rows import content_problems
+from scenegen.files.shards import shard_name
 from scenegen.files.verify import (
     Check,
     listed_check,
@@ -73,25 +74,27 @@ def _against_manifest(
     if set(manifest.files) != set(ALL_FILES):
         found = ", ".join(manifest.files)
         raise FileFormatError(folder / MANIFEST, found[:80], "the files of a split")
-    gaps = [problem for name in manifest.files for problem in _gaps(manifest, name)]
+    spec = SplitSpec.from_json(manifest.spec)
+    total = sum(getattr(spec, split) for split in SPLITS)
+    gaps = [] if manifest.count == total else [f"{manifest.count} questions, not {total}"]
+    gaps += [problem for name in manifest.files for problem in _gaps(manifest, spec, name)]
     return [
         *manifest_checks(folder, manifest, progress),
-        listed_check("rows", f"each of {manifest.count} questions once", gaps),
+        listed_check("rows", f"each of {total} questions once", gaps),
     ]
 
 
-def _gaps(manifest: Manifest, name: str) -> Iterator[str]:
-    """Yield where the shards of a file do not follow each other."""
-    shards, following = manifest.shards_of(name), 0
-    spec = SplitSpec.from_json(manifest.spec)
+def _gaps(manifest: Manifest, spec: SplitSpec, name: str) -> Iterator[str]:
+    """Yield what is missing of the shards of a file."""
+    shards = manifest.shards_of(name)
+    names = {shard_name(name, number, len(shards)) for number in range(len(shards))}
     for shard in shards:
-        if shard.first != following or shard.rows != shard.items:
-            yield f"{shard.file} begins with question {shard.first}, not {following}"
-        following = shard.first + shard.items
+        if shard.file != name and shard.file not in names:
+            yield f"{shard.file} is not one of {len(shards)} shards"
     split = next(split for split in SPLITS if name in FILES[split])
-    expected = sum(count for _, count in groups(spec, split).values())
-    if following != expected:
-        yield f"{name} has {following} questions, not {expected}"
+    rows, expected = sum(shard.rows for shard in shards), getattr(spec, split)
+    if rows != expected:
+        yield f"{name} has {rows} questions, not {expected}"
 
 
 def _made_again(

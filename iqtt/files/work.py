@@ -1,99 +1,102 @@
-"""Blocks of questions: drawn, rendered and packed, all at the same time, here or by processes."""
+"""Questions drawn, rendered and packed, all at the same time; any process can do it."""
 
-from collections.abc import Generator, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from typing import Any
 
-from iqtt.files.writer import PackedQuestions, pack_questions
+import numpy as np
+from numpy.typing import NDArray
+
+from iqtt.files.layout import ID_BYTES, NO_CUBE
 from iqtt.questions.distractors import Pools
 from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import Rendered, groups, render_questions
-from scenegen.files.cluster import threads_of_worker
-from scenegen.files.table import packing_threads
-from scenegen.files.workers import in_processes, in_threads, processors
+from iqtt.shapes.polycube import canonical, canonical_class, set_ids
+from scenegen.files.plan import Block
+from scenegen.files.sets import Packed
+from scenegen.files.table import pack_rows, packing_threads
+from scenegen.files.workers import in_threads
 from scenegen.rendering.renderer import share_processors
 
 BLOCK = 128  # questions that a worker process makes in one go
 PACKED = 8  # questions that a thread packs in one go
-
-
-@dataclass(frozen=True)
-class Block:
-    """Some rows of a part of a split, which begins with question `first` and has `count`."""
-
-    split: str
-    part: str
-    first: int
-    count: int
-    rows: range
-
-
-def whole_parts(spec: SplitSpec, split: str) -> list[Block]:
-    """Return a block for each part of a split, also for one without questions."""
-    parts = groups(spec, split).items()
-    return [Block(split, part, first, count, range(count)) for part, (first, count) in parts]
+OF_QUESTION = (
+    *("world_from_shape", "light_count", "light_position", "light_color"),
+    *("angle_degrees", "camera_distance"),
+)
 
 
 @dataclass(frozen=True, eq=False)
-class Work:
-    """What is done to questions, here or in other processes.
+class QuestionsWork:
+    """What is done to questions; a `making.Work`.
 
     Attributes:
         spec, pools: what they show.
         batch: questions rendered at once.
-        workers: processes that render.
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
     """
 
     spec: SplitSpec
     pools: Pools
     batch: int
-    workers: int
     device: str
     compression: str
 
-    def questions(self, block: Block, tally: Tally) -> Generator[PackedQuestions]:
-        """Render questions in order, and meanwhile pack them in threads."""
+    @property
+    def block(self) -> int:
+        """Questions that a worker process makes in one go."""
+        return BLOCK
+
+    def rows(self, block: Block, workers: int) -> Generator[Packed, None, Tally]:
+        """Render questions in order, and meanwhile pack them in threads; return their tally."""
+        share_processors(workers, self.device)
+        split, part, tally = block.part.bundle, block.part.name, Tally()
+        first, count = groups(self.spec, split)[part]
         rendered = render_questions(
-            self.spec, self.pools, block.split, block.first, block.count,
-            rows=block.rows, batch=self.batch, device=self.device, tally=tally,
+            self.spec, self.pools, split, first, count,
+            rows=block.items, batch=self.batch, device=self.device, tally=tally,
         )  # fmt: skip
         pieces = (some[i : i + PACKED] for some in rendered for i in range(0, len(some), PACKED))
 
-        def packed(questions: list[Rendered]) -> PackedQuestions:
-            return pack_questions(self.spec, block.part, questions, self.compression)
+        def packed(questions: list[Rendered]) -> Packed:
+            values = {
+                "questions": [one.images for one in questions],
+                "answers": np.array([one.question.shapes.answer for one in questions], np.uint8),
+                **_truth(self.spec, questions),
+            }
+            sheets = block.part.sheets
+            return [pack_rows(values, sheet.columns, self.compression) for sheet in sheets]
 
         ahead = 2 * self.batch // PACKED
-        return in_threads(packed, pieces, packing_threads(self.workers), ahead)
+        yield from in_threads(packed, pieces, packing_threads(workers), ahead)
+        return tally
 
-    def in_order(self, blocks: Iterable[Block], tally: Tally) -> Generator[PackedQuestions]:
-        """Yield the questions of all blocks, made here or by processes."""
-        filled = (block for block in blocks if block.rows)
-        if self.workers == 1:
-            for block in filled:
-                yield from self.questions(block, tally)
-            return
-        small = (
-            replace(block, rows=block.rows[i : i + BLOCK])
-            for block in filled
-            for i in range(0, len(block.rows), BLOCK)
-        )
-        for questions, found in in_processes(self.block, small, self.workers):
-            tally.add(found)
-            yield from questions
 
-    def block(self, block: Block) -> tuple[list[PackedQuestions], Tally]:
-        """Return the questions of a block; to be called by a worker."""
-        self.prepare()
-        tally = Tally()
-        return list(self.questions(block, tally)), tally
+def _truth(spec: SplitSpec, rendered: Sequence[Rendered]) -> dict[str, Any]:
+    """Return the values of `truth_columns`, for each question."""
+    most, images = spec.cubes[1], 1 + spec.answers
+    cubes = np.full((len(rendered), images, most, 3), NO_CUBE, np.int8)
+    shape_ids, class_ids = np.zeros((2, len(rendered), images, ID_BYTES), np.uint8)
+    counts = np.array([one.question.shapes.cubes.shape[1] for one in rendered])
+    for count in np.unique(counts).tolist():
+        rows = np.flatnonzero(counts == count)
+        cubes[rows, :, :count] = [rendered[i].question.shapes.cubes for i in rows.tolist()]
+        flat = cubes[rows, :, :count].reshape(-1, count, 3)
+        for ids, form in ((shape_ids, canonical), (class_ids, canonical_class)):
+            ids[rows] = set_ids(form(flat)).view(np.uint8).reshape(-1, images, ID_BYTES)
+    questions = [one.question for one in rendered]
 
-    def prepare(self) -> None:
-        """Get a worker ready: it takes its share of the processors."""
-        share_processors(self.workers, self.device)
+    def each(name: str) -> NDArray[Any]:
+        return np.array([getattr(question, name) for question in questions])
 
-    def on_cluster(self) -> "Work":
-        """Return the same work for the worker of a cluster that calls this, and get it ready."""
-        work = replace(self, workers=max(1, processors() // threads_of_worker()))
-        work.prepare()
-        return work
+    return {
+        "cube_count": counts,
+        "cubes": cubes,
+        "shape_id": shape_ids,
+        "class_id": class_ids,
+        **{name: each(name) for name in OF_QUESTION},
+        "distractor_kind": np.array([question.shapes.kinds for question in questions]),
+        "visible_pixels": np.array([one.visible_pixels for one in rendered]),
+        "depth": [one.depth for one in rendered],
+    }

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from iqtt.files.layout import FORMAT
 from iqtt.files.reader import QuestionsFile, parts
-from iqtt.files.shards import ANSWERS, FILES, MANIFEST
+from iqtt.files.split import ANSWERS, FILES, MANIFEST
 from iqtt.questions.specs import SPLITS
 from iqtt.sharing.withheld import check_withheld
 from scenegen.common.errors import FileFormatError

@@ -7,7 +7,7 @@ from typing import Any
 
 from iqtt.files.layout import answer_column, question_columns, truth_columns
 from iqtt.files.reader import AnswersFile, QuestionsFile
-from iqtt.files.shards import MANIFEST
+from iqtt.files.split import MANIFEST
 from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec
 from iqtt.sharing.published import PublishedSplit, published_split
 from iqtt.sharing.texts import (

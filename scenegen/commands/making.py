@@ -205,7 +205,7 @@ def _told_how_to_go_on(out: str) -> Iterator[None]:
 @OVERWRITE
 def merge(file: str, out: str, overwrite: bool) -> None:
     """Make one file of rooms that were rendered to several."""
-    from scenegen.rooms.merge import merge_rooms
+    from scenegen.rooms.make import merge_rooms
     from scenegen.rooms.reader import RoomsFile
 
     with RoomsFile(file) as rooms:

@@ -3,7 +3,6 @@
 Lengths are in scene units (the room's edge), frames as in `camera.py`.
 """
 
-import hashlib
 import itertools
 import math
 from dataclasses import dataclass
@@ -148,25 +147,6 @@ class DatasetSpec:
     def from_json(cls, text: str) -> "DatasetSpec":
         """Read what `to_json` wrote. Raises SpecError on anything else."""
         return from_json(cls, text, "dataset spec")
-
-
-class Fingerprint:
-    """SHA-256 of a request and of every scene: equal if and only if the ground truth is.
-
-    It says nothing about storage (compression) or about the machine that rendered.
-    """
-
-    def __init__(self, spec: DatasetSpec) -> None:
-        self._digest = hashlib.sha256(spec.to_json().encode())
-
-    def add(self, scene_line: bytes) -> None:
-        """Add the next scene, as the UTF-8 of what `SceneSpec.to_json` returns."""
-        self._digest.update(b"\n" + scene_line)
-
-    @property
-    def hex(self) -> str:
-        """The fingerprint of what was added so far, 64 hex digits."""
-        return self._digest.hexdigest()
 
 
 def _check_limits(spec: DatasetSpec) -> None:

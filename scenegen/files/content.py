@@ -77,6 +77,14 @@ def joint_digest(digests: Mapping[str, str]) -> str:
     return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
+def fingerprint(request: str, digests: Mapping[str, str]) -> str:
+    """Return the SHA-256, as hex, of a request and of the data sets that say how it was answered.
+
+    It does not depend on how values are stored, or on the machine that rendered.
+    """
+    return joint_digest({"request": hashlib.sha256(request.encode()).hexdigest(), **digests})
+
+
 def seal(file: h5py.File) -> None:
     """Write `content_digest` to a file in which each data set has its attribute `sha256`."""
     file.attrs[CONTENT_DIGEST] = content_digest(file)

@@ -1,117 +1,215 @@
 """Make the files of a set, and go on where an earlier run was killed.
 
-Each file gets its name when it is complete, and holds the same bytes whoever makes it. A file that
-was completed but is not in the manifest, as the run was killed right then, is made again.
+Each piece is made by one call, here or on a worker of a cluster. A file gets its name when it is
+complete, and holds the same bytes whoever makes it. A file that was completed but is not in the
+manifest, because the run was killed right then, is made again.
 """
 
 import platform
 import time
-from collections.abc import Callable, Generator, Sequence
-from contextlib import closing, nullcontext, suppress
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing, contextmanager, nullcontext, suppress
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol
 
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
-from scenegen.files.content import CONTENT_DIGEST
+from scenegen.files.cluster import Cluster, threads_of_worker
 from scenegen.files.manifest import (
+    FileRecord,
     Manifest,
-    ShardRecord,
-    file_sha256,
     read_manifest,
-    shard_problem,
     write_manifest,
+    wrong_files,
 )
 from scenegen.files.new_file import check_writable
 from scenegen.files.places import check_store, is_remote, listing
+from scenegen.files.plan import Block, Piece, Plan
 from scenegen.files.run_lock import run_lock
-from scenegen.files.shards import opened, set_name
-from scenegen.files.workers import in_threads, processors
+from scenegen.files.sets import Packed, Progress, write_piece, write_views
+from scenegen.files.shards import set_name
+from scenegen.files.workers import in_order, processors
 from scenegen.files.workspace import remove_leftovers
 
 SHARE = 0.05  # of the time that writing manifests may take; that of 10,000 shards has 3 MB
+Note = Callable[[Any], Any]
 
 
-@dataclass(frozen=True)
-class Task:
-    """Files that one worker makes together: a shard, or a shard of questions and their answers.
+class Work(Protocol):
+    """What a task does for a set. It is pickled, so that any process can do it."""
 
-    Attributes:
-        names: of the files, without a folder.
-        first, items: number of their first item, and how many they have.
-    """
+    @property
+    def block(self) -> int:
+        """Items that a worker process makes in one go."""
 
-    names: tuple[str, ...]
-    first: int
-    items: int
+    def rows(self, block: Block, workers: int) -> Generator[Packed, None, Any]:
+        """Make the rows of a block, on one of `workers` equal shares of this machine.
 
-
-T = TypeVar("T", bound=Task)
+        What it returns at the end goes to `note` of `make_set`.
+        """
 
 
-def complete_set(
+def make_set(
     place: Path,
-    asked: Manifest,
-    tasks: Sequence[T],
-    make: Callable[[Manifest, Sequence[T]], Generator[list[ShardRecord]]],
-    join: Callable[[Manifest], None],
+    plan: Plan,
+    work: Work,
+    shard_size: int,
     *,
+    workers: int = 1,
+    cluster: Cluster | None = None,
     overwrite: bool = False,
-    confirm: Callable[[Sequence[T]], None] = lambda kept: None,
-    progress: Callable[[int], Any] = lambda done: None,
+    progress: Progress = lambda rows: None,
+    note: Note = lambda end: None,
 ) -> None:
     """Make the files of a set that earlier runs of the same request have not made.
 
-    Files that are there are kept if their checksums are right. With `overwrite` they are not.
+    Files that the manifest lists are kept if their checksums are right; with `overwrite` they are
+    not. A set of one whole file has no manifest when it is complete.
 
     Args:
         place: where the manifest is; the files lie beside it.
-        asked: the manifest of the request, without shards.
-        make: makes the files of tasks, and yields the records of each task when it is done. It gets
-            the manifest of the run that began the set, whose command all files tell.
-        join: writes the files that show shards as one.
-        confirm: is called with the tasks whose files are kept, and raises SpecError where these
-            answer another request in a way that the manifest does not tell.
-        progress: is called with the number of rows that are there already.
+        shard_size: most items of one file; more go to shards.
+        workers: processes of this machine that make rows.
+        cluster: whose workers make whole pieces instead.
+        progress: is called with the number of rows that are there since the last call.
 
-    Raises SpecError where what is there answers another request, SceneGenError while another run
-    makes this set, and OSError where something else has one of the names, or the disk refuses.
+    Raises SpecError where the files there answer another request, SceneGenError while another run
+    makes this set, FileExistsError where all files are there or others have their names, and
+    OSError as the disk does.
     """
+    pieces = [piece for bundle in plan.bundles for piece in bundle.pieces(shard_size)]
+    request = plan.manifest(shard_size)
     if is_remote(place):
         check_store(place)
+    elif cluster is not None:
+        place = place.absolute()  # workers are in other folders
+    if len(pieces) == 1 and cluster is None:  # after a kill there is nothing to go on with
+        _kept(place, request, pieces, overwrite)
+        list(_made_here(place.parent, pieces, plan, work, workers, overwrite, progress, note))
+        _remove(place, request.files if overwrite else (), keep=pieces[0].names)
+        return
     lock = place.with_name(f".{place.name}.lock")
-    with nullcontext() if is_remote(place) else run_lock(lock, place):  # stores have no locks
-        manifest = _begun(place, asked, tasks, overwrite)
-        rows = {record.file: record.rows for record in manifest.shards}
-        kept = [task for task in tasks if rows.keys() >= set(task.names)]
-        confirm(kept)
-        whole = all(place.with_name(name).exists() for name in asked.files)
-        if manifest.complete and len(kept) == len(tasks) and whole:
-            check_writable(place.with_name(asked.files[0]), overwrite=False)
-        manifest = replace(manifest, complete=False)
-        for task in kept:
-            progress(rows[task.names[0]])
-        records, due = list[ShardRecord](), 0.0
-        write_manifest(place, manifest)
-        missing = [task for task in tasks if not rows.keys() >= set(task.names)]
-        try:
-            with closing(make(manifest, missing)) as made:
-                for some in made:
-                    records += some
-                    begun = time.monotonic()
-                    if begun >= due:
-                        write_manifest(place, manifest.with_shards(records))
-                        due = time.monotonic() + (time.monotonic() - begun) / SHARE
-        finally:
-            manifest = manifest.with_shards(records)
-            write_manifest(place, manifest)
-        join(manifest)
-        write_manifest(place, replace(manifest, complete=True))
+    with nullcontext() if is_remote(place) else run_lock(lock, place):
+        ledger = _Ledger(place, request, _kept(place, request, pieces, overwrite))
+        missing = [piece for piece in pieces if not ledger.has(piece)]
+        if overwrite:
+            _remove(place, request.files)
+        if cluster is None:
+            made = _made_here(place.parent, missing, plan, work, workers, True, progress, note)
+        else:
+            call = partial(_made_on_worker, place, request, missing, plan, work)
+            made = _noted(cluster.in_any_order(call, range(len(missing))), progress, note)
+        with ledger.kept(), closing(made):
+            progress(sum(ledger.rows(piece) for piece in pieces))
+            for records in made:
+                ledger.add(records)
+        for bundle in plan.bundles:
+            shards = [piece for piece in pieces if piece.is_shard and piece.bundle is bundle]
+            if shards:
+                write_views(place.parent, shards, ledger.records, plan.compression)
+        ledger.save(complete=True)
+        if len(pieces) == 1:
+            place.unlink()
         if not is_remote(place):
             remove_leftovers(place.parent)  # of workers that were killed
 
 
-def check_shared(place: Path, asked: Manifest) -> None:
+class _Ledger:
+    """The manifest of a run, which is written as files are completed.
+
+    Attributes:
+        records: of the complete files, by name.
+    """
+
+    def __init__(self, place: Path, request: Manifest, records: Sequence[FileRecord]) -> None:
+        self._place, self._request, self._due = place, request, 0.0
+        self.records = {record.file: record for record in records}
+
+    def has(self, piece: Piece) -> bool:
+        """Return whether all files of a piece are complete."""
+        return self.records.keys() >= set(piece.names)
+
+    def rows(self, piece: Piece) -> int:
+        """Return the number of rows of a piece that is complete, else 0."""
+        return self.records[piece.names[0]].rows if self.has(piece) else 0
+
+    def add(self, records: Sequence[FileRecord]) -> None:
+        """Take the records of files that are complete now."""
+        self.records.update({record.file: record for record in records})
+        begun = time.monotonic()
+        if begun >= self._due:
+            self.save()
+            self._due = time.monotonic() + (time.monotonic() - begun) / SHARE
+
+    def save(self, complete: bool = False) -> None:
+        """Write the manifest."""
+        shards = tuple(self.records[name] for name in sorted(self.records))
+        write_manifest(self._place, replace(self._request, complete=complete, shards=shards))
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Write the manifest, and again at the end of the block; it goes if no file is complete.
+
+        A file may have got its name just before its record is added.
+        """
+        self.save()
+        try:
+            yield
+        finally:
+            if self.records or _files(self._place.parent, self._request.files):
+                self.save()
+            else:
+                self._place.unlink(missing_ok=True)
+
+
+def _made_here(
+    folder: Path,
+    pieces: Sequence[Piece],
+    plan: Plan,
+    work: Work,
+    workers: int,
+    overwrite: bool,
+    progress: Progress,
+    note: Note,
+) -> Generator[list[FileRecord]]:
+    """Make pieces one after the other, with rows from this process or from worker processes."""
+    blocks = (block for piece in pieces for block in piece.blocks if block.items)
+    if workers > 1:
+        blocks = (part for block in blocks for part in block.cut(work.block))
+    make = partial(work.rows, workers=workers)
+    with closing(in_order(make, blocks, workers, note)) as rows:
+        for piece in pieces:
+            yield write_piece(folder, piece, rows, plan.compression, overwrite, progress)
+        next(rows, None)  # there are none; so worker processes end by themselves
+
+
+def _made_on_worker(
+    place: Path, request: Manifest, pieces: Sequence[Piece], plan: Plan, work: Work, number: int
+) -> tuple[list[FileRecord], list[Any]]:
+    """Make one of the pieces; to be called by a worker of a cluster."""
+    check_shared(place, request)
+    ends: list[Any] = []
+    share = max(1, processors() // threads_of_worker())
+    blocks = [block for block in pieces[number].blocks if block.items]
+    with closing(in_order(partial(work.rows, workers=share), blocks, 1, ends.append)) as rows:
+        records = write_piece(place.parent, pieces[number], rows, plan.compression)
+        next(rows, None)
+    return records, ends
+
+
+def _noted(
+    made: Generator[tuple[list[FileRecord], list[Any]]], progress: Progress, note: Note
+) -> Generator[list[FileRecord]]:
+    with closing(made):
+        for records, ends in made:
+            for end in ends:
+                note(end)
+            progress(records[0].rows)
+            yield records
+
+
+def check_shared(place: Path, request: Manifest) -> None:
     """Raise SceneGenError on a worker that does not see the manifest of the set that it works on.
 
     Another folder may have the same name there, or another run may have begun meanwhile.
@@ -119,82 +217,73 @@ def check_shared(place: Path, asked: Manifest) -> None:
     worker = f"the worker on {platform.node()}"
     if not place.exists():
         expected = "a folder that all workers see, or a URL such as s3://bucket/rooms.h5"
-        raise SceneGenError(worker, f"no {place}", expected)
-    differences = read_manifest(place).differences(asked)
+        raise SceneGenError(f"{worker} does not see {place}", expected=expected)
+    differences = read_manifest(place).differences(request)
     if differences:
-        found = f"{place} of another run ({'; '.join(differences)})"
-        raise SceneGenError(worker, found, "a folder that all workers share, and one run in it")
+        where = f"{worker} sees {place} of another run"
+        expected = "a folder that all workers share, and one run in it"
+        raise SceneGenError(where, "; ".join(differences), expected)
 
 
-def remove_set(place: Path, file: str) -> None:
-    """Remove what is left of the set that one whole file has just replaced."""
-    place.unlink(missing_ok=True)
-    for path in listing(place.parent):
-        if set_name(path.name) == file:
-            path.unlink(missing_ok=True)
+def _kept(
+    place: Path, request: Manifest, pieces: Sequence[Piece], overwrite: bool
+) -> list[FileRecord]:
+    """Return the records of files that earlier runs of the request completed, and that are right.
 
-
-def refuse_other_set(place: Path, files: Sequence[str]) -> None:
-    """Raise SpecError where a manifest has the name of ours, but is that of other files."""
-    if not place.exists():
-        return
-    with suppress(FileFormatError):  # a damaged one
-        found = read_manifest(place)
-        if set(found.files) != set(files):
-            told, expected = ", ".join(found.files), f"that of {', '.join(files)}"
-            raise SpecError(place, f"a manifest of {told}", expected, "choose another name")
-
-
-def _begun(place: Path, asked: Manifest, tasks: Sequence[Task], overwrite: bool) -> Manifest:
-    """Return the manifest of what is there already, without files that cannot be kept.
-
-    Raises as `complete_set`.
+    Raises as `make_set`.
     """
-    names = {name for task in tasks for name in task.names}
-    begun = place.exists()
-    if overwrite and begun:
-        refuse_other_set(place, asked.files)
-    if overwrite or not begun:
-        taken = [one for one in listing(place.parent) if one.name in names.union(asked.files)]
-        for one in taken:
-            check_writable(one, overwrite)
+    names = {name for piece in pieces for name in piece.names}
+    older = _older(place, request, overwrite)
+    differences = older.differences(request) if older else []
+    if older and not overwrite and not differences:
+        records = [record for record in older.shards if record.file in names]
+        wrong = wrong_files(place.parent, records)
+        whole = older.complete and not wrong and len(records) == len(names)
+        if whole and all(place.with_name(name).exists() for name in request.files):
+            check_writable(place.with_name(request.files[0]), overwrite=False)
+        return [record for record in records if record.file not in wrong]
+    if older and not overwrite and older.shards:
+        hint = "repeat its options to go on, or start anew with --overwrite"
+        where, expected = f"{place} is of another request", "the same options"
+        raise SpecError(where, "; ".join(differences), expected, hint)
+    for path in _files(place.parent, request.files):
+        check_writable(path, overwrite)
+    return []
+
+
+def _older(place: Path, request: Manifest, overwrite: bool) -> Manifest | None:
+    """Return the manifest that is there, if any.
+
+    Raises SpecError where it is that of other files, and FileFormatError unless it is replaced.
+    """
+    try:
+        if not place.exists():
+            return None
+    except OSError:  # the name is too long; then there is no manifest
+        return None
+    try:
+        older = read_manifest(place)
+    except FileFormatError:
         if overwrite:
-            _remove(place, asked)
-        return asked
-    found = read_manifest(place)
-    differences = found.differences(asked)
-    if differences:
-        raise other_request(place, "; ".join(differences))
-    records = [record for record in found.shards if record.file in names]
-
-    def problem(record: ShardRecord) -> str | None:
-        return shard_problem(place.parent, record)
-
-    problems = list(in_threads(problem, records, processors(), 2 * processors()))
-    kept = tuple(one for one, wrong in zip(records, problems, strict=True) if wrong is None)
-    return replace(found, shards=kept)
+            return None
+        raise
+    if set(older.files) != set(request.files):
+        where = f"{place} is the manifest of {', '.join(older.files)}"
+        raise SpecError(where, hint=f"choose another name than {request.files[0]}")
+    return older
 
 
-def other_request(where: object, found: str) -> SpecError:
-    """Return the error for files that answer another request."""
-    hint = "repeat its options to go on, or start anew with --overwrite"
-    return SpecError(where, found, "the same request as that of the run that began it", hint)
-
-
-def _remove(place: Path, asked: Manifest) -> None:
+def _remove(place: Path, files: Sequence[str], keep: Sequence[str] = ()) -> None:
     """Remove a set: the files that show it first, then its manifest, and its shards last."""
-    for name in asked.files:
+    for name in set(files).difference(keep):
         place.with_name(name).unlink(missing_ok=True)
-    place.unlink(missing_ok=True)
-    for path in listing(place.parent):
-        if set_name(path.name) in asked.files:
+    with suppress(OSError):  # a name that is too long
+        place.unlink(missing_ok=True)
+    for path in _files(place.parent, files) if files else ():
+        if path.name not in keep:
             path.unlink(missing_ok=True)
 
 
-def record_file(file: Path, task: Task, rows: int, started: float) -> ShardRecord:
-    """Return the record of a file that is complete; `started` is a time of `time.monotonic`."""
-    with opened(file) as content:
-        digest = str(content.attrs[CONTENT_DIGEST])
-    seconds = round(time.monotonic() - started, 3)
-    size, checksum = file.stat().st_size, file_sha256(file)
-    return ShardRecord(file.name, task.first, task.items, rows, size, checksum, digest, seconds)
+def _files(folder: Path, names: Sequence[str]) -> list[Path]:
+    """Return which files of these names are in a folder, and which shards of theirs."""
+    return [path for path in listing(folder) if {path.name, set_name(path.name)} & set(names)]

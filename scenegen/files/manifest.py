@@ -1,4 +1,4 @@
-"""The manifest of a set: what was asked for, and which of its files are complete.
+"""The manifest of a set: the request that it answers, and which of its files are complete.
 
 It is JSON beside the files, such as `rooms.manifest.json`, written anew as they are completed. So a
 run that was killed can go on, and anyone can check the files by their SHA-256.
@@ -8,7 +8,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,32 +20,27 @@ from scenegen.files.shards import set_name
 from scenegen.files.workers import in_threads, processors
 
 ENDING = ".manifest.json"
-FORMAT = "pix2shape-bench manifest 2"
+FORMAT = "pix2shape-bench manifest 1"
 MOST_BYTES = 20_000_000  # of 20,000 files with long names; read whole
 
 
 @dataclass(frozen=True)
-class ShardRecord:
-    """A complete file: a shard, or a whole file of a set that has several.
+class FileRecord:
+    """A complete file with rows: a shard, or a whole file of a set that has several.
 
     Attributes:
         file: its name, without a folder.
-        first, items: number of its first item, and how many it has.
         rows: the number of its rows.
         bytes: its size.
         sha256: of the whole file.
         content_digest: its attribute of that name.
-        seconds: that it took to make.
     """
 
     file: str
-    first: int
-    items: int
     rows: int
     bytes: int
     sha256: str
     content_digest: str
-    seconds: float
 
     def __post_init__(self) -> None:
         _check_name(self.file)
@@ -62,9 +57,8 @@ class Manifest:
         spec: the request, as JSON.
         count, shard_size: numbers of items, in all and of a shard.
         settings: what else the bytes depend on: compression, variant, versions.
-        command: that made it; empty where it must not be told.
         complete: whether all files are there.
-        shards: the files with values that are complete, by their names.
+        shards: the files with rows that are complete, by their names.
     """
 
     format: str
@@ -74,9 +68,8 @@ class Manifest:
     count: int
     shard_size: int
     settings: tuple[tuple[str, str], ...]
-    command: str
-    complete: bool
-    shards: tuple[ShardRecord, ...]
+    complete: bool = False
+    shards: tuple[FileRecord, ...] = ()
 
     def __post_init__(self) -> None:
         check(len(self.files) > 0, "files", "none", "at least one")
@@ -91,27 +84,22 @@ class Manifest:
         check(self.shard_size > 0, "shard_size", self.shard_size, "at least 1")
 
     def differences(self, other: "Manifest") -> list[str]:
-        """Return what makes the bytes of another set other ones: `name here, name there`."""
+        """Return what makes the bytes of another set other ones: `name here, not there`."""
         ours, theirs = self._request(), other._request()
-        names = sorted(ours.keys() | theirs.keys())
         return [
-            f"{n} {ours.get(n)}, not {theirs.get(n)}" for n in names if ours.get(n) != theirs.get(n)
+            f"{name} {ours.get(name)}, not {theirs.get(name)}"
+            for name in sorted(ours.keys() | theirs.keys())
+            if ours.get(name) != theirs.get(name)
         ]
 
     def _request(self) -> dict[str, Any]:
-        spec = json.loads(self.spec)
         names = {"files": ", ".join(self.files), "kind": self.kind}
         numbers = {"n": self.count, "shard-size": self.shard_size}
-        return {**spec, **dict(self.settings), **names, **numbers}
+        return {**json.loads(self.spec), **dict(self.settings), **names, **numbers}
 
-    def with_shards(self, shards: Iterable[ShardRecord]) -> "Manifest":
-        """Return the manifest with more shards."""
-        known = {one.file: one for one in (*self.shards, *shards)}
-        return replace(self, shards=tuple(known[name] for name in sorted(known)))
-
-    def shards_of(self, file: str) -> list[ShardRecord]:
+    def shards_of(self, file: str) -> list[FileRecord]:
         """Return the complete shards of one of `files`, in order; itself if it has none."""
-        return [one for one in self.shards if file in (one.file, set_name(one.file))]
+        return [shard for shard in self.shards if file in (shard.file, set_name(shard.file))]
 
 
 def _check_name(name: str) -> None:
@@ -134,8 +122,8 @@ def write_manifest(place: Path, manifest: Manifest) -> None:
 def read_manifest(place: Path) -> Manifest:
     """Read a manifest. Raises FileFormatError where it is not one, and OSError."""
     if not place.is_file():
-        found = "no file" if not place.exists() else "something that is no regular file"
-        raise FileFormatError(place, found, "a manifest")
+        problem = "is no regular file" if place.exists() else "no such file"
+        raise FileFormatError(f"{place}: {problem}", expected="a manifest")
     with place.open("rb") as file:
         data = file.read(MOST_BYTES + 1)
     try:
@@ -152,10 +140,11 @@ def manifests_in(folder: Path, kind: str) -> list[tuple[Path, Manifest]]:
 
     Raises FileFormatError where there is none, and as `read_manifest`.
     """
-    found = [(place, read_manifest(place)) for place in sorted(folder.glob(f"*{ENDING}"))]
-    chosen = [(place, one) for place, one in found if one.kind == kind]
+    places = sorted(folder.glob(f"*{ENDING}"))
+    manifests = [(place, read_manifest(place)) for place in places]
+    chosen = [(place, manifest) for place, manifest in manifests if manifest.kind == kind]
     if not chosen:
-        others = ", ".join(f"{place.name} of {one.kind}" for place, one in found)
+        others = ", ".join(f"{place.name} of {manifest.kind}" for place, manifest in manifests)
         expected = f"one that ends in {ENDING}, as of a set of {kind}"
         where = f"{folder}: is a folder"
         raise FileFormatError(where, others or "no manifest", expected, "name a file")
@@ -168,32 +157,30 @@ def file_sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def shard_problem(folder: Path, shard: ShardRecord) -> str | None:
-    """Return what is wrong with the file of a shard; None if it is as it was made."""
-    path = folder / shard.file
-    if not path.is_file():
-        return "is missing"
-    if path.stat().st_size != shard.bytes:
-        return f"has {path.stat().st_size} bytes, not {shard.bytes}"
-    if file_sha256(path) != shard.sha256:
-        return "has another SHA-256 than the manifest tells"
-    return None
-
-
 def wrong_files(
-    folder: Path, manifest: Manifest, progress: Callable[[int], Any] = lambda done: None
-) -> list[str]:
-    """Return what is wrong with the files of a manifest, checked by all processors.
+    folder: Path, records: Iterable[FileRecord], progress: Callable[[int], Any] = lambda rows: None
+) -> dict[str, str]:
+    """Return what is wrong with files, by their names; all processors read them.
 
     `progress` is called with the number of rows of each file that was read. Raises OSError.
     """
 
-    def problem(record: ShardRecord) -> tuple[ShardRecord, str | None]:
-        return record, shard_problem(folder, record)
+    def checked(record: FileRecord) -> tuple[FileRecord, str | None]:
+        return record, _problem(folder / record.file, record)
 
-    wrong = []
-    for record, found in in_threads(problem, manifest.shards, processors(), 2 * processors()):
-        if found:
-            wrong.append(f"{record.file} {found}")
+    wrong = {}
+    for record, problem in in_threads(checked, records, processors(), 2 * processors()):
+        if problem is not None:
+            wrong[record.file] = problem
         progress(record.rows)
     return wrong
+
+
+def _problem(path: Path, record: FileRecord) -> str | None:
+    if not path.is_file():
+        return "is missing"
+    if path.stat().st_size != record.bytes:
+        return f"has {path.stat().st_size} bytes, not {record.bytes}"
+    if file_sha256(path) != record.sha256:
+        return "has another SHA-256 than the manifest says"
+    return None

@@ -17,19 +17,25 @@ CLOSING_SLACK = 8192  # bytes that HDF5 may need to close a file beyond what it 
 @contextmanager
 def new_file(path: str | Path, overwrite: bool = False) -> Iterator[h5py.File]:
     """Open a new HDF5 file, which gets its name when the block ends well, as `written_beside`."""
-    with written_beside(path, overwrite) as temporary:
-        file = h5py.File(temporary, "w", rdcc_nbytes=0)  # without a cache of unwritten chunks
-        try:
-            yield file
-            _check_room_to_close(file, temporary)
+    with written_beside(path, overwrite) as temporary, new_hdf5(temporary) as file:
+        yield file
+
+
+@contextmanager
+def new_hdf5(path: Path) -> Iterator[h5py.File]:
+    """Open a new HDF5 file; on any error it is emptied, as nobody is to read it."""
+    file = h5py.File(path, "w", rdcc_nbytes=0)  # without a cache of unwritten chunks
+    try:
+        yield file
+        _check_room_to_close(file, path)
+        file.close()
+    except BaseException:
+        # Where the disk is full, an empty file makes room for HDF5 to close it. A file that it
+        # cannot close would crash the process at exit.
+        os.truncate(path, 0)
+        with suppress(Exception):
             file.close()
-        except BaseException:
-            # The file is lost. Where the disk is full, emptying the file first makes room for HDF5
-            # to close it; a file that it cannot close would crash the process at exit.
-            os.truncate(temporary, 0)
-            with suppress(Exception):
-                file.close()
-            raise
+        raise
 
 
 def _check_room_to_close(file: h5py.File, path: Path) -> None:

@@ -13,7 +13,7 @@ import glob
 import json
 import re
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from itertools import accumulate
@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError
-from scenegen.files.content import CONTENT_DIGEST, SHA256, dataset_digest
+from scenegen.files.content import CONTENT_DIGEST
 from scenegen.files.input_file import (
     StoredArray,
     checking,
@@ -78,20 +78,6 @@ def set_name(name: str) -> str | None:
 def cut(count: int, size: int) -> list[range]:
     """Return the items of each shard: `size` of them, and the rest in the last."""
     return [range(first, min(first + size, count)) for first in range(0, count, size)]
-
-
-def write_row_digests(group: h5py.Group, digests: Mapping[str, bytes]) -> None:
-    """Write the digests of all rows, 32 bytes each in their order, by name of the data set.
-
-    Names are as seen from `group`, the root of a shard.
-    """
-    names = sorted(digests)
-    rows = [np.frombuffer(digests[name], np.uint8).reshape(-1, 32) for name in names]
-    values = np.stack(rows, axis=1)
-    dataset = group.create_dataset(ROW_DIGESTS, data=values)
-    dataset.attrs["names"] = names
-    dataset.attrs["meaning"] = "SHA-256 of each row of each data set, as `sha256` is made of them"
-    dataset.attrs[SHA256] = dataset_digest(values)
 
 
 @contextmanager

@@ -71,11 +71,14 @@ def manifest_checks(
 
     `progress` is called with the number of rows of each file that was read. Raises OSError.
     """
+    checked = f"SHA-256 of {len(manifest.shards)} files"
     missing = [] if manifest.complete else ["the set is not complete"]
-    wrong = wrong_files(folder, manifest, progress)
+    wrong = wrong_files(folder, manifest.shards, progress)
     return [
         listed_check("manifest", "every file is complete", missing),
-        listed_check("checksums", f"SHA-256 of {len(manifest.shards)} files", wrong),
+        listed_check(
+            "checksums", checked, [f"{file} {problem}" for file, problem in wrong.items()]
+        ),
     ]
 
 

@@ -1,28 +1,38 @@
-"""Render a data set to a file of rooms, or to a set of shards that can be read as one file."""
+"""Make files of rooms: render a data set to one file or to shards, or merge shards to one file."""
 
-from collections.abc import Callable
-from contextlib import closing, suppress
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from scenegen.common.records import check
 from scenegen.description.specs import DatasetSpec
 from scenegen.files.cluster import Cluster
-from scenegen.files.making import refuse_other_set, remove_set
+from scenegen.files.making import make_set
 from scenegen.files.manifest import manifest_path
 from scenegen.files.new_file import check_writable
-from scenegen.files.places import as_place, check_store, is_remote
-from scenegen.files.shards import MOST_SHARDS
+from scenegen.files.places import as_place
+from scenegen.files.plan import Bundle, Mark, Part, Plan, Sheet
+from scenegen.files.row_file import writer_name
+from scenegen.files.sets import merge_file
+from scenegen.layout import (
+    CONVENTIONS,
+    FORMAT,
+    FORMAT_NAME,
+    FORMAT_VERSION,
+    SCORED,
+    TRUTH_DIGEST,
+    columns,
+)
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.families.store import MEMBER_STORE
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.renderer import useful_workers
-from scenegen.rooms.render import Work
-from scenegen.rooms.shards import make_shards
-from scenegen.rooms.writer import MAX_COUNT, create_rooms
+from scenegen.rooms.reader import RoomsFile
+from scenegen.rooms.render import RoomsWork
 
 DEFAULT_BATCH = 64
 MAX_BATCH = 4096
+MAX_COUNT = 100_000_000  # scenes
 MAX_RAYS = 2**28  # pixels of one batch; they take 8 GiB
 MAX_WORKERS = 256
 SHARD_SIZE = 10_000  # scenes
@@ -54,8 +64,7 @@ def make_dataset(
             change no byte either. More than one need a script whose own work is inside
             `if __name__ == "__main__":`, and `objects` that can be pickled.
         shard_size: if there are more scenes, they go to shards of so many beside `path`, which then
-            shows all of them as one (`shards.make_shards`). The same call goes on where an earlier
-            one was killed.
+            shows all of them as one. The same call goes on where an earlier one was killed.
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
         command: stored as the file's creation command.
         objects: what the scenes are made of; None for `objects_of(spec)`.
@@ -64,52 +73,72 @@ def make_dataset(
         progress: called now and then with the number of rows written since the last call.
 
     Raises SpecError for a setting out of range, BackendError where the device cannot render here,
-    PlacementError where no scene meets the request, and OSError where the disk refuses.
+    PlacementError where no scene meets the request, and others as `making.make_set`.
     """
     check(1 <= batch <= MAX_BATCH, "batch", batch, f"from 1 to {MAX_BATCH}")
     check(0 <= workers <= MAX_WORKERS, "workers", workers, f"from 0 to {MAX_WORKERS}")
-    most = MAX_RAYS // (spec.height * spec.width)
-    found = f"{batch}, with {len(spec.views)} views of a scene"
-    enough = max(batch, len(spec.views)) <= most
-    check(enough, "batch", found, f"at most {most} images of this size")
-    least = max(1, -(-count // MOST_SHARDS))
-    check(1 <= count <= MAX_COUNT, "n", count, f"from 1 to {MAX_COUNT:,} scenes")
-    check(least <= shard_size, "shard-size", shard_size, f"at least {least} for so many scenes")
+    most, views = MAX_RAYS // (spec.height * spec.width), len(spec.views)
+    batch_text = f"{batch}, with {views} views of a scene"
+    check(max(batch, views) <= most, "batch", batch_text, f"at most {most} images of this size")
+    check(1 <= count <= MAX_COUNT // views, "n", count, f"from 1 to {MAX_COUNT // views:,} scenes")
     variant = select_variant(device)
     objects = objects or objects_of(spec)
-    workers = workers or useful_workers(count * len(spec.views), variant)
-    attributes = {"creation_command": command, "variant": variant, **versions()}
-    work = Work(spec, batch, workers, device, objects, compression, MEMBER_STORE.folder)
     place = as_place(path)
-    if count > shard_size or cluster:
-        make_shards(
-            place, work, count, shard_size, attributes,
-            cluster=cluster, overwrite=overwrite, progress=progress,
-        )  # fmt: skip
-        return
-    if is_remote(place):
-        check_store(place)
-    check_writable(place, overwrite)
-    manifest, begun = manifest_path(place), False
-    with suppress(OSError):  # a name that is too long; then there is no set
-        begun = manifest.exists()
-    if begun and overwrite:
-        refuse_other_set(manifest, (place.name,))
-    elif begun:
-        check_writable(manifest, overwrite=False)
-    with (
-        create_rooms(
-            place,
-            work.spec,
-            count,
-            compression=work.compression,
-            overwrite=overwrite,
-            attributes=attributes,
-        ) as writer,
-        closing(work.in_order([range(count)])) as made,
-    ):
-        for rows in made:
-            writer.extend(rows)
-            progress(rows.count)
-    if begun:
-        remove_set(manifest, place.name)
+    check_writable(place, overwrite=True)
+    renderer = {"variant": variant, **versions()}
+    plan = rooms_plan(place.name, spec, count, renderer, compression, command)
+    work = RoomsWork(spec, batch, device, objects, compression, MEMBER_STORE.folder)
+    make_set(
+        manifest_path(place), plan, work, shard_size,
+        workers=workers or useful_workers(count * views, variant),
+        cluster=cluster, overwrite=overwrite, progress=progress, note=objects.problems.update,
+    )  # fmt: skip
+
+
+def rooms_plan(
+    name: str,
+    spec: DatasetSpec,
+    count: int,
+    renderer: Mapping[str, str],
+    compression: str,
+    command: str,
+) -> Plan:
+    """Return what a file of rooms holds, or a set of shards that it shows.
+
+    Args:
+        renderer: Mitsuba's variant, and the versions that `rendering.backend.versions` gives.
+    """
+    attributes = {
+        "format": FORMAT_NAME,
+        "format_version": FORMAT_VERSION,
+        "writer": writer_name(),
+        "spec": spec.to_json(),
+        "conventions": CONVENTIONS,
+        "creation_command": command,
+        **renderer,
+    }
+    marks = (Mark("fingerprint", ["scene"], request=spec.to_json()), Mark(TRUTH_DIGEST, SCORED))
+    settings = {"format_version": FORMAT_VERSION, "writer": writer_name(), **renderer}
+    bundle = Bundle({name: attributes}, [rooms_part(spec, count, marks)])
+    return Plan(FORMAT_NAME, spec.to_json(), settings, compression, [bundle])
+
+
+def rooms_part(spec: DatasetSpec, count: int, marks: tuple[Mark, ...] = ()) -> Part:
+    """Return the rows of so many scenes."""
+    return Part("", "", count, [Sheet(columns(spec))], marks, len(spec.views))
+
+
+def merge_rooms(
+    path: str | Path,
+    out: str | Path,
+    overwrite: bool = False,
+    progress: Callable[[int], Any] = lambda done: None,
+) -> None:
+    """Write the rows of a file of rooms, or of a set of shards, to one file.
+
+    Raises as `RoomsFile` and `sets.merge_file`.
+    """
+    with RoomsFile(path) as rooms:
+        part = rooms_part(rooms.spec, len(rooms) // len(rooms.spec.views))
+        compression = rooms.compression()
+        merge_file(Path(path), out, FORMAT.kind, [part], compression, overwrite, progress)

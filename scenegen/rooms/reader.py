@@ -66,7 +66,7 @@ class RoomsFile(RowFile):
 
     Attributes, besides those of `RowFile`:
         spec: the request that it answers.
-        fingerprint: SHA-256 of request and scenes (`specs.Fingerprint`).
+        fingerprint: SHA-256 of request and scenes (`content.fingerprint`).
     """
 
     SCORED = SCORED

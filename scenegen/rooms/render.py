@@ -4,8 +4,8 @@ Each worker process takes its own block of scenes through all of these steps. Me
 with the number of scenes.
 """
 
-from collections.abc import Callable, Generator, Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +14,17 @@ from numpy.typing import NDArray
 
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec
-from scenegen.files.cluster import threads_of_worker
-from scenegen.files.table import PackedRows, packing_threads
-from scenegen.files.workers import in_processes, in_threads, processors
+from scenegen.files.plan import Block
+from scenegen.files.sets import Packed
+from scenegen.files.table import packing_threads
+from scenegen.files.workers import in_threads
 from scenegen.layout import columns
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.families.store import MEMBER_STORE
 from scenegen.rendering.ground_truth import GroundTruth, visible_pixels
 from scenegen.rendering.packing import SceneBatch, pack_arrays
 from scenegen.rendering.renderer import launch, share_processors
-from scenegen.rooms.writer import RenderedScene, pack_rooms
+from scenegen.rooms.pack import RenderedScene, pack_rooms
 from scenegen.sampling.proposals import ProposalQueue
 
 Array = NDArray[Any]
@@ -35,71 +36,48 @@ _Begun = tuple[SceneArrays, SceneBatch, Callable[[], GroundTruth]]  # a batch be
 
 
 @dataclass(frozen=True, eq=False)
-class Work:
-    """What is done to scenes, here or in other processes.
+class RoomsWork:
+    """What is done to scenes, here or in other processes; a `making.Work`.
 
     Attributes:
         spec, objects: what they show.
         batch: images rendered at once.
-        workers: processes that render.
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
         cache_dir: where members of families are kept.
     """
 
     spec: DatasetSpec
     batch: int
-    workers: int
     device: str
     objects: Objects
     compression: str
     cache_dir: Path | None
 
-    def rows(self, indices: range) -> Generator[PackedRows]:
-        """Render scenes in order, and meanwhile pack their rows in threads."""
+    @property
+    def block(self) -> int:
+        """Scenes that a worker process makes in one go."""
+        return max(1, BLOCK // len(self.spec.views))
+
+    def rows(self, block: Block, workers: int) -> Generator[Packed, None, dict[str, str]]:
+        """Render scenes in order, and meanwhile pack their rows in threads.
+
+        Returns why models were refused, by name.
+        """
+        MEMBER_STORE.use(self.cache_dir)
+        share_processors(workers, self.device)
         fields = columns(self.spec)
-        pieces = (
+        groups = (
             items[first : first + PACKED]
-            for items in render_items(self.spec, indices, self.batch, self.device, self.objects)
+            for items in render_items(self.spec, block.items, self.batch, self.device, self.objects)
             for first in range(0, len(items), PACKED)
         )
 
-        def packed(rooms: list[RenderedScene]) -> PackedRows:
-            return pack_rooms(rooms, fields, self.compression)
+        def packed(rooms: list[RenderedScene]) -> Packed:
+            return [pack_rooms(rooms, fields, self.compression)]
 
         ahead = 2 * self.batch // PACKED
-        return in_threads(packed, pieces, packing_threads(self.workers), ahead)
-
-    def in_order(self, ranges: Iterable[range]) -> Generator[PackedRows]:
-        """Yield the rows of all scenes of these ranges, made here or by processes."""
-        if self.workers == 1:
-            for indices in ranges:
-                yield from self.rows(indices)
-            return
-        step = max(1, BLOCK // len(self.spec.views))
-        blocks = (
-            range(i, min(i + step, indices.stop))
-            for indices in ranges
-            for i in range(indices.start, indices.stop, step)
-        )
-        for rows, problems in in_processes(self.block, blocks, self.workers):
-            self.objects.problems.update(problems)
-            yield from rows
-
-    def block(self, indices: range) -> tuple[list[PackedRows], dict[str, str]]:
-        """Return the rows of scenes, and why models were refused; to be called by a worker."""
-        self.prepare()
-        return list(self.rows(indices)), self.objects.problems
-
-    def prepare(self) -> None:
-        """Get a worker ready: it takes its share of the processors, and the cache."""
-        MEMBER_STORE.use(self.cache_dir)
-        share_processors(self.workers, self.device)
-
-    def on_cluster(self) -> "Work":
-        """Return the same work for the worker of a cluster that calls this, and get it ready."""
-        work = replace(self, workers=max(1, processors() // threads_of_worker()))
-        work.prepare()
-        return work
+        yield from in_threads(packed, groups, packing_threads(workers), ahead)
+        return self.objects.problems
 
 
 def render_items(

@@ -19,8 +19,8 @@ from scenegen.objects.catalogue import Objects, changed_meshes
 from scenegen.rendering.ground_truth import visible_pixels
 from scenegen.rendering.packing import SceneBatch, pack
 from scenegen.rendering.shading import shade
+from scenegen.rooms.pack import described
 from scenegen.rooms.reader import Room, RoomsFile
-from scenegen.rooms.writer import described
 
 Array = NDArray[Any]
 UNIT_TOLERANCE = 1e-5  # by which the length of a normal may differ from 1

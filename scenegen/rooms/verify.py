@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.scenes import SceneSpec
-from scenegen.description.specs import DatasetSpec, Fingerprint
+from scenegen.description.specs import DatasetSpec
+from scenegen.files.content import fingerprint
 from scenegen.files.manifest import Manifest
 from scenegen.files.rows import RowBlock
 from scenegen.files.verify import (
@@ -74,24 +75,23 @@ def verify_file(
     Raises SpecError where the file shows meshes and `objects` are not given, FileFormatError where
     its attributes cannot be read, and BackendError where the device cannot render here.
     """
-    objects, fingerprint = objects or objects_of(rooms.spec), Fingerprint(rooms.spec)
+    made_of = objects or objects_of(rooms.spec)
 
     def look(block: RowBlock, row: int) -> Iterable[tuple[str, str]]:
-        if block.read("view_index", row) == 0:
-            fingerprint.add(block.read("scene", row))
-        return row_problems(rooms, block, row, objects)
+        return row_problems(rooms, block, row, made_of)
 
     step = max(1, BLOCK_PIXELS // (rooms.spec.height * rooms.spec.width))
     digests, broken = read_all(rooms, step, look, progress)
     rules = row_rules(rooms.spec)
-    same = fingerprint.hex == rooms.fingerprint
+    scenes = {"scene": digests.get("scene", "")}
+    same = fingerprint(rooms.spec.to_json(), scenes) == rooms.fingerprint
     layout = f"{len(rooms)} rows, format {rooms.attributes['format_version']}"
     return [
         listed_check("layout", layout, rooms.problems()),
         content_check("content", rooms.opened, digests),
         *(listed_check(x, f"{rules[x]} ({len(rooms)} rows)", broken[x]) for x in rules),
         Check("fingerprint", same, rooms.fingerprint if same else "does not match"),
-        *_some_again(rooms, items, device, objects),
+        *_some_again(rooms, items, device, made_of),
     ]
 
 

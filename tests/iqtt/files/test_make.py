@@ -1,4 +1,4 @@
-"""Splits as wholes: the same request, the same bytes; what is told of it; odd requests."""
+"""Splits as wholes: what is told of them, odd requests, folders, suites, and the preset v2."""
 
 import os
 import re
@@ -10,12 +10,16 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from made_splits import TINY
+from made_splits import TINY, StopError, listing
 
+from iqtt.files import make as module
 from iqtt.files import work
-from iqtt.files.make import make_split
-from iqtt.questions.specs import SplitSpec
-from scenegen.common.errors import SpecError
+from iqtt.files.make import make_split, make_suite
+from iqtt.files.reader import QuestionsFile
+from iqtt.files.split import ALL_FILES, MANIFEST
+from iqtt.questions.specs import SUITE, SplitSpec, preset_spec, question_kind
+from iqtt.shapes.splits import TooFewShapesError
+from scenegen.common.errors import PlacementError, SpecError
 from scenegen.rendering.backend import versions
 
 ENDS = ("little", "big")
@@ -24,6 +28,7 @@ SPEC = SplitSpec(
     seed=SECRET, train=7, labeled=3, val=4, test=5, cubes=(6, 7), height=24, width=32,
     min_cube_pixels=1, lights=(1, 2),
 )  # fmt: skip
+SUITE_SPEC = replace(TINY, cubes=(9, 9), train=2, labeled=1, val=2, test=1)
 COMMAND = f"iqtt make-split --seed {SECRET}"
 AGAIN = """
 import sys
@@ -42,7 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+    return {path.name: path.read_bytes() for path in folder.glob("*.h5")}
 
 
 def test_nothing_handed_out_tells_the_test_answers(folder):
@@ -94,15 +99,7 @@ def test_the_same_request_gives_the_same_bytes(folder, tmp_path):
     assert os.listdir(tmp_path) == ["again"]
 
 
-def test_depth_is_laid_out_alike_in_batches_of_any_size(tmp_path):
-    spec = replace(SPEC, with_depth=True, test=0, train=0, labeled=0)
-    for batch in (2, 64):
-        make_split(tmp_path / f"{batch}", spec, batch=batch)
-    assert contents(tmp_path / "2") == contents(tmp_path / "64")
-
-
-def test_worker_processes_never_change_a_byte(folder, tmp_path, monkeypatch):
-    """And all views that are proposed are counted."""
+def test_all_views_that_are_proposed_are_counted(folder, tmp_path, monkeypatch):
     monkeypatch.setattr(work, "BLOCK", 2)
     tally = make_split(tmp_path / "again", SPEC, workers=2, command=COMMAND)
     assert contents(tmp_path / "again") == contents(folder)
@@ -200,3 +197,110 @@ def test_a_split_without_any_question_is_refused(tmp_path):
     assert error.value.where == "train, val and test"
     assert error.value.expected == "at least 1 question in all"
     assert list(tmp_path.iterdir()) == []
+
+
+def test_other_files_of_a_folder_are_left_alone(tmp_path, monkeypatch):
+    """Also where it is the working directory."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "notes.txt").write_text("mine")
+    make_split(".", TINY)
+    make_split(".", TINY, overwrite=True)
+    assert sorted(listing(tmp_path)) == sorted([*ALL_FILES, MANIFEST, "notes.txt"])
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize("make", [make_split, make_suite])
+@pytest.mark.parametrize(
+    ("path", "kind"),
+    [
+        ("file", NotADirectoryError),
+        ("file/split", NotADirectoryError),
+        ("missing/split", FileNotFoundError),
+        ("nowhere", OSError),
+        ("locked/split", PermissionError),
+    ],
+)
+def test_places_that_cannot_be_a_folder_are_refused_first(tmp_path, monkeypatch, make, path, kind):
+    monkeypatch.setattr(module, "make_pools", None)
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
+    (tmp_path / "locked").mkdir()
+    before = listing(tmp_path)
+    monkeypatch.setattr(os, "access", lambda place, mode: "locked" not in str(place))
+    for overwrite in (False, True):
+        with pytest.raises(kind):
+            make(tmp_path / path, TINY, overwrite=overwrite)
+    assert listing(tmp_path) == before
+
+
+def test_errors_on_the_way_leave_nothing(tmp_path, monkeypatch):
+    with pytest.raises(TooFewShapesError):
+        make_split(tmp_path / "new", replace(TINY, cubes=(3, 3)))
+    with pytest.raises(TooFewShapesError):
+        make_suite(tmp_path / "new", replace(SUITE_SPEC, cubes=(6, 6)))
+    monkeypatch.setattr("iqtt.questions.views.QUESTION_ATTEMPTS", 1)
+    monkeypatch.setattr("iqtt.questions.views.VIEWS", 1)
+    with pytest.raises(PlacementError):
+        make_split(tmp_path / "new", replace(TINY, height=64, width=64, min_cube_pixels=14))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_suite_has_a_split_of_each_kind_in_a_folder_of_its_own(tmp_path):
+    """One that was stopped goes on, with the same seed only."""
+    rows: list[int] = []
+
+    def stop(count: int) -> None:
+        rows.append(count)
+        if sum(rows) > 7:
+            raise StopError
+
+    home = tmp_path / "suite"
+    with pytest.raises(StopError):
+        make_suite(home, SUITE_SPEC, progress=stop, compression="none")
+    first = {path: path.stat().st_mtime_ns for path in (home / next(iter(SUITE))).iterdir()}
+    with pytest.raises(SpecError):
+        make_suite(home, replace(SUITE_SPEC, seed=9), compression="none")
+    tally = make_suite(home, SUITE_SPEC, compression="none")
+    assert tally.proposed > 4 * 6 * 3
+    assert {path: path.stat().st_mtime_ns for path in first} == first
+    assert sorted(os.listdir(home)) == sorted(SUITE)
+    for name, (kind, answers) in SUITE.items():
+        with QuestionsFile(home / name / "iqtt-val.h5") as questions:
+            expected = replace(SUITE_SPEC, seed=None, distractors=kind, answers=answers)
+            assert questions.spec == expected
+            kinds = questions.read("distractor_kind", slice(None))
+            assert {question_kind(row) for row in kinds.tolist()} == {name}
+            assert questions.read("questions", 0).shape == (1 + answers, 16, 16, 3)
+            assert questions.compression() == "none"
+    with pytest.raises(FileExistsError):
+        make_suite(home, SUITE_SPEC, compression="none")
+
+
+def as_released(path: Path) -> list[tuple[np.ndarray, np.ndarray | None]]:
+    """Load images and answers as whoever has the released files does: with plain h5py, by the
+    names and types that their description tells.
+    """
+    tables = []
+    with h5py.File(path) as file:
+        for group in (file["labeled"], file["unlabeled"]) if "labeled" in file else (file,):
+            images = group["questions"][()]
+            assert (images.dtype, images.ndim) == (np.float32, 5)
+            assert images.shape[1:] == (4, 32, 32, 3)
+            assert 0 <= images.min() < 0.5 < images.max() <= 1
+            answers = group["answers"][()] if "answers" in group else None
+            assert answers is None or (answers.dtype, answers.shape) == (np.uint8, images.shape[:1])
+            tables.append((images, answers))
+    return tables
+
+
+def test_the_preset_v2_takes_the_place_of_the_released_files(tmp_path):
+    spec = preset_spec("v2", train=9, labeled=6, val=6, test=3, height=32, width=32)
+    make_split(tmp_path / "v2", spec)
+    labeled, unlabeled = as_released(tmp_path / "v2" / "iqtt-train.h5")
+    [val], [test] = (as_released(tmp_path / "v2" / f"iqtt-{name}.h5") for name in ("val", "test"))
+    assert [len(images) for images, _ in (labeled, unlabeled, val, test)] == [6, 3, 6, 3]
+    assert unlabeled[1] is test[1] is None
+    assert sorted(labeled[1]) == sorted(val[1]) == [0, 0, 1, 1, 2, 2]
+    for images, _ in (labeled, unlabeled, val, test):
+        assert (images[:, :, 0, 0] == 1).all(), "the background is white"
+        assert len(np.unique(images)) > 256, "more than bytes"

@@ -1,6 +1,5 @@
-"""Descriptions: JSON both ways, every setting guarded, fingerprints as files hold them."""
+"""Descriptions: JSON both ways, every setting guarded."""
 
-import hashlib
 import json
 from dataclasses import fields
 from typing import Any
@@ -13,7 +12,7 @@ from scenegen.camera import Camera
 from scenegen.common.errors import SpecError
 from scenegen.description.presets import preset_spec
 from scenegen.description.scenes import SHAPE_NAMES, Light, PlacedObject, SceneSpec
-from scenegen.description.specs import DatasetSpec, Fingerprint
+from scenegen.description.specs import DatasetSpec
 from scenegen.sampling.scenes import sample_scene
 
 NUMBER = st.floats(-1e9, 1e9)
@@ -222,26 +221,6 @@ def test_slots_hold_the_most_and_are_never_none():
     assert (empty.object_slots, empty.light_slots) == (1, 1)
 
 
-def fingerprint(spec, *lines):
-    found = Fingerprint(spec)
-    for line in lines:
-        found.add(line.encode())
-    return found.hex
-
-
-def test_fingerprints_are_what_files_hold_today():
-    """SHA-256 over sorted, compact JSON and one line a scene; another definition breaks files."""
-    settings_by_name = {f.name: getattr(DatasetSpec(), f.name) for f in fields(DatasetSpec)}
-    request = json.dumps(settings_by_name, sort_keys=True, separators=(",", ":"))
-    expected = hashlib.sha256("\n".join([request, "one", "two"]).encode()).hexdigest()
-    assert fingerprint(DatasetSpec(), "one", "two") == expected
-
-
-def test_fingerprints_notice_scenes_and_their_borders():
-    lines: list[list[str]] = [[], ["a"], ["b"], ["a", "b"], ["b", "a"], ["ab"], ["a", ""]]
-    assert len({fingerprint(DatasetSpec(), *scenes) for scenes in lines}) == len(lines)
-
-
 @pytest.mark.parametrize(
     ("settings", "alike"),
     [
@@ -250,8 +229,8 @@ def test_fingerprints_notice_scenes_and_their_borders():
         ({"ambient": (0.0, -0.0, 0.0)}, {"ambient": (0.0, 0.0, 0.0)}),
     ],
 )
-def test_equal_requests_have_equal_fingerprints(settings, alike):
-    assert fingerprint(DatasetSpec(**settings)) == fingerprint(DatasetSpec(**alike))
+def test_equal_requests_have_equal_texts(settings, alike):
+    assert DatasetSpec(**settings).to_json() == DatasetSpec(**alike).to_json()
 
 
 def test_a_size_means_what_the_option_means() -> None:

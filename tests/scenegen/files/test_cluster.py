@@ -114,10 +114,10 @@ def shared(task):
 def test_a_folder_that_workers_do_not_see_is_named(cluster, tmp_path):
     """Or one in which another run has begun."""
     place = tmp_path / "rooms.manifest.json"
-    asked = Manifest(FORMAT, "", ("rooms.h5",), "{}", 1, 1, (), "", False, ())
+    asked = Manifest(FORMAT, "", ("rooms.h5",), "{}", 1, 1, ())
     with pytest.raises(SceneGenError) as refused:
         list(cluster.in_any_order(shared, [(place, asked)]))
-    assert str(place) in refused.value.found
+    assert str(place) in refused.value.where
     write_manifest(place, asked)
     list(cluster.in_any_order(shared, [(place, asked)]))
     with pytest.raises(SceneGenError) as refused:

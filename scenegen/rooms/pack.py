@@ -1,35 +1,18 @@
-"""Write a file of rooms, row by row."""
+"""Rows of a file of rooms from scenes that were rendered, packed to be written."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.records import check
 from scenegen.description.scene_arrays import SceneArrays
-from scenegen.description.specs import DatasetSpec, Fingerprint
-from scenegen.files.content import seal
-from scenegen.files.row_file import new_file, writer_name
 from scenegen.files.schema import Column
-from scenegen.files.shards import write_row_digests
-from scenegen.files.table import PackedRows, Table, pack_rows
-from scenegen.layout import (
-    CONVENTIONS,
-    FORMAT_NAME,
-    FORMAT_VERSION,
-    TRUTH_DIGEST,
-    columns,
-)
+from scenegen.files.table import PackedRows, pack_rows
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rooms.reader import truth_digest
 
 Array = NDArray[Any]
-MAX_COUNT = 100_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,27 +37,6 @@ class RenderedScene:
     def index(self) -> int:
         """The item's number in its data set."""
         return int(self.scenes.index[self.row])
-
-
-class RoomsWriter:
-    """Writes the rows of a new file of rooms; `create_rooms` makes one."""
-
-    def __init__(
-        self, file: h5py.File, spec: DatasetSpec, count: int, compression: str, is_shard: bool
-    ) -> None:
-        self.views = len(spec.views)
-        self.table = Table(file, columns(spec), count * self.views, compression, is_shard)
-        self.fingerprint = Fingerprint(spec)
-
-    def append(self, rooms: Sequence[RenderedScene]) -> None:
-        """Write a row for each view of each scene, at least one."""
-        self.extend(pack_rooms(rooms, self.table.columns, self.table.compression))
-
-    def extend(self, rows: PackedRows) -> None:
-        """Write rows from `pack_rooms`."""
-        for text in rows.others["scene"][:: self.views]:
-            self.fingerprint.add(text.encode())
-        self.table.extend_packed(rows)
 
 
 def pack_rooms(
@@ -133,46 +95,3 @@ def described(batch: SceneBatch, images: Array) -> dict[str, Array]:
         "object/world_from_object": batch.world_from_object[images],
         "object/scale": batch.object_scale[images],
     }
-
-
-def root_attributes(spec: DatasetSpec) -> dict[str, Any]:
-    """Return the root attributes that a file of rooms has from the start."""
-    return {
-        "format": FORMAT_NAME,
-        "format_version": FORMAT_VERSION,
-        "writer": writer_name(),
-        "spec": spec.to_json(),
-        "conventions": CONVENTIONS,
-    }
-
-
-@contextmanager
-def create_rooms(
-    path: str | Path,
-    spec: DatasetSpec,
-    count: int,
-    *,
-    compression: str = "gzip",
-    overwrite: bool = False,
-    attributes: dict[str, str] | None = None,
-    is_shard: bool = False,
-) -> Iterator[RoomsWriter]:
-    """Open a new file of rooms for `count` scenes; it gets its name when the block ends well.
-
-    Its bytes depend on the rows alone, not on how many were appended at a time. Raises SpecError
-    for an unknown compression or a count below 1, OSError where the file cannot be written.
-    """
-    rows = count * len(spec.views)
-    most = MAX_COUNT // len(spec.views)
-    check(1 <= count <= most, "n", count, f"from 1 to {most:,} scenes")
-    with new_file(path, overwrite) as file:
-        file.attrs.update(root_attributes(spec), **(attributes or {}))
-        writer = RoomsWriter(file, spec, count, compression, is_shard)
-        yield writer
-        if writer.table.rows != rows:
-            raise RuntimeError(f"{path}: got {writer.table.rows} of {rows} rows")
-        if is_shard:
-            write_row_digests(file, writer.table.row_digests())
-        file.attrs["fingerprint"] = writer.fingerprint.hex
-        file.attrs[TRUTH_DIGEST] = truth_digest(file)
-        seal(file)

@@ -1,0 +1,278 @@
+"""Write the files of a set: whole ones, shards, those that show shards as one, and merged ones."""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from scenegen.common.errors import FileFormatError
+from scenegen.files.axes import name_axes
+from scenegen.files.content import CONTENT_DIGEST, SHA256, dataset_digest, seal
+from scenegen.files.manifest import FileRecord, file_sha256
+from scenegen.files.new_file import written_beside
+from scenegen.files.plan import Bundle, Part, Piece, Sheet
+from scenegen.files.row_file import new_file, new_hdf5
+from scenegen.files.schema import Column
+from scenegen.files.shards import (
+    ROW_DIGESTS,
+    SHARDS,
+    OpenFile,
+    Shard,
+    opened,
+)
+from scenegen.files.table import (
+    PackedRows,
+    Table,
+    extend_together,
+    pack_rows,
+    packing_threads,
+)
+from scenegen.files.workers import in_threads
+
+Packed = Sequence[PackedRows]  # as many rows for each table of a part
+Progress = Callable[[int], Any]
+COPIED_ROWS = 64  # that a merge reads and packs in one go
+
+
+def write_piece(
+    folder: Path,
+    piece: Piece,
+    rows: Iterator[Packed],
+    compression: str,
+    overwrite: bool = True,
+    progress: Progress = lambda rows: None,
+) -> list[FileRecord]:
+    """Write the files of a piece with the next rows of `rows`; they appear when all are complete.
+
+    The bytes depend on the rows alone, not on how many come at a time. `progress` is called with
+    the number of rows that were written. Raises OSError as `written_beside`.
+    """
+    with ExitStack() as naming:
+        places = [folder / name for name in piece.names]
+        hidden = [naming.enter_context(written_beside(place, overwrite)) for place in places]
+        with ExitStack() as writing:
+            files = [writing.enter_context(new_hdf5(path)) for path in hidden]
+            _fill(files, piece, rows, compression, progress)
+            digests = [str(file.attrs[CONTENT_DIGEST]) for file in files]
+        count = sum(block.rows for block in piece.blocks)
+        return [
+            FileRecord(name, count, path.stat().st_size, file_sha256(path), digest)
+            for name, path, digest in zip(piece.names, hidden, digests, strict=True)
+        ]
+
+
+def _fill(
+    files: Sequence[h5py.File],
+    piece: Piece,
+    rows: Iterator[Packed],
+    compression: str,
+    progress: Progress,
+) -> None:
+    """Write all tables of a piece, and seal its files."""
+    attributes = [dict(of_file) for of_file in piece.bundle.files.values()]
+    row_digests: list[dict[str, bytes]] = [{} for _ in files]
+    for block in piece.blocks:
+        tables = _tables(files, block.part, block.rows, compression, piece.is_shard)
+        while tables[0].rows < block.rows:
+            packed = next(rows)
+            extend_together(tables, packed)
+            progress(packed[0].count)
+        _mark(attributes, block.part, _digests(tables))
+        for sheet, table in zip(block.part.sheets, tables, strict=True):
+            row_digests[sheet.file] |= table.row_digests()
+    for file, of_file, of_rows in zip(files, attributes, row_digests, strict=True):
+        if piece.is_shard:
+            _write_row_digests(file, of_rows)
+        _seal(file, of_file)
+
+
+def write_views(
+    folder: Path, shards: Sequence[Piece], records: Mapping[str, FileRecord], compression: str
+) -> None:
+    """Write the files that show all shards of a bundle as one; they tell what whole files tell.
+
+    Raises FileFormatError where a shard is not the one that was recorded.
+    """
+    bundle = shards[0].bundle
+    attributes = [dict(of_file) for of_file in bundle.files.values()]
+    lists = [
+        [
+            Shard(name, records[name].rows, records[name].content_digest, piece.blocks[0].part.name)
+            for name, piece in zip(names, shards, strict=True)
+        ]
+        for names in zip(*(piece.names for piece in shards), strict=True)
+    ]
+    with ExitStack() as writing:
+        places = [folder / name for name in bundle.files]
+        files = [writing.enter_context(new_file(place, overwrite=True)) for place in places]
+        for part in bundle.parts:
+            if part.items:
+                of_part = [[one for one in listed if one.part == part.name] for listed in lists]
+                digests = _show_part(files, folder, part, of_part)
+            else:
+                digests = _digests(_tables(files, part, 0, compression))
+            _mark(attributes, part, digests)
+        for file, listed, of_file in zip(files, lists, attributes, strict=True):
+            _write_list(file, listed)
+            _seal(file, of_file)
+
+
+def _show_part(
+    files: Sequence[h5py.File], folder: Path, part: Part, shards: Sequence[Sequence[Shard]]
+) -> dict[str, str]:
+    """Show the columns of a part of all shards of each file; return their digests by name."""
+    joined = [_joined_digests(folder, of_file) for of_file in shards]
+    digests = {}
+    for sheet in part.sheets:
+        group = _group(files[sheet.file], sheet)
+        for path, column in sheet.paths.items():
+            dataset = _show(group, column, path, shards[sheet.file])
+            dataset.attrs[SHA256] = digests[column.name] = joined[sheet.file][path]
+    return digests
+
+
+def _show(group: h5py.Group, column: Column, path: str, shards: Sequence[Shard]) -> h5py.Dataset:
+    """Write a virtual data set that shows a column of all shards."""
+    dtype = h5py.string_dtype() if column.dtype == "text" else np.dtype(column.dtype)
+    layout = h5py.VirtualLayout((sum(shard.rows for shard in shards), *column.shape), dtype)
+    layout.dcpl.set_obj_track_times(False)  # the same bytes at any time
+    start = 0
+    for shard in shards:
+        source = h5py.VirtualSource(shard.file, path, (shard.rows, *column.shape))
+        layout[start : start + shard.rows] = source
+        start += shard.rows
+    fill = np.nan if dtype.kind == "f" else None
+    dataset = group.create_virtual_dataset(column.name, layout, fillvalue=fill)
+    dataset.attrs.update(column.attributes)
+    if column.axes is not None:
+        name_axes(group, dataset, ("row", *column.axes))
+    return dataset
+
+
+def merge_file(
+    path: Path,
+    out: str | Path,
+    kind: str,
+    parts: Sequence[Part],
+    compression: str,
+    overwrite: bool = False,
+    progress: Progress = lambda rows: None,
+) -> None:
+    """Write the rows of a file, or of a set of shards, to one file.
+
+    It has the bytes that the command which made the set would have written to one file.
+
+    Args:
+        path: a file of this kind (`schema.Format.kind`) that a reader has checked.
+        parts: what it holds, without marks, which are copied.
+
+    Raises as `OpenFile` and `new_file`, and FileFormatError where a value is not the one that was
+    written to its shard. Nothing is then left.
+    """
+    with OpenFile(path, kind) as source, new_file(out, overwrite) as file:
+        attributes = {k: v for k, v in source.file.attrs.items() if k != CONTENT_DIGEST}
+        whole = Bundle({path.name: attributes}, parts).whole()
+        sheets = [sheet for part in parts for sheet in part.sheets]
+        stored = {name: source.array(name) for sheet in sheets for name in sheet.paths}
+
+        def packed(task: tuple[Part, range]) -> Packed:
+            part, rows = task
+            return [_copied(stored, sheet, rows, compression) for sheet in part.sheets]
+
+        tasks = (
+            (block.part, range(block.rows)[first : first + COPIED_ROWS])
+            for block in whole.blocks
+            for first in range(0, block.rows, COPIED_ROWS)
+        )
+        threads = packing_threads()
+        copied = in_threads(packed, tasks, threads, 4 * threads)
+        _fill([file], whole, copied, compression, progress)
+        for name, array in stored.items():
+            if file[name].attrs[SHA256] != array.attrs[SHA256]:
+                problem = "values are not those that were written"
+                raise FileFormatError(f"{path}: {name}: {problem}", hint="verify says which")
+
+
+def _copied(stored: Mapping[str, Any], sheet: Sheet, rows: range, compression: str) -> PackedRows:
+    some = slice(rows.start, rows.stop)
+    values = {column.name: stored[path][some] for path, column in sheet.paths.items()}
+    return pack_rows(values, sheet.columns, compression)
+
+
+def _tables(
+    files: Sequence[h5py.File], part: Part, rows: int, compression: str, row_digests: bool = False
+) -> list[Table]:
+    """Create the tables of a part, for so many rows each."""
+    groups = [_group(files[sheet.file], sheet) for sheet in part.sheets]
+    return [
+        Table(group, sheet.columns, rows, compression, row_digests)
+        for group, sheet in zip(groups, part.sheets, strict=True)
+    ]
+
+
+def _group(file: h5py.File, sheet: Sheet) -> h5py.Group:
+    group = file.require_group(sheet.group or "/")
+    group.attrs.update(sheet.attributes)
+    return group
+
+
+def _digests(tables: Sequence[Table]) -> dict[str, str]:
+    """Return the digests of all columns by name."""
+    columns = [column for table in tables for column in table.datasets.items()]
+    return {name: dataset.attrs[SHA256] for name, dataset in columns}
+
+
+def _mark(attributes: Sequence[dict[str, Any]], part: Part, digests: Mapping[str, str]) -> None:
+    """Add the marks of a part to the root attributes of its files."""
+    for mark in part.marks:
+        for number in mark.files:
+            attributes[number][mark.name] = mark.value(digests)
+
+
+def _seal(file: h5py.File, attributes: Mapping[str, Any]) -> None:
+    """Write root attributes, in an order that does not depend on who wrote them, and the digest."""
+    file.attrs.update(sorted(attributes.items()))
+    seal(file)
+
+
+def _write_row_digests(file: h5py.File, digests: Mapping[str, bytes]) -> None:
+    """Write the digests of all rows of a shard, 32 bytes each, by name of the data set."""
+    names = sorted(digests)
+    rows = [np.frombuffer(digests[name], np.uint8).reshape(-1, 32) for name in names]
+    values = np.stack(rows, axis=1)
+    dataset = file.create_dataset(ROW_DIGESTS, data=values)
+    dataset.attrs["names"] = names
+    dataset.attrs["meaning"] = "SHA-256 of each row of each data set, as `sha256` is made of them"
+    dataset.attrs[SHA256] = dataset_digest(values)
+
+
+def _joined_digests(folder: Path, shards: Sequence[Shard]) -> dict[str, str]:
+    """Return the `column_digest` of each data set over all shards.
+
+    Raises FileFormatError where a shard is not the one that was recorded.
+    """
+    hashes: dict[str, hashlib._Hash] = {}
+    for shard in shards:
+        with opened(folder / shard.file) as file:
+            if file.attrs.get(CONTENT_DIGEST) != shard.content_digest:
+                problem = "another run has written it meanwhile"
+                hint = "run the same command again to continue"
+                raise FileFormatError(f"{folder / shard.file}: {problem}", hint=hint)
+            digests = file[ROW_DIGESTS]
+            values = digests[()]
+            for i, name in enumerate(digests.attrs["names"]):
+                hashes.setdefault(name, hashlib.sha256()).update(values[:, i].tobytes())
+    return {name: digest.hexdigest() for name, digest in hashes.items()}
+
+
+def _write_list(file: h5py.File, shards: Sequence[Shard]) -> None:
+    """Write the list of all shards of a set, those of each part in their order."""
+    lines = np.array([json.dumps(vars(shard)) for shard in shards], object)
+    listed = file.create_dataset(SHARDS, data=lines, dtype=h5py.string_dtype())
+    listed.attrs["meaning"] = "the files beside this one that hold the values, in their order"
+    listed.attrs[SHA256] = dataset_digest(lines)
