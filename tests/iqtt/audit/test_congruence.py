@@ -10,11 +10,11 @@ from polycubes import are_congruent, some_shapes
 
 from iqtt.audit import congruence
 from iqtt.audit.congruence import congruent_rows, cube_codes, name_shapes
-from iqtt.shapes.chains_and_trees import Kind, all_classes
+from iqtt.shapes.chains_and_trees import all_classes
 from iqtt.shapes.polycube import ROTATIONS, canonical, canonical_class, is_chiral, mirror, set_ids
 
 
-def test_each_turn_is_needed() -> None:
+def test_each_turn_is_needed():
     arm = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 1, 1]])
     for signs in itertools.product((1, -1), repeat=3):
         for axes in itertools.permutations(range(3)):
@@ -24,7 +24,7 @@ def test_each_turn_is_needed() -> None:
 
 
 @given(st.integers(0, 2**32), st.integers(1, 12), st.sampled_from(["chain", "tree"]))
-def test_turned_and_moved_copies_are_congruent(seed: int, size: int, kind: Kind) -> None:
+def test_turned_and_moved_copies_are_congruent(seed, size, kind):
     rng = np.random.default_rng(seed)
     shapes = some_shapes(rng, 24, size, kind)
     copies = np.einsum("qij,qnj->qni", ROTATIONS, shapes)[:, rng.permutation(size)]
@@ -33,7 +33,7 @@ def test_turned_and_moved_copies_are_congruent(seed: int, size: int, kind: Kind)
 
 @pytest.mark.parametrize("kind", ["chain", "tree"])
 @pytest.mark.parametrize("cubes", [4, 5, 6])
-def test_canonical_form_and_brute_force_agree_on_all_pairs(kind: Kind, cubes: int) -> None:
+def test_canonical_form_and_brute_force_agree_on_all_pairs(kind, cubes):
     classes = all_classes(cubes, kind)
     both = np.concatenate([classes, mirror(classes)])
     a, b = (both[index.ravel()] for index in np.indices((len(both), len(both))))
@@ -42,7 +42,7 @@ def test_canonical_form_and_brute_force_agree_on_all_pairs(kind: Kind, cubes: in
     assert same_form.sum() == len(both) + 2 * (~is_chiral(classes)).sum()
 
 
-def test_rows_beyond_one_chunk_are_judged_alike() -> None:
+def test_rows_beyond_one_chunk_are_judged_alike():
     rng = np.random.default_rng(0)
     a, b = some_shapes(rng, 9000, 4), some_shapes(rng, 9000, 4)
     same_form = (canonical(a) == canonical(b)).all(axis=(1, 2))
@@ -50,7 +50,7 @@ def test_rows_beyond_one_chunk_are_judged_alike() -> None:
     assert 0 < same_form.sum() < 9000
 
 
-def test_small_types_do_not_overflow() -> None:
+def test_small_types_do_not_overflow():
     rod = np.array([[0, 0, 100], [0, 0, 101]], dtype=np.int8)
     assert are_congruent(rod, np.array([[0, -128, 0], [0, -127, 0]], dtype=np.int8))
     far = np.array([[-128, 0, 0], [127, 0, 0]], dtype=np.int8)
@@ -70,9 +70,7 @@ def test_small_types_do_not_overflow() -> None:
         (np.array([[0, 0, 0], [2**64 - 1, 0, 0]], dtype=np.uint64), "shape 4321"),
     ],
 )
-def test_what_cannot_be_shapes_is_refused_and_its_row_named(
-    cubes: np.ndarray, message: str
-) -> None:
+def test_what_cannot_be_shapes_is_refused_and_its_row_named(cubes, message):
     rod = np.zeros(cubes.shape, cubes.dtype)
     rod[:, 0] = np.arange(len(cubes))
     shapes = np.tile(rod, (5000, 1, 1))
@@ -81,22 +79,22 @@ def test_what_cannot_be_shapes_is_refused_and_its_row_named(
         congruent_rows(shapes, shapes)
 
 
-def test_unlike_arrays_cannot_be_paired() -> None:
+def test_unlike_arrays_cannot_be_paired():
     with pytest.raises(ValueError, match="cannot pair"):
         congruent_rows(np.zeros((2, 4, 3), np.int8), np.zeros((3, 4, 3), np.int8))
 
 
-def same_partition(a: np.ndarray, b: np.ndarray) -> bool:
+def same_partition(a, b):
     """Whether two lists of names are equal at the same places."""
     pairs = len(np.unique(np.stack([a, b]), axis=1).T)
     return pairs == len(np.unique(a)) == len(np.unique(b))
 
 
-def numbered(ids: np.ndarray) -> np.ndarray:
+def numbered(ids):
     return np.unique(ids, return_inverse=True)[1].reshape(-1)
 
 
-def test_comparing_decides_where_invariants_collide(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_comparing_decides_where_invariants_collide(monkeypatch):
     monkeypatch.setattr(congruence, "shape_invariants", lambda cubes: np.zeros(len(cubes)))
     classes = all_classes(5)
     rng = np.random.default_rng(0)
@@ -110,7 +108,7 @@ def test_comparing_decides_where_invariants_collide(monkeypatch: pytest.MonkeyPa
 
 
 @given(st.integers(0, 2**32), st.integers(1, 11))
-def test_names_of_some_shapes(seed: int, size: int) -> None:
+def test_names_of_some_shapes(seed, size):
     rng = np.random.default_rng(seed)
     shapes = some_shapes(rng, 20, size, "tree")
     shapes = np.concatenate([shapes, rng.permutation(mirror(shapes)[:, ::-1] @ ROTATIONS[5].T)])
@@ -119,7 +117,7 @@ def test_names_of_some_shapes(seed: int, size: int) -> None:
     assert same_partition(mirrored, numbered(set_ids(canonical_class(shapes))))
 
 
-def test_no_shapes_have_no_names() -> None:
+def test_no_shapes_have_no_names():
     names, mirrored = name_shapes(np.zeros((0, 5, 3), np.int8))
     assert len(names) == len(mirrored) == 0
     assert cube_codes(np.zeros((0, 5, 3), np.int8)).shape == (0, 5)

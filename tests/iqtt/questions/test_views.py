@@ -10,8 +10,7 @@ from polycubes import turns_between
 from scipy.spatial.transform import Rotation
 
 from iqtt.questions import views as module
-from iqtt.questions.distractors import Pools, Shapes, arrange, draw_shapes, make_pools, question_key
-from iqtt.questions.packing import Question
+from iqtt.questions.distractors import Shapes, arrange, draw_shapes, make_pools, question_key
 from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import (
     Tally,
@@ -32,17 +31,17 @@ REQUESTS = [(i, i % 3, 0) for i in (0, 1, 2, 3, 40, 41, 42, 10**6)]
 
 
 @pytest.fixture(scope="module")
-def pools() -> Pools:
+def pools():
     return make_pools(SPEC)
 
 
 @pytest.fixture(scope="module")
-def sampled(pools: Pools) -> tuple[list[Question], Tally]:
+def sampled(pools):
     tally = Tally()
     return sample_questions(SPEC, pools, "val", REQUESTS, tally), tally
 
 
-def bits(question: Question) -> tuple:
+def bits(question):
     """All that a question is."""
     values = [*vars(question).values(), *vars(question.shapes).values()]
     return tuple(
@@ -50,7 +49,7 @@ def bits(question: Question) -> tuple:
     )
 
 
-def radius(cubes: np.ndarray) -> float:
+def radius(cubes):
     """The largest distance from the middle of the box to any corner of a cube."""
     corners = np.concatenate([cubes + offset for offset in itertools.product((0, 1), repeat=3)])
     return float(
@@ -58,7 +57,7 @@ def radius(cubes: np.ndarray) -> float:
     )
 
 
-def spec_distance(radius: float) -> float:
+def spec_distance(radius):
     """Where a sphere's outline is the image's inscribed circle, and a pixel of 64 on each side."""
     return 64 / 62 * radius / math.sin(math.radians(SPEC.fov_degrees / 2))
 
@@ -124,10 +123,7 @@ def test_questions_are_what_was_asked_for(sampled):
     assert len({bits(q) for q in questions}) == len(questions)
 
 
-@pytest.mark.parametrize(
-    "constants",
-    [{}, {"PROPOSALS_AT_ONCE": 1}, {"PROPOSALS_AT_ONCE": 5000}],
-)
+@pytest.mark.parametrize("constants", [{}, {"PROPOSALS_AT_ONCE": 1}, {"PROPOSALS_AT_ONCE": 5000}])
 def test_neither_company_nor_order_nor_chunks_change_a_question(
     pools, sampled, constants, monkeypatch
 ):

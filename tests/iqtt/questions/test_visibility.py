@@ -26,7 +26,7 @@ SPECS = {
 }
 
 
-def views(spec: SplitSpec, count: int, turns: np.ndarray) -> list[np.ndarray]:
+def views(spec, count, turns):
     """Centres, numbers of cubes, rotations and distances; the camera is as near as it may be."""
     rng = np.random.default_rng(3)
     sizes = range(spec.cubes[0], spec.cubes[1] + 1)

@@ -5,7 +5,7 @@ import pytest
 from polycubes import some_shapes
 
 from iqtt.shapes import chains_and_trees
-from iqtt.shapes.chains_and_trees import Kind, all_classes, all_walks, random_shapes
+from iqtt.shapes.chains_and_trees import all_classes, all_walks, random_shapes
 from iqtt.shapes.polycube import canonical_class, is_chiral, set_ids, symmetries
 
 # Self-avoiding walks of 1, 2, ... steps on the cubic lattice, OEIS A001412.
@@ -19,14 +19,14 @@ KINDS = pytest.mark.parametrize("kind", ["chain", "tree"])
 
 
 @pytest.mark.parametrize(("steps", "count"), list(enumerate(WALKS, start=1)))
-def test_as_many_walks_as_published(steps: int, count: int) -> None:
+def test_as_many_walks_as_published(steps, count):
     walks = all_walks(steps + 1)
     axes_used = (np.ptp(walks, axis=1) > 0).sum(axis=1)
     assert np.array([0, 6, 24, 48])[axes_used].sum() == count
 
 
 @pytest.mark.parametrize("cubes", range(1, 9))
-def test_as_many_polycubes_as_published(cubes: int) -> None:
+def test_as_many_polycubes_as_published(cubes):
     classes = all_classes(cubes, "tree")
     hands = 1 + is_chiral(classes)
     assert len(classes) == TWO_SIDED[cubes - 1]
@@ -35,7 +35,7 @@ def test_as_many_polycubes_as_published(cubes: int) -> None:
 
 
 @KINDS
-def test_all_classes_are_canonical_and_in_the_order_of_their_ids(kind: Kind) -> None:
+def test_all_classes_are_canonical_and_in_the_order_of_their_ids(kind):
     classes = all_classes(6, kind)
     assert (canonical_class(classes) == classes).all()
     ids = set_ids(classes).tolist()
@@ -44,7 +44,7 @@ def test_all_classes_are_canonical_and_in_the_order_of_their_ids(kind: Kind) -> 
 
 @KINDS
 @pytest.mark.parametrize("cubes", [1, 2, 5, 16])
-def test_random_shapes_are_connected_and_do_not_overlap(kind: Kind, cubes: int) -> None:
+def test_random_shapes_are_connected_and_do_not_overlap(kind, cubes):
     first, found, other = (
         some_shapes(np.random.default_rng(seed), 300, cubes, kind) for seed in (0, 0, 1)
     )
@@ -59,7 +59,7 @@ def test_random_shapes_are_connected_and_do_not_overlap(kind: Kind, cubes: int) 
         assert (earlier == 1).any(axis=1).all()
 
 
-def test_random_chains_are_uniform_over_walks() -> None:
+def test_random_chains_are_uniform_over_walks():
     # Five cubes: the shortest walks of which some meet themselves. 6 * 5**3 walks of four steps
     # never turn straight back; 726 of those avoid themselves, and only they are kept.
     walks = random_shapes(np.random.default_rng(0), 75_000, 5)
@@ -71,14 +71,14 @@ def test_random_chains_are_uniform_over_walks() -> None:
     assert abs(chi_squared - 725) < 5 * np.sqrt(2 * 725)
 
 
-def test_trees_grow_on_every_free_face_alike() -> None:
+def test_trees_grow_on_every_free_face_alike():
     # A domino shows ten faces, two of which make a rod of three.
     found = random_shapes(np.random.default_rng(0), 50_000, 3, "tree")
     rods = (np.ptp(found, axis=1) == 2).any(axis=1).sum()
     assert abs(rods - 10_000) < 5 * np.sqrt(50_000 * 0.2 * 0.8)
 
 
-def test_a_request_that_no_shape_meets_is_refused() -> None:
+def test_a_request_that_no_shape_meets_is_refused():
     rng = np.random.default_rng(0)
     for cubes in (0, 17):
         for call in (lambda: random_shapes(rng, 1, cubes), lambda: all_classes(cubes, "tree")):
@@ -89,7 +89,7 @@ def test_a_request_that_no_shape_meets_is_refused() -> None:
     assert random_shapes(rng, 0, 4).shape == (0, 4, 3)
 
 
-def test_growing_by_parts_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_growing_by_parts_changes_nothing(monkeypatch):
     whole = all_classes(6, "tree")
     monkeypatch.setattr(chains_and_trees, "MAX_GROWN", 90)
     assert (all_classes(6, "tree") == whole).all()

@@ -13,14 +13,14 @@ from iqtt.shapes.polycube import ROTATIONS, mirror
 from iqtt.shapes.splits import known_classes
 
 
-def solid(cubes: np.ndarray) -> trimesh.Trimesh:
+def solid(cubes):
     """The cubes as boxes of one mesh."""
     boxes = [trimesh.creation.box(bounds=[c, c + 1]) for c in cubes.astype(float)]
     return trimesh.util.concatenate(boxes)
 
 
 @pytest.mark.parametrize("cubes", [1, 3, 8])
-def test_radii_and_contacts_are_those_of_the_solid(cubes: int) -> None:
+def test_radii_and_contacts_are_those_of_the_solid(cubes):
     """Against trimesh's moments of inertia, and free faces counted cell by cell."""
     for shape in known_classes(cubes)[:20]:
         inertia = np.sort(solid(shape).principal_inertia_components)
@@ -32,7 +32,7 @@ def test_radii_and_contacts_are_those_of_the_solid(cubes: int) -> None:
         assert free == 6 * cubes - 2 * contacts(shape[None])[0]
 
 
-def test_higher_moments_are_sums_over_cubes() -> None:
+def test_higher_moments_are_sums_over_cubes():
     """Entry by entry, in plain Python."""
     shape = known_classes(7)[100]
     x, axes = shape - shape.mean(axis=0), range(3)
@@ -48,14 +48,14 @@ def test_higher_moments_are_sums_over_cubes() -> None:
     assert moments(shape[None])[0, 3:] == pytest.approx(expected, abs=2e-6)
 
 
-def test_turned_and_mirrored_shapes_have_the_same_moments() -> None:
+def test_turned_and_mirrored_shapes_have_the_same_moments():
     shapes = known_classes(8)[::9]
     for other in (mirror(shapes), shapes @ ROTATIONS[7].T):
         np.testing.assert_allclose(moments(other), moments(shapes), atol=2e-6)
         assert (contacts(other) == contacts(shapes)).all()
 
 
-def test_matched_shapes_are_all_that_are_alike_the_nearest_first() -> None:
+def test_matched_shapes_are_all_that_are_alike_the_nearest_first():
     """Against every pair."""
     shapes = known_classes(9, max_radius=3.5)[:1500]
     rows = matched_rows(shapes)
@@ -75,6 +75,6 @@ def test_matched_shapes_are_all_that_are_alike_the_nearest_first() -> None:
         np.testing.assert_allclose(apart[row[0], used], nearest[: len(used)], atol=2e-6)
 
 
-def test_few_shapes_have_no_matched_ones() -> None:
+def test_few_shapes_have_no_matched_ones():
     for count in (0, 1, 2):
         assert matched_rows(known_classes(8)[:count]).shape == (0, 1 + module.PARTNERS)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from polycubes import some_shapes
 
-from iqtt.shapes.chains_and_trees import Kind, all_classes
+from iqtt.shapes.chains_and_trees import all_classes
 from iqtt.shapes.near import is_chain, is_connected, move_cubes
-from iqtt.shapes.polycube import Cubes, bounding_radius
+from iqtt.shapes.polycube import bounding_radius
 
 ROD = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]
 TEE = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0]]
@@ -18,38 +18,38 @@ MOVES_OF = {n: 6 * n * (n - 1) for n in range(2, 9)}  # moves by the number of c
 TORN = [[0, 0, 0], [1, 0, 0], [5, 0, 0], [6, 0, 0]]
 
 
-def test_connected_shapes_and_chains_are_known() -> None:
+def test_connected_shapes_and_chains_are_known():
     cubes = np.array([ROD, TEE, RING, EDGE_ON, TORN])
     assert is_connected(cubes).tolist() == [True, True, True, False, False]
     assert is_chain(cubes).tolist() == [True, False, True, False, False]
 
 
 @pytest.mark.parametrize("cubes", range(1, 9))
-def test_the_trees_that_are_chains_are_all_the_chains(cubes: int) -> None:
+def test_the_trees_that_are_chains_are_all_the_chains(cubes):
     trees = all_classes(cubes, "tree")
     assert is_connected(trees).all()
     assert (trees[is_chain(trees)] == all_classes(cubes, "chain")).all()
 
 
-def test_a_compact_block_is_a_chain_in_any_row_order() -> None:
+def test_a_compact_block_is_a_chain_in_any_row_order():
     block = np.array(list(itertools.product(range(2), range(2), range(4))), dtype=np.int8)
     orders = [np.random.default_rng(seed).permutation(16) for seed in range(3)]
     assert is_chain(np.stack([block[order] for order in orders])).all()
 
 
-def test_many_shapes_are_judged_as_each_alone() -> None:
+def test_many_shapes_are_judged_as_each_alone():
     trees = some_shapes(np.random.default_rng(0), 9000, 6, "tree")  # more than one chunk
     for judge in (is_chain, is_connected):
         assert (judge(trees)[-900:] == judge(trees[-900:])).all()
         assert judge(trees[:0]).shape == (0,)
 
 
-def test_too_many_cubes_are_refused() -> None:
+def test_too_many_cubes_are_refused():
     with pytest.raises(ValueError, match="16 cubes"):
         is_chain(np.zeros((1, 17, 3), np.int8))
 
 
-def sets_one_move_away(cubes: Cubes, kind: Kind) -> set[frozenset[tuple[int, ...]]]:
+def sets_one_move_away(cubes, kind):
     """All valid sets of cubes that share all but one with these, found the slow way."""
     own = {tuple(cube) for cube in cubes.tolist()}
     low, high = cubes.min(axis=0) - 1, cubes.max(axis=0) + 2
@@ -61,7 +61,7 @@ def sets_one_move_away(cubes: Cubes, kind: Kind) -> set[frozenset[tuple[int, ...
 
 @pytest.mark.parametrize("kind", ["chain", "tree"])
 @pytest.mark.parametrize("size", [2, 3, 6])
-def test_the_valid_moves_are_all_there_are(kind: Kind, size: int) -> None:
+def test_the_valid_moves_are_all_there_are(kind, size):
     shape = some_shapes(np.random.default_rng(size), 1, size, kind)[0] + np.int8(20)
     moves = np.arange(MOVES_OF[size])
     moved, valid = move_cubes(np.stack([shape] * len(moves)), moves, kind)
@@ -70,7 +70,7 @@ def test_the_valid_moves_are_all_there_are(kind: Kind, size: int) -> None:
     assert ((moved != shape).any(axis=2).sum(axis=1) == 1)[valid].all()
 
 
-def test_a_move_is_made_the_same_alone_and_among_others() -> None:
+def test_a_move_is_made_the_same_alone_and_among_others():
     rng = np.random.default_rng(0)
     chains = some_shapes(rng, 40, 8)
     moves = rng.integers(MOVES_OF[8], size=40)
@@ -83,7 +83,7 @@ def test_a_move_is_made_the_same_alone_and_among_others() -> None:
         assert alone_valid[0] == valid[i]
 
 
-def test_moves_keep_within_the_radius() -> None:
+def test_moves_keep_within_the_radius():
     shape = some_shapes(np.random.default_rng(0), 1, 7, "tree")
     radius, moves = float(bounding_radius(shape)[0]), np.arange(MOVES_OF[7])
     every = move_cubes(shape.repeat(len(moves), axis=0), moves, "tree")
@@ -93,6 +93,6 @@ def test_moves_keep_within_the_radius() -> None:
 
 
 @pytest.mark.parametrize("move", [-1, 6 * 4 * 3])
-def test_a_move_out_of_range_is_refused(move: int) -> None:
+def test_a_move_out_of_range_is_refused(move):
     with pytest.raises(ValueError, match="out of bounds"):
         move_cubes(np.array([ROD]), np.array([move]))

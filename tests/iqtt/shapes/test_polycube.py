@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from polycubes import some_shapes
 
-from iqtt.shapes.chains_and_trees import Kind
 from iqtt.shapes.polycube import (
     MAX_CUBES,
     ROTATIONS,
@@ -40,20 +39,20 @@ BENT_ARM = (
 )
 
 
-def one(cubes: object) -> Shapes:
+def one(cubes):
     return np.array(cubes, dtype=np.int8)[None]
 
 
 @st.composite
-def shapes(draw: st.DrawFn) -> Shapes:
+def shapes(draw):
     """One random shape of 1 to 16 cubes, (1, n, 3)."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
-    kind: Kind = draw(st.sampled_from(("chain", "tree")))
+    kind = draw(st.sampled_from(("chain", "tree")))
     return some_shapes(rng, 1, draw(st.integers(1, MAX_CUBES)), kind)
 
 
 @st.composite
-def shapes_and_copies(draw: st.DrawFn) -> tuple[Shapes, Shapes]:
+def shapes_and_copies(draw):
     """A shape, and the same one turned, moved and with its cubes in another order."""
     shape = draw(shapes())
     turn = ROTATIONS[draw(st.integers(0, 23))]
@@ -62,7 +61,7 @@ def shapes_and_copies(draw: st.DrawFn) -> tuple[Shapes, Shapes]:
     return shape, ((shape @ turn.T) + shift)[:, order]
 
 
-def test_the_rotations_are_a_group_of_24() -> None:
+def test_the_rotations_are_a_group_of_24():
     members = {rotation.tobytes() for rotation in ROTATIONS}
     assert len(ROTATIONS) == len(members) == 24
     assert (ROTATIONS[0] == np.eye(3)).all()
@@ -74,7 +73,7 @@ def test_the_rotations_are_a_group_of_24() -> None:
 
 
 @given(shapes())
-def test_mirror_is_an_involution_that_keeps_the_box(shape: Shapes) -> None:
+def test_mirror_is_an_involution_that_keeps_the_box(shape):
     image = mirror(shape)
     assert (mirror(image) == shape).all()
     assert (image.min(axis=1) == shape.min(axis=1)).all()
@@ -84,7 +83,7 @@ def test_mirror_is_an_involution_that_keeps_the_box(shape: Shapes) -> None:
 
 
 @given(shapes_and_copies())
-def test_copies_have_one_canonical_form(pair: tuple[Shapes, Shapes]) -> None:
+def test_copies_have_one_canonical_form(pair):
     shape, copy = pair
     assert (canonical(shape) == canonical(copy)).all()
     assert (canonical_class(shape) == canonical_class(copy)).all()
@@ -95,7 +94,7 @@ def test_copies_have_one_canonical_form(pair: tuple[Shapes, Shapes]) -> None:
 
 
 @given(shapes())
-def test_canonical_forms_are_idempotent_sorted_and_at_the_origin(shape: Shapes) -> None:
+def test_canonical_forms_are_idempotent_sorted_and_at_the_origin(shape):
     for form in (canonical, canonical_class):
         result = form(shape)
         assert result.dtype == np.int8
@@ -105,13 +104,13 @@ def test_canonical_forms_are_idempotent_sorted_and_at_the_origin(shape: Shapes) 
 
 
 @given(shapes())
-def test_the_canonical_form_is_a_turned_copy(shape: Shapes) -> None:
+def test_the_canonical_form_is_a_turned_copy(shape):
     target = {tuple(cube) for cube in canonical(shape)[0].tolist()}
     turned = [shape[0] @ rotation.T for rotation in ROTATIONS]
     assert any({tuple(c) for c in (t - t.min(axis=0)).tolist()} == target for t in turned)
 
 
-def test_many_shapes_at_once_give_what_each_gives_alone() -> None:
+def test_many_shapes_at_once_give_what_each_gives_alone():
     many = some_shapes(np.random.default_rng(0), 20_000, 6)  # more than one chunk
     together = canonical(many)
     for row in (0, 8191, 8192, 19_999):
@@ -131,9 +130,7 @@ def test_many_shapes_at_once_give_what_each_gives_alone() -> None:
         (BENT_ARM, 1, True),
     ],
 )
-def test_symmetries_and_chirality_of_known_shapes(
-    cubes: list[list[int]], count: int, chiral: bool
-) -> None:
+def test_symmetries_and_chirality_of_known_shapes(cubes, count, chiral):
     shape = one(cubes)
     assert is_chiral(shape) == is_chiral(mirror(shape)) == [chiral]
     assert (set_ids(canonical(shape)) != set_ids(canonical(mirror(shape)))) == [chiral]
@@ -147,13 +144,13 @@ def test_symmetries_and_chirality_of_known_shapes(
         assert ({tuple(cube) for cube in turned.tolist()} == own) == keeps
 
 
-def test_ids_are_the_sorted_cubes_themselves() -> None:
+def test_ids_are_the_sorted_cubes_themselves():
     shape = np.array([[[4, 9, 7], [3, 8, 5]]])
     (bytes_,) = set_ids(shape).view(np.uint8).reshape(-1, 32)
     assert bytes_.tolist() == [0x00, 0x00, 0x01, 0x12] + [0xFF] * 28
 
 
-def test_ids_tell_sets_apart_but_not_places_and_orders() -> None:
+def test_ids_tell_sets_apart_but_not_places_and_orders():
     chain = some_shapes(np.random.default_rng(0), 3000, 5)
     ids = set_ids(chain)
     sets = [frozenset(map(tuple, (c - c.min(axis=0)).tolist())) for c in chain]
@@ -164,7 +161,7 @@ def test_ids_tell_sets_apart_but_not_places_and_orders() -> None:
 
 
 @pytest.mark.parametrize("cubes", [1, 2, 5, 16])
-def test_the_radius_reaches_the_farthest_corner(cubes: int) -> None:
+def test_the_radius_reaches_the_farthest_corner(cubes):
     unit = np.array(list(itertools.product((0, 1), repeat=3)))
     for shape in some_shapes(np.random.default_rng(cubes), 50, cubes):
         corners = (shape[:, None] + unit).reshape(-1, 3)
@@ -174,7 +171,7 @@ def test_the_radius_reaches_the_farthest_corner(cubes: int) -> None:
         assert bounding_radius(shape[None])[0] == pytest.approx(farthest)
 
 
-def test_no_shapes_are_no_trouble() -> None:
+def test_no_shapes_are_no_trouble():
     nothing = np.zeros((0, 4, 3), dtype=np.int8)
     assert canonical(nothing).shape == canonical_class(nothing).shape == (0, 4, 3)
     assert set_ids(nothing).shape == is_chiral(nothing).shape == (0,)
@@ -195,13 +192,13 @@ def test_no_shapes_are_no_trouble() -> None:
         (np.array([[[-(2**63), 0, 0], [2**63 - 1, 0, 0]]]), "shape 0 spans more than 16"),
     ],
 )
-def test_what_cannot_be_shapes_is_refused(cubes: NDArray[np.int64], message: str) -> None:
+def test_what_cannot_be_shapes_is_refused(cubes, message):
     for function in (canonical, canonical_class, set_ids, is_chiral, symmetries):
         with pytest.raises(ValueError, match=message):
             function(cubes)
 
 
-def test_the_longest_shape_is_accepted() -> None:
+def test_the_longest_shape_is_accepted():
     rod = np.zeros((1, MAX_CUBES, 3), dtype=np.int8)
     rod[0, :, 2] = np.arange(MAX_CUBES)
     assert canonical(rod)[0, :, 0].tolist() == list(range(MAX_CUBES))

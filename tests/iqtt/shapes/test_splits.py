@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from polycubes import some_shapes
 
-from iqtt.shapes.chains_and_trees import Kind, all_classes
+from iqtt.shapes.chains_and_trees import all_classes
 from iqtt.shapes.near import is_chain
 from iqtt.shapes.polycube import bounding_radius, canonical_class, set_ids
 from iqtt.shapes.splits import LISTED_CUBES, known_classes, split_classes, split_of
@@ -25,18 +25,18 @@ FOR_EVER = {
 }
 
 
-def ids_of(shapes: np.ndarray) -> set[bytes]:
+def ids_of(shapes):
     return {bytes(i) for i in set_ids(canonical_class(shapes))}
 
 
 @pytest.mark.parametrize(("kind", "cubes"), FOR_EVER)
-def test_the_split_of_each_class_is_what_it_always_was(kind: Kind, cubes: int) -> None:
+def test_the_split_of_each_class_is_what_it_always_was(kind, cubes):
     split = split_of(known_classes(cubes, kind))
     assert hashlib.sha256(split.astype(np.uint8).tobytes()).hexdigest() == FOR_EVER[kind, cubes]
 
 
 @pytest.mark.parametrize(("kind", "cubes"), [("chain", n) for n in range(3, 10)] + [("tree", 7)])
-def test_listed_classes_are_shared_out_evenly_by_their_hash(kind: Kind, cubes: int) -> None:
+def test_listed_classes_are_shared_out_evenly_by_their_hash(kind, cubes):
     """Reckoned with a plain sort; chains among chains, and shapes that branch among these."""
     classes = all_classes(cubes, kind)
     split, chain = split_of(classes), is_chain(classes)
@@ -51,7 +51,7 @@ def test_listed_classes_are_shared_out_evenly_by_their_hash(kind: Kind, cubes: i
 
 
 @pytest.mark.parametrize(("kind", "cubes"), [("chain", 12), ("tree", 10)])
-def test_beyond_the_lists_the_hash_alone_decides(kind: Kind, cubes: int) -> None:
+def test_beyond_the_lists_the_hash_alone_decides(kind, cubes):
     classes = canonical_class(some_shapes(RNG(0), 3000, cubes, kind))
     classes = classes[is_chain(classes) == (kind == "chain")]
     digests = [hashlib.sha256(b"3D-IQTT split " + bytes(i)).digest() for i in set_ids(classes)]
@@ -61,8 +61,8 @@ def test_beyond_the_lists_the_hash_alone_decides(kind: Kind, cubes: int) -> None
 
 
 @pytest.mark.parametrize(("cubes", "radius"), [(8, np.inf), (8, 2.8), (13, np.inf), (13, 3.2)])
-def test_no_seed_kind_or_radius_puts_a_class_in_two_splits(cubes: int, radius: float) -> None:
-    met: list[set[bytes]] = [set(), set(), set()]
+def test_no_seed_kind_or_radius_puts_a_class_in_two_splits(cubes, radius):
+    met = [set(), set(), set()]
     for seed, kind in ((1, "chain"), (2, "chain"), (3, "tree")):
         parts = split_classes(RNG(seed), cubes, kind, radius, most=200)
         again = split_classes(RNG(seed), cubes, kind, radius, most=200)
@@ -77,17 +77,17 @@ def test_no_seed_kind_or_radius_puts_a_class_in_two_splits(cubes: int, radius: f
     assert min(map(len, met)) > 100
 
 
-def test_all_classes_there_are_are_in_a_split() -> None:
+def test_all_classes_there_are_are_in_a_split():
     assert ids_of(np.concatenate(split_classes(RNG(0), 8))) == ids_of(all_classes(8))
     rod = np.array([[[0, 0, 0], [1, 0, 0]]], np.int8)
     assert len(known_classes(2, max_radius=float(bounding_radius(rod)[0]))) == 1, "met exactly"
 
 
-def test_the_search_for_shapes_that_there_are_not_is_bounded() -> None:
+def test_the_search_for_shapes_that_there_are_not_is_bounded():
     assert [len(part) for part in split_classes(RNG(0), 14, max_radius=1.2, most=100)] == [0] * 3
 
 
-def test_requests_without_sense_are_refused() -> None:
+def test_requests_without_sense_are_refused():
     for cubes, kind in ((0, "chain"), (5, "ring")):
         with pytest.raises(ValueError, match=r"cubes|kind"):
             split_classes(RNG(0), cubes, kind)  # type: ignore[arg-type]
@@ -96,6 +96,6 @@ def test_requests_without_sense_are_refused() -> None:
             known_classes(most + 1, listed)
 
 
-def test_listed_classes_cannot_be_changed_by_accident() -> None:
+def test_listed_classes_cannot_be_changed_by_accident():
     known_classes(5)[:] = 0
     assert (known_classes(5) == all_classes(5)).all()

@@ -1,8 +1,6 @@
 """Splits that are shared: whole, in shards, and with floating-point images of two answers."""
 
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -19,7 +17,7 @@ SPECS = {
 
 
 @pytest.fixture(scope="session")
-def splits(split_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def splits(split_folder, tmp_path_factory):
     """Return folders of splits that no test changes, by "whole", "shards" and "floats"."""
     made = tmp_path_factory.mktemp("splits")
     for name, (spec, size) in SPECS.items():
@@ -28,12 +26,12 @@ def splits(split_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict
 
 
 @pytest.fixture(scope="session")
-def publication() -> Publication:
+def publication():
     """Return what a person tells of a split."""
     return Publication("Some questions", ("A. Person",), "2026-01-31", "CC-BY-4.0")
 
 
 @pytest.fixture
-def load(tmp_path: Path) -> Any:
+def load(tmp_path):
     """Return `datasets.load_dataset` with a cache of its own, for the split "train"."""
     return loader(tmp_path / "cache")

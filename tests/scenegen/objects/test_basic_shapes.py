@@ -40,7 +40,7 @@ SIDES = {"box": 6, "pyramid": 5, "prism": 5, "tetrahedron": 4, "octahedron": 8}
 SIDES |= {"dodecahedron": 12, "icosahedron": 20, "torus": 2, "sphere": 0}
 
 
-def off_surface(name: str, p: Array) -> Array:
+def off_surface(name, p):
     """Signed distance of points near the smooth surface, positive outside."""
     r, y = np.hypot(p[..., 0], p[..., 2]), p[..., 1]
     if name == "sphere":
@@ -55,7 +55,7 @@ def off_surface(name: str, p: Array) -> Array:
 
 
 @pytest.mark.parametrize("name", SHAPE_NAMES)
-def test_bounding_radius_is_one_and_normals_agree_with_faces(name: str) -> None:
+def test_bounding_radius_is_one_and_normals_agree_with_faces(name):
     shape = unit_shape(name)
     assert shape.name == name
     assert unit_shape(name) is shape, "built once"
@@ -68,7 +68,7 @@ def test_bounding_radius_is_one_and_normals_agree_with_faces(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SOLID)
-def test_solids_are_closed_and_have_the_volume_of_their_formula(name: str) -> None:
+def test_solids_are_closed_and_have_the_volume_of_their_formula(name):
     mesh = welded(unit_shape(name))
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
@@ -80,7 +80,7 @@ def test_solids_are_closed_and_have_the_volume_of_their_formula(name: str) -> No
 
 
 @pytest.mark.parametrize("name", CURVED)
-def test_curved_meshes_follow_the_smooth_surface(name: str) -> None:
+def test_curved_meshes_follow_the_smooth_surface(name):
     shape = unit_shape(name)
     assert abs(off_surface(name, shape.triangles)).max() < 1e-12
     middles = (shape.triangles + np.roll(shape.triangles, 1, axis=1)) / 2
@@ -96,7 +96,7 @@ def test_curved_meshes_follow_the_smooth_surface(name: str) -> None:
     np.testing.assert_allclose(shape.normals[some], gradient / 2e-6, atol=7e-3)  # half a facet
 
 
-def test_the_teapot_is_open_at_its_seams_only() -> None:
+def test_the_teapot_is_open_at_its_seams_only():
     mesh = welded(unit_shape("teapot"))
     assert mesh.is_winding_consistent
     users = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_counts=True)[1]
@@ -106,13 +106,13 @@ def test_the_teapot_is_open_at_its_seams_only() -> None:
 
 
 @pytest.mark.parametrize("name", SHAPE_NAMES)
-def test_support_bounds_the_mesh_closely(name: str) -> None:
+def test_support_bounds_the_mesh_closely(name):
     shape, most = unit_shape(name), 3e-3 if name == "teapot" else 5e-5
     check_body(shape, welded(shape).vertices, most, unit_vectors(200))
 
 
 @pytest.mark.parametrize("name", SHAPE_NAMES)
-def test_bodies_stay_on_every_resting_side(name: str) -> None:
+def test_bodies_stay_on_every_resting_side(name):
     """The centre of mass projects to a convex combination of the points that touch the floor."""
     shape, mesh = unit_shape(name), welded(unit_shape(name))
     solid = mesh.convex_hull if name == "teapot" else mesh
@@ -129,7 +129,7 @@ def test_bodies_stay_on_every_resting_side(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", CURVED)
-def test_round_bodies_do_not_roll_off_their_resting_sides(name: str) -> None:
+def test_round_bodies_do_not_roll_off_their_resting_sides(name):
     """A small tilt in any direction lifts the centre of mass, or leaves it (rolling)."""
     mesh, rng = welded(unit_shape(name)), np.random.default_rng(2)
     sides = unit_shape(name).resting_directions
@@ -140,13 +140,13 @@ def test_round_bodies_do_not_roll_off_their_resting_sides(name: str) -> None:
         assert (height[1:] > height[0] - 1e-4).all(), down
 
 
-def test_unknown_shapes_are_refused() -> None:
+def test_unknown_shapes_are_refused():
     with pytest.raises(SpecError) as refused:
         unit_shape("cube")
     assert (refused.value.where, refused.value.found) == ("shape", "'cube'")
 
 
-def test_rotations_are_scipys() -> None:
+def test_rotations_are_scipys():
     turns = Rotation.random(20, rng=1)
     for turn, (x, y, z, w) in zip(turns.as_matrix(), turns.as_quat(), strict=True):
         np.testing.assert_allclose(rotation_matrix((w, x, y, z)), turn, atol=1e-12)
@@ -155,7 +155,7 @@ def test_rotations_are_scipys() -> None:
         np.testing.assert_array_equal(matrix[3], [0, 0, 0, 1])
 
 
-def test_the_room_is_three_unit_squares_facing_inwards() -> None:
+def test_the_room_is_three_unit_squares_facing_inwards():
     room = room_mesh()
     axes = room.face_normals[::2].argmax(axis=1)
     assert sorted(axes) == [0, 1, 2]
@@ -166,7 +166,7 @@ def test_the_room_is_three_unit_squares_facing_inwards() -> None:
     assert room.bounds.tolist() == [[0, 0, 0], [1, 1, 1]]
 
 
-def test_the_parts_of_a_scene_are_the_room_and_every_object_in_its_place() -> None:
+def test_the_parts_of_a_scene_are_the_room_and_every_object_in_its_place():
     half = 0.5**0.5
     objects = (
         PlacedObject("box", (0.5, 0.25, 0.5), (half, 0.0, half, 0.0), 0.1, (1, 1, 1)),

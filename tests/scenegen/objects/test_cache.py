@@ -5,8 +5,6 @@ import os
 import subprocess
 import sys
 import warnings
-from pathlib import Path
-from typing import Any
 from unittest.mock import Mock
 
 import numpy as np
@@ -14,17 +12,16 @@ import pytest
 
 from scenegen.objects import cache
 from scenegen.objects.cache import DiskCache, default_cache_dir
-from scenegen.objects.solids import Array
 
 NAMES = ("points", "text")
 ARRAYS = {"points": np.arange(3000.0).reshape(-1, 3), "text": np.array("a text")}
 
 
-def same(arrays: dict[str, Array] | None) -> bool:
+def same(arrays):
     return arrays is not None and all(np.array_equal(arrays[n], ARRAYS[n]) for n in NAMES)
 
 
-def test_an_entry_comes_back_as_it_was(tmp_path: Path) -> None:
+def test_an_entry_comes_back_as_it_was(tmp_path):
     folder = tmp_path / "new" / "cache"
     DiskCache(folder).write("key", ARRAYS)
     assert same(DiskCache(folder).read("key", NAMES))
@@ -35,7 +32,7 @@ def test_an_entry_comes_back_as_it_was(tmp_path: Path) -> None:
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == {"key.npz": first}
 
 
-def test_without_a_folder_nothing_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_folder_nothing_is_kept(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     none = DiskCache(None)
     none.check_folder()
@@ -44,7 +41,7 @@ def test_without_a_folder_nothing_is_kept(tmp_path: Path, monkeypatch: pytest.Mo
     assert list(tmp_path.iterdir()) == []
 
 
-def test_damaged_entries_count_as_missing(tmp_path: Path) -> None:
+def test_damaged_entries_count_as_missing(tmp_path):
     """Entries may be cut short, have one bit flipped anywhere, or hold something else."""
     disk, path = DiskCache(tmp_path), tmp_path / "key.npz"
     disk.write("key", ARRAYS)
@@ -65,17 +62,13 @@ def test_damaged_entries_count_as_missing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("other", [{"points": ARRAYS["points"]}, {**ARRAYS, "text": [object()]}])
-def test_entries_without_a_name_or_with_code_count_as_missing(
-    other: dict[str, Any], tmp_path: Path
-) -> None:
+def test_entries_without_a_name_or_with_code_count_as_missing(other, tmp_path):
     np.savez(tmp_path / "key.npz", **other)
     assert DiskCache(tmp_path).read("key", NAMES) is None
 
 
 @pytest.mark.parametrize("place", ["a file", "below a file", "full"])
-def test_a_folder_that_takes_nothing_costs_one_warning(
-    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_that_takes_nothing_costs_one_warning(place, tmp_path, monkeypatch):
     file = tmp_path / "file"
     file.write_text("")
     folder = {"a file": file, "below a file": file / "x"}.get(place, tmp_path / "cache")
@@ -94,9 +87,7 @@ def test_a_folder_that_takes_nothing_costs_one_warning(
     assert [path.name for path in (tmp_path / "cache").iterdir()] == ["old.npz"]
 
 
-def test_a_folder_that_is_too_large_loses_its_oldest_entries(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_that_is_too_large_loses_its_oldest_entries(tmp_path, monkeypatch):
     DiskCache(tmp_path).write("0", ARRAYS)
     size = (tmp_path / "0.npz").stat().st_size
     (tmp_path / "mine.txt").write_text("mine")
@@ -109,14 +100,14 @@ def test_a_folder_that_is_too_large_loses_its_oldest_entries(
     assert names == {"4.npz", "5.npz", "6.npz", "7.npz", "mine.txt"}
 
 
-def fill(folder: Path, start: Any) -> None:
+def fill(folder, start):
     start.wait()
     for number in range(12):
         DiskCache(folder).write(f"{number}", ARRAYS)
         assert same(DiskCache(folder).read(f"{number}", NAMES))
 
 
-def test_several_processes_fill_one_folder(tmp_path: Path) -> None:
+def test_several_processes_fill_one_folder(tmp_path):
     context = multiprocessing.get_context("spawn")
     start = context.Barrier(3)
     workers = [context.Process(target=fill, args=(tmp_path / "c", start)) for _ in range(3)]
@@ -128,7 +119,7 @@ def test_several_processes_fill_one_folder(tmp_path: Path) -> None:
     assert len(list((tmp_path / "c").iterdir())) == 12, "and no leftovers"
 
 
-def test_a_killed_process_leaves_no_entry_that_is_not_whole(tmp_path: Path) -> None:
+def test_a_killed_process_leaves_no_entry_that_is_not_whole(tmp_path):
     code = f"""
 import os, numpy
 from scenegen.objects.cache import DiskCache
@@ -146,7 +137,7 @@ DiskCache({str(tmp_path)!r}).write("key", {{"points": numpy.zeros(3)}})
     assert [path.name for path in tmp_path.iterdir()] == ["key.npz"]
 
 
-def test_where_the_cache_lies(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_where_the_cache_lies(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert default_cache_dir() == tmp_path / "pix2shape-bench" / "meshes"
     monkeypatch.setenv("HOME", str(tmp_path / "home"))

@@ -11,7 +11,7 @@ BASIC = ("box", "torus", "teapot", "icosahedron", "cone")
 MODELS = ("mug/0001", "chair/0002", "bottle/0003", "bag/0004", "table/0005")
 
 
-def test_normals_stand_on_faces_and_at_corners() -> None:
+def test_normals_stand_on_faces_and_at_corners():
     shape = unit_shape("cone")
     mesh = cast_mesh(shape)
     a, b, c = (shape.triangles[:, i] for i in range(3))
@@ -23,7 +23,7 @@ def test_normals_stand_on_faces_and_at_corners() -> None:
 
 
 @pytest.mark.parametrize("name", [*BASIC, *MODELS])
-def test_triangles_grow_by_the_overlap_each_in_its_plane(name: str) -> None:
+def test_triangles_grow_by_the_overlap_each_in_its_plane(name):
     triangles = built_in_shape(name).triangles
     grown = overlapping(triangles)
     edges = np.roll(triangles, -1, axis=1) - triangles
@@ -42,7 +42,7 @@ def test_triangles_grow_by_the_overlap_each_in_its_plane(name: str) -> None:
     np.testing.assert_allclose(end[blunt], OVERLAP, rtol=1e-6)
 
 
-def test_degenerate_triangles_stay_finite() -> None:
+def test_degenerate_triangles_stay_finite():
     point, line = np.ones((1, 3, 3)), np.arange(9.0).reshape(1, 3, 3)
     for triangle in (point, line):
         grown = overlapping(triangle)

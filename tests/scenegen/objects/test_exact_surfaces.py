@@ -11,7 +11,7 @@ SLABS |= {"dodecahedron": 6, "icosahedron": 10}
 
 
 @pytest.mark.parametrize("name", SLABS)
-def test_polyhedra_have_each_face_once_and_opposite_ones_together(name: str) -> None:
+def test_polyhedra_have_each_face_once_and_opposite_ones_together(name):
     shape = unit_shape(name)
     assert isinstance(shape.surface, Polyhedron)
     slabs = shape.surface.slabs
@@ -23,13 +23,13 @@ def test_polyhedra_have_each_face_once_and_opposite_ones_together(name: str) -> 
     np.testing.assert_allclose(at.min(axis=0)[closed], slabs[closed, 3], atol=1e-12)
 
 
-def test_planes_of_a_slab_may_be_given_twice() -> None:
+def test_planes_of_a_slab_may_be_given_twice():
     planes = np.array([[0, 1, 0, -0.5], [0, 1, 0, -0.5], [0, -1, 0, -0.25], [1, 0, 0, -1]])
     expected = [[0, 1, 0, -0.25, 0.5], [1, 0, 0, -FAR, 1]]
     np.testing.assert_array_equal(polyhedron_of(planes).slabs, expected)
 
 
-def test_a_cone_narrows_to_its_tip() -> None:
+def test_a_cone_narrows_to_its_tip():
     cone = cone_of(-0.5, 0.7, 0.9)
     for y, radius in ((-0.5, 0.9), (0.1, 0.45), (0.7, 0.0)):
         assert cone.a + cone.b * y + cone.c * y * y == pytest.approx(radius**2, abs=1e-12)

@@ -4,7 +4,6 @@ from collections import defaultdict
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from scenegen.objects.teapot import PROFILES, patches, tessellate, turned_quads
@@ -14,7 +13,7 @@ RIM, LID, KNOB, BOTTOM = range(4), range(16, 20), range(12, 16), range(20, 24)
 TUBE_ENDS = {(24, 0), (28, 0), (25, 1), (29, 1), (26, 0), (30, 0), (27, 1), (31, 1)}
 
 
-def borders() -> dict[tuple[float, ...], list[tuple[int, int]]]:
+def borders():
     """Return (patch, side) by the border's control points, in either direction.
 
     Sides 0 and 1 are the first and last row, 2 and 3 the first and last column.
@@ -27,7 +26,7 @@ def borders() -> dict[tuple[float, ...], list[tuple[int, int]]]:
     return found
 
 
-def test_every_border_is_shared_by_two_or_known_to_be_open_or_a_pole() -> None:
+def test_every_border_is_shared_by_two_or_known_to_be_open_or_a_pole():
     by_border = borders()
     alone = {users[0] for users in by_border.values() if len(users) == 1}
     open_rings = {(i, 0) for i in RIM} | {(i, 1) for i in LID}
@@ -38,7 +37,7 @@ def test_every_border_is_shared_by_two_or_known_to_be_open_or_a_pole() -> None:
     assert points == [(0.0, 0.0, 0.0), (0.0, 3.15, 0.0)]
 
 
-def test_the_surface_is_smooth_across_all_borders() -> None:
+def test_the_surface_is_smooth_across_all_borders():
     """Corners at the same place have the same normal, so seams have no creases.
 
     The handle's lower end only happens to touch the body, at one point.
@@ -53,7 +52,7 @@ def test_the_surface_is_smooth_across_all_borders() -> None:
     assert worst > 0.9999
 
 
-def test_it_is_its_own_mirror_image() -> None:
+def test_it_is_its_own_mirror_image():
     points = tessellate(8)[0].reshape(-1, 3)
     turned = points[: 4 * turned_quads(8)]
     quarter_turn = np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
@@ -62,7 +61,7 @@ def test_it_is_its_own_mirror_image() -> None:
     assert cKDTree(points).query(points @ quarter_turn)[0].max() > 0.5, "spout and handle"
 
 
-def test_known_extremes() -> None:
+def test_known_extremes():
     """The height of the knob, the bottom, the width of the belly and the back of the handle."""
     points = tessellate(64)[0].reshape(-1, 3)
     low, high = points.min(axis=0), points.max(axis=0)
@@ -72,7 +71,7 @@ def test_known_extremes() -> None:
     assert points[points[:, 0].argmax(), 1] == pytest.approx(2.46, abs=0.02)
 
 
-def test_published_points_are_where_they_were_published() -> None:
+def test_published_points_are_where_they_were_published():
     """Some vertices as printed, z up and y <= 0: rim, belly, knob, lid, bottom, handle, spout."""
     printed = [(1.3375, -0.749, 2.53125), (1.75, -0.98, 1.875), (0.8, -0.45, 3.15)]
     printed += [(0.4, -0.224, 2.55), (0.798, -1.425, 0.0), (-2.65, -0.3, 0.9375)]
@@ -82,7 +81,7 @@ def test_published_points_are_where_they_were_published() -> None:
         assert np.linalg.norm(z_up - point, axis=1).min() < 1e-12, point
 
 
-def test_turned_patches_are_round_to_half_a_percent() -> None:
+def test_turned_patches_are_round_to_half_a_percent():
     """Four cubics with tangents 0.56 r bulge by 0.4%; the knob's top, 0.5625 r, a bit more."""
     for r, tangent, _ in np.reshape(PROFILES, (-1, 3)):
         assert tangent == pytest.approx(0.56 * r, abs=0.0025 * r)
@@ -91,7 +90,7 @@ def test_turned_patches_are_round_to_half_a_percent() -> None:
     assert rim.min() == pytest.approx(1.4, abs=1e-9)
 
 
-def test_normals_point_outwards_and_quads_run_around_them() -> None:
+def test_normals_point_outwards_and_quads_run_around_them():
     corners, normals = tessellate(16)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0, atol=1e-12)
     across = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
@@ -103,11 +102,11 @@ def test_normals_point_outwards_and_quads_run_around_them() -> None:
     assert len(corners[tubes]) == 8 * 16**2
 
 
-def test_corners_lie_on_the_patches() -> None:
+def test_corners_lie_on_the_patches():
     """De Casteljau's construction instead of Bernstein polynomials, at a few corners."""
     corners = tessellate(4)[0].reshape(32, 4, 4, 4, 3)
 
-    def casteljau(points: NDArray[np.float64], t: float) -> NDArray[np.float64]:
+    def casteljau(points, t):
         while len(points) > 1:
             points = (1 - t) * points[:-1] + t * points[1:]
         return np.asarray(points[0])

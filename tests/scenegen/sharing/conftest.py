@@ -1,15 +1,12 @@
 """Files of rooms that are shared, and a loader."""
 
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 from tests.support.loaders import loader
 
 
 @pytest.fixture(scope="session")
-def holey_set(make_rooms: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def holey_set(make_rooms, tmp_path_factory):
     """Return 14 images in three shards; so wide a view that some pixels show nothing."""
     folder = tmp_path_factory.mktemp("set")
     how = {"shard_size": 3}
@@ -17,6 +14,6 @@ def holey_set(make_rooms: Any, tmp_path_factory: pytest.TempPathFactory) -> Path
 
 
 @pytest.fixture
-def load(tmp_path: Path) -> Any:
+def load(tmp_path):
     """Return `datasets.load_dataset` with a cache of its own, for the split "train"."""
     return loader(tmp_path / "cache")

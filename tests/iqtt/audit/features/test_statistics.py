@@ -1,7 +1,6 @@
 """Tests of what the audit measures: by hand, and angles against the generator's."""
 
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from iqtt.shapes.polycube import ROTATIONS, mirror, symmetries
 WHITE = np.array([255, 255, 255], np.uint8)
 
 
-def rectangles() -> Any:
+def rectangles():
     """One question of white images, (1, 4, 40, 60, 3) uint8: two rectangles, a step, nothing."""
     images = np.full((1, 4, 40, 60, 3), 255, np.uint8)
     images[0, 0, 10:20, 20:50] = (51, 102, 153)
@@ -27,11 +26,11 @@ def rectangles() -> Any:
     return images
 
 
-def measured(images: Any) -> Any:
+def measured(images):
     return measure(images, silhouettes(images, WHITE))
 
 
-def test_sizes_places_and_light_are_those_reckoned_by_hand() -> None:
+def test_sizes_places_and_light_are_those_reckoned_by_hand():
     found = measured(rectangles())[0]
     assert found["area"] * 2400 == pytest.approx([300, 32, 300, 0])
     assert found["extent"] == pytest.approx(np.hypot([10, 4, 20, 0], [30, 8, 20, 0]))
@@ -45,14 +44,14 @@ def test_sizes_places_and_light_are_those_reckoned_by_hand() -> None:
     assert found["colors"].sum(axis=1) == pytest.approx([1, 1, 1, 0])
 
 
-def test_spreads_of_a_rectangle_and_the_skew_of_a_step() -> None:
+def test_spreads_of_a_rectangle_and_the_skew_of_a_step():
     moments = measured(rectangles())["moments"][0]
     assert moments[0, :2] == pytest.approx(np.sqrt((np.array([30, 10]) ** 2 - 1) / 12) / 40)
     assert moments[0, 2:] == pytest.approx([0, 0], abs=1e-4)
     assert (moments[2, 2:] > 0.01).all()
 
 
-def test_thumbnails_and_distances() -> None:
+def test_thumbnails_and_distances():
     images = rectangles()
     found = measured(images)
     assert found["thumbnails"].mean(axis=2) == pytest.approx(found["image_brightness"])
@@ -60,7 +59,7 @@ def test_thumbnails_and_distances() -> None:
     assert found["pixel_distance"][0, 0, 2] == pytest.approx(np.sqrt((apart**2).mean()) / 255)
 
 
-def test_turning_and_mirroring_an_image_change_no_outline() -> None:
+def test_turning_and_mirroring_an_image_change_no_outline():
     rng = np.random.default_rng(1)
     images = np.full((2, 4, 32, 32, 3), 255, np.uint8)
     images[:, :, 6:30, 3:20] = rng.integers(0, 2, (2, 4, 24, 17, 1)) * 255
@@ -71,7 +70,7 @@ def test_turning_and_mirroring_an_image_change_no_outline() -> None:
             assert found[name] == pytest.approx(before[name], abs=1e-6)
 
 
-def test_rounding_is_no_silhouette() -> None:
+def test_rounding_is_no_silhouette():
     images = np.ones((1, 4, 16, 16, 3), np.float32)
     images[0, 0, 3, 3] -= 1e-4
     images[0, 1, 3, 3, 1] = 0.99
@@ -84,14 +83,14 @@ class Table(SimpleNamespace):
     """What proofs look at, of the cubes of some questions, (Q, 4, n, 3)."""
 
     @property
-    def images(self) -> int:
+    def images(self):
         return self.cubes.shape[1]
 
-    def __len__(self) -> int:
+    def __len__(self):
         return len(self.cubes)
 
 
-def test_numbers_of_shapes() -> None:
+def test_numbers_of_shapes():
     rod = np.array([[x, 0, 0] for x in range(4)], np.int8)
     square = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], np.int8)
     ell = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0]], np.int8)
@@ -103,7 +102,7 @@ def test_numbers_of_shapes() -> None:
     ]
     unused = ((0, 0), (0, 0), (0, 5), (0, 0))
     cubes = np.pad(np.array(questions), unused, constant_values=NO_CUBE)
-    tables: Any = [Table(cubes=some) for some in (cubes[:2], cubes[2:])]
+    tables = [Table(cubes=some) for some in (cubes[:2], cubes[2:])]
     found = compare_shapes(tables)
     first, second = shape_statistics(
         [one.cubes for one in tables],
@@ -116,7 +115,7 @@ def test_numbers_of_shapes() -> None:
     assert second[0, :, 2].tolist() == [2, 1, 2]
 
 
-def test_angles_are_those_of_the_generator() -> None:
+def test_angles_are_those_of_the_generator():
     rng = np.random.default_rng(3)
     rod = np.array([[[x, 0, 0] for x in range(5)]], np.int8)
     shapes = np.concatenate([some_shapes(rng, 40, 5), rod.repeat(5, axis=0)])
@@ -132,7 +131,7 @@ def test_angles_are_those_of_the_generator() -> None:
     ]
     truth = {"world_from_shape": views, "angle_degrees": np.array(expected)}
     spec = SimpleNamespace(min_angle_degrees=0.0)
-    one: Any = Table(name="table", cubes=asked, truth=truth, spec=spec)
+    one = Table(name="table", cubes=asked, truth=truth, spec=spec)
     found = compare_shapes([one])
     assert (found[0].place == 0).sum() >= 35
     assert angles([one], found).status == "ok"

@@ -6,7 +6,7 @@ from iqtt.audit.probes.patterns import pattern_responses
 from iqtt.audit.probes.trees import among_others, choose
 
 
-def test_a_mark_is_found_wherever_it_is() -> None:
+def test_a_mark_is_found_wherever_it_is():
     images = 0.2 * np.random.default_rng(2).random((240, 3, 16, 16), np.float32)
     right = np.arange(240) % 3
     for k, (y, x) in enumerate(np.random.default_rng(3).integers(2, 12, (240, 2)).tolist()):
@@ -16,5 +16,5 @@ def test_a_mark_is_found_wherever_it_is() -> None:
     np.testing.assert_array_equal(pattern_responses(images), responses)
 
 
-def test_flat_pictures_respond_to_nothing() -> None:
+def test_flat_pictures_respond_to_nothing():
     assert not pattern_responses(np.ones((2, 3, 16, 16), np.float32)).any()

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,19 +10,10 @@ from scipy.stats import binomtest
 
 from iqtt.audit.features.statistics import SHAPE_STATISTICS, statistics_record
 from iqtt.audit.probes import rules
-from iqtt.audit.probes.rules import (
-    FRAMES,
-    LIGHT,
-    MIRRORED,
-    OUTLINE,
-    WITHOUT,
-    Evidence,
-    Probe,
-    run_probes,
-)
+from iqtt.audit.probes.rules import FRAMES, LIGHT, MIRRORED, OUTLINE, WITHOUT, Evidence, run_probes
 
 
-def fair(seed: int, count: int = 300, answers: int = 3, **changes: Any) -> Evidence:
+def fair(seed, count=300, answers=3, **changes):
     """Questions of noise alone, whose right answers stand at balanced places."""
     rng = np.random.default_rng(seed)
     statistics = np.zeros(count, statistics_record(1 + answers))
@@ -45,30 +35,30 @@ def fair(seed: int, count: int = 300, answers: int = 3, **changes: Any) -> Evide
 LEARNED_PIXELS = ("low-resolution pixels", "small patterns of pixels")
 
 
-def shortcuts(evidence: Evidence) -> set[tuple[str, str, str]]:
+def shortcuts(evidence):
     return {(p.statistic, p.rule, p.sees) for p in run_probes(evidence) if p.is_shortcut}
 
 
-def one(evidence: Evidence, statistic: str, rule: str, sees: str) -> Probe:
+def one(evidence, statistic, rule, sees):
     asked = (statistic, rule, sees)
     (found,) = [p for p in run_probes(evidence) if (p.statistic, p.rule, p.sees) == asked]
     return found
 
 
-def changed(evidence: Evidence, name: str, values: Any) -> Evidence:
+def changed(evidence, name, values):
     statistics = evidence.statistics.copy()
     statistics[name] = values
     return replace(evidence, statistics=statistics)
 
 
 @pytest.fixture
-def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+def quick(monkeypatch):
     """Leave out what is learned by forests."""
     monkeypatch.setattr(rules, "LEAST_QUESTIONS", 10**9)
 
 
 @pytest.mark.usefixtures("quick")
-def test_numbers_are_those_of_the_binomial_test() -> None:
+def test_numbers_are_those_of_the_binomial_test():
     found = one(fair(0), "shape's brightness", "nearest", LIGHT)
     values = fair(0).statistics["brightness"]
     nearest = np.abs(values[:, 1:] - values[:, :1]).argmin(axis=1)
@@ -83,13 +73,13 @@ def test_numbers_are_those_of_the_binomial_test() -> None:
 
 
 @pytest.mark.usefixtures("quick")
-def test_fair_questions_are_seldom_accused() -> None:
+def test_fair_questions_are_seldom_accused():
     accused = [bool(shortcuts(fair(seed, 150))) for seed in range(60)]
     # One in a hundred; more than four of sixty would happen once in two thousand runs.
     assert sum(accused) <= 4
 
 
-def test_forests_learn_nothing_from_noise() -> None:
+def test_forests_learn_nothing_from_noise():
     found = [p for seed in range(4) for p in run_probes(fair(seed)) if p.rule == "learned"]
     assert len(found) == 28, "seven learned probes, four times"
     correct, n = sum(p.correct for p in found), sum(p.n for p in found)
@@ -101,7 +91,7 @@ def test_forests_learn_nothing_from_noise() -> None:
     [("brightness", "shape's brightness", 1.02), ("extent", "silhouette's extent", 0.95)],
 )
 @pytest.mark.usefixtures("quick")
-def test_right_answers_brighter_or_smaller(name: str, title: str, factor: float) -> None:
+def test_right_answers_brighter_or_smaller(name, title, factor):
     evidence = fair(1)
     values = 1 + (evidence.statistics[name] - 1) * 0.3  # images alike to 3%
     values[np.arange(300), 1 + evidence.right] *= factor
@@ -110,7 +100,7 @@ def test_right_answers_brighter_or_smaller(name: str, title: str, factor: float)
 
 
 @pytest.mark.usefixtures("quick")
-def test_light_that_goes_with_the_shape() -> None:
+def test_light_that_goes_with_the_shape():
     evidence = fair(2)
     colors = evidence.statistics["colors"].copy()
     rows = np.arange(300)
@@ -119,7 +109,7 @@ def test_light_that_goes_with_the_shape() -> None:
 
 
 @pytest.mark.usefixtures("quick")
-def test_mirror_images_of_another_size() -> None:
+def test_mirror_images_of_another_size():
     evidence = fair(4, 600)
     rows = np.flatnonzero(evidence.mirrored >= 0)
     area = np.ones((600, 4))
@@ -129,7 +119,7 @@ def test_mirror_images_of_another_size() -> None:
 
 
 @pytest.mark.usefixtures("quick")
-def test_right_answers_like_the_reference_are_no_fault() -> None:
+def test_right_answers_like_the_reference_are_no_fault():
     evidence = fair(5)
     apart = evidence.statistics["pixel_distance"].copy()
     apart[np.arange(300), 0, 1 + evidence.right] *= 0.7
@@ -143,16 +133,16 @@ def test_right_answers_like_the_reference_are_no_fault() -> None:
     [(np.arange(300) % 3, "after the last"), (np.arange(300) % 5 % 3 // 2, "commonest")],
 )
 @pytest.mark.usefixtures("quick")
-def test_places_that_can_be_foretold(places: Any, rule: str) -> None:
+def test_places_that_can_be_foretold(places, rule):
     assert ("place", rule, WITHOUT) in shortcuts(fair(6, right=places, places=[places]))
 
 
-def test_places_are_learned_from_other_questions() -> None:
+def test_places_are_learned_from_other_questions():
     learned = rules.likely_places(np.array([1, 2, 1, 2, 1, 2]), np.array([0, 1, 2, 3, 4, 4]), 3)
     assert learned.tolist() == [0, 0, 0, 0, 2, 1]
 
 
-def test_what_only_a_forest_sees() -> None:
+def test_what_only_a_forest_sees():
     evidence = fair(7)
     thumbnails = evidence.statistics["thumbnails"].copy()
     thumbnails[np.arange(300), 1 + evidence.right, :40] += 0.25  # a corner of the image
@@ -162,7 +152,7 @@ def test_what_only_a_forest_sees() -> None:
     assert ("low-resolution pixels", "learned", WITHOUT) in found
 
 
-def test_marks_anywhere_are_seen_by_small_patterns() -> None:
+def test_marks_anywhere_are_seen_by_small_patterns():
     evidence = fair(12, 600)
     pictures = 0.5 + 0.1 * evidence.statistics["thumbnails"].reshape(600, 4, 32, 32)
     for row, (y, x) in enumerate(np.random.default_rng(0).integers(4, 28, (600, 2))):
@@ -173,13 +163,13 @@ def test_marks_anywhere_are_seen_by_small_patterns() -> None:
     )
 
 
-def test_stored_frames_that_tell_the_right_answer() -> None:
+def test_stored_frames_that_tell_the_right_answer():
     evidence = fair(13)
     evidence.frames[np.arange(300), evidence.right, 7] += 0.8  # no rule looks at this number
     assert shortcuts(evidence) == {("rotations and order of cubes", "learned", FRAMES)}
 
 
-def test_outlines_that_trees_compare_with_the_reference_are_no_fault() -> None:
+def test_outlines_that_trees_compare_with_the_reference_are_no_fault():
     evidence = fair(14)
     outline, rows = evidence.statistics["outline"].copy(), np.arange(300)
     outline[rows, 1 + evidence.right, 3] = outline[rows, 0, 3]
@@ -188,14 +178,14 @@ def test_outlines_that_trees_compare_with_the_reference_are_no_fault() -> None:
     assert shortcuts(evidence) == set()
 
 
-def test_two_answers() -> None:
+def test_two_answers():
     found = run_probes(fair(15, answers=2))
     assert {p.chance for p in found} == {1 / 2}
     assert "odd one out" not in {p.rule for p in found}
     assert not any(p.is_shortcut for p in found)
 
 
-def test_shapes_that_are_right_more_often() -> None:
+def test_shapes_that_are_right_more_often():
     evidence = fair(8)
     spread = evidence.cubes["spread of cubes"]
     spread[np.arange(300), evidence.right] += 2
@@ -205,7 +195,7 @@ def test_shapes_that_are_right_more_often() -> None:
 
 
 @pytest.mark.usefixtures("quick")
-def test_ties_are_no_answer() -> None:
+def test_ties_are_no_answer():
     evidence = fair(9, 3000)
     found = one(changed(evidence, "area", 1), "silhouette's area", "largest", WITHOUT)
     assert found.low < 1 / 3 < found.high
@@ -213,7 +203,7 @@ def test_ties_are_no_answer() -> None:
     assert one(every_first, "silhouette's area", "largest", WITHOUT).accuracy < 0.36
 
 
-def test_few_questions_or_none() -> None:
+def test_few_questions_or_none():
     assert run_probes(fair(0, 0)) == ()
     assert {p.n for p in run_probes(fair(0, 6)) if p.sees != MIRRORED} == {6}
     untold = fair(0, cubes={name: np.full((300, 3), np.nan) for name in SHAPE_STATISTICS})
@@ -221,7 +211,7 @@ def test_few_questions_or_none() -> None:
     assert not found & {*SHAPE_STATISTICS, "answers' cubes"}
 
 
-def test_scikit_learn_comes_when_it_is_needed() -> None:
+def test_scikit_learn_comes_when_it_is_needed():
     code = (
         "import iqtt.audit.audit, sys; sys.exit(not {'sklearn', 'scipy'}.isdisjoint(sys.modules))"
     )

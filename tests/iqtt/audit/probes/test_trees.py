@@ -6,12 +6,12 @@ import pytest
 from iqtt.audit.probes.trees import AnswerTrees, among_others, choose, next_to_reference
 
 
-def noise(seed: int, *shape: int) -> np.ndarray:
+def noise(seed, *shape):
     return np.random.default_rng(seed).normal(size=shape)
 
 
 @pytest.mark.parametrize("answers", [2, 3])
-def test_how_an_answer_stands_to_the_others(answers: int) -> None:
+def test_how_an_answer_stands_to_the_others(answers):
     values = noise(0, 5, answers, 2)
     found = among_others(values).reshape(5, answers, 4, 2)
     for q in range(5):
@@ -24,7 +24,7 @@ def test_how_an_answer_stands_to_the_others(answers: int) -> None:
 
 
 @pytest.mark.parametrize("answers", [2, 3])
-def test_how_an_answer_stands_to_the_reference(answers: int) -> None:
+def test_how_an_answer_stands_to_the_reference(answers):
     values, distances = noise(0, 6, 1 + answers, 4), np.abs(noise(1, 6, answers, 3))
     found = next_to_reference(values, distances)
     assert found.shape == (6, answers, 3 * 4 + 2 * 3 + 2)
@@ -38,7 +38,7 @@ def test_how_an_answer_stands_to_the_reference(answers: int) -> None:
         np.testing.assert_allclose(lead, distances[:, k] - least, atol=1e-5)
 
 
-def test_a_planted_mark_is_found_and_places_make_no_difference() -> None:
+def test_a_planted_mark_is_found_and_places_make_no_difference():
     values, right = noise(2, 400, 3, 4), np.arange(400) % 3
     values[np.arange(400), right, 1] += 2
     columns = among_others(values)
@@ -51,7 +51,7 @@ def test_a_planted_mark_is_found_and_places_make_no_difference() -> None:
     np.testing.assert_array_equal(again, scores)
 
 
-def test_no_question_helps_to_answer_itself() -> None:
+def test_no_question_helps_to_answer_itself():
     """Trees that had seen the answers would be right in nearly all questions of noise."""
     right = np.random.default_rng(4).integers(3, size=300)
     chosen = choose(among_others(noise(3, 300, 3, 20)), right)

@@ -1,7 +1,6 @@
 """Proofs of kinds: fair questions pass, and each rule is seen to be broken."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from audit_tables import audit_table
@@ -20,28 +19,23 @@ NEAR = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 1, 1], [3, 1, 1
 PAIR, MIRROR = [-1, 2, 2], [-1, 2, 1]
 
 
-def about_z(degrees: float) -> Any:
+def about_z(degrees):
     half = np.radians(degrees) / 2
     return rotation_matrix(np.array([np.cos(half), 0, 0, np.sin(half)]))
 
 
-def status(rule: Any, cubes: Any, kinds: Any, views: Any = None) -> str:
+def status(rule, cubes, kinds, views=None):
     found = audit_table([cubes], [kinds], None if views is None else np.stack(views)[None])
     return str(rule([found[0]], [found[1]]).status)
 
 
-def test_mirror_images() -> None:
+def test_mirror_images():
     views = [np.eye(3)] * 3 + [about_z(50)]
     assert status(mirror_images, [ARM, ARM, IMAGE, IMAGE], PAIR, views) == "ok"
     assert status(mirror_images, [ARM, ARM, IMAGE, NEAR], MIRROR) == "ok"
     assert status(mirror_images, [ARM, ARM, NEAR, IMAGE], MIRROR) == "FAIL"
     assert status(mirror_images, [ARM, ARM, IMAGE, NEAR], PAIR, views) == "FAIL"
-    of_another = [
-        ARM,
-        ARM,
-        NEAR,
-        mirror(NEAR[None])[0],
-    ]  # not of the right one
+    of_another = [ARM, ARM, NEAR, mirror(NEAR[None])[0]]  # not of the right one
     assert is_chiral(NEAR[None]).all()
     assert status(mirror_images, of_another, PAIR, views) == "FAIL"
     assert status(mirror_images, [ARM, ARM, IMAGE], [-1, 2]) == "ok"
@@ -50,7 +44,7 @@ def test_mirror_images() -> None:
     assert status(mirror_images, [NEAR, NEAR, ARM, IMAGE], [-1, 1, 2]) == "ok"
 
 
-def test_two_mirror_images_from_two_sides() -> None:
+def test_two_mirror_images_from_two_sides():
     least = SplitSpec().min_angle_degrees
     for apart, expected in ((least - 0.01, "FAIL"), (least + 0.01, "ok")):
         turned = IMAGE @ ROTATIONS[5].T  # another frame makes no difference
@@ -58,13 +52,13 @@ def test_two_mirror_images_from_two_sides() -> None:
         assert status(mirror_images, [ARM, ARM, IMAGE, turned], PAIR, views) == expected
 
 
-def test_answers_differ() -> None:
+def test_answers_differ():
     assert status(answers_differ, [ARM, ARM, IMAGE, IMAGE], PAIR) == "ok"
     assert status(answers_differ, [ARM, ARM, NEAR, NEAR], [-1, 1, 1]) == "FAIL"
     assert status(answers_differ, [ARM, ARM, ARM @ ROTATIONS[3].T, NEAR], [-1, 2, 2]) == "FAIL"
 
 
-def test_matched() -> None:
+def test_matched():
     pool = known_classes(9, "chain", 3.5)
     row = next(iter(matched_rows(pool)))
     first, one, two = pool[row[:3]]
@@ -85,14 +79,14 @@ def test_matched() -> None:
         assert status(matched, [first, first, other, two], [-1, 0, 3]) == "ok"
 
 
-def test_radii_of_gyration_of_a_rod() -> None:
+def test_radii_of_gyration_of_a_rod():
     """A rod of n unit cubes has the moments of a solid box of sides n, 1 and 1."""
     rod = np.array([[k, 0, 0] for k in range(4)], float)
     expected = np.sqrt(np.array([1, 1, 16]) / 12)
     np.testing.assert_allclose(proofs_of_kinds.gyration_radii(rod), expected, atol=1e-12)
 
 
-def test_unknown_shapes_are_not_judged() -> None:
+def test_unknown_shapes_are_not_judged():
     table, shapes = audit_table([[ARM, ARM, NEAR, NEAR]], [[-1, 1, 1]])
     blind = replace(shapes, whole=np.zeros(1, np.bool_))
     assert answers_differ([table], [blind]).status == "ok"

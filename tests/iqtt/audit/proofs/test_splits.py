@@ -1,7 +1,6 @@
 """Proofs of splits: the audit's own hash and table of borders against the generator's rule."""
 
 import hashlib
-from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ from audit_tables import audit_table
 
 from iqtt.audit.proofs.splits import class_splits, is_walk, splits_for_ever, splits_share_nothing
 from iqtt.questions.specs import SplitSpec
-from iqtt.shapes.chains_and_trees import Kind
 from iqtt.shapes.polycube import ROTATIONS, canonical_class, mirror
 from iqtt.shapes.splits import known_classes, split_of
 
@@ -19,7 +17,7 @@ SPLITS = ("train", "val", "test")
 @pytest.mark.parametrize(
     ("cubes", "kind"), [(4, "chain"), (7, "chain"), (8, "chain"), (6, "tree"), (7, "tree")]
 )
-def test_the_generator_and_the_audit_agree(cubes: int, kind: Kind) -> None:
+def test_the_generator_and_the_audit_agree(cubes, kind):
     classes = known_classes(cubes, kind)
     rng = np.random.default_rng(0)
     turned = mirror(classes) @ ROTATIONS[7].T
@@ -29,7 +27,7 @@ def test_the_generator_and_the_audit_agree(cubes: int, kind: Kind) -> None:
     assert len(np.unique(split)) == 3
 
 
-def test_the_hash_is_the_one_that_the_documents_state() -> None:
+def test_the_hash_is_the_one_that_the_documents_state():
     """Four cubes in a row: their canonical form is x = 0 to 3, two bytes for each, 255 after."""
     text = b"".join(bytes([x, 0]) for x in range(4)).ljust(32, b"\xff")
     number = int.from_bytes(hashlib.sha256(b"3D-IQTT split " + text).digest()[:8], "big")
@@ -38,19 +36,19 @@ def test_the_hash_is_the_one_that_the_documents_state() -> None:
     assert class_splits(rod, True).tolist() == [expected]
 
 
-def test_walks() -> None:
+def test_walks():
     assert is_walk([[0, 0, 0], [2, 0, 0], [1, 0, 0], [2, 1, 0]])
     assert not is_walk([[0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0]])
     assert is_walk([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 
 
-def question_of(shapes: Any, split: str, spec: SplitSpec | None = SplitSpec()) -> Any:
+def question_of(shapes, split, spec=SplitSpec()):
     """Ask about the first of three shapes, with the others as wrong answers."""
     cubes = np.stack([shapes[0], *shapes[:3]])[None]
     return audit_table(cubes, [[-1, 0, 0]], spec=spec, split=split)
 
 
-def test_every_shape_is_in_its_split() -> None:
+def test_every_shape_is_in_its_split():
     classes = canonical_class(known_classes(8, "chain", 3.5))
     owner = split_of(classes, True)
     fair = [question_of(classes[owner == i], name) for i, name in enumerate(SPLITS)]
@@ -63,7 +61,7 @@ def test_every_shape_is_in_its_split() -> None:
         assert splits_for_ever([table], [one]).status == expected
 
 
-def test_shapes_in_two_splits() -> None:
+def test_shapes_in_two_splits():
     from iqtt.audit.proofs.shapes import compare_shapes
 
     classes = known_classes(8, "chain", 3.5)

@@ -1,7 +1,6 @@
 """Members of the built-in families: closed surfaces, close placement bodies, and no two alike."""
 
 import hashlib
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from shape_checks import DOWN, check_body, check_centred, check_size, unit_vecto
 from scenegen.common.errors import SpecError
 from scenegen.description.scenes import FAMILY_NAMES
 from scenegen.objects.families.members import MEMBERS, member_shape
-from scenegen.objects.solids import Array, UnitShape
 
 FAMILIES = pytest.mark.parametrize("family", FAMILY_NAMES)
 # SHA-256 of members 0, 1 and 999, coordinates rounded to 1e-6. A change of geometry changes every
@@ -34,17 +32,17 @@ PIXELS = 28  # of a small view's side: objects are 40 to 60 wide in pictures of 
 VIEWS = ((35.0, 25.0), (215.0, 50.0))  # azimuth and elevation, degrees
 
 
-def spread(family: str, step: int = 37) -> Iterator[UnitShape]:
+def spread(family, step=37):
     return (member_shape(family, member) for member in range(0, MEMBERS, step))
 
 
-def welded(shape: UnitShape) -> Array:
+def welded(shape):
     """Vertex numbers (F, 3): corners at one place, to 1e-8, are one vertex."""
     places = np.round(shape.triangles.reshape(-1, 3) * 1e8).astype(np.int64)
     return np.unique(places, axis=0, return_inverse=True)[1].reshape(-1, 3)
 
 
-def pieces(shape: UnitShape) -> list[Array]:
+def pieces(shape):
     """The triangles of each connected part."""
     vertices = welded(shape)
     edges = vertices[:, [0, 1, 1, 2]].reshape(-1, 2).T
@@ -55,7 +53,7 @@ def pieces(shape: UnitShape) -> list[Array]:
 
 
 @FAMILIES
-def test_every_part_is_closed_and_faces_outwards(family: str) -> None:
+def test_every_part_is_closed_and_faces_outwards(family):
     for shape in spread(family):
         vertices = welded(shape)
         edges = np.concatenate([vertices[:, [i, (i + 1) % 3]] for i in range(3)])
@@ -69,7 +67,7 @@ def test_every_part_is_closed_and_faces_outwards(family: str) -> None:
 
 
 @FAMILIES
-def test_parts_hang_together(family: str) -> None:
+def test_parts_hang_together(family):
     """The bounding boxes of the parts form one connected group."""
     for shape in spread(family):
         parts = pieces(shape)
@@ -80,7 +78,7 @@ def test_parts_hang_together(family: str) -> None:
 
 
 @FAMILIES
-def test_normals_are_unit_and_belong_to_their_faces(family: str) -> None:
+def test_normals_are_unit_and_belong_to_their_faces(family):
     """Faces deviate from their corner normals by at most 16 degrees, except few and tiny ones."""
     wide, total = 0.0, 0.0
     for shape in spread(family):
@@ -97,7 +95,7 @@ def test_normals_are_unit_and_belong_to_their_faces(family: str) -> None:
 
 
 @FAMILIES
-def test_members_are_centred_of_radius_one_and_stand(family: str) -> None:
+def test_members_are_centred_of_radius_one_and_stand(family):
     for shape in spread(family):
         corners = shape.triangles.reshape(-1, 3)
         check_size(shape)
@@ -111,14 +109,14 @@ def test_members_are_centred_of_radius_one_and_stand(family: str) -> None:
 
 
 @FAMILIES
-def test_support_bounds_members_closely(family: str) -> None:
+def test_support_bounds_members_closely(family):
     directions = np.concatenate([unit_vectors(300), np.eye(3), -np.eye(3)])
     for shape in spread(family):
         check_body(shape, shape.triangles, 0.02, directions)
 
 
 @FAMILIES
-def test_members_are_small(family: str) -> None:
+def test_members_are_small(family):
     shapes = list(spread(family))
     assert max(len(shape.triangles) for shape in shapes) <= 4000
     rows = [len(shape.hull_points) for shape in shapes]
@@ -128,7 +126,7 @@ def test_members_are_small(family: str) -> None:
 
 
 @FAMILIES
-def test_members_look_as_they_did(family: str) -> None:
+def test_members_look_as_they_did(family):
     code = hashlib.sha256()
     for member in (0, 1, 999):
         shape = member_shape(family, member)
@@ -137,7 +135,7 @@ def test_members_look_as_they_did(family: str) -> None:
     assert code.hexdigest()[:16] == DIGESTS[family]
 
 
-def test_a_member_is_named_and_built_once() -> None:
+def test_a_member_is_named_and_built_once():
     shape = member_shape("mug", 7)
     assert shape.name == "mug/0007"
     assert member_shape("mug", 7) is shape
@@ -147,7 +145,7 @@ def test_a_member_is_named_and_built_once() -> None:
     ("family", "member", "where", "found"),
     [("cup", 0, "family", "'cup'"), ("mug", MEMBERS, "mug", "1000"), ("mug", -1, "mug", "-1")],
 )
-def test_unknown_members_are_refused(family: str, member: int, where: str, found: str) -> None:
+def test_unknown_members_are_refused(family, member, where, found):
     with pytest.raises(SpecError) as error:
         member_shape(family, member)
     assert error.value.where == where
@@ -155,7 +153,7 @@ def test_unknown_members_are_refused(family: str, member: int, where: str, found
     assert error.value.expected
 
 
-def view_rays() -> tuple[Array, Array]:
+def view_rays():
     """Parallel rays through the pixels of all views, float32."""
     steps = (np.arange(PIXELS) + 0.5) / PIXELS * 2 - 1
     x, y = (v.reshape(-1, 1) for v in np.meshgrid(steps, -steps))
@@ -170,7 +168,7 @@ def view_rays() -> tuple[Array, Array]:
     return np.concatenate(origins, dtype=np.float32), np.concatenate(directions, dtype=np.float32)
 
 
-def least_difference(family: str, step: int) -> tuple[float, float]:
+def least_difference(family, step):
     """Return least and median share of pixels in which members differ from their most similar one.
 
     Pixels are those that either covers in small depth images; depths differ by over 0.03.
@@ -195,7 +193,7 @@ def least_difference(family: str, step: int) -> tuple[float, float]:
     ("step", "typical"), [(10, 0.25), pytest.param(1, 0.2, marks=pytest.mark.slow)]
 )
 @FAMILIES
-def test_members_are_visibly_different(family: str, step: int, typical: float) -> None:
+def test_members_are_visibly_different(family, step, typical):
     least, median = least_difference(family, step)
     assert least > 0.01
     assert median > typical

@@ -19,7 +19,7 @@ from scenegen.objects.families.parts.profiles import (
     tightest,
     wave,
 )
-from scenegen.objects.families.parts.surfaces import Part, loft
+from scenegen.objects.families.parts.surfaces import loft
 from scenegen.objects.families.parts.sweeps import tube
 from scenegen.objects.families.parts.walls import hollow, ring, shell
 from scenegen.objects.solids import UnitShape
@@ -34,13 +34,13 @@ CURVES = {
 }
 
 
-def volume(part: Part) -> float:
+def volume(part):
     a, b, c = (part.triangles[:, i] for i in range(3))
     return float(np.einsum("fi,fi->", a, np.cross(b, c)) / 6)
 
 
 @pytest.mark.parametrize("name", CURVES)
-def test_tangents_point_along_their_curve(name: str) -> None:
+def test_tangents_point_along_their_curve(name):
     """A chord lies between the tangents at its ends, or is parallel to both."""
     points, tangents = CURVES[name]
     along = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
@@ -53,21 +53,21 @@ def test_tangents_point_along_their_curve(name: str) -> None:
     assert (middle * chords).sum(axis=1).min() > np.cos(np.radians(6))
 
 
-def test_a_fillet_keeps_its_ends_and_its_radius() -> None:
+def test_a_fillet_keeps_its_ends_and_its_radius():
     points, _ = CURVES["fillet"]
     np.testing.assert_allclose(points[[0, -1]], [(0.0, 0.0), (0.0, 3.0)], atol=1e-12)
     assert tightest(CURVES["fillet"]) == pytest.approx(0.3, rel=0.02)
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).min() > 1e-6
 
 
-def test_insets_lie_on_the_left_and_meet_at_creases() -> None:
+def test_insets_lie_on_the_left_and_meet_at_creases():
     points, _ = inset(arc((0.0, 0.0), 1.0, 0, 90, 8), 0.25)
     np.testing.assert_allclose(np.hypot(*points.T), 0.75, atol=1e-12)
     points, _ = inset(line((1.0, 0.0), (1.0, 2.0), (0.0, 2.0)), 0.25)
     np.testing.assert_allclose(points, [(0.75, 0), (0.75, 1.75), (0.75, 1.75), (0, 1.75)])
 
 
-def test_hull_rows_are_the_corners_in_any_order() -> None:
+def test_hull_rows_are_the_corners_in_any_order():
     corners = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)]
     inner = [(1.0, 0.0), (1.0, 0.5), (2.0, 0.5), (0.0, 0.0), (2.0, 1.0 - 1e-17)]
     points = np.array(corners + inner)
@@ -76,13 +76,13 @@ def test_hull_rows_are_the_corners_in_any_order() -> None:
     assert {tuple(points[::-1][i]) for i in found} == set(corners)
 
 
-def test_an_upright_line_keeps_its_ends_although_rounding_bends_it() -> None:
+def test_an_upright_line_keeps_its_ends_although_rounding_bends_it():
     y = np.linspace(0.0, 1.0, 30)
     points = np.stack([0.3 + 1e-17 * np.arange(30) + 5e-17 * (-1) ** np.arange(30), y], axis=1)
     assert {0, 29} <= set(hull_rows(points))
 
 
-def test_lofts_have_the_volume_of_their_formula() -> None:
+def test_lofts_have_the_volume_of_their_formula():
     n = 40
     polygon = n / 2 * math.sin(2 * math.pi / n)  # the area of the disc's polygon
     assert volume(loft(line((0.5, 0.0), (0.5, 2.0)))) == pytest.approx(0.5 * polygon)
@@ -101,7 +101,7 @@ def test_lofts_have_the_volume_of_their_formula() -> None:
     assert volume(hoop) == pytest.approx(2 * polygon * (1 - 0.75**2))
 
 
-def test_lofted_normals_are_the_smooth_surface_s() -> None:
+def test_lofted_normals_are_the_smooth_surface_s():
     ball = loft(arc((0.0, 0.0), 1.0, -90, 90, 16))
     np.testing.assert_allclose(ball.normals, ball.triangles, atol=1e-12)
     cone = loft(line((1.0, 0.0), (0.5, 2.0)), lean=(0.25, 0.0))
@@ -113,7 +113,7 @@ def test_lofted_normals_are_the_smooth_surface_s() -> None:
     np.testing.assert_allclose(x[x[:, 0].argmin()], steep, atol=1e-12)
 
 
-def test_tubes_have_the_volume_and_the_normals_of_a_torus() -> None:
+def test_tubes_have_the_volume_and_the_normals_of_a_torus():
     bend = tube(arc((0.0, 0.0), 1.0, 0, 180, 60), 0.2, segments=40)
     assert volume(bend) == pytest.approx(math.pi * math.pi * 0.04, rel=0.01)
     middle = bend.triangles.copy()
@@ -127,7 +127,7 @@ def test_tubes_have_the_volume_and_the_normals_of_a_torus() -> None:
     assert np.ptp(flat.triangles[..., 2]) == pytest.approx(1.0), "half_width is across the plane"
 
 
-def test_bodies_hold_their_parts_closely() -> None:
+def test_bodies_hold_their_parts_closely():
     bow = arc((0.0, 0.0), 1.0, 0, 200, 24)
     parts = {
         "loft": loft(CURVES["line"], size=(1.3, 1.0), corner=0.4),
@@ -143,7 +143,7 @@ def test_bodies_hold_their_parts_closely() -> None:
         check_body(shape, part.triangles, 0.02, unit_vectors(200))
 
 
-def test_boxes_are_flat_and_moves_are_rigid() -> None:
+def test_boxes_are_flat_and_moves_are_rigid():
     part = boxes([box((0, 0, 0), (1, 2, 3)), box((5, 0, 0), (6, 1, 1), (0.5, 0.5), (0.5, 0.5))])
     assert volume(part) == pytest.approx(6 + (1 + 0.5 + 0.25) / 3)
     np.testing.assert_allclose(np.linalg.norm(part.normals, axis=-1), 1.0)
@@ -155,7 +155,7 @@ def test_boxes_are_flat_and_moves_are_rigid() -> None:
     assert len(buried(part).hull_points) == 0
 
 
-def test_walls_are_as_thick_as_asked() -> None:
+def test_walls_are_as_thick_as_asked():
     """Volumes of a bucket with half a torus as its rim, and of a dome: outside minus inside."""
     polygon = 20 * math.sin(2 * math.pi / 40)
     bucket = loft(hollow(line((1.0, 0.0), (1.0, 2.0)), 0.2))
@@ -165,7 +165,7 @@ def test_walls_are_as_thick_as_asked() -> None:
     assert volume(dome) == pytest.approx(2 / 3 * math.pi * (1 - 0.9**3), rel=0.02)
 
 
-def test_assembled_parts_are_centred_and_scaled() -> None:
+def test_assembled_parts_are_centred_and_scaled():
     pair = [boxes([box((0, 0, 0), (6, 2, 3))]), boxes([box((0, 1, 0), (1, 4, 1))])]
     shape = assemble("pair", pair)
     low, high = shape.triangles.min(axis=(0, 1)), shape.triangles.max(axis=(0, 1))

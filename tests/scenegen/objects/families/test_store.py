@@ -16,14 +16,14 @@ MUG = ("mug", 7)
 
 
 @pytest.fixture
-def made(monkeypatch: pytest.MonkeyPatch) -> Mock:
+def made(monkeypatch):
     """Its `call_count` says how often a member was made, not read from the cache."""
     counted = Mock(wraps=make_member)
     monkeypatch.setattr(store, "make_member", counted)
     return counted
 
 
-def check(members: MemberStore) -> None:
+def check(members):
     shape = make_member(*MUG)
     outline, face_count = members.outline(*MUG)
     assert (outline.name, face_count) == (shape.name, len(shape.triangles))
@@ -35,7 +35,7 @@ def check(members: MemberStore) -> None:
         np.testing.assert_array_equal(getattr(mesh, name), getattr(expected, name))
 
 
-def test_a_member_is_made_once_and_comes_back_as_it_was(tmp_path: Path, made: Mock) -> None:
+def test_a_member_is_made_once_and_comes_back_as_it_was(tmp_path, made):
     for _ in range(2):
         check(MemberStore(tmp_path))
     assert made.call_count == 1
@@ -45,9 +45,7 @@ def test_a_member_is_made_once_and_comes_back_as_it_was(tmp_path: Path, made: Mo
     assert made.call_count == 2
 
 
-def test_without_a_folder_only_the_last_meshes_are_kept(
-    made: Mock, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_a_folder_only_the_last_meshes_are_kept(made, monkeypatch):
     monkeypatch.setattr(store, "MOST_FACES_KEPT", 1)
     members = MemberStore()
     check(members)
@@ -58,16 +56,14 @@ def test_without_a_folder_only_the_last_meshes_are_kept(
 
 
 @pytest.mark.parametrize("member", [("cup", 1), ("mug", -1), ("mug", 1000), ("../mug", 1)])
-def test_unknown_members_are_refused(member: tuple[str, int], tmp_path: Path) -> None:
+def test_unknown_members_are_refused(member, tmp_path):
     for ask in (MemberStore(tmp_path).outline, MemberStore(tmp_path).mesh):
         with pytest.raises(SpecError):
             ask(*member)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_other_code_has_entries_of_its_own(
-    tmp_path: Path, made: Mock, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_other_code_has_entries_of_its_own(tmp_path, made, monkeypatch):
     MemberStore(tmp_path).mesh(*MUG)
     monkeypatch.setattr(np, "__version__", "0.0")
     code_version.cache_clear()
@@ -79,10 +75,10 @@ def test_other_code_has_entries_of_its_own(
     assert len(list(tmp_path.iterdir())) == 2
 
 
-def test_the_version_depends_on_all_that_makes_members(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_version_depends_on_all_that_makes_members(monkeypatch):
     read, seen = Path.read_bytes, list[str]()
 
-    def noted(path: Path) -> bytes:
+    def noted(path):
         seen.append(path.name)
         return read(path)
 

@@ -4,13 +4,11 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import trimesh
-from click.testing import Result
 
 from scenegen.objects.meshes.check import ModelCheck, check_models
 from scenegen.objects.meshes.folders import open_objects
@@ -22,7 +20,7 @@ PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH = 24, 1, 2
 
 
 @pytest.fixture
-def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def root(tmp_path, monkeypatch):
     """Two classes: four good boxes, one with a double face, one empty file, one with no faces."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
     root = tmp_path / "models"
@@ -40,7 +38,7 @@ def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return root
 
 
-def test_table_and_json(run: Callable[..., Result], root: Path, tmp_path: Path) -> None:
+def test_table_and_json(run, root, tmp_path):
     result = run("check-objects", root, "--json", "out.json", "--up", "z")
     assert result.exit_code == 0, result.output
     assert [line.split() for line in result.stdout.splitlines()[:4]] == [
@@ -62,9 +60,7 @@ def test_table_and_json(run: Callable[..., Result], root: Path, tmp_path: Path) 
     assert len(list((tmp_path / "xdg/pix2shape-bench/meshes").iterdir())) == 4, "equal files: one"
 
 
-def test_equal_files_in_two_splits_are_an_error(
-    run: Callable[..., Result], refuses: Callable[..., str], root: Path
-) -> None:
+def test_equal_files_in_two_splits_are_an_error(run, refuses, root):
     (root / "caf\u00e9" / "copy.off").write_bytes((root / "box" / "b.off").read_bytes())
     assert object_split("b") == object_split("copy")
     assert run("check-objects", root).exit_code == 0
@@ -76,7 +72,7 @@ def test_equal_files_in_two_splits_are_an_error(
         refuses(*command, "--object-split", split, words=("d.off", "two splits"))
 
 
-def test_exit_codes(run: Callable[..., Result], refuses: Callable[..., str], root: Path) -> None:
+def test_exit_codes(run, refuses, root):
     """1 where no model can be used, 2 where the request makes no sense."""
     (root / "bad").mkdir()
     (root / "bad" / "x.stl").write_text("solid")
@@ -86,9 +82,7 @@ def test_exit_codes(run: Callable[..., Result], refuses: Callable[..., str], roo
 
 
 @pytest.mark.parametrize("inside", ["model.obj", "models/model_normalized.obj"])
-def test_a_shapenet_model_without_a_file_is_refused(
-    run: Callable[..., Result], root: Path, tmp_path: Path, inside: str
-) -> None:
+def test_a_shapenet_model_without_a_file_is_refused(run, root, tmp_path, inside):
     for model_id in ("1a", "2b"):
         path = tmp_path / "net" / "03797390" / model_id / inside
         path.parent.mkdir(parents=True)
@@ -100,7 +94,7 @@ def test_a_shapenet_model_without_a_file_is_refused(
     assert "refused  mug/3c: " in result.stdout
 
 
-def test_jobs_give_what_one_gives(root: Path, tmp_path: Path) -> None:
+def test_jobs_give_what_one_gives(root, tmp_path):
     folder, ticks = open_objects(root), []
     alone = check_models(folder, None, 1, ticks.append)
     together = check_models(folder, tmp_path / "cache", 3, ticks.append)
@@ -137,14 +131,14 @@ check.check_models(open_objects(sys.argv[1]), None, 2)
 """
 
 
-def python(*arguments: object) -> subprocess.CompletedProcess[str]:
+def python(*arguments):
     told, env = list(map(str, arguments)), os.environ | {"PYTHONPATH": str(ROOT)}
     return subprocess.run(
         [sys.executable, *told], capture_output=True, text=True, check=False, timeout=120, env=env
     )
 
 
-def test_a_model_that_crashes_its_process_is_refused_alone(tmp_path: Path) -> None:
+def test_a_model_that_crashes_its_process_is_refused_alone(tmp_path):
     (tmp_path / "models" / "box").mkdir(parents=True)
     for i in range(6):
         text = BOX.export(file_type="off") + ("# deadly\n" if i in (3, 4) else "")
@@ -156,7 +150,7 @@ def test_a_model_that_crashes_its_process_is_refused_alone(tmp_path: Path) -> No
     assert done.stdout.count("process") == 2
 
 
-def test_an_unguarded_script_is_told_so(root: Path, tmp_path: Path) -> None:
+def test_an_unguarded_script_is_told_so(root, tmp_path):
     (tmp_path / "script.py").write_text(UNGUARDED)
     done = python(tmp_path / "script.py", root)
     assert done.returncode == 1
@@ -165,9 +159,7 @@ def test_an_unguarded_script_is_told_so(root: Path, tmp_path: Path) -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="uses Linux system calls")
 @pytest.mark.parametrize("jobs", ["1", "2"])
-def test_an_unreadable_file_is_refused_and_a_locked_cache_costs_one_warning(
-    root: Path, jobs: str
-) -> None:
+def test_an_unreadable_file_is_refused_and_a_locked_cache_costs_one_warning(root, jobs):
     """Root gives up its rights over files, so that this tests something for root too."""
     (root / "box" / "a.off").chmod(0)
     cache = root.parent / "locked"
@@ -186,7 +178,7 @@ os.execv(sys.executable, [sys.executable, "-c", "import cli; cli.scenegen()", *s
     assert done.stderr.count("\n") == 1
 
 
-def test_seams_and_unused_vertices_do_not_count_as_mended() -> None:
+def test_seams_and_unused_vertices_do_not_count_as_mended():
     harmless = {"merged_vertices": 9, "unused_vertices": 9}
     assert not ModelCheck("a/b", True, "", 1, harmless).was_mended
     assert ModelCheck("a/b", True, "", 1, {"degenerate_faces": 1}).was_mended

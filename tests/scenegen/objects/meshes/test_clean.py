@@ -1,22 +1,19 @@
 """Cleaning: every defect of real meshes on a small example, and the surface that is left."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 import trimesh
 from shape_checks import check_centred, first_hits, rays_inwards, unit_triangles
 
 from scenegen.objects.meshes import clean
-from scenegen.objects.meshes.clean import CleanMesh, clean_mesh
+from scenegen.objects.meshes.clean import clean_mesh
 from scenegen.objects.meshes.errors import BadMeshError
-from scenegen.objects.solids import Array
 
 BALL = trimesh.creation.icosphere(subdivisions=2)
 BOX = trimesh.creation.box((1.0, 2.0, 3.0))
 
 
-def check_whole(mesh: CleanMesh) -> None:
+def check_whole(mesh):
     """Check what holds for every clean mesh."""
     vertices = mesh.vertices.astype(float)
     assert mesh.vertices.dtype == np.float32
@@ -34,7 +31,7 @@ def check_whole(mesh: CleanMesh) -> None:
     assert not np.signbit(mesh.vertices[mesh.vertices == 0]).any()
 
 
-def same_surface(a: Array, b: Array) -> None:
+def same_surface(a, b):
     """Check that rays see no difference, but for a few that graze an edge of the silhouette."""
     one, two = (first_hits(triangles, *rays_inwards(3000))[0] for triangles in (a, b))
     assert np.isfinite(one).mean() > 0.2, "the rays miss: a weak test"
@@ -44,14 +41,14 @@ def same_surface(a: Array, b: Array) -> None:
 
 @pytest.mark.parametrize("scale", [1e-20, 0.3, 1.0, 2000.0, 1e20])
 @pytest.mark.parametrize("shift", [(0, 0, 0), (5e3, -7e3, 1e4)])
-def test_odd_scales_and_places(scale: float, shift: tuple[float, ...]) -> None:
+def test_odd_scales_and_places(scale, shift):
     mesh = clean_mesh((BOX.vertices + shift) * scale, BOX.faces)
     check_whole(mesh)
     np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), np.array([2, 4, 6]) / 14**0.5)
     assert sum(mesh.mended.values()) == 0
 
 
-def test_z_up_is_turned_not_mirrored() -> None:
+def test_z_up_is_turned_not_mirrored():
     mesh = clean_mesh(BOX.vertices, BOX.faces, "z")
     np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), np.array([2, 6, 4]) / 14**0.5)
     vertices = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)  # front is -y, up is z
@@ -63,12 +60,12 @@ def test_z_up_is_turned_not_mirrored() -> None:
     np.testing.assert_allclose(back, (-1, -1, -1) / np.sqrt(3), atol=1e-6)
 
 
-def with_nan(v: Array, f: Array) -> tuple[Array, Array]:
+def with_nan(v, f):
     more = np.array([(np.nan, 0, 0), (np.inf, 1, 1), (1e300, 0, 0)])
     return np.concatenate([v, more]), np.concatenate([f, len(v) + np.array([(0, 0, 1), (1, 2, 2)])])
 
 
-DEFECTS: dict[str, tuple[Callable[[Array, Array], tuple[Array, Array]], dict[str, int]]] = {
+DEFECTS = {
     "not merged": (lambda v, f: (v[f].reshape(-1, 3), np.arange(f.size)), {"merged_vertices": 798}),
     "inverted winding": (lambda v, f: (v, f[:, ::-1]), {}),
     "mixed winding": (lambda v, f: (v, np.concatenate([f[::2], f[1::2, ::-1]])), {}),
@@ -112,9 +109,7 @@ DEFECTS: dict[str, tuple[Callable[[Array, Array], tuple[Array, Array]], dict[str
 
 
 @pytest.mark.parametrize(("break_it", "expected"), DEFECTS.values(), ids=DEFECTS.keys())
-def test_defects_are_mended_and_counted(
-    break_it: Callable[[Array, Array], tuple[Array, Array]], expected: dict[str, int]
-) -> None:
+def test_defects_are_mended_and_counted(break_it, expected):
     mesh = clean_mesh(*break_it(np.array(BALL.vertices), np.array(BALL.faces)))
     check_whole(mesh)
     assert {name: count for name, count in mesh.mended.items() if count} == expected
@@ -122,14 +117,14 @@ def test_defects_are_mended_and_counted(
     same_surface(mesh.vertices[mesh.faces], unit_triangles(BALL))
 
 
-def test_what_is_clean_stays_as_it_is_to_the_bit() -> None:
+def test_what_is_clean_stays_as_it_is_to_the_bit():
     once = clean_mesh(BALL.vertices, BALL.faces)
     twice = clean_mesh(once.vertices, once.faces)
     np.testing.assert_array_equal(twice.vertices, once.vertices)
     np.testing.assert_array_equal(twice.faces, once.faces)
 
 
-def test_edges_of_three_faces_and_lone_corners_may_stay() -> None:
+def test_edges_of_three_faces_and_lone_corners_may_stay():
     """Not manifold: three sheets at one edge, and two boxes that share a corner."""
     sheets = np.array([(0, 0, 0), (0, 1, 0), (1, 0, 0), (-1, 0.5, 1), (-1, 0.5, -1)], float)
     mesh = clean_mesh(sheets, [(0, 1, 2), (0, 1, 3), (0, 1, 4)])
@@ -158,9 +153,7 @@ def test_edges_of_three_faces_and_lone_corners_may_stay() -> None:
         (BOX.vertices, np.zeros((2_000_001, 3), int), "faces", "2000001"),
     ],
 )
-def test_what_cannot_be_used_is_refused_with_a_reason(
-    vertices: Array, faces: Array, where: str, found: str
-) -> None:
+def test_what_cannot_be_used_is_refused_with_a_reason(vertices, faces, where, found):
     with pytest.raises(BadMeshError) as refused:
         clean_mesh(vertices, faces)
     assert refused.value.where == where

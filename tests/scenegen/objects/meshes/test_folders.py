@@ -5,14 +5,13 @@ import json
 import pickle
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 from unittest.mock import Mock
 
 import pytest
 
 from scenegen.objects.meshes.errors import MeshFolderError
 from scenegen.objects.meshes.folders import open_models, open_objects
-from scenegen.objects.meshes.listing import ModelFile, ModelFolder, object_split
+from scenegen.objects.meshes.listing import ModelFile, object_split
 from scenegen.objects.meshes.shapenet import open_shapenet
 
 Make = Callable[..., Path]
@@ -21,10 +20,10 @@ MUG, BOWL, PLANE = "03797390", "02880940", "02691156"
 
 
 @pytest.fixture
-def make(tmp_path: Path) -> Make:
+def make(tmp_path):
     """Write empty files of the given names below a folder."""
 
-    def files(*names: str, root: str = "root") -> Path:
+    def files(*names, root="root"):
         for name in names:
             path = tmp_path / root / name
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -35,10 +34,10 @@ def make(tmp_path: Path) -> Make:
 
 
 @pytest.fixture
-def shapenet(make: Make) -> Callable[..., Path]:
+def shapenet(make):
     """Lay out empty models: three mugs, two bowls and a plane."""
 
-    def lay(version: int, root: str = "root") -> Path:
+    def lay(version, root="root"):
         ids = [(MUG, "b"), (MUG, "a"), (MUG, "c"), (BOWL, "x"), (BOWL, "a"), (PLANE, "p")]
         extra = f"{MUG}/a/models/model_normalized.mtl", f"{MUG}/a/images/t.jpg", "README.txt"
         return make(*(f"{s}/{i}/{INSIDE[version]}" for s, i in ids), *extra, root=root)
@@ -46,15 +45,13 @@ def shapenet(make: Make) -> Callable[..., Path]:
     return lay
 
 
-def names_of(folder: ModelFolder) -> list[str]:
+def names_of(folder):
     return [file.name for name in folder.classes for file in folder.models[name]]
 
 
 @pytest.mark.parametrize("version", [1, 2])
 @pytest.mark.parametrize("opened", [open_shapenet, open_models])
-def test_shapenet_of_both_versions(
-    shapenet: Callable[..., Path], version: int, opened: Callable[..., ModelFolder]
-) -> None:
+def test_shapenet_of_both_versions(shapenet, version, opened):
     root = shapenet(version)
     found = opened(root)
     assert (found.kind, found.up) == (f"shapenet-v{version}", "y")
@@ -81,7 +78,7 @@ TREE = {
 
 
 @pytest.mark.parametrize("taxonomy", [FLAT, TREE], ids=["flat", "tree"])
-def test_names_from_the_taxonomy(shapenet: Callable[..., Path], taxonomy: Any) -> None:
+def test_names_from_the_taxonomy(shapenet, taxonomy):
     root = shapenet(2)
     (root / "taxonomy.json").write_text(json.dumps(taxonomy), encoding="utf-8-sig")
     found = open_shapenet(root)
@@ -94,21 +91,21 @@ def test_names_from_the_taxonomy(shapenet: Callable[..., Path], taxonomy: Any) -
     assert refused.value.expected == "JSON"
 
 
-def test_one_name_for_two_synsets(make: Make) -> None:
+def test_one_name_for_two_synsets(make):
     root = make(f"{PLANE}/a/model.obj", "01234567/a/model.obj")
     taxonomy = [{"synsetId": s, "name": "a/b  c,x"} for s in (PLANE, "01234567")]
     (root / "taxonomy.json").write_text(json.dumps(taxonomy))
     assert open_shapenet(root).classes == ("a b c", f"a b c {PLANE}")
 
 
-def test_splits_by_hash() -> None:
+def test_splits_by_hash():
     """70, 10 and 20 percent, by a rule that must never change."""
     for model_id in ("a", "caf\u00e9", "1a2b3c", ""):
         tenth = int(hashlib.sha256(model_id.encode()).hexdigest()[:16], 16) % 10
         assert object_split(model_id) == (["train"] * 7 + ["val"] + ["test"] * 2)[tenth]
 
 
-def test_a_split_is_a_part(make: Make) -> None:
+def test_a_split_is_a_part(make):
     root = make(*(f"{c}/{i}.obj" for c in ("one", "two") for i in range(99)))
     parts = [open_objects(root, split=name) for name in ("train", "val", "test")]
     together = sorted(name for part in parts for name in names_of(part))
@@ -117,7 +114,7 @@ def test_a_split_is_a_part(make: Make) -> None:
     assert len({part.digest() for part in parts}) == 3
 
 
-def test_the_official_splits_go_before_the_hash(shapenet: Callable[..., Path]) -> None:
+def test_the_official_splits_go_before_the_hash(shapenet):
     """A model missing from the list is in no split; synsets may have lost leading zeros."""
     root = shapenet(1)
     rows = ["id,synsetId,subSynsetId,modelId,split", f"1,{MUG},{MUG},a,test", f"2,{MUG[1:]},,b,VAL"]
@@ -133,7 +130,7 @@ def test_the_official_splits_go_before_the_hash(shapenet: Callable[..., Path]) -
     assert "split" in refused.value.expected
 
 
-def test_plain_folders(make: Make) -> None:
+def test_plain_folders(make):
     """Files of any depth; files that differ in suffix are one object; no hidden files."""
     root = make(
         "mug/b.obj", "mug/a.PLY", "mug/deep/er/c.stl", "mug/twin.glb", "mug/twin.off", "mug/t.mtl",
@@ -151,7 +148,7 @@ def test_plain_folders(make: Make) -> None:
     assert open_models(root).kind == "folder"
 
 
-def test_links_are_followed_to_classes_and_files_but_not_in_circles(make: Make) -> None:
+def test_links_are_followed_to_classes_and_files_but_not_in_circles(make):
     root = make("mug/a.obj", "mug/in/b.obj")
     (root / "mug" / "in" / "up").symlink_to(root)
     (root / "mug" / "self").symlink_to(root / "mug" / "self")
@@ -165,7 +162,7 @@ def test_links_are_followed_to_classes_and_files_but_not_in_circles(make: Make) 
     assert open_models(root).kind == "folder"
 
 
-def test_names_that_are_not_utf8_can_be_stored(make: Make) -> None:
+def test_names_that_are_not_utf8_can_be_stored(make):
     root = make("mug/a.obj")
     (root / "mug").joinpath("caf\udce9.obj").touch()
     found = open_objects(root)
@@ -175,7 +172,7 @@ def test_names_that_are_not_utf8_can_be_stored(make: Make) -> None:
     assert open_objects(root, split=object_split("caf\\xe9")).models["mug"]
 
 
-def test_a_copy_in_another_format_moves_no_object_to_another_split(make: Make) -> None:
+def test_a_copy_in_another_format_moves_no_object_to_another_split(make):
     root = make(*(f"c/{i}.obj" for i in range(20)))
     before = {name: names_of(open_objects(root, split=name)) for name in ("train", "test")}
     make(*(f"c/{i}.{suffix}" for i in range(20) for suffix in ("stl", "PLY")))
@@ -183,7 +180,7 @@ def test_a_copy_in_another_format_moves_no_object_to_another_split(make: Make) -
     assert len(open_objects(root).unused) == 40
 
 
-def test_the_digest_is_of_names_not_of_paths(shapenet: Callable[..., Path], make: Make) -> None:
+def test_the_digest_is_of_names_not_of_paths(shapenet, make):
     one, two = open_shapenet(shapenet(1)), open_shapenet(shapenet(1, "elsewhere"))
     assert one.digest() == two.digest()
     assert len(one.digest()) == 64
@@ -196,12 +193,12 @@ def test_the_digest_is_of_names_not_of_paths(shapenet: Callable[..., Path], make
     assert len({other.digest() for other in [one, *others]}) == 7
 
 
-def test_refusals(shapenet: Callable[..., Path], make: Make) -> None:
+def test_refusals(shapenet, make):
     net, plain = shapenet(1), make("mug/a.obj", "bowl/x.txt", root="plain")
     gutted, empty = make(f"{MUG}/a/x.txt", root="gutted"), make("x.txt", root="empty")
     flat, textual = make("a.obj", "b.ply", root="flat"), make("mug/readme.txt", root="textual")
     other = next(s for s in ("train", "val", "test") if s != object_split("a"))
-    cases: list[tuple[Callable[..., ModelFolder], tuple[Any, ...], str, str]] = [
+    cases = [
         (open_models, (net / "none",), "none: no such folder", ""),
         (open_models, ("~no_such_user/x",), "no home folder", ""),
         (open_objects, (empty / "x.txt",), "x.txt: is not a folder", ""),
@@ -228,9 +225,7 @@ def test_refusals(shapenet: Callable[..., Path], make: Make) -> None:
         assert refused.value.expected or refused.value.hint, arguments
 
 
-def test_files_and_folders_that_cannot_be_read(
-    shapenet: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_files_and_folders_that_cannot_be_read(shapenet, monkeypatch):
     root = shapenet(1)
     with pytest.raises(MeshFolderError):
         open_objects(root / ("x" * 5000))

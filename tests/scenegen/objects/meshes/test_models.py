@@ -1,6 +1,5 @@
 """Models from files: cleaned once, named by the file's content, refused with a reason."""
 
-from pathlib import Path
 from unittest.mock import Mock
 
 import numpy as np
@@ -14,26 +13,26 @@ from scenegen.objects.meshes.models import content_hash, load_model
 
 
 @pytest.fixture
-def ball(tmp_path: Path) -> Path:
+def ball(tmp_path):
     path = tmp_path / "ball.ply"
     path.write_bytes(trimesh.creation.icosphere(subdivisions=2).export(file_type="ply"))
     return path
 
 
 @pytest.fixture
-def disk(tmp_path: Path) -> DiskCache:
+def disk(tmp_path):
     return DiskCache(tmp_path / "cache")
 
 
 @pytest.fixture
-def cleaned(monkeypatch: pytest.MonkeyPatch) -> Mock:
+def cleaned(monkeypatch):
     """Its `call_count` says how often a model was cleaned, not read from the cache."""
     counted = Mock(wraps=models.clean_mesh)
     monkeypatch.setattr(models, "clean_mesh", counted)
     return counted
 
 
-def test_a_model_is_cleaned_once(ball: Path, disk: DiskCache, cleaned: Mock) -> None:
+def test_a_model_is_cleaned_once(ball, disk, cleaned):
     fresh, kept = load_model(ball, "y", disk), load_model(ball, "y", disk)
     assert cleaned.call_count == 1
     for name, kind in (("vertices", "float32"), ("faces", "int32"), ("hull_points", "float64")):
@@ -43,9 +42,7 @@ def test_a_model_is_cleaned_once(ball: Path, disk: DiskCache, cleaned: Mock) -> 
     assert kept.digest == fresh.digest == content_hash(ball.read_bytes(), ".ply", "y")
 
 
-def test_what_a_model_was_made_from_is_in_its_key(
-    ball: Path, disk: DiskCache, cleaned: Mock, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_model_was_made_from_is_in_its_key(ball, disk, cleaned, monkeypatch):
     """The key depends on up axis, suffix, content and cleaning version, but not on the path."""
     load_model(ball, "y", disk)
     copy = ball.with_name("copy.PLY")
@@ -61,9 +58,7 @@ def test_what_a_model_was_made_from_is_in_its_key(
     assert content_hash(b"", ".obj", "y") != content_hash(b"", ".off", "y")
 
 
-def test_refusals_are_kept_with_their_reasons(
-    tmp_path: Path, disk: DiskCache, cleaned: Mock
-) -> None:
+def test_refusals_are_kept_with_their_reasons(tmp_path, disk, cleaned):
     bad = tmp_path / "bad.obj"
     bad.write_text("v 0 0 0\n")
     reasons = set()
@@ -80,9 +75,7 @@ def test_refusals_are_kept_with_their_reasons(
 @pytest.mark.parametrize(
     ("error", "where"), [(MemoryError(), "model"), (np.linalg.LinAlgError("odd"), "cleaning")]
 )
-def test_errors_that_are_not_the_file_s_are_not_kept(
-    error: Exception, where: str, ball: Path, disk: DiskCache, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_errors_that_are_not_the_file_s_are_not_kept(error, where, ball, disk, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(models, "clean_mesh", Mock(side_effect=error))
         with pytest.raises(BadMeshError) as refused:

@@ -1,8 +1,6 @@
 """Models as unit shapes: their surface, their hull, and the store that keeps them."""
 
 import threading
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,7 +24,7 @@ from scenegen.objects.meshes.store import MeshStore
 from scenegen.objects.solids import UnitShape
 
 
-def bumpy(seed: int, faces: int = 1280) -> trimesh.Trimesh:
+def bumpy(seed, faces=1280):
     """A ball with dents, off its centre, without any symmetry."""
     mesh = trimesh.creation.icosphere(subdivisions={320: 2, 1280: 3, 5120: 4, 81920: 6}[faces])
     rng = np.random.default_rng(seed)
@@ -36,7 +34,7 @@ def bumpy(seed: int, faces: int = 1280) -> trimesh.Trimesh:
 
 
 @pytest.fixture
-def models(tmp_path: Path) -> Path:
+def models(tmp_path):
     root = tmp_path / "models"
     for name, seeds in (("odd", range(4)), ("other", range(4, 6))):
         (root / name).mkdir(parents=True)
@@ -47,11 +45,11 @@ def models(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def opened(models: Path, tmp_path: Path) -> Callable[[], MeshStore]:
+def opened(models, tmp_path):
     return lambda: MeshStore(open_objects(models), tmp_path / "cache")
 
 
-def check_shape(shape: UnitShape) -> None:
+def check_shape(shape):
     """Check what holds for every model: size, exact values, flat normals, and its hull."""
     triangles = shape.triangles
     assert triangles.dtype == np.float64
@@ -68,12 +66,12 @@ def check_shape(shape: UnitShape) -> None:
     np.testing.assert_array_equal(shape.resting_directions, DOWN)
 
 
-def check_hull(shape: UnitShape) -> None:
+def check_hull(shape):
     check_body(shape, shape.triangles, 0.03, unit_vectors(500), slack=1e-9)
     assert shape.support(DOWN)[0] == -shape.triangles[..., 1].min(), "it stands exactly"
 
 
-def test_models_are_unit_shapes(opened: Callable[[], MeshStore]) -> None:
+def test_models_are_unit_shapes(opened):
     models = opened()
     for name in ("odd/0", "odd/3", "other/5"):
         shape = models.shape(name)
@@ -83,7 +81,7 @@ def test_models_are_unit_shapes(opened: Callable[[], MeshStore]) -> None:
         assert len(shape.hull_points) < 642
 
 
-def test_the_surface_is_the_file_s(opened: Callable[[], MeshStore]) -> None:
+def test_the_surface_is_the_file_s(opened):
     """Cast Embree's rays at trimesh's reading of the file, normalised here."""
     models, rays = opened(), rays_inwards(4000)
     for file in models.folder.models["odd"][:3]:
@@ -100,7 +98,7 @@ def test_the_surface_is_the_file_s(opened: Callable[[], MeshStore]) -> None:
         assert (along[hit] > 0.999).mean() > 0.98, "elsewhere rays meet the edge of two faces"
 
 
-def test_a_coarser_hull_holds_the_model_and_stands_where_it_stands() -> None:
+def test_a_coarser_hull_holds_the_model_and_stands_where_it_stands():
     angle = np.linspace(0, 6.28, 5000)
     disc = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
     ball = trimesh.creation.icosphere(subdivisions=6).vertices
@@ -117,7 +115,7 @@ def test_a_coarser_hull_holds_the_model_and_stands_where_it_stands() -> None:
         assert body[:, 1].min() == points[:, 1].min(), "nothing below the floor"
 
 
-def test_a_hair_below_a_level_base_is_not_lost_in_rounding() -> None:
+def test_a_hair_below_a_level_base_is_not_lost_in_rounding():
     angle = np.linspace(0, 2 * np.pi, 30, endpoint=False)
     rings = [np.stack([np.cos(angle), y + 0 * angle, np.sin(angle)], 1) for y in (-0.5, 0.5)]
     for depth in np.geomspace(1e-15, 1e-10, 30):
@@ -127,7 +125,7 @@ def test_a_hair_below_a_level_base_is_not_lost_in_rounding() -> None:
 
 @pytest.mark.parametrize("turn", [0.0, 0.3])
 @pytest.mark.parametrize("side", [0, 2])
-def test_flat_models_have_hulls(turn: float, side: int, tmp_path: Path) -> None:
+def test_flat_models_have_hulls(turn, side, tmp_path):
     """An upright or leaning disc along either axis."""
     disc = trimesh.creation.icosphere(subdivisions=3).vertices
     disc[:, side] = 0.0
@@ -139,9 +137,7 @@ def test_flat_models_have_hulls(turn: float, side: int, tmp_path: Path) -> None:
     check_shape(MeshStore(open_objects(tmp_path), None).shape("flat/disc"))
 
 
-def test_shapes_in_memory_are_bounded(
-    opened: Callable[[], MeshStore], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_shapes_in_memory_are_bounded(opened, monkeypatch):
     monkeypatch.setattr(store, "MOST_FACES_KEPT", 1280)
     models = opened()
     first = models.shape("odd/0")
@@ -150,7 +146,7 @@ def test_shapes_in_memory_are_bounded(
     assert models.shape("odd/0") is not first
 
 
-def test_digests_are_of_the_file_that_gave_the_shape(opened: Callable[[], MeshStore]) -> None:
+def test_digests_are_of_the_file_that_gave_the_shape(opened):
     models, others = opened(), opened()
     digest = models.digest("odd/0")
     assert len(digest) == 16
@@ -163,7 +159,7 @@ def test_digests_are_of_the_file_that_gave_the_shape(opened: Callable[[], MeshSt
     assert len({models.digest(f"odd/{i}") for i in range(4)}) == 4
 
 
-def test_refusals_are_remembered(opened: Callable[[], MeshStore]) -> None:
+def test_refusals_are_remembered(opened):
     models = opened()
     models.shape("odd/0")
     assert models.problems == {}
@@ -184,16 +180,14 @@ def test_refusals_are_remembered(opened: Callable[[], MeshStore]) -> None:
     assert set(models.problems) == {"odd/bad", "odd/1"}
 
 
-def test_threads_may_share_a_store(
-    opened: Callable[[], MeshStore], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_threads_may_share_a_store(opened, monkeypatch):
     monkeypatch.setattr(store, "MOST_FACES_KEPT", 2 * 1280)
     models, alone = opened(), opened()
     names = [f"odd/{i}" for i in range(4)] + ["other/4", "other/5"]
     expected = {name: alone.shape(name).triangles for name in names}
-    failed: list[str] = []
+    failed = []
 
-    def ask(seed: int) -> None:
+    def ask(seed):
         rng = np.random.default_rng(seed)
         for name in map(str, rng.choice(names, 60)):
             found = models.shape(name).triangles

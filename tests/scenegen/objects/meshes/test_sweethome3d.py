@@ -28,7 +28,6 @@ from scenegen.objects.meshes.readers import polygons
 from scenegen.objects.meshes.readers.obj import obj_polygons
 from scenegen.objects.meshes.shapenet import open_shapenet
 from scenegen.objects.meshes.store import MeshStore
-from scenegen.objects.solids import Array
 from scenegen.objects.sources import object_source
 from scenegen.rooms.make import make_dataset
 
@@ -37,7 +36,7 @@ MODELS = 820
 RAYS = 400
 
 
-def fetched(folder: Path) -> list[Path]:
+def fetched(folder):
     """Return the package's libraries, from where the user has them or from Debian's mirror."""
     known = os.environ.get("SWEETHOME3D_FURNITURE")
     if known:
@@ -56,11 +55,11 @@ def fetched(folder: Path) -> list[Path]:
 
 
 @pytest.fixture(scope="module")
-def roots(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+def roots(tmp_path_factory):
     """The models as ShapeNet v1, materials and textures beside them, and as v2, bare."""
     folder = tmp_path_factory.mktemp("furniture")
     one, two = folder / "v1", folder / "v2"
-    synsets: dict[str, str] = {}
+    synsets = {}
     for library in fetched(folder):
         with zipfile.ZipFile(library) as archive:
             archive.extractall(folder / library.stem)
@@ -84,7 +83,7 @@ def roots(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return one, two
 
 
-def disagreement(path: Path, triangles: Array, rng: np.random.Generator) -> float:
+def disagreement(path, triangles, rng):
     """Share of rays that see another surface in trimesh's reading of a file, by Embree."""
     scene = trimesh.load_scene(path, skip_materials=True, process=False)
     theirs = unit_triangles(scene.to_mesh())
@@ -101,7 +100,7 @@ def disagreement(path: Path, triangles: Array, rng: np.random.Generator) -> floa
     return float((~np.isclose(found, expected, atol=1e-4, rtol=0)).mean())
 
 
-def tilings(path: Path) -> list[float]:
+def tilings(path):
     """Return, for flat polygons that a fan would not cover, triangle area over polygon area."""
     read = obj_polygons(read_bytes(path))
     ratios = []
@@ -125,9 +124,7 @@ def tilings(path: Path) -> list[float]:
 
 
 @pytest.mark.slow
-def test_furniture_made_by_others(
-    roots: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_furniture_made_by_others(roots, tmp_path, monkeypatch):
     """None crashes, under 1% are refused, with reasons; rays see what they see in trimesh's mesh.
 
     Trimesh cuts polygons into fans, right or wrong, so it is compared with fans; where the real cut
@@ -149,8 +146,8 @@ def test_furniture_made_by_others(
     rng = np.random.default_rng(0)
     store = MeshStore(first, tmp_path / "cache")
     paths = {file.name: file.path for files in first.models.values() for file in files}
-    worst: dict[str, float] = {}
-    cuts: list[float] = []
+    worst = {}
+    cuts = []
     for record in records:
         if not record.ok:
             continue
@@ -171,7 +168,7 @@ def test_furniture_made_by_others(
 
 
 @pytest.mark.slow
-def test_scenes_of_furniture_made_by_others(roots: tuple[Path, Path], tmp_path: Path) -> None:
+def test_scenes_of_furniture_made_by_others(roots, tmp_path):
     """Scenes render and verify, and are the same from either layout."""
     depths = []
     for root in roots:

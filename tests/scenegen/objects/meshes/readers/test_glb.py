@@ -3,7 +3,6 @@
 import base64
 import json
 import struct
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.read import parse_mesh
 
 
-def glb(document: dict[str, Any], binary: bytes = b"") -> bytes:
+def glb(document, binary=b""):
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
     chunks = struct.pack("<I4s", len(text), b"JSON") + text
@@ -23,7 +22,7 @@ def glb(document: dict[str, Any], binary: bytes = b"") -> bytes:
 
 
 TRIANGLES = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 1)], "<f4").tobytes()
-DOCUMENT: dict[str, Any] = {
+DOCUMENT = {
     "asset": {"version": "2.0"},
     "buffers": [{"byteLength": len(TRIANGLES)}],
     "bufferViews": [{"buffer": 0, "byteLength": len(TRIANGLES)}],
@@ -33,7 +32,7 @@ DOCUMENT: dict[str, Any] = {
 }
 
 
-def test_glb_with_transforms_against_trimesh() -> None:
+def test_glb_with_transforms_against_trimesh():
     """Two meshes at five places, under turned, scaled, mirrored and nested nodes."""
     scene = trimesh.Scene()
     rng = np.random.default_rng(3)
@@ -55,7 +54,7 @@ def test_glb_with_transforms_against_trimesh() -> None:
     np.testing.assert_allclose(ours, theirs, atol=1e-4)
 
 
-def test_glb_by_hand() -> None:
+def test_glb_by_hand():
     vertices, faces = parse_mesh(glb(DOCUMENT, TRIANGLES), ".glb")
     assert faces.tolist() == [[0, 1, 2], [1, 2, 3]], "a strip"
     uri = "data:application/octet-stream;base64," + base64.b64encode(TRIANGLES).decode()
@@ -75,7 +74,7 @@ def test_glb_by_hand() -> None:
     np.testing.assert_allclose(vertices, [(0, 0, 5), (0, 1, 5), (-1, 0, 5), (-1, 1, 6)], atol=1e-6)
 
 
-def test_glb_indices_do_not_reach_into_the_next_part() -> None:
+def test_glb_indices_do_not_reach_into_the_next_part():
     """The next part may be another primitive of the mesh or of another node."""
     indices = np.array([0, 1, 2, 0, 1, 4], "<u2").tobytes()
     part = {"attributes": {"POSITION": 0}, "indices": 1}
@@ -93,7 +92,7 @@ def test_glb_indices_do_not_reach_into_the_next_part() -> None:
     assert faces[::2].tolist() == [[i, i + 1, i + 2] for i in (0, 4, 8, 12)]
 
 
-def tables(*arrays: np.ndarray) -> tuple[dict[str, Any], bytes]:
+def tables(*arrays):
     """Return accessors, from number 1 on, and the bytes of `TRIANGLES` and these arrays."""
     kinds = {"u1": 5121, "f4": 5126}
     types = {2: {1: "SCALAR", 3: "VEC3", 4: "VEC4"}, 3: {4: "MAT4"}}
@@ -116,7 +115,7 @@ def tables(*arrays: np.ndarray) -> tuple[dict[str, Any], bytes]:
 POINTS = np.frombuffer(TRIANGLES, "<f4").reshape(4, 3).astype(float)
 
 
-def test_glb_instances_stand_where_their_attributes_say() -> None:
+def test_glb_instances_stand_where_their_attributes_say():
     places = np.array([(0, 0, 0), (5, 0, 0), (0, 7, 0)], "<f4")
     sizes = np.array([(1, 1, 1), (2, 2, 2), (1, 1, 3)], "<f4")
     more, data = tables(places, sizes)
@@ -132,7 +131,7 @@ def test_glb_instances_stand_where_their_attributes_say() -> None:
     assert len(faces) == 6
 
 
-def test_glb_skin_places_vertices_by_their_joints_not_by_their_node() -> None:
+def test_glb_skin_places_vertices_by_their_joints_not_by_their_node():
     """Two joints, one moved and one scaled; the last point belongs to both by halves."""
     joints = np.array([(0, 1, 0, 0)] * 4, "<u1")
     weights = np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 3, 0, 0), (1, 1, 0, 0)], "<f4")
@@ -158,7 +157,7 @@ def test_glb_skin_places_vertices_by_their_joints_not_by_their_node() -> None:
         parse_mesh(glb(DOCUMENT | more | away, data), ".glb")
 
 
-def test_glb_morph_weights_move_points_and_hidden_nodes_are_left_out() -> None:
+def test_glb_morph_weights_move_points_and_hidden_nodes_are_left_out():
     """The second target is sparse: only its last point moves."""
     first = np.array([(0, 0, 1)] * 4, "<f4")
     more, data = tables(first, np.array([[3]], "<u1"), np.array([(8, 0, 0)], "<f4"))
@@ -194,14 +193,14 @@ def test_glb_morph_weights_move_points_and_hidden_nodes_are_left_out() -> None:
         ({"extensionsRequired": ["KHR_materials_unlit", "EXT_x"]}, "the extension EXT_x"),
     ],
 )
-def test_glb_that_is_hostile(change: dict[str, Any], found: str) -> None:
+def test_glb_that_is_hostile(change, found):
     with pytest.raises(BadMeshError) as refused:
         parse_mesh(glb(DOCUMENT | change, TRIANGLES), ".glb")
     assert refused.value.where.startswith("GLB file")
     assert found in refused.value.found
 
 
-def test_glb_that_multiplies_is_stopped_before_it_fills_the_memory() -> None:
+def test_glb_that_multiplies_is_stopped_before_it_fills_the_memory():
     points = np.zeros((3000, 3), "<f4").tobytes()
     many = DOCUMENT | {
         "bufferViews": [{"buffer": 0, "byteLength": len(points)}],

@@ -1,8 +1,6 @@
 """The readers against trimesh's readers and against meshes written by hand."""
 
 import struct
-from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,15 +9,14 @@ from known_meshes import OBJ, PYRAMID, SPHERE
 from scenegen.objects.meshes.clean import clean_mesh
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.read import parse_mesh, read_bytes
-from scenegen.objects.solids import Array
 
 
-def faces_of(vertices: Array, faces: Array) -> set[tuple[tuple[float, ...], ...]]:
+def faces_of(vertices, faces):
     """Return triangles as sets of corner coordinates, independent of numbering and order."""
     return {tuple(sorted(map(tuple, np.round(vertices[face], 6).tolist()))) for face in faces}
 
 
-def pyramid_of(vertices: Array, faces: Array) -> None:
+def pyramid_of(vertices, faces):
     """Check that a mesh is the pyramid, its base cut along either diagonal."""
     points = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1)], float)
     found = faces_of(vertices, faces)
@@ -29,13 +26,13 @@ def pyramid_of(vertices: Array, faces: Array) -> None:
     assert len(faces) == 6
 
 
-def area_of(vertices: Array, faces: Array) -> float:
+def area_of(vertices, faces):
     a, b, c = vertices[faces].transpose(1, 0, 2)
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
 @pytest.mark.parametrize("text", OBJ.values(), ids=OBJ.keys())
-def test_obj_in_many_hands(text: str) -> None:
+def test_obj_in_many_hands(text):
     """Line ends of Unix, Windows and old Macs, byte order marks, UTF-16 and Latin-1."""
     ends = [text.replace("\n", end).encode() for end in ("\n", "\r\n", "\r")]
     latin = b"o caf\xe9 \xff\xfe\n" + text.encode() + b"\ng \xf0\x9f\x8d\xb5\x00\n"
@@ -43,7 +40,7 @@ def test_obj_in_many_hands(text: str) -> None:
         pyramid_of(*parse_mesh(data, ".obj"))
 
 
-def test_broken_lines_do_not_lose_a_model() -> None:
+def test_broken_lines_do_not_lose_a_model():
     """They become vertices that are not finite and faces that are out of range."""
     text = OBJ["plain"] + (
         "v 1 2\nv a b c\nv nan inf 1e999\nv 1,5 2,5 3,5\nv\nv -1.#IND 0 0\n"
@@ -60,13 +57,13 @@ def test_broken_lines_do_not_lose_a_model() -> None:
     assert mesh.mended["faces_not_finite"] == 1
 
 
-def obj_of(points: Iterable[Iterable[float]], face: Iterable[object]) -> bytes:
+def obj_of(points, face):
     """Return an OBJ file of one polygon."""
     lines = ["v " + " ".join(map(repr, map(float, point))) for point in points]
     return "\n".join([*lines, "f " + " ".join(map(str, face))]).encode()
 
 
-def star(corners: int, tilt: float = 0.0) -> Array:
+def star(corners, tilt=0.0):
     """A star with `corners` / 2 deep points, tilted about x."""
     angle = np.arange(corners) * 2 * np.pi / corners
     radius = np.where(np.arange(corners) % 2, 0.2, 1.0)
@@ -74,12 +71,12 @@ def star(corners: int, tilt: float = 0.0) -> Array:
     return np.stack([x, y * np.cos(tilt), y * np.sin(tilt)], axis=1)
 
 
-def area_inside(polygon: Array) -> float:
+def area_inside(polygon):
     """The area of a flat polygon, by the sum over its edges."""
     return float(np.linalg.norm(np.cross(polygon, np.roll(polygon, -1, axis=0)).sum(axis=0)) / 2)
 
 
-def covers_once(polygon: Array, vertices: Array, faces: Array) -> None:
+def covers_once(polygon, vertices, faces):
     """Check that triangles tile a simple flat polygon: its area, in its plane, none twice."""
     a, b, c = vertices[faces].transpose(1, 0, 2)
     turned = np.linalg.norm(np.cross(b - a, c - a).sum(axis=0)) / 2
@@ -90,7 +87,7 @@ def covers_once(polygon: Array, vertices: Array, faces: Array) -> None:
 @pytest.mark.parametrize("corners", [16, 272, 2000])
 @pytest.mark.parametrize("tilt", [0.0, 0.7, np.pi / 2])
 @pytest.mark.parametrize("turn", [1, -1])
-def test_huge_faces_that_are_not_convex(corners: int, tilt: float, turn: int) -> None:
+def test_huge_faces_that_are_not_convex(corners, tilt, turn):
     """The face is one line of thousands of characters; a fan would cover more than the polygon."""
     polygon = star(corners, tilt)[::turn]
     face = [f"{i + 1}/{i + 1}/{i + 1}" for i in range(corners)]
@@ -103,19 +100,19 @@ def test_huge_faces_that_are_not_convex(corners: int, tilt: float, turn: int) ->
 
 @pytest.mark.parametrize("first", range(4))
 @pytest.mark.parametrize("turn", [1, -1])
-def test_a_dart_is_cut_at_its_notch(first: int, turn: int) -> None:
+def test_a_dart_is_cut_at_its_notch(first, turn):
     dart = np.roll([(0, 0, 0), (2, 1, 0), (0, 2, 0), (0.5, 1, 0)], first, axis=0)[::turn]
     covers_once(dart, *parse_mesh(obj_of(dart, range(1, 5)), ".obj"))
 
 
-def test_a_hole_joined_to_the_rim_by_a_slit_stays_open() -> None:
+def test_a_hole_joined_to_the_rim_by_a_slit_stays_open():
     rim = [(0, 0, 0), (4, 0, 0), (4, 4, 0), (0, 4, 0)]
     hole = [(1, 1, 0), (1, 3, 0), (3, 3, 0), (3, 1, 0)]
     read = parse_mesh(obj_of(rim + hole, (1, 2, 3, 4, 1, 5, 6, 7, 8, 5)), ".obj")
     assert area_of(*read) == pytest.approx(12.0)
 
 
-def test_sides_that_cross_and_sides_on_a_line() -> None:
+def test_sides_that_cross_and_sides_on_a_line():
     """There is no right answer, or no area, but the result lies in the polygon's plane."""
     eight = [(0, 0, 0), (2, 2, 1), (2, 0, 1), (0, 2, 0), (-1, 1, -0.5)]
     bow = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0), (1, 1, 0), (2, 1, 0)]
@@ -131,7 +128,7 @@ def test_sides_that_cross_and_sides_on_a_line() -> None:
 
 
 @pytest.mark.parametrize("suffix", ["obj", "ply", "stl", "off", "glb", "ascii ply", "ascii stl"])
-def test_each_format_gives_what_was_written(suffix: str, tmp_path: Any) -> None:
+def test_each_format_gives_what_was_written(suffix, tmp_path):
     kind = suffix[-3:]
     how = {"ascii ply": {"encoding": "ascii"}, "ascii stl": {"file_type": "stl_ascii"}}
     path = tmp_path / f"caf\u00e9 \u6f22\u5b57.{kind.upper()}"
@@ -151,7 +148,7 @@ POINTS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1)]
 @pytest.mark.parametrize("order", ["<", ">"])
 @pytest.mark.parametrize("name", ["vertex_index", "vertex_indices"])
 @pytest.mark.parametrize("columns", ["f", "d", "B"])
-def test_binary_ply_with_all_sorts_of_columns(order: str, name: str, columns: str) -> None:
+def test_binary_ply_with_all_sorts_of_columns(order, name, columns):
     """Polygons of several sizes, a second list, colours, and an unknown table."""
     kind = {"f": "float", "d": "double", "B": "uchar"}[columns]
     long = {"<": "binary_little_endian", ">": "binary_big_endian"}[order]
@@ -170,7 +167,7 @@ def test_binary_ply_with_all_sorts_of_columns(order: str, name: str, columns: st
             parse_mesh(data[:length], ".ply")
 
 
-def test_text_ply() -> None:
+def test_text_ply():
     head = PLY_HEAD.format("ascii") + "property float x\nproperty float y\nproperty float z\n"
     head += "element face 5\nproperty uchar flags\nproperty list uchar int vertex_indices\n"
     lines = [f"{x} {y} {z}" for x, y, z in POINTS]
@@ -187,7 +184,7 @@ def test_text_ply() -> None:
     "head",
     ["OFF\n5 5 0\n", "OFF 5 5 0\n", "OFF5 5 0\n", "COFF\n5 5\n", "# x\n\nNOFF # y\n\n5 5 0 # z\n"],
 )
-def test_off_with_its_first_line_as_it_comes(head: str) -> None:
+def test_off_with_its_first_line_as_it_comes(head):
     rows = [f"{x} {y} {z} 9 9 9 1" for x, y, z in POINTS]
     rows += [" ".join(map(str, (len(face), *face, 255, 0, 0))) for face in sorted(PYRAMID)]
     pyramid_of(*parse_mesh((head + "\n# between\n".join(rows)).encode(), ".off"))
@@ -197,7 +194,7 @@ def test_off_with_its_first_line_as_it_comes(head: str) -> None:
 
 
 @pytest.mark.parametrize("ends", [" ", "\n", " \n\t"])
-def test_off_and_ply_as_streams_of_numbers(ends: str) -> None:
+def test_off_and_ply_as_streams_of_numbers(ends):
     """Lists go on in the next line, or all numbers stand in one."""
     rows = [" ".join(map(str, (len(face), *face))) for face in sorted(PYRAMID)]
     numbers = " ".join([*(f"{x} {y} {z}" for x, y, z in POINTS), *rows])
@@ -209,7 +206,7 @@ def test_off_and_ply_as_streams_of_numbers(ends: str) -> None:
 
 
 @pytest.mark.parametrize("count", [0, 1, 319, 321])
-def test_binary_stl_whose_count_is_wrong_is_never_read_in_part(count: int) -> None:
+def test_binary_stl_whose_count_is_wrong_is_never_read_in_part(count):
     data = SPHERE.export(file_type="stl")
     with pytest.raises(BadMeshError) as refused:
         parse_mesh(data[:80] + count.to_bytes(4, "little") + data[84:], ".stl")
@@ -217,7 +214,7 @@ def test_binary_stl_whose_count_is_wrong_is_never_read_in_part(count: int) -> No
     assert str(count) in refused.value.expected
 
 
-def test_a_binary_stl_may_start_like_a_text_and_have_more_at_its_end() -> None:
+def test_a_binary_stl_may_start_like_a_text_and_have_more_at_its_end():
     data = SPHERE.export(file_type="stl")
     for changed in (b"solid facet" + data[11:], data + b"more"):
         vertices, faces = parse_mesh(changed, ".stl")

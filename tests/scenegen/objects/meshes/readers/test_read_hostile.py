@@ -1,7 +1,6 @@
 """Mesh files that are too large, damaged or no files at all are refused, with bounded effort."""
 
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,13 +15,13 @@ from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.read import parse_mesh, read_bytes
 
 
-def refusal(data: bytes, suffix: str) -> BadMeshError:
+def refusal(data, suffix):
     with pytest.raises(BadMeshError) as refused:
         parse_mesh(data, suffix)
     return refused.value
 
 
-def test_faces_that_would_take_hours_are_refused() -> None:
+def test_faces_that_would_take_hours_are_refused():
     rng = np.random.default_rng(0)
     lines = [f"v {x} {y} 0" for x, y in rng.random((150_000, 2))]
     lines.append("f " + " ".join(map(str, range(1, 150_001))))
@@ -37,7 +36,7 @@ def test_faces_that_would_take_hours_are_refused() -> None:
         (b"v 1 2 3\n" * 60, "MOST_CORNERS", "vertices"),
     ],
 )
-def test_limits_hold(more: bytes, limit: str, where: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_limits_hold(more, limit, where, monkeypatch):
     parse_mesh(CORNERS.encode() + more + b"f 1 2 3\n", ".obj")
     monkeypatch.setattr(limits, limit, 10)
     error = refusal(CORNERS.encode() + more, ".obj")
@@ -58,13 +57,11 @@ def test_limits_hold(more: bytes, limit: str, where: str, monkeypatch: pytest.Mo
         (b"x", ".fbx", "'.fbx'"),
     ],
 )  # fmt: skip
-def test_small_files_that_claim_to_be_large_or_are_something_else(
-    data: bytes, suffix: str, found: str
-) -> None:
+def test_small_files_that_claim_to_be_large_or_are_something_else(data, suffix, found):
     assert found in refusal(data, suffix).found
 
 
-def test_files_that_are_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_that_are_no_files(tmp_path, monkeypatch):
     names = {
         "nothing in it": "empty blank",
         "a folder or a device": "folder pipe",
@@ -102,9 +99,7 @@ SEEDS = [
     st.lists(st.tuples(st.floats(0, 1), st.binary(max_size=4)), max_size=6),
     st.floats(0, 1),
 )
-def test_damaged_files_end_in_a_mesh_or_a_reason(
-    seed: tuple[bytes, str], edits: list[tuple[float, bytes]], end: float
-) -> None:
+def test_damaged_files_end_in_a_mesh_or_a_reason(seed, edits, end):
     data = bytearray(seed[0])
     for where, what in edits:
         at = int(where * len(data))
