@@ -201,13 +201,6 @@ def test_no_pixel_of_the_border_shows_the_bounding_sphere(height, width, fov, ra
     assert 0.93 - 3 / side < off_centre.max() < 1 - 1 / side
 
 
-def test_an_edge_has_the_length_in_pixels_that_is_said():
-    for height, width in ((128, 128), (64, 96), (160, 96)):
-        spec = SplitSpec(height=height, width=width, min_cube_pixels=1)
-        focal = intrinsics(height, width, spec.fov_y_degrees, pixel_centers="half")[0, 0]
-        assert spec.pixels_per_edge == pytest.approx(focal / spec.camera_distance)
-
-
 def test_no_surface_can_be_as_bright_as_the_background_by_default():
     """Nearest to all lights, facing them all."""
     spec = SplitSpec()

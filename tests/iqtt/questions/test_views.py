@@ -213,14 +213,6 @@ def test_whether_crowded_shapes_are_asked_for_does_not_tell_which_is_right(monke
     assert (unfair != unfair[0]).any()
 
 
-def test_the_last_proposal_counts_as_well(pools, monkeypatch):
-    monkeypatch.setattr(module, "VIEWS", 1)
-    tally = Tally()
-    easy = replace(SPEC, min_cube_pixels=0, min_angle_degrees=0, min_sight_angle_degrees=0)
-    assert {q.attempt for q in sample_questions(easy, pools, "test", REQUESTS, tally)} == {0}
-    assert tally == Tally(4 * len(REQUESTS), 0)
-
-
 def test_the_search_for_what_cannot_be_is_bounded(pools, monkeypatch):
     monkeypatch.setattr(module, "QUESTION_ATTEMPTS", 3)
     monkeypatch.setattr(module, "VIEWS", 5)

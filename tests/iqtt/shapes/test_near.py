@@ -31,22 +31,11 @@ def test_the_trees_that_are_chains_are_all_the_chains(cubes):
     assert (trees[is_chain(trees)] == all_classes(cubes, "chain")).all()
 
 
-def test_a_compact_block_is_a_chain_in_any_row_order():
-    block = np.array(list(itertools.product(range(2), range(2), range(4))), dtype=np.int8)
-    orders = [np.random.default_rng(seed).permutation(16) for seed in range(3)]
-    assert is_chain(np.stack([block[order] for order in orders])).all()
-
-
 def test_many_shapes_are_judged_as_each_alone():
     trees = some_shapes(np.random.default_rng(0), 9000, 6, "tree")  # more than one chunk
     for judge in (is_chain, is_connected):
         assert (judge(trees)[-900:] == judge(trees[-900:])).all()
         assert judge(trees[:0]).shape == (0,)
-
-
-def test_too_many_cubes_are_refused():
-    with pytest.raises(ValueError, match="16 cubes"):
-        is_chain(np.zeros((1, 17, 3), np.int8))
 
 
 def sets_one_move_away(cubes, kind):
@@ -96,3 +85,8 @@ def test_moves_keep_within_the_radius():
 def test_a_move_out_of_range_is_refused(move):
     with pytest.raises(ValueError, match="out of bounds"):
         move_cubes(np.array([ROD]), np.array([move]))
+
+
+def test_too_many_cubes_are_refused():
+    with pytest.raises(ValueError, match="16 cubes"):
+        is_chain(np.zeros((1, 17, 3), np.int8))

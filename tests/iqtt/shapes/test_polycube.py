@@ -72,16 +72,6 @@ def test_the_rotations_are_a_group_of_24():
         assert all((a @ b).tobytes() in members for b in ROTATIONS)
 
 
-@given(shapes())
-def test_mirror_is_an_involution_that_keeps_the_box(shape):
-    image = mirror(shape)
-    assert (mirror(image) == shape).all()
-    assert (image.min(axis=1) == shape.min(axis=1)).all()
-    assert (image.max(axis=1) == shape.max(axis=1)).all()
-    assert image.dtype == shape.dtype
-    assert (image[..., 1:] == shape[..., 1:]).all()
-
-
 @given(shapes_and_copies())
 def test_copies_have_one_canonical_form(pair):
     shape, copy = pair
@@ -196,9 +186,3 @@ def test_what_cannot_be_shapes_is_refused(cubes, message):
     for function in (canonical, canonical_class, set_ids, is_chiral, symmetries):
         with pytest.raises(ValueError, match=message):
             function(cubes)
-
-
-def test_the_longest_shape_is_accepted():
-    rod = np.zeros((1, MAX_CUBES, 3), dtype=np.int8)
-    rod[0, :, 2] = np.arange(MAX_CUBES)
-    assert canonical(rod)[0, :, 0].tolist() == list(range(MAX_CUBES))

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from iqtt import open_questions
-from iqtt.questions.specs import DISTRACTOR_KINDS
 from iqtt.sharing.questions import export_questions
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.sharing.export import ABOUT, FORMATS
@@ -93,18 +92,6 @@ def test_nothing_of_the_answers_beside_a_test_file_is_written(form, splits, tmp_
     assert files == {p.name: p.read_bytes() for p in (tmp_path / "without").iterdir()}
     columns = json.loads(files[ABOUT])["columns"]
     assert list(columns) == ["row", "reference", "answer_0", "answer_1", "answer_2"]
-
-
-def test_what_files_do_not_tell_is_beside_them(splits, tmp_path):
-    path = splits["shards"] / "iqtt-train.h5"
-    export_questions(path, "webdataset", tmp_path / "out", "labeled")
-    about = json.loads((tmp_path / "out" / ABOUT).read_text())
-    assert "iqtt-train.h5, labeled" in about["what"]
-    assert about["columns"]["reference"]["scale"] == 1 / 255
-    assert about["columns"]["depth"]["unit"] == "cube edge"
-    with open_questions(path, "labeled") as questions:
-        assert about["columns"]["distractor_kind"]["names"] == list(DISTRACTOR_KINDS)
-        assert about["attributes"] == questions.attributes
 
 
 def test_refused(splits, tmp_path, damaged, released):

@@ -130,18 +130,6 @@ def test_a_damaged_row_leaves_nothing(form, damaged, tmp_path):
     export_rows(path, form, tmp_path / "out", rows=[0, 7])
 
 
-@pytest.mark.parametrize("form", FORMATS)
-def test_texts_that_are_none(form, damaged, tmp_path):
-    def spoil(file):
-        models = file["object/model"][:]
-        models[4, 0] = b"\xff"
-        file["object/model"][:] = models
-
-    with pytest.raises(FileFormatError) as error:
-        export_rows(damaged(spoil), form, tmp_path / "out")
-    assert "object/model, row 4" in error.value.where
-
-
 @pytest.mark.parametrize(
     ("how", "where"),
     [
@@ -170,3 +158,15 @@ def test_no_more_rows_are_in_memory_than_fit(rooms_path, tmp_path, monkeypatch):
     groups = [file.metadata.row_group(i).num_rows for i in range(file.num_row_groups)]
     assert groups == steps == [3, 3, 2]
     assert re.fullmatch(r"rooms-00000-of-00001\.parquet", made[0].name)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_texts_that_are_none(form, damaged, tmp_path):
+    def spoil(file):
+        models = file["object/model"][:]
+        models[4, 0] = b"\xff"
+        file["object/model"][:] = models
+
+    with pytest.raises(FileFormatError) as error:
+        export_rows(damaged(spoil), form, tmp_path / "out")
+    assert "object/model, row 4" in error.value.where

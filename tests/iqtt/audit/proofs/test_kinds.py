@@ -79,13 +79,6 @@ def test_matched():
         assert status(matched, [first, first, other, two], [-1, 0, 3]) == "ok"
 
 
-def test_radii_of_gyration_of_a_rod():
-    """A rod of n unit cubes has the moments of a solid box of sides n, 1 and 1."""
-    rod = np.array([[k, 0, 0] for k in range(4)], float)
-    expected = np.sqrt(np.array([1, 1, 16]) / 12)
-    np.testing.assert_allclose(proofs_of_kinds.gyration_radii(rod), expected, atol=1e-12)
-
-
 def test_unknown_shapes_are_not_judged():
     table, shapes = audit_table([[ARM, ARM, NEAR, NEAR]], [[-1, 1, 1]])
     blind = replace(shapes, whole=np.zeros(1, np.bool_))

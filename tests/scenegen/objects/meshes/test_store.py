@@ -1,7 +1,5 @@
 """Models as unit shapes: their surface, their hull, and the store that keeps them."""
 
-import threading
-
 import numpy as np
 import pytest
 import trimesh
@@ -178,26 +176,3 @@ def test_refusals_are_remembered(opened):
         models.shape("odd/1")
     assert refused.value.where == "odd/1: file"
     assert set(models.problems) == {"odd/bad", "odd/1"}
-
-
-def test_threads_may_share_a_store(opened, monkeypatch):
-    monkeypatch.setattr(store, "MOST_FACES_KEPT", 2 * 1280)
-    models, alone = opened(), opened()
-    names = [f"odd/{i}" for i in range(4)] + ["other/4", "other/5"]
-    expected = {name: alone.shape(name).triangles for name in names}
-    failed = []
-
-    def ask(seed):
-        rng = np.random.default_rng(seed)
-        for name in map(str, rng.choice(names, 60)):
-            found = models.shape(name).triangles
-            failed.extend([] if np.array_equal(found, expected[name]) else [name])
-
-    threads = [threading.Thread(target=ask, args=(seed,)) for seed in range(6)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert failed == []
-    again = [models.shape(name) is models.shape(name) for name in names]
-    assert all(again), "the latest shape is kept"
