@@ -58,13 +58,6 @@ class UnitShape:
         """Unit normals of the smooth surface at those corners, (F, 3, 3)."""
         return self.mesh[1]
 
-    def support(self, directions: Array) -> Array:
-        """Return how far the convex body reaches along unit directions, (M, 3) -> (M,)."""
-        reach = self.hull_points @ directions.T
-        if self.hull_discs.any():
-            reach += self.hull_discs[:, None] * np.hypot(directions[:, 0], directions[:, 2])
-        return np.asarray(reach.max(axis=0) + self.rounding)
-
 
 def without_triangles(shape: UnitShape) -> UnitShape:
     """Return a shape without its triangles: the outline, which is all that placement needs."""

@@ -1,8 +1,9 @@
-"""Convex bodies of many shapes at once, against `UnitShape.support` of each alone."""
+"""Convex bodies of many shapes at once, against the body of each alone."""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from shape_checks import support
 
 from scenegen.description.scenes import SHAPE_NAMES
 from scenegen.objects.basic_shapes import unit_shape
@@ -20,7 +21,7 @@ DIRECTIONS = rounded(DIRECTIONS / np.linalg.norm(DIRECTIONS, axis=1)[:, None], D
 @pytest.mark.parametrize("coarse", [False, True])
 def test_reach_is_the_support_of_each_shape(coarse):
     found = BODIES.reach(KIND, TURN, DIRECTIONS, coarse)
-    expected = [SHAPES[k].support(DIRECTIONS @ turn) for k, turn in zip(KIND, TURN, strict=True)]
+    expected = [support(SHAPES[k], DIRECTIONS @ turn) for k, turn in zip(KIND, TURN, strict=True)]
     more = found - np.array(expected)
     teapots = (SHAPE_NAMES.index("teapot") == KIND)[:, None] & coarse
     assert abs(more[~teapots[:, 0]]).max() < 1e-7

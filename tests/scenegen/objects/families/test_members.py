@@ -8,7 +8,7 @@ from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from shape_checks import DOWN, check_body, check_centred, check_size, unit_vectors
+from shape_checks import DOWN, check_body, check_centred, check_size, support, unit_vectors
 
 from scenegen.common.errors import SpecError
 from scenegen.description.scenes import FAMILY_NAMES
@@ -29,6 +29,7 @@ DIGESTS = {
     "table": "9a86c4af2fd566fb",
 }
 PIXELS = 28  # of a small view's side: objects are 40 to 60 wide in pictures of 128
+DIRECTIONS = np.concatenate([unit_vectors(300), np.eye(3), -np.eye(3)])
 VIEWS = ((35.0, 25.0), (215.0, 50.0))  # azimuth and elevation, degrees
 
 
@@ -53,76 +54,60 @@ def pieces(shape):
 
 
 @FAMILIES
-def test_every_part_is_closed_and_faces_outwards(family):
+def test_members_are_closed_bodies_that_stand(family):
+    wide, total, rows = 0.0, 0.0, []
     for shape in spread(family):
-        vertices = welded(shape)
-        edges = np.concatenate([vertices[:, [i, (i + 1) % 3]] for i in range(3)])
-        assert (edges[:, 0] != edges[:, 1]).all(), shape.name
-        there, back = (np.sort(edges @ order) for order in ([1, 10**6], [10**6, 1]))
-        np.testing.assert_array_equal(there, back, err_msg=shape.name)
-        for part in pieces(shape):
-            about = part - part.mean(axis=(0, 1))
-            volume = np.einsum("fi,fi->", about[:, 0], np.cross(about[:, 1], about[:, 2])) / 6
-            assert volume > 1e-8, shape.name
-
-
-@FAMILIES
-def test_parts_hang_together(family):
-    """The bounding boxes of the parts form one connected group."""
-    for shape in spread(family):
-        parts = pieces(shape)
-        low = np.array([part.min(axis=(0, 1)) for part in parts])
-        high = np.array([part.max(axis=(0, 1)) for part in parts])
-        meets = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
-        assert connected_components(coo_array(meets))[0] == 1, shape.name
-
-
-@FAMILIES
-def test_normals_are_unit_and_belong_to_their_faces(family):
-    """Faces deviate from their corner normals by at most 16 degrees, except few and tiny ones."""
-    wide, total = 0.0, 0.0
-    for shape in spread(family):
-        assert np.isfinite(shape.triangles).all()
-        a, b, c = (shape.triangles[:, i] for i in range(3))
-        cross = np.cross(b - a, c - a)
-        area = np.linalg.norm(cross, axis=1)
+        check_closed(shape)
+        check_size(shape)
+        check_centred(shape.triangles.reshape(-1, 3), 1e-12)
+        check_stands(shape)
+        area, agreement = faces_and_normals(shape)
         assert area.min() > 1e-9, shape.name
-        agreement = np.einsum("fi,fki->fk", cross / area[:, None], shape.normals).min(axis=1)
         assert agreement.min() > 0.7, shape.name
         wide += area[agreement < np.cos(np.radians(16))].sum()
         total += area.sum()
-    assert wide < 0.03 * total
-
-
-@FAMILIES
-def test_members_are_centred_of_radius_one_and_stand(family):
-    for shape in spread(family):
-        corners = shape.triangles.reshape(-1, 3)
-        check_size(shape)
-        check_centred(corners, 1e-12)
-        low = corners[:, 1].min()
-        assert abs(shape.support(DOWN)[0] + low) < 1e-9
-        on_floor = corners[corners[:, 1] < low + 1e-9]
-        assert (np.ptp(on_floor[:, [0, 2]], axis=0) > 0.1).all(), f"{shape.name}: no base"
-        np.testing.assert_array_equal(shape.resting_directions, DOWN)
-        assert not shape.is_sphere
-
-
-@FAMILIES
-def test_support_bounds_members_closely(family):
-    directions = np.concatenate([unit_vectors(300), np.eye(3), -np.eye(3)])
-    for shape in spread(family):
-        check_body(shape, shape.triangles, 0.02, directions)
-
-
-@FAMILIES
-def test_members_are_small(family):
-    shapes = list(spread(family))
-    assert max(len(shape.triangles) for shape in shapes) <= 4000
-    rows = [len(shape.hull_points) for shape in shapes]
+        check_body(shape, shape.triangles, 0.02, DIRECTIONS)
+        assert len(shape.triangles) <= 4000
+        assert len(shape.hull_discs) == len(shape.hull_points) <= 250
+        rows.append(len(shape.hull_points))
+    assert wide < 0.03 * total, "few and tiny faces deviate from their normals by 16 degrees"
     assert np.median(rows) <= 150
-    assert max(rows) <= 250
-    assert all(len(shape.hull_discs) == n for shape, n in zip(shapes, rows, strict=True))
+
+
+def check_closed(shape):
+    """Check that each part is closed and faces outwards, and that their boxes hang together."""
+    vertices = welded(shape)
+    edges = np.concatenate([vertices[:, [i, (i + 1) % 3]] for i in range(3)])
+    assert (edges[:, 0] != edges[:, 1]).all(), shape.name
+    there, back = (np.sort(edges @ order) for order in ([1, 10**6], [10**6, 1]))
+    np.testing.assert_array_equal(there, back, err_msg=shape.name)
+    parts = pieces(shape)
+    for part in parts:
+        about = part - part.mean(axis=(0, 1))
+        volume = np.einsum("fi,fi->", about[:, 0], np.cross(about[:, 1], about[:, 2])) / 6
+        assert volume > 1e-8, shape.name
+    low = np.array([part.min(axis=(0, 1)) for part in parts])
+    high = np.array([part.max(axis=(0, 1)) for part in parts])
+    meets = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
+    assert connected_components(coo_array(meets))[0] == 1, shape.name
+
+
+def check_stands(shape):
+    corners = shape.triangles.reshape(-1, 3)
+    low = corners[:, 1].min()
+    assert abs(support(shape, DOWN)[0] + low) < 1e-9
+    on_floor = corners[corners[:, 1] < low + 1e-9]
+    assert (np.ptp(on_floor[:, [0, 2]], axis=0) > 0.1).all(), f"{shape.name}: no base"
+    np.testing.assert_array_equal(shape.resting_directions, DOWN)
+
+
+def faces_and_normals(shape):
+    """Return twice the faces' areas, and the least cosine of each to its corners' normals."""
+    assert np.isfinite(shape.triangles).all()
+    a, b, c = (shape.triangles[:, i] for i in range(3))
+    cross = np.cross(b - a, c - a)
+    area = np.linalg.norm(cross, axis=1)
+    return area, np.einsum("fi,fki->fk", cross / area[:, None], shape.normals).min(axis=1)
 
 
 @FAMILIES

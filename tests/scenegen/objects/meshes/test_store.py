@@ -10,6 +10,7 @@ from shape_checks import (
     check_size,
     first_hits,
     rays_inwards,
+    support,
     unit_triangles,
     unit_vectors,
 )
@@ -66,7 +67,7 @@ def check_shape(shape):
 
 def check_hull(shape):
     check_body(shape, shape.triangles, 0.03, unit_vectors(500), slack=1e-9)
-    assert shape.support(DOWN)[0] == -shape.triangles[..., 1].min(), "it stands exactly"
+    assert support(shape, DOWN)[0] == -shape.triangles[..., 1].min(), "it stands exactly"
 
 
 def test_models_are_unit_shapes(opened):
