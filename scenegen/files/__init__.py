@@ -1,6 +1,7 @@
 """Files of rows: one layer under rooms, questions and predictions, which knows none of them.
 
-`row_file` writes tables of rows, whose axes `axes` names, and `content` digests. `input_file` opens
-files and reads arrays, after `trial` has tried a file in another process; `attributes` reads texts.
-`making` and `manifest` make sets of shards, `pool` and `cluster` spread the work.
+Reading: `input_file` opens what anyone may have written, `shards` shows a set as one file, `rows`
+reads columns of a `schema`, `verify` checks them. Writing: `table` writes columns, `plan` says what
+a set of files holds, `sets` writes its files, and `making` makes those that are missing, with
+`workers` or a `cluster`. `new_file`, `new_folder` and `workspace`: outputs appear when complete.
 """

@@ -9,7 +9,6 @@ import logging
 import os
 import sys
 import threading
-import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
@@ -26,8 +25,7 @@ Task = TypeVar("Task")
 LOCAL = "local"
 LOGGING = "DASK_DISTRIBUTED__LOGGING__DISTRIBUTED"  # which Dask's processes read as they start
 BATCH = 200  # tasks that the scheduler is told of at once, as each message costs milliseconds
-PATIENCE = 10  # seconds in which a scheduler must answer, or that pass without a worker
-MOMENT = 0.002  # seconds
+PATIENCE = 10  # seconds in which a scheduler must answer
 _one_at_a_time = threading.Lock()  # Mitsuba and HDF5 take one task in a process
 Versions = Callable[[], Mapping[str, str]]
 
@@ -39,12 +37,10 @@ class Cluster:
     Attributes:
         client: of Dask.
         versions: tells what the results of a process depend on; each worker must say the same.
-        print_note: is called with a line where there are no workers.
     """
 
     client: Any
     versions: Versions
-    print_note: Callable[[str], Any]
 
     def in_any_order(self, function: Callable[[Task], T], tasks: Iterable[Task]) -> Generator[T]:
         """Call a function for each task on the workers; yield results as they come.
@@ -54,22 +50,15 @@ class Cluster:
         Raises what the function raises, and SceneGenError where a task has ended several workers,
         where a worker has other versions, or where the scheduler is gone.
         """
-        for _, result in self._numbered(function, tasks):
-            yield result
+        yield from self._results(function, tasks, in_order=False)
 
     def in_order(self, function: Callable[[Task], T], tasks: Iterable[Task]) -> Generator[T]:
         """Call a function for each task as `in_any_order`, but yield results in order."""
-        waiting, following = dict[int, T](), 0
-        for number, result in self._numbered(function, tasks):
-            waiting[number] = result
-            while following in waiting:
-                yield waiting.pop(following)
-                following += 1
+        yield from self._results(function, tasks, in_order=True)
 
-    def _numbered(
-        self, function: Callable[[Task], T], tasks: Iterable[Task]
-    ) -> Generator[tuple[int, T]]:
-        """Yield results with the numbers of their tasks."""
+    def _results(
+        self, function: Callable[[Task], T], tasks: Iterable[Task], in_order: bool
+    ) -> Generator[T]:
         from distributed import KilledWorker, as_completed
         from distributed.comm import CommClosedError
 
@@ -77,15 +66,11 @@ class Cluster:
         # makes it again where all that had it are gone.
         work = self.client.submit(_as_is, (function, self.versions, dict(self.versions())))
         futures = self.client.map(_call, list(tasks), work=work, pure=False, batch_size=BATCH)
-        numbers = {future.key: number for number, future in enumerate(futures)}
-        running = as_completed(futures)
         try:
-            for _ in futures:
-                self._wait_for(running)
-                future = next(running)
+            for future in futures if in_order else as_completed(futures):
                 result = future.result()
                 future.release()
-                yield numbers[future.key], result
+                yield result
         except KilledWorker as error:
             what = "cluster: a task ended several workers, probably because memory ran out"
             raise SceneGenError(what, hint="see the workers' logs") from error
@@ -95,17 +80,6 @@ class Cluster:
         finally:
             with suppress(Exception):  # the scheduler may be gone; nothing depends on it
                 self.client.cancel([*futures, work])
-
-    def _wait_for(self, running: Any) -> None:
-        """Wait for a result; say so where there has been no worker for a while."""
-        check_at = time.monotonic() + PATIENCE
-        while not running.has_ready():
-            time.sleep(MOMENT)
-            if time.monotonic() > check_at:
-                alone = not self.client.scheduler_info(n_workers=-1)["workers"]
-                if alone:
-                    self.print_note("the cluster has no workers any more; waiting for one")
-                check_at = float("inf") if alone else time.monotonic() + PATIENCE
 
 
 def threads_of_worker() -> int:
@@ -167,7 +141,7 @@ def connected(
         if not client.scheduler_info(n_workers=-1)["workers"]:
             print_note(f"{scheduler}: no workers yet; waiting for the first one")
             client.wait_for_workers(1)
-        yield Cluster(client, versions, print_note)
+        yield Cluster(client, versions)
 
 
 @contextmanager

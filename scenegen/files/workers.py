@@ -77,13 +77,19 @@ def in_threads(
     or to be taken. Raises what the function raises.
     """
     with ThreadPoolExecutor(count) as pool:
-        running: deque[Future[T]] = deque()
-        for task in tasks:
-            running.append(pool.submit(function, task))
-            if len(running) > ahead:
-                yield running.popleft().result()
-        while running:
+        yield from _oldest_first(lambda task: pool.submit(function, task), tasks, ahead)
+
+
+def _oldest_first(
+    submit: Callable[[Task], Future[T]], tasks: Iterable[Task], ahead: int
+) -> Generator[T]:
+    running: deque[Future[T]] = deque()
+    for task in tasks:
+        running.append(submit(task))
+        if len(running) > ahead:
             yield running.popleft().result()
+    while running:
+        yield running.popleft().result()
 
 
 def in_order(
@@ -124,22 +130,12 @@ def in_processes(function: Callable[[Task], T], tasks: Iterable[Task], count: in
     done = False
     try:
         with worker_pool(count, function) as pool:
-            running: deque[Future[tuple[T, list[_Warning]]]] = deque()
-
-            def oldest() -> T:
-                result, caught = running.popleft().result()
+            ahead = AHEAD * count - 1
+            results = _oldest_first(lambda task: pool.submit(_do, task), tasks, ahead)
+            for result, caught in results:
                 for text, category in caught:
-                    warnings.warn(text, category, stacklevel=3)
-                return result
-
-            for task in tasks:
-                with _processes_to_be_had():
-                    running.append(pool.submit(_do, task))
-                if len(running) >= AHEAD * count:
-                    yield oldest()
-                    done = True
-            while running:
-                yield oldest()
+                    warnings.warn(text, category, stacklevel=2)
+                yield result
                 done = True
     except BrokenProcessPool as error:
         what = "A worker process was killed, probably because memory ran out"
