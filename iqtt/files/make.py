@@ -68,7 +68,7 @@ def make_split(
     Raises:
         SpecError, TooFewShapesError: a setting, before anything is rendered.
         PlacementError: the bounded search found no question that meets the spec.
-        Others as `making.make_set`.
+        OSError, SceneGenError: as `making.make_set`.
     """
     count = spec.train + spec.val + spec.test
     check(count > 0, "train, val and test", count, "at least 1 question in all")
