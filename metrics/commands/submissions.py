@@ -86,6 +86,7 @@ def score(
     from metrics.score_file import write_scores
     from metrics.scoring.evaluate import open_runs, score_runs
     from metrics.scoring.runs import Settings, scorer_versions
+    from metrics.submissions.validation import hints
     from metrics.views.report import read_beside
     from metrics.views.score_tables import text_report, write_csv
     from scenegen.files.new_file import check_writable, write_text
@@ -103,6 +104,9 @@ def score(
             progress_bar(len(runs.files[0]), "image") as bar,
         ):
             scores = score_runs(runs, Settings(**settings, cluster=cluster), bar.update)
+        for file in runs.files:
+            for hint in hints(file, runs.truth):
+                print_line(f"hint: {file.path}: {hint}", err=True)
     if json_path:
         write_scores(scores, json_path, overwrite)
     if csv_path:

@@ -1,5 +1,7 @@
 """What every measure refuses: arrays of the wrong kind, values that are not finite, no values."""
 
+from typing import Any, TypeGuard
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -38,7 +40,7 @@ def require_some(count: float, where: str) -> None:
 
 
 def as_float64(values: ArrayLike, what: str) -> NDArray[np.float64]:
-    """Return real numbers as a float64 array.
+    """Return real numbers as a float64 array; masked ones become NaN.
 
     Raises MeasureError on booleans, complex numbers, text and ragged input.
     """
@@ -47,7 +49,14 @@ def as_float64(values: ArrayLike, what: str) -> NDArray[np.float64]:
     except ValueError as error:
         raise MeasureError(what, error, "an array of numbers") from error
     require(array.dtype.kind in "fiu", what, f"dtype {array.dtype}", "real numbers")
-    return array.astype(np.float64, copy=False)
+    array = array.astype(np.float64, copy=False)
+    if _is_masked(values):
+        array = np.where(np.ma.getmaskarray(values), np.nan, array)
+    return array
+
+
+def _is_masked(values: ArrayLike) -> TypeGuard[np.ma.MaskedArray[Any, Any]]:
+    return isinstance(values, np.ma.MaskedArray)
 
 
 def require_finite(

@@ -14,7 +14,7 @@ from metrics.measures.chamfer_hausdorff import (
     nearest_distances,
     point_scores,
 )
-from metrics.measures.depth import Alignment, compare_depth, depth_scores, mse_depth
+from metrics.measures.depth import Alignment, align, compare_depth, depth_scores, mse_depth
 from metrics.measures.empty_room import empty_room
 from metrics.measures.image_search import nearest_distances_on_image
 from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_depth
@@ -82,6 +82,7 @@ def score_view(
     empty: Array,
     other_relief: Array | None = None,
     *,
+    alignment: Alignment = "none",
     alignments: Sequence[Alignment] = ALIGNMENTS,
     non_finite: NonFinite = "error",
 ) -> ImageScores:
@@ -97,8 +98,9 @@ def score_view(
         empty: planar depth of the empty room, (H, W), scene units.
         other_relief: true relief of another scene, (H, W), scene units, NaN where it has none; None
             where there is no other scene.
-        alignments: the alignments after which depth is scored; points and relief are never
-            aligned.
+        alignment: what the method cannot know. The depth is fitted to the truth of the image so
+            far before anything is scored.
+        alignments: the alignments after which depth is scored once more.
         non_finite: what to do with scored pixels that break `submissions.rules`. "penalise" scores
             them at the worst: depth as 0 (at the camera), a normal as opposite to the true one. An
             image with such a depth gets the worst scores of relief, -1 and 0.
@@ -117,11 +119,15 @@ def score_view(
         depth = np.where(broken, 0.0, depth)
         if normal is not None:
             normal = np.where(_broken("normal", normal, mask)[..., None], -truth.normal, normal)
+    if alignment != "none":
+        fitted = align(compare_depth(depth, truth.depth, mask), alignment).predicted
+        depth = np.full(depth.shape, np.nan)
+        depth[mask] = fitted
     nearest = nearest_distances_on_image(depth, truth.depth, truth.fov_y_degrees, mask)
     scores = point_scores(nearest, F_SCORE_THRESHOLDS)
     pair = compare_depth(depth, truth.depth, mask)
-    for alignment in alignments:
-        scores |= depth_scores(pair, alignment)
+    for after in alignments:
+        scores |= depth_scores(pair, after)
     said = empty - depth
     relief = relief_scores(said[mask], (empty - truth.depth)[mask])
     if broken.any():  # else they would count as relief, at the camera

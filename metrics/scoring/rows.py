@@ -2,7 +2,6 @@
 
 import atexit
 import functools
-import os
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
@@ -27,7 +26,7 @@ from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import Identity, RoomPredictions, on_any_machine, open_predictions
 from metrics.submissions.truths import read_true_view
 from scenegen.files.cluster import Cluster
-from scenegen.files.workers import worker_pool
+from scenegen.files.workers import processors, worker_pool
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
@@ -73,7 +72,7 @@ def score_rows(
     chunks = [pairs[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
     submissions = tuple((file.path.absolute(), file.identity) for file in files)
     job = submissions, truth.path.absolute()
-    processes = min(settings.processes or os.cpu_count() or 1, len(chunks))
+    processes = min(settings.processes or processors(), len(chunks))
     few = settings.processes is None and len(rows) <= FEW
     parts: Iterable[ScoredRows]
     if settings.cluster is not None:
@@ -151,7 +150,7 @@ class RowScorer:
                 depth, normal = file.depth(i), file.normal(i) if file.has_normals else None
                 score = functools.partial(
                     score_view, depth, normal, view, empty.depth, relief,
-                    alignments=self._alignments,
+                    alignment=file.alignment, alignments=self._alignments,
                 )  # fmt: skip
                 try:
                     scores.append(score())

@@ -10,7 +10,12 @@ import numpy as np
 from metrics.submissions.hints.questions import answer_hints
 from metrics.submissions.hints.rooms import room_hints
 from metrics.submissions.problems import HINT, MOST_IDS, Problem
-from metrics.submissions.reader import QuestionPredictions, RoomPredictions, inspect_predictions
+from metrics.submissions.reader import (
+    Predictions,
+    QuestionPredictions,
+    RoomPredictions,
+    inspect_predictions,
+)
 from metrics.submissions.rules import Against, broken_rules
 from metrics.submissions.truths import FoundTruth, find_truth, match_problems, read_true_view
 from scenegen.common.errors import FileFormatError, SceneGenError
@@ -57,6 +62,17 @@ def validate(
             return [*problems, Problem("truth", "readable", expected, found)]
 
 
+def hints(predictions: Predictions, truth: Any) -> list[Problem]:
+    """Return hints on likely mistakes of a submission that fits its truth, an open file.
+
+    Raises FileFormatError where the truth is damaged.
+    """
+    if isinstance(predictions, RoomPredictions):
+        return room_hints(predictions, truth)
+    assert isinstance(predictions, QuestionPredictions)
+    return answer_hints(predictions, truth.read("answers", slice(None)))
+
+
 def _hints_on_source(truth: FoundTruth) -> list[Problem]:
     """Return a hint where nobody but the submission says that this is the truth."""
     if truth.source == "given":
@@ -81,7 +97,7 @@ def _against_rooms(
                     tallies.setdefault(key, _Tally(problem)).add(row, pixels)
             progress(1)
         counted = [tally.total for _, tally in sorted(tallies.items())]
-        return [*problems, *counted, *room_hints(predictions, truth)]
+        return [*problems, *counted, *hints(predictions, truth)]
 
 
 def _row_problems(
@@ -136,9 +152,9 @@ def _against_questions(predictions: QuestionPredictions, truth_path: Path) -> li
         truth_file = QuestionsFile(truth_path)
     with truth_file as truth:
         problems = match_problems(predictions, truth)
-        if not truth.has_answers or any(p.rule in ("match", "shape", "range") for p in problems):
+        if not truth.has_answers or any(p.rule in ("match", "shape") for p in problems):
             return problems
-        return problems + answer_hints(predictions, truth.read("answers", slice(None)))
+        return problems + hints(predictions, truth)
 
 
 def _short(error: Exception, path: str | Path) -> str:

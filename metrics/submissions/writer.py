@@ -195,7 +195,7 @@ def write_answers(
         raise PredictionError(questions_file, "no questions", "at least one")
     if answer is None and scores is None:
         raise PredictionError(path, "neither answer nor scores", "either")
-    ids = np.arange(count) if rows is None else np.asarray(rows)
+    ids = np.arange(count) if rows is None else _array(rows, f"{path}: rows")
     arrays = {"question": ids, "answer": answer, "scores": scores}
     values: dict[str, rules.Array] = {}
     for column in layout.COLUMNS["iqtt"]:
@@ -248,7 +248,16 @@ def _checked_texts(task: str, texts: Mapping[str, str]) -> dict[str, str]:
 
 
 def _array(values: ArrayLike, where: str) -> rules.Array:
-    """Return values as an array. Raises PredictionError for what is none."""
+    """Return values as an array; masked floats become NaN, which counts as missing.
+
+    Raises PredictionError for what is no array, and for masked integers.
+    """
+    if isinstance(values, np.ma.MaskedArray):
+        masked = int(np.ma.getmaskarray(values).sum())
+        if masked and values.dtype.kind != "f":
+            expected = "a value for each, or rows without them"
+            raise PredictionError(where, f"{masked} masked values", expected)
+        return np.asarray(values.filled(np.nan) if masked else values)
     try:
         return np.asarray(values)
     except Exception as error:

@@ -79,13 +79,19 @@ def floor_text(scores: ScoreFile, name: str) -> str:
 def floor_cell(scores: ScoreFile, name: str) -> Cell:
     """Return the floor of a score with its name, and what chance or noise gives."""
     label, value = references(scores).get(name, ("", 0.0))
-    reference = number(value, as_shown(scores.metrics[name]))
+    reference = _beside(value, scores.metrics[name])
     if name not in scores.skills:
         return Cell(reference, label) if label else Cell()
     floor, texts = scores.skills[name].floor, [floor_text(scores, name)]
     if label and not texts[0].startswith(label):
         texts.append(f"{label} {reference}")
-    return Cell(number(floor, as_shown(scores.metrics[name])), "; ".join(texts))
+    return Cell(_beside(floor, scores.metrics[name]), "; ".join(texts))
+
+
+def _beside(reference: float, score: Score) -> str:
+    """Return a number as its score is shown, but never a rounded 0."""
+    text = number(reference, as_shown(score))
+    return number(reference, reference) if reference and float(text) == 0 else text
 
 
 def references(scores: ScoreFile) -> dict[str, tuple[str, float]]:
@@ -105,11 +111,11 @@ def all_scores(scores: ScoreFile) -> Table:
         better = "higher" if metric(name).higher_is_better else "lower"
         std = "-" if score.std is None else number(score.std, score.value)
         skill = scores.skills.get(name)
-        floor = "-" if skill is None else number(skill.floor, as_shown(score))
+        floor = "-" if skill is None else _beside(skill.floor, score)
         rows.append((name, *interval_cells(score), std, floor, score.unit, better))
         if name in beside:
             label, value = beside[name]
-            rows.append((f"  {label}", number(value, score.value), "-", "-", "-", score.unit, ""))
+            rows.append((f"  {label}", _beside(value, score), "-", "-", "-", score.unit, ""))
     head = ("score", "value", INTERVAL, "std of runs", "floor", "unit", "better")
     return make_table("all scores", head, rows)
 
@@ -202,10 +208,22 @@ def notes_of(scores: ScoreFile) -> Iterator[str]:
         yield f"{SKILL} {what_the_floor_is(scores)}"
     bootstrap = f"{meta.resamples} resamples, seed {meta.seed}"
     if scores.task == "rooms":
-        claim = f"alignment claimed: {scores.alignment} (points are never aligned)"
+        claim = f"alignment: {scores.alignment}"
+        if scores.alignment != "none":
+            claim += ", fitted to the truth of each image before all scores"
         yield f"intervals: bootstrap over scenes, {bootstrap}; {claim}"
         if meta.noise_floors:
             yield "noise floor: the score of the true surface, sampled elsewhere, against itself"
+        below = [
+            name
+            for name, floor in meta.noise_floors.items()
+            if name in scores.metrics and (scores.metrics[name].value < floor)
+        ]
+        if below:
+            yield (
+                f"below the noise floor: {', '.join(below)}. This is no error: predictions on the"
+                " truth's own rays can lie nearer to it than two samplings of one surface"
+            )
     else:
         how = "Wilson's" if scores.runs == 1 else f"bootstrap, {bootstrap}"
         over = "questions, as the truth does not tell their shapes"

@@ -19,6 +19,10 @@ SWAPPED = 0.8  # least correlation with 1 / truth of disparity
 SAME_SCALE = 1.5  # factor within which two scales count as the same
 FEWEST = 3  # images that can share a scale
 OTHER_UNIT = 10.0  # least factor that looks like another unit of length
+SLOPE = 0.2  # by which the slopes of distances may differ from 1
+MOST_CONDITION = 1e6  # of the equations for the slopes
+ALONG_RAY = "looks like distance along the ray, not planar depth"
+PICTURES = (255.0, 65535.0)  # largest values of pictures of 8 and 16 bits
 UNITS = {1000.0: "millimetres for metres", 100.0: "centimetres for metres"}
 
 
@@ -29,7 +33,8 @@ def depth_hints(samples: Sequence[Sample], alignment: str) -> list[Problem]:
         images = [image for image in usable if image is not None]
         if not images:
             return []
-        found = [_swapped(images) or _shape(images), _scale(images, alignment)]
+        shape = _swapped(images) or _shape(images) or _along_rays(images)
+        found = [shape, _scale(images, alignment)]
     expected = "planar depth, -z in the camera frame, scene units, row 0 on top"
     return [Problem("depth", HINT, expected, text) for text in found if text]
 
@@ -90,6 +95,32 @@ def _shape(images: Sequence[_Image]) -> str | None:
     return found
 
 
+def _along_rays(images: Sequence[_Image]) -> str | None:
+    """Return that predictions are distances, where only noise hides it.
+
+    The logarithm of a distance is that of the planar depth plus that of the ray's length at depth
+    1. Each image may have a scale of its own. Noise of the predictions biases neither slope.
+    """
+    known, said = [], []
+    for image in images:
+        if (image.predicted <= 0.0).any():
+            return None
+        logs = np.log([image.true, image.sample.stretch[image.sample.mask], image.predicted])
+        *two, last = logs - logs.mean(axis=1, keepdims=True)
+        known.append(np.stack(two, axis=1))
+        said.append(last)
+    table, target = np.concatenate(known), np.concatenate(said)
+    square = table.T @ table
+    if np.linalg.cond(square) > MOST_CONDITION:
+        return None
+    slopes = np.linalg.solve(square, table.T @ target)
+    rest = target - table @ slopes
+    errors = np.sqrt(np.diag(np.linalg.inv(square)) * (rest @ rest) / len(rest))
+    if (np.abs(slopes - 1.0) > SLOPE).any() or (errors > SLOPE / 4.0).any():
+        return None
+    return ALONG_RAY
+
+
 def _mended(sample: Sample, remedy: Remedy) -> Array:
     """Return the values (N,) of a remedy where both depths are finite; infinite for NaN."""
     values = remedy(sample)[sample.mask]
@@ -127,6 +158,13 @@ def _scale(images: Sequence[_Image], alignment: str) -> str | None:
     normalised = low >= -1e-6 and 0.9 <= high <= 1.0 + 1e-6
     if normalised and follows and (alignment == "none" or low < 0.1):
         return "looks normalised to 0..1"
+    for most in PICTURES:
+        ends = [(float(i.predicted.min()), float(i.predicted.max())) for i in images]
+        if (
+            follows
+            and np.mean([a < 0.1 * most and 0.9 * most < b <= most for a, b in ends]) > SHARE
+        ):
+            return f"looks like a picture of depth, 0..{most:g} in each image"
     errors = [_error(image.predicted / scale, image.true) for image in images]
     near = np.mean([e <= 1.2 * i.spread for e, i in zip(errors, images, strict=True)]) >= SHARE
     alike = np.mean(np.abs(np.log(scales / scale)) <= 0.1) >= SHARE
@@ -160,7 +198,7 @@ def _transposed(sample: Sample) -> Array:
 
 
 _REMEDIES: dict[str, Remedy] = {
-    "looks like distance along the ray, not planar depth": lambda s: s.depth / s.stretch,
+    ALONG_RAY: lambda s: s.depth / s.stretch,
     "looks upside down": lambda s: s.depth[::-1],
     "looks mirrored, left for right": lambda s: s.depth[:, ::-1],
     "looks turned by 180 degrees": lambda s: s.depth[::-1, ::-1],

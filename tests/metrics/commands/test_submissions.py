@@ -207,3 +207,24 @@ def test_what_cannot_be_viewed(truths, folder, check_refusal):
     ):
         result = bench("view", *arguments)
         check_refusal(result.exit_code, result.stdout, result.stderr, words)
+
+
+def test_score_gives_the_hints_of_validate_and_never_a_floor_of_zero(truths, folder):
+    from metrics.prediction_writer import RoomPredictionWriter
+    from scenegen import open_rooms
+
+    with (
+        open_rooms(truths.rooms) as rooms,
+        RoomPredictionWriter("mm.h5", truths.rooms, method="mm") as out,
+    ):
+        for row, room in enumerate(rooms):
+            out.add(row, 1000 * room.depth)
+    scored = bench("score", "mm.h5", "--truth", truths.rooms)
+    told = bench("validate", "mm.h5", "--truth", truths.rooms).stdout
+    assert scored.exit_code == 0
+    (hint,) = [line for line in told.splitlines() if line.startswith("hint")]
+    assert hint.removeprefix("hint").strip() in scored.stderr
+    rows = [line.split() for line in scored.stdout.splitlines() if "noise floor" in line]
+    floors = [row[row.index("floor") + 1] for row in rows if row[:2] == ["noise", "floor"]]
+    assert floors
+    assert all(float(floor) > 0 for floor in floors if floor != "-" and floor[0].isdigit())

@@ -198,18 +198,30 @@ def test_a_depth_that_is_not_finite_is_no_relief(folder, tmp_path):
     assert not found.comparable
 
 
-def test_alignment_changes_no_relief(folder, tmp_path):
-    truth, found = folder / "rooms.h5", []
-    for alignment in ("none", "scale"):
-        path = tmp_path / f"{alignment}.h5"
-        with (
-            RoomsFile(truth) as rooms,
-            RoomPredictionWriter(path, truth, method="m", alignment=alignment) as out,
-        ):
-            for row, room in enumerate(rooms):
-                out.add(row, 2.0 * room.depth)
-        found.append(score([path], truth).metrics["relief_iou"].value)
-    assert found == [0.0, 0.0]
+@pytest.mark.parametrize(
+    ("alignment", "told"),
+    [
+        ("scale", lambda depth: 2.0 * depth),
+        ("scale_shift", lambda depth: (depth - np.nanmin(depth)) / np.ptp(depth)),
+        ("scale_shift", lambda depth: 7.0 + 0.01 * depth),
+    ],
+)
+def test_headlines_of_relative_depth_are_those_after_its_alignment(
+    folder, tmp_path, alignment, told
+):
+    """Depth that is exact up to what the method says it cannot know is perfect."""
+    truth, path = folder / "rooms.h5", tmp_path / "relative.h5"
+    with (
+        RoomsFile(truth) as rooms,
+        RoomPredictionWriter(path, truth, method="m", alignment=alignment) as out,
+    ):
+        for row, room in enumerate(rooms):
+            out.add(row, told(room.depth))
+    scores = score([path], truth)
+    for name, skill in scores.skills.items():
+        assert skill.value == pytest.approx(1.0, abs=2e-3), name
+    assert scores.metrics["chamfer"].value < 1e-4
+    assert scores.metrics["mse_depth"].value < 1e-9
 
 
 def test_every_row_serves_once_as_that_of_another_scene():

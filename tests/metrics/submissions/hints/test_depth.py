@@ -87,6 +87,11 @@ MISTAKES = {
     "ray": (lambda d, s: d * s, "distance along the ray"),
     "ray, noisy": (lambda d, s: d * s + 0.005 * np.random.default_rng(1).normal(size=d.shape),
                    "distance along the ray"),
+    "ray, 2% noise": (lambda d, s: d * s * np.random.default_rng(2).normal(1, 0.02, d.shape),
+                      "distance along the ray"),
+    "ray, 5% noise, scaled": (
+        lambda d, s: 0.8 * d * s * np.random.default_rng(3).normal(1, 0.05, d.shape),
+        "distance along the ray"),
     "ray, scaled": (lambda d, s: 1.2 * d * s, "distance along the ray"),
     "upside down": (lambda d, s: d[:, ::-1], "upside down"),
     "upside down, wavy": (lambda d, s: d[:, ::-1] + smooth(6, d.shape, 8, 0.03), "upside down"),
@@ -112,6 +117,13 @@ SCALES = {
     "from 0 to 1, each": (
         lambda d: (d - d.min((1, 2), keepdims=True)) / np.ptp(d, axis=(1, 2), keepdims=True),
         "normalised to 0..1"),
+    "from 0 to 255, each": (
+        lambda d: 255 * (d - d.min((1, 2), keepdims=True)) / np.ptp(d, axis=(1, 2), keepdims=True),
+        "picture of depth, 0..255"),
+    "from 0 to 65535, each, wavy": (
+        lambda d: 65535 * np.clip((d - d.min((1, 2), keepdims=True)) / np.ptp(
+            d, axis=(1, 2), keepdims=True) + smooth(9, d.shape, 8, 0.05), 0, 1),
+        "picture of depth, 0..65535"),
     "from 0 to 1, all": (lambda d: (d - d.min()) / np.ptp(d), "normalised to 0..1"),
     "at most 1": (lambda d: d / d.max(), "normalised to 0..1"),
 }  # fmt: skip

@@ -26,3 +26,20 @@ def test_scores_that_are_distances():
     assert "distances" in hint.found
     assert answer_hints(answered(-scores[:3]), right) == [], "too few to tell"
     assert answer_hints(answered(None, np.arange(3)), right) == []
+
+
+def test_answers_that_are_counted_from_one():
+    rng = np.random.default_rng(8)
+    right = rng.integers(0, 3, 300)
+    rows = np.arange(300)
+
+    def hints(answers):
+        return answer_hints(QuestionPredictions(Path(__file__), {}, rows, answers), right)
+
+    assert hints(right) == []
+    assert hints(rng.integers(0, 3, 300)) == []
+    assert hints(np.full(300, 1)) == []
+    (hint,) = hints(right + 1)
+    assert (hint.is_hint, hint.dataset) == (True, "answer")
+    (hint,) = hints(rng.integers(1, 4, 300))
+    assert hint.dataset == "answer"
