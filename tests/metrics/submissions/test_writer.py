@@ -104,7 +104,7 @@ REFUSED = {
     "objects": ((1, np.full(SIZE, None)), "row 1: depth", "object"),
     "ragged": ((1, [[1.0, 2.0], [3.0]]), "row 1: depth", "no array"),
     "NaN": ((1, spoiled(np.nan)), "row 1: depth", "1 pixels, the first at (3, 4)"),
-    "masked": ((1, np.ma.masked_array(DEPTH, DEPTH == DEPTH[3, 4])), "row 1: depth", "(3, 4)"),
+    "masked": ((1, np.ma.masked_array(DEPTH, DEPTH[3, 4] == DEPTH)), "row 1: depth", "(3, 4)"),
     "infinite": ((1, spoiled(np.inf)), "row 1: depth", "(3, 4)"),
     "beyond float32": ((1, spoiled(1e39)), "row 1: depth", "(3, 4)"),
     "negative z": ((1, -DEPTH), "row 1: depth", "at or below 0"),
