@@ -12,11 +12,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict
+from pydantic import ConfigDict, FailFast, Field, TypeAdapter
 
 from metrics.measures.checks import LARGEST_MAGNITUDE
 from metrics.measures.depth import Alignment
@@ -42,6 +42,7 @@ from metrics.scoring.records import (
     Label,
     Meta,
     Name,
+    Number,
     Score,
     ScoreFile,
     Skill,
@@ -69,6 +70,11 @@ RESAMPLES = range(100, 100_001)  # as many as `bench score` takes
 WITHOUT_JSON = "about 140,000 images fit; --csv writes the scores of any number of them"
 SCORE_AGAIN = "score the submission again with this release"
 Array = NDArray[Any]
+_NUMBERS = TypeAdapter(Annotated[list[Number | None], FailFast()])
+_WHOLE_NUMBERS = TypeAdapter(
+    Annotated[list[Annotated[int, Field(strict=True, le=LARGEST_WHOLE)]], FailFast()]
+)
+_LABELS = TypeAdapter(Annotated[list[Label], FailFast()])
 # Limits of whole numbers; ids of objects are int8 in rooms files.
 _LIMITS = {
     "object": (1, 127),
@@ -137,49 +143,33 @@ def write_scores(scores: ScoreFile, path: str | Path, overwrite: bool = False) -
 
 def to_json(scores: ScoreFile) -> str:
     """Return the text of a score file: keys in a fixed order, a line for each column of items."""
-    meta = asdict(scores.meta)
-    for name in ("versions", "counts", "noise_floors"):
-        meta[name] = dict(sorted(meta[name].items()))
+    groups = {
+        grouping: {key: asdict(groups[key]) for key in by_number(groups)}
+        for grouping, groups in scores.answer_groups.items()
+    }
     head = {
         "format": FORMAT_NAME,
         "format_version": FORMAT_VERSION,
         "task": scores.task,
         "method": scores.method,
         "alignment": scores.alignment,
-        "summary": _summary(scores),
-        "meta": meta,
+        "summary": {
+            "comparable": scores.comparable,
+            "warnings": scores.warnings,
+            "metrics": {name: vars(scores.metrics[name]) for name in in_order(scores.metrics)},
+            "skills": {name: vars(scores.skills[name]) for name in in_order(scores.skills)},
+        },
+        "meta": asdict(scores.meta),
+        **({"answer_groups": groups} if groups else {}),
     }
-    if scores.answer_groups:
-        head["answer_groups"] = {
-            grouping: {key: asdict(groups[key]) for key in by_number(groups)}
-            for grouping, groups in sorted(scores.answer_groups.items())
-        }
     # Only ASCII, as one wide character makes the whole text take 4 bytes a character when read.
-    text = json.dumps(_plain(head), indent=2, allow_nan=False)
+    text = json.dumps(head, indent=2, allow_nan=False)
     first = (*ID_COLUMNS[scores.task], *OPTIONAL_COLUMNS[scores.task])
     tables = _table("items", scores.columns, first)
     if scores.object_columns:
         first = (*OBJECT_COLUMNS, SHAPE_COLUMN)
         tables += ",\n" + _table("objects", scores.object_columns, first)
     return f"{text[:-2]},\n{tables}\n}}\n"
-
-
-def _summary(scores: ScoreFile) -> dict[str, Any]:
-    """Return what follows from the items, for people and for jq."""
-    groups = GROUPINGS[scores.task] if scores.task == "rooms" else ()
-    return {
-        "comparable": scores.comparable,
-        "warnings": scores.warnings,
-        "metrics": {name: vars(scores.metrics[name]) for name in in_order(scores.metrics)},
-        "skills": {name: vars(scores.skills[name]) for name in in_order(scores.skills)},
-        **{
-            grouping: {
-                key: {name: vars(group[name]) for name in in_order(group)}
-                for key, group in getattr(scores, grouping).items()
-            }
-            for grouping in groups
-        },
-    }
 
 
 def _table(key: str, columns: Mapping[str, Array], first: Sequence[str]) -> str:
@@ -197,17 +187,6 @@ def _listed(column: Array) -> list[Any]:
     if column.dtype.kind != "f" or np.isfinite(column).all():
         return values
     return [value if math.isfinite(value) else None for value in values]
-
-
-def _plain(value: Any) -> Any:
-    """Return the same in Python's own types; numbers that are not finite become None."""
-    if isinstance(value, Mapping):
-        return {key: _plain(member) for key, member in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(member) for member in value]
-    if isinstance(value, np.generic):
-        return _plain(value.item())
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 @contextmanager
@@ -312,7 +291,7 @@ def _columns(
             columns[name] = _numbers(where, values, *limits, whole=True)
         elif name == SHAPE_COLUMN and place == "objects":
             with _naming(where):
-                columns[name] = np.array(validated(tuple[Label, ...], values), object)
+                columns[name] = np.array(validated(_LABELS, values), object)
         else:
             columns[name] = _scores(where, values, name, task, runs)
         count = columns[required[0]].shape[-1] if required[0] in columns else None
@@ -357,22 +336,17 @@ def _known_metric(place: str, name: str, task: str) -> Metric:
 
 def _numbers(place: str, values: Any, least: float, most: float, whole: bool = False) -> Array:
     """Return a list of numbers within limits as an array (N,); null is NaN among floats."""
-    if not isinstance(values, list):
-        raise refusal(place, shown(values), "a list of numbers")
-    kinds = {int} if whole else {int, float, type(None)}
-    try:
-        if set(map(type, values)) <= kinds:
-            column = np.array(values, np.int64 if whole else np.float64)
-            if not ((column < least) | (column > most)).any():
-                return column
-    except OverflowError:
-        pass
-    for i, value in enumerate(values):
-        if type(value) not in kinds or (value is not None and not least <= value <= most):
-            within = f"{least:g} to {most:g}" if most < LARGEST_WHOLE else f"{least:g}"
-            expected = f"a {'whole' if whole else 'finite'} number from {within}"
-            raise refusal(f"{place}[{i}]", shown(value), expected)
-    raise AssertionError("an array of numbers within limits can be made")
+    with _naming(place):
+        if whole:
+            column = np.array(validated(_WHOLE_NUMBERS, values), np.int64)
+        else:
+            column = np.array(validated(_NUMBERS, values), np.float64)
+    outside = (column < least) | (column > most)
+    if outside.any():
+        i = int(np.argmax(outside))
+        limits = f"from {least:g} to {most:g}" if most < LARGEST_WHOLE else f"from {least:g}"
+        raise refusal(f"{place}[{i}]", repr(column[i].item()), f"a number {limits}")
+    return column
 
 
 def _check_meta(scores: ScoreFile) -> None:

@@ -5,7 +5,7 @@ whole, pixels not at all.
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,17 +39,17 @@ class Inspection:
     """What was found in a submission.
 
     Attributes:
-        texts: its root attributes.
         task: None where it is neither of the two.
+        texts: its root attributes that are as they should be.
+        arrays: the data sets that can be used, by name: stored ones, or arrays.
         ids: (M,) int64, rows of the truth or indices of questions; None where they are unusable.
-        arrays: the data sets that can be used, by name.
         answers: (M,) int64, of an iqtt submission; None where they are unusable.
     """
 
-    texts: dict[str, str] = field(default_factory=dict)
     task: str | None = None
+    texts: dict[str, str] = field(default_factory=dict)
+    arrays: dict[str, Any] = field(default_factory=dict)
     ids: Ids | None = None
-    arrays: dict[str, StoredArray] = field(default_factory=dict)
     answers: Ids | None = None
     problems: list[Problem] = field(default_factory=list)
 
@@ -57,46 +57,43 @@ class Inspection:
 def inspect(file: h5py.File) -> Inspection:
     """Check attributes, layout, ids and answers of an open file; never raise on its content."""
     result = Inspection()
-    _take_texts(file, result)
+    texts = {a.name: text for a in layout.ATTRIBUTES if (text := _text(file, a)) is not None}
+    head = [texts[name] for name in ("format", "format_version") if name in texts]
+    if any(isinstance(text, Problem) for text in head):  # then the others mean nothing
+        result.problems = [next(text for text in head if isinstance(text, Problem))]
+        return result
+    take_texts(result, texts)
     result.task = result.texts.get("task")
     if result.task is None:
         return result
+    if result.task == "rooms" and result.texts.get("truth_fingerprint") == "":
+        expected = "the attribute 'fingerprint' of the rooms file"
+        result.problems.append(Problem("truth_fingerprint", "value", expected, "an empty text"))
     file_faults = list(faults(file))
     for fault in file_faults:
         if fault.rule == "count":  # the objects after these were not looked at
             result.problems.append(Problem("file", fault.rule, fault.expected, fault.found))
             return result
     _take_arrays(file, result, layout.COLUMNS[result.task], file_faults)
-    _take_ids(result, layout.ID_NAMES[result.task])
-    if result.task == "iqtt" and result.ids is not None:
-        _take_answers(result, result.ids)
+    take_values(result)
     return result
 
 
 # ---- root attributes ----
 
 
-def _take_texts(file: h5py.File, result: Inspection) -> None:
-    """Take the root attributes that are as they should be, and what is wrong with the others.
-
-    If the file has another format or version, that alone is told.
-    """
-    texts: dict[str, str | None] = {}
-    for attribute in layout.ATTRIBUTES:
-        text = _text(file, attribute)
-        if not isinstance(text, Problem):
-            texts[attribute.name] = text
-        elif attribute.name in ("format", "format_version"):
-            result.problems = [text]
-            return
-        elif texts.get("task") is None or str(texts["task"]) in attribute.tasks:
+def take_texts(result: Inspection, texts: Mapping[str, str | Problem]) -> None:
+    """Take the root attributes that are as they should be, and what is wrong with the others."""
+    for attribute in layout.attributes(str(texts.get("task", ""))):
+        text = texts.get(attribute.name)
+        if isinstance(text, Problem):
             result.problems.append(text)
-    tasks = (texts["task"],) if texts.get("task") else layout.TASKS
-    kept = {a.name for a in layout.ATTRIBUTES if set(tasks) & set(a.tasks)}
-    result.texts = {name: text for name, text in texts.items() if text is not None and name in kept}
-    if texts.get("task") == "rooms" and texts.get("truth_fingerprint") == "":
-        expected = "the attribute 'fingerprint' of the rooms file"
-        result.problems.append(Problem("truth_fingerprint", "value", expected, "an empty text"))
+        elif text is not None:
+            fault = layout.text_fault(attribute, text)
+            if fault is None:
+                result.texts[attribute.name] = text
+            else:
+                result.problems.append(Problem(attribute.name, "value", fault[1], fault[0]))
 
 
 def _text(file: h5py.File, attribute: layout.Attribute) -> str | Problem | None:
@@ -118,12 +115,11 @@ def _text(file: h5py.File, attribute: layout.Attribute) -> str | Problem | None:
         text = value.decode() if isinstance(value, bytes) else str(value)
     except UnicodeDecodeError:
         return Problem(name, "type", "a text", "bytes that are not UTF-8")
-    fault = layout.text_fault(attribute, text)
-    if fault is None:
-        return text
-    kind = layout.DATA_FORMATS.get(text) if name == "format" else None
-    what = f", a file of {kind}, not a submission" if kind else ""
-    return Problem(name, "value", fault[1], fault[0] + what)
+    if name in ("format", "format_version") and text not in attribute.choices:
+        kind = layout.DATA_FORMATS.get(text)
+        what = f", a file of {kind}, not a submission" if kind else ""
+        return Problem(name, "value", repr(attribute.choices[0]), f"{text!r:.60}{what}")
+    return text
 
 
 def _unreadable(name: str, expected: str, error: FileFormatError) -> Problem:
@@ -215,7 +211,9 @@ def _with_cache(file: h5py.File, name: str) -> StoredArray:
 # ---- ids and answers ----
 
 
-def _take_ids(result: Inspection, name: str) -> None:
+def take_values(result: Inspection) -> None:
+    """Read and check the ids, and the answers where there are some."""
+    name = layout.ID_NAMES[str(result.task)]
     values = _values(result, name, lambda array: array[()])
     if values is None:
         return
@@ -225,7 +223,9 @@ def _take_ids(result: Inspection, name: str) -> None:
         return
     ids = values.astype(np.int64)
     result.problems += value_problems(name, ids, ids)
-    result.ids = ids if len(ids) else None
+    if len(ids):
+        result.ids = ids
+        _take_answers(result, ids)
 
 
 def _take_answers(result: Inspection, ids: Ids) -> None:
@@ -240,7 +240,7 @@ def _take_answers(result: Inspection, ids: Ids) -> None:
         result.answers = of_scores if answers is None else answers.astype(np.int64)
 
 
-def _answers(result: Inspection, scores: StoredArray, ids: Ids) -> Ids:
+def _answers(result: Inspection, scores: Any, ids: Ids) -> Ids:
     """Return the answers (M,) of scores (M, A), up to the first score that is not finite."""
     answers = np.empty(len(ids), np.int64)
     for start in range(0, len(ids), BLOCK_ROWS):
@@ -254,7 +254,7 @@ def _answers(result: Inspection, scores: StoredArray, ids: Ids) -> Ids:
     return answers
 
 
-def _values(result: Inspection, name: str, read: Callable[[StoredArray], Array]) -> Array | None:
+def _values(result: Inspection, name: str, read: Callable[[Any], Array]) -> Array | None:
     """Return what `read` makes of a data set; None where there is none, or it is damaged."""
     try:
         with reading(name):

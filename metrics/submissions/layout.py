@@ -77,8 +77,8 @@ ID_NAMES = {"rooms": "row", "iqtt": "question"}
 
 
 def attributes(task: str) -> tuple[Attribute, ...]:
-    """Return the root attributes of a task's submissions."""
-    return tuple(attribute for attribute in ATTRIBUTES if task in attribute.tasks)
+    """Return the root attributes of a task's submissions; of an unknown task, all."""
+    return tuple(a for a in ATTRIBUTES if task not in TASKS or task in a.tasks)
 
 
 def text_fault(attribute: Attribute, text: Any) -> tuple[str, str] | None:

@@ -19,8 +19,9 @@ class JsonError(SceneGenError):
     """A JSON file that is not what it should be; `where` is empty for the whole of it."""
 
     def inside(self, place: object) -> Self:
-        """Return the same error with the file before `where`."""
-        where = f"{place}: {self.where}" if self.where else place
+        """Return the same error with a file, or a key, before `where`."""
+        apart = "" if self.where.startswith("[") else ": "
+        where = f"{place}{apart}{self.where}" if self.where else place
         return type(self)(where, self.found, self.expected, self.hint)
 
 

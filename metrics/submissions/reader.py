@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from metrics.measures.depth import Alignment
 from metrics.submissions.inspection import Inspection, inspect
 from metrics.submissions.problems import Problem, first_error
-from metrics.submissions.rules import Ids, as_doubles
+from metrics.submissions.rules import as_doubles
 from scenegen.common.errors import FileFormatError
 from scenegen.files import trial
-from scenegen.files.input_file import StoredArray, checking, open_unchecked, reading
+from scenegen.files.input_file import checking, open_unchecked, reading
 
 Array = NDArray[np.float64]
 BLOCK_BYTES = 1 << 20
@@ -53,16 +53,16 @@ class Predictions:
 
     task = ""
 
-    def __init__(
-        self, path: Path, texts: dict[str, str], rows: Ids, file: h5py.File | None = None
-    ) -> None:
-        self.path = path
+    def __init__(self, path: Path, content: Inspection, file: h5py.File | None) -> None:
+        """Take over an open file whose ids are usable, or none after JSON was read."""
+        assert content.ids is not None, "only usable files are opened"
+        texts = content.texts
+        self.path, self.rows = path, content.ids
         self.method, self.run = texts.get("method", ""), texts.get("run", "")
         self.notes, self.truth_path = texts.get("notes", ""), texts.get("truth_path", "")
         self.truth_fingerprint = texts.get("truth_fingerprint") or None
         self.alignment = cast(Alignment, texts.get("alignment", "none"))
-        self.rows = rows
-        self._file = file
+        self._arrays, self._file = content.arrays, file
         self.identity = _identity(path if file is None else file.id.get_vfd_handle())
 
     def __len__(self) -> int:
@@ -103,19 +103,19 @@ class Predictions:
 
 
 class RoomPredictions(Predictions):
-    """Predicted depth of rooms, and optionally normals.
-
-    Attributes, besides those of `Predictions`:
-        height, width: of an image, pixels.
-    """
+    """Predicted depth of rooms, and optionally normals."""
 
     task = "rooms"
 
-    def __init__(self, path: Path, content: Inspection, rows: Ids, file: h5py.File) -> None:
-        """Take over an open file whose ids and depth are usable."""
-        super().__init__(path, content.texts, rows, file)
-        self._arrays = content.arrays
-        self.height, self.width = self._arrays["depth"].shape[1:3]
+    @property
+    def height(self) -> int:
+        """Of an image, pixels."""
+        return int(self._arrays["depth"].shape[1])
+
+    @property
+    def width(self) -> int:
+        """Of an image, pixels."""
+        return int(self._arrays["depth"].shape[2])
 
     @property
     def has_normals(self) -> bool:
@@ -153,31 +153,24 @@ class QuestionPredictions(Predictions):
 
     task = "iqtt"
 
-    def __init__(
-        self,
-        path: Path,
-        texts: dict[str, str],
-        rows: Ids,
-        answers: Ids,
-        scores: StoredArray | None = None,
-        file: h5py.File | None = None,
-    ) -> None:
-        """Take over an open file, or none."""
-        super().__init__(path, texts, rows, file)
-        self.answers, self._scores = answers, scores
+    def __init__(self, path: Path, content: Inspection, file: h5py.File | None) -> None:
+        """Take over an open file whose answers are usable, or none after JSON was read."""
+        assert content.answers is not None, "only usable files are opened"
+        super().__init__(path, content, file)
+        self.answers = content.answers
 
     @property
     def candidates(self) -> int | None:
         """How many answers have scores, 2 or 3; None where only answers are given."""
-        return None if self._scores is None else int(self._scores.shape[1])
+        return int(self._arrays["scores"].shape[1]) if "scores" in self._arrays else None
 
     @cached_property
     def scores(self) -> Array | None:
         """Scores (M, A), finite; None where only answers are given. Raises FileFormatError."""
-        if self._scores is None:
+        if "scores" not in self._arrays:
             return None
         with reading(f"{self.path}: scores"):
-            return as_doubles(self._scores[()])
+            return as_doubles(self._arrays["scores"][()])
 
 
 def open_predictions(
@@ -214,26 +207,25 @@ def inspect_predictions(
         OSError: no such file, or a folder.
         FileFormatError: neither HDF5 nor JSON.
     """
-    path = Path(path)
+    path, file = Path(path), None
     if _looks_like_json(path):
         from metrics.submissions.answers_json import read_answers
 
-        texts, ids, numbers, problems = read_answers(path)
-        return QuestionPredictions(path, texts, ids, numbers) if len(ids) else None, problems
-    if not tried:
-        trial.try_file(path)
-    file = open_unchecked(path, "submission")
-    with checking(file):
-        content = inspect(file)
-    rows, answers = content.ids, content.answers
-    if rows is not None and "depth" in content.arrays:
-        return RoomPredictions(path, content, rows, file), content.problems
-    if rows is not None and answers is not None:
-        scores = content.arrays.get("scores")
-        opened = QuestionPredictions(path, content.texts, rows, answers, scores, file)
-        return opened, content.problems
-    file.close()
-    return None, content.problems
+        content = read_answers(path)
+    else:
+        if not tried:
+            trial.try_file(path)
+        file = open_unchecked(path, "submission")
+        with checking(file):
+            content = inspect(file)
+    opened: RoomPredictions | QuestionPredictions | None = None
+    if content.ids is not None and "depth" in content.arrays:
+        opened = RoomPredictions(path, content, file)
+    elif content.ids is not None and content.answers is not None:
+        opened = QuestionPredictions(path, content, file)
+    elif file is not None:
+        file.close()
+    return opened, content.problems
 
 
 def _looks_like_json(path: Path) -> bool:

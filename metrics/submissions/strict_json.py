@@ -27,6 +27,7 @@ _EXPECTED = {
     "dataclass_type": "an object",
     "dict_type": "an object",
     "tuple_type": "a list",
+    "list_type": "a list",
     "string_type": "a text",
     "too_short": "at least one entry",
 }  # for the others pydantic's own words will do
@@ -111,10 +112,11 @@ def memory_needed(data: bytes) -> int:
     return int(held)
 
 
-def validated(kind: type[Kind], content: Any) -> Kind:
-    """Return parsed JSON as a dataclass. Raises JsonError with the first thing that is wrong."""
+def validated(kind: type[Kind] | TypeAdapter[Kind], content: Any) -> Kind:
+    """Return parsed JSON as this type. Raises JsonError with the first thing that is wrong."""
     try:
-        record: Kind = _adapter(kind).validate_python(content)
+        adapter = kind if isinstance(kind, TypeAdapter) else _adapter(kind)
+        record: Kind = adapter.validate_python(content)
         return record
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]

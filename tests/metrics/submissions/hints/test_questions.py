@@ -5,13 +5,16 @@ from pathlib import Path
 import numpy as np
 
 from metrics.submissions.hints.questions import answer_hints
+from metrics.submissions.inspection import Inspection
 from metrics.submissions.reader import QuestionPredictions
 
 
 def answered(scores, rows=None):
     """A submission with these scores (Q, 3)."""
     rows = np.arange(len(scores)) if rows is None else rows
-    return QuestionPredictions(Path(__file__), {}, rows, 0 * rows, scores)
+    arrays = {} if scores is None else {"scores": scores}
+    content = Inspection("iqtt", arrays=arrays, ids=rows, answers=0 * rows)
+    return QuestionPredictions(Path(__file__), content, None)
 
 
 def test_scores_that_are_distances():
