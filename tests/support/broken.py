@@ -224,7 +224,7 @@ JSON_OPEN = [
     ("JSON: a score file", ["the scores of a submission", "bench leaderboard"],
      {"format": "pix2shape-bench/scores", "method": "m"}),
     ("JSON: nested deeply", ["nested too deeply"], "[" * 200_000),
-    ("JSON: nested", ["answers[0]", "whole number for each question"], [[0], [1], [2], [0], [1], [2]]),
+    ("JSON: nested", ["answers[0]", "for each question"], [[0], [1], [2], [0], [1], [2]]),
     ("JSON: NaN", ["NaN"], "[0, 1, NaN, 0, 1, 2]"),
     ("JSON: infinity", ["inf"], "[0, 1, 1e999, 0, 1, 2]"),
     ("JSON: floats", ["answers[1]", "1.0"], "[0, 1.0, 2, 0, 1, 2]"),
