@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 
 from fuzz import file_edits, hdf5_edits
+from fuzz.programs import SUBMISSIONS
 from fuzz.values import ATTRIBUTES, JSON, NAMES
 
 Rng = np.random.Generator
@@ -81,7 +82,7 @@ def attribute(rng: Rng, suspect: Suspect) -> str:
     """Draw an attribute, most often one of the root."""
     names = [name for name in suspect.names() if "@" in name]
     of_root = [name for name in names if name.startswith("/@")]
-    return one_of(of_root if rng.random() < 0.7 else names)(rng, suspect)
+    return one_of((of_root if rng.random() < 0.7 else names) or ["/@unit"])(rng, suspect)
 
 
 def part_with_json(rng: Rng, suspect: Suspect) -> str:
@@ -102,19 +103,22 @@ class Edit:
     Attributes:
         change: (path, *arguments) -> nothing.
         weight: how often it is drawn.
-        suffixes: of the files that it suits; none for all files.
+        kinds: of the files that it suits: their suffixes, and SUBMISSION.
         arguments: how each argument is drawn.
     """
 
     change: Callable[..., None]
     weight: float
-    suffixes: tuple[str, ...]
+    kinds: tuple[str, ...]
     arguments: tuple[Drawer, ...]
 
 
-HDF5, TREES = (".h5",), (".json", ".h5", ".safetensors")
-BITS, TIMES = one_of([1, 8, 128, 255]), one_of([0, 0, 2, 10, 100_000])
+SUBMISSION = "submission"  # an HDF5 file of a stranger, which commands try in another process
+HDF5, TREES = (".h5", SUBMISSION), (".json", ".h5", ".safetensors", SUBMISSION)
 PLAIN_TEXT = (".obj", ".off", ".ply", ".stl")
+# HDF5 may hang or crash on other bytes, so that of its files only those of strangers are changed.
+BYTES = (*PLAIN_TEXT, ".glb", ".npz", ".json", ".safetensors", ".db", SUBMISSION)
+BITS, TIMES = one_of([1, 8, 128, 255]), one_of([0, 0, 2, 10, 100_000])
 EDITS = {
     edit.change.__name__: edit
     for edit in (
@@ -131,27 +135,28 @@ EDITS = {
              (part_with_json, one_of(file_edits.ACTS), fraction, one_of([*NAMES, *JSON]))),
         Edit(file_edits.json_frame, 8, (".json",), (one_of(list(file_edits.FRAMES)),)),
         Edit(file_edits.numeral, 20, PLAIN_TEXT, (fraction, one_of(file_edits.NUMERALS))),
-        Edit(file_edits.flip, 8, (), (any_place, BITS)),
-        Edit(file_edits.overwrite, 8, (),
+        Edit(file_edits.flip, 8, BYTES, (any_place, BITS)),
+        Edit(file_edits.overwrite, 8, BYTES,
              (any_place, one_of([1, 4, 8]), one_of(file_edits.SPECIAL))),
-        Edit(file_edits.repeat, 8, (), (any_place, any_place, TIMES)),
-        Edit(file_edits.splice, 5, (), (another, one_of([0.0, 0.1, 0.5, 0.9]))),
-        Edit(file_edits.become, 3, (), (one_of(list(file_edits.KINDS)),)),
+        Edit(file_edits.repeat, 8, BYTES, (any_place, any_place, TIMES)),
+        Edit(file_edits.splice, 5, BYTES, (another, one_of([0.0, 0.1, 0.5, 0.9]))),
+        Edit(file_edits.become, 3, (*BYTES, ".h5"), (one_of(list(file_edits.KINDS)),)),
+        Edit(file_edits.broken, 2, (SUBMISSION,), (one_of(["hangs.h5", "crashes.h5"]),)),
     )
 }  # fmt: skip
 
 
 def is_last(name: str) -> bool:
     """Return whether an edit comes after those that need a file that can be read."""
-    return not EDITS[name].suffixes
+    return EDITS[name].change in vars(file_edits).values() and name != "json_value"
 
 
 def draw(rng: Rng, honest: Path, path: str, inputs: Sequence[str]) -> list[Any]:
     """Draw a change that suits a file: the name of the edit, and its arguments."""
     others = [os.path.relpath(name, Path(path).parent) for name in inputs if name != path]
     suspect = Suspect(honest / path, others or [Path(path).name])
-    suffix = Path(path).suffix
-    suited = [name for name, edit in EDITS.items() if suffix in edit.suffixes or not edit.suffixes]
+    kind = SUBMISSION if path in SUBMISSIONS else Path(path).suffix
+    suited = [name for name, edit in EDITS.items() if kind in edit.kinds]
     weights = np.array([EDITS[name].weight for name in suited])
     name = str(rng.choice(suited, p=weights / weights.sum()))
     return [name, *(argument(rng, suspect) for argument in EDITS[name].arguments)]

@@ -73,13 +73,7 @@ KINDS: dict[str, Callable[[Path, bytes], Any]] = {
     "link to /dev/zero": lambda path, old: path.symlink_to("/dev/zero"),
     "unreadable": lambda path, old: (path.write_bytes(old), path.chmod(0)),
     "gone": lambda path, old: None,
-    "hangs.h5": lambda path, old: path.write_bytes(_unpacked("hangs.h5")),
-    "crashes.h5": lambda path, old: path.write_bytes(_unpacked("crashes.h5")),
 }
-
-
-def _unpacked(name: str) -> bytes:
-    return zlib.decompress((HOSTILE / f"{name}.z").read_bytes())
 
 
 def become(path: Path, kind: str) -> None:
@@ -87,6 +81,11 @@ def become(path: Path, kind: str) -> None:
     old = path.read_bytes()
     path.unlink()
     KINDS[kind](path, old)
+
+
+def broken(path: Path, name: str) -> None:
+    """Put a file in its place on which HDF5 hangs or crashes."""
+    path.write_bytes(zlib.decompress((HOSTILE / f"{name}.z").read_bytes()))
 
 
 FRAMES: dict[str, Callable[[str], bytes]] = {

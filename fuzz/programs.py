@@ -77,7 +77,7 @@ TARGETS = {
         " --out new.png",
         "pix2shape rotate --weights weights.safetensors --data rooms.h5 --items 0 --frames 2"
         " --out new.gif",
-        "bench baseline pix2shape --weights weights.safetensors --data rooms.h5 --out new.h5",
+        "bench baseline pix2shape-compact --weights weights.safetensors --data rooms.h5 --out new.h5",
     ),
 }
 WITH_TORCH = ("weights",)  # targets that import it; a process that has imported torch forks slowly
@@ -85,6 +85,7 @@ WITH_TORCH = ("weights",)  # targets that import it; a process that has imported
 CAN_FIND_FAULTS = ("rooms", "meshes", "questions")
 # Options that name what is written.
 OUTPUTS = ("--out", "--json", "--csv", "--html", "--export", "--submission")
+SUBMISSIONS = ("predictions.h5", "constant.h5", "answers.h5")  # what strangers hand in
 # Files that a command finds by way of others.
 FOUND_BY = {
     "predictions.h5": ["rooms.h5"],
