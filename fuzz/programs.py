@@ -77,7 +77,8 @@ TARGETS = {
         " --out new.png",
         "pix2shape rotate --weights weights.safetensors --data rooms.h5 --items 0 --frames 2"
         " --out new.gif",
-        "bench baseline pix2shape-compact --weights weights.safetensors --data rooms.h5 --out new.h5",
+        "bench baseline pix2shape-compact --weights weights.safetensors --data rooms.h5"
+        " --out new.h5",
     ),
 }
 WITH_TORCH = ("weights",)  # targets that import it; a process that has imported torch forks slowly
