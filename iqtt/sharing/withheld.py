@@ -12,8 +12,8 @@ from iqtt.questions.specs import SplitSpec
 from scenegen.common.errors import SpecError
 from scenegen.files.attributes import read_root
 from scenegen.files.content import SHA256
-from scenegen.files.input_file import checking
-from scenegen.files.rows import and_more, describing
+from scenegen.files.input_file import checking, describing
+from scenegen.files.rows import and_more
 from scenegen.files.schema import other_attributes
 from scenegen.files.shards import ROW_DIGESTS, SHARDS, OpenFile
 

@@ -137,15 +137,15 @@ def _objects(file: h5py.File) -> list[tuple[str, Any]]:
 
     An object may have several names; a group that has several is entered by one of them.
     """
-    found, groups, waiting = [], {file["/"]}, [("", file["/"])]
+    objects, groups, waiting = [], {file["/"]}, [("", file["/"])]
     while waiting:
         prefix, group = waiting.pop()
         for key, item in group.items():
-            found.append((f"{prefix}{key}", item))
+            objects.append((f"{prefix}{key}", item))
             if isinstance(item, h5py.Group) and item not in groups:
                 groups.add(item)
                 waiting.append((f"{prefix}{key}/", item))
-    return sorted(found, key=lambda pair: pair[0])
+    return sorted(objects, key=lambda pair: pair[0])
 
 
 def _bytes(values: Any) -> bytes | memoryview:
@@ -156,8 +156,8 @@ def _bytes(values: Any) -> bytes | memoryview:
     array = np.asarray(values)
     if array.dtype.kind in "OUS":
         parts = array.reshape(-1).tolist()
-        known = (str, bytes, np.ndarray)
-        return b"".join(_bytes(x) if isinstance(x, known) else repr(x).encode() for x in parts)
+        kinds = (str, bytes, np.ndarray)
+        return b"".join(_bytes(x) if isinstance(x, kinds) else repr(x).encode() for x in parts)
     numbers = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
     return numbers.reshape(-1).view(np.uint8).data
 

@@ -21,7 +21,7 @@ from h5py import h5d, h5l, h5o, h5t, h5z
 from isal import isal_zlib
 from numpy.typing import NDArray
 
-from scenegen.common.errors import FileFormatError, SceneGenError
+from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 
 Array = NDArray[Any]
 # What h5py raises on damaged files, by the kind of damage: this tuple is the only list of them.
@@ -139,6 +139,16 @@ def _raise_if_of_system(error: BaseException, where: object) -> None:
         raise OSError(number, _OF_SYSTEM[number], str(where)) from error
 
 
+@contextmanager
+def describing(place: str) -> Iterator[None]:
+    """Turn the SpecError of a stored description into a FileFormatError of its place."""
+    try:
+        yield
+    except SpecError as error:
+        where = f"{place}: {error.where}"
+        raise FileFormatError(where, error.found, error.expected, error.hint) from error
+
+
 def reason(error: BaseException) -> str:
     """Return what an error of HDF5 says in its innermost parentheses, on one line."""
     text = str(error.args[-1]) if error.args else type(error).__name__
@@ -152,7 +162,7 @@ def faults(file: h5py.File) -> Iterator[Fault]:
     Raises whatever HDF5 raises on a damaged file.
     """
     waiting, seen = [("", file.id)], 0
-    known: set[int] = set()
+    addresses: set[int] = set()
     yield from _attribute_faults("/", file.id)
     while waiting:
         prefix, group = waiting.pop()
@@ -166,9 +176,9 @@ def faults(file: h5py.File) -> Iterator[Fault]:
                 yield Fault(name, "link", f"a link{_target(group, raw)}", "an object of this file")
                 continue
             info = h5o.get_info(group, raw)
-            if info.addr in known:
+            if info.addr in addresses:
                 continue
-            known.add(info.addr)
+            addresses.add(info.addr)
             if info.type == h5o.TYPE_GROUP:
                 child = h5o.open(group, raw)
                 yield from _attribute_faults(name, child)
@@ -184,8 +194,8 @@ def faults(file: h5py.File) -> Iterator[Fault]:
 
 def _target(group: Any, raw: bytes) -> str:
     link = h5py.Group(group).get(raw, getlink=True)
-    told = f" to the file {link.filename!r:.60}" if isinstance(link, h5py.ExternalLink) else ""
-    return told.encode("utf-8", "backslashreplace").decode()
+    target = f" to the file {link.filename!r:.60}" if isinstance(link, h5py.ExternalLink) else ""
+    return target.encode("utf-8", "backslashreplace").decode()
 
 
 def _attribute_faults(name: str, item: Any) -> Iterator[Fault]:
@@ -223,11 +233,11 @@ def _dataset_faults(name: str, dataset: Any) -> Iterator[Fault]:
         expected = f"at most {MOST_BYTES >> 20} MiB (store one row to a chunk)"
         yield Fault(name, "chunks", found, expected)
     used = [storage.get_filter(i)[0] for i in range(storage.get_nfilters())]
-    known = [FILTERS.get(code, (f"filter {code}", -1)) for code in used]
-    places = [place for _, place in known]
+    filters = [FILTERS.get(code, (f"filter {code}", -1)) for code in used]
+    places = [place for _, place in filters]
     if -1 in places or places != sorted(set(places)):
         expected = "shuffle or not, gzip or lzf or neither, fletcher32 or not, in this order"
-        yield Fault(name, "filters", " and ".join(text for text, _ in known), expected)
+        yield Fault(name, "filters", " and ".join(text for text, _ in filters), expected)
     expected_chunks = math.prod(-(-s // c) for s, c in zip(shape, chunks, strict=True))
     there = dataset.get_num_chunks()
     if there < expected_chunks:
@@ -245,7 +255,7 @@ def virtual_sources(dataset: h5py.Dataset) -> list[tuple[str, str, int, int]]:
 
     A source of which not all rows are shown in their order has -1 rows.
     """
-    listed, found = dataset.id.get_create_plist(), []
+    listed, sources = dataset.id.get_create_plist(), []
     for i in range(listed.get_virtual_count()):
         name = listed.get_virtual_filename(i), listed.get_virtual_dsetname(i)
         here, there = listed.get_virtual_vspace(i), listed.get_virtual_srcspace(i)
@@ -254,8 +264,8 @@ def virtual_sources(dataset: h5py.Dataset) -> list[tuple[str, str, int, int]]:
         whole = not any(low) and tuple(high) == tuple(size - 1 for size in shape)
         whole &= here.get_select_npoints() == rows * math.prod(shape)
         whole &= there.get_select_type() == h5py.h5s.SEL_ALL
-        found.append((*name, first, rows if whole else -1))
-    return found
+        sources.append((*name, first, rows if whole else -1))
+    return sources
 
 
 def stored_bytes(dataset: Any) -> int:

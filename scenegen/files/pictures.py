@@ -43,8 +43,8 @@ def pick_rows(
 
 def check_picture_name(path: Path) -> None:
     """Raise SpecError for an ending that names no picture format."""
-    known = path.suffix.lower() in ENDINGS
-    check(known, "out", repr(path.name), "a picture's name such as sheet.png")
+    is_picture = path.suffix.lower() in ENDINGS
+    check(is_picture, "out", repr(path.name), "a picture's name such as sheet.png")
 
 
 def check_picture_size(picture: "Image", path: Path) -> None:

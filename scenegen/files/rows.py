@@ -5,8 +5,8 @@
 
 import operator
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
 from scenegen.files.attributes import read_digest
 from scenegen.files.content import (
@@ -318,41 +318,31 @@ def _stacked(file: RowFile, name: str, rows: list[int]) -> Array:
     return np.stack(values) if values else np.asarray(file.read(name, slice(0, 0)))
 
 
-def content_problems(opened: OpenFile, known: Mapping[str, str]) -> list[str]:
+def content_problems(opened: OpenFile, digests: Mapping[str, str]) -> list[str]:
     """Return a sentence for each data set that is not as it was sealed, and one for attributes.
 
-    `known` are the `content.column_digest`s of data sets that the caller has read already. Raises
+    `digests` are the `content.column_digest`s of data sets that the caller has read already. Raises
     FileFormatError where the attributes cannot be read.
     """
     problems = []
     with reading(opened.path):
         for name, dataset in datasets(opened.file):
-            told = dataset.attrs.get(SHA256)
+            sealed = dataset.attrs.get(SHA256)
             try:
                 with reading(name):
-                    found = known.get(name) or dataset_digest(opened.array(name))
+                    digest = digests.get(name) or dataset_digest(opened.array(name))
             except FileFormatError as error:
                 problems.append(str(error))
                 continue
-            if told is None:
+            if sealed is None:
                 problems.append(f"{name}: attribute {SHA256!r} is missing")
-            elif not (isinstance(told, str) and told == found):
+            elif not (isinstance(sealed, str) and sealed == digest):
                 problems.append(f"{name}: values are not those of its attribute {SHA256!r}")
-        told = opened.file.attrs.get(CONTENT_DIGEST)
-        if not (isinstance(told, str) and told == content_digest(opened.file)):
+        sealed = opened.file.attrs.get(CONTENT_DIGEST)
+        if not (isinstance(sealed, str) and sealed == content_digest(opened.file)):
             what = "the attributes, or the names, types and shapes of the datasets,"
             problems.append(f"{what} are not those of the attribute {CONTENT_DIGEST!r}")
     return problems
-
-
-@contextmanager
-def describing(place: str) -> Iterator[None]:
-    """Turn the SpecError of a stored description into a FileFormatError of its place."""
-    try:
-        yield
-    except SpecError as error:
-        where = f"{place}: {error.where}"
-        raise FileFormatError(where, error.found, error.expected, error.hint) from error
 
 
 def and_more(problems: Sequence[str]) -> str:

@@ -45,8 +45,8 @@ class Column:
         """All HDF5 attributes; `shape` names the axes, or else tells their sizes."""
         row = self.shape if self.axes is None else self.axes
         shape = f"({', '.join(('row', *map(str, row)))})"
-        told = {"unit": self.unit, "frame": self.frame, "shape": shape, "meaning": self.meaning}
-        return {**told, **self.more}
+        usual = {"unit": self.unit, "frame": self.frame, "shape": shape, "meaning": self.meaning}
+        return {**usual, **self.more}
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ digests of the set follow from those of its shards, and a damaged row can be nam
 """
 
 import glob
-import json
 import re
 from collections import OrderedDict
 from collections.abc import Iterator
@@ -25,16 +24,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError
+from scenegen.common.records import check, from_json
 from scenegen.files.content import CONTENT_DIGEST
 from scenegen.files.input_file import (
     StoredArray,
     checking,
+    describing,
     faults,
     open_file,
     open_unchecked,
     virtual_sources,
 )
 from scenegen.files.places import as_place, is_remote
+from scenegen.files.schema import DIGEST
 
 Array = NDArray[Any]
 SHARDS = "shards"  # in the file of a set: a line of JSON for each shard
@@ -62,6 +64,13 @@ class Shard:
     content_digest: str
     part: str = ""
 
+    def __post_init__(self) -> None:
+        check(self.rows > 0, "rows", self.rows, "at least 1")
+        is_digest = re.fullmatch(DIGEST, self.content_digest) is not None
+        check(is_digest, "content_digest", f"{self.content_digest!r:.40}", "64 hexadecimal digits")
+        is_part = PART.fullmatch(self.part) is not None
+        check(is_part, "part", f"{self.part!r:.40}", "the name of a group")
+
 
 def shard_name(path: str | Path, number: int, count: int) -> str:
     """Return the name of a shard, such as `rooms-00003-of-00128.h5` of `rooms.h5`."""
@@ -71,8 +80,8 @@ def shard_name(path: str | Path, number: int, count: int) -> str:
 
 def set_name(name: str) -> str | None:
     """Return the name of the set that a shard of this name belongs to; None if it is no shard's."""
-    found = SHARD_NAME.fullmatch(name)
-    return None if found is None else "".join(found.groups())
+    match = SHARD_NAME.fullmatch(name)
+    return None if match is None else "".join(match.groups())
 
 
 def cut(count: int, size: int) -> list[range]:
@@ -174,12 +183,12 @@ class OpenFile:
             shard = self.shards[number]
             place = self.folder / shard.file
             file = open_file(place, self._kind)
-            found = file.attrs.get(CONTENT_DIGEST)
-            if found != shard.content_digest:
+            digest = file.attrs.get(CONTENT_DIGEST)
+            if digest != shard.content_digest:
                 file.close()
                 expected = f"{shard.content_digest:.16}..., as {self.path.name} tells"
                 hint = "it is of another run, or was changed"
-                raise FileFormatError(place, f"content {found!r:.20}", expected, hint)
+                raise FileFormatError(place, f"content {digest!r:.20}", expected, hint)
             self._open[number] = file
             while len(self._open) > MOST_OPEN:
                 oldest, other = self._open.popitem(last=False)
@@ -223,22 +232,15 @@ def _read_list(listed: h5py.Dataset, path: Path) -> list[Shard]:
     text = h5py.check_string_dtype(listed.dtype) is not None
     if not text or listed.ndim != 1 or not 1 <= len(listed) <= MOST_SHARDS:
         raise FileFormatError(where, f"{listed.dtype} {listed.shape}", "a line for each shard")
-    found = []
+    shards = []
     for line in StoredArray(listed)[()]:
-        try:
-            shard = Shard(**json.loads(line[:LONGEST_LINE]))
-            good = shard.rows > 0 and type(shard.rows) is int
-            good &= re.fullmatch("[0-9a-f]{64}", shard.content_digest) is not None
-            good &= set_name(shard.file) == path.name and PART.fullmatch(shard.part) is not None
-        except (TypeError, ValueError, RecursionError):
-            good = False
-        if not good:
-            expected = f"file, rows and content_digest, as of {shard_name(path, 0, len(listed))}"
-            raise FileFormatError(
-                where, f"{line!r:.80}", expected, "the set was renamed or damaged"
-            )
-        found.append(shard)
-    return found
+        with describing(where):
+            shard = from_json(Shard, line, "shard", LONGEST_LINE)
+        if set_name(shard.file) != path.name:
+            expected = f"such as {shard_name(path, 0, len(listed))}"
+            raise FileFormatError(where, shard.file, expected, "the set was renamed or damaged")
+        shards.append(shard)
+    return shards
 
 
 class JoinedArray:

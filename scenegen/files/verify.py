@@ -58,9 +58,9 @@ def read_all(
     return {name: digest.hex for name, digest in digests.items()}, broken
 
 
-def content_check(name: str, file: OpenFile, known: Mapping[str, str]) -> Check:
-    """Check that values and attributes are those that were written; `known` as there."""
-    problems = content_problems(file, known)
+def content_check(name: str, file: OpenFile, digests: Mapping[str, str]) -> Check:
+    """Check that values and attributes are those that were written; `digests` as there."""
+    problems = content_problems(file, digests)
     return listed_check(name, "every value and attribute as written, by SHA-256", problems)
 
 

@@ -17,7 +17,8 @@ from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.files.attributes import read_root
 from scenegen.files.content import SHA256, joint_digest
-from scenegen.files.rows import RowDataset, RowFile, chosen_rows, describing
+from scenegen.files.input_file import describing
+from scenegen.files.rows import RowDataset, RowFile, chosen_rows
 from scenegen.files.shards import OpenFile
 from scenegen.layout import FIELDS, FORMAT, SCORED, TRUTH_DIGEST, columns
 from scenegen.rendering.ground_truth import decode_image
@@ -152,9 +153,9 @@ class RoomsDataset(RowDataset):
 
         Raises as `RoomsFile`, and SpecError for an unknown field.
         """
-        known = [field.name for field in FIELDS if field.dtype != "text"]
+        numeric = [field.name for field in FIELDS if field.dtype != "text"]
         for name in fields:
-            check(name in known, "field", repr(name), f"some of {', '.join(known)}")
+            check(name in numeric, "field", repr(name), f"some of {', '.join(numeric)}")
         with nullcontext(rooms) if isinstance(rooms, RoomsFile) else RoomsFile(rooms) as file:
             super().__init__(file, fields)
             self.path, self.spec, self.fingerprint = file.path, file.spec, file.fingerprint

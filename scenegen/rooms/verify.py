@@ -198,29 +198,29 @@ def _render(
     preparing a batch.
     """
     views = defaultdict[int, list[Room]](list)
-    for i in rows:
+    for row in rows:
         with suppress(FileFormatError):
-            room = rooms[i]
+            room = rooms[row]
             views[room.view_index].append(room)
     most = max(1, BATCH_PIXELS // (rooms.spec.height * rooms.spec.width))
-    found: dict[int, tuple[Room, dict[str, Array]]] = {}
+    rendered: dict[int, tuple[Room, dict[str, Array]]] = {}
 
-    def draw(view: int, some: list[Room]) -> None:
+    def draw(view: int, shown: list[Room]) -> None:
         try:
             with np.errstate(all="ignore"):
-                batch = pack(rooms.spec, [room.scene for room in some], (view,), objects)
+                batch = pack(rooms.spec, [room.scene for room in shown], (view,), objects)
                 pixels = vars(render(batch, device))
         except (SpecError, BadMeshError):
-            for room in some if len(some) > 1 else ():
+            for room in shown if len(shown) > 1 else ():
                 draw(view, [room])
             return
-        for k, room in enumerate(some):
-            found[room.index] = room, {name: pixels[name][k] for name in PIXELS}
+        for k, room in enumerate(shown):
+            rendered[room.index] = room, {name: pixels[name][k] for name in PIXELS}
 
     for view, same in views.items():
         for start in range(0, len(same), most):
             draw(view, same[start : start + most])
-    return found
+    return rendered
 
 
 def _within_tolerance(name: str, stored: Array, again: Array, spec: DatasetSpec) -> bool:
