@@ -16,7 +16,7 @@ class CastMesh:
     """What is cast and shaded.
 
     Attributes:
-        triangles: corners as from `overlapping`, (F, 3, 3) float32.
+        triangles: corners, (F, 3, 3) float32.
         normals: as from `normal_table`, (F, 12) float32.
     """
 
@@ -26,7 +26,7 @@ class CastMesh:
 
 def cast_mesh(shape: UnitShape) -> CastMesh:
     """Return a unit shape as the ray caster takes it."""
-    return CastMesh(overlapping(shape.triangles).astype(np.float32), normal_table(shape))
+    return CastMesh(shape.triangles.astype(np.float32), normal_table(shape))
 
 
 def normal_table(shape: UnitShape) -> Array:

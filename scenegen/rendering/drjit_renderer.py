@@ -13,22 +13,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import pixel_size
+from scenegen.description.specs import DatasetSpec
+from scenegen.objects.cast_meshes import CastMesh
+from scenegen.objects.catalogue import mesh_to_cast
 from scenegen.objects.exact_surfaces import Surface
 from scenegen.rendering.cubes import Cubes, closest_cube, upload_cubes
-from scenegen.rendering.model_scene import model_scene
+from scenegen.rendering.model_scene import GRID, model_scene
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.pixel_samples import SAMPLE_STEPS
+from scenegen.rendering.rasteriser import Triangles, nearest_triangle, rasterise, upload_triangles
 from scenegen.rendering.rays import (
     BEFORE_LIGHTS,
     OBJECT,
     Scenes,
     closest_hit,
+    nearer_than_room,
     normal_at,
     radiance_at,
 )
 from scenegen.rendering.surfaces.in_kernel import upload_surfaces
 from scenegen.rendering.tables import gather_row, upload_table
-from scenegen.rendering.unit_scene import unit_scene
+from scenegen.rendering.unit_scene import UnitScene, stacked, unit_scene
 
 Array = NDArray[Any]
 LANES = 32  # an image's rays are padded to a multiple of this, so no SIMD packet spans two images
@@ -41,9 +46,16 @@ def launch_pixels(
 
     Only what is needed for these fields of `GroundTruth` is computed.
     """
-    scenes, cameras = upload_scenes(batch, variant)
+    meshes = None
+    shown = batch.names if batch.spec.source != "shapes" else ()
+    models = [mesh_to_cast(batch.shape_of, name) for name in shown]
+    scenes, cameras = upload_scenes(batch, variant, models)
     cubes = upload_cubes(batch) if batch.cubes_only else None
-    everything = _trace(batch, scenes, cameras, cubes)
+    if batch.spec.source != "shapes":
+        meshes = upload_triangles(
+            batch, [model.triangles for model in models], padded_rays(batch.spec)
+        )
+    everything = _trace(batch, scenes, cameras, cubes, meshes)
     components = {name: everything[name] for name in fields}
     dr.eval(components)
     spec, count = batch.spec, len(batch)
@@ -60,15 +72,26 @@ def launch_pixels(
     return lambda: {name: pixels(name) for name in fields}
 
 
-def upload_scenes(batch: SceneBatch, variant: str) -> tuple[Scenes, Any]:
-    """Return the scenes on the device, and the cameras, (B, 13): world_from_camera, pixel size."""
+def upload_scenes(
+    batch: SceneBatch, variant: str, models: Sequence[CastMesh]
+) -> tuple[Scenes, Any]:
+    """Return the scenes on the device, and the cameras, (B, 13): world_from_camera, pixel size.
+
+    `models` are those of the batch's names, unless these are basic shapes.
+    """
     spec, count = batch.spec, len(batch)
     surfaces: list[Surface | None] = [None]
     if spec.source == "shapes":
         shapes = [batch.shape_of(name) for name in batch.names]
         unit, surfaces = unit_scene(variant, tuple(shapes)), [shape.surface for shape in shapes]
-    else:  # made by nobody where they are in the cache
-        unit = model_scene(variant, batch.shape_of, batch.names)
+    else:
+        tree, offset = None, np.zeros((max(1, len(models)), 3))
+        if spec.shadows:
+            tree, offset = model_scene(variant, batch.shape_of, batch.names, models)
+        mi.set_variant(variant)
+        normals = stacked([model.normals for model in models])[1]
+        # The rasteriser counts triangles from the first row of all tables.
+        unit = UnitScene(tree, offset, np.zeros(len(offset), np.uint32), GRID, normals)
     mi.set_variant(variant)
     exact = upload_surfaces(surfaces)
     shape = np.maximum(batch.shape, 0)
@@ -111,13 +134,17 @@ def _cast(kind: Any, values: Any) -> Any:
     return kind(values)
 
 
+def padded_rays(spec: DatasetSpec) -> int:
+    """Return the number of rays of an image, padded to a multiple of LANES."""
+    return -(-spec.height * spec.width // LANES) * LANES
+
+
 def _trace(
-    batch: SceneBatch, scenes: Scenes, cameras: Any, cubes: Cubes | None
+    batch: SceneBatch, scenes: Scenes, cameras: Any, cubes: Cubes | None, meshes: Triangles | None
 ) -> dict[str, list[Any]]:
     """Return the components of the fields of `GroundTruth` for every ray, not yet evaluated."""
     spec = batch.spec
-    height, width = spec.height, spec.width
-    rays = -(-height * width // LANES) * LANES
+    height, width, rays = spec.height, spec.width, padded_rays(spec)
     index = dr.arange(mi.UInt32, len(batch) * rays)
     item = index // rays
     pixel = dr.minimum(index - item * rays, height * width - 1)
@@ -126,37 +153,33 @@ def _trace(
     camera = gather_row(cameras, item, 13)
     right, up, back, origin = (mi.Vector3f(*camera[i:12:4]) for i in range(4))
 
-    def direction(x: Any, y: Any) -> Any:
-        """Return the world direction through the image point (x, y), in pixels; camera z is -1."""
-        return right * ((x - width / 2) * camera[12]) + up * ((height / 2 - y) * camera[12]) - back
+    def look(x: Any, y: Any) -> tuple[Any, Any, Any, Any]:
+        """Return what the rays through the point (x, y) of each pixel meet: t, id, normal, colour.
 
-    def hit(d: Any) -> tuple[Any, Any, Any, Any]:
+        Their directions have -z = 1 in the camera frame, so t is planar depth.
+        """
+        dx = (mi.Float(column) + x - width / 2) * camera[12]
+        dy = (height / 2 - (mi.Float(row) + y)) * camera[12]
+        d = right * dx + up * dy - back
         if cubes:
             t, object_id, n = closest_cube(cubes, item, origin, d)
-            return t, object_id, origin + dr.select(object_id >= 0, t, 0) * d, n
-        t, object_id, face, uv = closest_hit(scenes, item, origin, d)
+        elif meshes:
+            keys = rasterise(meshes, x, y)
+            hit = nearest_triangle(meshes, keys, item * rays + pixel, dx, dy)
+            t, object_id, face, uv = nearer_than_room(scenes, item, origin, d, hit)
+        else:
+            t, object_id, face, uv = closest_hit(scenes, item, origin, d)
         p = origin + dr.select(object_id >= 0, t, 0) * d
-        return t, object_id, p, normal_at(scenes, item, p, d, object_id, face, uv)
+        if not cubes:
+            n = normal_at(scenes, item, p, d, object_id, face, uv)
+        return t, object_id, n, radiance_at(scenes, item, p, d, n, object_id, spec.shadows)
 
-    d = direction(mi.Float(column) + 0.5, mi.Float(row) + 0.5)
-    t, object_id, p, n = hit(d)
-    image = radiance_at(scenes, item, p, d, n, object_id, spec.shadows)
-
-    def add_sample(sample: Any, total: Any) -> tuple[Any, Any]:
-        """Add the colour at one of `pixel_samples.sample_positions` other than the centre."""
-        mirrored = (sample & 1) == 1
-        x, y = (0.5 + mi.Float(sample // 2 + 1) * step for step in SAMPLE_STEPS)
-        x, y = (dr.select(mirrored, 1 - (f - dr.floor(f)), f - dr.floor(f)) for f in (x, y))
-        d = direction(mi.Float(column) + x, mi.Float(row) + y)
-        _, object_id, p, n = hit(d)
-        return sample + 1, total + radiance_at(scenes, item, p, d, n, object_id, spec.shadows)
-
+    # Positions in a pixel are variables for the rasteriser, whose kernel serves all of them.
+    middle = dr.opaque(mi.Float, 0.5) if meshes else 0.5
+    t, object_id, n, image = look(middle, middle)
     if spec.spp > 1:
-        others = spec.spp // 2 * 2
-        state = (mi.UInt32(0), image if spec.spp % 2 else mi.Vector3f(0))
-        more = lambda sample, total: sample < others  # noqa: E731
-        _, total = dr.while_loop(state, more, add_sample, mode="symbolic")
-        image = total / spec.spp
+        total = image if spec.spp % 2 else mi.Vector3f(0)
+        image = _sum_of_samples(total, spec.spp // 2 * 2, look, bool(meshes)) / spec.spp
     if spec.image_dtype == "uint8":
         image = _cast(dr.uint8_array_t(mi.Vector3f), dr.round(dr.clip(image, 0, 1) * 255))
     elif spec.image_dtype == "float16":
@@ -168,3 +191,25 @@ def _trace(
         "normal": list(normal),
         "object_id": [_cast(dr.int8_array_t(mi.Float), object_id)],
     }
+
+
+def _sum_of_samples(total: Any, count: int, look: Callable[..., Any], one_by_one: bool) -> Any:
+    """Add the colours at the first of `pixel_samples.sample_positions` other than the centre.
+
+    Args:
+        one_by_one: whether a kernel is launched for each sample, instead of one for all.
+    """
+
+    def add_sample(sample: Any, total: Any) -> tuple[Any, Any]:
+        mirrored = (sample & 1) == 1
+        x, y = (0.5 + mi.Float(sample // 2 + 1) * step for step in SAMPLE_STEPS)
+        x, y = (dr.select(mirrored, 1 - (f - dr.floor(f)), f - dr.floor(f)) for f in (x, y))
+        return sample + 1, total + look(x, y)[3]
+
+    state = (mi.UInt32(0), total)
+    if not one_by_one:
+        return dr.while_loop(state, lambda i, _: i < count, add_sample, mode="symbolic")[1]
+    for i in range(count):
+        state = add_sample(dr.opaque(mi.UInt32, i), state[1])
+        dr.eval(state)
+    return state[1]

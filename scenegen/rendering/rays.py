@@ -66,15 +66,9 @@ def closest_hit(scenes: Scenes, item: Any, o: Any, d: Any) -> Any:
 
     The face is a triangle of a mesh, or what `surfaces.in_kernel` calls a face.
     """
-    has_room, count = _about_scene(scenes, item)
-    walls = [dr.select(d[i] < 0, -o[i] / d[i], dr.inf) for i in range(3)]
-    t = dr.minimum(walls[0], dr.minimum(walls[1], walls[2]))
-    p = o + t * d
-    on_room = has_room & (t < dr.inf) & (p.x <= 1) & (p.y <= 1) & (p.z <= 1)
-    t = dr.select(on_room, t, dr.inf)
-    object_id = dr.select(on_room, mi.Int32(0), mi.Int32(-1))
-    face = mi.UInt32(0)
-    uv = mi.Point2f(0)
+    count = _about_scene(scenes, item)[1]
+    nothing = (mi.Float(dr.inf), mi.UInt32(0), mi.UInt32(0), mi.Point2f(0))
+    t, object_id, face, uv = nearer_than_room(scenes, item, o, d, nothing)
     k = mi.UInt32(0)
     while dr.hint(k < count, exclude=[scenes]):
         row = item * scenes.slots + k
@@ -93,6 +87,24 @@ def closest_hit(scenes: Scenes, item: Any, o: Any, d: Any) -> Any:
             uv = dr.select(nearer, its_uv, uv)
         k += 1
     return t, object_id, face, uv
+
+
+def nearer_than_room(scenes: Scenes, item: Any, o: Any, d: Any, hit: Any) -> Any:
+    """Return t, object id, face and barycentrics of the nearer of a hit and the room's faces.
+
+    A hit is (t, slot of the object, face, barycentrics), with t = inf for none.
+    """
+    depth, slot, face, uv = hit
+    has_room = _about_scene(scenes, item)[0]
+    walls = [dr.select(d[i] < 0, -o[i] / d[i], dr.inf) for i in range(3)]
+    t = dr.minimum(walls[0], dr.minimum(walls[1], walls[2]))
+    p = o + t * d
+    on_room = has_room & (t < dr.inf) & (p.x <= 1) & (p.y <= 1) & (p.z <= 1)
+    t = dr.select(on_room, t, dr.inf)
+    object_id = dr.select(on_room, mi.Int32(0), mi.Int32(-1))
+    on_object = (depth < dr.inf) & (depth <= t)
+    object_id = dr.select(on_object, mi.Int32(slot) + 1, object_id)
+    return dr.select(on_object, depth, t), object_id, face, uv
 
 
 @dr.syntax
