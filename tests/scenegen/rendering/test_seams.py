@@ -3,6 +3,7 @@
 import importlib
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -76,9 +77,12 @@ def test_no_ray_slips_through_models_and_without_overlap_some_do(
     def count():
         own = partial(built_in_shape)  # models are kept by where they come from
         others = names[:1] * 50
-        scene = models.model_scene(variant, own, [*names, *others, *names, *others, *names])
+        shown = [*names, *others, *names, *others, *names]
+        meshes = [cast_meshes.cast_mesh(own(name)) for name in shown]
+        scene, offset = models.model_scene(variant, own, shown, meshes)
+        unit = SimpleNamespace(scene=scene, offset=offset, grid=models.GRID)
         places = [k + start for start in (0, 55, 110) for k in range(5)]
-        return sum(slips(scene, i, own(names[i % 55])) for i in places)
+        return sum(slips(unit, i, own(names[i % 55])) for i in places)
 
     assert count() == 0
     monkeypatch.setattr(cast_meshes, "OVERLAP", 0.0)
@@ -89,10 +93,11 @@ def test_no_ray_slips_through_models_and_without_overlap_some_do(
 def test_places_of_models_are_exact_in_single_precision(count, variant, models):
     """Coordinates stay below 16, so that every point of the grid is a float32."""
     count = models.MOST_MODELS if count == "most" else count
-    found = models.model_scene(variant, unit_shape, ["tetrahedron"] * count)
-    assert abs(found.offset).max() + 1.0002 < 2.0**24 * found.grid
-    np.testing.assert_array_equal(np.round(found.offset / found.grid) * found.grid, found.offset)
-    assert len(np.unique(found.offset, axis=0)) == max(1, count)
+    mesh = cast_meshes.cast_mesh(unit_shape("tetrahedron"))
+    _, offset = models.model_scene(variant, unit_shape, ["tetrahedron"] * count, [mesh] * count)
+    assert abs(offset).max() + 1.0002 < 2.0**24 * models.GRID
+    np.testing.assert_array_equal(np.round(offset / models.GRID) * models.GRID, offset)
+    assert len(np.unique(offset, axis=0)) == max(1, count)
     if count > 1:
-        gaps = np.diff(np.unique(found.offset[:, 2]))
+        gaps = np.diff(np.unique(offset[:, 2]))
         assert gaps.min() > 2.0004, "their bounding spheres, a bit enlarged, are apart"

@@ -59,7 +59,7 @@ def test_models_kept_from_other_batches_are_let_go(scenes_of):
     spec = replace(PATH, source="families", shapes=FAMILY_NAMES, spp=1)
     kept = importlib.import_module("scenegen.rendering.model_scene").MODELS.kept
     scenes = scenes_of(spec, 4)
-    render(pack(replace(spec, shading="paper"), scenes))
+    render(pack(replace(spec, shading="paper", shadows=True), scenes))
     assert len(kept) > 3
     render(pack(spec, scenes[:1]))
     assert len(kept) == 0
