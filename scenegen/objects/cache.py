@@ -1,20 +1,27 @@
 """A cache on disk of arrays that take long to make, for later runs and other processes."""
 
 import errno
+import json
+import math
 import os
+import struct
 import threading
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
+from io import RawIOBase
 from pathlib import Path
 
 import numpy as np
+from isal import isal_zlib
 
 from scenegen.files.new_file import written_beside
 from scenegen.objects.solids import Array
 
 MOST_BYTES = 2**35  # of the entries in a folder
-ENDING = ".npz"
+ENDING = ".arrays"
+FIRST_READ = 2**14  # bytes, which hold the header and small arrays
+_LENGTH_AND_CHECK = struct.Struct("<2I")  # of the header
 
 
 def default_cache_dir() -> Path | None:
@@ -32,7 +39,10 @@ def default_cache_dir() -> Path | None:
 
 
 class DiskCache:
-    """Arrays in a folder, one npz file for each key. Threads and processes may share the folder.
+    """Arrays in a folder, one file for each key. Threads and processes may share the folder.
+
+    A file is a JSON header, {name: [dtype, shape, offset, CRC-32]}, and the arrays' bytes. Reading
+    some arrays of it takes a tenth of the time of an npz file.
 
     A key is a hash of everything that its arrays follow from, so an entry never grows old. An entry
     gets its name when it is complete; a damaged one counts as missing. If the folder cannot be
@@ -53,9 +63,8 @@ class DiskCache:
         if self.folder is None:
             return None
         try:
-            path = self.folder / f"{key}{ENDING}"
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as entry:
-                return {name: entry[name] for name in names}
+            with (self.folder / f"{key}{ENDING}").open("rb", buffering=0) as file:
+                return _read_arrays(file, names)
         except Exception:  # of whatever kind the damage is, the entry is made again
             return None
 
@@ -66,10 +75,10 @@ class DiskCache:
         path = self.folder / f"{key}{ENDING}"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            with written_beside(path, overwrite=True) as temporary, temporary.open("xb") as file:
-                np.savez(file, **arrays)  # type: ignore[arg-type]
-                size = file.tell()
-            self._trim(size)
+            data = _as_bytes(arrays)
+            with written_beside(path, overwrite=True) as temporary:
+                temporary.write_bytes(data)
+            self._trim(len(data))
         except OSError as error:
             self._give_up(error)
 
@@ -118,3 +127,36 @@ class DiskCache:
                 " made again in every process. Choose another --cache-dir.",
                 stacklevel=3,
             )
+
+
+def _as_bytes(arrays: dict[str, Array]) -> bytes:
+    header, body = {}, b""
+    for name, array in arrays.items():
+        data = np.ascontiguousarray(array).tobytes()
+        header[name] = [array.dtype.str, array.shape, len(body), isal_zlib.crc32(data)]
+        body += data
+    text = json.dumps(header).encode()
+    return _LENGTH_AND_CHECK.pack(len(text), isal_zlib.crc32(text)) + text + body
+
+
+def _read_arrays(file: RawIOBase, names: Sequence[str]) -> dict[str, Array]:
+    """Read some arrays of a file. Raises an exception of any kind where it is damaged."""
+    data = file.read(FIRST_READ) or b""
+    length, check = _LENGTH_AND_CHECK.unpack_from(data)
+    start = _LENGTH_AND_CHECK.size + length
+    text = data[_LENGTH_AND_CHECK.size : start]
+    if isal_zlib.crc32(text) != check:
+        raise ValueError("damaged header")
+    header = json.loads(text)
+    arrays = {}
+    for name in names:
+        dtype, shape, offset, check = header[name]
+        kind, count = np.dtype(dtype), math.prod(shape)
+        first, last = start + offset, start + offset + count * kind.itemsize
+        if last > len(data):
+            data += file.read(last - len(data)) or b""
+        part = memoryview(data)[first:last]
+        if isal_zlib.crc32(part) != check:
+            raise ValueError("damaged array")
+        arrays[name] = np.frombuffer(part, kind, count).reshape(shape)
+    return arrays
