@@ -92,7 +92,7 @@ def assert_same(one: dict[str, Any], other: dict[str, Any]) -> None:
 
 def test_each_step_sees_what_the_one_before_it_changed(tmp_path):
     state, told = begun(), []
-    steps = Steps(state.network)
+    steps = Steps(state.network.eval())
     how = {"every": 2, "progress": lambda *now: told.append(now)}
     fit(tmp_path, METHOD, state, steps, falling_late, **how)
     assert [now[:2] for now in told] == [(done, 5) for done in range(1, 6)]
@@ -122,12 +122,14 @@ def test_a_stop_anywhere_changes_nothing(stop, tmp_path):
     again = load_checkpoint(tmp_path / "cut", METHOD)
     at = 5 if stop == 5 else stop // 2 * 2
     assert again.card.iteration == at
+    again.card = replace(again.card, seconds=100.0)
     assert run(tmp_path / "cut", again) == expected[at:]
     assert_same(bits(again), bits(whole))
     files = (tmp_path / name / WEIGHTS for name in ("whole", "cut"))
     (one, card), (other, again) = (load_weights(path, METHOD) for path in files)
     assert_same(one.state_dict(), other.state_dict())
     assert replace(card, seconds=again.seconds) == again
+    assert 100 <= again.seconds < 110, "the time of both parts"
 
 
 SPOILT: dict[str, Callable[[Any, Any], Any]] = {
@@ -159,7 +161,7 @@ def test_a_loss_or_slope_that_is_not_finite_stops_it(step, name, tmp_path):
 @pytest.mark.parametrize("kind", ["weights", "moments"])
 def test_what_is_not_finite_after_a_step_replaces_no_files(kind, tmp_path):
     """The losses of an iteration are those before its step, which may be the one too far."""
-    state = begun()
+    state, prepared = begun(), []
 
     def spoil(number: int, weight: Any, loss: Any) -> Any:
         if number == 3 and weight is state.network.second:
@@ -170,7 +172,8 @@ def test_what_is_not_finite_after_a_step_replaces_no_files(kind, tmp_path):
         return loss
 
     with refused(TrainingError, "iteration 4"):
-        run(tmp_path / "run", state, spoil)
+        run(tmp_path / "run", state, spoil, prepare=lambda: prepared.append(1))
+    assert prepared == [1], "of the checkpoint of iteration 2"
     assert load_weights(tmp_path / "run" / WEIGHTS, METHOD)[1].iteration == 2
 
 
