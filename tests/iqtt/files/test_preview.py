@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from sheets import enlarged, find
 
 from iqtt.files.preview import BACKGROUND, RIGHT, question_sheet
 from iqtt.files.reader import QuestionRecord, open_questions
@@ -26,24 +27,7 @@ def noise(size, answer=1, dtype="uint8", index=0):
 
 def shown(record, factor=1):
     """The four images as a sheet should show them, `factor` times as large."""
-    return [
-        srgb_bytes(image).repeat(factor, axis=0).repeat(factor, axis=1) for image in record.radiance
-    ]
-
-
-def find(sheet, tile):
-    """Return (row, column) of the one place where a tile lies whole and unchanged."""
-    height, width = tile.shape[:2]
-    y, x = np.unravel_index(tile.sum(axis=-1).argmin(), (height, width))  # no background there
-    places = np.argwhere((sheet == tile[y, x]).all(axis=-1)) - (y, x)
-    limits = np.array(sheet.shape[:2]) - (height, width)
-    places = places[(places >= 0).all(axis=1) & (places <= limits).all(axis=1)]
-    for y, x in np.random.default_rng(0).integers(0, (height, width), (300, 2)):
-        places = places[(sheet[places[:, 0] + y, places[:, 1] + x] == tile[y, x]).all(axis=-1)]
-    assert len(places) == 1
-    top, left = places[0].tolist()
-    assert np.array_equal(sheet[top : top + height, left : left + width], tile)
-    return top, left
+    return [enlarged(srgb_bytes(image), factor) for image in record.radiance]
 
 
 def has(pixels, color):
@@ -126,7 +110,7 @@ def test_the_right_answer_is_known_from_the_truth_too(records):
 
 @pytest.mark.parametrize(
     ("size", "factor"),
-    [((16, 16), 8), ((100, 100), 2), ((128, 128), 1), ((256, 200), 1), ((20, 60), 3)],
+    [((16, 16), 8), ((100, 100), 2), ((256, 200), 1), ((20, 60), 3)],
 )
 @pytest.mark.parametrize("dtype", ["uint8", "float32"])
 def test_images_of_any_size_keep_their_pixels(size, factor, dtype):
@@ -143,13 +127,6 @@ def test_large_images_are_averaged_down():
     means = srgb_bytes(record.radiance[0]).reshape(256, 2, 256, 2, 3).mean(axis=(1, 3))
     assert np.abs(sheet[16:272, 16:272] - means).max() <= 1
     assert sheet.shape[1] < 1200
-
-
-def test_narrow_images_leave_room_for_the_labels():
-    record = noise((64, 16))
-    sheet = np.asarray(question_sheet([record], True))
-    places = [find(sheet, tile) for tile in shown(record, 2)]
-    assert (np.diff([x for _, x in places]) > 128).all()
 
 
 def test_plain_tiles_have_an_outline_and_no_number_is_black():

@@ -5,10 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 from PIL import Image
+from sheets import enlarged, find
 
 from scenegen import open_rooms
-from scenegen.common.errors import SpecError
-from scenegen.files.pictures import pick_rows, save_picture
 from scenegen.rooms.preview import contact_sheet, depth_bytes, srgb_bytes, tiles
 
 BACKGROUND = 250
@@ -21,21 +20,9 @@ def rooms(rooms_path):
         return list(file)
 
 
-def find_tiles(sheet, rooms):
-    """Return (row, column) of the top left corner of each tile of the first line of rooms."""
-    found = []
-    for room in rooms:
-        for picture in tiles(room):
-            large = picture.repeat(4, axis=0).repeat(4, axis=1)
-            places = [
-                (y, x)
-                for y in range(sheet.shape[0] - TILE + 1)
-                for x in np.flatnonzero((sheet[y, : -TILE + 1] == large[0, 0]).all(axis=-1))
-                if np.array_equal(sheet[y : y + TILE, x : x + TILE], large)
-            ]
-            assert len(places) == 1, "each picture is there once, whole and unchanged"
-            found.append(places[0])
-    return found
+def places_of(sheet, rooms):
+    """Return (row, column) of the top left corner of each tile of some rooms."""
+    return [find(sheet, enlarged(picture, 4)) for room in rooms for picture in tiles(room)]
 
 
 def test_the_sheet_shows_every_picture_once_with_labels(rooms):
@@ -43,7 +30,7 @@ def test_the_sheet_shows_every_picture_once_with_labels(rooms):
     assert sheet.dtype == np.uint8
     assert sheet.shape[1] >= 2 * 4 * TILE, "two rooms side by side"
     assert sheet.shape[0] >= 2 * TILE, "the third below them"
-    places = find_tiles(sheet, rooms[:3])
+    places = places_of(sheet, rooms[:3])
     assert [y for y, _ in places[:8]] == [places[0][0]] * 8
     assert sorted(places) == places, "image, depth, normal, ids of each room, in reading order"
     for y, x in places[:8]:
@@ -58,22 +45,19 @@ def test_the_sheet_shows_every_picture_once_with_labels(rooms):
     assert (bare == BACKGROUND).all(), "nothing is drawn elsewhere"
 
 
-def test_captions_tell_rooms_apart(rooms):
+def test_captions_tell_rooms_apart_and_stay_in_their_place(rooms):
     """Number and shapes are in the caption: it changes with either, pixels being equal."""
-    base = np.asarray(contact_sheet(rooms[:1]))
-    renumbered = np.asarray(contact_sheet([dataclasses.replace(rooms[0], index=7)]))
-    emptied = dataclasses.replace(rooms[0].scene, objects=())
-    reshaped = np.asarray(contact_sheet([dataclasses.replace(rooms[0], scene=emptied)]))
-    assert base.shape == renumbered.shape == reshaped.shape
-    assert not np.array_equal(base, renumbered)
-    assert not np.array_equal(base, reshaped)
 
+    def sheet(index=0, objects=rooms[0].scene.objects):
+        scene = dataclasses.replace(rooms[0].scene, objects=objects)
+        shown = dataclasses.replace(rooms[0], index=index, scene=scene)
+        return np.asarray(contact_sheet([shown, rooms[1]]))
 
-def test_a_long_caption_stays_in_its_place(rooms):
-    many = dataclasses.replace(rooms[0].scene, objects=rooms[0].scene.objects[:1] * 90)
-    sheet = np.asarray(contact_sheet([dataclasses.replace(rooms[0], scene=many), rooms[1]]))
-    (y, x), *_ = find_tiles(sheet, [rooms[1]])
-    assert (sheet[y + TILE : y + TILE + 18, x - 8 : x] == BACKGROUND).all()
+    assert not np.array_equal(sheet(), sheet(index=7))
+    assert not np.array_equal(sheet(), sheet(objects=()))
+    long = sheet(objects=rooms[0].scene.objects[:1] * 90)
+    (y, x), *_ = places_of(long, [rooms[1]])
+    assert (long[y + TILE : y + TILE + 18, x - 8 : x] == BACKGROUND).all()
 
 
 def test_near_is_dark():
@@ -122,48 +106,6 @@ def test_srgb_is_the_standard_curve():
     linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     assert srgb_bytes(linear).tolist() == list(range(256))
     assert srgb_bytes(np.array([-1.0, 7.0])).tolist() == [0, 255]
-
-
-def test_choice_of_rows():
-    assert pick_rows(5, None) == [0, 1, 2, 3, 4]
-    assert pick_rows(50, None) == list(range(12))
-    assert pick_rows(50, [7, 3, 7]) == [7, 3, 7]
-    some = pick_rows(1000, None, 12, seed=1)
-    assert some == pick_rows(1000, None, 12, seed=1)
-    assert some != pick_rows(1000, None, 12, seed=2)
-    assert len(set(some)) == 12
-    assert max(some) < 1000
-    assert pick_rows(5, None, 400) == [0, 1, 2, 3, 4]
-
-
-@pytest.mark.parametrize(
-    ("items", "number"), [([5], None), ([0], 2), ([], None), ([0] * 401, None)]
-)
-def test_impossible_choices_of_rows(items, number):
-    with pytest.raises(SpecError):
-        pick_rows(5, items, number)
-
-
-@pytest.mark.parametrize("name", ["s.png", "s.jpg", "S.PNG", "s.webp", "s.tiff"])
-def test_saving(tmp_path, name):
-    picture = Image.new("RGB", (20, 10), (200, 30, 30))
-    save_picture(picture, tmp_path / name)
-    with pytest.raises(FileExistsError):
-        save_picture(Image.new("RGB", (1, 1)), tmp_path / name)
-    save_picture(picture, tmp_path / name, overwrite=True)
-    assert [p.name for p in tmp_path.iterdir()] == [name]
-    with Image.open(tmp_path / name) as again:
-        assert again.size == (20, 10)
-        assert np.abs(np.asarray(again)[5, 5].astype(int) - (200, 30, 30)).max() < 8
-
-
-def test_a_sheet_that_a_format_cannot_hold(tmp_path):
-    tall = Image.new("RGB", (8, 16_384))
-    with pytest.raises(SpecError) as error:
-        save_picture(tall, tmp_path / "s.webp")
-    assert (error.value.where, "16384" in error.value.found) == ("out", True)
-    save_picture(tall, tmp_path / "s.png")
-    assert [p.name for p in tmp_path.iterdir()] == ["s.png"]
 
 
 def test_the_command(run, rooms_path, rooms):
