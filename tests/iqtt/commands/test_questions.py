@@ -177,15 +177,6 @@ def test_a_mistake_is_one_line_and_leaves_nothing(run, options, words, tmp_path,
     assert (tmp_path / "a-file").read_text() == "mine"
 
 
-def test_a_split_is_replaced_only_when_told(run, split, check_refusal):
-    shutil.copytree(split, "x")
-    command = ["make-split", *TINY.split(), "--out", "x", "--seed", "1"]
-    refused = run(*command)
-    check_refusal(refused.exit_code, refused.stdout, refused.stderr, ("x", "--overwrite"))
-    again = run(*command, "--overwrite")
-    assert again.exit_code == 0, again.output
-
-
 @pytest.mark.parametrize(
     ("arguments", "rows"),
     [
@@ -220,16 +211,6 @@ def test_audit_passes_and_writes_json(run, split, tmp_path, check_refusal):
     assert "| --- |" in told.stdout
 
 
-@pytest.mark.parametrize("counts", [(0, 0, 0, 5), (0, 0, 3, 0), (2, 0, 0, 0)])
-def test_a_split_may_have_questions_of_one_kind_only(run, counts):
-    train, labeled, val, test = counts
-    numbers = f"--train {train} --labeled {labeled} --val {val} --test {test} --size 32"
-    made = run("make-split", "--out", "x", *numbers.split())
-    assert made.exit_code == 0, made.output
-    assert made.stdout.startswith(f"x: {train} + {val} + {test} questions ({labeled} of")
-    assert run("audit", "x").exit_code == 0
-
-
 def test_audit_exits_with_1_when_a_proof_fails(run, split, tmp_path):
     shutil.copytree(split, "x")
     with h5py.File("x/iqtt-val.h5", "r+") as file:
@@ -251,12 +232,3 @@ def test_reading_and_auditing_need_no_renderer(split, tmp_path):
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ
     )
     assert done.stdout.split() == ["0", "False", "False"]
-
-
-def test_a_picture_is_replaced_only_when_told(run, split, tmp_path, check_refusal):
-    (tmp_path / "questions.png").write_text("mine")
-    words = ("show", split / "iqtt-val.h5", "--items", "0")
-    refused = run(*words)
-    check_refusal(refused.exit_code, refused.stdout, refused.stderr, ("--overwrite",))
-    assert run(*words, "--overwrite").exit_code == 0
-    assert (tmp_path / "questions.png").read_bytes()[:4] == b"\x89PNG"

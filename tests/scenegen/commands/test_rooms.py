@@ -107,34 +107,6 @@ def test_options_reach_the_request(run, monkeypatch, option, setting):
     assert json.loads(asked[0].to_json())[setting[0]] == setting[1]
 
 
-@pytest.mark.parametrize(
-    ("line", "option"),
-    [
-        ("--n 0", "--n: "),
-        ("--n 1 --preset none", "--preset: "),
-        ("--n 1 --object-radius 5", "--object-radius: "),
-    ],
-)
-def test_errors_name_options(refuses, line, option):
-    refuses("render", *line.split(), words=(option,))
-
-
-def test_images_are_counted_by_views(run):
-    result = run("render", "--n", 2, "--size", 16, "--views", "0,10,20")
-    assert result.stdout.startswith("rooms.h5: 6 images, ")
-    with h5py.File("rooms.h5") as file:
-        assert len(file["image"]) == 6
-
-
-def test_without_overwrite_a_file_is_kept(run, refuses, tmp_path):
-    assert run("render", "--n", 1, *TINY).exit_code == 0
-    before = (tmp_path / "rooms.h5").read_bytes()
-    refuses("render", "--n", 1, *TINY, "--seed", 1, words=("rooms.h5", "exists", "--overwrite"))
-    assert (tmp_path / "rooms.h5").read_bytes() == before
-    assert run("render", "--n", 1, *TINY, "--seed", 1, "--overwrite").exit_code == 0
-    assert (tmp_path / "rooms.h5").read_bytes() != before
-
-
 @pytest.fixture(scope="module")
 def options() -> dict[str, click.Option]:
     """Return the options of `scenegen render` by name."""
@@ -156,10 +128,3 @@ def test_an_export_never_replaces_what_it_exports(run, refuses, rooms_path, tmp_
     assert made.exit_code == 0, made.output
     how = ("--items", 0, "--format", "obj", "--out", "meshes/mug", "--overwrite")
     refuses("export", "x.h5", *how, *meshes, words=("x-000000.obj", "not an input"))
-
-
-def test_a_picture_is_replaced_only_when_told(run, refuses, rooms_path, tmp_path):
-    (tmp_path / "sheet.png").write_text("mine")
-    refuses("preview", rooms_path, words=("sheet.png", "--overwrite"))
-    assert run("preview", rooms_path, "--overwrite").exit_code == 0
-    assert (tmp_path / "sheet.png").read_bytes()[:4] == b"\x89PNG"
