@@ -188,8 +188,8 @@ def view(
         with RoomsFile(find_truth(predictions, truth).path) as rooms:
             shape_of = shapes_of(rooms.spec, **meshes)
             if not items and not scores_path and len(predictions) > MOST_SCORED:
-                told = f"note: the first {MOST_SCORED} of {len(predictions)} rows are shown"
-                print_line(f"{told}; --items or --scores shows others", err=True)
+                note = f"note: the first {MOST_SCORED} of {len(predictions)} rows are shown"
+                print_line(f"{note}; --items or --scores shows others", err=True)
             count = len(items) if items else min(len(predictions), MOST_SCORED)
             with progress_bar(count, "image") as bar:
                 scores = shown_scores(predictions, rooms, items, scores_path, bar.update)

@@ -59,8 +59,8 @@ def query_nearest(
     if backend != "scipy":
         tree_class = _import_pykdtree(required=backend == "pykdtree")
         if tree_class is not None:
-            found: NDArray[np.float64] = tree_class(data).query(queries)[0]
-            return found
+            distances: NDArray[np.float64] = tree_class(data).query(queries)[0]
+            return distances
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(data).query(queries)[0], dtype=np.float64)

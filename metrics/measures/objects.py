@@ -37,12 +37,12 @@ def single_objects(object_id: Array, depth_error: Array, nearest: Array) -> dict
     """
     ids, pixels = np.unique(object_id[object_id > 0], return_counts=True)
     ids, pixels = ids[pixels >= LEAST_PIXELS].astype(np.int64), pixels[pixels >= LEAST_PIXELS]
-    found = [object_id == one for one in ids.tolist()]
-    completeness = np.array([float(nearest[one].mean()) for one in found])
+    masks = [object_id == number for number in ids.tolist()]
+    completeness = np.array([float(nearest[mask].mean()) for mask in masks])
     return {
         "object": ids,
         "pixels": pixels.astype(np.int64),
-        "object_depth_error": np.array([float(depth_error[one].mean()) for one in found]),
+        "object_depth_error": np.array([float(depth_error[mask].mean()) for mask in masks]),
         "object_completeness": completeness,
         **{f"object_recall_{w:g}": (completeness < w).astype(np.float64) for w in RECALL_WITHIN},
     }
@@ -55,13 +55,13 @@ def object_means(objects: Mapping[str, Array]) -> dict[str, float]:
     over the objects. All are NaN where there is none.
     """
     pixels = objects["pixels"]
-    some = len(pixels) > 0
-    found = {}
+    means = {}
     for name, column in objects.items():
         if name.startswith("object_"):
             weights = None if name.startswith("object_recall_") else pixels
-            found[name] = float(np.average(column, weights=weights)) if some else np.nan
-    return found
+            mean = float(np.average(column, weights=weights)) if len(pixels) else np.nan
+            means[name] = mean
+    return means
 
 
 def size_range(share: float) -> str:

@@ -71,10 +71,10 @@ def open_runs(paths: Sequence[str | Path], truth: str | Path | None = None) -> I
             files.append(open_predictions(path))
             opening.enter_context(files[-1])
         _check_alike(files)
-        found = find_truth(files[0], truth)
-        opened = _opened_truth(files[0].task, found.path)
+        place = find_truth(files[0], truth)
+        opened = _opened_truth(files[0].task, place.path)
         opening.callback(opened.close)
-        yield Runs(files, opened, found.source == "given")
+        yield Runs(files, opened, place.source == "given")
 
 
 def _opened_truth(task: str, path: Path) -> "RoomsFile | AnswersFile":
@@ -87,13 +87,13 @@ def _opened_truth(task: str, path: Path) -> "RoomsFile | AnswersFile":
 
 def score_runs(runs: Runs, settings: Settings, progress: Progress) -> ScoreFile:
     """Score open submissions. Raises as `score`."""
-    truth, given = runs.truth, runs.truth_given
+    truth, options = runs.truth, (runs.truth_given, settings, progress)
     if isinstance(truth, RoomsFile):
         rooms = [file for file in runs.files if isinstance(file, RoomPredictions)]
-        scores = score_rooms(rooms, truth, given, settings, progress)
+        scores = score_rooms(rooms, truth, *options)
     else:
         answers = [file for file in runs.files if isinstance(file, QuestionPredictions)]
-        scores = score_questions(answers, truth, given, settings, progress)
+        scores = score_questions(answers, truth, *options)
     for file in runs.files:
         file.require_unchanged()
     return scores

@@ -90,13 +90,13 @@ def floor_of_questions(counts: Mapping[str, int], answers: int) -> tuple[float, 
     """
     if not counts:
         return 1.0 / answers, CHANCE_ONLY
-    found = {kind: floor_of_kind(kind, answers) for kind in sorted(counts)}
+    floor_of = {kind: floor_of_kind(kind, answers) for kind in sorted(counts)}
     kinds_of: dict[str, list[str]] = {}
-    for kind, (_, name) in found.items():
+    for kind, (_, name) in floor_of.items():
         kinds_of.setdefault(name, []).append(kind)
     names = [f"{name} ({', '.join(kinds)})" for name, kinds in kinds_of.items()]
     # Exact where all floors are the same, so that chance has a skill of 0.
-    floors = {floor for floor, _ in found.values()}
-    mean = math.fsum(counts[kind] * floor for kind, (floor, _) in found.items())
+    floors = {floor for floor, _ in floor_of.values()}
+    mean = math.fsum(counts[kind] * floor for kind, (floor, _) in floor_of.items())
     floor = floors.pop() if len(floors) == 1 else mean / sum(counts.values())
     return floor, "; ".join(names) if len(names) > 1 else next(iter(kinds_of))

@@ -259,8 +259,8 @@ def _threshold(name: str) -> float | None:
         threshold = float(match[1]) if match else 0.0
     except ValueError:
         return None
-    known = match and 0.0 < threshold < math.inf and f"{threshold:g}" == match[1]
-    return threshold if known else None
+    valid = match and 0.0 < threshold < math.inf and f"{threshold:g}" == match[1]
+    return threshold if valid else None
 
 
 def markdown_table() -> str:

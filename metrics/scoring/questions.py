@@ -110,15 +110,15 @@ def _shapes(truth: "AnswersFile") -> Array | None:
     return np.asarray(np.argsort(np.argsort(first))[index.reshape(-1)])
 
 
-def _same(one: QuestionPredictions, other: QuestionPredictions) -> bool:
+def _same(first: QuestionPredictions, other: QuestionPredictions) -> bool:
     """Return whether two submissions answer alike, and give no scores that differ."""
-    a, b = (np.argsort(file.rows) for file in (one, other))
+    a, b = (np.argsort(file.rows) for file in (first, other))
     pairs: list[tuple[Array, Array]] = [
-        (one.rows[a], other.rows[b]),
-        (one.answers[a], other.answers[b]),
+        (first.rows[a], other.rows[b]),
+        (first.answers[a], other.answers[b]),
     ]
-    if one.scores is not None and other.scores is not None:
-        pairs.append((one.scores[a], other.scores[b]))
+    if first.scores is not None and other.scores is not None:
+        pairs.append((first.scores[a], other.scores[b]))
     return all(np.array_equal(x, y) for x, y in pairs)
 
 

@@ -40,16 +40,16 @@ def score_rooms(
     rows = matched_rows(files, truth, settings.allow_partial)
     for file in files:
         if file.has_normals != files[0].has_normals:
-            told, expected = ("normals", "none") if file.has_normals else ("none", "normals")
-            raise ScoringError(f"{file.path}: normal", told, f"{expected} as in {files[0].path}")
+            found, expected = ("normals", "none") if file.has_normals else ("none", "normals")
+            raise ScoringError(f"{file.path}: normal", found, f"{expected} as in {files[0].path}")
     scored = score_rows(files, truth, rows, settings, progress)
     scores, bad = scored.scores, scored.bad
     if bad and settings.non_finite == "error":
         first = next(iter(bad.values()))
         shown = ", ".join(map(str, list(bad)[:IDS_SHOWN])) + ", ..." * (len(bad) > IDS_SHOWN)
-        told = f"rows that cannot be scored, {len(bad)} in all: {shown}"
+        listed = f"rows that cannot be scored, {len(bad)} in all: {shown}"
         advice = "mend them, or score them at the worst with --non-finite penalise"
-        raise ScoringError(first.where, first.found, first.expected, f"{told}; {advice}")
+        raise ScoringError(first.where, first.found, first.expected, f"{listed}; {advice}")
 
     def alike(i: int, j: int) -> bool:
         return all(np.array_equal(x[i], x[j], equal_nan=True) for x in scores.values())
@@ -101,19 +101,21 @@ def object_shapes(truth: RoomsFile, row: Array, object_id: Array) -> Array:
     Raises FileFormatError where an object that is seen has none.
     """
     shape, names = truth.read("object/shape", slice(None)), truth.spec.shapes
-    found = []
+    shapes = []
     for i, k in zip(row.tolist(), object_id.tolist(), strict=True):
         index = int(shape[i, k - 1]) if k <= shape.shape[1] else -1
         if not 0 <= index < len(names):
             where = f"{truth.path}: object/shape, row {i}"
             raise FileFormatError(where, f"no shape of object {k}, which is seen", "its shape")
-        found.append(names[index])
-    return np.array(found, object)
+        shapes.append(names[index])
+    return np.array(shapes, object)
 
 
 def _mean_noise_floors(truth: RoomsFile, rows: Array) -> dict[str, float]:
     """Return the mean of each noise floor over some of these rows, spread evenly."""
-    some = rows[np.unique(np.linspace(0, len(rows) - 1, FLOOR_ROWS).astype(int))]
-    measured = [noise_floors(read_true_view(truth, row)) for row in some.tolist()]
-    names = dict.fromkeys(name for one in measured for name in one)
-    return {name: float(np.mean([one[name] for one in measured if name in one])) for name in names}
+    spread = rows[np.unique(np.linspace(0, len(rows) - 1, FLOOR_ROWS).astype(int))]
+    views = [noise_floors(read_true_view(truth, row)) for row in spread.tolist()]
+    names = dict.fromkeys(name for floors in views for name in floors)
+    return {
+        name: float(np.mean([floors[name] for floors in views if name in floors])) for name in names
+    }

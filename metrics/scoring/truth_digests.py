@@ -50,21 +50,22 @@ def answers_digest(truth: "AnswersFile", columns: Mapping[str, NDArray[Any]]) ->
 
     Raises ScoringError where it is not the one that was written with the file.
     """
-    found = {name: dataset_digest(rows) for name, rows in columns.items()}
-    told = {name: digest for name, digest in truth.stored_digests().items() if name in columns}
-    return _checked(truth.path, found, truth.stored_truth_digest, told)
+    digests = {name: dataset_digest(rows) for name, rows in columns.items()}
+    stored = {name: digest for name, digest in truth.stored_digests().items() if name in columns}
+    return _checked(truth.path, digests, truth.stored_truth_digest, stored)
 
 
 def _checked(
-    path: Path, found: Mapping[str, str], stored: str | None, own: Mapping[str, str]
+    path: Path, digests: Mapping[str, str], expected: str | None, stored: Mapping[str, str]
 ) -> str:
-    digest = joint_digest(found)
-    if stored is None or stored == digest:  # released files have none
+    """Return the joint digest of columns. Raises ScoringError where it is not the expected one."""
+    digest = joint_digest(digests)
+    if expected is None or expected == digest:  # released files have none
         return digest
-    changed = [name for name in own if own[name] != found.get(name, own[name])]
+    changed = [name for name in stored if stored[name] != digests.get(name, stored[name])]
     raise ScoringError(
         f"{path}: {TRUTH_DIGEST}",
         f"content with the digest {digest:.12}",
-        f"{stored!s:.12}, with which the file was written",
+        f"{expected!s:.12}, with which the file was written",
         f"what was changed since: {', '.join(changed)}" if changed else "",
     )

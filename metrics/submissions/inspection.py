@@ -145,8 +145,8 @@ def _take_arrays(
             count = array.shape[0]
         for axis, size in zip(column.axes or (), array.shape[1:], strict=True):
             sizes[axis] = (size,)
-    told = {problem.dataset for problem in result.problems} | set(result.arrays)
-    if result.task == "iqtt" and not {"answer", "scores"} & told:
+    present = {problem.dataset for problem in result.problems} | set(result.arrays)
+    if result.task == "iqtt" and not {"answer", "scores"} & present:
         found = f"neither; found {_names(file)}"
         result.problems.append(Problem("answer", "present", "answer, or scores", found))
 

@@ -72,11 +72,11 @@ def parse_json(data: bytes, most_keys: int, most_memory: int = MOST_MEMORY) -> A
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         if len(pairs) > most_keys:
             raise refusal("", f"an object of {len(pairs)} keys", f"at most {most_keys}")
-        found = dict(pairs)
-        if len(found) < len(pairs):
+        members = dict(pairs)
+        if len(members) < len(pairs):
             twice = Counter(name for name, _ in pairs).most_common(1)[0][0]
             raise refusal("", f"the key {twice!r:.60} twice", "each key once")
-        return found
+        return members
 
     if data.startswith(b"\x89HDF"):
         raise refusal("", "an HDF5 file", "JSON")

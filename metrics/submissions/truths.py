@@ -59,23 +59,23 @@ class TrueView:
         return np.isfinite(self.depth)
 
 
-def find_truth(predictions: Predictions, given: str | Path | None = None) -> FoundTruth:
+def find_truth(predictions: Predictions, named: str | Path | None = None) -> FoundTruth:
     """Return where the truth of a submission lies.
 
-    That is `given`, or else the path recorded in the submission, taken from the submission's folder
+    That is `named`, or else the path recorded in the submission, taken from the submission's folder
     and then from the working directory; a file of a stranger's choice is tried in another process.
     Only a regular file, or a link to one, is a truth. For a test file without answers it is the
-    file of answers beside it (iqtt-test-answers.h5). Where `given` is there, nothing that the
+    file of answers beside it (iqtt-test-answers.h5). Where `named` is there, nothing that the
     submission names is looked at.
 
     Raises FileFormatError where nothing lies there, with the places that were looked at, and as
     `trial.try_file`.
     """
-    advice = "give it with --truth" if given is None else ""
-    if given is None and not predictions.truth_path:
+    advice = "give it with --truth" if named is None else ""
+    if named is None and not predictions.truth_path:
         raise FileFormatError(predictions.path, "no path of a truth file", "a path", advice)
     recorded = Path(predictions.truth_path)
-    places = [predictions.path.parent / recorded, recorded] if given is None else [Path(given)]
+    places = [predictions.path.parent / recorded, recorded] if named is None else [Path(named)]
     for place in places:
         if not os.path.isfile(place):  # so neither a pipe nor a device is ever opened
             continue
@@ -84,9 +84,9 @@ def find_truth(predictions: Predictions, given: str | Path | None = None) -> Fou
             from iqtt.files.reader import answers_beside
 
             truth = answers_beside(place) or place
-        if given is None:  # whoever made the submission may have chosen the file
+        if named is None:  # whoever made the submission may have chosen the file
             trial.try_file(truth)
-        return FoundTruth(truth, "submission" if given is None else "given")
+        return FoundTruth(truth, "submission" if named is None else "given")
     looked = " and ".join(dict.fromkeys(str(place) for place in places))
     raise FileFormatError(
         f"{predictions.path}: truth", f"no file at {looked}", "the file that is predicted", advice

@@ -33,35 +33,35 @@ def order_hints(predictions: RoomPredictions, truth: RoomsFile) -> list[Problem]
         return []
     size = (truth.spec.height, truth.spec.width)
     grid = np.ix_(mirrored_grid(size[0], SIDE), mirrored_grid(size[1], SIDE))
-    known = np.stack([_pixels(truth.read("depth", int(row)), grid) for row in candidates])
+    true = np.stack([_pixels(truth.read("depth", int(row)), grid) for row in candidates])
     among = entries[np.isin(rows[entries], candidates)]
     spread = np.linspace(0, len(among) - 1, PREDICTIONS).astype(np.int64)
     predicted = {}
     for entry in among[np.unique(spread)].tolist():
         with suppress(FileFormatError):
             predicted[entry] = _pixels(predictions.depth(entry), grid)
-    own = {entry: int(np.searchsorted(candidates, rows[entry])) for entry in predicted}
+    place_of = {entry: int(np.searchsorted(candidates, rows[entry])) for entry in predicted}
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # images without a finite pixel have no error
-        scale = np.nanmedian([p / known[own[entry]] for entry, p in predicted.items()])
-        fits = [(e, _other_row(p / scale, known, own[e])) for e, p in predicted.items()]
+        scale = np.nanmedian([p / true[place_of[entry]] for entry, p in predicted.items()])
+        fits = [(e, _other_row(p / scale, true, place_of[e])) for e, p in predicted.items()]
     others = {int(rows[e]): int(candidates[place]) for e, place in fits if place is not None}
     if len(set(others.values())) < max(3.0, SHARE * len(predicted)):
         return []
-    told = ", ".join(f"that of row {a} fits row {b}" for a, b in list(others.items())[:3])
-    got = f"rows look shuffled: {len(others)} of {len(predicted)} predictions; {told}"
-    return [Problem("row", HINT, "each prediction with its own row", got, first_ids(others))]
+    listed = ", ".join(f"that of row {a} fits row {b}" for a, b in list(others.items())[:3])
+    found = f"rows look shuffled: {len(others)} of {len(predicted)} predictions; {listed}"
+    return [Problem("row", HINT, "each prediction with its own row", found, first_ids(others))]
 
 
-def _other_row(predicted: Array, known: Array, own: int) -> int | None:
-    """Return which of the images (N, P) a prediction (P,) clearly shows, unless it is its own."""
-    errors = np.nanmean(np.abs(known - predicted), axis=1)
+def _other_row(predicted: Array, true: Array, place: int) -> int | None:
+    """Return which of the images (N, P) a prediction (P,) clearly shows, unless that at `place`."""
+    errors = np.nanmean(np.abs(true - predicted), axis=1)
     if not np.isfinite(errors).all():
         return None
     best, second = np.argsort(errors)[:2].tolist()
-    spread = float(np.nanmean(np.abs(known[best] - np.nanmedian(known[best]))))
+    spread = float(np.nanmean(np.abs(true[best] - np.nanmedian(true[best]))))
     most = min(CLEAR * errors[second], FIT * spread)
-    return best if best != own and errors[best] <= most else None
+    return best if best != place and errors[best] <= most else None
 
 
 def _pixels(depth: Array, grid: tuple[Array, ...]) -> Array:

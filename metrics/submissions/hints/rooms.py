@@ -17,7 +17,7 @@ def room_hints(predictions: RoomPredictions, truth: RoomsFile) -> list[Problem]:
     where the truth is damaged.
     """
     samples = sample_rooms(predictions, truth)
-    found = depth_hints(samples, predictions.alignment)
+    hints = depth_hints(samples, predictions.alignment)
     if predictions.has_normals:
-        found += normal_hints(samples)
-    return found + order_hints(predictions, truth)
+        hints += normal_hints(samples)
+    return hints + order_hints(predictions, truth)
