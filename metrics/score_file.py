@@ -366,12 +366,12 @@ def _check_meta(scores: ScoreFile) -> None:
         ("answers", counts.get("answers", 2) in (2, 3), "2 or 3, of each question"),
     ]
     if test is not None:
+        if test.task != task:
+            raise refusal("meta.truth_digest", f"that of {test.name}", f"a truth of task {task!r}")
         rules.append((total, counts[total] == test.rows, f"{test.rows}, as {test.name} has"))
     for name, holds, expected in rules:
         if not holds:
             raise refusal(f"meta.counts.{name}", shown(counts[name]), expected)
-    if test is not None and test.task != task:
-        raise refusal("meta.truth_digest", f"that of {test.name}", f"a truth of task {task!r}")
     if meta.resamples not in ((0,) if formula else RESAMPLES):
         expected = "0, as the interval is Wilson's" if formula else "100 to 100000"
         raise refusal("meta.resamples", shown(meta.resamples), expected)
