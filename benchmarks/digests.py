@@ -28,6 +28,7 @@ from typing import Any
 import click
 import h5py
 import numpy as np
+from PIL import Image
 
 from scenegen.files.new_file import write_text
 
@@ -130,6 +131,10 @@ def file_parts(path: Path) -> Iterator[tuple[str, str, Any]]:
                         yield "data", name, head + array.tobytes()
     elif path.suffix == ".json":
         yield from leaves(json.loads(path.read_text()), "")
+    elif path.suffix == ".png":
+        with Image.open(path) as image:
+            yield "data", "pixels", f"{image.mode} {image.size}".encode() + image.tobytes()
+            yield "text", "texts", repr(sorted(image.info.items(), key=str))
     elif path.suffix == ".csv":
         yield from printed_parts(path.read_text())
     else:
