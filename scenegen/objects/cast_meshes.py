@@ -1,4 +1,4 @@
-"""Shapes in the form that the ray caster takes: triangles grown by a hair, and their normals."""
+"""Shapes in the form that is rendered: triangles and normals; grown triangles for trees."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

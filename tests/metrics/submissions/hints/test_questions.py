@@ -37,7 +37,8 @@ def test_answers_that_are_counted_from_one():
     rows = np.arange(300)
 
     def hints(answers):
-        return answer_hints(QuestionPredictions(Path(__file__), {}, rows, answers), right)
+        content = Inspection("iqtt", arrays={}, ids=rows, answers=answers)
+        return answer_hints(QuestionPredictions(Path(__file__), content, None), right)
 
     assert hints(right) == []
     assert hints(rng.integers(0, 3, 300)) == []
