@@ -190,6 +190,7 @@ def showing(order, source=None):
         name = IMAGES[task]
         with h5py.File(path, "r+") as file:
             shape, kind, old = file[name].shape, file[name].dtype, file[name].virtual_sources()
+            told = {k: v for k, v in file[name].attrs.items() if not k.startswith("DIMENSION")}
             layout, place = h5py.VirtualLayout(shape, kind), 0
             for number in order:
                 first, last = (bounds[0] for bounds in old[number].vspace.get_select_bounds())
@@ -198,7 +199,7 @@ def showing(order, source=None):
                 layout[place : place + count] = h5py.VirtualSource(shown, name, (count, *shape[1:]))
                 place += count
             del file[name]
-            file.create_virtual_dataset(name, layout)
+            file.create_virtual_dataset(name, layout).attrs.update(told)
 
     return edit
 
