@@ -41,6 +41,21 @@ def test_truth_beside_the_submission_comes_first(truths, tmp_path, monkeypatch):
         assert "--truth" in caught.value.hint
 
 
+def test_only_a_truth_of_a_strangers_choice_is_tried_in_another_process(
+    truths, tmp_path, monkeypatch
+):
+    with (
+        open_predictions(good_rooms(tmp_path, truths.rooms)) as rooms,
+        open_predictions(good_answers(tmp_path, truths.iqtt)) as answers,
+    ):
+        tried = []
+        monkeypatch.setattr("scenegen.files.trial.try_file", tried.append)
+        find_truth(rooms, truths.rooms)
+        assert tried == []
+        places = [find_truth(predictions).path for predictions in (rooms, answers)]
+    assert tried == places == [truths.rooms, truths.iqtt.with_name("iqtt-test-answers.h5")]
+
+
 def test_truth_as_given(truths, tmp_path):
     with open_predictions(good_rooms(tmp_path, truths.rooms)) as found:
         assert find_truth(found) == FoundTruth(truths.rooms, "submission")
