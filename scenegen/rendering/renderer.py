@@ -21,7 +21,8 @@ from scenegen.rendering.surfaces.in_numpy import cast_at_surface
 Array = NDArray[Any]
 MOST_WORKERS = 8  # that are used unasked; each takes about 0.4 GiB
 WORTHWHILE = 2000  # images for each worker; below, starting it takes longer than it saves
-MOST_FACES = 2_000_000  # of the models in one Mitsuba scene
+MOST_FACES = 2_000_000  # of the models of one launch; the rasteriser takes 96 bytes a face
+MOST_DRAWN = 8_000_000  # faces that the images of one launch show; it takes some 16 bytes for each
 MOST_MODELS = 2000  # in one Mitsuba scene; must not exceed `model_scene.MOST_MODELS`
 
 
@@ -111,20 +112,22 @@ def _with_traced_image(
 
 
 def parts(batch: SceneBatch) -> list[SceneBatch]:
-    """Cut a batch such that the models of each part do not have too many faces for one scene.
+    """Cut a batch such that no part has too many faces, of its models or shown by its images.
 
     An image's bits do not depend on the rest of its batch, so this changes no pixel.
     """
     if batch.spec.source == "shapes":
         return [batch]
     faces = np.array([face_count(batch.shape_of, name) for name in batch.names])
-    starts, seen = [0], set[int]()
+    starts, seen, drawn = [0], set[int](), 0
     for row, shapes in enumerate(batch.shape):
-        seen |= set(shapes[shapes >= 0].tolist())
+        shown = shapes[shapes >= 0].tolist()
+        seen |= set(shown)
+        drawn += int(faces[shown].sum())
         many = len(seen) > MOST_MODELS or faces[list(seen)].sum() > MOST_FACES
-        if many and row > starts[-1]:
+        if (many or drawn > MOST_DRAWN) and row > starts[-1]:
             starts.append(row)
-            seen = set(shapes[shapes >= 0].tolist())
+            seen, drawn = set(shown), int(faces[shown].sum())
     ends = [*starts[1:], len(batch)]
     return [batch.rows(start, end) for start, end in zip(starts, ends, strict=True)]
 

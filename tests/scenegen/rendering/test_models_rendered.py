@@ -49,7 +49,9 @@ def test_hundreds_of_other_models_change_no_bit():
     assert [bits(together, row) for row in (3, 4)] == alone
 
 
-@pytest.mark.parametrize("limits", [{"MOST_FACES": 1}, {"MOST_FACES": 9000}, {"MOST_MODELS": 3}])
+@pytest.mark.parametrize(
+    "limits", [{"MOST_FACES": 1}, {"MOST_FACES": 9000}, {"MOST_MODELS": 3}, {"MOST_DRAWN": 9000}]
+)
 def test_a_batch_cut_into_parts_is_the_same(limits, scenes_of, monkeypatch):
     scenes = scenes_of(FAMILIES, 7)
     batch = pack(FAMILIES, scenes)
@@ -67,6 +69,9 @@ def test_a_batch_cut_into_parts_is_the_same(limits, scenes_of, monkeypatch):
         faces = sum(len(part.shape_of(name).triangles) for name in part.names)
         assert len(part) == 1 or faces <= renderer.MOST_FACES
         assert len(part) == 1 or len(part.names) <= renderer.MOST_MODELS
+        counts = [len(part.shape_of(name).triangles) for name in part.names]
+        drawn = sum(counts[i] for i in part.shape.ravel().tolist() if i >= 0)
+        assert len(part) == 1 or drawn <= renderer.MOST_DRAWN
     cut = render(batch)
     for name in vars(whole):
         assert getattr(cut, name).tobytes() == getattr(whole, name).tobytes()
