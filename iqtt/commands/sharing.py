@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from scenegen.command_line.groups import EXAMPLE, needs
-from scenegen.command_line.options import OVERWRITE
+from scenegen.command_line.options import ENCODING, OVERWRITE
 from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputFolder, refuse_command_inputs
 from scenegen.commands.sharing import SHARE, publication_of, publication_options
@@ -65,14 +65,21 @@ def card(
               help="Folder to make [iqtt-val-parquet of iqtt-val.h5; iqtt-train-labeled-parquet].")
 @click.option("--rows-per-file", type=click.IntRange(1), default=1000, show_default=True,
               help="Most questions of a file.")
+@ENCODING
 @OVERWRITE
 def export(
-    file: str, form: str, part: str | None, out: str | None, rows_per_file: int, overwrite: bool
+    file: str,
+    form: str,
+    part: str | None,
+    out: str | None,
+    rows_per_file: int,
+    curve: str,
+    overwrite: bool,
 ) -> None:
     """Write all that FILE tells of its questions in a format of data loaders.
 
-    Images of 8 bits become PNG files. The answers to test questions are in another file, and are
-    not written.
+    Images of 8 bits become PNG files, sRGB unless --encoding linear. The answers to test questions
+    are in another file, and are not written.
     """
     if form == "parquet":
         needs("iqtt export --format parquet", SHARE, "share")
@@ -85,7 +92,7 @@ def export(
     with progress_bar(count, "question") as bar:
         written = export_questions(
             file, form, folder, part,
-            rows_per_file=rows_per_file, overwrite=overwrite, progress=bar.update,
+            encoding=curve, rows_per_file=rows_per_file, overwrite=overwrite, progress=bar.update,
         )
     megabytes = sum(path.stat().st_size for path in written) / 1e6
     print_line(f"{folder}: {count} questions in {len(written) - 1} files, {megabytes:.1f} MB")

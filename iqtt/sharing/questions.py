@@ -43,7 +43,7 @@ def export_questions(
     "labeled". Only what the file itself tells is written: a file of test questions has no answers.
 
     Args:
-        how: `rows_per_file`, `overwrite` and `progress` of `write_export`.
+        how: `encoding`, `rows_per_file`, `overwrite` and `progress` of `write_export`.
 
     Raises as `write_export` and `QuestionsFile`.
     """

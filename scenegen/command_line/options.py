@@ -136,6 +136,10 @@ IMAGE_DTYPE = click.option("--image-dtype", type=click.Choice(["uint8", "float16
 COMPRESSION = click.option("--compression", type=click.Choice(["gzip", "lzf", "none"]),
                            default="gzip", show_default=True,
                            help="How images are compressed; only h5py reads lzf.")
+ENCODING = click.option("--encoding", "curve", type=click.Choice(["srgb", "linear"]),
+                        default="srgb", show_default=True,
+                        help="Encoding of pictures: sRGB for eyes and networks, or linear radiance."
+                        " Floating-point images stay linear.")
 SIZE = click.option("--size", type=Size(), default="128", show_default=True,
                     help="Image size in pixels.")
 SEED = click.option("--seed", type=int, default=0, show_default=True,

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from scenegen.command_line.groups import EXAMPLE, needs
-from scenegen.command_line.options import DEVICE, MESHES, OVERWRITE, Items
+from scenegen.command_line.options import DEVICE, ENCODING, MESHES, OVERWRITE, Items
 from scenegen.command_line.output import print_checks, print_line, progress_bar
 from scenegen.command_line.paths import (
     InputPath,
@@ -120,14 +120,7 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     " them; ply the surfels; obj the scene's mesh; parquet and webdataset all values of many rows,"
     " for data loaders.",
 )
-@click.option(
-    "--encoding",
-    "curve",
-    type=click.Choice(["srgb", "linear"]),
-    default="srgb",
-    show_default=True,
-    help="Encoding of colours in png and ply.",
-)
+@ENCODING
 @click.option(
     "--bits",
     type=click.Choice(["8", "16"]),
@@ -185,7 +178,7 @@ def export(
         raise click.UsageError("--all and --items exclude each other: use one of them")
     if form in SHARED:
         folder = out or f"{Path(file).stem}-{form}"
-        _export_many(file, items, form, folder, rows_per_file, overwrite)
+        _export_many(file, items, form, folder, curve, rows_per_file, overwrite)
     elif items is None and not every:
         raise click.UsageError(f"--format {form} needs rows: use --items 0-9, or --all")
     else:
@@ -198,6 +191,7 @@ def _export_many(
     items: list[int] | None,
     form: str,
     out: str,
+    curve: str,
     rows_per_file: int,
     overwrite: bool,
 ) -> None:
@@ -215,6 +209,7 @@ def _export_many(
             form,
             out,
             items,
+            encoding=curve,
             rows_per_file=rows_per_file,
             overwrite=overwrite,
             progress=bar.update,

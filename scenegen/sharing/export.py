@@ -1,9 +1,13 @@
-"""Write the rows of a file, as they are stored, to a folder of Parquet or WebDataset files."""
+"""Write the rows of a file to a folder of Parquet or WebDataset files.
+
+Values are those that are stored, except for pictures of 8 bits: these are encoded as sRGB for eyes
+and networks, unless the caller asks for linear ones.
+"""
 
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +18,11 @@ from scenegen.files.new_folder import folder_written_beside
 from scenegen.files.rows import RowFile
 from scenegen.files.schema import Column
 from scenegen.files.shards import cut, shard_name
-from scenegen.sharing.stored import as_text, stored_blocks
+from scenegen.rooms.preview import srgb_bytes
+from scenegen.sharing.stored import as_text, is_picture, stored_blocks
 
 FORMATS = {"parquet": ".parquet", "webdataset": ".tar"}  # and how the names of their files end
+ENCODINGS = ("srgb", "linear")  # of pictures
 ROWS_PER_FILE = 1000
 MOST_FILES = 100_000  # as many as their numbers of five digits can tell apart
 ABOUT = "config.json"  # a name that `datasets` never takes for data
@@ -48,6 +54,7 @@ def write_export(
     folder: str | Path,
     rows: Sequence[int] | None = None,
     *,
+    encoding: str = "srgb",
     rows_per_file: int = ROWS_PER_FILE,
     overwrite: bool = False,
     progress: Callable[[int], Any] = lambda done: None,
@@ -62,6 +69,7 @@ def write_export(
         form: one of FORMATS.
         folder: to make; with `overwrite`, an older one of such files is replaced.
         rows: which to write, in this order; all by default.
+        encoding: one of ENCODINGS, of pictures. Images of floating-point numbers stay linear.
         rows_per_file: the most rows of one file.
         progress: is told the number of rows that were written since the last call.
 
@@ -72,6 +80,7 @@ def write_export(
     """
     count = len(table.file)
     check(form in FORMATS, "format", repr(form), f"one of {', '.join(FORMATS)}")
+    check(encoding in ENCODINGS, "encoding", repr(encoding), f"one of {', '.join(ENCODINGS)}")
     check(rows_per_file >= 1, "rows per file", rows_per_file, "1 or more")
     check(count > 0, table.what, "no rows", "at least one")
     chosen = list(range(count) if rows is None else rows)
@@ -84,12 +93,33 @@ def write_export(
     names = [shard_name(f"{table.stem}{ending}", i, len(parts)) for i in range(len(parts))]
     ours = {*names, ABOUT, *_older_files(folder, table.stem, ending)}
     write = _writer(form)
+    if encoding == "srgb":
+        table = _for_eyes(table)
     with folder_written_beside(folder, ours, overwrite) as made:
         for name, part in zip(names, parts, strict=True):
             blocks = _blocks(table, [chosen[i] for i in part], progress)
             write(made / name, (ROW, *table.columns), blocks)
         (made / ABOUT).write_text(_about(table, form, names), encoding="utf-8")
     return [Path(folder) / name for name in (*names, ABOUT)]
+
+
+def _for_eyes(table: ExportedTable) -> ExportedTable:
+    """Return a table whose pictures are encoded as sRGB, and whose columns say so."""
+    codes = srgb_bytes(np.arange(256) / 255)
+    pictures = [column.name for column in table.columns if is_picture(column)]
+    how = "value times `scale`, decoded by the sRGB curve (IEC 61966-2-1), is linear radiance"
+
+    def described(column: Column) -> Column:
+        if column.name not in pictures:
+            return column
+        more = {**column.more, "encoding": "srgb"}
+        return replace(column, unit="sRGB", meaning=f"RGB; {how}", more=more)
+
+    def values(stored: Mapping[str, Any]) -> Mapping[str, Any]:
+        exported = table.values(stored)
+        return {**exported, **{name: codes[exported[name]] for name in pictures}}
+
+    return replace(table, columns=[described(column) for column in table.columns], values=values)
 
 
 def _older_files(folder: str | Path, stem: str, ending: str) -> list[str]:

@@ -37,7 +37,7 @@ def export_rows(
     `camera/fov_y_degrees` is `camera_fov_y_degrees`.
 
     Args:
-        how: `rows_per_file`, `overwrite` and `progress` of `write_export`.
+        how: `encoding`, `rows_per_file`, `overwrite` and `progress` of `write_export`.
 
     Raises as `write_export`; and OSError where there is no such file, FileFormatError where it is
     not one of rooms.

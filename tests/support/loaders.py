@@ -5,6 +5,8 @@ import subprocess
 import sys
 import warnings
 
+import numpy as np
+
 os.environ |= {"HF_HUB_OFFLINE": "1", "HF_DATASETS_OFFLINE": "1", "HF_HUB_DISABLE_TELEMETRY": "1"}
 
 
@@ -16,6 +18,13 @@ def loader(cache):
     return lambda *names, **how: datasets.load_dataset(
         *names, cache_dir=str(cache), **{"split": "train", **how}
     )
+
+
+def check_srgb(codes, radiance):
+    """The radiance is within half a step of the 8-bit sRGB codes, decoded as IEC 61966-2-1 says."""
+    half = np.stack([codes - 0.5, codes + 0.5]).clip(0, 255) / 255
+    low, high = np.where(half <= 0.04045, half / 12.92, ((half + 0.055) / 1.055) ** 2.4)
+    assert ((low - 1e-7 <= radiance) & (radiance <= high + 1e-7)).all()
 
 
 def faultless_croissant(path):

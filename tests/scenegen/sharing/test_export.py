@@ -13,6 +13,7 @@ from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.layout import FIELDS
 from scenegen.sharing.export import ABOUT, FORMATS
 from scenegen.sharing.rooms import export_rows
+from tests.support.loaders import check_srgb
 
 
 @pytest.fixture(params=["8 bits", "floats"])
@@ -45,7 +46,7 @@ def check_rows(found, path, rows, column):
 
 @pytest.mark.parametrize("how", ["files", "folder"])
 def test_parquet_in_datasets(how, path, load, tmp_path):
-    made = export_rows(path, "parquet", tmp_path / "out", rows_per_file=4)
+    made = export_rows(path, "parquet", tmp_path / "out", encoding="linear", rows_per_file=4)
     if how == "files":
         loaded = load("parquet", data_files=[str(p) for p in made if p.name != ABOUT])
     else:
@@ -59,10 +60,34 @@ def test_parquet_in_datasets(how, path, load, tmp_path):
 
 
 def test_webdataset_in_datasets(path, load, tmp_path):
-    made = export_rows(path, "webdataset", tmp_path / "out", rows_per_file=4)
+    made = export_rows(path, "webdataset", tmp_path / "out", encoding="linear", rows_per_file=4)
     loaded = load("webdataset", data_files=[str(p) for p in made if p.name != ABOUT])
     check_rows(loaded, path, range(len(loaded)), of_archive)
     assert loaded["__key__"] == [f"{row:09d}" for row in range(len(loaded))]
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_pictures_are_srgb_and_decode_to_the_stored_radiance(form, holey_set, load, tmp_path):
+    made = export_rows(holey_set, form, tmp_path / "out", rows_per_file=99)
+    about = json.loads((tmp_path / "out" / ABOUT).read_text())["columns"]["image"]
+    assert (about["encoding"], about["unit"], about["scale"]) == ("srgb", "sRGB", 1 / 255)
+    loaded = load(form, data_files=[str(made[0])])
+    value = of_archive if form == "webdataset" else dict.__getitem__
+    with open_rooms(holey_set) as rooms:
+        for room, row in zip(rooms, loaded, strict=True):
+            codes = np.asarray(value(row, "image")).astype(float)
+            check_srgb(codes, room.radiance)
+            assert np.abs(codes - room.image).max() > 40, "a curve that does nothing"
+
+
+def test_floating_point_images_stay_radiance(float_path, tmp_path):
+    export_rows(float_path, "webdataset", tmp_path / "out")
+    about = json.loads((tmp_path / "out" / ABOUT).read_text())["columns"]["image"]
+    assert "encoding" not in about
+    with tarfile.open(tmp_path / "out" / "float-00000-of-00001.tar") as archive:
+        image = np.load(io.BytesIO(archive.extractfile("000000001.image.npy").read()))
+    with open_rooms(float_path) as rooms:
+        np.testing.assert_array_equal(image, rooms[1].image)
 
 
 def of_archive(row, name):
@@ -137,6 +162,7 @@ def test_a_damaged_row_leaves_nothing(form, damaged, tmp_path):
         ({"rows": [99]}, "items"),
         ({"rows": []}, "items"),
         ({"rows_per_file": 0}, "rows per file"),
+        ({"encoding": "log"}, "encoding"),
     ],
 )
 def test_refused(how, where, rooms_path, tmp_path):
