@@ -39,6 +39,9 @@ def score_rooms(
     """Score runs of one method on an open rooms file; raises as `evaluate.score`."""
     rows = matched_rows(files, truth, settings.allow_partial)
     for file in files:
+        if file.kind != files[0].kind:
+            expected = f"{files[0].kind} as in {files[0].path}"
+            raise ScoringError(f"{file.path}: {file.kind}", file.kind, expected)
         if file.has_normals != files[0].has_normals:
             found, expected = ("normals", "none") if file.has_normals else ("none", "normals")
             raise ScoringError(f"{file.path}: normal", found, f"{expected} as in {files[0].path}")

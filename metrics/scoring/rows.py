@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.depth import Alignment
+from metrics.scoring.geometry import planar_depth
 from metrics.scoring.image_scores import (
     ALIGNMENTS,
     score_empty_room,
@@ -147,10 +148,11 @@ class RowScorer:
             scores = []
             for file, entries in zip(self._files, self._entries, strict=True):
                 i = entries[row]
-                depth, normal = file.depth(i), file.normal(i) if file.has_normals else None
+                predicted = file.view(i)
+                depth, alignment = planar_depth(predicted, view.depth)
                 score = functools.partial(
-                    score_view, depth, normal, view, empty.depth, relief,
-                    alignment=file.alignment, alignments=self._alignments,
+                    score_view, depth, predicted.normal, view, empty.depth, relief,
+                    alignment=alignment, alignments=self._alignments,
                 )  # fmt: skip
                 try:
                     scores.append(score())

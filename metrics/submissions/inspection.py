@@ -75,6 +75,7 @@ def inspect(file: h5py.File) -> Inspection:
             result.problems.append(Problem("file", fault.rule, fault.expected, fault.found))
             return result
     _take_arrays(file, result, layout.COLUMNS[result.task], file_faults)
+    _check_alignment(result)
     take_values(result)
     return result
 
@@ -133,7 +134,7 @@ def _take_arrays(
     file: h5py.File, result: Inspection, columns: Sequence[Column], file_faults: Sequence[Fault]
 ) -> None:
     """Open the data sets of the layout that can be used; all have as many rows as the first."""
-    count: int | None = None
+    count, before = None, len(result.problems)
     sizes: dict[str, tuple[int, ...]] = dict(layout.SIZES)
     for column in columns:
         array, problems = _opened(file, column, count, sizes, file_faults)
@@ -149,6 +150,26 @@ def _take_arrays(
     if result.task == "iqtt" and not {"answer", "scores"} & present:
         found = f"neither; found {_names(file)}"
         result.problems.append(Problem("answer", "present", "answer, or scores", found))
+    if result.task == "rooms":
+        result.problems[before:before] = _kind_problems(present, file)
+
+
+def _kind_problems(present: set[str], file: h5py.File) -> list[Problem]:
+    """Return what is wrong unless exactly one kind of geometry is there."""
+    kinds = [kind for kind in layout.KINDS if kind in present]
+    expected = f"one of {', '.join(layout.KINDS)}"
+    if not kinds:
+        return [Problem("depth", "present", expected, f"no such dataset; found {_names(file)}")]
+    return [Problem(kind, "unique", expected, f"it beside {kinds[0]}") for kind in kinds[1:]]
+
+
+def _check_alignment(result: Inspection) -> None:
+    """Refuse an alignment that the kind of geometry does not allow."""
+    alignment = result.texts.get("alignment")
+    kind = next((kind for kind in layout.KINDS if kind in result.arrays), None)
+    if alignment and kind and alignment not in layout.KINDS[kind]:
+        expected = f"{' or '.join(layout.KINDS[kind])}, for {kind}"
+        result.problems.append(Problem("alignment", "value", expected, repr(alignment)))
 
 
 def _opened(
@@ -223,6 +244,9 @@ def take_values(result: Inspection) -> None:
         return
     ids = values.astype(np.int64)
     result.problems += value_problems(name, ids, ids)
+    fov = _values(result, "fov_y_degrees", lambda array: as_doubles(array[()]))
+    if fov is not None:
+        result.problems += value_problems("fov_y_degrees", fov, ids)
     if len(ids):
         result.ids = ids
         _take_answers(result, ids)

@@ -2,17 +2,23 @@
 
 import unicodedata
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any
 
 from metrics.measures.answers import CANDIDATES
-from metrics.measures.depth import Alignment
 from metrics.submissions.rules import RULES, kind_text, shape_text
 from scenegen.files.schema import Column
 
 FORMAT_NAME = "pix2shape-bench/predictions"
 FORMAT_VERSION = "1.0"
 TASKS = ("rooms", "iqtt")
-ALIGNMENTS: tuple[str, ...] = get_args(Alignment)
+# Kinds of geometry: the data set of each, and what a method of it may not know. The first is meant
+# where a submission does not say.
+KINDS: dict[str, tuple[str, ...]] = {
+    "depth": ("none", "median_scale", "scale", "scale_shift"),
+    "disparity": ("scale_shift",),
+    "points": ("none", "scale", "scale_shift"),
+}
+ALIGNMENTS = KINDS["depth"]
 LONGEST_NAME = 200  # characters of method and run, which tables and file names repeat
 LONGEST_TEXT = 10_000
 DATA_FORMATS = {"pix2shape-bench/rooms": "rooms", "pix2shape-bench/iqtt": "questions"}
@@ -44,7 +50,9 @@ ATTRIBUTES = (
     Attribute("truth_path", "where the truth lay; looked up from the submission's folder, then the"
               " working directory, unless --truth is given; scores are not comparable without that",
               required=False, may_be_empty=True),
-    Attribute("alignment", "what the method cannot know, and the truth may decide for it",
+    Attribute("alignment", "what the method cannot know, and the truth may decide for it, by kind: "
+              + "; ".join(f"{kind} {', '.join(kinds)}" for kind, kinds in KINDS.items())
+              + "; the first by default",
               required=False, tasks=("rooms",), choices=ALIGNMENTS),
     Attribute("writer", "the program that wrote the file", required=False, may_be_empty=True),
     Attribute("notes", "anything else", required=False, may_be_empty=True),
@@ -56,9 +64,17 @@ COLUMNS = {
                "planar depth, -z in the camera frame (not the distance along the ray), of the ray"
                " through the pixel's centre; above 0 to lie in front of the camera",
                ("y", "x"), own_chunk=True),
+        Column("disparity", (), "float32", "1", "camera",
+               "1 / planar depth, up to a scale above 0 and a shift of each image; large where the"
+               " surface is near", ("y", "x"), own_chunk=True),
+        Column("points", (), "float32", "scene unit", "camera",
+               "surface points, x right, y up, z towards the viewer, so that planar depth is -z",
+               ("y", "x", "xyz"), own_chunk=True),
         Column("normal", (), "float32", "1", "camera",
                "surface normal, x right, y up, z towards the viewer; faces the viewer; of any"
                " length but 0", ("y", "x", "xyz"), own_chunk=True),
+        Column("fov_y_degrees", (), "float64", "degree",
+               meaning="vertical field of view, where the method estimates the camera"),
     ),
     "iqtt": (
         Column("question", (), "int64", meaning="index in the test file; in any order"),
@@ -70,8 +86,8 @@ COLUMNS = {
                " abstention; if `answer` is there too, both must say the same", axes=("answer",)),
     ),
 }  # fmt: skip
-NEEDED = {"row": "", "depth": "", "question": "", "answer": "this, or both; ",
-          "scores": "this, or both; "}  # fmt: skip
+NEEDED = {"row": "", "question": "", **dict.fromkeys(KINDS, f"one of {', '.join(KINDS)}; "),
+          "answer": "this, or both; ", "scores": "this, or both; "}  # fmt: skip
 SIZES = {"xyz": (3,), "answer": CANDIDATES}  # of axes that are alike in all files
 ID_NAMES = {"rooms": "row", "iqtt": "question"}
 
@@ -139,7 +155,8 @@ def describe_format() -> str:
 def _describe_attribute(attribute: Attribute) -> str:
     notes = "" if attribute.required else "optional; "
     only = f"{attribute.tasks[0]} only; " if len(attribute.tasks) == 1 else ""
-    choices = f": {', '.join(attribute.choices)}" if attribute.choices else ""
+    listed = attribute.choices and attribute.name != "alignment"  # whose choices go by kind
+    choices = f": {', '.join(attribute.choices)}" if listed else ""
     return f"  {attribute.name:<18} {notes}{only}{attribute.meaning}{choices}"
 
 
@@ -150,4 +167,4 @@ def _describe_column(column: Column) -> str:
     notes = NEEDED.get(column.name, "optional; ")
     rules = "; ".join(rule.expected for rule in RULES if column.name in rule.columns)
     indent = "\n            "
-    return f"  {column.name:<9} {what}{indent}{notes}{column.meaning}{indent}must be: {rules}"
+    return f"  {column.name:<13} {what}{indent}{notes}{column.meaning}{indent}must be: {rules}"

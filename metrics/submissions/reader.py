@@ -6,6 +6,7 @@ truth, except for the pixels, which are read one row at a time.
 
 import hashlib
 import os
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Self, cast
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.depth import Alignment
+from metrics.submissions import layout
 from metrics.submissions.inspection import Inspection, inspect
 from metrics.submissions.problems import Problem, first_error
 from metrics.submissions.rules import as_doubles
@@ -47,7 +49,7 @@ class Predictions:
         rows: (M,) int64: which row of the truth, or which question, each entry answers; every one
             at least 0 and there once.
         alignment: what the method says it cannot know: "none", "median_scale", "scale" or
-            "scale_shift", as in `metrics.measures.depth.align`; "none" for questions.
+            "scale_shift" (`layout.KINDS`); "none" for questions.
         identity: which file it was when it was opened, whatever has its path now.
     """
 
@@ -61,12 +63,18 @@ class Predictions:
         self.method, self.run = texts.get("method", ""), texts.get("run", "")
         self.notes, self.truth_path = texts.get("notes", ""), texts.get("truth_path", "")
         self.truth_fingerprint = texts.get("truth_fingerprint") or None
-        self.alignment = cast(Alignment, texts.get("alignment", "none"))
         self._arrays, self._file = content.arrays, file
+        allowed = layout.KINDS.get(self.kind, ("none",))
+        self.alignment = cast(Alignment, texts.get("alignment", allowed[0]))
         self.identity = _identity(path if file is None else file.id.get_vfd_handle())
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    @property
+    def kind(self) -> str:
+        """What is predicted: "depth", "disparity" or "points" of rooms; "answers" to questions."""
+        return next((kind for kind in layout.KINDS if kind in self._arrays), "answers")
 
     @cached_property
     def sha256(self) -> str:
@@ -102,31 +110,70 @@ class Predictions:
         self.close()
 
 
+@dataclass(frozen=True, eq=False)
+class PredictedView:
+    """What is predicted for one image.
+
+    Attributes:
+        kind: which of `layout.KINDS` the geometry is.
+        alignment: what the method cannot know, one of those that the kind allows.
+        geometry: planar depth or disparity (H, W), or points (H, W, 3), camera frame, as stored.
+        normal: (H, W, 3), camera frame, as stored; None where there are none.
+        fov_y_degrees: vertical field of view; None where the method does not estimate it.
+    """
+
+    kind: str
+    alignment: Alignment
+    geometry: Array
+    normal: Array | None = None
+    fov_y_degrees: float | None = None
+
+
 class RoomPredictions(Predictions):
-    """Predicted depth of rooms, and optionally normals."""
+    """Predicted depth, disparity or points of rooms, and optionally normals and field of view."""
 
     task = "rooms"
 
     @property
     def height(self) -> int:
         """Of an image, pixels."""
-        return int(self._arrays["depth"].shape[1])
+        return int(self._arrays[self.kind].shape[1])
 
     @property
     def width(self) -> int:
         """Of an image, pixels."""
-        return int(self._arrays["depth"].shape[2])
+        return int(self._arrays[self.kind].shape[2])
 
     @property
     def has_normals(self) -> bool:
         """Whether there are normals."""
         return "normal" in self._arrays
 
-    def depth(self, index: int) -> Array:
-        """Predicted planar depth (H, W) of entry `index`, scene units, camera frame, as stored.
+    def view(self, index: int) -> PredictedView:
+        """Everything that is predicted in entry `index`. Raises FileFormatError."""
+        normal = self.normal(index) if self.has_normals else None
+        fov = float(self._arrays["fov_y_degrees"][index]) if self.has_fov else None
+        return PredictedView(self.kind, self.alignment, self.geometry(index), normal, fov)
+
+    @property
+    def has_fov(self) -> bool:
+        """Whether fields of view are predicted."""
+        return "fov_y_degrees" in self._arrays
+
+    def geometry(self, index: int) -> Array:
+        """Depth or disparity (H, W), or points (H, W, 3), of entry `index`, as stored.
 
         Values need not be finite. Raises FileFormatError where they are damaged.
         """
+        return self._read(self.kind, index)
+
+    def depth(self, index: int) -> Array:
+        """Planar depth (H, W) of entry `index`, scene units, camera frame: as stored, or of points.
+
+        Values need not be finite. Raises FileFormatError where they are damaged, or disparity.
+        """
+        if self.kind == "points":
+            return -self.geometry(index)[..., 2]
         return self._read("depth", index)
 
     def normal(self, index: int) -> Array:
@@ -134,11 +181,11 @@ class RoomPredictions(Predictions):
 
         Raises FileFormatError where there are none, or they are damaged.
         """
-        if not self.has_normals:
-            raise FileFormatError(f"{self.path}: normal", "none")
         return self._read("normal", index)
 
     def _read(self, name: str, index: int) -> Array:
+        if name not in self._arrays:
+            raise FileFormatError(f"{self.path}: {name}", "none")
         with reading(f"{self.path}: {name}, row {self.rows[index]}"):
             return as_doubles(self._arrays[name][index])
 
@@ -219,7 +266,7 @@ def inspect_predictions(
         with checking(file):
             content = inspect(file)
     opened: RoomPredictions | QuestionPredictions | None = None
-    if content.ids is not None and "depth" in content.arrays:
+    if content.ids is not None and layout.KINDS.keys() & content.arrays.keys():
         opened = RoomPredictions(path, content, file)
     elif content.ids is not None and content.answers is not None:
         opened = QuestionPredictions(path, content, file)

@@ -106,16 +106,20 @@ RULES = (
     Rule(IDS, "unique", "each once", "given more than once", lambda ids, _: _repeated(ids)),
     Rule(IDS, "known", "rows of the truth", "that the truth does not have", _unknown),
     Rule(
-        ("depth",), "finite", f"finite numbers {SURFACE}", "NaN, infinite or huge",
-        lambda depth, against: _on_surface(~_finite(depth), against),
+        ("depth", "disparity"), "finite", f"finite numbers {SURFACE}", "NaN, infinite or huge",
+        lambda values, against: _on_surface(~_finite(values), against),
     ),
     Rule(
-        ("normal",), "finite", f"finite numbers {SURFACE}", "NaN, infinite or huge",
-        lambda normal, against: _on_surface(~_finite(normal).all(axis=-1), against),
+        ("points", "normal"), "finite", f"finite numbers {SURFACE}", "NaN, infinite or huge",
+        lambda vectors, against: _on_surface(~_finite(vectors).all(axis=-1), against),
     ),
     Rule(
         ("normal",), "length", f"normals of a length above 0 {SURFACE}", "of length 0",
         lambda normal, against: _on_surface(~normal.any(axis=-1), against),
+    ),
+    Rule(
+        ("fov_y_degrees",), "range", "degrees between 0 and 180", "outside of that",
+        lambda degrees, _: ~((degrees > 0.0) & (degrees < 180.0)),
     ),
     Rule(
         ("answer",), "range", "the number of an answer from 0, or -1", "that are no answer",

@@ -111,7 +111,9 @@ def match_problems(
         height, width = truth.spec.height, truth.spec.width
         if (predictions.height, predictions.width) != (height, width):
             found = f"images of {predictions.height}x{predictions.width}"
-            problems.append(Problem("depth", "shape", f"{height}x{width}, as the truth", found))
+            problems.append(
+                Problem(predictions.kind, "shape", f"{height}x{width}, as the truth", found)
+            )
     name, rows = ID_NAMES[predictions.task], predictions.rows
     problems += [
         problem

@@ -105,7 +105,7 @@ def _row_problems(
 ) -> Iterator[tuple[Problem, int]]:
     """Yield what is wrong with the values of a row, and at how many pixels."""
     surface = read_true_view(truth, row).mask
-    readers = {"depth": predictions.depth}
+    readers = {predictions.kind: predictions.geometry}
     if predictions.has_normals:
         readers["normal"] = predictions.normal
     for name, read in readers.items():

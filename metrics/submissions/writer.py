@@ -26,7 +26,7 @@ from scenegen.rooms.reader import RoomsFile
 
 
 class RoomPredictionWriter:
-    """Writes predicted depth, and optionally normals, of the rooms of a file; a context manager.
+    """Writes predicted geometry, and optionally normals, of the rooms of a file; a context manager.
 
     The file appears under its name when the block ends without an error and every row was given.
     Memory stays flat. Not to be shared between threads.
@@ -39,7 +39,7 @@ class RoomPredictionWriter:
         *,
         method: str,
         run: str = "",
-        alignment: Alignment = "none",
+        alignment: Alignment | None = None,
         notes: str = "",
         overwrite: bool = False,
         allow_partial: bool = False,
@@ -49,19 +49,22 @@ class RoomPredictionWriter:
         Args:
             truth: the rooms file that is predicted, recorded as given.
             method, run: who predicts; runs of one method are averaged.
-            alignment: what the method cannot know, as in `metrics.measures.depth.align`.
+            alignment: what the method cannot know: "none", "median_scale", "scale" or
+                "scale_shift"; None for "none", or "scale_shift" of disparity.
             allow_partial: whether rows may be missing; scores of such a file are not comparable.
 
         Raises PredictionError where a text does not suit; when the block begins also OSError for
         either path, and FileFormatError for the truth.
         """
-        texts = {"method": method, "run": run, "alignment": alignment, "notes": notes}
-        self._texts = _checked_texts("rooms", {**texts, "truth_path": str(truth)})
+        texts: dict[str, Any] = {"method": method, "run": run, "notes": notes}
+        texts |= {} if alignment is None else {"alignment": alignment}
+        self._given = _checked_texts("rooms", {**texts, "truth_path": str(truth)})
         _check_elsewhere(path, truth)
         self._path, self._truth_path = Path(path), Path(truth)
         self._overwrite, self._allow_partial = overwrite, allow_partial
         self._context: AbstractContextManager[None] | None = None
         self._table: Table | None = None
+        self._names: list[str] = []  # of what is written, as in the first row
 
     def __enter__(self) -> Self:
         self._context = self._opened()
@@ -73,14 +76,30 @@ class RoomPredictionWriter:
         assert context is not None, "a block ends after it began"
         context.__exit__(*error)
 
-    def add(self, row: int, depth: ArrayLike, normal: ArrayLike | None = None) -> None:
+    def add(
+        self,
+        row: int,
+        depth: ArrayLike | None = None,
+        normal: ArrayLike | None = None,
+        *,
+        disparity: ArrayLike | None = None,
+        points: ArrayLike | None = None,
+        fov_y_degrees: float | None = None,
+    ) -> None:
         """Write the prediction for one row of the truth; rows may come in any order.
+
+        One of depth, disparity and points is given, the same for all rows; arrays may be tensors
+        of torch.
 
         Args:
             row: of the truth file.
             depth: (H, W) floats: planar depth, scene units, camera frame.
             normal: (H, W, 3) floats: camera frame, facing the viewer, of any length but 0. For
                 all rows or for none.
+            disparity: (H, W) floats: 1 / planar depth, up to a scale above 0 and a shift.
+            points: (H, W, 3) floats: camera frame (x right, y up, z towards the viewer), scene
+                units.
+            fov_y_degrees: vertical field of view that the method estimates. For all rows or none.
 
         Raises PredictionError, naming the row, what was found and what was expected.
         """
@@ -90,26 +109,48 @@ class RoomPredictionWriter:
         where = f"{self._path}: row {row}"
         surface = np.isfinite(self._truth.read("depth", row))
         sizes = dict(zip(("y", "x"), ((size,) for size in surface.shape), strict=True))
+        images = {"depth": depth, "disparity": disparity, "points": points, "normal": normal}
         values = {}
-        for column in layout.COLUMNS["rooms"][1:]:
-            image = depth if column.name == "depth" else normal
+        for column in layout.COLUMNS["rooms"]:
+            image = images.get(column.name)
             if image is not None:
                 place = f"{where}: {column.name}"
-                array = _checked(column, [_array(image, place)], where, 1, sizes)[0]
+                array = _checked(column, [as_array(image, place)], where, 1, sizes)[0]
                 rules.refuse_pixels(PredictionError, place, column.name, array, surface)
                 values[column.name] = array
-        if self._texts["alignment"] != "scale_shift" and rules.faces_away(values["depth"], surface):
-            expected = "planar depth, which is positive in front of the camera"
-            raise PredictionError(f"{where}: depth", "most of it at or below 0", expected)
+        self._check_kind(values, where, surface)
+        if fov_y_degrees is not None:
+            values["fov_y_degrees"] = _checked_fov(fov_y_degrees, where)
         if self._table is None:
             self._table = self._new_table(values)
-        names = [column.name for column in self._table.columns]
-        if names != list(values):
-            found, expected = ("none", "one") if "normal" in names else ("one", "none")
-            raise PredictionError(f"{where}: normal", found, f"{expected}, as in the first row")
+            self._names = list(values)
+        for name in sorted(set(self._names) ^ set(values)):
+            found, expected = ("one", "none") if name in values else ("none", "one")
+            raise PredictionError(f"{where}: {name}", found, f"{expected}, as in the first row")
+        self._fov.append(values.pop("fov_y_degrees", np.array(np.nan)))
         self._table.append(values)
         self._rows.append(row)
         self._written[row] = True
+
+    def _check_kind(self, values: Mapping[str, rules.Array], where: str, surface: Any) -> None:
+        """Raise PredictionError unless there is one geometry, as the alignment allows."""
+        kinds = [kind for kind in layout.KINDS if kind in values]
+        if len(kinds) != 1:
+            expected = f"one of {', '.join(layout.KINDS)}"
+            raise PredictionError(f"{where}: geometry", " and ".join(kinds) or "none", expected)
+        kind, allowed = kinds[0], layout.KINDS[kinds[0]]
+        alignment = self._texts.setdefault("alignment", allowed[0])
+        if alignment not in allowed:
+            expected = f"{' or '.join(allowed)}, for {kind}"
+            raise PredictionError(f"{where}: alignment", repr(alignment), expected)
+        if kind == "disparity" or alignment == "scale_shift":
+            return
+        depth = values["depth"] if kind == "depth" else -values["points"][..., 2]
+        if rules.faces_away(depth, surface):
+            expected = "planar depth, which is positive in front of the camera"
+            if kind == "points":
+                expected = "points whose depth, -z, is positive in front of the camera"
+            raise PredictionError(f"{where}: {kind}", "most of it at or below 0", expected)
 
     @contextmanager
     def _opened(self) -> Iterator[None]:
@@ -119,7 +160,10 @@ class RoomPredictionWriter:
         ):
             self._written = np.zeros(len(self._truth), np.bool_)
             self._rows: list[int] = []
+            self._fov: list[rules.Array] = []
+            self._names = []
             self._table = None
+            self._texts = dict(self._given)
             yield
             self._finish(self._file)
 
@@ -128,7 +172,7 @@ class RoomPredictionWriter:
             # Without axes, which would be data sets of their own: readers go by the shape.
             replace(column, shape=values[column.name].shape, axes=None, more=_shape(column))
             for column in layout.COLUMNS["rooms"]
-            if column.name in values
+            if column.name in values and column.own_chunk
         ]
         return Table(self._file, columns, len(self._written))
 
@@ -157,7 +201,8 @@ class RoomPredictionWriter:
         for column in self._table.columns if len(missing) else ():
             file[column.name].resize(len(self._rows), axis=0)
         file.attrs.update({**self._texts, "truth_fingerprint": self._truth.fingerprint})
-        _write_columns(file, "rooms", {"row": np.array(self._rows)})
+        fov = {"fov_y_degrees": np.array(self._fov)} if "fov_y_degrees" in self._names else {}
+        _write_columns(file, "rooms", {"row": np.array(self._rows), **fov})
 
 
 def write_answers(
@@ -195,7 +240,7 @@ def write_answers(
         raise PredictionError(questions_file, "no questions", "at least one")
     if answer is None and scores is None:
         raise PredictionError(path, "neither answer nor scores", "either")
-    ids = np.arange(count) if rows is None else _array(rows, f"{path}: rows")
+    ids = np.arange(count) if rows is None else as_array(rows, f"{path}: rows")
     arrays = {"question": ids, "answer": answer, "scores": scores}
     values: dict[str, rules.Array] = {}
     for column in layout.COLUMNS["iqtt"]:
@@ -247,10 +292,21 @@ def _checked_texts(task: str, texts: Mapping[str, str]) -> dict[str, str]:
     return texts
 
 
-def _array(values: ArrayLike, where: str) -> rules.Array:
+def _checked_fov(degrees: Any, where: str) -> rules.Array:
+    """Return a vertical field of view, (). Raises PredictionError."""
+    value = as_array(degrees, f"{where}: fov_y_degrees")
+    if value.shape != () or value.dtype.kind not in "fiu" or not 0.0 < float(value) < 180.0:
+        expected = "a number of degrees between 0 and 180"
+        raise PredictionError(f"{where}: fov_y_degrees", f"{degrees!r:.60}", expected)
+    return value.astype(np.float64)
+
+
+def as_array(values: Any, where: str) -> rules.Array:
     """Return values as an array; masked floats become NaN, which counts as missing.
 
-    Raises PredictionError for what is no array, and for masked integers.
+    Tensors of torch, on any device and with gradients, are taken without importing torch; the
+    bfloat16 that NumPy lacks becomes float32. Raises PredictionError for what is no array, and for
+    masked integers.
     """
     if isinstance(values, np.ma.MaskedArray):
         masked = int(np.ma.getmaskarray(values).sum())
@@ -259,6 +315,9 @@ def _array(values: ArrayLike, where: str) -> rules.Array:
             raise PredictionError(where, f"{masked} masked values", expected)
         return np.asarray(values.filled(np.nan) if masked else values)
     try:
+        if hasattr(values, "detach"):
+            values = values.detach().cpu()
+            values = values.float() if str(values.dtype).endswith("bfloat16") else values
         return np.asarray(values)
     except Exception as error:
         found = f"{type(values).__name__}, which is no array ({error!s:.80})"
@@ -273,7 +332,7 @@ def _checked(
     sizes: Mapping[str, tuple[int, ...]],
 ) -> rules.Array:
     """Return the values of a column as they are stored. Raises PredictionError."""
-    array = _array(values, f"{where}: {column.name}")
+    array = as_array(values, f"{where}: {column.name}")
     problem = rules.array_problem(column, array, count, {**layout.SIZES, **sizes})
     if problem is not None:
         raise first_error(PredictionError, where, [problem])

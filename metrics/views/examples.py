@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.answers import ABSTAINED
+from metrics.scoring.geometry import planar_depth
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
 from metrics.submissions.reader import QuestionPredictions, RoomPredictions, open_predictions
@@ -147,10 +148,11 @@ def room_pictures(
     rooms: RoomsFile, predictions: RoomPredictions, row: int, place: int
 ) -> list[Picture]:
     """Return the pictures of a row; `place` is that of its prediction."""
+    true_depth = rooms.read("depth", row)
     urls = view_pictures(
         decode_image(rooms.read("image", row)),
-        rooms.read("depth", row),
-        predictions.depth(place),
+        true_depth,
+        planar_depth(predictions.view(place), true_depth)[0],
         rooms.read("normal", row),
         float(rooms.read("camera/fov_y_degrees", row)),
         predictions.normal(place) if predictions.has_normals else None,

@@ -26,7 +26,7 @@ PICTURES = (255.0, 65535.0)  # largest values of pictures of 8 and 16 bits
 UNITS = {1000.0: "millimetres for metres", 100.0: "centimetres for metres"}
 
 
-def depth_hints(samples: Sequence[Sample], alignment: str) -> list[Problem]:
+def depth_hints(samples: Sequence[Sample], alignment: str, kind: str = "depth") -> list[Problem]:
     """Return hints on depth from sampled images; `alignment` is what the submission claims."""
     with np.errstate(all="ignore"):  # whatever comes out not finite satisfies no rule
         usable = [_Image.of(sample) for sample in samples]
@@ -36,7 +36,17 @@ def depth_hints(samples: Sequence[Sample], alignment: str) -> list[Problem]:
         shape = _swapped(images) or _shape(images) or _along_rays(images)
         found = [shape, _scale(images, alignment)]
     expected = "planar depth, -z in the camera frame, scene units, row 0 on top"
-    return [Problem("depth", HINT, expected, text) for text in found if text]
+    return [Problem(kind, HINT, expected, text) for text in found if text]
+
+
+def disparity_hints(samples: Sequence[Sample]) -> list[Problem]:
+    """Return a hint where declared disparity follows the true depth, and not its inverse."""
+    with np.errstate(all="ignore"):
+        images = [image for sample in samples if (image := _Image.of(sample)) is not None]
+        if not images or np.mean([i.correlation(i.true) >= SWAPPED for i in images]) < SHARE:
+            return []
+    found = "looks like depth: large where the truth is far"
+    return [Problem("disparity", HINT, "1 / depth, large where the surface is near", found)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """Hints on a submission of rooms: depth, normals, and the order of rows."""
 
-from metrics.submissions.hints.depth import depth_hints
+from metrics.submissions.hints.depth import depth_hints, disparity_hints
 from metrics.submissions.hints.normals import normal_hints
 from metrics.submissions.hints.order import order_hints
 from metrics.submissions.hints.samples import sample_rooms
@@ -17,7 +17,10 @@ def room_hints(predictions: RoomPredictions, truth: RoomsFile) -> list[Problem]:
     where the truth is damaged.
     """
     samples = sample_rooms(predictions, truth)
-    hints = depth_hints(samples, predictions.alignment)
+    if predictions.kind == "disparity":
+        hints = disparity_hints(samples)
+    else:
+        hints = depth_hints(samples, predictions.alignment, predictions.kind)
     if predictions.has_normals:
         hints += normal_hints(samples)
     return hints + order_hints(predictions, truth)

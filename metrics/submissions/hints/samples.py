@@ -22,7 +22,7 @@ class Sample:
     """Predicted and true pixels of one image, on a grid that is its own mirror image.
 
     Attributes:
-        depth: predicted planar depth, (h, w).
+        depth: predicted planar depth, (h, w), or disparity.
         true_depth: scene units, (h, w).
         mask: where both are finite, (h, w).
         stretch: length of the ray at depth 1: distance along the ray is depth times this, (h, w).
@@ -61,7 +61,8 @@ def mirrored_grid(count: int, about: int) -> Array:
 def _sample(predictions: RoomPredictions, i: int, truth: RoomsFile) -> Sample | None:
     row = int(predictions.rows[i])
     try:
-        depth = predictions.depth(i)
+        disparity = predictions.kind == "disparity"
+        depth = predictions.geometry(i) if disparity else predictions.depth(i)
         normal = predictions.normal(i) if predictions.has_normals else None
     except FileFormatError:
         return None
