@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from metrics.measures.checks import as_float64, require, require_finite, require_some
-from metrics.measures.statistics import RESAMPLES, bca_ends, normal_quantile, resampled_means
+from metrics.measures.statistics import RESAMPLES, resampled_means, studentised_ends
 
 Array = NDArray[Any]
 
@@ -35,13 +35,13 @@ def skill_intervals(
     resamples: int = RESAMPLES,
     confidence: float = 0.95,
 ) -> tuple[Array, Array]:
-    """Return BCa intervals, low (K,) and high (K,), of 1 - mean(scores) / mean(floors).
+    """Return intervals, low (K,) and high (K,), of 1 - mean(scores) / mean(floors).
 
     Of scores of which 1 is perfect, give what they lack: 1 - score.
 
-    They are paired: each resample draws clusters with all of their values. The acceleration comes
-    from the ratio's empirical influence values (Efron and Tibshirani 1993, equation 22.28). Both
-    ends are NaN for a single cluster, and where a resample has floors of 0 only. The K skills share
+    They are those of the studentised bootstrap, as `statistics.bootstrap_interval` has it, and
+    paired: each resample draws clusters with all of their values. The standard error comes from the
+    ratio's empirical influence values (Davison and Hinkley 1997, section 2.7.2). Both ends are NaN for a single cluster, and where a resample has floors of 0 only. The K skills share
     their resamples, which take most of the time.
 
     Args:
@@ -61,11 +61,17 @@ def skill_intervals(
     apart = errors - score / floor * lines
     # Of scores that are all the same multiple of the floor, such as the floor itself, exactly 0.
     apart[np.abs(apart) <= 1e-15 * np.abs(errors)] = 0.0
-    means = resampled_means(np.concatenate([apart, lines], axis=-1), seed, resamples)
-    gains, bases = np.split(means, 2, axis=-1)
-    z, ends = normal_quantile(confidence), np.full((2, len(score)), np.nan)
-    for k in np.flatnonzero((bases > 0.0).all(axis=0)):
-        low, high = bca_ends(apart[:, k] / floor[k], gains[:, k] / bases[:, k], z)
-        value = (floor[k] - score[k]) / floor[k]
-        ends[:, k] = value - max(high, 0.0), value - min(low, 0.0)
+    apart, lines = apart / floor, lines / floor
+    products = [apart, lines, apart * apart, apart * lines, lines * lines]
+    means = resampled_means(np.concatenate(products, axis=-1), seed, resamples)
+    moved, base, *squares = np.split(means, len(products), axis=-1)
+    ends = np.full((2, len(score)), np.nan)
+    k = (base > 0.0).all(axis=0)
+    moved, base, squares = moved[:, k], base[:, k], [square[:, k] for square in squares]
+    ratio = moved / base
+    variances = (squares[0] - 2.0 * ratio * squares[1] + ratio * ratio * squares[2]) / base**2
+    low, high = studentised_ends(apart[:, k], ratio, variances, confidence)
+    value = ((floor - score) / floor)[k]
+    # Of 1 minus the ratio, what lies above is below.
+    ends[:, k] = value - np.maximum(high, 0.0), value - np.minimum(low, 0.0)
     return ends[0], ends[1]

@@ -108,14 +108,21 @@ def _joined(parts: Sequence[ScoredRows]) -> ScoredRows:
 def other_scenes(scene_index: Array, view_index: Array) -> Array:
     """Return for each of N rows, (N,) each, one of another scene, as indices (N,).
 
-    It is the next scene's in the same view; each row is that of exactly one other. A constant
-    prediction therefore scores equally against its own and the other scene, on average. If pairing
-    is impossible, as there is one scene only, or views are very uneven, each row is paired with
+    It is the next scene's in the same view, and the first one's for the last scene; each row is
+    that of exactly one other. A constant prediction therefore scores equally against its own and
+    the other scene, on average. Rows whose view is in no other scene are paired with each other. If
+    a row would be paired with its own scene, as there is one scene only, each row is paired with
     itself.
     """
-    order = np.lexsort((scene_index, view_index))
+    views, index, rows_of = np.unique(view_index, return_inverse=True, return_counts=True)
+    group = np.where(rows_of[index] > 1, index, len(views))
+    order = np.lexsort((scene_index, group))
+    first = np.diff(group[order], prepend=-1) != 0
+    last = np.append(first[1:], True)
+    after = np.roll(order, -1)
+    after[last] = order[first]
     partner = np.empty_like(order)
-    partner[order] = np.roll(order, -1)
+    partner[order] = after
     same = scene_index[partner] == scene_index
     return np.arange(len(partner)) if same.any() else partner
 

@@ -15,6 +15,7 @@ from metrics.views.score_tables import (
     GROUP_TITLES,
     INTERVAL,
     SKILL,
+    few_clusters,
     floor_cell,
     floor_text,
     interval_cells,
@@ -84,6 +85,7 @@ def headline_section(files: Sequence[ScoreFile]) -> Section:
         f"[low, high]: {INTERVAL} over {over}. On its scale: the dot is this method with its"
         " interval, the solid line its floor, and dashed lines are the methods beside it.",
         PAPER_NOTE,
+        *(f"Warning: {text}." for text in few_clusters(scores)),
     ]
     return Section("", tables=[table], notes=notes)
 

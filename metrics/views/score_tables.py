@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from metrics.measures.statistics import FEW_CLUSTERS
 from metrics.scoring.estimates import CONFIDENCE, question_skill
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import (
@@ -202,7 +203,7 @@ def title_of(scores: ScoreFile) -> str:
 def notes_of(scores: ScoreFile) -> Iterator[str]:
     """Yield what has to be known to read the tables, and where the scores come from."""
     meta = scores.meta
-    for warning in scores.warnings:
+    for warning in (*scores.warnings, *few_clusters(scores)):
         yield f"warning: {warning}"
     if scores.skills:
         yield f"{SKILL} {what_the_floor_is(scores)}"
@@ -237,6 +238,23 @@ def notes_of(scores: ScoreFile) -> Iterator[str]:
     )
     runs = ", ".join(f"{run.path} {run.sha256[:12]}" for run in meta.submissions)
     yield f"submissions: {plain(runs)}"
+
+
+def few_clusters(scores: ScoreFile) -> list[str]:
+    """Return a warning where bootstrapped intervals rest on too few scenes or shapes; else none."""
+    labels = scores.clusters if scores.task == "rooms" else scores.items.get("shape", scores.ids)
+    units = "scenes" if scores.task == "rooms" else "shapes"
+    return too_few(len(np.unique(labels)), units) if scores.meta.resamples else []
+
+
+def too_few(count: int, units: str) -> list[str]:
+    """Return a warning where so many scenes or shapes do not suffice for intervals; else none."""
+    if not 1 < count < FEW_CLUSTERS:
+        return []
+    return [
+        f"{count} {units} are too few for intervals at {CONFIDENCE:.0%}, which then hold the truth"
+        f" less often; take at least {FEW_CLUSTERS}"
+    ]
 
 
 def what_the_floor_is(scores: ScoreFile) -> str:

@@ -33,6 +33,7 @@ from metrics.views.page import Lead, Section, html_page
 from metrics.views.pictures import DEPTH, ERROR
 from metrics.views.plots import Point, strip
 from metrics.views.report import ROOMS_REMARK, curves_section
+from metrics.views.score_tables import too_few
 from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import number
@@ -148,6 +149,7 @@ def _legend(comparison: Comparison) -> list[str]:
         f"better/worse/same: {items}. p: {test}, two-sided; Holm: corrected for {comparisons}.",
         f"least shown: what this test set would show in {POWER:.0%} of cases after the correction,"
         " as the differences spread here; none: no difference, or none can be told.",
+        *(f"warning: {text}" for text in (too_few(comparison.clusters, "scenes") if rooms else ())),
     ]
 
 

@@ -38,7 +38,13 @@ from metrics.views.leaderboard.rows import (
     skill_column,
 )
 from metrics.views.paper import PAPER_KIND, TABLES, Figure
-from metrics.views.score_tables import INTERVAL, SKILL, labels_of, what_the_floor_is
+from metrics.views.score_tables import (
+    INTERVAL,
+    SKILL,
+    few_clusters,
+    labels_of,
+    what_the_floor_is,
+)
 from metrics.views.table import Table
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import by_number, plain
@@ -370,6 +376,7 @@ def _notes(files: Sequence[ScoreFile]) -> Iterator[str]:
         " ±: standard deviation over training runs. Best in bold, which is no test of a difference:"
         " see bench compare."
     )
+    yield from (f"Warning: {text}." for text in few_clusters(first))
     if first.meta.noise_floors:
         yield (
             "Noise floor: the score of the true surface, sampled elsewhere, against itself. Floors"

@@ -49,6 +49,23 @@ def test_the_interval_is_about_that_of_plain_percentiles():
     assert skill_interval(scores, FLOORS, 1) != (low, high)
 
 
+def test_the_interval_is_that_of_a_plain_loop():
+    scores = FLOORS * RNG.uniform(0.0, 1.9, 60)
+    ratio = scores.sum() / FLOORS.sum()
+
+    def spread(score, floor, about):
+        return np.std(score - about * floor) / floor.mean()
+
+    scaled = []
+    for d in np.random.default_rng(2).integers(0, 60, (500, 60)):
+        mine = scores[d].sum() / FLOORS[d].sum()
+        scaled.append((mine - ratio) / spread(scores[d], FLOORS[d], mine))
+    error = spread(scores, FLOORS, ratio)
+    low, high = 1.0 - ratio + error * np.quantile(scaled, [0.025, 0.975])
+    found = skill_intervals(scores[:, None], FLOORS[:, None], 2, 500)
+    assert (found[0].item(), found[1].item()) == pytest.approx((low, high))
+
+
 def test_skills_that_share_their_resamples_have_the_intervals_of_each_alone():
     scores = np.stack([FLOORS * RNG.uniform(0.3, 0.9, 60), FLOORS, np.zeros(60)], axis=-1)
     floors = np.stack([FLOORS, FLOORS, np.eye(60)[0]], axis=-1)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from scipy.stats import binomtest, bootstrap
+from scipy.stats import binomtest
 
 from metrics.measures import statistics
 from metrics.measures.statistics import (
@@ -49,11 +49,17 @@ def test_bootstrap_covers(name):
     assert bootstrap_coverage(name, 200, 400, 500, 1) == pytest.approx(0.95, abs=0.033)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scenes", [200, 500])
 @pytest.mark.parametrize("name", SKEWED)
-def test_bootstrap_covers_93_to_97_percent(name, scenes):
-    assert 0.93 <= bootstrap_coverage(name, scenes, 4000, 1000, 2) <= 0.97
+def test_few_scenes_are_enough_from_the_stated_number_on(name):
+    """BCa percentiles cover 88 to 92% here."""
+    assert bootstrap_coverage(name, statistics.FEW_CLUSTERS, 400, 500, 4) >= 0.91
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scenes", "least"), [(30, 0.92), (40, 0.925), (200, 0.93), (500, 0.93)])
+@pytest.mark.parametrize("name", SKEWED)
+def test_bootstrap_covers_92_to_97_percent(name, scenes, least):
+    assert least <= bootstrap_coverage(name, scenes, 4000, 1000, 2) <= 0.97
 
 
 @given(st.integers(1, 10**6), st.floats(0.0, 1.0), st.sampled_from([0.5, 0.9, 0.95, 0.999]))
@@ -114,13 +120,21 @@ def test_clusters_never_shorten_an_interval(seed, clusters):
     assert linearised_means(values, np.arange(len(values)))[:, 0].tolist() == values.tolist()
 
 
-def test_bca_agrees_with_scipy():
-    values = np.random.default_rng(3).lognormal(0.0, 1.0, (150, 1))
-    low, high = bootstrap_interval(values, seed=0, resamples=20000)
-    ours = np.array([low[0], high[0]])
-    scipys = bootstrap((values[:, 0],), np.mean, n_resamples=20000, method="BCa", rng=1)
-    expected = np.array(scipys.confidence_interval)
-    assert ours == pytest.approx(expected, abs=0.03 * float(np.ptp(expected)))
+@pytest.mark.parametrize("rare", [False, True])
+def test_the_studentised_interval_is_that_of_a_plain_loop(rare):
+    values = np.random.default_rng(3).lognormal(0.0, 1.0, 25)
+    if rare:  # resamples without the one that differs have no variance of their own
+        values = np.where(np.arange(25) == 7, 1.0, 0.0)
+    error = values.std()
+    drawn = np.random.default_rng(5).integers(0, 25, (400, 25))
+    scaled = [
+        (values[d].mean() - values.mean()) / max(values[d].std(), np.sqrt(0.1) * error)
+        for d in drawn
+    ]
+    low, high = values.mean() - error * np.quantile(scaled, [0.975, 0.025])
+    ends = bootstrap_interval(values[:, None], 5, 400)
+    expected = (max(low, values.min()), min(high, values.max()))
+    assert (ends[0].item(), ends[1].item()) == pytest.approx(expected)
 
 
 def test_means_of_scenes_then_of_all():
