@@ -41,8 +41,9 @@ def skill_intervals(
 
     They are those of the studentised bootstrap, as `statistics.bootstrap_interval` has it, and
     paired: each resample draws clusters with all of their values. The standard error comes from the
-    ratio's empirical influence values (Davison and Hinkley 1997, section 2.7.2). Both ends are NaN for a single cluster, and where a resample has floors of 0 only. The K skills share
-    their resamples, which take most of the time.
+    ratio's empirical influence values (Davison and Hinkley 1997, section 2.7.2). Both ends are NaN
+    for a single cluster, and where a resample has floors of 0 only. The K skills share their
+    resamples.
 
     Args:
         scores, floors: means of S clusters, (S, K) each, at least 0, lower is better.
