@@ -12,7 +12,12 @@ QUESTIONS = (
     "metrics.commands.people",
 )
 
-SCORES = ("metrics.commands.submissions", "metrics.commands.standings", "baselines.commands")
+SCORES = (
+    "metrics.commands.submissions",
+    "metrics.commands.intake",
+    "metrics.commands.standings",
+    "baselines.commands",
+)
 
 
 @click.group(cls=PackageCommands, modules=ROOMS)

@@ -1,0 +1,142 @@
+"""The `bench` commands that make submissions: from folders of files, and from a model."""
+
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import click
+
+from scenegen.command_line.groups import EXAMPLE
+from scenegen.command_line.options import OVERWRITE
+from scenegen.command_line.output import print_line, progress_bar
+from scenegen.command_line.paths import InputPath, OutputPath
+
+
+class Factor(click.ParamType):  # type: ignore[type-arg]
+    """`0.001` or `1/256`, as a float."""
+
+    name = "NUMBER or N/M"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse a text."""
+        try:
+            return float(Fraction(value)) if isinstance(value, str) else value
+        except (ValueError, ZeroDivisionError, OverflowError):
+            self.fail(f"found {value!r:.40}, expected a number such as 0.001 or 1/256", param, ctx)
+
+
+ALIGNMENTS = ("none", "median_scale", "scale", "scale_shift")
+DATA = click.option(
+    "--data", "truth", type=InputPath(), required=True, metavar="ROOMS.h5",
+    help="The file of rooms or questions that is predicted.",
+)  # fmt: skip
+OUT = click.option(
+    "--out", type=OutputPath(), required=True, metavar="PREDICTIONS.h5", help="File to write."
+)
+METHOD = click.option("--method", help="Name of the method in tables [default: taken from files].")
+RUN = click.option("--run", "run_name", default="", help="Which training run, such as its seed.")
+NOTES = click.option("--notes", default="", help="A note to keep in the file.")
+FRAME = click.option(
+    "--frame", type=click.Choice(["opencv", "opengl"]), default="opencv", show_default=True,
+    help="Axes of points and normals: x right, y down, z forward; or y up, z towards the viewer.",
+)  # fmt: skip
+MISSING = click.option(
+    "--missing", type=click.Choice(["refuse", "nearest"]), default="refuse", show_default=True,
+    help="Pixels without a value: refuse them, or fill them from the nearest pixel that has one.",
+)  # fmt: skip
+
+
+# fmt: off
+@click.command("import", epilog=f"{EXAMPLE}bench import --depth 'out/*.png' --unit mm"
+                                " --data rooms.h5 --out mine.h5")
+@click.option("--depth", "pattern", metavar="FILES",
+              help="A folder, a pattern in quotes such as 'out/*.png', or one NPY or NPZ file with"
+              " an image for each row. PNG, TIFF, EXR, PFM, NPY and NPZ are read.")
+@click.option("--kind", type=click.Choice(["depth", "disparity", "distance", "points"]),
+              default="depth", show_default=True,
+              help="What the numbers are: planar depth, disparity (large where near), distance"
+              " along the ray, or points x, y, z.")
+@click.option("--unit", type=click.Choice(["m", "cm", "mm"]),
+              help="Unit of the numbers; the edge of the room is 1 m.")
+@click.option("--scale", type=Factor(), help="Scene units for each step, such as 1/256.")
+@click.option("--alignment", type=click.Choice(ALIGNMENTS),
+              help="What the method cannot know [default: none; scale_shift of disparity]."
+              " Disparity with none or scale is 1 / depth.")
+@click.option("--invalid", type=float, multiple=True,
+              help="Stored number that stands for no value, such as 0; may be repeated.")
+@MISSING
+@click.option("--normals", metavar="FILES", help="Normals, as --depth; whole numbers are -1 to 1.")
+@FRAME
+@click.option("--array", help="Name of the array in NPZ, or of the channel in EXR files.")
+@click.option("--match", type=click.Choice(["number", "name"]), default="number",
+              show_default=True, help="How files belong to rows: by the number in their names, or"
+              " in the order of their names.")
+@click.option("--answers", type=InputPath(), metavar="ANSWERS",
+              help="Answers to questions instead: .csv, .json or .jsonl.")
+@DATA
+@OUT
+@METHOD
+@RUN
+@NOTES
+@OVERWRITE
+def import_(
+    pattern: str | None, kind: Any, unit: str | None, scale: float | None,
+    alignment: Any, invalid: tuple[float, ...], missing: Any, normals: str | None, frame: Any,
+    array: str | None, match: Any, answers: str | None, truth: str, out: str, method: str | None,
+    run_name: str, notes: str, overwrite: bool,
+) -> None:
+    """Make a submission of predictions that lie in files.
+
+    Files belong to rows by the number in their names. A missing, extra or doubled file is an error.
+    Images of another size are resampled to that of the truth.
+    """
+    from metrics.intake.importing import UNITS, Reading, import_rooms
+    from scenegen.files.new_file import check_writable
+
+    texts: dict[str, Any] = {"run": run_name, "notes": notes, "overwrite": overwrite}
+    check_writable(Path(out), overwrite)
+    if (pattern is None) == (answers is None):
+        raise click.UsageError("give --depth for rooms, or --answers for questions")
+    if answers is not None:
+        from metrics.intake.answer_files import import_answers
+
+        count = import_answers(answers, truth, out, method=method or Path(answers).stem, **texts)
+        print_line(f"{out}: answers to {count} questions")
+        return
+    assert pattern is not None
+    if unit and scale:
+        raise click.UsageError("give --unit or --scale, not both")
+    factor = scale if scale is not None else UNITS[unit or "m"]
+    reading = Reading(kind, factor, alignment, invalid, frame, missing, array, match)
+    with progress_bar(None, "image") as bar:
+        how = import_rooms(
+            pattern, truth, out, method=method or _name_of(pattern), reading=reading,
+            normals=normals, progress=bar.update, **texts,
+        )
+    print_line(f"{out}: {how}")
+    _print_hints(out, truth)
+
+
+# fmt: on
+def _name_of(pattern: str) -> str:
+    """Return the name of the folder that files lie in, for tables."""
+    path = Path(pattern)
+    folder = path if path.is_dir() else path.parent
+    return folder.resolve().name or "predictions"
+
+
+def _print_hints(out: str, truth: str) -> None:
+    from metrics.submissions.reader import RoomPredictions, open_predictions
+    from metrics.submissions.validation import hints
+    from scenegen.rooms.reader import RoomsFile
+
+    with open_predictions(out) as opened, RoomsFile(truth) as rooms:
+        assert isinstance(opened, RoomPredictions)
+        said = f"{opened.kind}, alignment {opened.alignment}"
+        print_line(f"{out}: {len(opened)} rows of {said}" + ", normals" * opened.has_normals)
+        for hint in hints(opened, rooms):
+            print_line(f"hint: {out}: {hint}", err=True)
+    print_line(f"now: bench score {out} --truth {truth}")
+
+
+COMMANDS = (import_,)

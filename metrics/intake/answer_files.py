@@ -1,0 +1,179 @@
+"""Import answers to questions from CSV, JSON or JSON lines: an index, a letter, or scores."""
+
+import csv
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from metrics.submissions.problems import JsonError
+from metrics.submissions.rules import MOST_ROWS
+from metrics.submissions.strict_json import parse_json, read_bytes
+from metrics.submissions.writer import write_answers
+from scenegen.common.errors import SceneGenError
+
+MOST_BYTES = 64 * 2**20
+LETTERS = "ABC"
+QUESTION = ("question", "id", "index", "row")  # names that the index of a question may have
+ANSWER = ("answer", "prediction", "choice")
+ENDINGS = (".csv", ".json", ".jsonl")
+
+
+class AnswerFileError(SceneGenError):
+    """A file of answers that is not as it should be."""
+
+
+def import_answers(
+    path: str | Path,
+    questions: str | Path,
+    out: str | Path,
+    *,
+    method: str,
+    run: str = "",
+    notes: str = "",
+    overwrite: bool = False,
+) -> int:
+    """Write a submission from a file of answers, and return how many there are.
+
+    A CSV file has columns `question` (may be left out where all questions are answered in order)
+    and `answer`, or a score of each answer: `A`, `B`, `C`. A line of JSON has the same keys, or
+    `scores`. JSON is a list, or an object from question to answer. An answer is an index from 0, a
+    letter from A, or -1 or nothing to abstain.
+
+    Raises AnswerFileError, PredictionError, and OSError.
+    """
+    path = Path(path)
+    readers = {".csv": _csv, ".json": _json, ".jsonl": _json_lines}
+    reader = readers.get(path.suffix.lower())
+    if reader is None:
+        raise AnswerFileError(path, f"the ending {path.suffix!r:.20}", " or ".join(ENDINGS))
+    rows, values = list[int | None](), list[Any]()
+    try:
+        for place, question, value in reader(read_bytes(path, MOST_BYTES)):
+            rows.append(None if question is None else _index(question, place))
+            values.append(_value(value, place))
+    except JsonError as error:
+        raise AnswerFileError(f"{path}: {error.where}", error.found, error.expected) from error
+    except AnswerFileError as error:
+        raise error.inside(path) from error
+    if not values:
+        raise AnswerFileError(path, "no answers", "one for each question")
+    if len({type(value) for value in values}) > 1 or len({type(row) for row in rows}) > 1:
+        raise AnswerFileError(
+            path, "entries of two kinds", "all with a question, or none; all with scores, or none"
+        )
+    ids = None if rows[0] is None else [row for row in rows if row is not None]
+    form = "scores" if isinstance(values[0], list) else "answer"
+    arrays: dict[str, Any] = {form: values}
+    if form == "scores":
+        if len({len(value) for value in values}) > 1:
+            raise AnswerFileError(path, "different numbers of scores", "as many for each question")
+        arrays[form] = np.array(values, np.float64)
+    write_answers(
+        out, questions, method=method, run=run, notes=notes, overwrite=overwrite, rows=ids, **arrays
+    )
+    return len(values)
+
+
+Entries = Iterator[tuple[str, Any, Any]]  # place, question, answer or scores
+
+
+def _text(data: bytes) -> str:
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise AnswerFileError("text", "bytes that are not UTF-8", "text") from error
+
+
+def _csv(data: bytes) -> Entries:
+    lines = csv.DictReader(_text(data).splitlines(), skipinitialspace=True, strict=True)
+    try:
+        names = {(name or "").strip().lower(): name for name in lines.fieldnames or ()}
+        question = next((names[name] for name in QUESTION if name in names), None)
+        answer = next((names[name] for name in ANSWER if name in names), None)
+        scores = [names[letter.lower()] for letter in LETTERS if letter.lower() in names]
+        if answer is None and len(scores) < 2:
+            found = ", ".join(map(repr, list(names)[:8])) or "no columns"
+            raise AnswerFileError("line 1", found, "a column answer, or columns A, B, C of scores")
+        for entry in lines:
+            place = f"line {lines.line_num}"
+            value = [entry[name] for name in scores] if answer is None else entry[answer]
+            if value is None or (isinstance(value, list) and None in value):
+                raise AnswerFileError(place, "too few columns", "as many as in line 1")
+            yield place, entry[question] if question else None, value
+    except csv.Error as error:
+        raise AnswerFileError(f"line {lines.line_num}", str(error), "CSV") from error
+
+
+def _json(data: bytes) -> Entries:
+    content = parse_json(data, MOST_ROWS)
+    if isinstance(content, dict) and "answers" in content:
+        content = content["answers"]
+    if isinstance(content, dict):
+        for key, value in content.items():
+            yield f"key {key!r:.20}", key, value
+        return
+    if not isinstance(content, list):
+        raise AnswerFileError("JSON", type(content).__name__, "a list or an object")
+    for place, value in enumerate(content):
+        yield _entry(f"entry {place}", value) if isinstance(value, dict) else (
+            f"entry {place}", None, value
+        )  # fmt: skip
+
+
+def _json_lines(data: bytes) -> Entries:
+    for number, line in enumerate(data.splitlines(), 1):
+        if line.strip():
+            try:
+                content = parse_json(line, 100)
+            except JsonError as error:
+                raise AnswerFileError(f"line {number}", error.found, error.expected) from error
+            if not isinstance(content, dict):
+                content = {"answer": content}
+            yield _entry(f"line {number}", content)
+
+
+def _entry(place: str, content: Mapping[str, Any]) -> tuple[str, Any, Any]:
+    question = next((content[name] for name in QUESTION if name in content), None)
+    for name in ("scores", *ANSWER):
+        if name in content:
+            return place, question, content[name]
+    raise AnswerFileError(
+        place, f"the keys {', '.join(map(repr, list(content)[:8]))}", "answer, or scores"
+    )
+
+
+def _index(value: Any, place: str) -> int:
+    if isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= MOST_ROWS:
+        return value
+    if isinstance(value, str) and re.fullmatch(" *[0-9]{1,8} *", value):
+        return int(value)
+    raise AnswerFileError(f"{place}: question", f"{value!r:.40}", "the index of a question, from 0")
+
+
+def _value(value: Any, place: str) -> int | list[float]:
+    """Return an answer, or scores."""
+    if isinstance(value, list):
+        try:
+            return [_number(score) for score in value]
+        except ValueError as error:
+            raise AnswerFileError(f"{place}: scores", f"{value!r:.60}", "numbers") from error
+    if value is None:
+        return -1
+    if isinstance(value, int) and not isinstance(value, bool) and -1 <= value < len(LETTERS):
+        return value
+    text = value.strip().upper() if isinstance(value, str) else "?"
+    if text in LETTERS and len(text) == 1:
+        return LETTERS.index(text)
+    if re.fullmatch("-1|[0-2]|", text):
+        return int(text or -1)
+    expected = "an index from 0, a letter from A, or -1 to abstain"
+    raise AnswerFileError(f"{place}: answer", f"{value!r:.40}", expected)
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or value is None or isinstance(value, list | dict):
+        raise ValueError(value)
+    return float(value)

@@ -1,0 +1,166 @@
+"""Read one array of numbers from a file: NPY, NPZ, PNG, TIFF, EXR or PFM.
+
+Sizes are taken from headers before anything is unpacked. Values come as stored: no curve, no scale.
+"""
+
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.common.errors import SceneGenError
+from scenegen.description.specs import MAX_PIXELS
+
+Array = NDArray[Any]
+MOST_CHANNELS = 4
+DEPTH_CHANNELS = ("Z", "depth", "Depth", "D", "Y", "V")  # of EXR files with several
+VECTOR_CHANNELS = (("X", "Y", "Z"), ("R", "G", "B"), ("N.X", "N.Y", "N.Z"))
+
+
+class ArrayFileError(SceneGenError):
+    """A file that holds no array of numbers as it should."""
+
+
+def read_array(path: Path, name: str | None = None, vectors: bool = False) -> Array:
+    """Return an image (h, w), or (h, w, 3) of vectors, as it is stored.
+
+    Of NPY and NPZ files any other shape, too; integers from 0 of PNG and TIFF, and floats.
+
+    Args:
+        name: of the array in an NPZ file, or of the channel in an EXR file; needed where there are
+            several and none has a usual name.
+        vectors: whether three channels are wanted.
+
+    Raises ArrayFileError, and OSError for the path.
+    """
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise ArrayFileError(path, f"the ending {path.suffix!r:.20}", ", ".join(READERS))
+    with path.open("rb") as file:
+        if not file.read(1):
+            raise ArrayFileError(path, "an empty file", "an array of numbers")
+    try:
+        return reader(path, name, vectors)
+    except ArrayFileError:
+        raise
+    except Exception as error:  # of five libraries, which share no class of errors
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise ArrayFileError(path, f"a file that cannot be read ({reason:.120})") from error
+
+
+def _check_size(path: Path, shape: tuple[int, ...], most: int = MAX_PIXELS * MOST_CHANNELS) -> None:
+    count = 1
+    for size in shape:
+        count *= size
+    if count > most:
+        raise ArrayFileError(path, f"shape {shape}", f"at most {most:,} numbers")
+
+
+def _npy(path: Path, _name: str | None, _vectors: bool) -> Array:
+    """Map a file of one or more images; pages are read when they are used."""
+    array = np.load(path, mmap_mode="r", allow_pickle=False)
+    per_image = array.shape[1:] if array.ndim > 3 else array.shape[-2:]
+    _check_size(path, per_image)
+    return np.asarray(array)
+
+
+def _npz(path: Path, name: str | None, vectors: bool) -> Array:
+    with zipfile.ZipFile(path) as archive:
+        names = [member.removesuffix(".npy") for member in archive.namelist()]
+        usual = ("points", "normal") if vectors else ("depth", "disparity", "pred", "arr_0")
+        chosen = name or (
+            names[0] if len(names) == 1 else next(filter(names.__contains__, usual), "")
+        )
+        if chosen not in names:
+            found = f"the arrays {', '.join(map(repr, names[:8]))}"
+            hint = "" if name else "name one with --array"
+            raise ArrayFileError(path, found, repr(name) if name else "one", hint)
+        with archive.open(f"{chosen}.npy") as member:
+            version = np.lib.format.read_magic(member)
+            read = (
+                np.lib.format.read_array_header_1_0
+                if version == (1, 0)
+                else np.lib.format.read_array_header_2_0
+            )
+            _check_size(path, read(member)[0])
+    with np.load(path, allow_pickle=False) as arrays:
+        return np.asarray(arrays[chosen])
+
+
+def _picture(path: Path, _name: str | None, vectors: bool) -> Array:
+    from PIL import Image
+
+    with Image.open(path) as picture:
+        _check_size(path, (picture.height, picture.width), MAX_PIXELS)
+        pictures = getattr(picture, "n_frames", 1)
+        if pictures > 1:
+            raise ArrayFileError(path, f"{pictures} pictures", "one")
+        if picture.mode in ("P", "PA"):
+            raise ArrayFileError(path, "colours of a palette", "numbers", _AS_NUMBERS)
+        if picture.format == "PNG" and picture.mode not in ("L", "I", "I;16", "F", "1"):
+            return _colour_png(path, vectors)
+        return _channels(path, np.asarray(picture), vectors)
+
+
+def _colour_png(path: Path, vectors: bool) -> Array:
+    """Read a PNG file of several channels; Pillow would cut 16 bits to 8."""
+    import png
+
+    with path.open("rb") as file:
+        width, height, rows, about = png.Reader(file=file).asDirect()
+        kind = np.uint16 if about["bitdepth"] > 8 else np.uint8
+        values = np.array([np.asarray(row, kind) for row in rows])
+    return _channels(path, values.reshape(height, width, about["planes"]), vectors)
+
+
+_AS_NUMBERS = "save the numbers themselves, as .npy or as a 16-bit PNG of one channel"
+
+
+def _channels(path: Path, values: Array, vectors: bool) -> Array:
+    """Return (h, w) of pictures of one channel, or of equal ones; (h, w, 3) of vectors."""
+    if values.ndim == 3 and values.shape[-1] in (2, 4):
+        values = values[..., :-1]  # without alpha
+    if vectors:
+        if values.ndim != 3 or values.shape[-1] != 3:
+            raise ArrayFileError(path, "one channel", "three: x, y, z as R, G, B")
+        return values
+    if values.ndim == 3:
+        if not (values == values[..., :1]).all():
+            raise ArrayFileError(path, "a picture in colours", "one channel", _AS_NUMBERS)
+        values = values[..., 0]
+    return values
+
+
+def _exr(path: Path, name: str | None, vectors: bool) -> Array:
+    import OpenEXR
+
+    header = OpenEXR.File(str(path), header_only=True).header()
+    low, high = header["dataWindow"]
+    _check_size(path, (int(high[1] - low[1]) + 1, int(high[0] - low[0]) + 1), MAX_PIXELS)
+    channels = OpenEXR.File(str(path), separate_channels=True).channels()
+    listed = f"the channels {', '.join(list(channels)[:12])}"
+    if vectors:
+        triples = [tuple(name.split(","))] if name else VECTOR_CHANNELS
+        for triple in triples:
+            if all(channel in channels for channel in triple):
+                return np.dstack([channels[channel].pixels for channel in triple])
+        expected = " or ".join(",".join(triple) for triple in triples)
+        raise ArrayFileError(path, listed, expected, "name three with --array X,Y,Z")
+    if name is None and set(channels) in ({"R", "G", "B"}, {"R", "G", "B", "A"}):
+        return _channels(path, np.dstack([channels[c].pixels for c in "RGB"]), vectors)
+    usual = tuple(channels) if len(channels) == 1 else DEPTH_CHANNELS
+    chosen = name or next((channel for channel in usual if channel in channels), "")
+    if chosen not in channels:
+        expected = repr(name) if name else f"one of {', '.join(DEPTH_CHANNELS)}"
+        raise ArrayFileError(path, listed, expected, "name one with --array")
+    return np.asarray(channels[chosen].pixels)
+
+
+Reader = Callable[[Path, str | None, bool], Array]
+READERS: dict[str, Reader] = {
+    ".npy": _npy, ".npz": _npz, ".png": _picture, ".tif": _picture, ".tiff": _picture,
+    ".exr": _exr, ".pfm": _picture,
+}  # fmt: skip

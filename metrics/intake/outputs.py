@@ -1,0 +1,202 @@
+"""What a model returns for one image, as the geometry of the submission format.
+
+The names of keys are those of MoGe (Wang et al. 2025), which wraps other models by them, too.
+"""
+
+import difflib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.intake.resampling import filled, nearest, resampled
+from metrics.measures.depth import Alignment
+from metrics.submissions.writer import as_array
+from scenegen.camera import pixel_directions
+from scenegen.common.errors import SceneGenError
+from scenegen.description.specs import MAX_PIXELS
+
+Array = NDArray[Any]
+Frame = Literal["opencv", "opengl"]
+Missing = Literal["refuse", "nearest"]
+# The geometry of a key, and what is not known of it; the first that a model returns is taken.
+KEYS: dict[str, tuple[str, Alignment]] = {
+    "points_metric": ("points", "none"),
+    "depth_metric": ("depth", "none"),
+    "points_scale_invariant": ("points", "scale"),
+    "depth_scale_invariant": ("depth", "scale"),
+    "points_affine_invariant": ("points", "scale_shift"),
+    "depth_affine_invariant": ("depth", "scale_shift"),
+    "disparity_affine_invariant": ("disparity", "scale_shift"),
+}
+OTHERS = ("normal", "mask", "intrinsics")
+FRAMES: dict[Frame, Array] = {  # what an axis is multiplied by to be one of ours
+    "opencv": np.array([1.0, -1.0, -1.0]),
+    "opengl": np.array([1.0, 1.0, 1.0]),
+}
+FILL = "say --missing nearest to fill them from the nearest pixel that has a value"
+_WANTED = "a dict with one of " + ", ".join(KEYS)
+
+
+class OutputError(SceneGenError):
+    """What a model returned, or a file holds, that is no prediction."""
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """What is predicted for one image, in the conventions of the submission format.
+
+    Attributes:
+        kind, alignment: as in `submissions.layout.KINDS`.
+        geometry: depth or disparity (h, w), or points (h, w, 3), camera frame; NaN for no value.
+        normal: (h, w, 3), camera frame; None where there are none.
+        fov_y_degrees: vertical field of view; None where it is not estimated.
+        key: the name that the model gave to the geometry.
+    """
+
+    kind: str
+    alignment: Alignment
+    geometry: Array
+    normal: Array | None = None
+    fov_y_degrees: float | None = None
+    key: str = ""
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The arguments of `RoomPredictionWriter.add`, beside the row."""
+        values = {self.kind: self.geometry}
+        values |= {} if self.normal is None else {"normal": self.normal}
+        return values | (
+            {} if self.fov_y_degrees is None else {"fov_y_degrees": self.fov_y_degrees}
+        )
+
+
+def read_output(
+    output: Any,
+    height: int,
+    width: int,
+    *,
+    frame: Frame = "opencv",
+    key: str | None = None,
+    missing: Missing = "refuse",
+) -> Geometry:
+    """Return what a model predicts for an image of (H, W) pixels, in that size.
+
+    Args:
+        output: a mapping with one of `KEYS`, and maybe `normal` (h, w, 3), `mask` (h, w; what is
+            False has no value) and `intrinsics` (3, 3), normalised by the image's size or in its
+            pixels. Arrays, or tensors of torch; axes of size 1 around them are dropped.
+        frame: of points and normals: "opencv" has x right, y down, z forward; "opengl" is ours.
+        key: which of `KEYS` to take; by default the first that is there.
+        missing: "nearest" fills pixels without a value from the nearest that has one.
+
+    Raises OutputError.
+    """
+    if not isinstance(output, Mapping):
+        found = "None" if output is None else _described(output)
+        raise OutputError("returned", found, _WANTED)
+    chosen = key or next((name for name in KEYS if name in output), None)
+    if chosen is None or chosen not in output or chosen not in KEYS:
+        names = ", ".join(f"{name!r:.30}" for name in list(output)[:8]) or "none"
+        close = difflib.get_close_matches(str(next(iter(output), "")), KEYS, 1)
+        hint = f"close to {close[0]}" if close and not key else ""
+        wanted = _WANTED if chosen is None else f"the key {chosen!r}"
+        raise OutputError("returned", f"a dict with the keys {names}", wanted, hint)
+    kind, alignment = KEYS[chosen]
+    image = image_of(output[chosen], chosen, vectors=kind == "points")
+    if output.get("mask") is not None:
+        inside = image_of(output["mask"], "mask") > 0.5
+        if inside.shape != image.shape[:2]:
+            raise OutputError("mask", f"shape {inside.shape}", f"{image.shape[:2]}, as {chosen}")
+        image = np.where(inside.reshape(inside.shape + (1,) * (image.ndim - 2)), image, np.nan)
+    normal = output.get("normal")
+    geometry = Geometry(
+        kind,
+        alignment,
+        image,
+        None if normal is None else image_of(normal, "normal", vectors=True),
+        _fov(output.get("intrinsics"), height),
+        chosen,
+    )
+    return fitted_to(geometry, height, width, frame=frame, missing=missing)
+
+
+def fitted_to(
+    geometry: Geometry, height: int, width: int, *, frame: Frame, missing: Missing
+) -> Geometry:
+    """Return a geometry of any size and frame in ours, at (H, W) pixels. Raises OutputError."""
+    name, image, normal = geometry.key or geometry.kind, geometry.geometry, geometry.normal
+    _refuse_transposed(image, name, height, width)
+    image = np.where(np.isfinite(image), image, np.nan)
+    if geometry.kind == "points":
+        image = image * FRAMES[frame]
+    image = resampled(geometry.kind, image, height, width)
+    valid = np.asarray(np.isfinite(image.reshape(height, width, -1)).all(axis=-1))
+    if not valid.any():
+        raise OutputError(name, "no finite value", "numbers")
+    if normal is not None:
+        _refuse_transposed(normal, "normal", height, width)
+        normal = nearest(normal * FRAMES[frame], height, width)
+    if missing == "nearest":
+        image = filled(image, valid)
+        if normal is not None:
+            sensible = np.isfinite(normal) & normal.any(axis=-1, keepdims=True)
+            normal = filled(normal, np.asarray(sensible.all(axis=-1)))
+    return replace(geometry, geometry=image, normal=normal)
+
+
+def image_of(values: Any, name: str, vectors: bool = False) -> Array:
+    """Return numbers of pixels as float64, (h, w), or (h, w, 3) of vectors. Raises OutputError."""
+    try:
+        array = as_array(values, name)
+    except SceneGenError as error:
+        raise OutputError(error.where, error.found, error.expected) from error
+    wanted = "(h, w, 3)" if vectors else "(h, w)"
+    shape, axes = array.shape, 3 if vectors else 2
+    while array.ndim > axes and array.shape[0] == 1:
+        array = array[0]
+    while array.ndim > axes and array.shape[-1] == 1:
+        array = array[..., 0]
+    if array.dtype.kind not in "fiub":
+        raise OutputError(name, f"type {array.dtype!s:.40}", f"numbers {wanted}")
+    if array.ndim != axes or 0 in array.shape or (vectors and array.shape[-1] != 3):
+        first = vectors and len(shape) == 3 and shape[0] == 3
+        hint = "move the first axis to the end" if first else ""
+        raise OutputError(name, f"shape {shape}", wanted, hint)
+    if math.prod(array.shape[:2]) > MAX_PIXELS:
+        raise OutputError(name, f"shape {shape}", f"at most {MAX_PIXELS:,} pixels")
+    return array.astype(np.float64)
+
+
+def planar_from_distance(distance: Array, fov_y_degrees: float) -> Array:
+    """Return planar depth (h, w) of distances along the rays of a true camera."""
+    rays = pixel_directions(distance.shape[0], distance.shape[1], fov_y_degrees)
+    return np.asarray(distance / np.linalg.norm(rays, axis=-1))
+
+
+def _fov(matrix: Any, height: int) -> float | None:
+    """Return the vertical field of view of intrinsics (3, 3), in degrees; None without any."""
+    if matrix is None:
+        return None
+    values = as_array(matrix, "intrinsics")
+    values = values[0] if values.ndim == 3 and len(values) == 1 else values
+    if values.shape != (3, 3) or values.dtype.kind not in "fiu" or not values[1, 1] > 0.0:
+        found = f"shape {values.shape}" if values.shape != (3, 3) else "no focal length above 0"
+        raise OutputError("intrinsics", found, "a matrix (3, 3), normalised or in pixels")
+    # Normalised ones have their centre at about 0.5, those in pixels at half the height.
+    half = 0.5 if 0.0 < values[1, 2] < 2.0 else height / 2.0
+    return math.degrees(2.0 * math.atan(half / float(values[1, 1])))
+
+
+def _refuse_transposed(image: Array, name: str, height: int, width: int) -> None:
+    if height != width and image.shape[:2] == (width, height):
+        found = f"{width} rows and {height} columns"
+        raise OutputError(name, found, f"({height}, {width}), rows first", "transpose it")
+
+
+def _described(value: Any) -> str:
+    shape = getattr(value, "shape", None)
+    return type(value).__name__ + ("" if shape is None else f" of shape {tuple(shape)}")
