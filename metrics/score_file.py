@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, FailFast, Field, TypeAdapter
 
+from metrics.measures.alignment import Alignment
 from metrics.measures.checks import LARGEST_MAGNITUDE
-from metrics.measures.depth import Alignment
 from metrics.measures.objects import LEAST_PIXELS
 from metrics.scoring.estimates import ACCURACY
 from metrics.scoring.known_tests import known_test

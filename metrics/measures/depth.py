@@ -7,15 +7,15 @@ the formulas, p is a predicted depth, t the true one, and means are over the sco
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from metrics.measures import alignment as alignments
+from metrics.measures.alignment import Alignment
 from metrics.measures.checks import MeasureError, require_depth_pair
 
 Array = NDArray[np.float64]
-Alignment = Literal["none", "median_scale", "scale", "scale_shift"]
 
 # Scene units. Smaller depths are raised to this before a logarithm, which needs positive numbers.
 SMALLEST_LOG_DEPTH = 1e-3
@@ -46,40 +46,8 @@ def compare_depth(
 
 
 def align(pair: DepthPair, alignment: Alignment) -> DepthPair:
-    """Return the pair with the prediction fitted to the truth, as far as the alignment allows.
-
-    - none: p as given.
-    - median_scale: s p, s = median(t) / median(p). Source: Zhou et al. 2017 (Unsupervised Learning
-      of Depth and Ego-Motion).
-    - scale: s p, s = sum(p t) / sum(p p), which minimises sum (s p - t)^2.
-    - scale_shift: s p + b, which minimises sum (s p + b - t)^2. Source: Ranftl et al. 2020 (MiDaS),
-      here applied to depth where they align disparity.
-
-    A scale is never negative, or a prediction that swaps near and far, such as disparity, would
-    count as depth. Where the formula gives a negative s or none (p is 0 throughout, or constant
-    under scale_shift), s is 0, the least-squares optimum under s >= 0.
-
-    Raises MeasureError on another alignment.
-    """
-    p, t = pair.predicted, pair.true
-    if alignment == "none":
-        return pair
-    if alignment == "median_scale":
-        return replace(pair, predicted=_ratio(float(np.median(t)), float(np.median(p))) * p)
-    # Squares of unit-sized numbers do not vanish, and a constant is 1 and centres to 0 exactly.
-    size = float(np.abs(p).max()) or 1.0
-    unit = p / size
-    if alignment == "scale":
-        return replace(pair, predicted=_ratio(float(unit @ t), float(unit @ unit)) * unit)
-    if alignment == "scale_shift":
-        centred, target = unit - unit.mean(), t - t.mean()
-        spread = float(centred @ centred)
-        return replace(pair, predicted=_ratio(float(centred @ target), spread) * centred + t.mean())
-    raise MeasureError("alignment", alignment, f"one of {', '.join(get_args(Alignment))}")
-
-
-def _ratio(above: float, below: float) -> float:
-    return max(above / below, 0.0) if below > 0.0 else 0.0
+    """Return the pair with the prediction fitted to the truth, as `measures.alignment` says."""
+    return replace(pair, predicted=alignments.align(pair.predicted, pair.true, alignment))
 
 
 def mse_depth(pair: DepthPair) -> float:
@@ -131,7 +99,7 @@ def depth_scores(pair: DepthPair, alignment: Alignment = "none") -> dict[str, fl
     """Return every score of this module by name, after alignment.
 
     The names are `mse_depth`, `rmse`, `abs_rel`, `silog`, `delta_1`, `delta_2` and `delta_3`; with
-    an alignment they end in `_after_median_scale`, `_after_scale` or `_after_scale_shift`.
+    an alignment they end in `_after_` and its name.
     """
     aligned = align(pair, alignment)
     named = {score.__name__: score(aligned) for score in (mse_depth, rmse, abs_rel, silog)}

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.measures.alignment import Alignment
 from metrics.measures.chamfer_hausdorff import (
     NearestDistances,
     chamfer,
@@ -14,7 +15,7 @@ from metrics.measures.chamfer_hausdorff import (
     nearest_distances,
     point_scores,
 )
-from metrics.measures.depth import Alignment, align, compare_depth, depth_scores, mse_depth
+from metrics.measures.depth import align, compare_depth, depth_scores, mse_depth
 from metrics.measures.empty_room import empty_room
 from metrics.measures.image_search import nearest_distances_on_image
 from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_depth
@@ -29,7 +30,6 @@ from scenegen.camera import back_project, pixel_directions
 Array = NDArray[Any]
 NonFinite = Literal["error", "penalise"]
 F_SCORE_THRESHOLDS = (0.01, 0.02, 0.05)  # scene units: edges of the room
-ALIGNMENTS: tuple[Alignment, ...] = ("none", "scale", "scale_shift")
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def score_view(
     other_relief: Array | None = None,
     *,
     alignment: Alignment = "none",
-    alignments: Sequence[Alignment] = ALIGNMENTS,
+    alignments: Sequence[Alignment] = (),
     non_finite: NonFinite = "error",
 ) -> ImageScores:
     """Return every score of one image.
@@ -99,7 +99,7 @@ def score_view(
         other_relief: true relief of another scene, (H, W), scene units, NaN where it has none; None
             where there is no other scene.
         alignment: what the method cannot know. The depth is fitted to the truth of the image so
-            far before anything is scored.
+            far before anything is scored; after "disparity_scale_shift" it is already.
         alignments: the alignments after which depth is scored once more.
         non_finite: what to do with scored pixels that break `submissions.rules`. "penalise" scores
             them at the worst: depth as 0 (at the camera), a normal as opposite to the true one. An
@@ -119,15 +119,20 @@ def score_view(
         depth = np.where(broken, 0.0, depth)
         if normal is not None:
             normal = np.where(_broken("normal", normal, mask)[..., None], -truth.normal, normal)
-    if alignment != "none":
+    if alignment not in ("none", "disparity_scale_shift"):
         fitted = align(compare_depth(depth, truth.depth, mask), alignment).predicted
         depth = np.full(depth.shape, np.nan)
         depth[mask] = fitted
     nearest = nearest_distances_on_image(depth, truth.depth, truth.fov_y_degrees, mask)
     scores = point_scores(nearest, F_SCORE_THRESHOLDS)
     pair = compare_depth(depth, truth.depth, mask)
+    plain = depth_scores(pair)
+    scores |= plain
     for after in alignments:
-        scores |= depth_scores(pair, after)
+        if after == alignment:
+            scores |= {f"{name}_after_{after}": value for name, value in plain.items()}
+        else:
+            scores |= depth_scores(pair, after)
     said = empty - depth
     relief = relief_scores(said[mask], (empty - truth.depth)[mask])
     if broken.any():  # else they would count as relief, at the camera

@@ -31,6 +31,7 @@ SKILLED = dict.fromkeys(RELIEF, OTHER_SCENE) | dict.fromkeys(OF_EMPTY_ROOM, EMPT
 F_SCORE = "f_score_<threshold>"
 DERIVED = "derived_"
 _NEAREST = "the predicted depth of an image nearest to the true depth in least squares."
+_NEAREST_L1 = "the mean of absolute difference of depth divided by true depth least."
 _ALIGNED = {
     "_after_median_scale": (
         "scaled to the truth's median",
@@ -40,6 +41,19 @@ _ALIGNED = {
     "_after_scale_shift": (
         "scaled and shifted",
         f"the same after the scale, at least 0, and the shift that bring {_NEAREST}",
+    ),
+    "_after_scale_l1": (
+        "scaled by L1",
+        f"the same after the scale, at least 0, that makes {_NEAREST_L1}",
+    ),
+    "_after_scale_shift_l1": (
+        "scaled and shifted by L1",
+        f"the same after the scale, at least 0, and the shift that make {_NEAREST_L1}",
+    ),
+    "_after_disparity_scale_shift": (
+        "with disparity scaled and shifted",
+        "the same after 1 / depth was fitted to 1 / true depth by a scale, at least 0, and a shift"
+        " in least squares; no depth then exceeds the largest true one.",
     ),
 }
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, FailFast, Field
 
-from metrics.measures.depth import Alignment
+from metrics.measures.alignment import Alignment
 from metrics.scoring.estimates import (
     ACCURACY,
     CONFIDENCE,

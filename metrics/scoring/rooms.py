@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.scoring.geometry import scored_alignment
 from metrics.scoring.image_scores import noise_floors
 from metrics.scoring.metric_names import EMPTY_ROOM, OBJECT_SCORES
 from metrics.scoring.records import OBJECT_COLUMNS, SHAPE_COLUMN, ScoreFile
@@ -79,9 +80,9 @@ def score_rooms(
     }
     objects = {name: scored.objects[name] for name in (*OBJECT_COLUMNS, *OBJECT_SCORES)}
     meta = meta_of(files, truth, truth_given, truth.fingerprint, digest, settings, counts, floors)
-    return ScoreFile(
-        "rooms", files[0].method, files[0].alignment, items, meta, {**objects, SHAPE_COLUMN: shape}
-    )
+    alignment = scored_alignment(files[0].kind, files[0].alignment)
+    objects[SHAPE_COLUMN] = shape
+    return ScoreFile("rooms", files[0].method, alignment, items, meta, objects)
 
 
 def view_angles(scene_index: Array, view_index: Array, world_from_camera: Array) -> Array:

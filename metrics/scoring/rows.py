@@ -7,15 +7,13 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures.depth import Alignment
-from metrics.scoring.geometry import planar_depth
+from metrics.scoring.geometry import alignments_scored, planar_depth
 from metrics.scoring.image_scores import (
-    ALIGNMENTS,
     score_empty_room,
     score_view,
     true_relief,
@@ -134,8 +132,7 @@ class RowScorer:
         """Take files that stay open as long as rows are scored."""
         self._files, self._truth = files, truth
         self._entries = [{row: i for i, row in enumerate(f.rows.tolist())} for f in files]
-        wanted = {*ALIGNMENTS, files[0].alignment}
-        self._alignments = tuple(a for a in get_args(Alignment) if a in wanted)
+        self._alignments = alignments_scored(files[0].kind, files[0].alignment)
 
     def score(self, pairs: Array) -> ScoredRows:
         """Return the scores of rows, (N, 2) with a row of another scene each.

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures.depth import Alignment
+from metrics.measures.alignment import Alignment
 from metrics.submissions import layout
 from metrics.submissions.inspection import Inspection, inspect
 from metrics.submissions.problems import Problem, first_error

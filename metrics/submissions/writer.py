@@ -15,8 +15,8 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike
 
+from metrics.measures.alignment import Alignment
 from metrics.measures.answers import answers_from_scores
-from metrics.measures.depth import Alignment
 from metrics.submissions import layout, rules
 from metrics.submissions.problems import PredictionError, first_error, first_ids
 from scenegen.files.row_file import new_file, writer_name

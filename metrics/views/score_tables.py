@@ -4,9 +4,11 @@ import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
+from metrics.measures.alignment import Alignment
 from metrics.measures.statistics import FEW_CLUSTERS
 from metrics.scoring.estimates import CONFIDENCE, question_skill
 from metrics.scoring.known_tests import known_test
@@ -34,12 +36,14 @@ GROUP_TITLES = {
     "by_rotation_angle": "by rotation between reference and right answer, degrees",
     "by_position": "by place of the right answer",
 }
+ALIGNMENT_SCORES = ("abs_rel", "rmse", "delta_1")
 GROUP_SCORES = {"rooms": HEADLINE["rooms"], "iqtt": ("iqtt_accuracy",)}
 
 
 def text_report(scores: ScoreFile, as_markdown: bool = False) -> str:
     """Return the headline, all scores, and the main ones by group, as aligned text or Markdown."""
-    tables = [headline_rows(scores), all_scores(scores), *group_tables(scores)]
+    tables = [headline_rows(scores), *alignment_tables(scores), all_scores(scores)]
+    tables += group_tables(scores)
     return (to_markdown if as_markdown else to_text)(title_of(scores), tables, notes_of(scores))
 
 
@@ -101,6 +105,24 @@ def references(scores: ScoreFile) -> dict[str, tuple[str, float]]:
     if scores.task == "iqtt":
         values["iqtt_accuracy"] = ("chance", 1.0 / scores.meta.counts["answers"])
     return values
+
+
+def alignment_tables(scores: ScoreFile) -> Iterator[Table]:
+    """Yield the scores of depth under each alignment side by side, the one that ranks first."""
+    ending = "" if scores.alignment == "none" else f"_after_{scores.alignment}"
+    names = [f"{name}{ending}" for name in ALIGNMENT_SCORES]
+    if not all(name in scores.metrics for name in names):
+        return
+    rows = []
+    for alignment in get_args(Alignment):
+        ending = "" if alignment == "none" else f"_after_{alignment}"
+        shown = [scores.metrics.get(f"{name}{ending}") for name in ALIGNMENT_SCORES]
+        if shown[0] is not None and (ending or scores.alignment == "none"):
+            ranks = alignment == scores.alignment
+            label = f"{alignment} (ranks)" if ranks else alignment
+            rows.append((not ranks, [label, *map(score_cell, shown)]))
+    table = [row for _, row in sorted(rows, key=lambda row: row[0])]
+    yield make_table("depth after each alignment", ("alignment", *ALIGNMENT_SCORES), table)
 
 
 def all_scores(scores: ScoreFile) -> Table:

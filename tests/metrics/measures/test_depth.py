@@ -1,13 +1,16 @@
 """Depth errors by hand, alignment against general solvers, and hostile depth."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from metrics.measures.alignment import Alignment
 from metrics.measures.depth import align, compare_depth, delta, depth_scores, silog
 
-ALIGNMENTS = ["none", "median_scale", "scale", "scale_shift"]
+ALIGNMENTS = get_args(Alignment)
 
 
 def random_pair(seed):

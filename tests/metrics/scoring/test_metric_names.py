@@ -1,12 +1,14 @@
 """The table of names against the functions that make the scores, and against the docs."""
 
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 from refusals import refused
 from scipy.spatial import cKDTree
 
+from metrics.measures.alignment import Alignment
 from metrics.measures.chamfer_hausdorff import NearestDistances, point_scores
 from metrics.measures.depth import compare_depth, depth_scores
 from metrics.measures.normals import normal_scores
@@ -23,7 +25,7 @@ from metrics.scoring.metric_names import (
 )
 
 DOCS = Path(__file__).parents[3] / "docs" / "scores.md"
-ALIGNMENTS = ("none", "median_scale", "scale", "scale_shift")
+ALIGNMENTS = get_args(Alignment)
 
 
 def all_scores(noise):
