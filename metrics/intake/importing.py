@@ -20,7 +20,7 @@ from metrics.intake.outputs import (
     image_of,
     planar_from_distance,
 )
-from metrics.measures.depth import Alignment
+from metrics.measures.alignment import Alignment
 from metrics.submissions.layout import KINDS
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.writer import RoomPredictionWriter

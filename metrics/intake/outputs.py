@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.intake.resampling import filled, nearest, resampled
-from metrics.measures.depth import Alignment
+from metrics.measures.alignment import Alignment
 from metrics.submissions.writer import as_array
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import SceneGenError
