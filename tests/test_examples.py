@@ -8,9 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from metrics.intake.model_file import load_model
+from metrics.intake.running import Call, run_model
 from metrics.score_file import read_scores
 from metrics.scoring.evaluate import score
 from metrics.scoring.known_tests import known_test
+from metrics.submissions.reader import open_predictions
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES, SAMPLE = ROOT / "examples", ROOT / "examples" / "sample"
@@ -30,6 +33,15 @@ def test_an_example_writes_what_can_be_scored(name, truths, tmp_path):
     done = run(name, truth, "out.h5", folder=tmp_path)
     assert (done.returncode, done.stdout) == (0, f"now: bench score out.h5 --truth {truth}\n")
     assert score([tmp_path / "out.h5"], truth).comparable
+
+
+@pytest.mark.parametrize(("name", "kind"), [("numpy", "disparity"), ("torch", "points")])
+def test_a_model_runs_and_can_be_scored(name, kind, truths, tmp_path):
+    model = load_model(EXAMPLES / f"run_{name}.py", {"batch": 3} if name == "torch" else {})
+    run_model(model, truths.rooms, tmp_path / "out.h5", call=Call(batch=3), method=name)
+    with open_predictions(tmp_path / "out.h5") as predictions:
+        assert predictions.kind == kind
+    assert score([tmp_path / "out.h5"], truths.rooms).comparable
 
 
 @pytest.mark.parametrize(

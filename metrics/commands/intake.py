@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from scenegen.command_line.groups import EXAMPLE
-from scenegen.command_line.options import OVERWRITE
+from scenegen.command_line.options import ENCODING, OVERWRITE
 from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputPath
 
@@ -91,6 +91,7 @@ def import_(
     Images of another size are resampled to that of the truth.
     """
     from metrics.intake.importing import UNITS, Reading, import_rooms
+    from metrics.intake.running import count_rows
     from scenegen.files.new_file import check_writable
 
     texts: dict[str, Any] = {"run": run_name, "notes": notes, "overwrite": overwrite}
@@ -108,7 +109,7 @@ def import_(
         raise click.UsageError("give --unit or --scale, not both")
     factor = scale if scale is not None else UNITS[unit or "m"]
     reading = Reading(kind, factor, alignment, invalid, frame, missing, array, match)
-    with progress_bar(None, "image") as bar:
+    with progress_bar(count_rows(truth), "image") as bar:
         how = import_rooms(
             pattern, truth, out, method=method or _name_of(pattern), reading=reading,
             normals=normals, progress=bar.update, **texts,
@@ -126,17 +127,93 @@ def _name_of(pattern: str) -> str:
 
 
 def _print_hints(out: str, truth: str) -> None:
+    """Print what a submission of rooms holds, hints on mistakes, and the next command."""
     from metrics.submissions.reader import RoomPredictions, open_predictions
     from metrics.submissions.validation import hints
     from scenegen.rooms.reader import RoomsFile
 
-    with open_predictions(out) as opened, RoomsFile(truth) as rooms:
-        assert isinstance(opened, RoomPredictions)
-        said = f"{opened.kind}, alignment {opened.alignment}"
-        print_line(f"{out}: {len(opened)} rows of {said}" + ", normals" * opened.has_normals)
-        for hint in hints(opened, rooms):
-            print_line(f"hint: {out}: {hint}", err=True)
+    with open_predictions(out) as opened:
+        if isinstance(opened, RoomPredictions):
+            with RoomsFile(truth) as rooms:
+                found = hints(opened, rooms)
+            normals = ", with normals" if opened.has_normals else ""
+            print_line(f"{out}: {opened.kind}, alignment {opened.alignment}{normals}")
+            for hint in found:
+                print_line(f"hint: {out}: {hint}", err=True)
     print_line(f"now: bench score {out} --truth {truth}")
 
 
-COMMANDS = (import_,)
+# fmt: off
+@click.command(epilog=f"{EXAMPLE}bench run my_model.py --data rooms.h5 --out mine.h5")
+@click.argument("model", type=InputPath(), metavar="MODEL.py")
+@DATA
+@OUT
+@METHOD
+@RUN
+@NOTES
+@click.option("--device", help="Handed to the model's load(), such as cuda.")
+@click.option("--batch", type=click.IntRange(1, 4096),
+              help="Images for each call of the model's infer_batch [default: 8]; handed to its"
+              " load(), too.")
+@click.option("--intrinsics", is_flag=True,
+              help="Tell the model the true camera; the file notes that.")
+@ENCODING
+@click.option("--exposure", type=Factor(), default=1.0, show_default=True,
+              help="Factor of radiance; 1 is the brightest value of an image.")
+@click.option("--key", help="Which key of the model's output to take [default: the best known].")
+@FRAME
+@MISSING
+@click.option("--resume", "keep", flag_value="resume",
+              help="Keep rows that another model file or other options made.")
+@click.option("--restart", "keep", flag_value="restart", help="Begin anew.")
+@click.option("--traceback", is_flag=True, help="Show all of an error that the model raises.")
+@OVERWRITE
+def run(
+    model: str, truth: str, out: str, method: str | None, run_name: str, notes: str,
+    device: str | None, batch: int | None, intrinsics: bool, curve: str, exposure: float,
+    key: str | None, frame: Any, missing: Any, keep: str | None, traceback: bool, overwrite: bool,
+) -> None:
+    """Run a model on every image of a file and write its predictions.
+
+    MODEL.py holds infer(image, intrinsics=None), which returns a dict with depth, disparity or
+    points; for questions infer(reference, answers), which returns an index or scores. It may be a
+    class, or what load() returns. docs/your-model.md has examples.
+
+    A killed run loses nothing: the same command goes on where it stopped.
+    """
+    from traceback import print_exception
+
+    from metrics.intake.model_file import ModelError, load_model
+    from metrics.intake.outputs import KEYS
+    from metrics.intake.running import DEFAULT_BATCH, Call, count_rows, run_model
+    from scenegen.files.new_file import check_writable
+
+    check_writable(Path(out), overwrite)
+    if key is not None and key not in KEYS:
+        raise click.BadParameter(f"found {key!r:.40}, expected one of {', '.join(KEYS)}",
+                                 param_hint="--key")
+    asked = {"device": device, "batch": batch}
+    options = {name: value for name, value in asked.items() if value is not None}
+    call = Call(curve, exposure, intrinsics, batch or DEFAULT_BATCH, frame, key, missing)
+    try:
+        loaded = load_model(model, options)
+        with progress_bar(count_rows(truth), "row") as bar:
+            said = run_model(
+                loaded, truth, out, call=call, method=method or Path(model).stem, run=run_name,
+                notes=notes, overwrite=overwrite, keep=keep, options=options, progress=bar.update,
+            )
+    except ModelError as error:
+        if traceback and error.__cause__ is not None:
+            print_exception(error.__cause__)
+        elif error.__cause__ is not None:
+            error.hint = "; ".join(filter(None, (error.hint, "--traceback shows all of it")))
+        raise
+    except KeyboardInterrupt:
+        print_line(f"stopped; the same command goes on with the rows in {out}.rows", err=True)
+        raise
+    print_line(f"{out}: {said}")
+    _print_hints(out, truth)
+
+
+# fmt: on
+COMMANDS = (import_, run)

@@ -1,4 +1,4 @@
-"""`bench import`: what it prints, and one line for every mistake."""
+"""`bench import` and `bench run`: what they print, and one line for every mistake."""
 
 import json
 
@@ -77,3 +77,59 @@ def test_a_mistake_is_one_line_and_leaves_nothing(options, word, folder, truths,
     line = done.stderr.splitlines()[-1]
     assert word in line
     assert [path.name for path in folder.iterdir()] == ["mine"]
+
+
+MODEL = """
+import numpy as np
+def infer(image):
+    print("looking")
+    return {"depth_metric": np.full(image.shape[:2], 1.5)}
+"""
+
+
+def test_a_model_is_run(truths, tmp_path):
+    (tmp_path / "wall.py").write_text(MODEL)
+    out = tmp_path / "p.h5"
+    done = bench("run", tmp_path / "wall.py", "--data", truths.rooms, "--out", out)
+    assert done.exit_code == 0, done.output
+    assert done.stdout.splitlines()[-1] == f"now: bench score {out} --truth {truths.rooms}"
+    assert "looking" in done.stderr
+    assert "looking" not in done.stdout
+    with open_predictions(out) as found:
+        assert found.method == "wall"
+
+
+def test_an_error_of_the_model_is_one_line_unless_all_is_asked_for(truths, tmp_path):
+    (tmp_path / "wall.py").write_text(MODEL.replace("1.5", "1 / 0"))
+    line = ["run", tmp_path / "wall.py", "--data", truths.rooms, "--out", tmp_path / "p.h5"]
+    done = bench(*line)
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert done.stderr.splitlines()[1:] == [done.stderr.splitlines()[-1]]
+    assert "line 5: row 0" in done.stderr
+    assert "Traceback" in bench(*line, "--traceback").stderr
+    assert [path.name for path in tmp_path.iterdir() if path.suffix] == ["wall.py"]
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (["none.py"], "none.py"),
+        (["folder"], "folder"),
+        (["wall.py", "--key", "depth"], "--key"),
+        (["wall.py", "--key", "depth_affine_invariant"], "depth_affine_invariant"),
+        (["wall.py", "--device", "cuda"], "--device"),
+        (["wall.py", "--batch", "4"], "--batch"),
+        (["wall.py", "--intrinsics"], "--intrinsics"),
+        (["wall.py", "--data", "wall.py"], "wall.py"),
+    ],
+)
+def test_a_mistake_in_running_is_one_line(options, word, truths, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "wall.py").write_text(MODEL)
+    (tmp_path / "folder").mkdir()
+    data = [] if "--data" in options else ["--data", truths.rooms]
+    done = bench("run", *options, *data, "--out", "p.h5")
+    assert done.exit_code == 2, done.output
+    assert word in done.stderr.splitlines()[-1]
+    assert not (tmp_path / "p.h5").exists()
+    assert not (tmp_path / "p.h5.rows").exists()

@@ -1,0 +1,267 @@
+"""Run a model on every row of a file of rooms or questions, and write its submission."""
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.intake.importing import told_of_missing
+from metrics.intake.kept_rows import KeptRows, kept_rows
+from metrics.intake.model_file import Model, ModelError, accepts
+from metrics.intake.outputs import Frame, Geometry, Missing, OutputError, read_output
+from metrics.submissions.problems import PredictionError
+from metrics.submissions.writer import RoomPredictionWriter, as_array, write_answers
+from scenegen.camera import intrinsics
+from scenegen.common.errors import SpecError
+from scenegen.files.new_file import check_writable
+from scenegen.files.shards import OpenFile
+from scenegen.rendering.ground_truth import decode_image
+from scenegen.rooms.preview import srgb_bytes
+from scenegen.rooms.reader import RoomsFile
+
+Array = NDArray[Any]
+Progress = Callable[[int], Any]
+DEFAULT_BATCH = 8  # images, of a model that has infer_batch
+KIND = "file of rooms or questions"
+TOLD = "the true intrinsics were given to the model"
+
+
+@dataclass(frozen=True)
+class Call:
+    """How a model is called, and what is made of what it returns.
+
+    Attributes:
+        encoding: of images: "srgb" for networks, or "linear" radiance.
+        exposure: factor of radiance; 1 is the brightest value.
+        intrinsics: whether the model is told the true camera.
+        batch: images for each call of `infer_batch`.
+        frame, key, missing: as in `outputs.read_output`.
+    """
+
+    encoding: str = "srgb"
+    exposure: float = 1.0
+    intrinsics: bool = False
+    batch: int = DEFAULT_BATCH
+    frame: Frame = "opencv"
+    key: str | None = None
+    missing: Missing = "refuse"
+
+    def picture(self, image: Array, where: str) -> Array:
+        """Return a stored image (..., H, W, 3) as bytes for a network. Raises SpecError."""
+        radiance = decode_image(image) * np.float32(self.exposure)
+        brightest = float(radiance.max())
+        if not brightest <= 1.0 + 1e-6:
+            hint = f"say --exposure {0.9 * self.exposure / brightest:.2g}"
+            raise SpecError(where, f"radiance up to {brightest:.4g}", "at most 1", hint)
+        if self.encoding == "srgb":
+            return srgb_bytes(radiance)
+        return np.asarray(np.rint(np.clip(radiance, 0.0, 1.0) * 255.0).astype(np.uint8))
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What the rows depend on."""
+        names = ("encoding", "exposure", "intrinsics", "frame", "key", "missing")
+        return {name: getattr(self, name) for name in names}
+
+
+def run_model(
+    model: Model,
+    data: str | Path,
+    out: str | Path,
+    *,
+    call: Call,
+    method: str,
+    run: str = "",
+    notes: str = "",
+    overwrite: bool = False,
+    keep: str | None = None,
+    options: dict[str, Any] | None = None,
+    progress: Progress = lambda done: None,
+) -> str:
+    """Write the submission of a model, and return in words what it holds.
+
+    Every row is kept on the disk when it is done, so that a killed run loses none; the same call
+    goes on with the others.
+
+    Args:
+        data: a file of rooms, or of questions.
+        keep: "resume", "restart" or None, as in `kept_rows`.
+        options: that the model was loaded with; kept rows of others are refused.
+        progress: called with the number of rows that were done since it was last called.
+
+    Raises ModelError, OutputError and PredictionError, naming the row; and as `kept_rows` and the
+    readers and writers of files.
+    """
+    from iqtt.files.reader import holds_questions
+
+    check_writable(out, overwrite)
+    with OpenFile(data, KIND) as opened:
+        questions = holds_questions(opened)
+    texts: dict[str, Any] = {"method": method, "run": run, "notes": notes, "overwrite": overwrite}
+    settings = {"model": model.sha256, **call.settings, "options": options or {}}
+    runner = _run_questions if questions else _run_rooms
+    return runner(model, data, out, call, texts, settings, keep, progress)
+
+
+def count_rows(data: str | Path) -> int:
+    """Return how many rows a file of rooms or questions has. Raises as their readers."""
+    from iqtt.files.reader import QuestionsFile, holds_questions
+
+    with OpenFile(data, KIND) as opened:
+        reader = QuestionsFile if holds_questions(opened) else RoomsFile
+        return len(reader(opened))
+
+
+# ---- rooms ----
+
+
+def _run_rooms(
+    model: Model, data: str | Path, out: str | Path, call: Call, texts: dict[str, Any],
+    settings: dict[str, Any], keep: str | None, progress: Progress,
+) -> str:  # fmt: skip
+    if call.intrinsics:
+        if not accepts(model.infer_batch or model.infer, "intrinsics"):
+            found = f"infer of {model.path}, which takes none"
+            raise ModelError("--intrinsics", found, "infer(image, intrinsics=None)")
+        texts["notes"] = "\n".join(filter(None, (texts["notes"], TOLD)))
+    with RoomsFile(data) as rooms:
+        settings |= {"data": rooms.fingerprint}
+        with kept_rows(out, settings, keep) as kept:
+            done = kept.count
+            rows = _geometries(model, rooms, call, kept)
+            start = next(rows)
+            first = start[1]
+            with RoomPredictionWriter(out, data, alignment=first.alignment, **texts) as writer:
+                for row, geometry in itertools.chain([start], rows):
+                    where = f"{model.path}: row {row}"
+                    try:
+                        if geometry.key != first.key:
+                            expected = f"{first.key!r}, as in row 0"
+                            raise OutputError("returned", repr(geometry.key), expected)
+                        writer.add(row, **geometry.values)
+                    except (OutputError, PredictionError) as error:
+                        error.where = error.where.removeprefix(f"{out}: row {row}: ")
+                        raise told_of_missing(error, where) from error
+                    kept.write(row, _arrays(geometry))
+                    progress(1)
+    again = f", {done} of them from an earlier run" if done else ""
+    return f"{first.key} of {len(rooms)} rows{again}"
+
+
+def _geometries(
+    model: Model, rooms: RoomsFile, call: Call, kept: KeptRows
+) -> Iterator[tuple[int, Geometry]]:
+    """Yield what is predicted for each row, in order: kept, or from the model."""
+    size = call.batch if model.infer_batch else 1
+    height, width = rooms.spec.height, rooms.spec.width
+    for start in range(0, len(rooms), size):
+        rows = range(start, min(start + size, len(rooms)))
+        stored = {row: kept.read(row) for row in rows}
+        todo = [row for row in rows if stored[row] is None]
+        outputs = dict(zip(todo, _outputs(model, rooms, call, todo), strict=True)) if todo else {}
+        for row in rows:
+            arrays = stored[row]
+            if arrays is not None:
+                yield row, _geometry(arrays)
+                continue
+            try:
+                geometry = read_output(
+                    outputs[row], height, width,
+                    frame=call.frame, key=call.key, missing=call.missing,
+                )  # fmt: skip
+            except OutputError as error:
+                raise error.inside(f"{model.path}: row {row}") from error
+            yield row, geometry
+
+
+def _outputs(model: Model, rooms: RoomsFile, call: Call, rows: Sequence[int]) -> Sequence[Any]:
+    """Return what the model returns for some rows. Raises ModelError."""
+    images, cameras = [], []
+    for row in rows:
+        images.append(call.picture(rooms.read("image", row), rooms.place("image", row)))
+        fov = float(rooms.read("camera/fov_y_degrees", row))
+        size = rooms.spec.height, rooms.spec.width
+        cameras.append(intrinsics(*size, fov, pixel_centers="half"))
+    if model.infer_batch is None:
+        told = [(camera,) if call.intrinsics else () for camera in cameras]
+        return [
+            model.call(model.infer, f"row {row}", image, *more)
+            for row, image, more in zip(rows, images, told, strict=True)
+        ]
+    where = f"rows {rows[0]} to {rows[-1]}"
+    batch = (np.stack(images), *([np.stack(cameras)] if call.intrinsics else []))
+    outputs = model.call(model.infer_batch, where, *batch)
+    if not isinstance(outputs, Sequence) or len(outputs) != len(rows):
+        found = f"{type(outputs).__name__}" + (
+            f" of {len(outputs)}" if isinstance(outputs, Sequence) else ""
+        )
+        raise OutputError(
+            f"{model.path}: {where}: infer_batch", found, f"a list of {len(rows)} dicts"
+        )
+    return outputs
+
+
+def _arrays(geometry: Geometry) -> dict[str, Any]:
+    arrays = {"geometry": geometry.geometry.astype(np.float32), "key": geometry.key}
+    arrays |= {"kind": geometry.kind, "alignment": geometry.alignment}
+    arrays |= {} if geometry.normal is None else {"normal": geometry.normal.astype(np.float32)}
+    return arrays | ({} if geometry.fov_y_degrees is None else {"fov": geometry.fov_y_degrees})
+
+
+def _geometry(arrays: dict[str, Any]) -> Geometry:
+    """Return what `_arrays` kept."""
+    alignment: Any = str(arrays["alignment"])
+    fov = float(arrays["fov"]) if "fov" in arrays else None
+    kind, key = str(arrays["kind"]), str(arrays["key"])
+    return Geometry(kind, alignment, arrays["geometry"], arrays.get("normal"), fov, key)
+
+
+# ---- questions ----
+
+
+def _run_questions(
+    model: Model, data: str | Path, out: str | Path, call: Call, texts: dict[str, Any],
+    settings: dict[str, Any], keep: str | None, progress: Progress,
+) -> str:  # fmt: skip
+    from iqtt.files.reader import QuestionsFile
+
+    values = []
+    with QuestionsFile(data) as questions:
+        settings |= {"data": questions.fingerprint or ""}
+        with kept_rows(out, settings, keep) as kept:
+            done = kept.count
+            for row in range(len(questions)):
+                arrays = kept.read(row)
+                if arrays is None:
+                    images = call.picture(questions.read("questions", row), f"{data}: row {row}")
+                    value = model.call(model.infer, f"row {row}", images[0], images[1:])
+                    where = f"{model.path}: row {row}: returned"
+                    arrays = {"value": _answer(value, questions.answers, where)}
+                    kept.write(row, arrays)
+                values.append(arrays["value"])
+                if values[-1].shape != values[0].shape:
+                    where = f"{model.path}: row {row}: returned"
+                    raise OutputError(where, "an index after scores, or scores after an index",
+                                      "the same for all questions")  # fmt: skip
+                progress(1)
+            form = "scores" if values and values[0].ndim else "answer"
+            given: dict[str, Any] = {form: np.array(values)}
+            write_answers(out, data, **texts, **given)
+    again = f", {done} of them from an earlier run" if done else ""
+    return f"{form} to {len(values)} questions{again}"
+
+
+def _answer(value: Any, offered: int, where: str) -> Array:
+    """Return an index as int64, or scores (A,) as float64. Raises OutputError."""
+    expected = f"the index of an answer, 0 to {offered - 1}, or {offered} scores"
+    array = as_array(value, where)
+    if array.shape == () and array.dtype.kind in "iu" and -1 <= int(array) < offered:
+        return array.astype(np.int64)
+    if array.shape == (offered,) and array.dtype.kind in "fiu" and np.isfinite(array).all():
+        return array.astype(np.float64)
+    found = "None" if value is None else f"{value!r:.60}"
+    raise OutputError(where, " ".join(found.split()), expected)
