@@ -22,7 +22,8 @@ from scenegen.command_line.paths import (
 
 SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
 MOST_NAMED = 20  # exported rows whose files are listed
-SHARED = ("parquet", "webdataset")  # and of files of many
+SHARED = ("parquet", "webdataset")  # of files of many rows
+FOLDERS = ("nerfstudio", "colmap", "bop", "coco", "moge")  # of folders that a tool reads
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen preview rooms.h5 --random 12 --out sheet.png")
@@ -108,17 +109,17 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
 )
 @click.argument("file", type=InputPath())
 @click.option(
-    "--items", type=Items(), help="Rows to export; parquet and webdataset take all without it."
+    "--items", type=Items(), help="Rows to export; exr, png, ply and obj need it, or --all."
 )
 @click.option("--all", "every", is_flag=True, help="Export all rows.")
 @click.option(
     "--format",
     "form",
-    type=click.Choice([*SINGLE, *SHARED]),
+    type=click.Choice([*SINGLE, *SHARED, *FOLDERS]),
     required=True,
     help="exr has all channels; png a picture of each, and a JSON file that says how to decode"
     " them; ply the surfels; obj the scene's mesh; parquet and webdataset all values of many rows,"
-    " for data loaders.",
+    " for data loaders; nerfstudio, colmap, bop, coco and moge the folder that the tool reads.",
 )
 @ENCODING
 @click.option(
@@ -126,26 +127,26 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     type=click.Choice(["8", "16"]),
     default="8",
     show_default=True,
-    help="Bits of images and normals in png. Depth always has 16.",
+    help="Bits of images and normals in PNG files. Depth always has 16.",
 )
 @click.option(
     "--exposure",
     type=click.FloatRange(0, min_open=True),
     default=1.0,
     show_default=True,
-    help="Factor of radiance in png and ply, so that bright images fit.",
+    help="Factor of radiance in pictures and PLY files, so that bright images fit.",
 )
 @click.option(
     "--depth-unit",
     type=click.FloatRange(0, min_open=True),
     default=1e-4,
     show_default=True,
-    help="Scene units for each of the 65,535 steps of depth in png.",
+    help="Scene units for each of the 65,535 steps of depth in PNG files; moge needs none.",
 )
 @click.option(
     "--out",
     type=OutputFolder(),
-    help="Folder to write to; parquet and webdataset make it [., or rooms-parquet of rooms.h5].",
+    help="Folder to write to [.; formats of many rows make one, such as rooms-parquet].",
 )
 @click.option(
     "--rows-per-file",
@@ -156,6 +157,7 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
 )
 @OVERWRITE
 @MESHES
+@DEVICE
 def export(
     file: str,
     items: list[int] | None,
@@ -168,21 +170,25 @@ def export(
     out: str | None,
     rows_per_file: int,
     overwrite: bool,
+    device: str,
     **meshes: Any,
 ) -> None:
     """Write rows of a file in the formats of other tools.
 
-    A value that does not fit into png or ply is refused. The message names the option that helps.
+    A value that does not fit into its encoding is refused. The message names the option that helps.
+    Masks of whole objects, for bop, are rendered (--device).
     """
     if every and items is not None:
         raise click.UsageError("--all and --items exclude each other: use one of them")
+    folder = out or f"{Path(file).stem}-{form}"
+    how = (curve, int(bits), exposure, depth_unit)
     if form in SHARED:
-        folder = out or f"{Path(file).stem}-{form}"
         _export_many(file, items, form, folder, curve, rows_per_file, overwrite)
+    elif form in FOLDERS:
+        _export_folder(file, items, form, folder, overwrite, device, meshes, how)
     elif items is None and not every:
         raise click.UsageError(f"--format {form} needs rows: use --items 0-9, or --all")
     else:
-        how = (curve, int(bits), exposure, depth_unit)
         _export_single(file, items, form, out or ".", overwrite, meshes, how)
 
 
@@ -218,6 +224,40 @@ def _export_many(
     print_line(f"{out}: {count} images in {len(written) - 1} files, {megabytes:.1f} MB")
 
 
+def _export_folder(
+    file: str,
+    items: list[int] | None,
+    form: str,
+    out: str,
+    overwrite: bool,
+    device: str,
+    meshes: dict[str, Any],
+    how: tuple[str, int, float, float],
+) -> None:
+    """Write rows, or all, to the folder that a tool reads; `how` are the fields of `Encoding`."""
+    from scenegen.objects.sources import file_objects
+    from scenegen.rooms.export.encoding import Encoding
+    from scenegen.rooms.export.folder import export_folder
+    from scenegen.rooms.reader import RoomsFile
+
+    with RoomsFile(file) as rooms:
+        objects = file_objects(rooms.spec, **meshes) if form == "bop" else None
+        count = len(rooms if items is None else items)
+        with progress_bar(count, "image") as bar:
+            export_folder(
+                rooms,
+                form,
+                out,
+                items,
+                encoding=Encoding(*how),
+                objects=objects,
+                device=device,
+                overwrite=overwrite,
+                progress=bar.update,
+            )
+    print_line(f"{out}: {count} images")
+
+
 def _export_single(
     file: str,
     items: list[int] | None,
@@ -233,7 +273,8 @@ def _export_single(
     from scenegen.files.pictures import pick_rows
     from scenegen.objects.catalogue import changed_meshes
     from scenegen.objects.sources import file_objects, mesh_folder
-    from scenegen.rooms.export import Encoding, export_paths, export_room
+    from scenegen.rooms.export.encoding import Encoding
+    from scenegen.rooms.export.single import export_paths, export_room
     from scenegen.rooms.reader import RoomsFile
 
     mesh_folder(meshes["shapenet_root"], meshes["objects_root"], meshes["up"])

@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +17,8 @@ def folder_written_beside(
     path: str | Path, names: Collection[str], overwrite: bool = False
 ) -> Iterator[Path]:
     """Give a hidden folder for files of these names; they appear when the block ends well.
+
+    A name that ends in "/" is that of a folder, which is replaced with all that it holds.
 
     A new folder gets its name in one step. An older folder stays, so that it may be a mount point
     or the working directory: its old files are removed, then the new ones get their names. A run
@@ -35,7 +38,10 @@ def folder_written_beside(
                 os.rename(new, folder)
                 return
             for name in names:
-                (folder / name).unlink(missing_ok=True)
+                if name.endswith("/"):
+                    shutil.rmtree(folder / name, ignore_errors=True)
+                else:
+                    (folder / name).unlink(missing_ok=True)
             for name in os.listdir(new):
                 os.replace(new / name, folder / name)
 
@@ -52,10 +58,16 @@ def check_folder(path: str | Path, names: Collection[str], overwrite: bool, own:
     if not overwrite:
         raise FileExistsError(errno.EEXIST, EXISTS, str(folder))
     remove_leftovers(folder)
-    ours = {own, *(name for name in names if (folder / name).is_file())}
+    ours = {own, *(name.rstrip("/") for name in names if _is_there(folder, name))}
     strangers = sorted(set(os.listdir(folder)) - ours)
     if strangers:
         raise FileExistsError(errno.EEXIST, f"holds other files too ({strangers[0]})", str(folder))
+
+
+def _is_there(folder: Path, name: str) -> bool:
+    """Return whether a folder holds a file, or for a name with "/" at its end a folder."""
+    path = folder / name
+    return path.is_dir() and not path.is_symlink() if name.endswith("/") else path.is_file()
 
 
 def check_place(path: str | Path) -> None:

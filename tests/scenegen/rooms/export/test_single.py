@@ -14,7 +14,8 @@ from scenegen.camera import pixel_directions, transform_vectors
 from scenegen.common.errors import SpecError
 from scenegen.description.scenes import SHAPE_NAMES
 from scenegen.objects.scene_mesh import scene_parts
-from scenegen.rooms.export import PICTURES, PLAIN, Encoding, export_paths, export_room
+from scenegen.rooms.export.encoding import PLAIN, Encoding
+from scenegen.rooms.export.single import PICTURES, export_paths, export_room
 
 
 @pytest.fixture(scope="module")

@@ -1,85 +1,24 @@
 """Write one row of a file of rooms in the formats of other tools: EXR, PNG, PLY, OBJ."""
 
-import json
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import png
 from numpy.typing import NDArray
 
 from scenegen.camera import transform_vectors
-from scenegen.common.errors import SpecError
 from scenegen.files.new_file import written_beside
 from scenegen.objects.catalogue import Objects, built_in_shape
-from scenegen.rooms.obj_file import one_word, write_mtl, write_obj
-from scenegen.rooms.preview import srgb
+from scenegen.rooms.export.encoding import PLAIN, Encoding, write_png
+from scenegen.rooms.export.obj import one_word, write_mtl, write_obj
 from scenegen.rooms.reader import Room
 
 Array = NDArray[Any]
 Writer = Callable[[Room, Path], None]
 FORMATS = ("exr", "png", "ply", "obj")
 PICTURES = ("image", "depth", "normal", "object_id")  # a PNG file of each
-
-
-@dataclass(frozen=True)
-class Encoding:
-    """How values become the whole numbers of PNG and PLY files.
-
-    Attributes:
-        curve: of images, "srgb" for eyes and networks, or "linear".
-        bits: of images and normals in PNG files, 8 or 16.
-        exposure: factor of radiance; 1 is the brightest that can be encoded.
-        depth_unit: scene units for each step of a 16-bit depth.
-    """
-
-    curve: str = "srgb"
-    bits: int = 8
-    exposure: float = 1.0
-    depth_unit: float = 1e-4
-
-    def colors(self, room: Room) -> Array:
-        """Return the image as fractions of the brightest value. Raises SpecError."""
-        radiance = room.radiance * self.exposure
-        brightest = float(radiance.max())
-        if brightest > 1 + 1e-6:
-            hint = f"use --exposure {0.9 * self.exposure / brightest:.2g}, or --format exr"
-            where = f"row {room.index}: radiance"
-            raise SpecError(where, f"{brightest:.4g} with this exposure", "at most 1", hint)
-        return (
-            np.asarray(srgb(radiance))
-            if self.curve == "srgb"
-            else np.asarray(np.clip(radiance, 0, 1))
-        )
-
-    def depth_steps(self, room: Room) -> Array:
-        """Return the depth in steps of `depth_unit`, 0 where nothing is hit. Raises SpecError."""
-        steps = np.rint(np.nan_to_num(room.depth.astype(float)) / self.depth_unit)
-        if steps.max() > 65535:
-            farthest = float(np.nanmax(room.depth))
-            hint = f"use --depth-unit {1.1 * farthest / 65535:.2g}, or --format exr"
-            expected = f"at most {65535 * self.depth_unit:.5g} scene units in 16 bits"
-            raise SpecError(f"row {room.index}: depth", f"{farthest:.5g}", expected, hint)
-        return np.asarray(steps)
-
-    def description(self, room: Room) -> str:
-        """Return, as JSON, how the PNG files of a room are decoded, and its camera."""
-        most = 2**self.bits - 1
-        about = {
-            "image": {"encoding": self.curve, "bits": self.bits, "exposure": self.exposure},
-            "depth": {"unit": self.depth_unit, "bits": 16, "nothing": 0, "kind": "planar"},
-            "normal": {"scale": 2 / most, "offset": -1, "bits": self.bits, "frame": "camera"},
-            "object_id": {"offset": -1, "bits": 8},
-            "world_from_camera": room.world_from_camera.tolist(),
-            "fov_y_degrees": room.fov_y_degrees,
-        }
-        return json.dumps(about, indent=1) + "\n"
-
-
-PLAIN = Encoding()
 
 
 def export_paths(row: int, folder: str | Path, stem: str, form: str) -> list[Path]:
@@ -111,7 +50,7 @@ def export_room(
     if form == "png":
         writers = _png_writers(room, encoding)
     elif form == "ply":
-        colors = np.rint(encoding.colors(room) * 255).astype(np.uint8)
+        colors = encoding.color_bytes(room)
         writers = [lambda room, path: write_surfels_ply(room, path, colors)]
     elif form == "obj":
         writers = [
@@ -150,19 +89,34 @@ def write_exr(room: Room, path: str | Path) -> None:
 def write_surfels_ply(room: Room, path: str | Path, colors: Array) -> None:
     """Write the surfels in the world frame: position, normal, colour (H, W, 3) uint8, object id."""
     hit = room.object_id >= 0
-    names = ("x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "object_id")
-    kinds = 6 * ["float"] + 4 * ["uchar"]  # Open3D reads no "char"
-    types = {"float": "<f4", "uchar": "u1"}
-    points = room.points_world[hit]
+    comments = [
+        f"surfels of room {room.index}: world frame, y up, scene units",
+        "object_id: 0 the room, k the k-th object; pixels without a hit are left out",
+    ]
     normals = transform_vectors(room.world_from_camera, room.normal[hit])
-    columns = (*points.T, *normals.T, *colors[hit].T, room.object_id[hit])
+    columns = (room.points_world[hit], normals, colors[hit])
+    write_points_ply(path, *columns, comments, object_id=room.object_id[hit])
+
+
+def write_points_ply(
+    path: str | Path,
+    points: Array,
+    normals: Array,
+    colors: Array,
+    comments: Sequence[str],
+    **bytes_of: Array,
+) -> None:
+    """Write points, normals (n, 3) and colours (n, 3) uint8, and further columns of bytes (n,)."""
+    names = ("x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", *bytes_of)
+    kinds = 6 * ["float"] + (3 + len(bytes_of)) * ["uchar"]  # Open3D reads no "char"
+    types = {"float": "<f4", "uchar": "u1"}
     named = list(zip(names, kinds, strict=True))
+    columns = (*points.T, *normals.T, *colors.T, *bytes_of.values())
     vertices = np.rec.fromarrays(columns, [(name, types[kind]) for name, kind in named])
     header = [
         "ply",
         "format binary_little_endian 1.0",
-        f"comment surfels of room {room.index}: world frame, y up, scene units",
-        "comment object_id: 0 the room, k the k-th object; pixels without a hit are left out",
+        *(f"comment {comment}" for comment in comments),
         f"element vertex {len(vertices)}",
         *(f"property {kind} {name}" for name, kind in named),
         "end_header",
@@ -171,24 +125,20 @@ def write_surfels_ply(room: Room, path: str | Path, colors: Array) -> None:
 
 
 def _png_writers(room: Room, encoding: Encoding) -> list[Writer]:
-    most = 2**encoding.bits - 1
+    bits = encoding.bits
     pictures = {
-        "image": (encoding.colors(room) * most, encoding.bits),
+        "image": (encoding.colors(room) * encoding.largest, bits),
         "depth": (encoding.depth_steps(room), 16),
-        "normal": ((room.normal * 0.5 + 0.5) * most, encoding.bits),
+        "normal": (encoding.normal_steps(room.normal), bits),
         "object_id": (room.object_id.astype(float) + 1, 8),
     }
-    writers: list[Writer] = [partial(_write_png, *pictures[name]) for name in PICTURES]
-    return [*writers, lambda room, path: _write_text(path, encoding.description(room))]
+    about = encoding.description(room)
+    writers: list[Writer] = [partial(_write_picture, *pictures[name]) for name in PICTURES]
+    return [*writers, lambda _room, path: _write_text(path, about)]
 
 
-def _write_png(values: Array, bits: int, _room: Room, path: Path) -> None:
-    """Write (H, W) or (H, W, 3) values, from 0 to the largest whole number of so many bits."""
-    pixels = np.rint(values).astype(np.uint8 if bits == 8 else np.uint16)
-    height, width = pixels.shape[:2]
-    writer = png.Writer(width, height, greyscale=pixels.ndim == 2, bitdepth=bits)
-    with path.open("wb") as file:
-        writer.write(file, pixels.reshape(height, -1))
+def _write_picture(values: Array, bits: int, _room: Room, path: Path) -> None:
+    write_png(path, values, bits)
 
 
 def _write_text(path: Path, text: str) -> None:

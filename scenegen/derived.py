@@ -1,0 +1,131 @@
+"""Truth that follows from depth, cameras and poses, without rendering: arrays in, arrays out.
+
+Frames and pixels are those of `scenegen.camera`.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.camera import back_project, pixel_size, transform_points, transform_vectors
+from scenegen.common.records import check
+
+Array = NDArray[Any]
+
+
+def project(
+    points: Array, world_from_camera: Array, height: int, width: int, fov_y_degrees: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return where points of the world, (..., 3), are in an image, and their planar depth.
+
+    Returns (..., 2) pixels, x right and y down, the centre of the first pixel at (0.5, 0.5); and
+    depth (...), scene units. Pixels are NaN where the depth is not positive.
+    """
+    local = (points - world_from_camera[:3, 3]) @ world_from_camera[:3, :3]
+    depth = -local[..., 2]
+    scale = pixel_size(height, fov_y_degrees) * np.where(depth > 0, depth, np.nan)
+    x = width / 2 + local[..., 0] / scale
+    y = height / 2 - local[..., 1] / scale
+    return np.stack([x, y], axis=-1), np.asarray(depth)
+
+
+def optical_flow(
+    depth: Array,
+    world_from_camera: Array,
+    other_world_from_camera: Array,
+    fov_y_degrees: float,
+    other_fov_y_degrees: float | None = None,
+) -> NDArray[np.float64]:
+    """Return how far each pixel's surface point moves from one view to another, (H, W, 2).
+
+    In pixels, x right and y down. The scene does not move; occluded points have a flow too. NaN
+    where the depth, (H, W), is NaN or the point is behind the other camera.
+    """
+    height, width = depth.shape
+    points = transform_points(world_from_camera, back_project(depth, fov_y_degrees))
+    fov = fov_y_degrees if other_fov_y_degrees is None else other_fov_y_degrees
+    pixels, _ = project(points, other_world_from_camera, height, width, fov)
+    centers = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1)
+    return np.asarray(pixels - centers)
+
+
+def seen_from(
+    points: Array,
+    object_id: Array,
+    other_depth: Array,
+    other_normal: Array,
+    other_object_id: Array,
+    other_world_from_camera: Array,
+    fov_y_degrees: float,
+    tolerance: float = 0.75,
+) -> NDArray[np.bool_]:
+    """Return whether surface points are visible in another view, which is known by its maps.
+
+    A point is visible where it lies on the surface of its object that one of the four nearest
+    pixels of the other view shows: no farther behind the plane of that pixel's surfel than
+    `tolerance` pixels are wide there. So the answer can be wrong in a band of a pixel along
+    silhouettes.
+
+    Args:
+        points: world, (..., 3); those with NaN are not visible.
+        object_id: of the points, (...).
+        other_depth, other_normal, other_object_id: maps of the other view, (H, W), (H, W, 3) and
+            (H, W), as in a file of rooms.
+        fov_y_degrees: vertical field of view of the other view.
+    """
+    height, width = other_depth.shape
+    pixels, depth = project(points, other_world_from_camera, height, width, fov_y_degrees)
+    surfels = transform_points(other_world_from_camera, back_project(other_depth, fov_y_degrees))
+    normals = transform_vectors(other_world_from_camera, other_normal)
+    inside = (
+        (depth > 0)
+        & (pixels >= 0).all(axis=-1)
+        & (pixels[..., 0] < width)
+        & (pixels[..., 1] < height)
+    )
+    corner = np.floor(np.where(inside[..., None], pixels, 0.5) - 0.5).astype(np.int64)
+    thickness = tolerance * pixel_size(height, fov_y_degrees) * depth
+    visible = np.zeros(inside.shape, bool)
+    for right, down in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        column = (corner[..., 0] + right).clip(0, width - 1)
+        row = (corner[..., 1] + down).clip(0, height - 1)
+        offset = np.nan_to_num(points) - np.nan_to_num(surfels[row, column])
+        before = np.einsum("...i,...i->...", offset, normals[row, column])
+        visible |= (other_object_id[row, column] == object_id) & (before > -thickness)
+    return np.asarray(visible & inside)
+
+
+def object_coordinates(
+    points: Array, object_id: Array, world_from_object: Array
+) -> NDArray[np.float64]:
+    """Return where each pixel's point lies in the frame of its object's unit shape, (H, W, 3).
+
+    Unit shapes have bounding radius 1 about 0, so (value + 1) / 2 lies in the unit cube, as the
+    coordinates of NOCS do (Wang et al., CVPR 2019). NaN where no object is hit.
+
+    Args:
+        points: world, (H, W, 3), scene units.
+        object_id: (H, W), from 1 for objects.
+        world_from_object: similarities by slot, (K, 4, 4).
+    """
+    coordinates = np.full(points.shape, np.nan)
+    most = int(object_id.max(initial=0))
+    check(most <= len(world_from_object), "object_id", most, f"at most {len(world_from_object)}")
+    for k in range(1, most + 1):
+        matrix, shown = world_from_object[k - 1], object_id == k
+        if shown.any():
+            linear = matrix[:3, :3] / np.square(matrix[:3, 0]).sum()  # transposed inverse
+            coordinates[shown] = (points[shown] - matrix[:3, 3]) @ linear
+    return coordinates
+
+
+def albedo(object_id: Array, reflectance: Array) -> NDArray[np.float64]:
+    """Return the reflectance rho of each pixel's surface, (H, W, 3) RGB, linear; NaN for nothing.
+
+    Args:
+        object_id: (H, W).
+        reflectance: by object id, (1 + K, 3), as `material/reflectance` of a file of rooms.
+    """
+    rho = np.asarray(reflectance, np.float64)[object_id.clip(0)]
+    return np.where(object_id[..., None] < 0, np.nan, rho)
