@@ -21,8 +21,10 @@ from metrics.measures.image_search import nearest_distances_on_image
 from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_depth
 from metrics.measures.objects import counted_objects, object_means, single_objects
 from metrics.measures.relief import relief_scores
+from metrics.scoring.geometry import alignments_scored, planar_depth
 from metrics.scoring.metric_names import OF_EMPTY_ROOM, OTHER_SCENE
 from metrics.submissions.problems import PredictionError
+from metrics.submissions.reader import PredictedView
 from metrics.submissions.rules import Against, broken_rules, refuse_pixels
 from metrics.submissions.truths import TrueView
 from scenegen.camera import back_project, pixel_directions
@@ -73,6 +75,30 @@ def true_relief(depth: Array, world_from_camera: Array, fov_y_degrees: float) ->
     """Return the relief of a true view of this depth, (H, W), scene units; NaN where no depth."""
     empty, _ = empty_room(world_from_camera, fov_y_degrees, *depth.shape)
     return np.asarray(empty - depth)
+
+
+def score_prediction(
+    predicted: PredictedView,
+    truth: TrueView,
+    empty: Array,
+    other_relief: Array | None = None,
+    non_finite: NonFinite = "error",
+) -> ImageScores:
+    """Return every score of what is predicted for one image; arguments and errors as `score_view`.
+
+    The depth is scored after every alignment that leaves as much open as the method does.
+    """
+    depth, alignment = planar_depth(predicted, truth.depth)
+    return score_view(
+        depth,
+        predicted.normal,
+        truth,
+        empty,
+        other_relief,
+        alignment=alignment,
+        alignments=alignments_scored(predicted.kind, predicted.alignment),
+        non_finite=non_finite,
+    )
 
 
 def score_view(

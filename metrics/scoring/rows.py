@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.scoring.geometry import alignments_scored, planar_depth
 from metrics.scoring.image_scores import (
     score_empty_room,
-    score_view,
+    score_prediction,
     true_relief,
 )
 from metrics.scoring.metric_names import OBJECT_SCORES
@@ -132,7 +131,6 @@ class RowScorer:
         """Take files that stay open as long as rows are scored."""
         self._files, self._truth = files, truth
         self._entries = [{row: i for i, row in enumerate(f.rows.tolist())} for f in files]
-        self._alignments = alignments_scored(files[0].kind, files[0].alignment)
 
     def score(self, pairs: Array) -> ScoredRows:
         """Return the scores of rows, (N, 2) with a row of another scene each.
@@ -153,11 +151,7 @@ class RowScorer:
             for file, entries in zip(self._files, self._entries, strict=True):
                 i = entries[row]
                 predicted = file.view(i)
-                depth, alignment = planar_depth(predicted, view.depth)
-                score = functools.partial(
-                    score_view, depth, predicted.normal, view, empty.depth, relief,
-                    alignment=alignment, alignments=self._alignments,
-                )  # fmt: skip
+                score = functools.partial(score_prediction, predicted, view, empty.depth, relief)
                 try:
                     scores.append(score())
                 except PredictionError as error:
