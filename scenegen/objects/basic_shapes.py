@@ -25,6 +25,7 @@ from scenegen.objects.solids import (
     polyhedron,
     resting_directions,
     revolution,
+    unshared,
 )
 
 
@@ -129,7 +130,7 @@ def _teapot() -> UnitShape:
     corners = (corners - center) * scale
     triangles = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
     corner_normals = np.concatenate([normals[:, [0, 1, 2]], normals[:, [0, 2, 3]]])
-    mesh = face_outwards(triangles, corner_normals)
+    mesh = unshared(*face_outwards(triangles, corner_normals))
     return UnitShape("teapot", lambda: mesh, hull, discs, 0.0, resting)
 
 

@@ -4,6 +4,7 @@ import errno
 import json
 import math
 import os
+import secrets
 import struct
 import threading
 import warnings
@@ -15,12 +16,10 @@ from pathlib import Path
 import numpy as np
 from isal import isal_zlib
 
-from scenegen.files.new_file import written_beside
 from scenegen.objects.solids import Array
 
 MOST_BYTES = 2**35  # of the entries in a folder
 ENDING = ".arrays"
-FIRST_READ = 2**14  # bytes, which hold the header and small arrays
 _LENGTH_AND_CHECK = struct.Struct("<2I")  # of the header
 
 
@@ -72,12 +71,17 @@ class DiskCache:
         """Keep arrays under a key; a folder above MOST_BYTES loses the entries written first."""
         if self.folder is None or not self._writes:
             return
-        path = self.folder / f"{key}{ENDING}"
+        # What a killed process leaves of the first name is an entry that nobody asks for.
+        begun = self.folder / f"{key}.{secrets.token_hex(8)}{ENDING}"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             data = _as_bytes(arrays)
-            with written_beside(path, overwrite=True) as temporary:
-                temporary.write_bytes(data)
+            try:
+                begun.write_bytes(data)
+                os.replace(begun, self.folder / f"{key}{ENDING}")
+            except BaseException:
+                begun.unlink(missing_ok=True)
+                raise
             self._trim(len(data))
         except OSError as error:
             self._give_up(error)
@@ -130,18 +134,18 @@ class DiskCache:
 
 
 def _as_bytes(arrays: dict[str, Array]) -> bytes:
-    header, body = {}, b""
+    header, parts, offset = {}, list[bytes](), 0
     for name, array in arrays.items():
-        data = np.ascontiguousarray(array).tobytes()
-        header[name] = [array.dtype.str, array.shape, len(body), isal_zlib.crc32(data)]
-        body += data
+        parts.append(np.ascontiguousarray(array).tobytes())
+        header[name] = [array.dtype.str, array.shape, offset, isal_zlib.crc32(parts[-1])]
+        offset += len(parts[-1])
     text = json.dumps(header).encode()
-    return _LENGTH_AND_CHECK.pack(len(text), isal_zlib.crc32(text)) + text + body
+    return b"".join([_LENGTH_AND_CHECK.pack(len(text), isal_zlib.crc32(text)), text, *parts])
 
 
 def _read_arrays(file: RawIOBase, names: Sequence[str]) -> dict[str, Array]:
     """Read some arrays of a file. Raises an exception of any kind where it is damaged."""
-    data = file.read(FIRST_READ) or b""
+    data = file.read() or b""
     length, check = _LENGTH_AND_CHECK.unpack_from(data)
     start = _LENGTH_AND_CHECK.size + length
     text = data[_LENGTH_AND_CHECK.size : start]
@@ -153,8 +157,6 @@ def _read_arrays(file: RawIOBase, names: Sequence[str]) -> dict[str, Array]:
         dtype, shape, offset, check = header[name]
         kind, count = np.dtype(dtype), math.prod(shape)
         first, last = start + offset, start + offset + count * kind.itemsize
-        if last > len(data):
-            data += file.read(last - len(data)) or b""
         part = memoryview(data)[first:last]
         if isal_zlib.crc32(part) != check:
             raise ValueError("damaged array")

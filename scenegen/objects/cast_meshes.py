@@ -1,32 +1,24 @@
-"""Shapes in the form that is rendered: triangles and normals; grown triangles for trees."""
+"""Shapes in the form that is rendered: in single precision; triangles grown for trees."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from scenegen.common.rotations import cross
-from scenegen.objects.solids import Array, UnitShape, face_vectors
+from scenegen.objects.solids import Array, Mesh, UnitShape, face_vectors
 
 OVERLAP = 4e-6  # of neighbouring triangles; rays slip between them if it is below 2e-6
 
 
-@dataclass(frozen=True, eq=False)
-class CastMesh:
-    """What is cast and shaded.
-
-    Attributes:
-        triangles: corners, (F, 3, 3) float32.
-        normals: as from `normal_table`, (F, 12) float32.
-    """
-
-    triangles: Array
-    normals: Array
-
-
-def cast_mesh(shape: UnitShape) -> CastMesh:
-    """Return a unit shape as the ray caster takes it."""
-    return CastMesh(shape.triangles.astype(np.float32), normal_table(shape))
+def cast_mesh(mesh: Mesh) -> Mesh:
+    """Return a mesh as the rasteriser takes it: float32, and vertices numbered by few bytes."""
+    number = np.uint16 if len(mesh.vertices) <= 2**16 else np.uint32
+    normals = mesh.normals
+    return Mesh(
+        mesh.vertices.astype(np.float32, copy=False),
+        mesh.faces.astype(number),
+        None if normals is None else normals.astype(np.float32),
+    )
 
 
 def normal_table(shape: UnitShape) -> Array:

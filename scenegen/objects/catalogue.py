@@ -8,13 +8,13 @@ from scenegen.common.errors import SpecError
 from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.basic_shapes import unit_shape
-from scenegen.objects.cast_meshes import CastMesh, cast_mesh
+from scenegen.objects.cast_meshes import cast_mesh
 from scenegen.objects.families.members import MEMBERS, member_shape
 from scenegen.objects.families.store import MEMBER_STORE
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import object_split
 from scenegen.objects.meshes.store import MeshStore
-from scenegen.objects.solids import UnitShape, without_triangles
+from scenegen.objects.solids import Mesh, UnitShape, without_triangles
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +87,11 @@ def face_count(shape_of: Callable[[str], UnitShape], name: str) -> int:
     return _known(shape_of, name)[1]
 
 
-def mesh_to_cast(shape_of: Callable[[str], UnitShape], name: str) -> CastMesh:
-    """Return a unit shape as the ray caster takes it; members of families come from their cache."""
+def mesh_to_cast(shape_of: Callable[[str], UnitShape], name: str) -> Mesh:
+    """Return a mesh as from `cast_mesh`; those of families come from their cache."""
     if _is_member(shape_of, name):
         return MEMBER_STORE.mesh(*_family_and_number(name))
-    return cast_mesh(shape_of(name))
+    return cast_mesh(shape_of(name).mesh)
 
 
 def _is_member(shape_of: Callable[[str], UnitShape], name: str) -> bool:
@@ -104,8 +104,8 @@ def _known(shape_of: Callable[[str], UnitShape], name: str) -> tuple[UnitShape, 
         return MEMBER_STORE.outline(*_family_and_number(name))
     shape = shape_of(name)
     if name in SHAPE_NAMES:
-        return shape, 0 if shape.surface else len(shape.triangles)
-    return without_triangles(shape), len(shape.triangles)
+        return shape, 0 if shape.surface else len(shape.mesh.faces)
+    return without_triangles(shape), len(shape.mesh.faces)
 
 
 @lru_cache(maxsize=16)

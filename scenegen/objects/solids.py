@@ -13,9 +13,24 @@ from scenegen.common.rotations import cross
 from scenegen.objects.exact_surfaces import Surface, polyhedron_of
 
 Array = NDArray[Any]
-Mesh = tuple[Array, Array]  # triangles and normals
 SEGMENTS = 512  # around an axis
 STRIPS = 16  # along a straight profile; with long slivers rays take three times as long
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles that share vertices.
+
+    Attributes:
+        vertices: corners, (V, 3).
+        faces: three vertices of each triangle, (F, 3) integers, counter-clockwise seen from
+            outside.
+        normals: unit normals of the smooth surface at the vertices, (V, 3); None for flat faces.
+    """
+
+    vertices: Array
+    faces: Array
+    normals: Array | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +39,7 @@ class UnitShape:
 
     Attributes:
         name: as in `scenes.PlacedObject.shape`.
-        make_mesh: returns `triangles` and `normals`; it is called when one is first asked for.
+        make_mesh: returns the mesh; it is called when that is first asked for.
         hull_points, hull_discs, rounding: a convex body that contains the shape, for placement. It
             is the convex hull of horizontal discs with centres (V, 3) and radii (V,), extended by
             the distance `rounding` in all directions.
@@ -48,15 +63,20 @@ class UnitShape:
         """The triangles and their normals."""
         return self.make_mesh()
 
-    @property
+    @cached_property
     def triangles(self) -> Array:
-        """Corners, (F, 3, 3), counter-clockwise seen from outside."""
-        return self.mesh[0]
+        """Corners, (F, 3, 3) float64, counter-clockwise seen from outside."""
+        return self.mesh.vertices.astype(np.float64)[self.mesh.faces]
 
-    @property
+    @cached_property
     def normals(self) -> Array:
-        """Unit normals of the smooth surface at those corners, (F, 3, 3)."""
-        return self.mesh[1]
+        """Unit normals of the surface at those corners, (F, 3, 3)."""
+        if self.mesh.normals is not None:
+            return np.asarray(self.mesh.normals[self.mesh.faces])
+        a, b, c = self.triangles.swapaxes(0, 1)
+        normals = np.cross(b - a, c - a)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        return np.broadcast_to(normals[:, None], self.triangles.shape)  # one copy for the corners
 
 
 def without_triangles(shape: UnitShape) -> UnitShape:
@@ -65,8 +85,14 @@ def without_triangles(shape: UnitShape) -> UnitShape:
 
 
 def no_mesh() -> Mesh:
-    """Return no triangles and no normals."""
-    return np.zeros((0, 3, 3)), np.zeros((0, 3, 3))
+    """Return a mesh without triangles."""
+    return Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int64), None)
+
+
+def unshared(triangles: Array, normals: Array) -> Mesh:
+    """Return triangles and normals, (F, 3, 3) each, as a mesh whose triangles share no vertices."""
+    faces = np.arange(3 * len(triangles)).reshape(-1, 3)
+    return Mesh(triangles.reshape(-1, 3), faces, normals.reshape(-1, 3))
 
 
 def polyhedron(name: str, points: Array) -> UnitShape:
@@ -75,7 +101,7 @@ def polyhedron(name: str, points: Array) -> UnitShape:
     points = points / np.linalg.norm(points, axis=1).max()
     hull = ConvexHull(points)
     normals = np.repeat(hull.equations[:, None, :3], 3, axis=1)
-    mesh = face_outwards(points[hull.simplices], normals)
+    mesh = unshared(*face_outwards(points[hull.simplices], normals))
     resting = resting_directions(points)
     exact = polyhedron_of(hull.equations)
     discs = np.zeros(len(points))
@@ -118,7 +144,8 @@ def revolution(
                 take = [np.s_[i : i + rows, j : j + columns] for i, j in (a, b, c)]
                 corners.append(np.stack([p[t] for t in take], axis=2).reshape(-1, 3, 3))
                 normals.append(np.stack([n[t] for t in take], axis=2).reshape(-1, 3, 3))
-        return face_outwards(np.concatenate(corners) * scale, np.concatenate(normals))
+        outwards = face_outwards(np.concatenate(corners) * scale, np.concatenate(normals))
+        return unshared(*outwards)
 
     if resting is None:
         resting = resting_directions(np.unique(turn(rings, angle[:-1]).reshape(-1, 3), axis=0))

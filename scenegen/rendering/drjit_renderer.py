@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from scenegen.camera import pixel_size
 from scenegen.description.specs import DatasetSpec
-from scenegen.objects.cast_meshes import CastMesh
 from scenegen.objects.catalogue import mesh_to_cast
 from scenegen.objects.exact_surfaces import Surface
+from scenegen.objects.solids import Mesh
 from scenegen.rendering.cubes import Cubes, closest_cube, upload_cubes
 from scenegen.rendering.model_scene import GRID, model_scene
 from scenegen.rendering.packing import SceneBatch
@@ -30,10 +30,11 @@ from scenegen.rendering.rays import (
     nearer_than_room,
     normal_at,
     radiance_at,
+    visible_normal,
 )
 from scenegen.rendering.surfaces.in_kernel import upload_surfaces
 from scenegen.rendering.tables import gather_row, upload_table
-from scenegen.rendering.unit_scene import UnitScene, stacked, unit_scene
+from scenegen.rendering.unit_scene import UnitScene, unit_scene
 
 Array = NDArray[Any]
 LANES = 32  # an image's rays are padded to a multiple of this, so no SIMD packet spans two images
@@ -52,9 +53,7 @@ def launch_pixels(
     scenes, cameras = upload_scenes(batch, variant, models)
     cubes = upload_cubes(batch) if batch.cubes_only else None
     if batch.spec.source != "shapes":
-        meshes = upload_triangles(
-            batch, [model.triangles for model in models], padded_rays(batch.spec)
-        )
+        meshes = upload_triangles(batch, models, padded_rays(batch.spec))
     everything = _trace(batch, scenes, cameras, cubes, meshes)
     components = {name: everything[name] for name in fields}
     dr.eval(components)
@@ -72,9 +71,7 @@ def launch_pixels(
     return lambda: {name: pixels(name) for name in fields}
 
 
-def upload_scenes(
-    batch: SceneBatch, variant: str, models: Sequence[CastMesh]
-) -> tuple[Scenes, Any]:
+def upload_scenes(batch: SceneBatch, variant: str, models: Sequence[Mesh]) -> tuple[Scenes, Any]:
     """Return the scenes on the device, and the cameras, (B, 13): world_from_camera, pixel size.
 
     `models` are those of the batch's names, unless these are basic shapes.
@@ -88,10 +85,7 @@ def upload_scenes(
         tree, offset = None, np.zeros((max(1, len(models)), 3))
         if spec.shadows:
             tree, offset = model_scene(variant, batch.shape_of, batch.names, models)
-        mi.set_variant(variant)
-        normals = stacked([model.normals for model in models])[1]
-        # The rasteriser counts triangles from the first row of all tables.
-        unit = UnitScene(tree, offset, np.zeros(len(offset), np.uint32), GRID, normals)
+        unit = UnitScene(tree, offset, np.zeros(len(offset), np.uint32), GRID, None)
     mi.set_variant(variant)
     exact = upload_surfaces(surfaces)
     shape = np.maximum(batch.shape, 0)
@@ -166,11 +160,13 @@ def _trace(
         elif meshes:
             keys = rasterise(meshes, x, y)
             hit = nearest_triangle(meshes, keys, item * rays + pixel, dx, dy)
-            t, object_id, face, uv = nearer_than_room(scenes, item, origin, d, hit)
+            t, object_id, flat, smooth = nearer_than_room(scenes, item, origin, d, hit)
         else:
             t, object_id, face, uv = closest_hit(scenes, item, origin, d)
         p = origin + dr.select(object_id >= 0, t, 0) * d
-        if not cubes:
+        if meshes:
+            n = visible_normal(scenes, item, p, d, object_id, (flat, smooth))
+        elif not cubes:
             n = normal_at(scenes, item, p, d, object_id, face, uv)
         return t, object_id, n, radiance_at(scenes, item, p, d, n, object_id, spec.shadows)
 

@@ -20,8 +20,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.objects.cast_meshes import CastMesh, overlapping
-from scenegen.objects.solids import UnitShape
+from scenegen.objects.cast_meshes import overlapping
+from scenegen.objects.solids import Mesh, UnitShape
 from scenegen.rendering.unit_scene import triangle_mesh
 
 Array = NDArray[Any]
@@ -45,11 +45,11 @@ class ModelCache:
         self.kept.clear()
         self.faces = 0
 
-    def get(self, variant: str, shape_of: ShapeOf, name: str, mesh: CastMesh) -> Any:
+    def get(self, variant: str, shape_of: ShapeOf, name: str, mesh: Mesh) -> Any:
         """Return a model's Mitsuba shape group from the cache, or make it."""
         key = (variant, shape_of, name)
         if key not in self.kept:
-            grown = overlapping(mesh.triangles)
+            grown = overlapping(mesh.vertices[mesh.faces])
             group = mi.load_dict({"type": "shapegroup", "mesh": triangle_mesh(name, grown)})
             self.kept[key] = group, len(grown)
             self.faces += len(grown)
@@ -64,7 +64,7 @@ MODELS = ModelCache()
 
 
 def model_scene(
-    variant: str, shape_of: ShapeOf, names: Sequence[str], meshes: Sequence[CastMesh]
+    variant: str, shape_of: ShapeOf, names: Sequence[str], meshes: Sequence[Mesh]
 ) -> tuple[Any, Array]:
     """Build the scene of these models, at most MOST_MODELS; return it and their places, (M, 3)."""
     mi.set_variant(variant)

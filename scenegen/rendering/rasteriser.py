@@ -21,13 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import pixel_size
+from scenegen.objects.solids import Mesh
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.tables import gather_row, upload_table
+from scenegen.rendering.tables import gather_packet, gather_row, upload_rows, upload_table
 
 Array = NDArray[Any]
 NOTHING = 0xFFFFFFFF_FFFFFFFF  # the key of a pixel that no triangle covers
 SLACK = 0.01  # pixels by which bounding rectangles grow, as corners are rounded
 CHUNK = 24  # pixels that a thread visits at most; larger triangles take several threads
+NO_NORMALS = np.zeros((0, 3), np.float32)
 BEHIND = 1e-6  # a corner nearer to the camera's plane than this has no place in the picture
 
 
@@ -41,12 +43,15 @@ class Triangles:
         images, height, width: of the batch.
         rays: of an image, padded to whole SIMD packets.
         count: number of threads.
-        corners: of each triangle of each model, (1 + F, 9), in the frame of its unit shape; row 0
-            belongs to no triangle.
+        vertices: of all models, in the frames of their unit shapes, (V, 3).
+        faces: three vertices of each triangle, counted in its model, uint32 in packets of four.
+        normals: at the vertices of smooth models, (N, 3); before them a row for no vertex.
         draw: of each thread, its draw.
         placed: of each draw, (D, 13): rows of camera_from_object, and the size of a pixel.
-        image, slot: of each draw, uint32.
-        shift: of each draw: number of a triangle in `corners` minus its thread's, modulo 2^32.
+        starts: of each draw, uint32 in packets of four: number of its image; of a triangle in
+            `faces` minus its thread's, modulo 2^32; of its model's first row in `vertices` and in
+            `normals`, which is 0 if it is flat.
+        slot: of each draw, uint32.
     """
 
     images: int
@@ -54,19 +59,24 @@ class Triangles:
     width: int
     rays: int
     count: int
-    corners: Any
+    vertices: Any
+    faces: Any
+    normals: Any
     draw: Any
     placed: Any
-    image: Any
+    starts: Any
     slot: Any
-    shift: Any
 
 
-def upload_triangles(batch: SceneBatch, corners: Sequence[Array], rays: int) -> Triangles:
-    """Copy the triangles of a batch, (F, 3, 3) float32 of each of its names, to the device."""
+def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Triangles:
+    """Copy the meshes of a batch, as from `cast_mesh` for each of its names, to the device."""
     spec = batch.spec
-    sizes = np.array([len(table) for table in corners], np.int64)
-    starts = 1 + np.cumsum(sizes) - sizes
+    sizes = np.array([len(mesh.faces) for mesh in meshes], np.int64)
+    faces, first_face = upload_rows([mesh.faces for mesh in meshes], np.uint32)
+    vertices, first_vertex = upload_rows([mesh.vertices for mesh in meshes])
+    smooth = [NO_NORMALS if mesh.normals is None else mesh.normals for mesh in meshes]
+    normals, first_normal = upload_rows([np.zeros((1, 3)), *smooth])
+    first_normal = np.where([len(table) > 0 for table in smooth], first_normal[1:], 0)
     image, slot = np.nonzero(batch.shape >= 0)
     model = batch.shape[image, slot]
     threads = sizes[model]
@@ -82,19 +92,21 @@ def upload_triangles(batch: SceneBatch, corners: Sequence[Array], rays: int) -> 
     def numbers(values: Array) -> Any:
         return mi.UInt32(values.astype(np.uint32) if len(values) else np.zeros(1, np.uint32))
 
-    table = np.concatenate([np.zeros((1, 3, 3), np.float32), *corners])
+    shift = (first_face[model] - first_thread) % 2**32
+    starts = np.stack([image, shift, first_vertex[model], first_normal[model]], axis=1)
     return Triangles(
         images=len(batch),
         height=spec.height,
         width=spec.width,
         rays=rays,
         count=int(threads.sum()),
-        corners=upload_table(table.reshape(-1, 9)),
+        vertices=vertices,
+        faces=faces,
+        normals=normals,
         draw=numbers(np.repeat(np.arange(len(model)), threads)),
         placed=upload_table(placed),
-        image=numbers(image),
+        starts=upload_rows([starts], np.uint32)[0],
         slot=numbers(slot),
-        shift=numbers(starts[model] - first_thread),
     )
 
 
@@ -132,8 +144,8 @@ def _cover(triangles: Triangles, keys: Any, thread: Any, start: Any, x: Any, y: 
     Returns the number of pixels of each rectangle.
     """
     draw = dr.gather(mi.UInt32, triangles.draw, thread)
-    image = dr.gather(mi.UInt32, triangles.image, draw)
-    a, b, c, size = _corners(triangles, thread, draw)
+    image = dr.gather(mi.Vector4u, triangles.starts, draw).x
+    a, b, c, size = _in_camera(triangles, draw, _corners(triangles, thread, draw)[0])
     left, top, columns, rows = _rectangle(triangles, a, b, c, size, x, y)
     area = mi.UInt32(columns * rows)
     planes = [_edge_plane(b, c), _edge_plane(c, a), _edge_plane(a, b)]
@@ -168,7 +180,11 @@ def _cover(triangles: Triangles, keys: Any, thread: Any, start: Any, x: Any, y: 
 
 
 def nearest_triangle(triangles: Triangles, keys: Any, ray: Any, dx: Any, dy: Any) -> Any:
-    """Return depth (inf: nothing), object slot, row of the triangle and barycentrics of hits.
+    """Return what rays meet: depth (inf: nothing), object slot, and the normals there.
+
+    These are the normal of the triangle and that of the smooth surface, in the frame of the unit
+    shape, not normalised. The triangle's is computed from its corners there, where their rounding
+    is finest.
 
     Args:
         keys: as from `rasterise`, of the same points of the pixels.
@@ -180,30 +196,60 @@ def nearest_triangle(triangles: Triangles, keys: Any, ray: Any, dx: Any, dy: Any
     thread = mi.UInt32(dr.select(hit, key & 0xFFFFFFFF, 0))
     depth = dr.reinterpret_array(mi.Float, mi.UInt32(key >> 32))
     draw = dr.gather(mi.UInt32, triangles.draw, thread, hit)
-    a, b, c, _ = _corners(triangles, thread, draw)
+    corners, vertex = _corners(triangles, thread, draw)
+    a, b, c, _ = _in_camera(triangles, draw, corners)
     sides = [
         dx * n.x + dy * n.y - n.z for n in (_edge_plane(b, c), _edge_plane(c, a), _edge_plane(a, b))
     ]
     total = sides[0] + sides[1] + sides[2]
     inverse = dr.select(total == 0, 0, 1 / total)
-    uv = mi.Point2f(sides[1] * inverse, sides[2] * inverse)
+    u, v = sides[1] * inverse, sides[2] * inverse
     slot = dr.gather(mi.UInt32, triangles.slot, draw, hit)
-    triangle = thread + dr.gather(mi.UInt32, triangles.shift, draw, hit)
-    return dr.select(hit, depth, dr.inf), slot, triangle, uv
+    flat = _cross(corners[1] - corners[0], corners[2] - corners[0])
+    first = dr.gather(mi.Vector4u, triangles.starts, draw, hit).w
+    curved = hit & (first > 0)
+    rows = [dr.gather(mi.Vector4f, triangles.normals, first + i, curved) for i in vertex]
+    p, q, r = (mi.Vector3f(row.x, row.y, row.z) for row in rows)
+    smooth = dr.select(curved, (1 - u - v) * p + u * q + v * r, flat)
+    return dr.select(hit, depth, dr.inf), slot, flat, smooth
 
 
-def _corners(triangles: Triangles, thread: Any, draw: Any) -> tuple[Any, Any, Any, Any]:
+def _corners(triangles: Triangles, thread: Any, draw: Any) -> tuple[list[Any], list[Any]]:
+    """Return a triangle's corners, in the frame of its unit shape, and their numbers."""
+    starts = dr.gather(mi.Vector4u, triangles.starts, draw)
+    face = dr.gather(mi.Vector4u, triangles.faces, thread + starts.y)
+    vertex = [face.x, face.y, face.z]
+    return [gather_packet(triangles.vertices, starts.z + i).xyz for i in vertex], vertex
+
+
+def _in_camera(triangles: Triangles, draw: Any, corners: list[Any]) -> tuple[Any, Any, Any, Any]:
     """Return a triangle's corners in the camera frame, and the size of a pixel at depth 1."""
-    triangle = thread + dr.gather(mi.UInt32, triangles.shift, draw)
-    table = gather_row(triangles.corners, triangle, 9)
     m = gather_row(triangles.placed, draw, 13)
     a, b, c = (
         mi.Vector3f(
-            *(m[4 * i] * x + m[4 * i + 1] * y + m[4 * i + 2] * z + m[4 * i + 3] for i in range(3))
+            *(m[4 * i] * p.x + m[4 * i + 1] * p.y + m[4 * i + 2] * p.z + m[4 * i + 3]
+              for i in range(3))
         )
-        for x, y, z in (table[:3], table[3:6], table[6:])
-    )
+        for p in corners
+    )  # fmt: skip
     return a, b, c, m[12]
+
+
+def _cross(a: Any, b: Any) -> Any:
+    """Return a x b within two units in the last place, which rounding costs needles otherwise.
+
+    W. Kahan's difference of products, as analysed by Jeannerod, Louvet and Muller (2013).
+    """
+
+    def difference(a: Any, b: Any, c: Any, d: Any) -> Any:
+        product = c * d
+        return dr.fma(a, b, -product) + dr.fma(-c, d, product)
+
+    return mi.Vector3f(
+        difference(a.y, b.z, a.z, b.y),
+        difference(a.z, b.x, a.x, b.z),
+        difference(a.x, b.y, a.y, b.x),
+    )
 
 
 def _rectangle(

@@ -90,11 +90,12 @@ def closest_hit(scenes: Scenes, item: Any, o: Any, d: Any) -> Any:
 
 
 def nearer_than_room(scenes: Scenes, item: Any, o: Any, d: Any, hit: Any) -> Any:
-    """Return t, object id, face and barycentrics of the nearer of a hit and the room's faces.
+    """Return t, object id and details of the nearer of a hit and the room's faces.
 
-    A hit is (t, slot of the object, face, barycentrics), with t = inf for none.
+    A hit is (t, slot of the object, *details), with t = inf for none. Details say nothing where the
+    room is nearer.
     """
-    depth, slot, face, uv = hit
+    depth, slot, *details = hit
     has_room = _about_scene(scenes, item)[0]
     walls = [dr.select(d[i] < 0, -o[i] / d[i], dr.inf) for i in range(3)]
     t = dr.minimum(walls[0], dr.minimum(walls[1], walls[2]))
@@ -104,7 +105,7 @@ def nearer_than_room(scenes: Scenes, item: Any, o: Any, d: Any, hit: Any) -> Any
     object_id = dr.select(on_room, mi.Int32(0), mi.Int32(-1))
     on_object = (depth < dr.inf) & (depth <= t)
     object_id = dr.select(on_object, mi.Int32(slot) + 1, object_id)
-    return dr.select(on_object, depth, t), object_id, face, uv
+    return dr.select(on_object, depth, t), object_id, *details
 
 
 @dr.syntax
@@ -150,10 +151,8 @@ def _first_hit(scenes: Scenes, row: Any, start: Any, u: Any, reach: Any) -> tupl
 @dr.syntax
 def normal_at(scenes: Scenes, item: Any, p: Any, d: Any, object_id: Any, face: Any, uv: Any) -> Any:
     """Return the unit world normal of a hit, facing the viewer; zero if nothing is hit."""
-    least = dr.minimum(dr.abs(p.x), dr.minimum(dr.abs(p.y), dr.abs(p.z)))
-    on_x = dr.abs(p.x) == least
-    on_y = ~on_x & (dr.abs(p.y) == least)
-    n = mi.Vector3f(mi.Float(on_x), mi.Float(on_y), mi.Float(~on_x & ~on_y))
+    flat = mi.Vector3f(0)
+    smooth = mi.Vector3f(0)
     if dr.hint(object_id > 0, exclude=[scenes]):
         row = item * scenes.slots + mi.UInt32(object_id - 1)
         record = gather_packet(scenes.objects, row * OBJECT + 4)
@@ -170,6 +169,24 @@ def normal_at(scenes: Scenes, item: Any, p: Any, d: Any, object_id: Any, face: A
                     + uv.x * mi.Vector3f(*table[6:9])
                     + uv.y * mi.Vector3f(*table[9:])
                 )
+    return visible_normal(scenes, item, p, d, object_id, (flat, smooth))
+
+
+@dr.syntax
+def visible_normal(
+    scenes: Scenes, item: Any, p: Any, d: Any, object_id: Any, normals: tuple[Any, Any]
+) -> Any:
+    """Return what `normal_at` does, from the normals in the frame of the unit shape.
+
+    They are the normal of the face and that of the smooth surface, not normalised.
+    """
+    flat, smooth = normals
+    least = dr.minimum(dr.abs(p.x), dr.minimum(dr.abs(p.y), dr.abs(p.z)))
+    on_x = dr.abs(p.x) == least
+    on_y = ~on_x & (dr.abs(p.y) == least)
+    n = mi.Vector3f(mi.Float(on_x), mi.Float(on_y), mi.Float(~on_x & ~on_y))
+    if dr.hint(object_id > 0, exclude=[scenes]):
+        row = item * scenes.slots + mi.UInt32(object_id - 1)
         n = dr.normalize(_to_world(scenes, row, smooth))
         n = dr.select(dr.dot(_to_world(scenes, row, flat), d) > 0, -n, n)
         # A smooth normal may lean away just inside a silhouette: make it perpendicular to the ray.

@@ -4,6 +4,7 @@ Without that, a gather of what a whole image shares takes one load for each ray 
 of a kernel's time where the processor has no fast gathers.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import drjit as dr
@@ -21,14 +22,26 @@ def upload_table(rows: NDArray[Any]) -> Any:
     Dr.Jit gathers packets only from aligned data, and compiles another kernel for other data. It
     may use numpy's memory as it is, so that is aligned here.
     """
-    width = rows.shape[-1]
+    return upload_rows([rows.reshape(-1, rows.shape[-1])])[0]
+
+
+def upload_rows(parts: Sequence[NDArray[Any]], kind: type = np.float32) -> tuple[Any, Any]:
+    """Copy parts, (n, width) each, as one table; return it, and the first row of each part.
+
+    `kind` is float32 or uint32. A table without rows gets one of zeros.
+    """
+    width = parts[0].shape[1] if parts else 1
     padded = -(-width // PACKET) * PACKET
-    count = rows.size // width
+    ends = np.cumsum([len(part) for part in parts], dtype=np.int64)
+    count = max(1, int(ends[-1]) if parts else 0)
     memory = np.zeros(4 * count * padded + ALIGNMENT, np.uint8)
     start = -memory.ctypes.data % ALIGNMENT
-    table = memory[start : start + 4 * count * padded].view(np.float32)
-    table.reshape(count, padded)[:, :width] = rows.reshape(count, width)
-    return mi.Float(table)
+    table: NDArray[Any] = memory[start : start + 4 * count * padded].view(kind)
+    rows = table.reshape(count, padded)
+    for part, end in zip(parts, ends.tolist(), strict=True):
+        rows[end - len(part) : end, :width] = part
+    starts = ends - np.array([len(part) for part in parts], np.int64)
+    return (mi.Float if kind is np.float32 else mi.UInt32)(table), starts
 
 
 def gather_packet(table: Any, index: Any) -> Any:

@@ -7,7 +7,7 @@ from numpy.random import Generator
 
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.profiles import Curve, arc, bezier, join, line, reverse
-from scenegen.objects.families.parts.surfaces import Part, loft
+from scenegen.objects.families.parts.surfaces import Part, joined, loft
 from scenegen.objects.families.parts.walls import shell
 from scenegen.objects.solids import Array
 
@@ -159,7 +159,7 @@ def _plate(grid: Array, up: Array, thickness: float) -> Part:
     """
     lift = np.array([0.0, thickness, 0.0])
     top = grid + lift
-    faces = [_sheet(top, up), _sheet(grid[:, ::-1], -up[:, ::-1])]
+    sheets = [_sheet(top, up), _sheet(grid[:, ::-1], -up[:, ::-1])]
     # The border runs such that the outside is on its right, seen from above.
     border = np.concatenate([grid[0, :-1], grid[:-1, -1], grid[-1, :0:-1], grid[:0:-1, 0]])
     after = np.roll(border, -1, axis=0)
@@ -167,17 +167,17 @@ def _plate(grid: Array, up: Array, thickness: float) -> Part:
     out = np.stack([along[:, 2], 0 * along[:, 1], -along[:, 0]], axis=1)
     out /= np.sqrt((out * out).sum(axis=1, keepdims=True))
     quads = np.stack([border, border + lift, after + lift, after], axis=1)
-    side = quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
-    faces.append((side, np.repeat(out[:, None], 6, axis=1).reshape(-1, 3, 3)))
+    halves = 4 * np.arange(len(quads))[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])
+    sides = quads.reshape(-1, 3), halves.reshape(-1, 3), np.repeat(out, 4, axis=0)
     ends = np.concatenate([grid[0], grid[-1], top[0], top[-1]])
-    triangles, normals = (np.concatenate(several) for several in zip(*faces, strict=True))
-    return Part(triangles, normals, ends, np.zeros(len(ends)))
+    return Part(*joined([*sheets, sides]), ends, np.zeros(len(ends)))
 
 
-def _sheet(points: Array, normals: Array) -> tuple[Array, Array]:
-    """Return two triangles, with normals, for each cell of (rows, columns, 3) points."""
+def _sheet(points: Array, normals: Array) -> tuple[Array, Array, Array]:
+    """Return vertices, two triangles a cell, and normals of (rows, columns, 3) points."""
     normals = normals / np.sqrt((normals * normals).sum(axis=-1, keepdims=True))
     i = np.arange(len(points) - 1)[:, None, None]
     j = np.arange(points.shape[1] - 1)[:, None]
     rows, columns = i + np.array([0, 1, 1, 0, 1, 0]), j + np.array([0, 0, 1, 0, 1, 1])
-    return points[rows, columns].reshape(-1, 3, 3), normals[rows, columns].reshape(-1, 3, 3)
+    faces = (rows * points.shape[1] + columns).reshape(-1, 3)
+    return points.reshape(-1, 3), faces, normals.reshape(-1, 3)

@@ -9,14 +9,14 @@ import numpy as np
 import scenegen
 from scenegen.common.recent import Recent
 from scenegen.objects.cache import DiskCache
-from scenegen.objects.cast_meshes import CastMesh, cast_mesh
+from scenegen.objects.cast_meshes import cast_mesh
 from scenegen.objects.families.members import check_member, make_member
 from scenegen.objects.families.parts.assembly import UPRIGHT
-from scenegen.objects.solids import Array, UnitShape, no_mesh
+from scenegen.objects.solids import Array, Mesh, UnitShape, no_mesh
 
-MOST_FACES_KEPT = 1_000_000  # of the meshes in memory; a face takes 84 bytes
+MOST_FACES_KEPT = 4_000_000  # of the meshes in memory; a face takes some 20 bytes
 _SOURCES = ("common/rotations.py", "objects/solids.py", "objects/cast_meshes.py")
-_OUTLINE, _MESH = ("hull_points", "hull_discs", "face_count"), ("triangles", "normals")
+_OUTLINE, _MESH = ("hull_points", "hull_discs"), ("vertices", "faces", "normals")
 
 
 class MemberStore:
@@ -24,7 +24,7 @@ class MemberStore:
 
     def __init__(self, folder: str | Path | None = None) -> None:
         self._disk = DiskCache(folder)
-        self._meshes: Recent[CastMesh] = Recent(MOST_FACES_KEPT)
+        self._meshes: Recent[Mesh] = Recent(MOST_FACES_KEPT)
 
     @property
     def folder(self) -> Path | None:
@@ -37,38 +37,34 @@ class MemberStore:
 
     def outline(self, family: str, number: int) -> tuple[UnitShape, int]:
         """Return a member without its triangles, and their number. Raises as `make_member`."""
-        arrays = self._arrays(family, number, _OUTLINE)
-        points, discs, face_count = (arrays[name] for name in _OUTLINE)
+        arrays = self._arrays(family, number)
+        points, discs = (arrays[name] for name in _OUTLINE)
         name = f"{family}/{number:04d}"
-        return UnitShape(name, no_mesh, points, discs, 0.0, UPRIGHT), int(face_count)
+        return UnitShape(name, no_mesh, points, discs, 0.0, UPRIGHT), len(arrays["faces"])
 
-    def mesh(self, family: str, number: int) -> CastMesh:
+    def mesh(self, family: str, number: int) -> Mesh:
         """Return a member's mesh. Raises as `make_member`."""
-        mesh = self._meshes.get((family, number))
-        if mesh is None:
-            arrays = self._arrays(family, number, _MESH)
-            mesh = CastMesh(arrays["triangles"], arrays["normals"])
-            self._meshes.put((family, number), mesh, len(mesh.normals))
-        return mesh
+        return self._meshes.get((family, number)) or _mesh(self._arrays(family, number))
 
-    def _arrays(self, family: str, number: int, names: tuple[str, ...]) -> dict[str, Array]:
+    def _arrays(self, family: str, number: int) -> dict[str, Array]:
+        """Return all of a member, and keep its mesh in memory: what is placed is soon cast."""
         check_member(family, number)
         key = f"{family}-{number:04d}-{code_version()}"
-        return self._disk.read(key, names) or self._made(family, number, key)
+        arrays = self._disk.read(key, _OUTLINE + _MESH) or self._made(family, number, key)
+        self._meshes.put((family, number), _mesh(arrays), len(arrays["faces"]))
+        return arrays
 
     def _made(self, family: str, number: int, key: str) -> dict[str, Array]:
         shape = make_member(family, number)
-        mesh = cast_mesh(shape)
-        self._meshes.put((family, number), mesh, len(mesh.normals))
-        arrays = {
-            "hull_points": shape.hull_points,
-            "hull_discs": shape.hull_discs,
-            "face_count": np.array(len(mesh.normals)),
-            "triangles": mesh.triangles,
-            "normals": mesh.normals,
-        }
+        mesh = cast_mesh(shape.mesh)
+        outline = {name: getattr(shape, name) for name in _OUTLINE}
+        arrays = {**outline, **{name: getattr(mesh, name) for name in _MESH}}
         self._disk.write(key, arrays)
         return arrays
+
+
+def _mesh(arrays: dict[str, Array]) -> Mesh:
+    return Mesh(*(arrays[name] for name in _MESH))
 
 
 @functools.cache

@@ -10,9 +10,9 @@ from scenegen.objects.cache import DiskCache
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFolder
 from scenegen.objects.meshes.models import Model, load_model
-from scenegen.objects.solids import UnitShape
+from scenegen.objects.solids import Mesh, UnitShape
 
-MOST_FACES_KEPT = 3_000_000  # of all shapes in memory; a face takes about 100 bytes
+MOST_FACES_KEPT = 8_000_000  # of all shapes in memory; a face takes about 20 bytes
 
 
 class MeshStore:
@@ -43,7 +43,7 @@ class MeshStore:
         shape = self._shapes.get(name)
         if shape is None:
             shape = _unit_shape(name, self._load(name))
-            self._shapes.put(name, shape, len(shape.triangles))
+            self._shapes.put(name, shape, len(shape.mesh.faces))
         return shape
 
     def digest(self, name: str) -> str:
@@ -72,10 +72,6 @@ class MeshStore:
 
 
 def _unit_shape(name: str, model: Model) -> UnitShape:
-    triangles = model.vertices.astype(np.float64)[model.faces]
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    flat = np.broadcast_to(normals[:, None], triangles.shape)  # one copy for the three corners
-    hull = model.hull_points
+    mesh, hull = Mesh(model.vertices, model.faces, None), model.hull_points
     down = np.array([[0.0, -1.0, 0.0]])
-    return UnitShape(name, lambda: (triangles, flat), hull, np.zeros(len(hull)), 0.0, down)
+    return UnitShape(name, lambda: mesh, hull, np.zeros(len(hull)), 0.0, down)

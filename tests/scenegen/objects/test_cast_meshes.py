@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from scenegen.objects.basic_shapes import unit_shape
-from scenegen.objects.cast_meshes import OVERLAP, cast_mesh, overlapping
+from scenegen.objects.cast_meshes import OVERLAP, cast_mesh, normal_table, overlapping
 from scenegen.objects.catalogue import built_in_shape
+from scenegen.objects.solids import Mesh
 
 BASIC = ("box", "torus", "teapot", "icosahedron", "cone")
 MODELS = ("mug/0001", "chair/0002", "bottle/0003", "bag/0004", "table/0005")
@@ -13,13 +14,23 @@ MODELS = ("mug/0001", "chair/0002", "bottle/0003", "bag/0004", "table/0005")
 
 def test_normals_stand_on_faces_and_at_corners():
     shape = unit_shape("cone")
-    mesh = cast_mesh(shape)
+    table = normal_table(shape)
     a, b, c = (shape.triangles[:, i] for i in range(3))
     cross = np.cross(b - a, c - a)
     cross /= np.linalg.norm(cross, axis=1, keepdims=True)
-    np.testing.assert_allclose(mesh.normals[:, :3], cross, atol=1e-6)
-    np.testing.assert_array_equal(mesh.normals[:, 3:].reshape(-1, 3, 3), np.float32(shape.normals))
-    np.testing.assert_array_equal(mesh.triangles, np.float32(shape.triangles))
+    np.testing.assert_allclose(table[:, :3], cross, atol=1e-6)
+    np.testing.assert_array_equal(table[:, 3:].reshape(-1, 3, 3), np.float32(shape.normals))
+
+
+def test_meshes_are_cast_in_single_precision():
+    shape = built_in_shape("mug/0001")
+    mesh = cast_mesh(shape.mesh)
+    assert (mesh.vertices.dtype, mesh.faces.dtype) == (np.float32, np.uint16)
+    np.testing.assert_array_equal(mesh.vertices[mesh.faces], np.float32(shape.triangles))
+    np.testing.assert_array_equal(mesh.normals[mesh.faces], np.float32(shape.normals))
+    flat = cast_mesh(Mesh(np.zeros((2**16 + 1, 3)), np.array([[0, 1, 2**16]]), None))
+    assert flat.normals is None
+    assert flat.faces.tolist() == [[0, 1, 2**16]]
 
 
 @pytest.mark.parametrize("name", [*BASIC, *MODELS])

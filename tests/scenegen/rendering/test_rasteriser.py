@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scenegen.camera import Camera, pixel_directions
 from scenegen.description.scenes import PlacedObject, SceneSpec
 from scenegen.objects.catalogue import Objects
-from scenegen.objects.solids import UnitShape
+from scenegen.objects.solids import Mesh, UnitShape
 from scenegen.rendering.ground_truth import GroundTruth
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import render
@@ -37,11 +37,9 @@ def objects_of(**meshes: Array) -> Objects:
     """Return objects of triangles, (F, 3, 3), by name."""
 
     def shape(name: str) -> UnitShape:
-        triangles = meshes[name.partition("/")[2]].astype(np.float32).astype(float)
-        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
-        flat = np.broadcast_to(normals[:, None], triangles.shape)
-        return UnitShape(name, lambda: (triangles, flat), np.zeros((1, 3)), np.zeros(1), 0.0, flat)
+        corners = meshes[name.partition("/")[2]].astype(np.float32).reshape(-1, 3)
+        mesh = Mesh(corners, np.arange(len(corners)).reshape(-1, 3), None)
+        return UnitShape(name, lambda: mesh, *np.zeros((2, 1, 3)), 0.0, np.zeros((0, 3)))
 
     return Objects({"mug": [f"mug/{name}" for name in meshes]}, shape, lambda name: "")
 

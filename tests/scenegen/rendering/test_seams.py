@@ -78,7 +78,7 @@ def test_no_ray_slips_through_models_and_without_overlap_some_do(
         own = partial(built_in_shape)  # models are kept by where they come from
         others = names[:1] * 50
         shown = [*names, *others, *names, *others, *names]
-        meshes = [cast_meshes.cast_mesh(own(name)) for name in shown]
+        meshes = [cast_meshes.cast_mesh(own(name).mesh) for name in shown]
         scene, offset = models.model_scene(variant, own, shown, meshes)
         unit = SimpleNamespace(scene=scene, offset=offset, grid=models.GRID)
         places = [k + start for start in (0, 55, 110) for k in range(5)]
@@ -93,7 +93,7 @@ def test_no_ray_slips_through_models_and_without_overlap_some_do(
 def test_places_of_models_are_exact_in_single_precision(count, variant, models):
     """Coordinates stay below 16, so that every point of the grid is a float32."""
     count = models.MOST_MODELS if count == "most" else count
-    mesh = cast_meshes.cast_mesh(unit_shape("tetrahedron"))
+    mesh = cast_meshes.cast_mesh(unit_shape("tetrahedron").mesh)
     _, offset = models.model_scene(variant, unit_shape, ["tetrahedron"] * count, [mesh] * count)
     assert abs(offset).max() + 1.0002 < 2.0**24 * models.GRID
     np.testing.assert_array_equal(np.round(offset / models.GRID) * models.GRID, offset)

@@ -60,9 +60,9 @@ def boxes(corners: Sequence[Sequence[Corner]]) -> Part:
     """Return boxes, each given by its `box` corners, as one flat-shaded part."""
     points = np.array(corners)
     quads = points[:, _SIDES].reshape(-1, 4, 3)
-    triangles = quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
+    faces = 4 * np.arange(len(quads))[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])
     face = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1])
     face /= np.sqrt((face * face).sum(axis=1, keepdims=True))
-    normals = np.repeat(face[:, None], 6, axis=1).reshape(-1, 3, 3)
     hull = points.reshape(-1, 3)
-    return Part(triangles, normals, hull, np.zeros(len(hull)))
+    mesh = quads.reshape(-1, 3), faces.reshape(-1, 3), np.repeat(face, 4, axis=0)
+    return Part(*mesh, hull, np.zeros(len(hull)))

@@ -1,6 +1,7 @@
 """Turn parts, shift them, or leave them out of the convex body that placement uses."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,8 @@ def moved(part: Part, offset: tuple[float, float, float], turn: Array | None = N
     """Return a part rotated by the matrix `turn`, (3, 3), if given, and then shifted."""
     shift = np.array(offset)
     if turn is None:
-        return Part(part.triangles + shift, part.normals, part.hull_points + shift, part.hull_discs)
+        hull = part.hull_points + shift
+        return Part(part.vertices + shift, part.faces, part.normals, hull, part.hull_discs)
     # Discs must be horizontal: one that tips over is replaced by a polygon that contains it.
     flat = part.hull_discs > 0.0
     discs = part.hull_discs[flat]
@@ -23,7 +25,8 @@ def moved(part: Part, offset: tuple[float, float, float], turn: Array | None = N
     rims = (part.hull_points[flat][:, None] + discs[:, None, None] * spokes).reshape(-1, 3)
     points = np.concatenate([part.hull_points[~flat], rims])
     return Part(
-        _turned(part.triangles, turn) + shift,
+        _turned(part.vertices, turn) + shift,
+        part.faces,
         _turned(part.normals, turn),
         _turned(points, turn) + shift,
         np.zeros(len(points)),
@@ -50,4 +53,4 @@ def turn_about_z(angle: float) -> Array:
 
 def buried(part: Part) -> Part:
     """Return a part without hull points, for one that lies in the convex hull of the others."""
-    return Part(part.triangles, part.normals, np.empty((0, 3)), np.empty(0))
+    return replace(part, hull_points=np.empty((0, 3)), hull_discs=np.empty(0))

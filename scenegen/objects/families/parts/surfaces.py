@@ -20,13 +20,15 @@ class Part:
     """A closed surface, wound counter-clockwise seen from outside.
 
     Attributes:
-        triangles: corners, (F, 3, 3).
-        normals: unit normals of the smooth surface at those corners, (F, 3, 3).
+        vertices: corners, all used, (V, 3).
+        faces: three vertices of each triangle, (F, 3).
+        normals: unit normals of the smooth surface at the vertices, (V, 3).
         hull_points, hull_discs: centres (V, 3) and radii (V,) of horizontal discs whose convex
             hull contains the part.
     """
 
-    triangles: Array
+    vertices: Array
+    faces: Array
     normals: Array
     hull_points: Array
     hull_discs: Array
@@ -127,8 +129,8 @@ def section(sizes: Array, outward: Array, quadrant: Array) -> Array:
     return np.asarray(quadrant * (sizes[:, None, :2] - radius) + outward * radius)
 
 
-def strips(grid: Array, normals: Array) -> tuple[Array, Array]:
-    """Return the triangles and unit normals between neighbouring rows of closed outlines.
+def strips(grid: Array, normals: Array) -> tuple[Array, Array, Array]:
+    """Return vertices, triangles and unit normals between neighbouring rows of closed outlines.
 
     Strips without width (a crease repeats a row) and triangles without area (rows on an axis, arcs
     of radius 0) are left out.
@@ -152,8 +154,22 @@ def strips(grid: Array, normals: Array) -> tuple[Array, Array]:
             np.stack([a[lower], c[lower], d[lower]], axis=1),
         ]
     )
-    corners = (np.arange(copies)[:, None, None] * (rows * count) + corners).reshape(-1, 3)
+    used = np.zeros(rows * count, bool)
+    used[corners] = True
+    number = np.cumsum(used) - 1
+    vertices, normals = (table.reshape(copies, -1, 3)[:, used] for table in (grid, normals))
+    faces = np.arange(copies)[:, None, None] * vertices.shape[1] + number[corners]
     x, y, z = (normals[..., i] for i in range(3))
     length = np.sqrt(x * x + y * y + z * z)
     unit = normals / np.maximum(length, 1e-300)[..., None]
-    return grid.reshape(-1, 3).take(corners, axis=0), unit.reshape(-1, 3).take(corners, axis=0)
+    return vertices.reshape(-1, 3), faces.reshape(-1, 3), unit.reshape(-1, 3)
+
+
+def joined(
+    meshes: Sequence[tuple[Array, Array, Array]],
+) -> tuple[Array, Array, Array]:
+    """Return vertices, faces and normals of several meshes as those of a single one."""
+    vertices, faces, normals = zip(*meshes, strict=True)
+    first = np.cumsum([0, *map(len, vertices[:-1])])
+    moved = [part + start for part, start in zip(faces, first.tolist(), strict=True)]
+    return np.concatenate(vertices), np.concatenate(moved), np.concatenate(normals)

@@ -20,7 +20,7 @@ from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.folders import open_objects
 from scenegen.objects.meshes.hull import hull_points
 from scenegen.objects.meshes.store import MeshStore
-from scenegen.objects.solids import UnitShape
+from scenegen.objects.solids import Mesh, UnitShape
 
 
 def bumpy(seed, faces=1280):
@@ -106,9 +106,8 @@ def test_a_coarser_hull_holds_the_model_and_stands_where_it_stands():
         centered = corners - (corners.min(axis=0) + corners.max(axis=0)) / 2
         points = np.asarray(centered / np.linalg.norm(centered, axis=1).max())
         body = hull_points(points)
-        shape = UnitShape(
-            "x", lambda p=points: (p[:, None], p), body, np.zeros(len(body)), 0.0, DOWN
-        )
+        mesh = Mesh(points, np.arange(len(points))[:, None], None)
+        shape = UnitShape("x", lambda mesh=mesh: mesh, body, np.zeros(len(body)), 0.0, DOWN)
         check_hull(shape)
         assert len(body) < 2 * hull.MOST_POINTS
         assert body[:, 1].min() == points[:, 1].min(), "nothing below the floor"
