@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from iqtt.commands.models import model_options
 from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import ENCODING, OVERWRITE
 from scenegen.command_line.output import print_line, progress_bar
@@ -55,17 +56,23 @@ def card(
     print_line(f"{out}: {', '.join(NAMES)} of {count} questions")
 
 
-@click.command(epilog=f"{EXAMPLE}iqtt export iqtt-split/iqtt-val.h5 --format parquet")
+@click.command(
+    epilog=f"{EXAMPLE}iqtt export iqtt-split/iqtt-val.h5 --format parquet\n"
+    "  iqtt export iqtt-split/iqtt-val.h5 --format vlm --rotations 3 --out val-vlm"
+)
 @click.argument("file", type=InputPath())
-@click.option("--format", "form", type=click.Choice(["parquet", "webdataset"]), required=True,
-              help="What to write; datasets.load_dataset reads both.")
+@click.option("--format", "form", type=click.Choice(["parquet", "webdataset", "vlm"]),
+              required=True,
+              help="parquet and webdataset are for data loaders. vlm is for models that read"
+              " pictures and text: Parquet, VLMEvalKit and lmms-eval.")
 @click.option("--part", type=click.Choice(["labeled", "unlabeled"]),
               help="Part of a training file.")
 @click.option("--out", type=OutputFolder(),
               help="Folder to make [iqtt-val-parquet of iqtt-val.h5; iqtt-train-labeled-parquet].")
 @click.option("--rows-per-file", type=click.IntRange(1), default=1000, show_default=True,
-              help="Most questions of a file.")
+              help="Most questions of a file; not for vlm.")
 @ENCODING
+@model_options
 @OVERWRITE
 def export(
     file: str,
@@ -75,20 +82,24 @@ def export(
     rows_per_file: int,
     curve: str,
     overwrite: bool,
+    **how: Any,
 ) -> None:
-    """Write all that FILE tells of its questions in a format of data loaders.
+    """Write the questions of FILE in a format of data loaders or of models.
 
     Images of 8 bits become PNG files, sRGB unless --encoding linear. The answers to test questions
-    are in another file, and are not written.
+    are in another file. They are not written, unless --with-answers asks for it.
     """
-    if form == "parquet":
-        needs("iqtt export --format parquet", SHARE, "share")
+    if form != "webdataset":
+        needs(f"iqtt export --format {form}", SHARE, "share")
+    folder = out or "-".join(filter(None, (Path(file).stem, part, form)))
+    if form == "vlm":
+        _export_for_models(file, part, folder, overwrite, how)
+        return
     from iqtt.files.reader import open_questions
     from iqtt.sharing.questions import export_questions
 
     with open_questions(file, part) as questions:
         count = len(questions)
-    folder = out or "-".join(filter(None, (Path(file).stem, part, form)))
     with progress_bar(count, "question") as bar:
         written = export_questions(
             file, form, folder, part,
@@ -96,6 +107,20 @@ def export(
         )
     megabytes = sum(path.stat().st_size for path in written) / 1e6
     print_line(f"{folder}: {count} questions in {len(written) - 1} files, {megabytes:.1f} MB")
+
+
+def _export_for_models(
+    file: str, part: str | None, folder: str, overwrite: bool, how: dict[str, Any]
+) -> None:
+    from iqtt.vlm.export import export_for_models
+    from iqtt.vlm.rows import Asked, count_rows
+
+    asked = Asked(file, part, **how)
+    count = count_rows(asked)
+    with progress_bar(count, "question") as bar:
+        written = export_for_models(asked, folder, overwrite=overwrite, progress=bar.update)
+    megabytes = sum(path.stat().st_size for path in written) / 1e6
+    print_line(f"{folder}: {count} rows, {megabytes:.1f} MB: {', '.join(p.name for p in written)}")
 
 
 # fmt: on

@@ -15,7 +15,7 @@ from metrics.measures.statistics import (
     clustered_wilson_interval,
     linearised_means,
 )
-from metrics.scoring.floors import floor_of_questions
+from iqtt.floors import floor_of_questions
 from metrics.scoring.metric_names import OBJECT_SCORES, SKILLED, metric
 
 Array = NDArray[Any]

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from metrics.score_file import SCORE_AGAIN
 from metrics.scoring import floors
-from metrics.scoring.floors import floor_of_kind
+from iqtt.floors import floor_of_kind
 from metrics.scoring.metric_names import EMPTY_ROOM, OTHER_SCENE, SKILLED
 from metrics.scoring.records import ScoreFile
 from metrics.views.by_angle import angle_floors

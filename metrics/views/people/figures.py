@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from iqtt.quiz.answers import Answer, Answers
-from metrics.scoring.floors import floor_of_kind
+from iqtt.floors import floor_of_kind
 from metrics.scoring.questions import ANGLE_BINS
 from metrics.submissions.reader import QuestionPredictions, open_predictions
 from metrics.views.people.intervals import (

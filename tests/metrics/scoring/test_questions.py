@@ -17,7 +17,7 @@ from metrics.measures.statistics import design_effect, wilson_interval
 from metrics.prediction_writer import PredictionError, write_answers
 from metrics.scoring import floors
 from metrics.scoring.evaluate import score
-from metrics.scoring.floors import Floor, floor_of_questions
+from iqtt.floors import Floor, floor_of_questions
 from metrics.scoring.runs import ScoringError
 
 

@@ -13,7 +13,7 @@ from metrics.measures.empty_room import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.score_file import Skill
 from metrics.scoring.evaluate import score
-from metrics.scoring.floors import Floor
+from iqtt.floors import Floor
 from metrics.scoring.records import Submission
 from metrics.views.headline import headline_section, kinds_sections
 from metrics.views.report import BesideError, html_report
@@ -50,7 +50,7 @@ def test_every_score_stands_beside_its_reference():
 
 def test_questions_have_the_floor_of_their_kind(monkeypatch):
     floors = (Floor("mirror", "outline", 0, 0.5, 0.4, 0.6),)
-    monkeypatch.setattr("metrics.scoring.floors.FLOORS", floors)
+    monkeypatch.setattr("iqtt.floors.FLOORS", floors)
     accuracy = {"iqtt_accuracy": Skill(0.0, None, None, 0.5, "outline")}
     group = {"mirror": {"iqtt_accuracy": make_score("iqtt_accuracy", 1 / 3)}}
     scores = iqtt_scores("a", [1, 0], skills=accuracy, by_distractor=group)

@@ -9,7 +9,7 @@ from made_scores import DIGEST, iqtt_scores, make_score, rooms_scores, stated
 from refusals import refused
 
 from metrics.score_file import Skill
-from metrics.scoring.floors import Floor
+from iqtt.floors import Floor
 from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import UnknownMetricError
 from metrics.views.leaderboard.floors import FloorError
@@ -20,7 +20,7 @@ from metrics.views.paper import TABLES
 @pytest.fixture(autouse=True)
 def _no_floors(monkeypatch):
     """Kinds of questions are taken as not measured, except where a test says otherwise."""
-    monkeypatch.setattr("metrics.scoring.floors.FLOORS", ())
+    monkeypatch.setattr("iqtt.floors.FLOORS", ())
 
 
 SCENES = [0, 0, 1, 1]
@@ -230,7 +230,7 @@ def by_kind(*rights):
 def test_questions_by_kind_with_the_floors_of_each_kind(monkeypatch):
     table = (Floor("near", "outline-trees", 1000, 0.6, 0.5, 0.7),)
     table += (Floor("matched", "outline-trees", 1000, 0.35, 0.3, 0.4),)
-    monkeypatch.setattr("metrics.scoring.floors.FLOORS", (*table, replace(table[0], kind="other")))
+    monkeypatch.setattr("iqtt.floors.FLOORS", (*table, replace(table[0], kind="other")))
     file = iqtt_scores("a", [1, 0, 1, 0], by_distractor=by_kind(0.3, 0.7))
     _, kinds, floors = leaderboard([file], paper="none")
     assert kinds.head[2:] == ("matched", "near")

@@ -13,7 +13,7 @@ from scipy import stats
 
 from iqtt.quiz.answers import read_answers, to_csv
 from metrics.prediction_writer import write_answers
-from metrics.scoring.floors import floor_of_kind
+from iqtt.floors import floor_of_kind
 from metrics.views.people.figures import compute
 from metrics.views.people.references import compare, references
 from scenegen.common.errors import FileFormatError, SpecError

@@ -1,0 +1,352 @@
+"""Ask a server that speaks OpenAI's chat protocol (vLLM, llama.cpp, Ollama), row by row.
+
+Each reply is written to a log, and to the disk, before the row counts as asked. So a run that is
+stopped goes on where it was, and asks no row twice. The log never holds the key.
+"""
+
+import base64
+import json
+import os
+import random
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+from iqtt.vlm.reading import read_answer
+from iqtt.vlm.rows import Asked, Row, vlm_rows
+from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
+
+FORMAT = "pix2shape-bench/asked"
+RETRIED = frozenset({408, 409, 425, 429, 500, 502, 503, 504, 529})  # HTTP statuses that may pass
+LONGEST_WAIT = 60.0  # seconds between two tries
+
+
+class AskError(SceneGenError):
+    """The server gave no usable reply."""
+
+
+@dataclass(frozen=True)
+class Server:
+    """A model behind a server, and how it is asked.
+
+    Attributes:
+        model: name that the server knows.
+        base_url: such as "http://127.0.0.1:8000/v1".
+        key: for the header; it is never written. Empty for servers that ask for none.
+        temperature, max_tokens: of the reply.
+        timeout: seconds that a reply may take.
+        tries: most requests for one row.
+        concurrency: requests at the same time.
+        pause: seconds before the second try; each further pause is twice as long.
+    """
+
+    model: str
+    base_url: str
+    key: str = ""
+    temperature: float = 0.0
+    max_tokens: int = 1024
+    timeout: float = 120.0
+    tries: int = 6
+    concurrency: int = 4
+    pause: float = 1.0
+
+
+@dataclass(frozen=True)
+class Totals:
+    """What a log of replies holds.
+
+    Attributes:
+        rows: that have a reply.
+        answered, unparsed, refused: their outcomes.
+        right: rows with the right letter, of those whose answer is known; `known` counts these.
+        input_tokens, output_tokens: as the server tells them.
+    """
+
+    rows: int
+    answered: int
+    unparsed: int
+    refused: int
+    right: int
+    known: int
+    input_tokens: int
+    output_tokens: int
+
+
+def ask(
+    asked: Asked,
+    server: Server,
+    log: str | Path,
+    progress: Callable[[int], Any] = lambda done: None,
+) -> list[dict[str, Any]]:
+    """Ask all rows that the log does not hold yet; return all lines of the log, by row.
+
+    Args:
+        log: JSON Lines: a heading, then one object a reply. It is made, or continued.
+        progress: is told how many rows have a reply, once at the start and then as they come.
+
+    Raises:
+        AskError: a row got no usable reply after all tries. What came before is in the log.
+        SpecError: the log is of other questions or settings.
+        FileFormatError: the log is damaged.
+        OSError, SpecError, FileFormatError: as `vlm_rows`.
+    """
+    import httpx
+
+    path = Path(log)
+    rows = vlm_rows(asked)
+    first = next(rows, None)
+    if first is None:
+        raise SpecError(asked.path, "no questions", "at least one")
+    heading = _heading(asked, server, first)
+    replies = read_log(path, heading) if path.exists() else {}
+    progress(len(replies))
+    headers = {"Authorization": f"Bearer {server.key}"} if server.key else {}
+    with (
+        _appending(path, heading) as file,
+        httpx.Client(timeout=server.timeout, headers=headers) as client,
+        ThreadPoolExecutor(server.concurrency) as pool,
+    ):
+        waiting: set[Future[dict[str, Any]]] = set()
+        stop = threading.Event()  # ends pauses between tries
+        try:
+            for row in _chained(first, rows):
+                if row.id in replies:
+                    continue
+                waiting.add(pool.submit(_ask_row, client, server, asked.layout, row, stop))
+                if len(waiting) >= 2 * server.concurrency:
+                    waiting = _keep(waiting, file, replies, progress)
+            while waiting:
+                waiting = _keep(waiting, file, replies, progress)
+        except BaseException:
+            stop.set()
+            for future in waiting:
+                future.cancel()
+            for future in waiting:  # replies that were paid for are kept
+                with suppress(BaseException):
+                    _write(file, future.result(), replies)
+            raise
+    return [replies[name] for name in sorted(replies, key=_order)]
+
+
+def totals(replies: list[dict[str, Any]]) -> Totals:
+    """Return the sums of a log's lines."""
+    outcomes = [reply["outcome"] for reply in replies]
+    known = [reply for reply in replies if reply["right"] is not None]
+    return Totals(
+        rows=len(replies),
+        answered=outcomes.count("answered"),
+        unparsed=outcomes.count("unparsed"),
+        refused=outcomes.count("refused"),
+        right=sum(reply["right"] for reply in known),
+        known=len(known),
+        input_tokens=sum(reply["input_tokens"] for reply in replies),
+        output_tokens=sum(reply["output_tokens"] for reply in replies),
+    )
+
+
+def read_log(path: str | Path, heading: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Return the replies of a log by the id of their row. A last line that is cut off is left out.
+
+    Args:
+        heading: that the log must have.
+
+    Raises OSError; FileFormatError for a damaged log; SpecError for one with another heading.
+    """
+    *lines, _ = Path(path).read_bytes().split(b"\n")
+    values = [_line(path, number, line) for number, line in enumerate(lines, 1)]
+    if not values or values[0].get("format") != FORMAT:
+        raise FileFormatError(path, "no log of bench ask", "one, or a new name")
+    for name, value in (heading or {}).items():
+        if values[0].get(name) != value:
+            place = f"{path}: {name}"
+            raise SpecError(place, values[0].get(name), f"{value}, or a new name for the log")
+    replies = {}
+    for value in values[1:]:
+        if value["id"] in replies:
+            raise FileFormatError(path, f"row {value['id']} twice", "each row once")
+        replies[value["id"]] = value
+    return replies
+
+
+def read_heading(path: str | Path) -> dict[str, Any]:
+    """Return the heading of a log: model, settings, digest of the questions."""
+    with Path(path).open("rb") as file:
+        return _line(path, 1, file.readline())
+
+
+def _line(path: str | Path, number: int, line: bytes) -> dict[str, Any]:
+    try:
+        value = json.loads(line)
+    except ValueError:
+        value = None
+    if not isinstance(value, dict) or ("id" not in value and "format" not in value):
+        raise FileFormatError(f"{path}: line {number}", "no reply", "a JSON object with an id")
+    return value
+
+
+def _heading(asked: Asked, server: Server, first: Row) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "model": server.model,
+        "temperature": server.temperature,
+        "max_tokens": server.max_tokens,
+        "layout": asked.layout,
+        "rotations": asked.rotations,
+        "size": asked.size,
+        "control": not asked.with_reference,
+        "digest": first.digest,
+        "prompt": first.question,
+    }
+
+
+@contextmanager
+def _appending(path: Path, heading: Mapping[str, Any]) -> Iterator[TextIO]:
+    """Open a log to append whole lines; a last line that is cut off is removed."""
+    new = not path.exists()
+    if not new:
+        os.truncate(path, path.read_bytes().rfind(b"\n") + 1)
+    with path.open("a", encoding="utf-8") as file:
+        if new:
+            _append(file, heading)
+        yield file
+
+
+def _append(file: TextIO, value: Mapping[str, Any]) -> None:
+    file.write(json.dumps(value, ensure_ascii=False) + "\n")
+    file.flush()
+    os.fsync(file.fileno())
+
+
+def _write(file: TextIO, reply: dict[str, Any], replies: dict[str, Any]) -> None:
+    _append(file, reply)
+    replies[reply["id"]] = reply
+
+
+def _keep(
+    waiting: set[Future[dict[str, Any]]],
+    file: TextIO,
+    replies: dict[str, Any],
+    progress: Callable[[int], Any],
+) -> set[Future[dict[str, Any]]]:
+    """Write the replies that have come; return the requests that still wait."""
+    done, still = wait(waiting, return_when=FIRST_COMPLETED)
+    failed = None
+    for future in done:
+        error = future.exception()
+        if error is None:
+            _write(file, future.result(), replies)
+            progress(1)
+        failed = failed or error
+    if failed is not None:
+        waiting.difference_update(done)
+        raise failed
+    return still
+
+
+def _ask_row(
+    client: Any, server: Server, layout: str, row: Row, stop: threading.Event
+) -> dict[str, Any]:
+    """Return the line of the log for a row. Raises AskError after the last try."""
+    started, rng = time.monotonic(), random.Random(row.id)
+    body = _body(server, layout, row)
+    url = server.base_url.rstrip("/") + "/chat/completions"
+    problem, pause = "", server.pause
+    for number in range(1, server.tries + 1):
+        problem, later, reply = _one_try(client, url, body)
+        if reply is not None:
+            return _reply(row, reply, number, time.monotonic() - started)
+        if later is None:
+            break
+        if number < server.tries:
+            if stop.wait(min(LONGEST_WAIT, max(later, pause * rng.uniform(1.0, 1.5)))):
+                break
+            pause *= 2
+    place = f"{server.base_url}: row {row.id}"
+    raise AskError(place, problem, "a chat completion", "run the same command to go on")
+
+
+def _one_try(
+    client: Any, url: str, body: dict[str, Any]
+) -> tuple[str, float | None, dict[str, Any] | None]:
+    """Return the problem, how many seconds to wait before a new try (None: no use), the reply."""
+    import httpx
+
+    try:
+        response = client.post(url, json=body)
+    except httpx.HTTPError as error:
+        return f"{type(error).__name__} {error}".strip(), 0.0, None
+    if response.status_code != 200:
+        text = f"status {response.status_code}: {response.text[:200]}"
+        if response.status_code not in RETRIED:
+            return text, None, None
+        return text, _seconds(response.headers.get("retry-after", "0")), None
+    try:
+        value = response.json()
+        content = value["choices"][0]["message"]["content"]
+    except (ValueError, LookupError, TypeError):
+        return f"no chat completion: {response.text[:100]!r}", 0.0, None
+    if not isinstance(content, str | None):
+        return "a message that is no text", 0.0, None
+    usage = value.get("usage")
+    usage = usage if isinstance(usage, dict) else {}
+    return "", 0.0, {"text": content or "", "usage": usage}
+
+
+def _seconds(text: str) -> float:
+    try:
+        return max(0.0, float(text))
+    except ValueError:  # a date
+        return 0.0
+
+
+def _body(server: Server, layout: str, row: Row) -> dict[str, Any]:
+    pictures = [row.image] if layout == "composed" else list(row.images)
+    content: list[dict[str, Any]] = [
+        {"type": "image_url", "image_url": {"url": _data_url(picture)}} for picture in pictures
+    ]
+    content.append({"type": "text", "text": row.question})
+    return {
+        "model": server.model,
+        "messages": [{"role": "user", "content": content}],
+        "temperature": server.temperature,
+        "max_tokens": server.max_tokens,
+    }
+
+
+def _data_url(png: bytes) -> str:
+    return "data:image/png;base64," + base64.b64encode(png).decode()
+
+
+def _reply(row: Row, reply: Mapping[str, Any], tries: int, seconds: float) -> dict[str, Any]:
+    reading = read_answer(reply["text"], len(row.letters))
+    letter = None if reading.answer is None else row.letters[reading.answer]
+    tokens = [reply["usage"].get(name) for name in ("prompt_tokens", "completion_tokens")]
+    counted = [count if isinstance(count, int) else 0 for count in tokens]
+    return {
+        "id": row.id,
+        "question_index": row.question_index,
+        "rotation": row.rotation,
+        "letter": letter,
+        "outcome": reading.outcome,
+        "answer": None if reading.answer is None else row.original(reading.answer),
+        "right": None if row.answer is None else letter == row.answer,
+        "text": reply["text"],
+        "input_tokens": counted[0],
+        "output_tokens": counted[1],
+        "tries": tries,
+        "seconds": round(seconds, 3),
+    }
+
+
+def _chained(first: Row, rows: Iterator[Row]) -> Iterator[Row]:
+    yield first
+    yield from rows
+
+
+def _order(name: str) -> tuple[int, ...]:
+    return tuple(int(number) for number in name.split("-"))

@@ -1,0 +1,199 @@
+"""Questions written for the programs that ask models: Parquet, VLMEvalKit, lmms-eval.
+
+`questions.parquet` and `control.parquet` have the columns of `COLUMNS`; the control leaves out the
+reference. `NAME.tsv` and `NAME_circular.tsv` follow VLMEvalKit's layout of own multiple-choice
+data, and the YAML files are tasks of lmms-eval.
+"""
+
+import base64
+import csv
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from iqtt.vlm.prompt import CANARY
+from iqtt.vlm.rows import Asked, Row, count_rows, vlm_rows
+from scenegen.files.new_folder import folder_written_beside
+
+COLUMNS = {
+    "id": "name of the row: question and rotation",
+    "question_index": "row of the question in its file, from 0",
+    "rotation": "letter k shows the answer (k + rotation) mod K of the file",
+    "image": "sRGB PNG: the reference above, the answers below with their letters",
+    "images": "sRGB PNGs: the reference, then the answers in the order of their letters",
+    "question": "the text to ask",
+    "choices": "names of the answers",
+    "answer": "the right letter; left out of a withheld test, as are the facts below",
+    "kind": "kind of the question, such as matched",
+    "angle": "smallest rotation from the reference's view to the right answer's, degrees",
+    "cubes": "number of cubes of each shape",
+    "shape": "cluster for intervals: questions about one shape, or its mirror image, share it",
+    "floor": "accuracy that is reached on this kind without any idea of 3D",
+    "canary": "mark of test data; do not train on text or pictures that carry it",
+    "digest": "fingerprint of the table of questions; answers are only taken for the same one",
+}
+FACTS = ("answer", "kind", "angle", "cubes", "shape", "floor")
+CIRCULAR = 1_000_000  # VLMEvalKit: index + k * CIRCULAR is rotation k of a question
+AT_ONCE = 32  # rows of a row group
+TEMPLATES = Path(__file__).with_name("lmms_eval")
+QUESTIONS, CONTROL, CARD = "questions.parquet", "control.parquet", "README.md"
+
+
+def export_for_models(
+    asked: Asked,
+    folder: str | Path,
+    *,
+    overwrite: bool = False,
+    progress: Callable[[int], Any] = lambda done: None,
+) -> list[Path]:
+    """Write a file of questions for models to a folder, which appears when it is complete.
+
+    Args:
+        progress: is told the number of rows that were written since the last call.
+
+    Returns the files. Raises as `vlm_rows`, and OSError as `folder_written_beside`.
+    """
+    name = Path(asked.path).stem
+    sheets = (f"{name}.tsv", f"{name}_circular.tsv")
+    tasks = sorted(path.name for path in TEMPLATES.iterdir() if path.is_file())
+    names = [QUESTIONS, CONTROL, *sheets, CARD, *tasks]
+    count_rows(asked)  # refuses what cannot be asked before anything is written
+    with folder_written_beside(folder, names, overwrite) as made:
+        with (
+            (made / sheets[0]).open("w", encoding="utf-8", newline="") as plain,
+            (made / sheets[1]).open("w", encoding="utf-8", newline="") as circular,
+        ):
+            rows = _in_sheets(vlm_rows(asked), _sheet(plain), _sheet(circular), asked.layout)
+            withheld, answers = _write_parquet(made / QUESTIONS, rows, progress)
+        control = replace(asked, with_reference=False, rotations=1)
+        _write_parquet(made / CONTROL, vlm_rows(control), lambda done: None)
+        if asked.rotations == 1:
+            (made / sheets[1]).unlink()
+            names.remove(sheets[1])
+        (made / CARD).write_text(_card(name, answers, withheld), encoding="utf-8")
+        for task in tasks:
+            text = (TEMPLATES / task).read_text(encoding="utf-8")
+            target = str(Path(folder).absolute() / QUESTIONS)
+            (made / task).write_text(text.replace("QUESTIONS_PARQUET", target), encoding="utf-8")
+    return [Path(folder) / name for name in names]
+
+
+def row_values(row: Row) -> dict[str, Any]:
+    """Return the values of a row by COLUMNS; without FACTS where the answer is withheld."""
+    values = {
+        "id": row.id,
+        "question_index": row.question_index,
+        "rotation": row.rotation,
+        "image": {"bytes": row.image, "path": None},
+        "images": [{"bytes": image, "path": None} for image in row.images],
+        "question": row.question,
+        "choices": [f"picture {letter}" for letter in row.letters],
+        "answer": row.answer,
+        **row.facts,
+        "canary": CANARY,
+        "digest": row.digest,
+    }
+    hidden = FACTS if row.answer is None else ()
+    return {name: values[name] for name in COLUMNS if name not in hidden}
+
+
+def _write_parquet(
+    path: Path, rows: Iterator[Row], progress: Callable[[int], Any]
+) -> tuple[bool, int]:
+    """Write rows; return whether the answers are withheld, and how many answers there are."""
+    import pyarrow.parquet as pq
+    from datasets import Dataset, Features, Image, List, Value
+
+    types: dict[str, Any] = {name: Value("string") for name in COLUMNS}
+    types |= dict.fromkeys(("question_index", "rotation", "cubes"), Value("int32"))
+    types |= dict.fromkeys(("angle", "floor"), Value("float64"))
+    types |= {"image": Image(), "images": List(Image()), "choices": List(Value("string"))}
+    writer, withheld, answers = None, False, 0
+    try:
+        for block in _batches(rows, AT_ONCE):
+            values = [row_values(row) for row in block]
+            features = Features({name: types[name] for name in values[0]})
+            if writer is None:
+                withheld, answers = block[0].answer is None, len(block[0].letters)
+                writer = pq.ParquetWriter(path, features.arrow_schema, compression="zstd")
+            columns = {name: [row[name] for row in values] for name in values[0]}
+            writer.write_table(Dataset.from_dict(columns, features).data.table)
+            progress(len(block))
+    finally:
+        if writer is not None:
+            writer.close()
+    return withheld, answers
+
+
+def _sheet(file: Any) -> Any:
+    return csv.writer(file, delimiter="\t", lineterminator="\n")
+
+
+def _in_sheets(rows: Iterator[Row], plain: Any, circular: Any, layout: str) -> Iterator[Row]:
+    """Yield rows, and write each to the sheets of VLMEvalKit as it passes."""
+    for number, row in enumerate(rows):
+        told = row.answer is not None
+        if number == 0:
+            heading = ["index", "image", "question", *row.letters, *(["answer"] * told)]
+            heading += ["category", "split"] if told else []
+            plain.writerow(heading)
+            circular.writerow([*heading, "g_index"])
+        pictures = [row.image] if layout == "composed" else list(row.images)
+        texts = [base64.b64encode(picture).decode() for picture in pictures]
+        image = texts[0] if layout == "composed" else json.dumps(texts)
+        values: list[Any] = [row.question, *(f"picture {letter}" for letter in row.letters)]
+        values += [row.answer, row.facts["kind"], "test"] if told else []
+        index = row.question_index + row.rotation * CIRCULAR
+        if row.rotation == 0:
+            plain.writerow([index, image, *values])
+        circular.writerow([index, image, *values, row.question_index])
+        yield row
+
+
+def _card(name: str, answers: int, withheld: bool) -> str:
+    columns = "\n".join(
+        f"| `{column}` | {text} |"
+        for column, text in COLUMNS.items()
+        if not (withheld and column in FACTS)
+    )
+    return f"""---
+license: cc-by-4.0
+task_categories: [visual-question-answering]
+tags: [mental-rotation, 3d, synthetic, pix2shape-bench]
+configs:
+- config_name: default
+  data_files: {QUESTIONS}
+- config_name: control
+  data_files: {CONTROL}
+---
+
+# {name}: mental-rotation questions for models
+
+Each question shows a reference and {answers} answers. One answer shows the same shape, turned.
+A program drew all pictures from cubes, and an audit proves that each question has one right answer.
+
+`{CONTROL}` asks the same questions without the reference. A model scores at the floor there, or
+it has learned something else than mental rotation.
+
+| column | what it holds |
+| --- | --- |
+{columns}
+
+Report the accuracy on `matched` and on `mirror-pair` with two answers, beside their floors, with
+intervals by `shape`. Circular accuracy counts a question as right if every rotation is right.
+
+{CANARY}
+"""
+
+
+def _batches(rows: Iterator[Row], size: int) -> Iterator[list[Row]]:
+    block: list[Row] = []
+    for row in rows:
+        block.append(row)
+        if len(block) == size:
+            yield block
+            block = []
+    if block:
+        yield block

@@ -1,0 +1,36 @@
+"""What a model is asked, in words."""
+
+from iqtt.vlm.reading import LETTERS
+
+RULE = (
+    "Each shape is made of unit cubes that touch face to face. Every cube of a shape shows in every"
+    " picture of it. One of the answers shows the same shape as the reference, turned in space. The"
+    " other answers show other shapes, and these may be the mirror image of the reference."
+)
+# Not a sentence to be learned: whoever trains on text with this mark has trained on test data.
+CANARY = "pix2shape-bench:canary:5b0c1e0a-6f0e-4c39-9a7d-2f4f0d9c7e61"
+
+
+def letters(answers: int) -> str:
+    """Return "A, B or C" for three answers."""
+    return f"{', '.join(LETTERS[: answers - 1])} or {LETTERS[answers - 1]}"
+
+
+def question_text(answers: int, layout: str = "composed", with_reference: bool = True) -> str:
+    """Return the question.
+
+    Args:
+        answers: how many there are, 2 or 3.
+        layout: "composed" for one picture of all, or "separate" for one picture each.
+        with_reference: False asks without the reference, for a control.
+    """
+    names = ", ".join(LETTERS[:answers])
+    if layout == "separate":
+        shown = f"The first picture is the reference. The next {answers} pictures are {names}."
+        shown = shown if with_reference else f"The {answers} pictures are {names}."
+    else:
+        shown = f"The picture shows the reference above, and the answers {names} below."
+        shown = shown if with_reference else f"The picture shows the answers {names}."
+    hidden = "" if with_reference else " The reference is not shown to you: guess."
+    ask = "Which answer shows the same shape as the reference?"
+    return f"{shown}{hidden} {RULE}\n\n{ask} Answer with one letter: {letters(answers)}."

@@ -1,0 +1,187 @@
+"""Questions as rows for models: pictures, text, and what the file tells of the answer."""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from numpy.typing import NDArray
+
+from iqtt.files.reader import QuestionsFile, answers_beside
+from iqtt.files.truth import QuestionTruth
+from iqtt.floors import floor_of_kind
+from iqtt.questions.specs import DISTRACTOR_KINDS, question_kind
+from iqtt.vlm.pictures import composed, draw_pictures, png
+from iqtt.vlm.prompt import question_text
+from iqtt.vlm.reading import LETTERS
+from scenegen.common.errors import FileFormatError
+from scenegen.common.records import check
+from scenegen.files.rows import chosen_rows
+
+Array = NDArray[Any]
+Layout = Literal["composed", "separate"]
+SIZE = 512  # pixels of a picture's shorter side
+AT_ONCE = 16  # questions whose truth is in memory
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A file of questions, and how a model is asked them.
+
+    Attributes:
+        path: the file of questions.
+        part: "labeled" or "unlabeled" of a training file.
+        answers: the file of the test answers, which holds the cubes; None takes the one beside.
+        with_answers: whether rows of a test file tell the answers.
+        layout: one picture of all, or one picture each.
+        rotations: 1, or as many as there are answers: in rotation r, answer r comes first.
+        size: of the shorter side of each picture, pixels.
+        with_reference: False leaves the reference out, for a control.
+        items: rows that are asked; all by default.
+        device: as in `backend.DEVICES`.
+    """
+
+    path: str | Path
+    part: str | None = None
+    answers: str | Path | None = None
+    with_answers: bool = False
+    layout: Layout = "composed"
+    rotations: int = 1
+    size: int = SIZE
+    with_reference: bool = True
+    items: Sequence[int] | None = None
+    device: str = "auto"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A question in one order of its answers.
+
+    Attributes:
+        id: of the row, such as "17-0".
+        question_index: row of the question in its file.
+        rotation: letter k shows the answer (k + rotation) mod K of the file.
+        image: one PNG file in sRGB with all pictures and their letters.
+        images: PNG files in sRGB of the reference and of each answer.
+        question: the text, as the layout wants it.
+        letters: those of the answers.
+        answer: the right letter; None where it is withheld.
+        facts: kind, angle, cubes, shape and floor, as `truth` has them; None where withheld.
+        digest: fingerprint of the table that the question is from.
+    """
+
+    id: str
+    question_index: int
+    rotation: int
+    image: bytes
+    images: tuple[bytes, ...]
+    question: str
+    letters: str
+    answer: str | None
+    facts: dict[str, Any]
+    digest: str
+
+    def original(self, letter: int) -> int:
+        """Return the answer of the file that a letter of this row shows, both from 0."""
+        return (letter + self.rotation) % len(self.letters)
+
+
+def count_rows(asked: Asked) -> int:
+    """Return how many rows `vlm_rows` yields. Raises as it does."""
+    with QuestionsFile(asked.path, asked.part) as questions:
+        return len(_items(asked, questions)) * _rotations(asked, questions)
+
+
+def vlm_rows(asked: Asked) -> Iterator[Row]:
+    """Yield the rows of a file, question by question, each in `rotations` orders of its answers.
+
+    Raises:
+        OSError, FileFormatError: as `QuestionsFile`; a file that tells no cubes, as a released one
+            or a test file without its answers, cannot be drawn anew.
+        SpecError: a number out of range.
+    """
+    with _opened(asked) as questions:
+        rotations, items = _rotations(asked, questions), _items(asked, questions)
+        tell = asked.with_answers or questions.beside is None
+        assert questions.spec is not None  # `_opened` refuses released files
+        for start in range(0, len(items), AT_ONCE):
+            chosen = items[start : start + AT_ONCE]
+            truths = [truth for row in chosen if (truth := questions.truth(row)) is not None]
+            drawn = draw_pictures(questions.spec, truths, asked.size, asked.device)
+            for row, truth, pictures in zip(chosen, truths, drawn, strict=True):
+                answer = int(questions.read("answers", row)) if tell else None
+                for rotation in range(rotations):
+                    yield _row(asked, questions, row, rotation, pictures, truth, answer)
+
+
+def _opened(asked: Asked) -> QuestionsFile:
+    """Open a file with what it takes to draw its pictures: its own truth, or that of its answers.
+
+    Raises as `vlm_rows`.
+    """
+    questions = QuestionsFile(asked.path, asked.part)
+    if questions.spec is not None and not questions.has_answers:
+        questions.close()
+        path = asked.answers or answers_beside(asked.path)
+        if path is None:
+            hint = "give the file of answers with --answers: it tells the cubes"
+            raise FileFormatError(asked.path, "pictures alone", "cubes and poses to draw", hint)
+        questions = QuestionsFile(asked.path, asked.part, path)
+    if not questions.has_truth or not questions.has_answers:
+        questions.close()
+        raise FileFormatError(asked.path, "pictures alone", "cubes and poses to draw")
+    return questions
+
+
+def _items(asked: Asked, questions: QuestionsFile) -> Sequence[int]:
+    rows = range(len(questions))
+    if asked.items is None:
+        return rows
+    chosen = chosen_rows(list(asked.items), len(rows))
+    return [chosen] if isinstance(chosen, int) else chosen
+
+
+def _rotations(asked: Asked, questions: QuestionsFile) -> int:
+    choices = (1, questions.answers)
+    check(asked.rotations in choices, "rotations", asked.rotations, f"1 or {questions.answers}")
+    return asked.rotations
+
+
+def _facts(truth: QuestionTruth, answers: int) -> dict[str, Any]:
+    codes = [-1 if k is None else DISTRACTOR_KINDS.index(k) for k in truth.distractor_kind]
+    kind = question_kind(codes)
+    return {
+        "kind": kind,
+        "angle": round(truth.angle_degrees, 3),
+        "cubes": int(truth.cubes.shape[1]),
+        "shape": hashlib.sha256(truth.class_id[0]).hexdigest()[:16],
+        "floor": floor_of_kind(kind, answers)[0],
+    }
+
+
+def _row(
+    asked: Asked,
+    questions: QuestionsFile,
+    index: int,
+    rotation: int,
+    pictures: Array,
+    truth: QuestionTruth,
+    answer: int | None,
+) -> Row:
+    count = questions.answers
+    facts = _facts(truth, count)
+    order = [0, *(1 + (k + rotation) % count for k in range(count))]
+    turned = pictures[order]
+    return Row(
+        id=f"{index}-{rotation}",
+        question_index=index,
+        rotation=rotation,
+        image=png(composed(turned, asked.with_reference)),
+        images=tuple(png(picture) for picture in turned[0 if asked.with_reference else 1 :]),
+        question=question_text(count, asked.layout, asked.with_reference),
+        letters=LETTERS[:count],
+        answer=None if answer is None else LETTERS[(answer - rotation) % count],
+        facts=dict.fromkeys(facts) if answer is None else facts,
+        digest=questions.fingerprint or "",
+    )
