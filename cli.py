@@ -13,9 +13,7 @@ QUESTIONS = (
 )
 
 SCORES = (
-    "metrics.commands.submissions",
-    "metrics.commands.intake",
-    "metrics.commands.standings",
+    *(f"metrics.commands.{name}" for name in ("submissions", "intake", "asking", "standings")),
     "baselines.commands",
 )
 

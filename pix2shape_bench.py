@@ -4,7 +4,7 @@ Inspect names a task after the package that holds it, so this file has the proje
 """
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -75,23 +75,27 @@ def _url(png: bytes) -> str:
 @metric
 def circular_accuracy() -> Metric:
     """Questions whose every rotation is right."""
-    return lambda scores: harness.circular_accuracy(_rows(scores))
+    return _over_rows(harness.circular_accuracy)
 
 
 @metric
 def skill() -> Metric:
     """How much of the way from the floor to perfect."""
-    return lambda scores: harness.skill(_rows(scores))
+    return _over_rows(harness.skill)
 
 
 @metric
 def unparsed() -> Metric:
     """Rows without an answer."""
-    return lambda scores: harness.unparsed(_rows(scores))
+    return _over_rows(harness.unparsed)
 
 
-def _rows(scores: Sequence[SampleScore]) -> list[dict[str, Any]]:
-    return [score.score.metadata or {} for score in scores]
+def _over_rows(mean: Callable[[Sequence[harness.Answered]], float]) -> Metric:
+    # Inspect goes by the annotation: a function without it gets scores of another type.
+    def of_scores(scores: list[SampleScore]) -> float:
+        return mean([score.score.metadata or {} for score in scores])
+
+    return of_scores
 
 
 @scorer(

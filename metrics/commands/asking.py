@@ -15,38 +15,78 @@ from scenegen.command_line.paths import InputPath, OutputPath
 SERVER = "http://127.0.0.1:8000/v1"
 
 
-# fmt: off
 @click.command(
     epilog=f"{EXAMPLE}bench ask iqtt-split/iqtt-test.h5 --model openai:my-model"
     f" --base-url {SERVER} --log asked.jsonl --out predictions.h5"
 )
 @click.argument("file", type=InputPath())
-@click.option("--model", required=True, metavar="openai:NAME",
-              help="Model that the server knows; openai is the protocol.")
-@click.option("--base-url", default=SERVER, show_default=True,
-              help="Address of the server: vLLM, llama.cpp, Ollama or any other of the protocol.")
-@click.option("--key-from", default="OPENAI_API_KEY", show_default=True,
-              help="Environment variable that holds the key. The key is never written.")
-@click.option("--log", type=OutputPath(), default="asked.jsonl", show_default=True,
-              help="JSON Lines of all replies. The same command goes on where it stopped.")
+@click.option(
+    "--model",
+    required=True,
+    metavar="openai:NAME",
+    help="Model that the server knows; openai is the protocol.",
+)
+@click.option(
+    "--base-url",
+    default=SERVER,
+    show_default=True,
+    help="Address of the server: vLLM, llama.cpp, Ollama or any other of the protocol.",
+)
+@click.option(
+    "--key-from",
+    default="OPENAI_API_KEY",
+    show_default=True,
+    help="Environment variable that holds the key. The key is never written.",
+)
+@click.option(
+    "--log",
+    type=OutputPath(),
+    default="asked.jsonl",
+    show_default=True,
+    help="JSON Lines of all replies. The same command goes on where it stopped.",
+)
 @click.option("--out", type=OutputPath(), help="Submission to write, for `bench score`.")
-@click.option("--part", type=click.Choice(["labeled", "unlabeled"]),
-              help="Part of a training file.")
+@click.option(
+    "--part", type=click.Choice(["labeled", "unlabeled"]), help="Part of a training file."
+)
 @click.option("--control", is_flag=True, help="Leave the reference out: a model must then guess.")
 @click.option("--temperature", type=click.FloatRange(0, 2), default=0.0, show_default=True)
-@click.option("--max-tokens", type=click.IntRange(1, 1_000_000), default=1024, show_default=True,
-              help="Most tokens of a reply.")
-@click.option("--timeout", type=click.FloatRange(0.1, 3600), default=120.0, show_default=True,
-              help="Seconds that a reply may take.")
-@click.option("--tries", type=click.IntRange(1, 100), default=6, show_default=True,
-              help="Most requests for one row, with growing pauses.")
-@click.option("--concurrency", type=click.IntRange(1, 256), default=4, show_default=True,
-              help="Requests at the same time.")
-@click.option("--prices", type=(float, float), metavar="IN OUT",
-              help="Prices of a million tokens, of the prompt and of the reply; the cost is shown.")
+@click.option(
+    "--max-tokens",
+    type=click.IntRange(1, 1_000_000),
+    default=1024,
+    show_default=True,
+    help="Most tokens of a reply.",
+)
+@click.option(
+    "--timeout",
+    type=click.FloatRange(0.1, 3600),
+    default=120.0,
+    show_default=True,
+    help="Seconds that a reply may take.",
+)
+@click.option(
+    "--tries",
+    type=click.IntRange(1, 100),
+    default=6,
+    show_default=True,
+    help="Most requests for one row, with growing pauses.",
+)
+@click.option(
+    "--concurrency",
+    type=click.IntRange(1, 256),
+    default=4,
+    show_default=True,
+    help="Requests at the same time.",
+)
+@click.option(
+    "--prices",
+    type=(float, float),
+    metavar="IN OUT",
+    help="Prices of a million tokens, of the prompt and of the reply; the cost is shown.",
+)
 @model_options
 @OVERWRITE
-# fmt: on
 def ask(
     file: str,
     model: str,
@@ -62,14 +102,14 @@ def ask(
 ) -> None:
     """Ask the questions of FILE to a model and keep every reply.
 
-    Pictures are drawn anew from the cubes of FILE, in sRGB, with letters. A reply that is a server's
-    error is asked again. A reply without a letter counts as no answer.
+    Pictures are drawn anew from the cubes of FILE, in sRGB, with letters. A row is asked again if
+    the server fails. A reply without a letter counts as no answer.
     """
     needs("bench ask", ("httpx",), "vlm")
     from iqtt.vlm.ask import Server, totals
     from iqtt.vlm.ask import ask as ask_rows
-    from iqtt.vlm.returned import returned_from_log, write_returned
     from iqtt.vlm.rows import Asked, count_rows
+    from metrics.submissions.returned import read_returned, write_returned
 
     protocol, _, name = model.partition(":")
     if protocol != "openai" or not name:
@@ -93,7 +133,7 @@ def ask(
     if sums.known:
         print_line(f"{log}: {sums.right} of {sums.known} rows right")
     if out is not None:
-        write_returned(out, file, returned_from_log(log), part=part, overwrite=overwrite)
+        write_returned(out, file, read_returned(log), part=part, overwrite=overwrite)
         print_line(f"{out}: answers of {name}; next: bench score {out}")
 
 

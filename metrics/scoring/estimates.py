@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from iqtt.floors import floor_of_questions
 from metrics.measures.objects import size_range
 from metrics.measures.skill import skill, skill_intervals
 from metrics.measures.statistics import (
@@ -15,7 +16,6 @@ from metrics.measures.statistics import (
     clustered_wilson_interval,
     linearised_means,
 )
-from iqtt.floors import floor_of_questions
 from metrics.scoring.metric_names import OBJECT_SCORES, SKILLED, metric
 
 Array = NDArray[Any]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from metrics.measures.answers import ABSTAINED
 from metrics.scoring.estimates import ACCURACY, Bootstrap, accuracy
-from metrics.scoring.records import AnswerGroup, ScoreFile
+from metrics.scoring.records import AnswerGroup, Meta, ScoreFile
 from metrics.scoring.runs import (
     Progress,
     Settings,
@@ -20,6 +20,7 @@ from metrics.scoring.runs import (
 )
 from metrics.scoring.truth_digests import answers_digest
 from metrics.submissions.reader import QuestionPredictions
+from metrics.submissions.rules import OUTCOMES
 from scenegen.common.errors import FileFormatError
 
 if TYPE_CHECKING:
@@ -69,6 +70,8 @@ def score_questions(
         return _answer_groups(right, shapes, labels, Bootstrap(meta.seed, meta.resamples))
 
     groups = {"by_position": grouped(true[rows])}
+    if len(files) == 1:  # runs may differ in these
+        groups |= _groups_of_texts(files[0], answers[0, rows], true, rows, shapes, meta)
     if len(columns) > 1:
         kinds, angles = (columns[name][rows] for name in LABELS)
         bins = np.clip(np.digitize(angles, ANGLE_BINS) - 1, 0, len(ANGLE_BINS) - 2)
@@ -94,6 +97,26 @@ def _answer_groups(
         score = accuracy(right[:, here], shapes[here], bootstrap)
         counts = np.count_nonzero(right[:, here], axis=1).tolist()
         groups[str(label)] = AnswerGroup(score.n, tuple(counts), score.low, score.high)
+    return groups
+
+
+def _groups_of_texts(
+    file: QuestionPredictions, answers: Array, true: Array, rows: Array, shapes: Array, meta: Meta
+) -> dict[str, dict[str, AnswerGroup]]:
+    """Return groups by the answers (Q,) that a model gave, and by what its texts held."""
+    bootstrap = Bootstrap(meta.seed, meta.resamples)
+    right = (answers == true[rows])[None].astype(np.float64)
+    letters = np.where(answers == ABSTAINED, "none", answers.astype(str))
+    groups = {"by_answer": _answer_groups(right, shapes, letters, bootstrap)}
+    place = np.argsort(file.rows)[np.searchsorted(np.sort(file.rows), rows)]
+    outcome, rotated = file.told("outcome"), file.told("rotated")
+    if outcome is not None:
+        labels = np.array(OUTCOMES)[outcome[place]]
+        groups["by_outcome"] = _answer_groups(right, shapes, labels, bootstrap)
+    if rotated is not None:
+        every = (rotated[place] == true[rows, None]).all(axis=1)[None].astype(np.float64)
+        label = np.full(len(rows), "every order")
+        groups["by_circle"] = _answer_groups(every, shapes, label, bootstrap)
     return groups
 
 

@@ -75,7 +75,10 @@ COUNTS = {
 }
 GROUPINGS = {
     "rooms": ("by_view_angle", "by_object_shape", "by_object_size"),
-    "iqtt": ("by_distractor", "by_rotation_angle", "by_position"),
+    "iqtt": (
+        *("by_distractor", "by_rotation_angle", "by_position"),
+        *("by_answer", "by_outcome", "by_circle"),
+    ),
 }
 _STRICT = ConfigDict(extra="forbid")
 
@@ -302,6 +305,21 @@ class ScoreFile:
     def by_position(self) -> Groups:
         """Scores by index of the right answer, "0" to "2"."""
         return self._groups_of_answers("by_position")
+
+    @cached_property
+    def by_answer(self) -> Groups:
+        """Scores by the answer that was given, "0" to "2", or "none": how a method leans."""
+        return self._groups_of_answers("by_answer")
+
+    @cached_property
+    def by_outcome(self) -> Groups:
+        """Scores by what became of a model's text: "answered", "unparsed" or "refused"."""
+        return self._groups_of_answers("by_outcome")
+
+    @cached_property
+    def by_circle(self) -> Groups:
+        """Circular accuracy, as "every order": right in each order of the answers."""
+        return self._groups_of_answers("by_circle")
 
     @property
     def _bootstrap(self) -> Bootstrap:

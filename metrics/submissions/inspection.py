@@ -262,6 +262,11 @@ def _take_answers(result: Inspection, ids: Ids) -> None:
         result.problems += value_problems("answer", answers, ids, Against(of_scores=usable))
     if len(result.problems) == before:
         result.answers = of_scores if answers is None else answers.astype(np.int64)
+    for name in ("outcome", "rotated"):
+        values = _values(result, name, lambda array: array[()])
+        if values is not None:
+            against = Against(of_scores=result.answers)
+            result.problems += value_problems(name, values, ids, against)
 
 
 def _answers(result: Inspection, scores: Any, ids: Ids) -> Ids:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from metrics.measures.answers import CANDIDATES
-from metrics.submissions.rules import RULES, kind_text, shape_text
+from metrics.submissions.rules import OUTCOMES, RULES, kind_text, shape_text
 from scenegen.files.schema import Column
 
 FORMAT_NAME = "pix2shape-bench/predictions"
@@ -84,6 +84,12 @@ COLUMNS = {
         Column("scores", (), "float64",
                meaning="one for each answer; the highest wins, a tie for it counts as an"
                " abstention; if `answer` is there too, both must say the same", axes=("answer",)),
+        Column("outcome", (), "int8",
+               meaning="what a model's text held: "
+               + ", ".join(f"{i} {name}" for i, name in enumerate(OUTCOMES))),
+        Column("rotated", (), "int8",
+               meaning="the answer, from 0, when answer r stood first, for r from 0; -1 abstains;"
+               " the first is `answer`", axes=("answer",)),
     ),
 }  # fmt: skip
 NEEDED = {"row": "", "question": "", **dict.fromkeys(KINDS, f"one of {', '.join(KINDS)}; "),

@@ -211,6 +211,13 @@ class QuestionPredictions(Predictions):
         """How many answers have scores, 2 or 3; None where only answers are given."""
         return int(self._arrays["scores"].shape[1]) if "scores" in self._arrays else None
 
+    def told(self, name: str) -> Array | None:
+        """Return `outcome`, (M,), or `rotated`, (M, A), as int64; None where it is not there."""
+        if name not in self._arrays:
+            return None
+        with reading(f"{self.path}: {name}"):
+            return np.asarray(self._arrays[name][()], np.int64)
+
     @cached_property
     def scores(self) -> Array | None:
         """Scores (M, A), finite; None where only answers are given. Raises FileFormatError."""

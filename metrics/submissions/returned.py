@@ -17,9 +17,9 @@ from iqtt.files.reader import QuestionsFile
 from iqtt.vlm.ask import FORMAT as ASKED
 from iqtt.vlm.export import CIRCULAR
 from iqtt.vlm.reading import Outcome, Reading, read_answer
+from metrics.submissions.rules import OUTCOMES
 from metrics.submissions.writer import write_answers
-from scenegen.common.errors import FileFormatError
-from scenegen.files.input_file import describing
+from scenegen.common.errors import FileFormatError, SceneGenError
 
 ABSTAINED = -1
 
@@ -82,13 +82,14 @@ def read_returned(path: str | Path) -> Log:
     two answers to a row.
     """
     path = Path(path)
-    with describing(str(path)):
-        if path.suffix == ".eval" or path.suffix == ".json":
-            log = _of_inspect(path)
-        elif path.suffix == ".jsonl":
-            log = _of_lines(path)
-        else:
-            log = _of_sheet(path)
+    readers = {".eval": _of_inspect, ".json": _of_inspect, ".jsonl": _of_lines}
+    try:
+        log = readers.get(path.suffix, _of_sheet)(path)
+    except (SceneGenError, OSError):
+        raise
+    except Exception as error:  # the file is a stranger's, and so may its fault be of any kind
+        found = f"{type(error).__name__}: {error}"[:200]
+        raise FileFormatError(path, found, "the log of a harness") from error
     seen: set[tuple[int, int]] = set()
     for answer in log.answers:
         row = answer.question, answer.rotation
@@ -144,9 +145,6 @@ def write_returned(
     )  # fmt: skip
 
 
-OUTCOMES: tuple[Outcome, ...] = ("answered", "unparsed", "refused")
-
-
 def _answer(row: Mapping[str, Any], text: str, answers: int) -> ReturnedAnswer:
     return _from_reading(row, read_answer(text, answers), answers)
 
@@ -161,10 +159,7 @@ def _from_reading(row: Mapping[str, Any], reading: Reading, answers: int) -> Ret
 def _of_inspect(path: Path) -> Log:
     from inspect_ai.log import read_eval_log
 
-    try:
-        log = read_eval_log(str(path))
-    except Exception as error:  # of any kind: the file is a stranger's
-        raise FileFormatError(path, str(error)[:200], "a log of Inspect") from error
+    log = read_eval_log(str(path))
     answers = []
     for sample in log.samples or ():
         row = sample.metadata

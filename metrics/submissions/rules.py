@@ -100,6 +100,7 @@ def _on_surface(wrong: Any, against: Against) -> Any:
     return wrong if against.surface is None else wrong & against.surface
 
 
+OUTCOMES = ("answered", "unparsed", "refused")  # of the text of a model that was asked
 IDS, SURFACE = ("row", "question"), "wherever the truth shows a surface"
 RULES = (
     Rule(IDS, "range", "0 or more", "negative", lambda ids, _: ids < 0),
@@ -124,6 +125,18 @@ RULES = (
     Rule(
         ("answer",), "range", "the number of an answer from 0, or -1", "that are no answer",
         _no_answer,
+    ),
+    Rule(
+        ("rotated",), "range", "numbers of answers from 0, or -1", "that are no answers",
+        lambda answers, against: _no_answer(answers, against).any(axis=1),
+    ),
+    Rule(
+        ("rotated",), "agreement", "`answer`, in the first column", "that begin with another one",
+        lambda answers, against: _other_than_scores(answers[:, 0], against),
+    ),
+    Rule(
+        ("outcome",), "range", f"0 to {len(OUTCOMES) - 1}", "outside of that",
+        lambda outcome, _: (outcome < 0) | (outcome >= len(OUTCOMES)),
     ),
     Rule(
         ("scores",), "finite", "finite numbers", "NaN, infinite or huge",

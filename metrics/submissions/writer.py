@@ -212,6 +212,8 @@ def write_answers(
     method: str,
     answer: ArrayLike | None = None,
     scores: ArrayLike | None = None,
+    outcome: ArrayLike | None = None,
+    rotated: ArrayLike | None = None,
     rows: Sequence[int] | None = None,
     run: str = "",
     notes: str = "",
@@ -225,6 +227,8 @@ def write_answers(
         answer: (Q,) integers from 0, or -1 to abstain, which counts as wrong.
         scores: (Q, A) floats for A answers, 2 or 3 as the file offers: the highest wins, a tie for
             it abstains. Either or both; both must say the same.
+        outcome: (Q,) what a model's text held, an index into `rules.OUTCOMES`.
+        rotated: (Q, A) the answers when answer r stood first, for r from 0; -1 abstains.
         rows: (Q,) the questions that are answered, each once; scores of such a file are not
             comparable unless these are all.
 
@@ -242,6 +246,7 @@ def write_answers(
         raise PredictionError(path, "neither answer nor scores", "either")
     ids = np.arange(count) if rows is None else as_array(rows, f"{path}: rows")
     arrays = {"question": ids, "answer": answer, "scores": scores}
+    arrays |= {"outcome": outcome, "rotated": rotated}
     values: dict[str, rules.Array] = {}
     for column in layout.COLUMNS["iqtt"]:
         array = arrays[column.name]
@@ -255,6 +260,11 @@ def write_answers(
         of_scores = None if scores is None else answers_from_scores(values["scores"])
         against = rules.Against(count, offered, of_scores)
         problems = rules.value_problems("answer", np.asarray(answer), ids, against)
+    for name in ("outcome", "rotated"):
+        if name in values and not problems:
+            given = None if answer is None else np.asarray(answer)
+            against = rules.Against(count, offered, given)
+            problems = rules.value_problems(name, values[name], ids, against)
     if problems:
         raise first_error(PredictionError, path, problems)
     with new_file(path, overwrite) as file:

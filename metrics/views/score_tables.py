@@ -35,6 +35,9 @@ GROUP_TITLES = {
     "by_distractor": "by kind of question",
     "by_rotation_angle": "by rotation between reference and right answer, degrees",
     "by_position": "by place of the right answer",
+    "by_answer": "by the answer that was given, from 0",
+    "by_outcome": "by what the model's text held",
+    "by_circle": "circular: right in every order of the answers",
 }
 ALIGNMENT_SCORES = ("abs_rel", "rmse", "delta_1")
 GROUP_SCORES = {"rooms": HEADLINE["rooms"], "iqtt": ("iqtt_accuracy",)}

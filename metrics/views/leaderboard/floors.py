@@ -3,9 +3,9 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from metrics.score_file import SCORE_AGAIN
-from metrics.scoring import floors
+from iqtt import floors
 from iqtt.floors import floor_of_kind
+from metrics.score_file import SCORE_AGAIN
 from metrics.scoring.metric_names import EMPTY_ROOM, OTHER_SCENE, SKILLED
 from metrics.scoring.records import ScoreFile
 from metrics.views.by_angle import angle_floors

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from iqtt.quiz.answers import Answer, Answers
 from iqtt.floors import floor_of_kind
+from iqtt.quiz.answers import Answer, Answers
 from metrics.scoring.questions import ANGLE_BINS
 from metrics.submissions.reader import QuestionPredictions, open_predictions
 from metrics.views.people.intervals import (

@@ -4,10 +4,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from iqtt.floors import floor_of_questions
 from iqtt.quiz.pages import Bar
 from iqtt.quiz.study import UNTOLD, Question
 from metrics.measures.statistics import wilson_interval
-from iqtt.floors import floor_of_questions
 from metrics.views.paper import PAPER, PEOPLE, TABLES
 
 THREE = 3  # answers of each of the paper's questions

@@ -31,7 +31,7 @@ FORMS = [
     ("", NONE), ("The shape has 9 cubes.", NONE), ("D", NONE), ("The answer is D.", NONE),
     ("A cube sticks out of a long chain.", NONE), ("1", NONE), ("None of them.", NONE),
     ("<think>The answer is A", NONE), ("I cannot see any image.", REFUSED),
-    ("I'm sorry, but I can't help with that.", REFUSED), ("As an AI I am unable to view it.", REFUSED),
+    ("I'm sorry, but I can't help with that.", REFUSED), ("As an AI I cannot view it.", REFUSED),
 ]  # fmt: skip
 
 

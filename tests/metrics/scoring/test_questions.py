@@ -11,13 +11,13 @@ import pytest
 from refusals import refused
 
 from baselines.trivial import write_chance
+from iqtt import floors
 from iqtt.files.make import make_split
+from iqtt.floors import Floor, floor_of_questions
 from iqtt.questions.specs import QUESTION_KINDS, SplitSpec, question_kind
 from metrics.measures.statistics import design_effect, wilson_interval
 from metrics.prediction_writer import PredictionError, write_answers
-from metrics.scoring import floors
 from metrics.scoring.evaluate import score
-from iqtt.floors import Floor, floor_of_questions
 from metrics.scoring.runs import ScoringError
 
 

@@ -9,11 +9,11 @@ import pytest
 from made_scores import iqtt_scores, make_score, rooms_scores, simple_rooms, stated
 from pages import Page, cells_of
 
+from iqtt.floors import Floor
 from metrics.measures.empty_room import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.score_file import Skill
 from metrics.scoring.evaluate import score
-from iqtt.floors import Floor
 from metrics.scoring.records import Submission
 from metrics.views.headline import headline_section, kinds_sections
 from metrics.views.report import BesideError, html_report

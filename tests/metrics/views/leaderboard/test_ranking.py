@@ -8,8 +8,8 @@ import pytest
 from made_scores import DIGEST, iqtt_scores, make_score, rooms_scores, stated
 from refusals import refused
 
-from metrics.score_file import Skill
 from iqtt.floors import Floor
+from metrics.score_file import Skill
 from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import UnknownMetricError
 from metrics.views.leaderboard.floors import FloorError

@@ -11,9 +11,9 @@ import pytest
 from quizzes import MADE, made_answers
 from scipy import stats
 
+from iqtt.floors import floor_of_kind
 from iqtt.quiz.answers import read_answers, to_csv
 from metrics.prediction_writer import write_answers
-from iqtt.floors import floor_of_kind
 from metrics.views.people.figures import compute
 from metrics.views.people.references import compare, references
 from scenegen.common.errors import FileFormatError, SpecError
