@@ -109,7 +109,7 @@ def ask(
     from iqtt.vlm.ask import Server, totals
     from iqtt.vlm.ask import ask as ask_rows
     from iqtt.vlm.rows import Asked, count_rows
-    from metrics.submissions.returned import read_returned, write_returned
+    from metrics.intake.harness_logs import read_returned, write_returned
 
     protocol, _, name = model.partition(":")
     if protocol != "openai" or not name:

@@ -72,7 +72,8 @@ MISSING = click.option(
               show_default=True, help="How files belong to rows: by the number in their names, or"
               " in the order of their names.")
 @click.option("--answers", type=InputPath(), metavar="ANSWERS",
-              help="Answers to questions instead: .csv, .json or .jsonl.")
+              help="Answers to questions instead: .csv, .json or .jsonl; or the log of a harness: of"
+              " bench ask, Inspect (.eval), lmms-eval (.jsonl), VLMEvalKit (.tsv, .xlsx).")
 @DATA
 @OUT
 @METHOD
@@ -100,8 +101,15 @@ def import_(
         raise click.UsageError("give --depth for rooms, or --answers for questions")
     if answers is not None:
         from metrics.intake.answer_files import import_answers
+        from metrics.intake.harness_logs import is_log, read_returned, write_returned
 
-        count = import_answers(answers, truth, out, method=method or Path(answers).stem, **texts)
+        if is_log(answers):
+            log = read_returned(answers)
+            texts["notes"] = notes or log.settings
+            count = write_returned(out, truth, log, method=method or "", **texts)
+        else:
+            stem = Path(answers).stem
+            count = import_answers(answers, truth, out, method=method or stem, **texts)
         print_line(f"{out}: answers to {count} questions")
         return
     assert pattern is not None

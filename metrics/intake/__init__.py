@@ -4,7 +4,8 @@
 `resampling` brings it to the size of the truth. `running` calls a model of the user's
 (`model_file`) on every row and keeps what is done (`kept_rows`). `importing` takes folders of files
 instead: `matching` says which file belongs to which row, `array_files` reads them, and
-`answer_files` reads answers to questions. Start reading with `outputs`.
+`answer_files` reads answers to questions, and `harness_logs` those that programs logged which ask
+models. Start reading with `outputs`.
 
 Imports `metrics.submissions` and what it imports; never torch.
 """

@@ -15,8 +15,8 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.vlm.export import CIRCULAR, export_for_models, row_values
 from iqtt.vlm.reading import LETTERS
 from iqtt.vlm.rows import Asked, Row, vlm_rows
+from metrics.intake.harness_logs import is_log, read_returned, write_returned
 from metrics.scoring.evaluate import score
-from metrics.submissions.returned import is_log, read_returned, write_returned
 from scenegen.common.errors import FileFormatError, SceneGenError
 
 TEXTS = ["The answer is {}.", "\\boxed{{{}}}", "I cannot see it.", "A or B"]

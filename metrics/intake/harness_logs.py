@@ -110,9 +110,10 @@ def write_returned(
     part: str | None = None,
     method: str = "",
     run: str = "",
+    notes: str = "",
     overwrite: bool = False,
-) -> None:
-    """Write the answers of a log as a submission.
+) -> int:
+    """Write the answers of a log as a submission; return how many questions they answer.
 
     The answer to a question is that of rotation 0; where it has no letter it counts as wrong. The
     answers of all rotations are stored beside it, for circular accuracy, and so is the outcome.
@@ -137,12 +138,13 @@ def write_returned(
     rotations = {answer.rotation for answer in log.answers}
     write_answers(
         out, questions_file,
-        method=method or log.model or "model", run=run, notes=log.settings, overwrite=overwrite,
+        method=method or log.model or "model", run=run, notes=notes or log.settings, overwrite=overwrite,
         rows=[answer.question for answer in first],
         answer=[answer.answer for answer in first],
         outcome=[OUTCOMES.index(answer.outcome) for answer in first],
         rotated=rotated if len(rotations) > 1 else None,
     )  # fmt: skip
+    return len(first)
 
 
 def _answer(row: Mapping[str, Any], text: str, answers: int) -> ReturnedAnswer:
