@@ -72,8 +72,8 @@ MISSING = click.option(
               show_default=True, help="How files belong to rows: by the number in their names, or"
               " in the order of their names.")
 @click.option("--answers", type=InputPath(), metavar="ANSWERS",
-              help="Answers to questions instead: .csv, .json or .jsonl; or the log of a harness: of"
-              " bench ask, Inspect (.eval), lmms-eval (.jsonl), VLMEvalKit (.tsv, .xlsx).")
+              help="Answers to questions instead: .csv, .json or .jsonl; or a harness's log: bench"
+              " ask (.jsonl), Inspect (.eval), lmms-eval (.jsonl), VLMEvalKit (.tsv, .xlsx).")
 @DATA
 @OUT
 @METHOD

@@ -138,7 +138,8 @@ def write_returned(
     rotations = {answer.rotation for answer in log.answers}
     write_answers(
         out, questions_file,
-        method=method or log.model or "model", run=run, notes=notes or log.settings, overwrite=overwrite,
+        method=method or log.model or "model", run=run, notes=notes or log.settings,
+        overwrite=overwrite,
         rows=[answer.question for answer in first],
         answer=[answer.answer for answer in first],
         outcome=[OUTCOMES.index(answer.outcome) for answer in first],
