@@ -36,7 +36,7 @@ OUTSIDE = """() => {
 def pages(make_rooms, truths, tmp_path_factory):
     """Paths of pages by what they are; their methods have hostile names."""
     folder = tmp_path_factory.mktemp("pages")
-    rooms = make_rooms(folder / "rooms.h5", 7, views=(0.0, 1.0, 35.0, 80.0))
+    rooms = make_rooms(folder / "rooms.h5", 3, views=(0.0, 1.0, 80.0))
     files = []
     for i, name in enumerate(("flat", HOSTILE)):
         path = folder / f"{i}.h5"
@@ -63,24 +63,17 @@ def pages(make_rooms, truths, tmp_path_factory):
     return paths | {f"site-{n}": folder / "site" / f"{n}.html" for n in ("index", "gallery")}
 
 
-@pytest.mark.parametrize(("width", "scheme"), [(360, "dark"), (1280, "light")])
-def test_pages_fit_read_well_and_stay_silent(visit, pages, width, scheme):
-    for name in NAMES:
+@pytest.mark.parametrize(
+    ("width", "scheme", "names"), [(360, "dark", NAMES), (1280, "light", NAMES[:1])]
+)
+def test_pages_fit_read_well_and_stay_silent(visit, pages, width, scheme, names):
+    for name in names:
         seen = visit(pages[name].as_uri(), width=width, color_scheme=scheme)
         seen.page.evaluate("document.querySelectorAll('details').forEach(d => d.open = 1)")
         assert seen.page.evaluate(OUTSIDE) == [], name
         assert seen.page.evaluate("document.documentElement.scrollWidth") <= width, name
         assert seen.violations() == [], name
         assert seen.page.evaluate("[...document.images].every(i => i.complete && i.naturalWidth)")
-
-
-def test_the_policy_stops_what_a_page_should_not_do(visit, pages):
-    seen = visit(pages["little"].as_uri())
-    seen.page.evaluate(
-        "document.body.insertAdjacentHTML('beforeend', '<p id=x style=\"color: red\">x</p>')"
-    )
-    assert any("style" in error for error in seen.errors)
-    seen.errors.clear()
 
 
 def test_folded_numbers_are_printed(visit, pages):

@@ -18,7 +18,7 @@ from metrics.views.table import (
     to_markdown,
     to_text,
 )
-from scenegen.common.text_table import markdown, printable
+from scenegen.common.text_table import printable
 
 HOSTILE = [
     "a | b",
@@ -112,10 +112,6 @@ def test_each_format_marks_the_best_and_rows_of_other_kinds():
         "x", "", "t", "  #  method  score", "  1  first   0.10 [0.09]", "     none    0.20",
     ]  # fmt: skip
     assert cells_of(table) == {"first": ["0.10 [0.09]"], "none": ["0.20"]}
-
-
-def test_the_title_of_markdown_is_escaped():
-    assert to_markdown("a|b", [make_table("", ["x"], [["y"]])]).startswith(markdown("a|b"))
 
 
 SPECIAL = {

@@ -1,7 +1,6 @@
 """People's answers as a submission: `bench score` gives the accuracy that the answers have."""
 
 from collections import Counter
-from functools import partial
 from statistics import mean
 
 import pytest
@@ -9,7 +8,6 @@ from quizzes import made_answers
 
 from iqtt.quiz.answers import read_answers
 from iqtt.quiz.study import Study
-from metrics.prediction_writer import PredictionError, write_answers
 from metrics.scoring.evaluate import score
 from metrics.scoring.runs import Settings
 from metrics.submissions.reader import open_predictions
@@ -66,11 +64,3 @@ def test_what_most_answered(people, quiz_split, tmp_path):
         best = [place for place, n in votes.items() if n == max(votes.values())]
         assert answer == (best[0] if len(best) == 1 else -1)
     assert -1 in scored.values(), "a tie is among the made-up answers"
-
-
-@pytest.mark.parametrize("rows", [[0, 0], [-1, 0], [0, 24], [0.5, 1.0], []])
-def test_rows_that_cannot_be(quiz_split, tmp_path, rows):
-    write = partial(write_answers, tmp_path / "x.h5", quiz_split / "iqtt-test.h5", method="m")
-    with pytest.raises(PredictionError):
-        write(answer=[0] * len(rows), rows=rows)
-    assert not (tmp_path / "x.h5").exists()
