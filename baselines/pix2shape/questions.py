@@ -11,9 +11,9 @@ from baselines.pix2shape.batch import Batch, as_batch
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.polar import BRIGHT
 from baselines.training.images import Opened, check_reducible
-from baselines.training.questions import check_truth, question_images
+from baselines.training.questions import check_truth, question_images, question_lights
 from iqtt import QuestionsFile
-from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.errors import SpecError
 from scenegen.common.records import check
 
 Z_VIEW = 10  # of the code's 128 dimensions, those that tell the view, as in the paper
@@ -40,29 +40,20 @@ class QuestionImages(Dataset[dict[str, Any]]):
         self._opened, self._size, self.spec = opened, size, questions.spec
         self.fingerprint = questions.fingerprint
         self.has_answers = questions.has_answers
-        names = ("camera_distance", "light_position", "light_color")
-        self._lights = {name: questions.read(name, slice(None)) for name in names}
-        for name, values in self._lights.items():
-            wrong = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
-            if wrong.any():
-                where = f"{questions.path}: row {np.flatnonzero(wrong)[0]}"
-                raise FileFormatError(where, f"{name} that is not finite", "finite numbers")
+        self._places, self._colors = question_lights(questions, len(questions))
 
     def __len__(self) -> int:
-        return len(self._lights["camera_distance"])
+        return len(self._places)
 
     def __getitem__(self, row: int) -> dict[str, Any]:
         """Return a question: float32 arrays with a row an image, and the answer if there is one."""
         images = question_images(self._opened.file, row, self._size)
-        # All lengths are scaled to one distance of the camera; no image changes by that, as the
-        # lights are made brighter by the square of the scale.
-        scale = self.spec.camera_distance / self._lights["camera_distance"][row]
         place = (0.0, 0.0, self.spec.camera_distance)
         told = {
             "image": images,
             "condition": np.empty((len(images), 0)),
-            "light_position": scale * self._lights["light_position"][row] - place,
-            "light_color": scale**2 * self._lights["light_color"][row],
+            "light_position": self._places[row] - place,
+            "light_color": self._colors[row],
             "attenuation": np.tile((0.0, 1.0), (len(images), 1)),
         }
         for name in ("ambient", "reflectance", "background"):

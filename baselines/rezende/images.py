@@ -6,9 +6,8 @@ import numpy as np
 
 from baselines.rezende.rasteriser import Views
 from baselines.training.images import Array, check_reducible
-from baselines.training.questions import check_truth, question_images
+from baselines.training.questions import check_truth, question_images, question_lights
 from iqtt import QuestionsFile
-from scenegen.common.errors import FileFormatError
 
 MOST_QUESTIONS = 5_000  # that are read; their 20,000 small images take 250 MB
 
@@ -57,12 +56,7 @@ def read_question_pictures(questions: QuestionsFile, size: int) -> Pictures:
     spec, count = questions.spec, min(len(questions), MOST_QUESTIONS)
     assert spec is not None, "check_truth asks for it"
     images = [image for row in range(count) for image in question_images(questions, row, size)]
-    names = "light_position", "light_color", "camera_distance"
-    position, color, distance = (questions.read(name, slice(0, count)) for name in names)
-    if not (np.isfinite(position).all() and np.isfinite(color).all()):
-        message = "light_position or light_color that is not finite"
-        raise FileFormatError(questions.path, message, "the lights of each image")
-    scale = (spec.camera_distance / distance)[:, None, None, None]
+    position, color = question_lights(questions, count)
     rows = len(images), position.shape[2], 3
     views = Views(
         size=size,
@@ -72,7 +66,7 @@ def read_question_pictures(questions: QuestionsFile, size: int) -> Pictures:
         ambient=np.array(spec.ambient),
         background=np.array(spec.background),
         attenuation=(0.0, 1.0),
-        light_position=(position * scale).reshape(rows),
-        light_color=(color * scale**2).reshape(rows),  # as light falls off with the square
+        light_position=position.reshape(rows),
+        light_color=color.reshape(rows),
     )
     return Pictures(np.stack(images), 0.5 * spec.max_radius, views, str(questions.fingerprint))

@@ -11,7 +11,7 @@ from torch import Tensor
 from baselines.training.images import Array, channels_first, check_reducible, row_batches
 from iqtt import QuestionsFile, open_questions
 from iqtt.files.reader import PARTS, holds_questions
-from scenegen.common.errors import SpecError
+from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.files.shards import OpenFile
 from scenegen.rendering.ground_truth import decode_image
 
@@ -79,6 +79,28 @@ def question_images(questions: QuestionsFile, row: int, size: int) -> Array:
     where = f"{questions.path}: row {row}"
     stored = decode_image(questions.read("questions", row))
     return np.stack([channels_first(image, size, where) for image in stored])
+
+
+def question_lights(questions: QuestionsFile, count: int) -> tuple[Array, Array]:
+    """Return places and colours of the lights of the first questions, (Q, 1 + K, L, 3) each.
+
+    Lengths of a question are scaled so that every camera has the distance that the spec's has. No
+    image changes by that, as lights are made brighter by the square of the scale.
+
+    Raises FileFormatError for a number that is not finite.
+    """
+    assert questions.spec is not None, "check_truth asks for it"
+    rows = slice(0, count)
+    scale = questions.spec.camera_distance / questions.read("camera_distance", rows)
+    scale = scale[:, None, None, None]
+    lights = {"light_position": scale, "light_color": scale**2}
+    for name, factor in lights.items():
+        lights[name] = questions.read(name, rows) * factor
+        wrong = ~np.isfinite(lights[name]).all(axis=(1, 2, 3))
+        if wrong.any():
+            where = f"{questions.path}: row {np.flatnonzero(wrong)[0]}"
+            raise FileFormatError(where, f"{name} that is not finite", "finite numbers")
+    return lights["light_position"], lights["light_color"]
 
 
 @torch.no_grad()

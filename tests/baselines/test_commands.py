@@ -143,12 +143,3 @@ def test_who_interrupts_is_told_how_to_go_on(folder, fake, monkeypatch):
     monkeypatch.setattr(module, "train", train)
     result = bench(*f"train cnn {DATA} --out run".split())
     assert (result.exit_code, "--resume" in result.stdout) == (1, True)
-
-
-def test_every_trained_baseline_has_a_module():
-    pytest.importorskip("torch")
-    for name in commands.TRAINED:
-        module = commands._module(name)
-        assert module.Settings(iterations=7, seed=3).iterations == 7
-        assert callable(module.train)
-        assert callable(module.write_submission)

@@ -114,15 +114,6 @@ def test_an_animation_goes_there_and_back(tmp_path, name, count):
             assert found.info["duration"] == 80
 
 
-def test_one_picture_is_a_picture_and_replaces_another(tmp_path):
-    for shade in (3, 9):
-        save_pictures([frame(shade)], tmp_path / "one.png", overwrite=True)
-        with Image.open(tmp_path / "one.png") as found:
-            assert (np.asarray(found) == np.asarray(frame(shade))).all()
-    with pytest.raises(FileExistsError):
-        save_pictures([frame(5)], tmp_path / "one.png")
-
-
 @pytest.mark.parametrize(
     ("count", "name"),
     [(3, "turn.png"), (3, "turn"), (3, "turn.gif.h5"), (1, "one.gif"), (1, "one")],

@@ -6,7 +6,7 @@ from ptn_models import tiny, volume_of, voxel_centres
 from refusals import refused
 
 from baselines.ptn.projection import silhouettes
-from baselines.ptn.rooms import RoomImages, TrainingRooms, room_box
+from baselines.ptn.rooms import TrainingRooms, room_box
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.rooms.reader import RoomsFile
 
@@ -42,19 +42,6 @@ def test_a_ball_is_where_all_views_of_a_batch_see_it(make_rooms, tmp_path):
         found = silhouettes(ball(path, model, mirrored), model.box, *rays, 64)[0] > 0.5
         assert (found != (batch.silhouette[item] > 0)).float().mean() < 0.03
     assert seen == {False, True}
-
-
-def test_an_image_is_mirrored_where_its_camera_stands_nearer_z(make_rooms, tmp_path):
-    path = make_rooms(tmp_path / "ball.h5", 1, **BALL)
-    with RoomsFile(path) as rooms:
-        images = RoomImages(rooms, 32)
-        assert [rows.tolist() for rows in images.rows_of] == [[0, 1, 2]]
-        for row, pose in enumerate(images.poses):
-            plain = np.moveaxis(rooms[row].radiance, -1, 0)
-            wanted = plain[:, :, ::-1] if pose[2, 3] > pose[0, 3] else plain
-            assert (images.image(row) == wanted).all()
-        assert images.mirrored.any()
-        assert not images.mirrored.all()
 
 
 def test_the_box_holds_every_object(make_rooms, tmp_path):

@@ -3,13 +3,12 @@
 import h5py
 import numpy as np
 import pytest
-from ptn_models import TINY, card_of, tiny, volume_of, voxel_centres
+from ptn_models import TINY, tiny, volume_of, voxel_centres
 
-from baselines.ptn.network import METHOD, Settings
+from baselines.ptn.network import Settings
 from baselines.ptn.rooms import RoomImages
 from baselines.ptn.submission import FILES, seen, write_submission
 from baselines.ptn.training import train
-from baselines.training.checkpoint import new_state, save_weights
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.measures.empty_room import empty_room
@@ -17,12 +16,6 @@ from metrics.scoring.evaluate import score
 from scenegen.rooms.reader import RoomsFile
 
 VIEWS = {"views": (0.0, 80.0), "objects": (1, 1), "shapes": ("sphere",)}
-
-
-def stored(folder, task="rooms", **settings):
-    card, path = card_of(task, **settings), folder / f"{task}.safetensors"
-    save_weights(path, METHOD, new_state(METHOD, card).network, card)
-    return path
 
 
 def test_a_true_volume_gives_the_truths_depth_and_normals_in_every_view(make_rooms, tmp_path):
@@ -48,21 +41,6 @@ def test_a_true_volume_gives_the_truths_depth_and_normals_in_every_view(make_roo
                 cosine = (normal * room.normal).sum(axis=-1)[both]
                 assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean() < 8
                 assert depth[~inside] == pytest.approx(room.depth[~inside], abs=0.2)
-
-
-def test_submissions_for_rooms_can_be_scored(make_rooms, tmp_path):
-    path = make_rooms(tmp_path / "rooms.h5", 2, **VIEWS)
-    out, done = tmp_path / "out.h5", []
-    write_submission(path, out, stored(tmp_path), progress=lambda *told: done.append(told))
-    assert done == [(1, 4)] * 4
-    found = score([out]).metrics
-    assert np.isfinite(found["chamfer"].value)
-    with pytest.raises(FileExistsError):
-        write_submission(path, out, stored(tmp_path))
-    weights = stored(tmp_path, silhouettes="ids")
-    write_submission(path, out, weights, overwrite=True)
-    with h5py.File(out) as file:
-        assert "ids" in file.attrs["method"]
 
 
 @pytest.fixture(scope="module")

@@ -40,16 +40,6 @@ def test_a_few_rooms_are_learnt_by_heart(rooms):
     assert np.mean(losses[-10:]) < 0.4
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("silhouettes", "guess"), ("width", 3), ("size", 20), ("samples", 1), ("iterations", 0),
-     ("learning_rate", 0.0), ("weight_decay", 2.0)],
-)  # fmt: skip
-def test_impossible_settings_are_refused(name, value):
-    with refused(SpecError, name.replace("_", " ")):
-        Settings(**{name: value})
-
-
 def test_what_does_not_fit_is_refused_before_training(rooms, train_questions, tmp_path):
     with refused(SpecError, "labels", "5", "rooms"):
         train(rooms, tmp_path / "run", Settings(**TINY), labels=5)

@@ -2,12 +2,10 @@
 
 import pytest
 import torch
-from refusals import refused
 
 from baselines.pix2shape.network.architecture import contrast
 from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms
 from baselines.relief.network import Card, Settings, predicted_depth, relief_network
-from scenegen.common.errors import SpecError
 
 
 def cameras(*positions: tuple[float, float, float]) -> Cameras:
@@ -67,13 +65,3 @@ def test_contrast_is_blind_to_what_is_even():
     torch.testing.assert_close(contrast(even), torch.zeros_like(even), atol=1e-5, rtol=0)
     even[0, 0, 8, 8] += 0.81
     assert float(contrast(even)[0, 0, 8, 8]) == pytest.approx(8 * 0.8)
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("network", "mlp"), ("size", 48), ("width", 100.0), ("iterations", 0), ("batch", 1),
-     ("learning_rate", -1.0), ("seed", -1)],
-)  # fmt: skip
-def test_impossible_settings_are_refused(name, value):
-    with refused(SpecError, name.replace("_", " ")):
-        Settings(**{name: value})

@@ -17,7 +17,6 @@ from iqtt import open_questions
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.scoring.evaluate import score
-from scenegen.common.errors import SpecError
 
 MODULES = {"cnn": cnn, "siamese": siamese}
 SMALL = {"width": 4, "size": 16, "batch": 2}
@@ -55,27 +54,6 @@ def test_a_submission_is_valid_and_holds_the_networks_scores(name, run_folders, 
     val = truths.iqtt.with_name("iqtt-val.h5")
     assert 0 <= right <= 1
     assert card.validation == accuracy(network, val, 16, 3)
-
-
-def test_questions_of_two_answers(run_folders, tmp_path):
-    """A softmax has as many outputs as in training; distances are measured to any answer."""
-    spec = SplitSpec(
-        train=4, labeled=4, val=2, test=5, cubes=(8, 8), distractors="mirror-pair", answers=2,
-        height=32, width=32, min_cube_pixels=0,
-    )  # fmt: skip
-    make_split(tmp_path / "two", spec)
-    test, out = tmp_path / "two" / "iqtt-test.h5", tmp_path / "x.h5"
-    siamese.write_submission(test, out, run_folders["siamese"] / WEIGHTS)
-    with h5py.File(out) as file:
-        assert file["scores"].shape == (5, 2)
-    with pytest.raises(SpecError) as error:
-        cnn.write_submission(test, out, run_folders["cnn"] / WEIGHTS, overwrite=True)
-    assert error.value.found == "questions of 2 answers"
-    settings = cnn.Settings(iterations=2, **SMALL)
-    weights = cnn.train(tmp_path / "two/iqtt-train.h5", tmp_path / "run", settings)
-    cnn.write_submission(test, out, weights, overwrite=True)
-    with h5py.File(out) as file:
-        assert file["scores"].shape == (5, 2)
 
 
 def test_no_answers_no_accuracy(run_folders, truths, tmp_path):

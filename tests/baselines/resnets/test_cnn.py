@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from baselines.resnets.card import Card, Settings
-from baselines.resnets.cnn import KIND, AnswerClassifier
+from baselines.resnets.cnn import AnswerClassifier
 
 
 @pytest.mark.parametrize("answers", [2, 3])
@@ -21,9 +21,3 @@ def test_layers_and_probabilities(answers):
     # The first layer sees the features of every image, in the order of the images.
     alone = torch.cat([network.resnet(images[:, k]) for k in range(1 + answers)], dim=1)
     assert torch.allclose(network.head(alone).log_softmax(1), scores, atol=1e-5)
-
-
-def test_the_loss_is_the_cross_entropy():
-    scores = torch.tensor([[0.7, 0.2, 0.1], [0.5, 0.25, 0.25]]).log()
-    expected = -(torch.tensor(0.7).log() + torch.tensor(0.25).log()) / 2
-    assert KIND.loss(scores, torch.tensor([0, 2])) == pytest.approx(expected.item())

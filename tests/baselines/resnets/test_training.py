@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 import torch
-from refusals import refused
 
 from baselines.resnets import cnn, siamese
 from baselines.resnets.training import permuted
 from baselines.training.checkpoint import load_weights
-from scenegen.common.errors import SpecError
 
 
 def test_permuted_answers_stay_with_their_questions():
@@ -40,24 +38,3 @@ def test_it_learns_the_questions_that_it_sees(module, train_questions, tmp_path)
     assert 0 <= accuracy <= 1
     card = load_weights(path, module.KIND.method)[1]
     assert (card.validation, card.answers, card.labels) == (accuracy, 3, 3)
-
-
-@pytest.mark.parametrize(
-    ("settings", "where"),
-    [
-        ({"depth": 34}, "depth"), ({"width": 10**9}, "width"), ({"size": 0}, "size"),
-        ({"batch": 0}, "batch"), ({"learning_rate": float("nan")}, "learning rate"),
-        ({"iterations": 0}, "iterations"), ({"seed": -1}, "seed"),
-    ],
-    ids=str,
-)  # fmt: skip
-def test_settings_out_of_range(settings, where):
-    with refused(SpecError, where):
-        cnn.Settings(**settings)
-
-
-def test_no_labels_and_other_sizes_are_refused(train_questions, tmp_path):
-    for settings, labels, where in (({}, 0, "labels"), ({"size": 24}, None, "iqtt-train.h5")):
-        with refused(SpecError, where):
-            cnn.train(train_questions, tmp_path / "run", cnn.Settings(**settings), labels=labels)
-    assert not (tmp_path / "run").exists()

@@ -46,16 +46,6 @@ def test_questions_that_codes_can_answer_are_learned_and_the_encoder_stays():
     assert all(torch.equal(model.state_dict()[k], v) for k, v in before.items())
 
 
-def test_the_seed_decides_the_head():
-    images, right = asked(20, 2)
-    models = [model_of(4) for _ in range(3)]
-    for model, seed in zip(models, (0, 0, 1)):
-        train_head(model, codes(model, images), right, seed)
-    heads = [model.head.layers[0].weight for model in models]
-    assert torch.equal(heads[0], heads[1])
-    assert not torch.equal(heads[0], heads[2])
-
-
 def test_answers_are_scored_alike_wherever_they_stand():
     model = model_of(4)
     images, _ = asked(5, 3)

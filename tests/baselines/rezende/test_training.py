@@ -3,16 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 import torch
-from refusals import refused
 
 from baselines.rezende import training
 from baselines.rezende.network import METHOD, Card, Settings
 from baselines.rezende.reconstruct import errors, reconstruct, untrained
 from baselines.rezende.training import bound, near_vertices, pixel_errors, train_pictures, windows
 from baselines.training.checkpoint import new_state
-from scenegen.common.errors import SpecError
 
 TINY = Settings(size=16, code=4, iterations=80, batch=8, pairs=4, learning_rate=0.003)
 
@@ -76,38 +73,3 @@ def test_the_far_side_is_charged_with_nothing_and_the_middle_keeps_its_depth(one
     moved = model.vertices(offsets)
     torch.testing.assert_close(moved[:, :, 2].mean(dim=1), torch.zeros(8), rtol=0, atol=1e-5)
     torch.testing.assert_close(moved[:, :, :2], model.sphere[:, :2].expand(8, -1, -1))
-
-
-def test_what_moves_one_vertex_changes_errors_in_its_window_alone(one_box):
-    state = state_of()
-    state.network.smooth = torch.eye(162)
-    offsets = torch.zeros(2, 8, 162, 3)
-    vertex = int(state.network.sphere[:, 2].argmax())  # it faces the camera
-    offsets[1, :, vertex] = torch.tensor([0.08, -0.1, 0.0])
-    squared = pixel_errors(state.network, offsets, one_box, np.arange(8))
-    changed = squared[0] != squared[1]
-    around = windows(state.network, offsets[0], one_box)
-    top, bottom, left, right = (edge[:, vertex] for edge in around)
-    assert (top + bottom == 16).all()  # the vertex lies on the camera's axis
-    assert (left + right == 16).all()
-    near = near_vertices(changed[None].astype(np.float32), around)
-    assert (changed.sum(axis=(1, 2)) > 3).all()
-    np.testing.assert_allclose(near[0, :, vertex], changed.sum(axis=(1, 2)), rtol=0.4)
-
-
-def test_the_head_has_an_optimiser_of_its_own():
-    state = state_of()
-    learned = {id(w) for w in state.optimisers["adam"].param_groups[0]["params"]}
-    named = state.network.named_parameters()
-    left = {name.partition(".")[0] for name, weights in named if id(weights) not in learned}
-    assert left == {"head"}
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("size", 20), ("size", 10**6), ("code", 10**9), ("pairs", 0), ("width", float("inf")),
-     ("iterations", 0), ("seed", -1)],
-)  # fmt: skip
-def test_impossible_settings_are_refused(name, value):
-    with refused(SpecError, name):
-        replace(TINY, **{name: value})

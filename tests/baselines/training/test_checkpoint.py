@@ -3,7 +3,6 @@
 import copy
 import json
 import os
-import resource
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -105,15 +104,6 @@ def test_weights_come_back_and_those_beyond_the_type_are_kept_in_full(dtype, sav
         assert stored[name].dtype == (value.dtype if full else dtype), name
         assert torch.equal(again.state_dict()[name], stored[name].to(value.dtype)), name
     assert len(os.listdir(tmp_path)) == 2
-
-
-def test_the_seed_decides_the_weights_and_no_other_random_number():
-    cards = CARD, CARD, replace(CARD, settings=Settings(seed=4))
-    before = torch.get_rng_state()
-    one, same, other = (new_state(METHOD, card).network.unused.weight for card in cards)
-    assert torch.equal(torch.get_rng_state(), before)
-    assert torch.equal(one, same)
-    assert not torch.equal(one, other)
 
 
 Edit = Callable[[dict[str, Any], dict[str, Any]], Any]
@@ -257,43 +247,6 @@ def test_what_is_no_file_is_refused(tmp_path):
     with pytest.raises(FileNotFoundError) as none:
         load_checkpoint(tmp_path, METHOD)
     assert none.value.filename == str(tmp_path)
-
-
-class Touch(str):
-    """Makes a folder of this name when it is unpickled."""
-
-    def __reduce__(self) -> tuple[Callable[[str], None], tuple[str]]:
-        return os.mkdir, (str(self),)
-
-
-def test_a_pickle_is_refused_and_not_run(tmp_path):
-    path = tmp_path / WEIGHTS
-    torch.save({BIAS: torch.zeros(128), "x": Touch(str(tmp_path / "owned"))}, path)
-    with refused(FileFormatError, str(path)):
-        load_weights(path, METHOD)
-    assert not (tmp_path / "owned").exists()
-    torch.load(path.rename(tmp_path / "w.pt"), weights_only=False)
-    assert (tmp_path / "owned").exists(), "it would have run"
-
-
-def test_a_write_that_fails_leaves_what_was_there(saved, tmp_path):
-    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (200, hard))
-    try:
-        with pytest.raises(OSError, match="File too large") as error:
-            save_checkpoint(tmp_path, saved)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
-    assert str(tmp_path / CHECKPOINT) in str(error.value)
-
-
-def test_equal_states_have_equal_files(saved, tmp_path):
-    before = [(tmp_path / name).read_bytes() for name in (WEIGHTS, CHECKPOINT)]
-    save_weights(tmp_path / WEIGHTS, METHOD, saved.network, saved.card)
-    save_checkpoint(tmp_path, saved)
-    assert [(tmp_path / name).read_bytes() for name in (WEIGHTS, CHECKPOINT)] == before
 
 
 def test_numbers_out_of_range_are_refused():

@@ -17,7 +17,6 @@ from baselines.training.images import (
     channels_first,
     check_reducible,
     reduced,
-    row_batches,
 )
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError, SpecError
@@ -44,10 +43,6 @@ def test_radiance_that_networks_cannot_take_is_refused(value):
 def test_images_of_other_sizes_are_refused(height, width):
     with refused(SpecError, "rooms.h5", f"images of {height}x{width}", "32"):
         check_reducible("rooms.h5", height, width, 32)
-
-
-def test_batches_of_rows():
-    assert [rows.tolist() for rows in row_batches(5, 2)] == [[0, 1], [2, 3], [4]]
 
 
 def test_every_process_opens_the_file_for_itself(rooms_path):
@@ -79,11 +74,3 @@ def test_processes_share_each_batch(world):
     for whole, *parts in islice(zip(Draws(11, 5, 3), *shares, strict=True), 9):
         assert sorted(row for part in parts for row in part) == sorted(whole)
         assert max(map(len, parts)) - min(map(len, parts)) <= 1
-
-
-def test_the_order_changes_with_epoch_and_seed():
-    def orders(seed: int) -> list[tuple[int, ...]]:
-        return [tuple(rows) for rows in islice(Draws(20, 20, seed), 5)]
-
-    assert orders(1) == orders(1)
-    assert len({*orders(1), *orders(2)}) == 10

@@ -130,32 +130,6 @@ def test_a_secret_that_is_none(run, tmp_path, options, words, check_refusal):
 
 
 @pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        ("", {"train": 1000, "labeled": 100, "val": 200, "test": 200}),
-        ("--preset v2", {"train": 100_000, "labeled": 10_000, "val": 10_000, "test": 10_000}),
-        ("--preset paper", {"train": 100_000, "labeled": 1_000, "val": 100_000, "test": 100_000}),
-        ("--size 64 --train 50", {"min_cube_pixels": 8, "train": 50, "labeled": 5}),
-    ],
-)
-def test_presets_and_what_follows_from_them(run, monkeypatch, options, expected, tmp_path):
-    from iqtt.files import make as module
-    from iqtt.questions.views import Tally
-
-    asked = {}
-
-    def make_split(folder, spec, **how):
-        asked.update(vars(spec))
-        (tmp_path / "iqtt-split").mkdir()
-        return Tally()
-
-    monkeypatch.setattr(module, "make_split", make_split)
-    result = run("make-split", *options.split())
-    assert result.exit_code == 0, result.output
-    assert {name: asked[name] for name in expected} == expected
-
-
-@pytest.mark.parametrize(
     ("options", "words"),
     [
         ("--cubes 3-4", ["cubes", "too few", "--cubes"]),

@@ -191,14 +191,6 @@ def test_plain_h5py_reads_every_type_and_compression(compression, dtype, tmp_pat
         assert file["truth/depth"].shape == (2, 4, 16, 16)
 
 
-def test_a_split_without_any_question_is_refused(tmp_path):
-    with pytest.raises(SpecError) as error:
-        make_split(tmp_path / "empty", SplitSpec(train=0, labeled=0, val=0, test=0))
-    assert error.value.where == "train, val and test"
-    assert error.value.expected == "at least 1 question in all"
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_other_files_of_a_folder_are_left_alone(tmp_path, monkeypatch):
     """Also where it is the working directory."""
     monkeypatch.chdir(tmp_path)

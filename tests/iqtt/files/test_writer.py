@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from polycubes import are_congruent
 
-from iqtt.files.layout import CONVENTIONS
 from iqtt.files.make import make_split
 from iqtt.files.split import ALL_FILES as FILES
 from iqtt.questions.distractors import make_pools
@@ -99,31 +98,6 @@ def test_tables_hold_the_questions_that_are_made_one_by_one(folder, split, part,
             assert answers is None or answers[row] == answer
         if answers is not None:
             assert sorted(answers[:].tolist()) == sorted(i % 3 for i in range(len(answers)))
-
-
-def test_every_number_says_what_it_is(folder):
-    for name in FILES:
-        with h5py.File(folder / name) as file:
-            for path, item in everything(file).items():
-                if isinstance(item, h5py.Dataset):
-                    assert item.attrs["meaning"], path
-                    assert path.endswith("answers") or item.attrs["unit"], path
-            for path in ("truth", "truth/labeled", "truth/unlabeled"):
-                if "questions" not in file.get(path, {}) and "cubes" in file.get(path, {}):
-                    attributes = file[path].attrs
-                    assert attributes["fov_y_degrees"] == SPEC.fov_y_degrees
-                    for one in ("ambient", "reflectance", "background"):
-                        assert tuple(attributes[one]) == getattr(SPEC, one)
-                    assert attributes["attenuation"].tolist() == [0, 1]
-            root = file.attrs
-            assert root["format"] == "pix2shape-bench/iqtt"
-            assert root["conventions"] == CONVENTIONS
-            assert "very cube" in root["task"]
-            assert root["split"] == name.split("-")[1].removesuffix(".h5")
-            spec = SplitSpec.from_json(root["spec"])
-            assert spec == (SPEC if "answers" in name else SPEC.public())
-            if "questions" in file:
-                assert file["questions"].attrs["scale"] == 1 / 255
 
 
 def plain_digest(dataset):

@@ -220,33 +220,6 @@ def test_no_path_leads_out(lasting, path):
     assert b"There is no such" in body
 
 
-def test_other_methods(lasting):
-    for method, path in (
-        ("PUT", "/quiz"),
-        ("GET", "/start"),
-        ("POST", "/"),
-        ("DELETE", "/image/0/0"),
-    ):
-        assert lasting.ask(method, path)[0] == 405
-    assert lasting.ask("HEAD", "/")[0] == 200
-
-
-def test_nonsense_instead_of_http(lasting):
-    host = b" HTTP/1.1\r\nHost: localhost\r\n"
-    for sent in (
-        b"\x16\x03\x01\x00",
-        b"GET / HTTP/1.1\r\n\r\n",
-        b"GET /" + host + b"Host: localhost\r\n\r\n",
-        b"GET /" + b"a" * 70000 + host + b"\r\n",
-        b"GET http://evil.example/" + host + b"\r\n",
-    ):
-        with socket.create_connection(("127.0.0.1", lasting.port), timeout=5) as connection:
-            connection.sendall(sent)
-            connection.shutdown(socket.SHUT_WR)
-            assert connection.recv(100)[:12] in (b"", b"HTTP/1.1 400", b"HTTP/1.1 404")
-    assert lasting.ask("GET", "/")[0] == 200
-
-
 def test_slow_clients_are_cut_off(site, monkeypatch):
     monkeypatch.setattr(serve, "EXCHANGE_SECONDS", 0.3)
     began = time.monotonic()

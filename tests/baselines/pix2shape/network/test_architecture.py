@@ -40,20 +40,6 @@ def test_the_papers_networks_have_the_tables_sizes() -> None:
     assert count(architecture.Statistics(spec)) == 128 * 256 + 256 + 256 * 512 + 512 + 512 + 1
 
 
-def test_every_layer_has_the_output_size_of_its_table() -> None:
-    spec = NetworkSpec(width=0.02)
-    sizes: list[tuple[int, ...]] = []
-    encoder, decoder = Encoder(spec).eval(), Decoder(spec).eval()
-    for layer in (*encoder.layers, encoder.last, *decoder.layers, decoder.last):
-        layer.register_forward_hook(lambda _m, _i, out: sizes.append(tuple(out.shape[1:])))
-    image, camera = torch.rand(1, 3, 128, 128), torch.rand(1, 3)
-    decoder(encoder(image, camera), camera)
-    pixels = [64, 32, 16, 8, 4, 1, 4, 8, 16, 32, 64, 128]
-    assert [(h, w) for _, h, w in sizes] == [(p, p) for p in pixels]
-    assert sizes[5] == (128, 1, 1)
-    assert sizes[-1] == (1, 128, 128)
-
-
 @pytest.mark.parametrize(
     ("size", "camera", "classes"),
     [(32, False, 0), (32, False, 3), (64, True, 7), (128, True, 0), (256, True, 0)],
@@ -66,26 +52,6 @@ def test_all_sizes_and_conditions(size: int, camera: bool, classes: int) -> None
     assert Decoder(spec)(code, condition).shape == (2, 1, size, size)
     assert Critic(spec)(image, code, condition).shape == (2,)
     assert architecture.Statistics(spec)(code[:, :20], code[:, 20:]).shape == (2,)
-
-
-def test_width_scales_channels() -> None:
-    assert NetworkSpec(width=0.5).channels(architecture.ENCODER_CHANNELS) == [42, 85, 170, 340, 680]
-    assert NetworkSpec().channels(architecture.DECODER_CHANNELS) == list(
-        architecture.DECODER_CHANNELS
-    )
-    assert NetworkSpec(size=256).channels(architecture.DECODER_CHANNELS) == [
-        *architecture.DECODER_CHANNELS,
-        42,
-    ]
-    assert NetworkSpec(size=64).channels(architecture.ENCODER_CHANNELS) == [170, 340, 680, 1360]
-
-
-def test_the_camera_matters_to_every_network() -> None:
-    torch.manual_seed(0)
-    image, code, camera = torch.rand(3, 3, 32, 32), torch.randn(3, 128), torch.rand(3, 3)
-    for make, inputs in ((Encoder, (image,)), (Decoder, (code,)), (Critic, (image, code))):
-        network = make(SMALL)
-        assert not torch.allclose(network(*inputs, camera), network(*inputs, camera + 1))
 
 
 def test_conditional_normalisation_normalises_and_then_follows_its_condition() -> None:

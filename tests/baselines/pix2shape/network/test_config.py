@@ -46,13 +46,6 @@ def test_nonsense_is_refused(change: dict[str, object], found: str) -> None:
         model_config("paper", **change)
 
 
-def test_an_unknown_configuration() -> None:
-    with pytest.raises(SpecError) as error:
-        model_config("huge")
-    expected = "one of paper, compact, rays, views"
-    assert (error.value.where, error.value.expected) == ("config", expected)
-
-
 def test_depth_stays_within_its_reach_whatever_the_code() -> None:
     torch.manual_seed(0)
     model = Pix2Shape(tiny(depth_middle=2.0, depth_reach=0.25))

@@ -133,11 +133,3 @@ def test_a_dark_light_on_a_shining_surface_harms_no_gradient() -> None:
     scene = Scene(FOV, place, black, one, one[:, :2], one, *gloss)
     render(depth, scene).sum().backward()
     assert torch.isfinite(depth.grad).all()
-
-
-def test_items_do_not_mix() -> None:
-    scene, depth = some_scene(3), 1 + torch.rand(3, 6, 5, dtype=torch.float64)
-    together = render(depth, scene)
-    for b in range(3):
-        one = Scene(FOV, *(getattr(scene, name)[b : b + 1] for name in LIT))
-        torch.testing.assert_close(render(depth[b : b + 1], one)[0], together[b])

@@ -1,7 +1,5 @@
 """Training: the same to the bit whenever it was stopped; it learns; it stops at nonsense."""
 
-import math
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,8 +11,6 @@ from pix2shape_models import question_source, room_source, state_of, suited, tin
 from refusals import refused
 
 from baselines.pix2shape.network.architecture import NetworkSpec
-from baselines.pix2shape.questions import QuestionImages
-from baselines.pix2shape.rooms import RoomImages
 from baselines.pix2shape.training import iterations
 from baselines.pix2shape.training.batches import Sources
 from baselines.pix2shape.training.iterations import Iterations, check_request
@@ -22,7 +18,7 @@ from baselines.pix2shape.training.run import learning_rate
 from baselines.pix2shape.training.turning import turned
 from baselines.pix2shape.weights import METHOD
 from baselines.training.checkpoint import load_checkpoint, moments_of
-from baselines.training.fit import TrainingError, fit
+from baselines.training.fit import fit
 from scenegen.common.errors import SpecError
 
 TINY = tiny(mutual_information=0.0, questions=0.0)
@@ -111,28 +107,6 @@ def test_every_step_has_noise_of_its_own(rooms_path, tmp_path, monkeypatch):
         run(state_of(config, iteration=first), room_source(rooms_path, config), tmp_path)
     assert len(set(seeds[:4])) == 4
     assert seeds == [*seeds[:4], *seeds[:4], *seeds[2:4]]
-
-
-def test_only_the_labels_that_are_told_are_used(train_questions, tmp_path, monkeypatch):
-    config = suited(replace(TINY, questions=1.0, batch=8), train_questions)
-    source = question_source(train_questions, "unlabeled", config)
-    labelled = question_source(train_questions, "labeled", config)
-    read: set[int] = set()
-    item = QuestionImages.__getitem__
-
-    def spy(self: QuestionImages, row: int) -> dict[str, Any]:
-        if self is labelled:
-            read.add(row)
-        return item(self, row)
-
-    monkeypatch.setattr(QuestionImages, "__getitem__", spy)
-    losses = run(state_of(config), Sources(source, labelled, 2), tmp_path)
-    assert read == {0, 1}
-    assert all("questions" in one for one in losses)
-    read.clear()
-    losses = run(state_of(config), Sources(source, labelled, 0), tmp_path)
-    assert read == set()
-    assert not any("questions" in one for one in losses)
 
 
 def test_some_of_the_contrasted_questions_are_labelled(train_questions, tmp_path, monkeypatch):
@@ -268,36 +242,3 @@ def test_it_learns(rooms_path, tmp_path):
     losses = run(state_of(config), room_source(rooms_path, config), tmp_path, every=60)
     found = [numbers["reconstruction"] for numbers in losses]
     assert np.mean(found[-10:]) < 0.5 * found[0]
-
-
-@pytest.mark.parametrize("decay", [False, True])
-def test_the_learning_rate(decay):
-    config = replace(PLAIN, iterations=10, learning_rate=0.01, decay=decay)
-    rates = [learning_rate(config, iteration) for iteration in range(10)]
-    falling = [0.01] * 6 + [0.008, 0.006, 0.004, 0.002]
-    assert rates == pytest.approx(falling if decay else [0.01] * 10)
-
-
-@pytest.mark.parametrize("config", [TINY, PLAIN], ids=["all", "plain"])
-def test_an_image_that_is_not_finite_stops_it(rooms_path, tmp_path, monkeypatch, config):
-    """As no file can have that is read: row 5 has one impossible pixel."""
-    item = RoomImages.__getitem__
-
-    def poisoned(self: RoomImages, row: int) -> dict[str, Any]:
-        values = item(self, row)
-        if row == 5:
-            values["image"][:, 4, 4] = math.nan
-        return values
-
-    monkeypatch.setattr(RoomImages, "__getitem__", poisoned)
-    state = state_of(replace(config, batch=2))
-    with pytest.raises(TrainingError) as error:
-        run(state, room_source(rooms_path, config), tmp_path)
-    assert 0 < state.card.iteration < 4
-    assert error.value.where == f"iteration {state.card.iteration}"
-    again, statistics = load_checkpoint(tmp_path, METHOD), re.compile("running|tracked")
-    found, expected = (
-        {name: value for name, value in bits(one).items() if not statistics.search(name)}
-        for one in (state, again)
-    )
-    assert_same(found, expected)

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 import torch
-from pix2shape_models import edited, made, of_rows, room_source, tiny, written
+from pix2shape_models import made, room_source, tiny, written
 from torch.utils.data import default_collate
 
 from baselines.pix2shape.network.empty_rooms import empty_rooms
@@ -80,20 +80,6 @@ def test_each_row_is_the_input_views_code_seen_from_the_rows_camera(model, sever
         np.testing.assert_allclose(found["depth"][row], depth, rtol=1e-4)
         np.testing.assert_allclose(found["normal"][row], normal, atol=1e-3)
     assert len({found["depth"][row].tobytes() for row in range(9)}) == 9
-
-
-def test_without_view_0_the_first_stored_view_is_the_input(model, several_path, tmp_path):
-    """Scene 1 has lost its view 0, and its view 2 comes before view 1; scene 2 keeps view 2."""
-    rows = [5, 0, 4, 2, 8]
-    path = edited(several_path, tmp_path / "lost.h5", of_rows(rows))
-    with pytest.warns(UserWarning, match=r"lost\.h5: 2 of 3 scenes have no view 0"):
-        found = predicted(model, path, tmp_path / "p.h5")
-    whole = predicted(model, several_path, tmp_path / "q.h5")
-    for place in (1, 3):  # the scene that has its view 0
-        np.testing.assert_allclose(found["depth"][place], whole["depth"][rows[place]], rtol=1e-4)
-    for place, first in ((0, 4), (2, 4), (4, 8)):
-        depth, _ = decoded(model, several_path, first, rows[place])
-        np.testing.assert_allclose(found["depth"][place], depth, rtol=1e-4)
 
 
 def plane(size: int, fov: float = 50.0) -> tuple[Any, np.ndarray]:
