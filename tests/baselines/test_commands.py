@@ -133,13 +133,3 @@ def test_a_mistake_is_one_line_and_leaves_nothing(line, words, folder, check_ref
     result = bench(*line.split())
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
     assert files_in(folder) == before
-
-
-def test_who_interrupts_is_told_how_to_go_on(folder, fake, monkeypatch):
-    def train(*given, **how):
-        raise KeyboardInterrupt
-
-    module = commands.import_module("baselines.resnets.cnn")
-    monkeypatch.setattr(module, "train", train)
-    result = bench(*f"train cnn {DATA} --out run".split())
-    assert (result.exit_code, "--resume" in result.stdout) == (1, True)

@@ -78,6 +78,20 @@ def test_questions(folder):
     assert "iqtt_accuracy" in bench("score", "predictions.h5").stdout
 
 
+def test_who_interrupts_is_told_how_to_go_on(folder, monkeypatch):
+    from baselines.pix2shape.training import run
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run, "train_run", interrupted)
+    result = train("--set=iterations=2")
+    assert result.exit_code == 1
+    assert "--resume" in result.stdout
+    assert "Aborted" in result.stderr
+
+
+@pytest.mark.slow
 def test_a_process_that_is_killed_ends_the_other_with_one_line(folder, check_refusal):
     """Started as on two machines, of which both ends are here."""
     with socket.socket() as probe:

@@ -88,7 +88,7 @@ def test_samples_of_a_class_have_its_proportions(tmp_path: Path) -> None:
 
 def test_they_answer_questions(tmp_path: Path) -> None:
     """More than three standard errors above chance."""
-    spec = SplitSpec(seed=77, train=1, labeled=0, val=0, test=160, distractors="other")
+    spec = SplitSpec(seed=77, train=1, labeled=0, val=0, test=96, distractors="other")
     make_split(tmp_path / "split", spec)
     data, out = tmp_path / "split" / "iqtt-test.h5", tmp_path / "predictions.h5"
     assert suited(data) == suited(data, "pix2shape-views") == "iqtt"
@@ -99,4 +99,4 @@ def test_they_answer_questions(tmp_path: Path) -> None:
     answer_file(open_weights("iqtt")[0], data, out)
     with h5py.File(tmp_path / "split" / "iqtt-test-answers.h5") as truth, h5py.File(out) as file:
         right = file["scores"][:].argmax(axis=1) == truth["answers"][:]
-    assert right.mean() > 1 / 3 + 3 * np.sqrt(2 / 9 / 160), right.mean()
+    assert right.mean() > 1 / 3 + 3 * np.sqrt(2 / 9 / 96), right.mean()

@@ -6,12 +6,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from refusals import refused
 
 from baselines.relief import depth_supervised, view_pairs
 from baselines.relief.predict import FILES
 from metrics.measures.empty_room import empty_room
-from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
 
@@ -50,10 +48,3 @@ def test_objects_are_seen_through_the_code_from_80_degrees_away(unseen_path, tmp
     found = relief_iou(unseen_path, tmp_path / "code.h5").reshape(-1, 2)  # scenes, views
     assert found[:, 0].mean() > 0.25
     assert found[:, 1].mean() > 0.15
-
-
-def test_weights_of_the_other_method_are_refused(unseen_path, tmp_path):
-    weights = FILES / "depth-supervised.safetensors"
-    with refused(FileFormatError, f"{weights}: method", "depth-supervised", "view-pairs"):
-        view_pairs.write_submission(unseen_path, tmp_path / "p.h5", weights)
-    assert not (tmp_path / "p.h5").exists()

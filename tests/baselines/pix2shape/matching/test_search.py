@@ -53,22 +53,6 @@ def test_objects_are_found_without_depth(bits, many_near_path):
     assert (raised & truly).sum() / (raised | truly).sum() > 0.6
 
 
-def test_the_true_relief_costs_less_than_the_empty_room(near_path):
-    rooms = in_memory(near_path, 64, depth=True)
-    row, other = torch.tensor([1]), torch.tensor([2])
-    views = [rooms.image[i].float() for i in (row, other)]
-    cost = matching_cost(views[0], cameras(rooms, row), views[1], cameras(rooms, other))[0]
-    assert cost.shape == (STEPS, 64, 64)
-    walls, _, _ = empty_rooms(rooms.world_from_camera[row], rooms.fov_y_degrees, 64)
-    true = (walls - rooms.depth[row])[0]
-    step = (true / STEP).round().long().clamp(0, STEPS - 1)
-    at_truth = cost.gather(0, step[None])[0]
-    standing = true > 0.1
-    assert standing.any()
-    assert at_truth[standing].median() < cost[0][standing].median() / 2
-    assert at_truth[~standing & (true < 0.01)].median() < 0.1
-
-
 def test_what_the_other_image_does_not_show_costs_the_same_at_every_relief(near_path):
     rooms = in_memory(near_path, 64)
     row, other = torch.tensor([0]), torch.tensor([3])

@@ -16,6 +16,8 @@ def test_the_paper_and_compact() -> None:
     assert paper.networks == NetworkSpec()
     compact = model_config("compact", seed=3)
     assert (compact.networks.size, compact.networks.width, compact.seed) == (64, 0.125, 3)
+    with pytest.raises(SpecError, match="config"):
+        model_config("huge")
 
 
 @pytest.mark.parametrize("name", CONFIGS)

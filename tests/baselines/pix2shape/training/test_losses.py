@@ -57,10 +57,9 @@ def test_mutual_information_of_a_known_statistic() -> None:
     assert float(found) == pytest.approx((3 + 10) / 2 - math.log((math.exp(5) + math.exp(6)) / 2))
 
 
-@pytest.mark.parametrize("correlation", [0.0, 0.8])
-def test_mine_finds_the_information_of_correlated_gaussians(correlation: float) -> None:
+def test_mine_finds_the_information_of_correlated_gaussians() -> None:
     """I = -log(1 - r^2) / 2 a dimension, within 0.1 nat."""
-    generator = torch.Generator().manual_seed(0)
+    correlation, generator = 0.8, torch.Generator().manual_seed(0)
     torch.manual_seed(0)
     statistics = Statistics(NetworkSpec(z_scene=2, z_view=2))
     optimiser = torch.optim.Adam(statistics.parameters(), lr=3e-3)

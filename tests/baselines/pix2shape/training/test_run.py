@@ -24,7 +24,6 @@ from baselines.pix2shape.training import run as module
 from baselines.pix2shape.training.run import train_run
 from baselines.pix2shape.weights import METHOD
 from baselines.training.checkpoint import load_checkpoint, load_weights
-from baselines.training.fit import TrainingError
 from baselines.training.launch import Machine
 from baselines.training.processes import LostProcessError
 from scenegen.common.errors import SceneGenError, SpecError
@@ -267,20 +266,3 @@ def test_rays_refuse_uneven_views_before_the_search(near_path, folder, tmp_path)
     with refused(SpecError, str(uneven)):
         train_run(folder, uneven, RAYS, HERE)
     assert not folder.exists()
-
-
-def test_a_prior_that_is_not_finite_replaces_no_checkpoint(rooms_path, folder, monkeypatch):
-    """The last step's losses and weights are finite, and the earlier files stay."""
-    stored: dict[str, bytes] = {}
-
-    def spoiled(model: Any, sources: Any) -> None:
-        if folder.joinpath(WEIGHTS).exists():
-            stored.update({path.name: path.read_bytes() for path in folder.glob("*.safetensors")})
-            model.prior.mean.fill_(torch.nan)
-
-    monkeypatch.setattr(module, "fit_prior", spoiled)
-    config = replace(CONFIG, adversarial=0.0, iterations=2)
-    with refused(TrainingError, "iteration 2"):
-        train_run(folder, rooms_path, config, replace(HERE, every=1))
-    assert len(stored) == 2
-    assert {name: (folder / name).read_bytes() for name in stored} == stored
