@@ -4,7 +4,8 @@
 - `basic_shapes` makes boxes, spheres, teapots and the like, `families` makes everyday objects, and
   `meshes` reads models from files.
 - `cache` keeps on disk what takes long to make.
-- `cast_meshes` turns shapes into what the ray caster takes.
+- `cast_meshes` turns shapes into what the ray caster takes; `coarse_hulls` makes fewer corners
+  of a convex body that has very many.
 - `catalogue` says which models a data set draws from; `sources` turns the command line's options
   on objects into such a catalogue.
 - `scene_mesh` gives the parts of a scene as meshes, for export and for other ray casters.

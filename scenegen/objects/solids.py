@@ -47,6 +47,7 @@ class UnitShape:
             it lies at rest; empty if all may.
         is_sphere: whether it is the unit sphere, which path tracers know.
         surface: what is rendered instead of the triangles; None if those are rendered.
+        coarse: as from `coarse_hulls.coarse_hull`, if it was kept.
     """
 
     name: str
@@ -57,6 +58,7 @@ class UnitShape:
     resting_directions: Array
     is_sphere: bool = False
     surface: Surface | None = None
+    coarse: tuple[Array, float] | None = None
 
     @cached_property
     def mesh(self) -> Mesh:

@@ -12,14 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.rotations import cos_sin
+from scenegen.objects.coarse_hulls import MOST_CORNERS, POINT_STEP, coarse_hull, rounded
 from scenegen.objects.solids import UnitShape
 
 Array = NDArray[Any]
-POINT_STEP, DIRECTION_STEP = 2.0**-26, 2.0**-25
-MOST_CORNERS = 500  # of a body before its supports along many directions are those of a coarser one
-COARSE_CORNERS = 128
-_TRIED = 6000  # directions along which a coarse body is compared with its original
+DIRECTION_STEP = 2.0**-25
 BLOCK = 512  # points that are multiplied at once
 MARGIN = 2.0**-24  # scene units; more than rounding can take away from what an object reaches
 
@@ -37,11 +34,6 @@ def along(points: Array, directions: Array) -> Array:
     return products
 
 
-def rounded(values: Array, step: float) -> Array:
-    """Return the nearest multiples of a power of two."""
-    return np.asarray(np.rint(values * (1 / step)) * step)
-
-
 class Bodies:
     """What placement needs of a number of shapes, in groups of shapes with about as many points."""
 
@@ -49,7 +41,7 @@ class Bodies:
         """Collect the hulls and the resting directions of shapes, which are then known by place."""
         # Hulls and sides come from libraries whose last bits differ between machines.
         hulls = [rounded(_corners(shape), POINT_STEP) for shape in shapes]
-        coarse = [_coarse(shape) if len(hull) > MOST_CORNERS else (hull, 0.0)
+        coarse = [shape.coarse or (_coarse(shape) if len(hull) > MOST_CORNERS else (hull, 0.0))
                   for shape, hull in zip(shapes, hulls, strict=True)]  # fmt: skip
         self._hulls = _groups(hulls, 8)
         self._coarse = _groups([hull for hull, _ in coarse], 8)
@@ -102,30 +94,14 @@ def bodies_of(shapes: tuple[UnitShape, ...]) -> Bodies:
     return Bodies(shapes)
 
 
+@lru_cache(maxsize=256)
+def _coarse(shape: UnitShape) -> tuple[Array, float]:
+    return coarse_hull(_corners(shape))
+
+
 def _corners(shape: UnitShape) -> Array:
     """Return the centres and radii of a hull's discs, (V, 4)."""
     return np.column_stack([shape.hull_points, shape.hull_discs])
-
-
-@lru_cache(maxsize=256)
-def _coarse(shape: UnitShape) -> tuple[Array, float]:
-    """Return COARSE_CORNERS of a body's corners, and by how much they must grow to contain all.
-
-    One after another, that corner is taken which reaches farthest beyond those taken before.
-    """
-    height = 1 - (2 * np.arange(_TRIED) + 1) / _TRIED
-    cosine, sine = cos_sin(np.arange(_TRIED) * ((5**0.5 - 1) / 2))
-    radius = np.sqrt(1 - height * height)
-    directions = np.stack([radius * cosine, height, radius * sine])
-    corners = _corners(shape)
-    reach = corners[:, :3] @ directions + corners[:, 3:] * radius
-    farthest, best, chosen = reach.max(axis=0), np.full(_TRIED, -1.0), []
-    for _ in range(COARSE_CORNERS):
-        chosen.append(int(reach[:, (farthest - best).argmax()].argmax()))
-        best = np.maximum(best, reach[chosen[-1]])
-    # Twice, since the directions that were not tried may need a little more than those that were.
-    growth = 2 * float((farthest - best).max())
-    return rounded(corners[chosen], POINT_STEP), float(rounded(np.array(growth), POINT_STEP))
 
 
 _Group = tuple[Array, Array]  # each shape's place in `rows`, or -1; and the rows, (M, V, ...)

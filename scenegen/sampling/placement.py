@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.rotations import cos_sin
-from scenegen.sampling.bodies import DIRECTION_STEP, POINT_STEP, Bodies, along, rounded
+from scenegen.objects.coarse_hulls import POINT_STEP, rounded
+from scenegen.sampling.bodies import DIRECTION_STEP, Bodies, along
 
 Array = NDArray[Any]
 GAP = 2e-3  # least distance between two objects, scene units

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from scenegen.objects.cache import DiskCache
+from scenegen.objects.coarse_hulls import MOST_CORNERS, coarse_hull
 from scenegen.objects.meshes.clean import clean_mesh
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.hull import hull_points
@@ -27,6 +28,7 @@ class Model:
         digest: content hash of its file, as from `content_hash`.
         vertices, faces, mended: as in `CleanMesh`.
         hull_points: as from `hull.hull_points`, (H, 3) float64.
+        coarse: as from `coarse_hulls.coarse_hull`, for a hull of more than MOST_CORNERS points.
     """
 
     digest: str
@@ -34,6 +36,7 @@ class Model:
     faces: Array
     hull_points: Array
     mended: Mapping[str, int]
+    coarse: tuple[Array, float] | None
 
 
 def load_model(path: Path, up: str, cache: DiskCache) -> Model:
@@ -51,7 +54,21 @@ def load_model(path: Path, up: str, cache: DiskCache) -> Model:
     if reason := str(arrays["refusal"]):
         raise BadMeshError(reason)
     vertices, faces, corners = (arrays[name] for name in _ARRAYS[:3])
-    return Model(digest, vertices, faces, corners, json.loads(str(arrays["mended"])))
+    coarse = _coarse(digest, corners, cache)
+    return Model(digest, vertices, faces, corners, json.loads(str(arrays["mended"])), coarse)
+
+
+def _coarse(digest: str, corners: Array, cache: DiskCache) -> tuple[Array, float] | None:
+    """Return a body's coarser one, if it has one, from the cache if it is there."""
+    if len(corners) <= MOST_CORNERS:
+        return None
+    key = f"{digest}-coarse"
+    arrays = cache.read(key, ("points", "growth"))
+    if arrays is not None:
+        return arrays["points"], float(arrays["growth"])
+    coarse = coarse_hull(np.column_stack([corners, np.zeros(len(corners))]))
+    cache.write(key, {"points": coarse[0], "growth": np.array(coarse[1])})
+    return coarse
 
 
 def content_hash(data: bytes, suffix: str, up: str) -> str:

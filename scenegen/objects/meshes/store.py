@@ -74,4 +74,5 @@ class MeshStore:
 def _unit_shape(name: str, model: Model) -> UnitShape:
     mesh, hull = Mesh(model.vertices, model.faces, None), model.hull_points
     down = np.array([[0.0, -1.0, 0.0]])
-    return UnitShape(name, lambda: mesh, hull, np.zeros(len(hull)), 0.0, down)
+    discs = np.zeros(len(hull))
+    return UnitShape(name, lambda: mesh, hull, discs, 0.0, down, coarse=model.coarse)

@@ -7,7 +7,8 @@ from shape_checks import support
 
 from scenegen.description.scenes import SHAPE_NAMES
 from scenegen.objects.basic_shapes import unit_shape
-from scenegen.sampling.bodies import COARSE_CORNERS, DIRECTION_STEP, Bodies, rounded
+from scenegen.objects.coarse_hulls import COARSE_CORNERS, rounded
+from scenegen.sampling.bodies import DIRECTION_STEP, Bodies
 
 SHAPES = [unit_shape(name) for name in SHAPE_NAMES]
 BODIES = Bodies(SHAPES)

@@ -12,7 +12,8 @@ from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scenes import SHAPE_NAMES
 from scenegen.objects.basic_shapes import unit_shape
-from scenegen.sampling.bodies import POINT_STEP, Bodies, rounded
+from scenegen.objects.coarse_hulls import POINT_STEP, rounded
+from scenegen.sampling.bodies import Bodies
 from scenegen.sampling.placement import (
     CANDIDATES,
     GAP,
