@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from metrics.scoring.records import ScoreFile
-from metrics.submissions.reader import BLOCK_BYTES
 from scenegen.common.errors import SceneGenError
 from scenegen.files import trial
 
@@ -69,11 +68,8 @@ def _truth_digest(file: ScoreFile, path: Path) -> str | None:
 
 
 def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
     try:
         with path.open("rb") as file:
-            while block := file.read(BLOCK_BYTES):
-                digest.update(block)
+            return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError:
         return ""
-    return digest.hexdigest()

@@ -1,6 +1,5 @@
 """Scores over the angle between a view and its scene's first one: floors and curves."""
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -59,8 +58,7 @@ def _points(file: ScoreFile, name: str) -> list[Point]:
 
 def score_point(score: Score, at: float = 0.0) -> Point:
     """Return a score and its interval as a point of a chart."""
-    low, high = (math.nan if end is None else end for end in (score.low, score.high))
-    return Point(at, score.value, low, high)
+    return Point(at, score.value, score.low, score.high)
 
 
 def _with_paper(chart: Chart, name: str) -> Chart:

@@ -52,12 +52,12 @@ _STRIP_STYLES = {"floor": "-", "zero": "-", "chance": ":"}  # of lines; others a
 
 @dataclass(frozen=True)
 class Point:
-    """A value at some place, and its interval; the ends are NaN where there is none."""
+    """A value at some place, and its interval; the ends are None where there is none."""
 
     at: float
     value: float
-    low: float = math.nan
-    high: float = math.nan
+    low: float | None = None
+    high: float | None = None
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,8 @@ def curves(series: Sequence[Series], title: str, unit: str) -> Chart | None:
 def _draw_curve(axes: "Axes", line: Series, aside: float) -> None:
     """Draw a series a little aside, so that no interval hides another."""
     color, marker = KINDS[line.kind]
-    at, value, low, high = np.array([(p.at, p.value, p.low, p.high) for p in line.points]).T
+    ends = [(p.at, p.value, p.low, p.high) for p in line.points]
+    at, value, low, high = np.array(ends, float).T  # None is NaN
     at = at + (0.6 * aside if line.kind != LINE else 0.0)
     style = "--" if line.kind == LINE else "-"
     axes.plot(at, value, style, color=color, marker=marker, markersize=4, linewidth=1.2)
@@ -155,7 +156,7 @@ def _draw_curve(axes: "Axes", line: Series, aside: float) -> None:
 
 def _lowest(series: Sequence[Series]) -> float:
     ends = [(p.value, p.low, p.high) for line in series for p in line.points]
-    return float(np.nanmin(ends))
+    return float(np.nanmin(np.array(ends, float)))
 
 
 def _apart(degrees: Sequence[float]) -> list[float]:
@@ -168,7 +169,7 @@ def _apart(degrees: Sequence[float]) -> list[float]:
 
 
 def _in_words(point: Point) -> str:
-    if not (math.isfinite(point.low) and math.isfinite(point.high)):
+    if point.low is None or point.high is None:
         return number(point.value)
     ends = f"[{number(point.low, point.value)}, {number(point.high, point.value)}]"
     return f"{number(point.value)} {ends}"
@@ -186,7 +187,7 @@ def bars(counts: Sequence[int], title: str, unit: str, counted: str) -> Chart:
 
 
 def strip(
-    point: Point, marks: Sequence[tuple[str, float]], others: Sequence[float] = (),
+    point: Point, marks: Sequence[tuple[str, float]], others: Sequence[float | None] = (),
     limits: tuple[float, float] = (-math.inf, math.inf),
 ) -> tuple[str, str]:  # fmt: skip
     """Return a line with one value, its interval and marks, as a data URL; and its ends in words.
@@ -202,7 +203,7 @@ def strip(
     from matplotlib.ticker import MaxNLocator
 
     ends = [point.value, point.low, point.high, *others, *(at for _, at in marks)]
-    shown = [end for end in ends if math.isfinite(end)]
+    shown = [end for end in ends if end is not None and math.isfinite(end)]
     ticks = MaxNLocator(4).tick_values(min(0.0, *shown), max(0.0, *shown))
     low, high = max(float(ticks[0]), limits[0]), min(float(ticks[-1]), limits[1])
     with _drawing(1.6, 0.22, layout=None) as (figure, axes):
@@ -214,7 +215,7 @@ def strip(
         for kind, at in marks:
             color = KINDS.get(kind, KINDS[LINE])[0]
             axes.axvline(at, color=color, linestyle=_STRIP_STYLES.get(kind, "--"), linewidth=1.5)
-        if math.isfinite(point.low) and math.isfinite(point.high):
+        if point.low is not None and point.high is not None:
             axes.plot((point.low, point.high), (0, 0), color=KINDS["s0"][0], linewidth=2)
         axes.plot(point.value, 0, "o", color=KINDS["s0"][0], markersize=5)
         picture = _svg(figure)

@@ -1,7 +1,6 @@
 """A comparison for people, as aligned text, Markdown or a page, and for programs, as JSON."""
 
 import json
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -228,7 +227,7 @@ def _answer(comparison: Comparison, label: str) -> str:
 def _page_table(differences: Sequence[Difference]) -> Table:
     """Return the others' differences from the reference in one score, each drawn on one scale."""
     definition = metric(differences[0].metric)
-    points = [_point(d) for d in differences]
+    points = [Point(0.0, d.difference, d.low, d.high) for d in differences]
     ends = [end for point in points for end in (point.value, point.low, point.high)]
     rows: list[Sequence[Cell | str]] = []
     for d, point in zip(differences, points, strict=True):
@@ -240,11 +239,6 @@ def _page_table(differences: Sequence[Difference]) -> Table:
         )
     title = f"{definition.title} ({definition.unit}, {definition.direction})"
     return make_table(title, ("method", "difference", "on its scale", *TESTS_HEAD), rows)
-
-
-def _point(d: Difference) -> Point:
-    low, high = (math.nan if end is None else end for end in (d.low, d.high))
-    return Point(0.0, d.difference, low, high)
 
 
 def _examples(

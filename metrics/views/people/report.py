@@ -165,7 +165,7 @@ def _charts(figures: Figures) -> Iterator[Chart]:
 
 def _point(group: Group, estimate: Estimate, scale: float = 1) -> Point:
     """Return an estimate in the middle of a group's range of angles."""
-    ends = (math.nan if end is None else scale * end for end in (estimate.low, estimate.high))
+    ends = (None if end is None else scale * end for end in (estimate.low, estimate.high))
     middle = sum(map(float, group.name.split("-"))) / 2
     return Point(middle, scale * estimate.value, *ends)
 
