@@ -14,7 +14,7 @@ from click.testing import CliRunner
 import cli
 from iqtt.questions.specs import secret_seed
 
-TINY = "--train 6 --labeled 3 --val 3 --test 3 --size 32 --batch 4"
+TINY = "--train 6 --labeled 3 --val 3 --test 3 --size 32 --batch 4 --cubes 6-7"
 FILES = ["iqtt-test-answers.h5", "iqtt-test.h5", "iqtt-train.h5", "iqtt-val.h5"]
 
 

@@ -124,7 +124,9 @@ def test_a_table_does_not_depend_on_the_size_of_the_others(folder, tmp_path):
 @pytest.mark.parametrize(
     "changed",
     [
-        {"cubes": (16, 16), "shapes": "tree", "train": 1, "labeled": 0},
+        pytest.param(
+            {"cubes": (16, 16), "shapes": "tree", "train": 1, "labeled": 0}, marks=pytest.mark.slow
+        ),
         {"cubes": (12, 12), "distractors": "mirror", "test": 0},
         {"height": 24, "width": 40, "min_angle_degrees": 90},
         {"height": 40, "width": 24, "lights": (1, 4)},

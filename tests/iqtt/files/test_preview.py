@@ -101,6 +101,11 @@ def unanswered(record):
     return dataclasses.replace(record, answer=None, truth=None)
 
 
+def test_the_right_answer_is_known_from_the_truth_too(records):
+    sheet = np.asarray(question_sheet([dataclasses.replace(records[0], answer=None)], True))
+    assert np.array_equal(sheet, np.asarray(question_sheet([records[0]], True)))
+
+
 @pytest.mark.parametrize(
     ("size", "factor"),
     [((16, 16), 8), ((100, 100), 2), ((256, 200), 1), ((20, 60), 3)],
