@@ -11,15 +11,16 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from scenegen.common.errors import SpecError
 from scenegen.objects import teapot
+from scenegen.objects.basic_hulls import kept
 from scenegen.objects.exact_surfaces import FAR, Capsule, Torus, Turned, cone_of
 from scenegen.objects.solids import (
     Array,
     UnitShape,
     arc,
+    convex_hull,
     face_outwards,
     line,
     polyhedron,
@@ -99,8 +100,9 @@ def _icosahedron() -> UnitShape:
 
 
 def _dodecahedron() -> UnitShape:
-    hull = ConvexHull(_golden_points())
-    return polyhedron("dodecahedron", _golden_points()[hull.simplices].mean(axis=1))
+    points = _golden_points()
+    faces = kept("dodecahedron-faces", lambda: convex_hull(points).simplices)
+    return polyhedron("dodecahedron", points[faces].mean(axis=1))
 
 
 def _golden_points() -> Array:
@@ -116,16 +118,16 @@ def _teapot() -> UnitShape:
     scale = 1 / np.linalg.norm(corners - center, axis=-1).max()
     # The hull for placement: slightly too large discs for turned parts, points for the others.
     points = corners.reshape(-1, 3)
-    on_hull = ConvexHull(points).vertices
+    on_hull = kept("teapot-hull", lambda: convex_hull(points).vertices)
     turned_points = 4 * teapot.turned_quads(divisions=32)
     turned = points[on_hull[on_hull < turned_points]]
     others = points[on_hull[on_hull >= turned_points]]
     profile = np.stack([np.hypot(turned[:, 0], turned[:, 2]), turned[:, 1]], axis=1)
-    discs, heights = profile[ConvexHull(profile).vertices].T
+    discs, heights = profile[kept("teapot-profile", lambda: convex_hull(profile).vertices)].T
     axis_points = np.stack([0 * heights, heights, 0 * heights], axis=1)
     hull = (np.concatenate([axis_points, others]) - center) * scale
     discs = np.concatenate([discs, np.zeros(len(others))]) * scale
-    resting = resting_directions(points[on_hull])
+    resting = kept("teapot-resting", lambda: resting_directions(points[on_hull]))
 
     corners = (corners - center) * scale
     triangles = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])

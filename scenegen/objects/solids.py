@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from scenegen.common.rotations import cross
+from scenegen.objects.basic_hulls import kept
 from scenegen.objects.exact_surfaces import Surface, polyhedron_of
 
 Array = NDArray[Any]
@@ -101,11 +101,12 @@ def polyhedron(name: str, points: Array) -> UnitShape:
     """Return the convex hull of points, (V, 3), with flat faces, centred and scaled to radius 1."""
     points = points - (points.min(0) + points.max(0)) / 2
     points = points / np.linalg.norm(points, axis=1).max()
-    hull = ConvexHull(points)
-    normals = np.repeat(hull.equations[:, None, :3], 3, axis=1)
-    mesh = unshared(*face_outwards(points[hull.simplices], normals))
-    resting = resting_directions(points)
-    exact = polyhedron_of(hull.equations)
+    planes = kept(f"{name}-planes", lambda: convex_hull(points).equations)
+    corners = kept(f"{name}-corners", lambda: convex_hull(points).simplices)
+    normals = np.repeat(planes[:, None, :3], 3, axis=1)
+    mesh = unshared(*face_outwards(points[corners], normals))
+    resting = kept(f"{name}-resting", lambda: resting_directions(points))
+    exact = polyhedron_of(planes)
     discs = np.zeros(len(points))
     return UnitShape(name, lambda: mesh, points, discs, 0.0, resting, surface=exact)
 
@@ -150,7 +151,8 @@ def revolution(
         return unshared(*outwards)
 
     if resting is None:
-        resting = resting_directions(np.unique(turn(rings, angle[:-1]).reshape(-1, 3), axis=0))
+        rims = np.unique(turn(rings, angle[:-1]).reshape(-1, 3), axis=0)
+        resting = kept(f"{name}-resting", lambda: resting_directions(rims))
     discs, heights = (rings * scale).T
     hull = np.stack([0 * heights, heights, 0 * heights], axis=1)
     return UnitShape(name, mesh, hull, discs, rounding * scale, resting, is_sphere, exact)
@@ -173,12 +175,19 @@ def face_vectors(triangles: Array) -> tuple[Array, Array, Array]:
     return cross(first, second)
 
 
+def convex_hull(points: Array, options: str | None = None) -> Any:
+    """Return Qhull's hull of points, (N, D), a `scipy.spatial.ConvexHull`."""
+    from scipy.spatial import ConvexHull  # takes a third of a second, and is seldom needed
+
+    return ConvexHull(points, qhull_options=options)
+
+
 def resting_directions(points: Array) -> Array:
     """Return outward normals, (S, 3), of the faces of the points' hull on which it can rest.
 
     It rests on a face if the perpendicular from its centre of mass meets that face.
     """
-    hull = ConvexHull(points)
+    hull = convex_hull(points)
     corners, normal = points[hull.simplices], hull.equations[:, :3]
     inside = points.mean(axis=0)
     spokes = corners - inside  # tetrahedra from `inside` to each triangle

@@ -1,9 +1,8 @@
 """A convex body of few points around a mesh. Placement tests these bodies for overlap."""
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
-from scenegen.objects.solids import Array
+from scenegen.objects.solids import Array, convex_hull
 
 MOST_POINTS = 400  # of the body, as placement loops over all of them many times
 _DIRECTIONS = 300
@@ -17,15 +16,17 @@ def hull_points(vertices: Array) -> Array:
     The body is their convex hull within 1e-9. If that has more than MOST_POINTS corners, the body
     has fewer, and is a few percent larger. It reaches exactly as far down (-y) as the vertices.
     """
+    from scipy.spatial import QhullError
+
     points = np.asarray(vertices, np.float64)
     lowest = points[[int(points[:, 1].argmin())]]
     try:
         # QJ moves points by some 1e-11; without, 20,000 points on a circle take Qhull minutes.
-        body = points[ConvexHull(points, qhull_options="QJ Pp").vertices]
+        body = points[convex_hull(points, "QJ Pp").vertices]
         if len(body) > MOST_POINTS:
             body = _coarser(body, float(lowest[0, 1]))
         else:
-            body = body[ConvexHull(body).vertices]
+            body = body[convex_hull(body).vertices]
     except QhullError:  # the points lie in a plane
         body = _flat_hull(points)
     return np.concatenate([body, lowest])
@@ -35,7 +36,7 @@ def _flat_hull(points: Array) -> Array:
     """Return the corners of the convex hull of points that lie in a plane."""
     centered = points - points.mean(axis=0)
     axes = np.linalg.svd(centered, full_matrices=False)[2]
-    return np.asarray(points[ConvexHull(centered @ axes[:2].T).vertices])
+    return np.asarray(points[convex_hull(centered @ axes[:2].T).vertices])
 
 
 def _coarser(points: Array, floor: float) -> Array:
@@ -50,7 +51,7 @@ def _coarser(points: Array, floor: float) -> Array:
     directions = _even_directions(_DIRECTIONS) / np.maximum(np.ptp(points, axis=0), 1e-9)
     extreme = _extreme(blocks, directions)
     middle = extreme.mean(axis=0)
-    hull = ConvexHull(extreme - middle)
+    hull = convex_hull(extreme - middle)
     outward = hull.equations[:, :3] / -hull.equations[:, 3:]  # 1 on the hull, less inside
     growth = max(float((outward @ (block - middle).T).max()) for block in blocks)
     if growth > _MOST_GROWTH:

@@ -13,6 +13,7 @@ from scenegen.camera import Camera
 from scenegen.common.errors import SpecError
 from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scenes import SHAPE_NAMES, PlacedObject, SceneSpec
+from scenegen.objects import basic_hulls
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.scene_mesh import room_mesh, scene_parts, welded, world_from_object
 
@@ -171,3 +172,15 @@ def test_the_parts_of_a_scene_are_the_room_and_every_object_in_its_place():
     cone = corners[18:].reshape(-1, 3) - objects[1].position
     tip = cone[cone[:, 2].argmax()]  # a quarter turn about x takes y to z
     np.testing.assert_allclose(tip, [0, 0, 0.2 * half], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", SHAPE_NAMES)
+def test_hulls_that_are_kept_are_those_of_qhull(name, monkeypatch):
+    monkeypatch.setattr(basic_hulls, "_kept", dict)
+    expected, shape = unit_shape.__wrapped__(name), unit_shape(name)
+    for field in ("hull_points", "hull_discs", "resting_directions"):
+        np.testing.assert_allclose(getattr(shape, field), getattr(expected, field), atol=1e-9)
+    np.testing.assert_allclose(shape.triangles, expected.triangles, atol=1e-9)
+    np.testing.assert_allclose(shape.normals, expected.normals, atol=1e-9)
+    if hasattr(shape.surface, "slabs"):
+        np.testing.assert_allclose(shape.surface.slabs, expected.surface.slabs, atol=1e-9)
