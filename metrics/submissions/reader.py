@@ -55,8 +55,17 @@ class Predictions:
 
     task = ""
 
-    def __init__(self, path: Path, content: Inspection, file: h5py.File | None) -> None:
-        """Take over an open file whose ids are usable, or none after JSON was read."""
+    def __init__(
+        self,
+        path: Path,
+        content: Inspection,
+        file: h5py.File | None,
+        identity: Identity | None = None,
+    ) -> None:
+        """Take over an open file whose ids are usable, or none after JSON was read.
+
+        `identity` is that of content that lies in no file.
+        """
         assert content.ids is not None, "only usable files are opened"
         texts = content.texts
         self.path, self.rows = path, content.ids
@@ -66,7 +75,9 @@ class Predictions:
         self._arrays, self._file = content.arrays, file
         allowed = layout.KINDS.get(self.kind, ("none",))
         self.alignment = cast(Alignment, texts.get("alignment", allowed[0]))
-        self.identity = _identity(path if file is None else file.id.get_vfd_handle())
+        if identity is None:
+            identity = _identity(path if file is None else file.id.get_vfd_handle())
+        self.identity = identity
 
     def __len__(self) -> int:
         return len(self.rows)

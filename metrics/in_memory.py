@@ -1,0 +1,219 @@
+"""Scores of predictions in memory, the same numbers as `bench score` prints.
+
+    scores = metrics.evaluate((model.infer(image) for image in images), "rooms.h5")
+    print(scores.metrics["relief_iou"].value)
+
+Predictions are arrays or tensors of torch, or dicts as `bench run` takes them.
+"""
+
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.intake.outputs import Frame, Geometry, OutputError, fitted_to, image_of, read_output
+from metrics.measures.alignment import Alignment
+from metrics.scoring.image_scores import NonFinite, score_empty_room, score_prediction
+from metrics.scoring.metric_names import EMPTY_ROOM
+from metrics.scoring.records import ScoreFile
+from metrics.scoring.rooms import score_rooms
+from metrics.scoring.runs import Settings
+from metrics.submissions.inspection import Inspection
+from metrics.submissions.layout import KINDS
+from metrics.submissions.reader import PredictedView, RoomPredictions
+from metrics.submissions.rules import as_doubles
+from metrics.submissions.truths import TrueView
+from scenegen.common.errors import SpecError
+from scenegen.rooms.reader import Room, RoomsFile
+
+Array = NDArray[Any]
+PLACE = Path("predictions in memory")
+
+
+def evaluate_room(
+    prediction: Any,
+    truth: Room,
+    *,
+    kind: str = "depth",
+    alignment: Alignment | None = None,
+    normal: Any = None,
+    frame: Frame = "opencv",
+    non_finite: NonFinite = "error",
+) -> dict[str, float]:
+    """Return the scores of one prediction by name, those of this row in a file of scores.
+
+    Scores that compare with the relief of another scene need more than one room and are left out.
+    A score that this room does not have is NaN.
+
+    Args:
+        prediction: depth or disparity (h, w), or points (h, w, 3); or a dict, as
+            `intake.outputs.read_output` describes it, which then says kind and alignment itself.
+        truth: a row of an open file of rooms, such as `rooms[0]`.
+        kind, alignment: of an array: one of `layout.KINDS` and what the method cannot know.
+        normal: (h, w, 3), beside an array.
+        frame: of points and normals: "opencv" has x right, y down, z forward; "opengl" is ours.
+        non_finite: "error", or "penalise" as `image_scores.score_view`.
+
+    Raises OutputError for what is no prediction, SpecError for kind or alignment, and
+    PredictionError for values that are not finite where the truth shows a surface.
+    """
+    height, width = truth.depth.shape
+    geometry = _geometry(prediction, normal, height, width, kind, alignment, frame)
+    values = _stored(geometry)
+    predicted = PredictedView(
+        geometry.kind,
+        geometry.alignment,
+        as_doubles(values[geometry.kind]),
+        as_doubles(values["normal"]) if "normal" in values else None,
+        geometry.fov_y_degrees,
+    )
+    view = TrueView(
+        truth.depth, truth.normal, truth.object_id, truth.fov_y_degrees, truth.world_from_camera
+    )
+    empty = score_empty_room(view)
+    scores = score_prediction(predicted, view, empty.depth, non_finite=non_finite).scores
+    return scores | {EMPTY_ROOM + name: value for name, value in empty.scores.items()}
+
+
+def evaluate(
+    predictions: Iterable[Any],
+    rooms: str | Path | RoomsFile,
+    *,
+    items: Sequence[int] | None = None,
+    kind: str = "depth",
+    alignment: Alignment | None = None,
+    normals: Iterable[Any] | None = None,
+    frame: Frame = "opencv",
+    method: str = "in memory",
+    settings: Settings | None = None,
+) -> ScoreFile:
+    """Score predictions of the rooms of a file, and return what `bench score` writes.
+
+    `result.metrics["relief_iou"]` has a value and its interval; `score_file.write_scores` writes
+    the result. This process does all of the work.
+
+    Args:
+        predictions: one for each row, in order, each as for `evaluate_room`; such as an array
+            (N, H, W), or a generator, of which only the predictions are kept.
+        rooms: the file, or an open one.
+        items: the rows that are predicted; all by default. Scores of some are not comparable.
+        kind, alignment, frame: as for `evaluate_room`.
+        normals: one for each prediction, (N, H, W, 3), beside arrays.
+        settings: None for the defaults of `bench score`.
+
+    Raises as `evaluate_room`; OSError and FileFormatError for the file; SpecError where there are
+    more or fewer predictions than rows.
+    """
+    chosen = settings or Settings()
+    with ExitStack() as stack:
+        truth = rooms if isinstance(rooms, RoomsFile) else stack.enter_context(RoomsFile(rooms))
+        rows = np.arange(len(truth)) if items is None else np.array(items, np.int64)
+        if (
+            not len(rows)
+            or len(np.unique(rows)) < len(rows)
+            or not ((rows >= 0) & (rows < len(truth))).all()
+        ):
+            raise SpecError("items", f"{list(rows[:8])}", f"rows of {truth.path}, each once")
+        content = _content(
+            predictions, normals, rows, truth, kind=kind, alignment=alignment, frame=frame
+        )
+        content.texts |= {"method": method, "truth_fingerprint": truth.fingerprint}
+        run = replace(
+            chosen,
+            processes=1,
+            cluster=None,
+            allow_partial=chosen.allow_partial or items is not None,
+        )
+        return score_rooms([_InMemory(content)], truth, True, run, lambda done: None)
+
+
+class _InMemory(RoomPredictions):
+    """Predictions that lie in no file."""
+
+    def __init__(self, content: Inspection) -> None:
+        """Take arrays of usable rows."""
+        super().__init__(PLACE, content, None, identity=(0, 0, 0, 0))
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the rows and the values, as hex."""
+        digest = hashlib.sha256()
+        for array in (self.rows, *self._arrays.values()):
+            digest.update(np.ascontiguousarray(array).data)
+        return digest.hexdigest()
+
+
+def _content(
+    predictions: Iterable[Any],
+    normals: Iterable[Any] | None,
+    rows: Array,
+    truth: RoomsFile,
+    **how: Any,
+) -> Inspection:
+    """Return predictions as an opened file has them."""
+    height, width = truth.spec.height, truth.spec.width
+    arrays: dict[str, list[Array]] = {}
+    first: Geometry | None = None
+    given = iter(predictions)
+    given_normals = None if normals is None else iter(normals)
+    for row in rows.tolist():
+        try:
+            prediction = next(given)
+            normal = None if given_normals is None else next(given_normals)
+        except StopIteration:
+            found = f"{len(arrays.get(first.kind, ())) if first else 0}"
+            raise SpecError("predictions", found, f"{len(rows)}, one for each row") from None
+        try:
+            geometry = _geometry(prediction, normal, height, width, **how)
+        except OutputError as error:
+            raise error.inside(f"row {row}") from error
+        values = _stored(geometry)
+        first = first or geometry
+        if (geometry.kind, geometry.alignment) != (first.kind, first.alignment) or (
+            arrays and values.keys() != arrays.keys()
+        ):
+            found = f"{', '.join(values)} under {geometry.alignment}"
+            raise OutputError(f"row {row}", found, "the same as in the first row")
+        for name, value in values.items():
+            arrays.setdefault(name, []).append(value)
+    if next(given, None) is not None:
+        raise SpecError("predictions", f"more than {len(rows)}", "one for each row")
+    assert first is not None, "there is a row"
+    stacked = {name: np.stack(values) for name, values in arrays.items()}
+    return Inspection("rooms", {"alignment": first.alignment}, stacked, rows)
+
+
+def _geometry(
+    prediction: Any,
+    normal: Any,
+    height: int,
+    width: int,
+    kind: str,
+    alignment: Alignment | None,
+    frame: Frame,
+) -> Geometry:
+    if isinstance(prediction, Mapping):
+        return read_output(prediction, height, width, frame=frame)
+    if kind not in KINDS:
+        raise SpecError("kind", repr(kind), " or ".join(KINDS))
+    alignment = alignment or KINDS[kind][0]  # type: ignore[assignment]
+    if alignment not in KINDS[kind]:
+        raise SpecError("alignment", repr(alignment), f"{' or '.join(KINDS[kind])}, for {kind}")
+    image = image_of(prediction, kind, vectors=kind == "points")
+    normal = None if normal is None else image_of(normal, "normal", vectors=True)
+    geometry = Geometry(kind, alignment, image, normal)
+    return fitted_to(geometry, height, width, frame=frame, missing="refuse")
+
+
+def _stored(geometry: Geometry) -> dict[str, Array]:
+    """Return the values in the precision of a submission."""
+    with np.errstate(over="ignore"):
+        return {
+            name: np.asarray(value, np.float64 if name == "fov_y_degrees" else np.float32)
+            for name, value in geometry.values.items()
+        }
