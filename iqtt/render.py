@@ -140,6 +140,13 @@ def _checked(
     return done
 
 
+def shows_every_cube(spec: SplitSpec, question: Question, device: str = "auto") -> bool:
+    """Return whether each image of a question shows `min_cube_pixels` pixels of every cube."""
+    ids = launch_fields(pack_questions(spec, [question]), ("object_id",), device)()["object_id"]
+    shown = visible_pixels(ids, question.shapes.cubes.shape[1])
+    return bool((shown >= spec.min_cube_pixels).all())
+
+
 def _shows_all(spec: SplitSpec, rendered: Rendered) -> bool:
     used = rendered.question.shapes.cubes.shape[1]
     return bool((rendered.visible_pixels[:, :used] >= spec.min_cube_pixels).all())

@@ -21,19 +21,20 @@ from scenegen.rooms.preview import BACKGROUND, INK, srgb_bytes
 Array = NDArray[Any]
 SMALLEST, LARGEST = 64, 1024  # pixels of a side
 FINER = 2  # a pixel is the mean of FINER x FINER rays
+_CURVE = srgb_bytes(np.linspace(0.0, 1.0, 1 << 16))  # a table is 20 times faster than the power
 PIXELS_AT_ONCE = 1 << 24  # rays of one launch, so that memory stays flat
 REFERENCE = "Reference"
 
 
 def draw_pictures(
-    spec: SplitSpec, truths: Sequence[QuestionTruth], size: int, device: str = "auto"
+    spec: SplitSpec, questions: Sequence[Question], size: int, device: str = "auto"
 ) -> Iterator[Array]:
     """Yield the pictures of each question: reference, then answers, (1 + K, H, W, 3) sRGB uint8.
 
-    The shapes, poses, lights and field of view are those that are stored. A pixel is the mean
-    radiance of 2 x 2 rays, encoded as sRGB (IEC 61966-2-1).
+    A pixel is the mean radiance of 2 x 2 rays, encoded as sRGB (IEC 61966-2-1).
 
     Args:
+        questions: shapes, poses and lights; `stored_question` returns those of a file.
         size: of the shorter side, pixels.
 
     Raises SpecError for a size out of range, BackendError as `renderer.render`.
@@ -46,14 +47,23 @@ def draw_pictures(
     )
     images = 1 + spec.answers
     at_once = max(1, PIXELS_AT_ONCE // (images * fine.height * fine.width))
-    for start in range(0, len(truths), at_once):
-        questions = [_question(spec, truth) for truth in truths[start : start + at_once]]
-        radiance = launch_fields(pack_questions(fine, questions), ("image",), device)()["image"]
-        means = radiance.reshape(-1, height, FINER, width, FINER, 3).mean(axis=(2, 4))
-        yield from srgb_bytes(means).reshape(len(questions), images, height, width, 3)
+    for start in range(0, len(questions), at_once):
+        batch = pack_questions(fine, questions[start : start + at_once])
+        radiance = launch_fields(batch, ("image",), device)()["image"]
+        rays = radiance.reshape(-1, height, FINER, width, FINER, 3)
+        upper, lower = rays[:, :, 0], rays[:, :, 1]
+        means = (upper[:, :, :, 0] + upper[:, :, :, 1] + lower[:, :, :, 0] + lower[:, :, :, 1]) / 4
+        yield from encoded(means).reshape(-1, images, height, width, 3)
 
 
-def _question(spec: SplitSpec, truth: QuestionTruth) -> Question:
+def encoded(radiance: Array) -> NDArray[np.uint8]:
+    """Return linear radiance as sRGB, both (...); equal to `srgb_bytes` within a step."""
+    steps = np.clip(radiance, 0.0, 1.0) * (len(_CURVE) - 1) + 0.5
+    return np.asarray(_CURVE[steps.astype(np.int32)])
+
+
+def stored_question(spec: SplitSpec, truth: QuestionTruth) -> Question:
+    """Return what a file tells of a question, ready to be drawn."""
     images, most = 1 + spec.answers, spec.lights[1]
     position, color = np.zeros((2, images, most, 3))
     counts = np.array([len(lights) for lights in truth.light_position])

@@ -12,7 +12,7 @@ from iqtt.files.reader import QuestionsFile, answers_beside
 from iqtt.files.truth import QuestionTruth
 from iqtt.floors import floor_of_kind
 from iqtt.questions.specs import DISTRACTOR_KINDS, question_kind
-from iqtt.vlm.pictures import composed, draw_pictures, png
+from iqtt.vlm.pictures import composed, draw_pictures, png, stored_question
 from iqtt.vlm.prompt import question_text
 from iqtt.vlm.reading import LETTERS
 from scenegen.common.errors import FileFormatError
@@ -108,7 +108,8 @@ def vlm_rows(asked: Asked) -> Iterator[Row]:
         for start in range(0, len(items), AT_ONCE):
             chosen = items[start : start + AT_ONCE]
             truths = [truth for row in chosen if (truth := questions.truth(row)) is not None]
-            drawn = draw_pictures(questions.spec, truths, asked.size, asked.device)
+            shown = [stored_question(questions.spec, truth) for truth in truths]
+            drawn = draw_pictures(questions.spec, shown, asked.size, asked.device)
             for row, truth, pictures in zip(chosen, truths, drawn, strict=True):
                 answer = int(questions.read("answers", row)) if tell else None
                 for rotation in range(rotations):

@@ -35,6 +35,7 @@ class Purpose(IntEnum):
     WEIGHTS = 15
     PICTURES = 16
     QUIZ = 17
+    ENVIRONMENT = 18
 
 
 def item_rng(seed: int, index: int, purpose: Purpose, attempt: int = 0) -> np.random.Generator:

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from iqtt.files.reader import QuestionsFile
-from iqtt.vlm.pictures import composed, draw_pictures
+from iqtt.vlm.pictures import composed, draw_pictures, stored_question
 from iqtt.vlm.reading import LETTERS
 from iqtt.vlm.rows import Asked, vlm_rows
 from scenegen.common.errors import FileFormatError, SpecError
@@ -37,7 +37,8 @@ def test_pictures_are_the_stored_ones_drawn_finer(asked: Asked) -> None:
     with QuestionsFile(asked.path) as questions:
         assert questions.spec is not None
         truths = [truth for i in range(6) if (truth := questions.truth(i)) is not None]
-        drawn = list(draw_pictures(questions.spec, truths, 64))
+        shown = [stored_question(questions.spec, truth) for truth in truths]
+        drawn = list(draw_pictures(questions.spec, shown, 64))
         for record, pictures in zip(questions, drawn, strict=True):
             stored = srgb_bytes(record.radiance).repeat(2, axis=1).repeat(2, axis=2)
             differs = np.abs(stored.astype(int) - pictures).max(axis=-1) > 3
