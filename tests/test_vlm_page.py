@@ -1,0 +1,10 @@
+"""The page on vision-language models, run in an empty folder as a reader runs it."""
+
+from page_blocks import blocks, run_block
+
+
+def test_the_page_runs(tmp_path):
+    printed = [run_block(*block, tmp_path) for block in blocks("vlm.md")]
+    rows = dict(line.split()[:2] for line in printed[1].splitlines() if len(line.split()) == 2)
+    assert float(rows["circular_accuracy"]) == 0.0
+    assert 0 <= float(rows["accuracy"]) <= 0.7
