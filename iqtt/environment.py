@@ -142,19 +142,19 @@ class Questions(Sequence[dict[str, Any]]):
     gives 1.0 for the right letter, else 0.0.
     """
 
-    def __init__(self, count: int, seed: int = 0, **settings: Any) -> None:
+    def __init__(self, length: int, seed: int = 0, **settings: Any) -> None:
         """Take the number of questions, the seed, and the settings of `question`."""
-        self.count, self.seed, self.settings = count, seed, settings
+        self.length, self.seed, self.settings = length, seed, settings
 
     def __len__(self) -> int:
-        return self.count
+        return self.length
 
     def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(self.count))]
-        row = int(index) + (self.count if index < 0 else 0)
-        if not 0 <= row < self.count:
-            raise IndexError(f"question {index} of {self.count}")
+            return [self[i] for i in range(*index.indices(self.length))]
+        row = int(index) + (self.length if index < 0 else 0)
+        if not 0 <= row < self.length:
+            raise IndexError(f"question {index} of {self.length}")
         made = question(self.seed, row, **self.settings)
         facts = ("kind", "cubes", "angle_degrees", "difficulty", "seed", "index")
         return {
