@@ -87,17 +87,16 @@ class Card(BaseCard):
 class Ptn(nn.Module):
     """Encoder and volume decoder."""
 
-    def __init__(self, settings: Settings, task: str, box: tuple[Corner, Corner]) -> None:
-        """Make the layers. The arguments are those of a `Card`."""
+    def __init__(self, card: Card) -> None:
         super().__init__()
-        self.settings, self._box = settings, box
-        width, camera = settings.width, 3 * (task == "rooms")
+        self.settings, self._box = card.settings, (card.low, card.high)
+        width, camera = card.settings.width, 3 * (card.task == "rooms")
         channels = (3, width, 2 * width, 4 * width)
         layers: list[nn.Module] = []
         for a, b in pairwise(channels):
             layers += [nn.Conv2d(a, b, 5, stride=2, padding=2), nn.ReLU()]
         self.pixels = nn.Sequential(*layers, nn.Flatten())
-        last, wide = 4 * width * (settings.size // 8) ** 2, 16 * width
+        last, wide = 4 * width * (card.settings.size // 8) ** 2, 16 * width
         self.code = nn.Sequential(
             *(nn.Linear(last + camera, wide), nn.ReLU()),
             *(nn.Linear(wide, wide), nn.ReLU()),
@@ -137,12 +136,8 @@ class Ptn(nn.Module):
         return self.decode(self.encode(image, camera), camera)
 
 
-def _network(card: Card) -> Ptn:
-    return Ptn(card.settings, card.task, (card.low, card.high))
-
-
 def _optimisers(card: Card, model: Ptn) -> dict[str, Adam]:
     return {"adam": Adam(model.parameters(), weight_decay=card.settings.weight_decay)}
 
 
-METHOD = Method("ptn", Card, _network, _optimisers)
+METHOD = Method("ptn", Card, Ptn, _optimisers)

@@ -15,8 +15,8 @@ Loss = Callable[[Tensor], Tensor]
 
 def sampled_gradient(
     loss: Loss, mean: Tensor, width: float, pairs: int, generator: torch.Generator
-) -> tuple[Tensor, Tensor]:
-    """Return an unbiased estimate of d E[loss(x)] / d mean, x ~ N(mean, width^2), and mean losses.
+) -> Tensor:
+    """Return an unbiased estimate of d E[loss(x)] / d mean, x ~ N(mean, width^2), like `mean`.
 
     The score of a Gaussian is eps / width, where x = mean + width eps. Samples come in pairs of
     eps and -eps, each the baseline of the other:
@@ -33,8 +33,6 @@ def sampled_gradient(
             B; called once, and no gradient is asked of it.
         mean: (B, ...); gradients of it are not followed.
         pairs: number of antithetic pairs for each of the B.
-
-    Returns the estimate, like `mean`, and the losses' means over samples, (B,) or (B, V).
     """
     with torch.no_grad():
         noise = torch.randn((pairs, *mean.shape), generator=generator)
@@ -42,7 +40,7 @@ def sampled_gradient(
         losses = loss(mean.detach() + steps)
         difference = (losses[:pairs] - losses[pairs:]) / (2 * width)
         weights = difference.view(*difference.shape, *(1,) * (noise.dim() - difference.dim()))
-        return (weights * noise).mean(dim=0), losses.mean(dim=0)
+        return (weights * noise).mean(dim=0)
 
 
 def with_gradient(value: Tensor, gradient: Tensor) -> Tensor:

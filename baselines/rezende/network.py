@@ -66,23 +66,18 @@ class Card(BaseCard):
 
 
 class Model(nn.Module):
-    """Encoder, decoder and head.
-
-    Args:
-        size: height and width of images, a multiple of 8.
-        code: length of a code.
-        subdivisions: of the icosphere; 2 for 162 vertices.
-    """
+    """Encoder, decoder and head; the mesh has 162 vertices."""
 
     sphere: Tensor
     smooth: Tensor
 
-    def __init__(self, size: int = 32, code: int = 64, subdivisions: int = 2) -> None:
+    def __init__(self, card: Card) -> None:
         super().__init__()
-        corners, faces = icosphere(subdivisions)
+        size, code = card.settings.size, card.settings.code
+        corners, faces = icosphere()
         self.faces = faces
         self.register_buffer("sphere", torch.from_numpy(corners).float(), persistent=False)
-        smooth = torch.from_numpy(smoothing(subdivisions)).float()
+        smooth = torch.from_numpy(smoothing()).float()
         self.register_buffer("smooth", smooth, persistent=False)
         layers: list[nn.Module] = []
         before = 3
@@ -152,8 +147,4 @@ def _optimisers(_card: Card, model: Model) -> dict[str, Adam]:
     return {"adam": Adam([*model.encoder.parameters(), *model.decoder.parameters()])}
 
 
-def _network(card: Card) -> Model:
-    return Model(card.settings.size, card.settings.code)
-
-
-METHOD = Method("rezende", Card, _network, _optimisers)
+METHOD = Method("rezende", Card, Model, _optimisers)

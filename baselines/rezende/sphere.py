@@ -46,15 +46,15 @@ def _subdivided(corners: Array, faces: Array) -> tuple[Array, Array]:
 
 
 @cache
-def smoothing(subdivisions: int = 2, weight: float = SMOOTHING) -> Array:
-    """Return the matrix that smooths values of the vertices, (V, V): (1 + weight L)^-1.
+def smoothing() -> Array:
+    """Return the matrix that smooths values of the vertices, (V, V): (1 + SMOOTHING L)^-1.
 
     L is the Laplacian of the mesh's graph, divided by the number of neighbours. A constant stays
     as it is; what differs from one vertex to the next is damped.
     """
-    corners, faces = icosphere(subdivisions)
+    corners, faces = icosphere()
     linked = np.zeros((len(corners), len(corners)))
     linked[faces, np.roll(faces, 1, axis=1)] = 1.0
     linked = np.maximum(linked, linked.T)
     laplacian = np.eye(len(corners)) - linked / linked.sum(axis=1, keepdims=True)
-    return np.linalg.inv(np.eye(len(corners)) + weight * laplacian)
+    return np.linalg.inv(np.eye(len(corners)) + SMOOTHING * laplacian)

@@ -132,7 +132,7 @@ def bound(model: Model, pictures: Pictures, settings: Settings, number: int) -> 
 
     likelihood, totals = 1 / (2 * settings.noise**2), list[float]()
     around = windows(model, offsets, pictures)
-    gradient, _ = sampled_gradient(misfit, offsets, settings.width, settings.pairs, generator)
+    gradient = sampled_gradient(misfit, offsets, settings.width, settings.pairs, generator)
     nats = divergence(mean, log_variance)
     prior = (offsets**2).sum() / (2 * settings.spread**2)
     loss = (with_gradient(offsets, gradient) + prior + nats.sum()) / settings.batch

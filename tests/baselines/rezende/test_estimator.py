@@ -11,10 +11,10 @@ PAIRS = 20_000
 
 
 def estimate(loss, mean, width, pairs=PAIRS, seed=1):
-    """Return the mean estimate of single pairs, its standard error, and the mean loss."""
+    """Return the mean estimate of single pairs, and its standard error."""
     rows = mean.expand(pairs, *mean.shape).clone()
-    each, losses = sampled_gradient(loss, rows, width, 1, torch.Generator().manual_seed(seed))
-    return each.mean(dim=0), each.std(dim=0) / math.sqrt(pairs), losses.mean()
+    each = sampled_gradient(loss, rows, width, 1, torch.Generator().manual_seed(seed))
+    return each.mean(dim=0), each.std(dim=0) / math.sqrt(pairs)
 
 
 def test_a_quadratic_loss_gives_its_own_gradient():
@@ -26,17 +26,15 @@ def test_a_quadratic_loss_gives_its_own_gradient():
     def loss(x):
         return 0.5 * torch.einsum("...i,ij,...j->...", x, matrix, x) + x @ slope
 
-    found, error, value = estimate(loss, mean, 0.3)
+    found, error = estimate(loss, mean, 0.3)
     true = matrix @ mean + slope
     assert (abs(found - true) < 4.5 * error).all()
     assert (error < 0.05 * true.norm()).all()
-    smoothed = loss(mean) + 0.5 * 0.3**2 * matrix.trace()  # E of a quadratic form
-    assert abs(value - smoothed) < 0.02 * smoothed
 
 
 def test_a_step_without_any_derivative_gives_the_density_at_the_step():
     mean, width = torch.tensor([0.1]), 0.4
-    found, error, _ = estimate(lambda x: (x[..., 0] > 0).float(), mean, width)
+    found, error = estimate(lambda x: (x[..., 0] > 0).float(), mean, width)
     density = math.exp(-0.5 * (0.1 / width) ** 2) / (width * math.sqrt(2 * math.pi))
     assert abs(found - density) < 4.5 * error
     assert error < 0.02 * density
@@ -50,10 +48,9 @@ def test_each_item_has_its_own_gradient_and_losses_are_asked_for_no_gradient():
         assert x.shape == (6, 2, 2)
         return (x**2).sum(dim=2) * torch.tensor([1.0, 0.0])  # the second item's loss is constant
 
-    found, losses = sampled_gradient(loss, mean, 0.01, 3, torch.Generator().manual_seed(0))
+    found = sampled_gradient(loss, mean, 0.01, 3, torch.Generator().manual_seed(0))
     assert found[0].abs().sum() > 0
     np.testing.assert_array_equal(found[1], 0)
-    assert losses.shape == (2,)
 
 
 def test_a_given_gradient_flows_back():

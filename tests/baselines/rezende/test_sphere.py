@@ -21,7 +21,7 @@ def test_an_icosphere_is_a_closed_mesh_that_faces_outwards(cuts, corners, triang
 
 
 def test_smoothing_keeps_constants_and_damps_what_alternates():
-    matrix = smoothing(2)
+    matrix = smoothing()
     np.testing.assert_allclose(matrix.sum(axis=1), 1, atol=1e-9)
     spike = np.eye(162)[7]
     smooth = matrix @ spike
