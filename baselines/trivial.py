@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from iqtt.files.reader import open_questions
 from metrics.measures.empty_room import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
+from metrics.submissions.layout import Shown
 from scenegen.common.errors import SpecError
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.rooms.reader import RoomsFile
@@ -55,7 +56,10 @@ def write_room_baseline(
         learned = _mean_depth(rooms, train) if train is not None else np.empty(0)
         if name == "constant":
             learned = np.full_like(learned, learned.mean())
-        with RoomPredictionWriter(out, data, method=name, overwrite=overwrite) as submission:
+        shown: Shown = "scored_view" if name == "oracle" else "no_view"
+        with RoomPredictionWriter(
+            out, data, method=name, shown=shown, overwrite=overwrite
+        ) as submission:
             for row in range(len(rooms)):
                 if learns:
                     submission.add(row, learned)

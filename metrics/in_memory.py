@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from metrics.intake.outputs import Frame, Geometry, OutputError, fitted_to, image_of, read_output
 from metrics.measures.alignment import Alignment
-from metrics.scoring.image_scores import NonFinite, score_empty_room, score_prediction
-from metrics.scoring.metric_names import EMPTY_ROOM
+from metrics.scoring.image_scores import NonFinite, reference_of, score_prediction
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.rooms import score_rooms
 from metrics.scoring.runs import Settings
@@ -48,7 +47,8 @@ def evaluate_room(
     """Return the scores of one prediction by name, those of this row in a file of scores.
 
     Scores that compare with the relief of another scene need more than one room and are left out.
-    A score that this room does not have is NaN.
+    A score that this room does not have is NaN, and so are those of surfaces behind, which need the
+    scene's first view.
 
     Args:
         prediction: depth or disparity (h, w), or points (h, w, 3); or a dict, as
@@ -75,9 +75,9 @@ def evaluate_room(
     view = TrueView(
         truth.depth, truth.normal, truth.object_id, truth.fov_y_degrees, truth.world_from_camera
     )
-    empty = score_empty_room(view)
-    scores = score_prediction(predicted, view, empty.depth, non_finite=non_finite).scores
-    return scores | {EMPTY_ROOM + name: value for name, value in empty.scores.items()}
+    reference = reference_of(view)
+    scores = score_prediction(predicted, view, reference, non_finite=non_finite).scores
+    return scores | reference.floors
 
 
 def evaluate(

@@ -24,8 +24,8 @@ from metrics.measures.objects import LEAST_PIXELS
 from metrics.scoring.estimates import ACCURACY
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import (
-    EMPTY_ROOM,
     OBJECT_SCORES,
+    OF_TRUTH,
     Metric,
     UnknownMetricError,
     in_order,
@@ -49,6 +49,7 @@ from metrics.scoring.records import (
     Submission,
     Task,
 )
+from metrics.submissions.layout import Shown
 from metrics.submissions.problems import JsonError
 from metrics.submissions.strict_json import (
     LARGEST_WHOLE,
@@ -111,6 +112,7 @@ class _Stored:
     items: dict[str, Any]
     objects: dict[str, Any] = field(default_factory=dict)
     answer_groups: AnswerGroups = field(default_factory=dict)
+    shown: Shown = "scored_view"
     summary: Any = None
 
 
@@ -153,6 +155,7 @@ def to_json(scores: ScoreFile) -> str:
         "task": scores.task,
         "method": scores.method,
         "alignment": scores.alignment,
+        **({"shown": scores.shown} if scores.task == "rooms" else {}),
         "summary": {
             "comparable": scores.comparable,
             "warnings": scores.warnings,
@@ -207,7 +210,7 @@ def _parsed(data: bytes) -> ScoreFile:
         raise JsonError(error.where, error.found, error.expected, hint) from error
     task, runs = stored.task, len(stored.meta.submissions)
     if task == "iqtt":
-        for name, empty in (("objects", {}), ("alignment", "none")):
+        for name, empty in (("objects", {}), ("alignment", "none"), ("shown", "scored_view")):
             if getattr(stored, name) != empty:
                 raise refusal(name, shown(getattr(stored, name)), f"{empty!r} for questions")
     columns = _item_columns(stored.items, task, runs)
@@ -220,6 +223,7 @@ def _parsed(data: bytes) -> ScoreFile:
         stored.meta,
         objects,
         stored.answer_groups,
+        shown=stored.shown,
     )
     _check_meta(scores)
     _check_groups(scores)
@@ -232,7 +236,7 @@ def _item_columns(stored: Mapping[str, Any], task: str, runs: int) -> dict[str, 
     required = (*first, ACCURACY) if task == "iqtt" else first
     whole = (*first, *OPTIONAL_COLUMNS[task])
     columns = _columns("items", stored, required, whole, task, runs)
-    if all(name in whole or name.startswith(EMPTY_ROOM) for name in columns):
+    if all(name in whole or name.startswith(OF_TRUTH) for name in columns):
         raise refusal("items", "no score", "at least one")
     ids = columns[first[0]]
     falls = np.flatnonzero(np.diff(ids) <= 0)
@@ -305,7 +309,7 @@ def _scores(place: str, values: Any, name: str, task: str, runs: int) -> Array:
     """Return a column of scores: (R, N) for R runs, but (N,) for those of the empty room."""
     score = _known_metric(place, name, task)
     limits = score.smallest, min(score.largest, LARGEST_MAGNITUDE)
-    if name.startswith(EMPTY_ROOM):
+    if name.startswith(OF_TRUTH):
         column = _numbers(place, values, *limits)
     elif runs == 1:
         column = _numbers(place, values, *limits)[None]

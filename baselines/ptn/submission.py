@@ -6,6 +6,7 @@ the method is told, as its volume holds objects alone.
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -67,7 +68,8 @@ def _predict_rooms(
     method = "ptn" if model.settings.silhouettes == "image" else "ptn, silhouettes from ids"
     with open_rooms(data) as rooms:
         images = RoomImages(rooms, model.settings.size)
-        with RoomPredictionWriter(out, data, method=method, overwrite=overwrite) as file:
+        how: dict[str, Any] = {"method": method, "shown": "first_view", "overwrite": overwrite}
+        with RoomPredictionWriter(out, data, **how) as file:
             for rows in images.rows_of:
                 source = int(rows[0])
                 image = torch.from_numpy(images.image(source))[None]

@@ -63,4 +63,5 @@ def write_submission(
 
         full_name = name if kind == "unet" else f"{name}-{kind}"
         how = {"method": full_name, "notes": f"{FROM[kind]}; {TOLD}", "overwrite": overwrite}
-        write_depths(rooms, out, data, depth, progress, **how)
+        shown = "scored_view" if kind == "unet" else "first_view"
+        write_depths(rooms, out, data, depth, progress, shown=shown, **how)

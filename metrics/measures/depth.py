@@ -17,7 +17,7 @@ from metrics.measures.checks import MeasureError, require_depth_pair
 
 Array = NDArray[np.float64]
 
-# Scene units. Smaller depths are raised to this before a logarithm, which needs positive numbers.
+# Scene units. Smaller depths are raised to this before a logarithm or an inverse is taken.
 SMALLEST_LOG_DEPTH = 1e-3
 DELTA_BASE = 1.25
 
@@ -68,6 +68,32 @@ def abs_rel(pair: DepthPair) -> float:
     return float((np.abs(pair.predicted - pair.true) / pair.true).mean())
 
 
+def sq_rel(pair: DepthPair) -> float:
+    """Return mean (p - t)^2 / t, in units of depth.
+
+    Source: Eigen et al. 2014, "Squared Relative difference".
+    """
+    return float((np.square(pair.predicted - pair.true) / pair.true).mean())
+
+
+def rmse_log(pair: DepthPair) -> float:
+    """Return sqrt(mean (ln p - ln t)^2). Source: Eigen et al. 2014, "RMSE (log)"."""
+    predicted = np.maximum(pair.predicted, SMALLEST_LOG_DEPTH)
+    return float(np.sqrt(np.square(np.log(predicted) - np.log(pair.true)).mean()))
+
+
+def log10(pair: DepthPair) -> float:
+    """Return mean |log10 p - log10 t|. Source: Saxena et al. 2009 (Make3D)."""
+    predicted = np.maximum(pair.predicted, SMALLEST_LOG_DEPTH)
+    return float(np.abs(np.log10(predicted) - np.log10(pair.true)).mean())
+
+
+def irmse(pair: DepthPair) -> float:
+    """Return sqrt(mean (1/p - 1/t)^2), in inverse units. Source: Uhrig et al. 2017 (KITTI)."""
+    predicted = np.maximum(pair.predicted, SMALLEST_LOG_DEPTH)
+    return float(np.sqrt(np.square(1.0 / predicted - 1.0 / pair.true).mean()))
+
+
 def silog(pair: DepthPair) -> float:
     """Return the scale-invariant logarithmic error 100 sqrt(var d), with d = ln p - ln t.
 
@@ -95,14 +121,18 @@ def delta(pair: DepthPair, power: int) -> float:
     return float(np.mean((p < limit * t) & (t < limit * p)))
 
 
-def depth_scores(pair: DepthPair, alignment: Alignment = "none") -> dict[str, float]:
+def depth_scores(
+    pair: DepthPair, alignment: Alignment = "none", aligned: bool = False
+) -> dict[str, float]:
     """Return every score of this module by name, after alignment.
 
-    The names are `mse_depth`, `rmse`, `abs_rel`, `silog`, `delta_1`, `delta_2` and `delta_3`; with
-    an alignment they end in `_after_` and its name.
+    The names are `mse_depth`, `rmse`, `abs_rel`, `silog`, `delta_1`, `delta_2` and `delta_3`, and
+    without alignment `sq_rel`, `rmse_log`, `log10` and `irmse`; with one they end in `_after_` and
+    its name. `aligned` says that the alignment was made already.
     """
-    aligned = align(pair, alignment)
-    named = {score.__name__: score(aligned) for score in (mse_depth, rmse, abs_rel, silog)}
-    named |= {f"delta_{power}": delta(aligned, power) for power in (1, 2, 3)}
-    ending = "" if alignment == "none" else f"_after_{alignment}"
-    return {name + ending: value for name, value in named.items()}
+    fitted = pair if aligned else align(pair, alignment)
+    named = {score.__name__: score(fitted) for score in (mse_depth, rmse, abs_rel, silog)}
+    named |= {f"delta_{power}": delta(fitted, power) for power in (1, 2, 3)}
+    if alignment == "none":
+        return named | {score.__name__: score(pair) for score in (sq_rel, rmse_log, log10, irmse)}
+    return {f"{name}_after_{alignment}": value for name, value in named.items()}

@@ -23,7 +23,7 @@ from scenegen.camera import back_project
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-WITHIN_DEGREES = (11.25, 22.5, 30.0)
+WITHIN_DEGREES = (5.0, 7.5, 11.25, 22.5, 30.0)
 # The line to a neighbour on the same surface makes at least this angle with the viewing ray.
 GRAZING_DEGREES = 10.0
 # Smallest ratio of the middle to the largest variance of a patch. A patch below it is a line; the
@@ -73,8 +73,9 @@ def normal_scores(angles: Array) -> dict[str, float]:
     """Return the scores of angles (N,), in degrees, by name.
 
     These are `normal_mean_degrees`, `normal_median_degrees`, `normal_rmse_degrees` (the root mean
-    square), and `normal_within_<limit>`: the fractions, 0 to 1, of angles below 11.25, 22.5 and 30
-    degrees. Source: Fouhey et al. 2013 (Data-Driven 3D Primitives). Raises EmptyError without
+    square), and `normal_within_<limit>`: the fractions, 0 to 1, of angles below WITHIN_DEGREES.
+    Sources: Fouhey et al. 2013 (Data-Driven 3D Primitives) for 11.25, 22.5 and 30; Bae and Davison
+    2024 (DSINE) for 5 and 7.5. Raises EmptyError without
     angles.
     """
     require_some(angles.size, "angles")

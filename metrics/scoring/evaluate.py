@@ -104,7 +104,7 @@ def _check_alike(files: Sequence[Predictions]) -> None:
     first = files[0]
     seen: dict[str, Path] = {}
     for file in files:
-        for name in ("task", "method", "alignment"):
+        for name in ("task", "method", "alignment", "shown"):
             ours, theirs = getattr(first, name), getattr(file, name)
             if ours != theirs:
                 raise ScoringError(

@@ -7,7 +7,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures.alignment import Alignment
+from metrics.measures.alignment import Alignment, align_points
+from metrics.measures.behind import behind_scores, hidden_from
+from metrics.measures.boundaries import boundary_scores
 from metrics.measures.chamfer_hausdorff import (
     NearestDistances,
     chamfer,
@@ -20,14 +22,21 @@ from metrics.measures.empty_room import empty_room
 from metrics.measures.image_search import nearest_distances_on_image
 from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_depth
 from metrics.measures.objects import counted_objects, object_means, single_objects
+from metrics.measures.points import local_point_scores, point_map_scores
 from metrics.measures.relief import relief_scores
+from metrics.measures.shape import flat_error, inside_objects, one_normal_degrees, shape_scores
 from metrics.scoring.geometry import alignments_scored, planar_depth
-from metrics.scoring.metric_names import OF_EMPTY_ROOM, OTHER_SCENE
+from metrics.scoring.metric_names import CUT_OUT, EMPTY_ROOM, OF_EMPTY_ROOM, OTHER_SCENE
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.rules import Against, broken_rules, refuse_pixels
 from metrics.submissions.truths import TrueView
-from scenegen.camera import back_project, pixel_directions
+from scenegen.camera import (
+    back_project,
+    pixel_directions,
+    transform_points,
+    transform_vectors,
+)
 
 Array = NDArray[Any]
 NonFinite = Literal["error", "penalise"]
@@ -48,27 +57,82 @@ class ImageScores:
 
 
 @dataclass(frozen=True)
-class EmptyRoom:
-    """The empty room that the camera of a true view sees.
-
-    Attributes:
-        depth: planar, (H, W), scene units.
-        scores: those of `metric_names.OF_EMPTY_ROOM`, by name.
-    """
+class FirstView:
+    """What the first view of a scene sees: depth (H, W), `world_from_camera` (4, 4)."""
 
     depth: Array
-    scores: dict[str, float]
+    world_from_camera: Array
 
 
-def score_empty_room(truth: TrueView) -> EmptyRoom:
-    """Draw and score the empty room of a true view, the floor of all skills."""
+@dataclass(frozen=True)
+class Reference:
+    """What scores need of a true view beside itself, the same for all submissions.
+
+    Attributes:
+        empty: planar depth of the empty room that its camera sees, (H, W), scene units.
+        normals: derived from its depth, (H, W, 3), and where they are reliable, `smooth`, (H, W).
+        inside: the object of each pixel inside one, (H, W), as `shape.inside_objects`.
+        hidden: pixels of objects that count and that the first view does not see, (H, W).
+        floors: scores of the empty room and of cut-outs, by name; those of OF_TRUTH.
+    """
+
+    empty: Array
+    normals: Array
+    smooth: Array
+    inside: Array
+    hidden: Array
+    floors: dict[str, float]
+
+
+def reference_of(truth: TrueView, first: FirstView | None = None) -> Reference:
+    """Return the reference of a true view; `first` is None where it is the first one itself."""
     height, width = truth.depth.shape
     depth, _ = empty_room(truth.world_from_camera, truth.fov_y_degrees, height, width)
     nearest = nearest_distances_on_image(depth, truth.depth, truth.fov_y_degrees, truth.mask)
     scores = {"chamfer": chamfer(nearest), "hausdorff": hausdorff(nearest)}
     scores["mse_depth"] = mse_depth(compare_depth(depth, truth.depth, truth.mask))
     scores |= object_means(_single_objects(depth, truth, nearest))
-    return EmptyRoom(depth, {name: scores[name] for name in OF_EMPTY_ROOM})
+    hidden = _hidden(truth, first)
+    scores |= behind_scores(
+        np.abs(depth - truth.depth)[hidden], nearest.reverse[hidden[truth.mask]]
+    )
+    floors = {EMPTY_ROOM + name: scores[name] for name in OF_EMPTY_ROOM}
+    normals, smooth = normals_from_depth(truth.depth, truth.fov_y_degrees, truth.mask)
+    inside = inside_objects(truth.object_id)
+    at, derived_at = inside > 0, _smooth_pixels(inside, smooth)
+    floors |= {
+        f"{CUT_OUT}shape_error": flat_error(truth.depth[at].astype(np.float64), inside[at]),
+        f"{CUT_OUT}shape_normal_degrees": one_normal_degrees(truth.normal[at], inside[at]),
+        f"{CUT_OUT}derived_shape_normal_degrees": one_normal_degrees(
+            normals[derived_at], inside[derived_at]
+        ),
+    }
+    return Reference(depth, normals, smooth, inside, hidden, floors)
+
+
+def _smooth_pixels(inside: Array, smooth: Array) -> Array:
+    """Return the pixels inside objects whose derived normals are scored; all if none is reliable.
+
+    So an image has both scores of normals inside objects or none.
+    """
+    at = inside > 0
+    return at & smooth if (at & smooth).any() else at
+
+
+def _hidden(truth: TrueView, first: FirstView | None) -> Array:
+    counted = counted_objects(truth.object_id)
+    if first is None or not counted.any():
+        return np.zeros_like(counted)
+    points = back_project(truth.depth, truth.fov_y_degrees)[counted]
+    hidden = np.zeros_like(counted)
+    hidden[counted] = hidden_from(
+        transform_points(truth.world_from_camera, points),
+        transform_vectors(truth.world_from_camera, truth.normal[counted]),
+        first.depth,
+        first.world_from_camera,
+        truth.fov_y_degrees,
+    )
+    return hidden
 
 
 def true_relief(depth: Array, world_from_camera: Array, fov_y_degrees: float) -> Array:
@@ -80,7 +144,7 @@ def true_relief(depth: Array, world_from_camera: Array, fov_y_degrees: float) ->
 def score_prediction(
     predicted: PredictedView,
     truth: TrueView,
-    empty: Array,
+    reference: Reference,
     other_relief: Array | None = None,
     non_finite: NonFinite = "error",
 ) -> ImageScores:
@@ -93,8 +157,10 @@ def score_prediction(
         depth,
         predicted.normal,
         truth,
-        empty,
+        reference,
         other_relief,
+        points=predicted.geometry if predicted.kind == "points" else None,
+        fov_y_degrees=predicted.fov_y_degrees,
         alignment=alignment,
         alignments=alignments_scored(predicted.kind, predicted.alignment),
         non_finite=non_finite,
@@ -105,9 +171,11 @@ def score_view(
     depth: Array,
     normal: Array | None,
     truth: TrueView,
-    empty: Array,
+    reference: Reference,
     other_relief: Array | None = None,
     *,
+    points: Array | None = None,
+    fov_y_degrees: float | None = None,
     alignment: Alignment = "none",
     alignments: Sequence[Alignment] = (),
     non_finite: NonFinite = "error",
@@ -121,9 +189,11 @@ def score_view(
         depth: predicted planar depth, (H, W), scene units.
         normal: predicted normals, (H, W, 3), camera frame; None where the method gives none.
         truth: what it is compared with.
-        empty: planar depth of the empty room, (H, W), scene units.
+        reference: what belongs to that.
         other_relief: true relief of another scene, (H, W), scene units, NaN where it has none; None
             where there is no other scene.
+        points: predicted points, (H, W, 3), camera frame; None for those of the depth.
+        fov_y_degrees: predicted vertical field of view; None where the method gives none.
         alignment: what the method cannot know. The depth is fitted to the truth of the image so
             far before anything is scored; after "disparity_scale_shift" it is already.
         alignments: the alignments after which depth is scored once more.
@@ -135,16 +205,7 @@ def score_view(
     ValueError on other shapes than the truth's.
     """
     mask = truth.mask
-    broken = np.zeros_like(mask)
-    if non_finite == "error":
-        refuse_pixels(PredictionError, "predicted depth", "depth", depth, mask)
-        if normal is not None:
-            refuse_pixels(PredictionError, "predicted normals", "normal", normal, mask)
-    else:
-        broken = _broken("depth", depth, mask)
-        depth = np.where(broken, 0.0, depth)
-        if normal is not None:
-            normal = np.where(_broken("normal", normal, mask)[..., None], -truth.normal, normal)
+    depth, normal, broken = _repaired(depth, normal, truth, non_finite)
     if alignment not in ("none", "disparity_scale_shift"):
         fitted = align(compare_depth(depth, truth.depth, mask), alignment).predicted
         depth = np.full(depth.shape, np.nan)
@@ -152,15 +213,11 @@ def score_view(
     nearest = nearest_distances_on_image(depth, truth.depth, truth.fov_y_degrees, mask)
     scores = point_scores(nearest, F_SCORE_THRESHOLDS)
     pair = compare_depth(depth, truth.depth, mask)
-    plain = depth_scores(pair)
-    scores |= plain
+    scores |= depth_scores(pair)
     for after in alignments:
-        if after == alignment:
-            scores |= {f"{name}_after_{after}": value for name, value in plain.items()}
-        else:
-            scores |= depth_scores(pair, after)
-    said = empty - depth
-    relief = relief_scores(said[mask], (empty - truth.depth)[mask])
+        scores |= depth_scores(pair, after, aligned=after == alignment)
+    said = reference.empty - depth
+    relief = relief_scores(said[mask], (reference.empty - truth.depth)[mask])
     if broken.any():  # else they would count as relief, at the camera
         worst = {"relief_correlation": -1.0, "relief_iou": 0.0}
         relief = {name: value if np.isnan(value) else worst[name] for name, value in relief.items()}
@@ -174,20 +231,84 @@ def score_view(
         scores |= {
             OTHER_SCENE + name: np.nan if np.isnan(relief[name]) else other[name] for name in relief
         }
-    counted = counted_objects(truth.object_id)
+    counted, hidden = counted_objects(truth.object_id), reference.hidden
+    scores |= boundary_scores(depth, truth.depth, mask)
+    scores |= behind_scores(np.abs(depth - truth.depth)[hidden], nearest.reverse[hidden[mask]])
+    scores |= _scores_of_points(depth, points, truth, reference, counted, alignment, alignments)
+    if fov_y_degrees is not None:
+        scores["fov_error_degrees"] = abs(fov_y_degrees - truth.fov_y_degrees)
+    scores |= _scores_of_normals(depth, normal, truth, reference, counted)
+    return ImageScores(scores, objects)
+
+
+def _repaired(
+    depth: Array, normal: Array | None, truth: TrueView, non_finite: NonFinite
+) -> tuple[Array, Array | None, Array]:
+    """Return depth and normals without values that break rules, and where such a depth was."""
+    mask = truth.mask
+    broken = np.zeros_like(mask)
+    if non_finite == "error":
+        refuse_pixels(PredictionError, "predicted depth", "depth", depth, mask)
+        if normal is not None:
+            refuse_pixels(PredictionError, "predicted normals", "normal", normal, mask)
+        return depth, normal, broken
+    broken = _broken("depth", depth, mask)
+    if normal is not None:
+        normal = np.where(_broken("normal", normal, mask)[..., None], -truth.normal, normal)
+    return np.where(broken, 0.0, depth), normal, broken
+
+
+def _scores_of_normals(
+    depth: Array, normal: Array | None, truth: TrueView, reference: Reference, counted: Array
+) -> dict[str, float]:
+    """Return the scores of predicted normals, and of those of aligned depth."""
+    mask, inside, scores = truth.mask, reference.inside > 0, dict[str, float]()
     if normal is not None:
         angles = angular_errors_degrees(normal, truth.normal, mask)
         scores |= normal_scores(angles)
         scores["object_normal_mean_degrees"] = _mean(angles[counted[mask]])
+        scores["shape_normal_degrees"] = _mean(angles[inside[mask]])
     # Both derived alike, so that a perfect depth is perfect at creases, too, where planes blend.
     derived, _ = normals_from_depth(depth, truth.fov_y_degrees, mask)
-    true_derived, on_surface = normals_from_depth(truth.depth, truth.fov_y_degrees, mask)
-    angles = angular_errors_degrees(derived, true_derived, on_surface)
-    scores |= {f"derived_{name}": value for name, value in normal_scores(angles).items()}
+    angles = np.full(mask.shape, np.nan)
+    angles[mask] = angular_errors_degrees(derived, reference.normals, mask)
+    smooth = reference.smooth
+    scores |= {f"derived_{name}": value for name, value in normal_scores(angles[smooth]).items()}
     # Of objects so thin that no pixel has such a plane, all pixels count.
-    smooth = counted & on_surface if (counted & on_surface).any() else counted
-    angles = angular_errors_degrees(derived, true_derived, smooth) if smooth.any() else angles[:0]
-    return ImageScores(scores | {"derived_object_normal_mean_degrees": _mean(angles)}, objects)
+    at = counted & smooth if (counted & smooth).any() else counted
+    scores["derived_object_normal_mean_degrees"] = _mean(angles[at])
+    at = _smooth_pixels(reference.inside, smooth)
+    scores["derived_shape_normal_degrees"] = _mean(angles[at])
+    return scores
+
+
+def _scores_of_points(
+    depth: Array,
+    points: Array | None,
+    truth: TrueView,
+    reference: Reference,
+    counted: Array,
+    alignment: Alignment,
+    alignments: Sequence[Alignment],
+) -> dict[str, float]:
+    """Return the scores of points, over the image and inside objects.
+
+    `depth` was aligned already. Points that are predicted have an alignment of their own, in space.
+    """
+    mask = truth.mask
+    true = back_project(truth.depth, truth.fov_y_degrees)[mask]
+    at_depth = back_project(depth, truth.fov_y_degrees)[mask]
+    cloud = at_depth
+    if points is not None:
+        cloud = align_points(np.where(np.isfinite(points), points, 0.0)[mask], true, alignment)
+    scores = point_map_scores(cloud, true)
+    for after in ("scale", "scale_shift"):
+        if after in alignments:
+            scores |= point_map_scores(cloud, true, after)
+    scores |= local_point_scores(cloud, true, np.where(counted, truth.object_id, 0)[mask])
+    inside = reference.inside[mask]
+    at = inside > 0
+    return scores | shape_scores(at_depth[at], true[at], inside[at])
 
 
 def noise_floors(truth: TrueView) -> dict[str, float]:

@@ -13,9 +13,11 @@ from typing import Literal
 from scenegen.common.errors import SceneGenError
 
 HEADLINE = {
-    "rooms": ("relief_iou", "relief_correlation", "chamfer", "hausdorff", "mse_depth"),
+    "rooms": (
+        "shape_error", "behind_depth_error", "relief_iou", "chamfer", "hausdorff", "mse_depth",
+    ),
     "iqtt": ("iqtt_accuracy",),
-}
+}  # fmt: skip
 RECALL_WITHIN = ("0.02", "0.05")  # scene units
 OBJECT_SCORES = (
     "object_depth_error",
@@ -23,11 +25,25 @@ OBJECT_SCORES = (
     *(f"object_recall_{limit}" for limit in RECALL_WITHIN),
 )  # of single objects, too
 EMPTY_ROOM = "empty_room_"  # begins the names of the empty room's own scores
+CUT_OUT = "cut_out_"  # begins the names of the scores of flat cut-outs
+OF_TRUTH = (EMPTY_ROOM, CUT_OUT)  # begin names of scores that no submission has a part in
 OTHER_SCENE = "other_scene_"  # begins the names of scores against another scene's relief
-OF_EMPTY_ROOM = ("chamfer", "hausdorff", "mse_depth", "object_depth_error", "object_completeness")
+OF_EMPTY_ROOM = (
+    "chamfer", "hausdorff", "mse_depth", "object_depth_error", "object_completeness",
+    "behind_depth_error",
+)  # fmt: skip
+OF_CUT_OUT = {
+    "shape_error": "of flat cut-outs, each at its object's median depth",
+    "shape_normal_degrees": "of each object's mean true normal",
+    "derived_shape_normal_degrees": "of each object's mean true normal, derived from depth",
+}
 RELIEF = ("relief_correlation", "relief_iou")
 # Scores that have a skill: what begins the name of the floor's column, by name.
-SKILLED = dict.fromkeys(RELIEF, OTHER_SCENE) | dict.fromkeys(OF_EMPTY_ROOM, EMPTY_ROOM)
+SKILLED = (
+    dict.fromkeys(RELIEF, OTHER_SCENE)
+    | dict.fromkeys(OF_EMPTY_ROOM, EMPTY_ROOM)
+    | dict.fromkeys(OF_CUT_OUT, CUT_OUT)
+)
 F_SCORE = "f_score_<threshold>"
 DERIVED = "derived_"
 _NEAREST = "the predicted depth of an image nearest to the true depth in least squares."
@@ -58,6 +74,19 @@ _ALIGNED = {
 }
 
 
+POINT_ALIGNMENTS = {
+    "_after_scale": (
+        "scaled",
+        "the same after the scale, at least 0, that brings the predicted points of an image nearest"
+        " to the true ones in least squares.",
+    ),
+    "_after_scale_shift": (
+        "scaled and shifted",
+        "the same after the scale, at least 0, and the shift in space that bring them nearest.",
+    ),
+}
+
+
 class UnknownMetricError(SceneGenError):
     """A name that is no score of this benchmark."""
 
@@ -73,7 +102,10 @@ class Metric:
         definition: one sentence that defines the score of one image or question.
         largest, smallest: the limits of its values.
         lacking: pictures that have no such score: "objects", those without any object that counts;
-            "relief", those whose true relief nowhere exceeds `relief.RELIEF_ABOVE`; else "".
+            "relief", those whose true relief nowhere exceeds `relief.RELIEF_ABOVE`; "inside", those
+            without pixels inside objects (`shape.inside_objects`), and "bends", also those whose
+            objects are flat; "behind", those that show little that the first view does not;
+            "boundary", those whose true depth nowhere jumps; else "".
     """
 
     name: str
@@ -84,7 +116,7 @@ class Metric:
     definition: str
     largest: float = math.inf
     smallest: float = 0.0
-    lacking: Literal["", "objects", "relief"] = ""
+    lacking: Literal["", "objects", "relief", "inside", "bends", "behind", "boundary"] = ""
 
     @property
     def direction(self) -> str:
@@ -139,6 +171,40 @@ _DEPTH = (
              f" {factor}.")
       for power, factor in enumerate(("1.25", "1.25^2", "1.25^3"), start=1)),
 )  # fmt: skip
+_MORE_DEPTH = (
+    _distance("sq_rel", "SqRel", "mean squared difference of depth divided by true depth."),
+    _distance("rmse_log", "RMSE-log",
+              "root mean square of ln predicted - ln true depth; depths up to 0.001 count as 0.001,"
+              " as in the next two.", "ln"),
+    _distance("log10", "log10",
+              "mean absolute difference of the decimal logarithms of depth.", "log10"),
+    _distance("irmse", "iRMSE",
+              "root mean square of 1 / predicted - 1 / true depth.", "1 / scene unit"),
+    replace(_share("boundary_f1", "Boundary F1",
+                   "harmonic mean of precision and recall of pairs of neighbours whose depths"
+                   " differ by a ratio above a threshold; weighted mean over ten thresholds from"
+                   " 1.05 to 1.25."), lacking="boundary"),
+    replace(_share("boundary_recall", "Boundary recall", "the same mean of the recall alone."),
+            lacking="boundary"),
+)  # fmt: skip
+_POINT_MAPS = (
+    _distance("points_rel", "Points, relative error",
+              "mean distance of each predicted point from the true one of its pixel, divided by the"
+              " true distance from the camera.", "ratio"),
+    _share("points_delta_1", "Points, delta 1",
+           "fraction of the pixels where that distance is below a quarter of the smaller distance"
+           " from the camera."),
+)  # fmt: skip
+_LOCAL_POINTS = (
+    replace(_distance("local_points_rel", "Local points, relative error",
+                      "mean over objects of the mean distance of points, after scale and shift of"
+                      " each object alone, divided by its diameter.", "ratio"), lacking="objects"),
+    replace(_share("local_points_delta_1", "Local points, delta 1",
+                   "mean over objects of the fraction of pixels where that ratio is below 0.25."),
+            lacking="objects"),
+    _angle("fov_error_degrees", "Field of view, error",
+           "absolute difference of predicted and true vertical field of view."),
+)  # fmt: skip
 _NORMALS = (
     _angle("normal_mean_degrees", "Normals, mean",
            "mean angle between predicted and true normals."),
@@ -146,7 +212,7 @@ _NORMALS = (
     _angle("normal_rmse_degrees", "Normals, RMS", "root mean square of these angles."),
     *(_share(f"normal_within_{limit}", f"Normals within {limit}°",
              f"fraction of these angles below {limit} degrees.")
-      for limit in ("11.25", "22.5", "30")),
+      for limit in ("5", "7.5", "11.25", "22.5", "30")),
 )  # fmt: skip
 _OBJECTS = tuple(
     replace(metric, lacking="objects")
@@ -167,12 +233,40 @@ _OBJECTS = tuple(
                "the same of normals derived from the predicted and from the true depth."),
     )
 )  # fmt: skip
+_SHAPE = tuple(
+    replace(metric, lacking=metric.lacking or "inside")
+    for metric in (
+        _distance("shape_error", "Shape error",
+                  "mean absolute error of depth inside objects, after each object's median error is"
+                  " taken off."),
+        Metric("shape_correlation", "Shape correlation", "rooms", "correlation", True,
+               "correlation inside objects of what predicted and true depth have left after the"
+               " least-squares plane of each object.", 1.0, -1.0, "bends"),
+        _share("shape_recall_0.02", "Shapes within 0.02",
+               "fraction of the objects whose own `shape_error` is below 0.02 scene units."),
+        _angle("shape_normal_degrees", "Normals inside objects",
+               "mean angle between predicted and true normals inside objects."),
+        _angle("derived_shape_normal_degrees", "Normals inside objects, from depth",
+               "the same of normals derived from the predicted and from the true depth."),
+    )
+)  # fmt: skip
+_BEHIND = tuple(
+    replace(metric, lacking="behind")
+    for metric in (
+        _distance("behind_depth_error", "Depth error behind",
+                  "mean absolute difference of depth at the pixels of objects that the first view"
+                  " of the scene does not see."),
+        _share("behind_recall_0.05", "Found behind within 0.05",
+               "fraction of the true points there that are nearer than 0.05 scene units to a"
+               " predicted point."),
+    )
+)  # fmt: skip
 _RELIEF = (
     Metric("relief_correlation", "Relief correlation", "rooms", "correlation", True,
            "correlation, over the scored pixels, of predicted with true relief: planar depth of the"
            " empty room minus that of the surface.", 1.0, -1.0, "relief"),
     replace(
-        _share("relief_iou", "Relief IoU",
+        _share("relief_iou", "Segmentation (relief IoU)",
                "pixels where predicted and true relief both exceed 0.05 scene units, divided by"
                " those where either does."),
         lacking="relief"),
@@ -186,7 +280,7 @@ _ACCURACY = _share(
 
 
 def _aligned(metric: Metric, ending: str) -> Metric:
-    how, definition = _ALIGNED[ending]
+    how, definition = (POINT_ALIGNMENTS if metric in _POINT_MAPS else _ALIGNED)[ending]
     return replace(
         metric,
         name=metric.name + ending,
@@ -211,8 +305,14 @@ ALL: dict[str, Metric] = {
         *_POINTS,
         *_DEPTH,
         *(_aligned(metric, ending) for ending in _ALIGNED for metric in _DEPTH),
+        *_MORE_DEPTH,
+        *_POINT_MAPS,
+        *(_aligned(m, ending) for ending in POINT_ALIGNMENTS for m in _POINT_MAPS),
+        *_LOCAL_POINTS,
         *_NORMALS,
         *(_derived(metric) for metric in _NORMALS),
+        *_SHAPE,
+        *_BEHIND,
         *_OBJECTS,
         *_RELIEF,
         _ACCURACY,
@@ -226,6 +326,15 @@ ALL |= {
         definition=f"`{name}` of the empty room, drawn from the true camera.",
     )
     for name in OF_EMPTY_ROOM
+}
+ALL |= {
+    CUT_OUT + name: replace(
+        ALL[name],
+        name=CUT_OUT + name,
+        title=f"{ALL[name].title}, cut-out",
+        definition=f"`{name}` {whose}.",
+    )
+    for name, whose in OF_CUT_OUT.items()
 }
 ALL |= {
     OTHER_SCENE + name: replace(
@@ -283,18 +392,25 @@ def markdown_table() -> str:
         (f"<depth score>{ending}", "the same", "the same", definition)
         for ending, (_, definition) in _ALIGNED.items()
     ]
+    points = [
+        (f"<point score>{ending}", "the same", "the same", definition)
+        for ending, (_, definition) in POINT_ALIGNMENTS.items()
+    ]
     of_these = ", ".join(f"`{name}`" for name in OF_EMPTY_ROOM)
     floor = f"the same of the empty room, for {of_these}; in `items` alone."
+    flat = "; ".join(f"`{name}` {whose}" for name, whose in OF_CUT_OUT.items())
     other = "the same of the prediction with the relief of another scene, seen in the same view."
     derived = "the same of normals derived from the predicted and from the true depth."
     rows = [
-        *map(_cells, (*_POINTS, *_DEPTH)),
+        *map(_cells, (*_SHAPE, *_BEHIND, *_RELIEF, *_OBJECTS, *_POINTS, *_DEPTH)),
         *forms,
-        *map(_cells, _NORMALS),
+        *map(_cells, (*_MORE_DEPTH, *_POINT_MAPS)),
+        *points,
+        *map(_cells, (*_LOCAL_POINTS, *_NORMALS)),
         (f"{DERIVED}<normal score>", "the same", "the same", derived),
-        *map(_cells, (*_OBJECTS, *_RELIEF)),
         (f"{OTHER_SCENE}<relief score>", "the same", "-", other),
         (f"{EMPTY_ROOM}<score>", "the same", "the same", floor),
+        (f"{CUT_OUT}<score>", "the same", "the same", f"{flat}; in `items` alone."),
         _cells(_ACCURACY),
     ]
     lines = [f"| `{name}` | {' | '.join(cells)} |" for name, *cells in rows]

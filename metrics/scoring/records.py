@@ -32,7 +32,8 @@ from metrics.scoring.estimates import (
     skills,
 )
 from metrics.scoring.known_tests import Task, known_test
-from metrics.scoring.metric_names import EMPTY_ROOM, OBJECT_SCORES, metric
+from metrics.scoring.metric_names import OBJECT_SCORES, OF_TRUTH, metric
+from metrics.submissions.layout import Shown
 from metrics.submissions.strict_json import LARGEST_WHOLE
 
 __all__ = [
@@ -178,13 +179,14 @@ class ScoreFile:
         columns: an entry for each of N images or questions: the integers of `ID_COLUMNS`, (N,), of
             which the first ascend, maybe those of `OPTIONAL_COLUMNS` (-1 where not known; `shape`
             numbers the shapes of references, by which intervals are clustered), and float64 by name
-            of the metric, (R, N) for R runs, (N,) for scores of the empty room; NaN where a row has
+            of the metric, (R, N) for R runs, (N,) for scores of OF_TRUTH; NaN where a row has
             no such score.
         object_columns: rooms only: an entry for each of L objects that are scored by themselves:
             the integers of `OBJECT_COLUMNS`, (L,) (row of the truth, id in the image, pixels that
             show it), the texts of `SHAPE_COLUMN`, (L,), and float64 by name of the metric, (R, L).
         answer_groups: questions only: by grouping, then by group.
         path: where it was read from; no part of the content.
+        shown: rooms: which image of a scene the method was shown.
     """
 
     task: Task
@@ -195,6 +197,7 @@ class ScoreFile:
     object_columns: Mapping[str, Array] = field(default_factory=dict)
     answer_groups: AnswerGroups = field(default_factory=dict)
     path: Path | None = None
+    shown: Shown = "scored_view"
 
     @property
     def runs(self) -> int:
@@ -210,6 +213,12 @@ class ScoreFile:
     def clusters(self) -> Array:
         """The scene of each image, whose errors are correlated; each question by itself, (N,)."""
         return self.columns["scene_index" if self.task == "rooms" else "question"]
+
+    @property
+    def sees_first_view_alone(self) -> bool:
+        """Whether the method predicts other views than the one it was shown."""
+        later = self.task == "rooms" and bool((self.columns["view_index"] > 0).any())
+        return later and self.shown == "first_view"
 
     @property
     def place(self) -> str:
@@ -331,7 +340,7 @@ class ScoreFile:
         return {
             name: np.atleast_2d(column)
             for name, column in self.columns.items()
-            if column.dtype == np.float64 and not name.startswith(EMPTY_ROOM)
+            if column.dtype == np.float64 and not name.startswith(OF_TRUTH)
         }
 
     def _groups_of_objects(self, labels: Array | None) -> Groups:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from metrics.scoring.geometry import scored_alignment
 from metrics.scoring.image_scores import noise_floors
-from metrics.scoring.metric_names import EMPTY_ROOM, OBJECT_SCORES
+from metrics.scoring.metric_names import OBJECT_SCORES
 from metrics.scoring.records import OBJECT_COLUMNS, SHAPE_COLUMN, ScoreFile
 from metrics.scoring.rows import score_rows
 from metrics.scoring.runs import (
@@ -76,13 +76,14 @@ def score_rooms(
         "view_index": view[rows],
         "view_angle_degrees": angle,
         **scores,
-        **{EMPTY_ROOM + name: column for name, column in scored.floors.items()},
+        **scored.floors,
     }
     objects = {name: scored.objects[name] for name in (*OBJECT_COLUMNS, *OBJECT_SCORES)}
     meta = meta_of(files, truth, truth_given, truth.fingerprint, digest, settings, counts, floors)
     alignment = scored_alignment(files[0].kind, files[0].alignment)
     objects[SHAPE_COLUMN] = shape
-    return ScoreFile("rooms", files[0].method, alignment, items, meta, objects)
+    shown = files[0].shown
+    return ScoreFile("rooms", files[0].method, alignment, items, meta, objects, shown=shown)
 
 
 def view_angles(scene_index: Array, view_index: Array, world_from_camera: Array) -> Array:

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.scoring.image_scores import (
-    score_empty_room,
+    FirstView,
+    reference_of,
     score_prediction,
     true_relief,
 )
@@ -42,7 +43,7 @@ class ScoredRows:
 
     Attributes:
         scores: by name, (R, M).
-        floors: scores of the empty room, by name, (M,).
+        floors: scores of the empty room and of cut-outs, by name, (M,).
         objects: of each of L objects that count in these rows: `row`, `object` and `pixels`, (L,),
             and its scores by name, (R, L).
         bad: for each row with values that are not finite, or normals of length 0, what is wrong;
@@ -66,8 +67,9 @@ def score_rows(
 ) -> ScoredRows:
     """Score these M rows in each of R submissions, by the processes or cluster of the settings."""
     scene, view = (truth.read(name, slice(None))[rows] for name in ("scene_index", "view_index"))
-    pairs = np.stack([rows, rows[other_scenes(scene, view)]], axis=-1)
-    chunks = [pairs[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
+    others = rows[other_scenes(scene, view)]
+    triples = np.stack([rows, others, first_views(truth)[rows]], axis=-1)
+    chunks = [triples[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
     submissions = tuple((file.path.absolute(), file.identity) for file in files)
     job = submissions, truth.path.absolute()
     processes = min(settings.processes or processors(), len(chunks))
@@ -124,6 +126,14 @@ def other_scenes(scene_index: Array, view_index: Array) -> Array:
     return np.arange(len(partner)) if same.any() else partner
 
 
+def first_views(truth: RoomsFile) -> Array:
+    """Return the row of each row's first view of its scene, (N,); -1 where the file lacks it."""
+    scene, view = (truth.read(name, slice(None)) for name in ("scene_index", "view_index"))
+    at = np.flatnonzero(view == 0)
+    row_of = dict(zip(scene[at].tolist(), at.tolist(), strict=True))
+    return np.array([row_of.get(number, -1) for number in scene.tolist()])
+
+
 class RowScorer:
     """Scores rows of open submissions against an open truth."""
 
@@ -132,26 +142,28 @@ class RowScorer:
         self._files, self._truth = files, truth
         self._entries = [{row: i for i, row in enumerate(f.rows.tolist())} for f in files]
 
-    def score(self, pairs: Array) -> ScoredRows:
-        """Return the scores of rows, (N, 2) with a row of another scene each.
+    def score(self, triples: Array) -> ScoredRows:
+        """Return the scores of rows, (N, 3) with a row of another scene and the first view of each.
 
         Values that are not finite are penalised; the caller decides whether that shall count.
         """
         bad: dict[int, ScoringError] = {}
         digests: dict[int, RowDigests] = {}
         images, floors = [], []
-        for row, other in pairs.tolist():
+        for row, other, first in triples.tolist():
             view = read_true_view(self._truth, row)
-            empty = score_empty_room(view)
-            relief = None
+            seen = ("depth", "camera/world_from_camera", "camera/fov_y_degrees")
+            relief, first_view = None, None
             if other != row:
-                seen = ("depth", "camera/world_from_camera", "camera/fov_y_degrees")
                 relief = true_relief(*(self._truth.read(name, other) for name in seen))
+            if first not in (row, -1):
+                first_view = FirstView(*(self._truth.read(name, first) for name in seen[:2]))
+            reference = reference_of(view, first_view)
             scores = []
             for file, entries in zip(self._files, self._entries, strict=True):
                 i = entries[row]
                 predicted = file.view(i)
-                score = functools.partial(score_prediction, predicted, view, empty.depth, relief)
+                score = functools.partial(score_prediction, predicted, view, reference, relief)
                 try:
                     scores.append(score())
                 except PredictionError as error:
@@ -159,11 +171,11 @@ class RowScorer:
                     bad[row] = ScoringError(where, error.found, error.expected, error.hint)
                     scores.append(score(non_finite="penalise"))
             images.append(scores)
-            floors.append(empty.scores)
+            floors.append(reference.floors)
             digests[row] = view_digests(view)
         names = images[0][0].scores
         counts = [len(scores[0].objects["object"]) for scores in images]
-        objects = {"row": np.repeat(pairs[:, 0], counts)}
+        objects = {"row": np.repeat(triples[:, 0], counts)}
         for name in images[0][0].objects:
             columns = zip(*images, strict=True)
             runs = [np.concatenate([run.objects[name] for run in column]) for column in columns]

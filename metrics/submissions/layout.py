@@ -2,7 +2,7 @@
 
 import unicodedata
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, get_args
 
 from metrics.measures.answers import CANDIDATES
 from metrics.submissions.rules import OUTCOMES, RULES, kind_text, shape_text
@@ -11,6 +11,7 @@ from scenegen.files.schema import Column
 FORMAT_NAME = "pix2shape-bench/predictions"
 FORMAT_VERSION = "1.0"
 TASKS = ("rooms", "iqtt")
+Shown = Literal["scored_view", "first_view", "no_view"]
 # Kinds of geometry: the data set of each, and what a method of it may not know. The first is meant
 # where a submission does not say.
 KINDS: dict[str, tuple[str, ...]] = {
@@ -54,6 +55,9 @@ ATTRIBUTES = (
               + "; ".join(f"{kind} {', '.join(kinds)}" for kind, kinds in KINDS.items())
               + "; the first by default",
               required=False, tasks=("rooms",), choices=ALIGNMENTS),
+    Attribute("shown", "which image of a scene the method was shown to predict a view: that of the"
+              " view, that of the scene's first view alone, or none; scored_view by default",
+              required=False, tasks=("rooms",), choices=get_args(Shown)),
     Attribute("writer", "the program that wrote the file", required=False, may_be_empty=True),
     Attribute("notes", "anything else", required=False, may_be_empty=True),
 )  # fmt: skip

@@ -50,6 +50,7 @@ class Predictions:
             at least 0 and there once.
         alignment: what the method says it cannot know: "none", "median_scale", "scale" or
             "scale_shift" (`layout.KINDS`); "none" for questions.
+        shown: which image of a scene the method was shown, as `layout.Shown`.
         identity: which file it was when it was opened, whatever has its path now.
     """
 
@@ -72,6 +73,7 @@ class Predictions:
         self.method, self.run = texts.get("method", ""), texts.get("run", "")
         self.notes, self.truth_path = texts.get("notes", ""), texts.get("truth_path", "")
         self.truth_fingerprint = texts.get("truth_fingerprint") or None
+        self.shown = cast(layout.Shown, texts.get("shown", "scored_view"))
         self._arrays, self._file = content.arrays, file
         allowed = layout.KINDS.get(self.kind, ("none",))
         self.alignment = cast(Alignment, texts.get("alignment", allowed[0]))

@@ -40,6 +40,7 @@ class RoomPredictionWriter:
         method: str,
         run: str = "",
         alignment: Alignment | None = None,
+        shown: layout.Shown = "scored_view",
         notes: str = "",
         overwrite: bool = False,
         allow_partial: bool = False,
@@ -51,12 +52,15 @@ class RoomPredictionWriter:
             method, run: who predicts; runs of one method are averaged.
             alignment: what the method cannot know: "none", "median_scale", "scale" or
                 "scale_shift"; None for "none", or "scale_shift" of disparity.
+            shown: which image the method was shown to predict a view: that of the view
+                ("scored_view"), of the scene's first view alone ("first_view"), or none
+                ("no_view"). Leaderboards rank "first_view" apart.
             allow_partial: whether rows may be missing; scores of such a file are not comparable.
 
         Raises PredictionError where a text does not suit; when the block begins also OSError for
         either path, and FileFormatError for the truth.
         """
-        texts: dict[str, Any] = {"method": method, "run": run, "notes": notes}
+        texts: dict[str, Any] = {"method": method, "run": run, "shown": shown, "notes": notes}
         texts |= {} if alignment is None else {"alignment": alignment}
         self._given = _checked_texts("rooms", {**texts, "truth_path": str(truth)})
         _check_elsewhere(path, truth)

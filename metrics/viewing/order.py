@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.score_file import read_scores
-from metrics.scoring.metric_names import EMPTY_ROOM, OTHER_SCENE, in_order, metric
+from metrics.scoring.metric_names import OF_TRUTH, OTHER_SCENE, in_order, metric
 from metrics.scoring.rows import score_rows
 from metrics.scoring.runs import Progress, ScoringError, Settings, matched_rows
 from metrics.submissions.reader import Predictions, RoomPredictions
@@ -107,7 +107,7 @@ def _stored_scores(path: str | Path, predictions: RoomPredictions, truth: RoomsF
 def sortable(scores: RowScores) -> dict[str, str]:
     """Return titles of scores that some row has, with the names of the scores."""
     names = in_order(name for name, column in scores.values.items() if np.isfinite(column).any())
-    of_others = (EMPTY_ROOM, OTHER_SCENE)
+    of_others = (*OF_TRUTH, OTHER_SCENE)
     return {metric(name).title: name for name in names if not name.startswith(of_others)}
 
 

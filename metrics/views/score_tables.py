@@ -13,6 +13,7 @@ from metrics.measures.statistics import FEW_CLUSTERS
 from metrics.scoring.estimates import CONFIDENCE, question_skill
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import (
+    CUT_OUT,
     EMPTY_ROOM,
     HEADLINE,
     OTHER_SCENE,
@@ -27,7 +28,11 @@ from scenegen.files.new_file import written_beside
 
 INTERVAL = f"{CONFIDENCE:.0%} interval"
 SKILL = "Skill: 1 is perfect, 0 is as good as the floor, below 0 is worse than the floor."
-FLOORS_OF_ROOMS = {EMPTY_ROOM: "empty room", OTHER_SCENE: "against another scene"}
+FLOORS_OF_ROOMS = {
+    EMPTY_ROOM: "empty room",
+    CUT_OUT: "flat cut-out",
+    OTHER_SCENE: "against another scene",
+}
 GROUP_TITLES = {
     "by_view_angle": "by degrees between the view and the scene's first one",
     "by_object_shape": "of single objects, by shape",
@@ -286,8 +291,9 @@ def what_the_floor_is(scores: ScoreFile) -> str:
     """Return in a sentence what the floor of the skills is."""
     if scores.task == "rooms":
         return (
-            "The floor is the empty room: walls and floor from the true camera, no objects; of"
-            " relief it is the same prediction, held against the relief of another scene."
+            "The floor of shape is a flat cut-out of each object at its median depth. Of relief it"
+            " is the same prediction, held against the relief of another scene. Else it is the"
+            " empty room: walls and floor from the true camera, no objects."
         )
     return "The floor is the best method without 3D, by kind of question: docs/results.md."
 

@@ -38,7 +38,7 @@ def test_what_is_written_reads_back_to_the_same_bits(runs, tmp_path):
     scores = made_scores.rooms_with_objects(runs=runs, noise_floors={"chamfer": 0.1 + 0.2})
     other = read_again(scores, tmp_path)
     assert other.path == tmp_path / "s.json"
-    for name in ("task", "method", "alignment", "meta"):
+    for name in ("task", "method", "alignment", "shown", "meta"):
         assert getattr(other, name) == getattr(scores, name), name
     for kind in ("columns", "object_columns"):
         ours, theirs = getattr(scores, kind), getattr(other, kind)
@@ -233,6 +233,7 @@ WRONG_ROOMS = [
     ("method", "m" * 201, "", "at most 200"),
     ("method", "\ud800", "", "unicode"),
     ("alignment", "affine", "", "'scale_shift'"),
+    ("shown", "both", "", "'first_view'"),
     ("comparable", True, "", "no key of this name"),
     ("path", "s.json", "", "no key of this name"),
     ("\x1b[31m\n", 1, r"\x1b[31m", "no key of this name"),

@@ -112,7 +112,7 @@ def predict_rooms(
             views = condition[rows], Cameras(poses[rows], fov)
             return model.surfels(code[scene_of[rows]], *views).depth
 
-        how: dict[str, Any] = {"method": method, "notes": notes, "run": run}
+        how: dict[str, Any] = {"method": method, "notes": notes, "run": run, "shown": "first_view"}
         write_depths(rooms, out, data, depth, progress, overwrite=overwrite, **how)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.checks import LARGEST_MAGNITUDE
-from metrics.scoring.metric_names import EMPTY_ROOM, HEADLINE, metric
+from metrics.scoring.metric_names import HEADLINE, OF_TRUTH, metric
 from metrics.scoring.records import ID_COLUMNS, ScoreFile
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import plain
@@ -50,11 +50,17 @@ def require_same_test(
             raise ComparisonError(
                 file.place, f"scores that are {why}", hint="or say --allow-incomparable"
             )
-    names = tuple(dict.fromkeys(metrics or HEADLINE[first.task]))
+    # A test set of single views, say, has nothing behind.
+    shown = [name for name in HEADLINE[first.task] if any(_has(file, name) for file in files)]
+    names = tuple(dict.fromkeys(metrics or shown or HEADLINE[first.task]))
     for name in names:
         if metric(name).task != first.task:
             raise ComparisonError("metric", name, f"a score of task {first.task!r}")
     return names
+
+
+def _has(file: ScoreFile, name: str) -> bool:
+    return name in file.items and bool(np.isfinite(file.items[name]).any())
 
 
 def common_rows(files: Sequence[ScoreFile]) -> list[NDArray[np.int64]]:
@@ -97,7 +103,7 @@ def _require_same_floors(files: Sequence[ScoreFile], orders: Sequence[NDArray[np
     """Raise ComparisonError where files disagree about the empty room, which is the truth's."""
     first = files[0].items
     for file, order in zip(files[1:], orders[1:], strict=True):
-        for name in [name for name in first if name.startswith(EMPTY_ROOM) and name in file.items]:
+        for name in [name for name in first if name.startswith(OF_TRUTH) and name in file.items]:
             ours, theirs = first[name][orders[0]], file.items[name][order]
             same = np.isclose(theirs, ours, FLOOR_AGREEMENT, FLOOR_AGREEMENT**2, equal_nan=True)
             if not same.all():

@@ -49,7 +49,7 @@ def floor_cells_of_groups(file: ScoreFile, name: str, keys: Sequence[str]) -> Ce
     """Return the floors of a score by view angle, or by kind of question."""
     if file.task == "rooms":
         values = angle_floors(file, name) if is_shared(name) else {}
-        return _shown({FLOOR + FLOORS_OF_ROOMS[EMPTY_ROOM]: values} if values else {})
+        return _shown({FLOOR + FLOORS_OF_ROOMS[SKILLED[name]]: values} if values else {})
     answers = file.meta.counts["answers"]
     best = {kind: floor_of_kind(kind, answers)[0] for kind in keys}
     chance = dict.fromkeys(keys, 1.0 / answers)

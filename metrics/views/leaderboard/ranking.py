@@ -54,6 +54,8 @@ WIDEST = 6  # columns of scores in one table
 ANGLES = "Angle between each view and its scene's first one."
 KINDS = 'Kinds of wrong answers; "-2" ends those of questions with two answers.'
 AS_RANKED = "Rows as in the ranking."
+# Ranks methods that see a scene's first view alone. Others look at what it asks for.
+BEHIND = "behind_depth_error"
 ALIKE_NOTE = (
     f"{ALIKE} not told apart from the first method in this score: paired test over the same items,"
     " corrected for all scores and methods of the table, at 5%. Skills have no test of their own."
@@ -106,7 +108,8 @@ def rankings(
 ) -> tuple[list[Ranking], list[Table]]:
     """Return what is shown of each test set, in the order of the files, and further tables.
 
-    The digest of its truth tells a test set, wherever its file lay and whatever made it. Further
+    The digest of its truth tells a test set, wherever its file lay and whatever made it. Methods
+    that see a scene's first view alone, and predict others, have a ranking of their own. Further
     tables have what probes reached on the kinds of questions, and the paper's own tables.
 
     Args:
@@ -126,16 +129,21 @@ def rankings(
     """
     _require_once(files)
     tasks = {name: metric(name).task for name in metrics or ()}
-    groups: dict[tuple[str, str], list[ScoreFile]] = {}
+    groups: dict[tuple[str, str, bool], list[ScoreFile]] = {}
     for file in files:
-        groups.setdefault((file.task, file.meta.truth_digest), []).append(file)
+        key = (file.task, file.meta.truth_digest, file.sees_first_view_alone)
+        groups.setdefault(key, []).append(file)
     ranked: list[Ranking] = []
     placed: set[Figure] = set()
-    for (task, _), members in groups.items():
-        _require_same_rows(members)
-        require_same_floors(members)
+    for (task, digest, first_alone), members in groups.items():
+        lists = (groups.get((task, digest, alone), []) for alone in (False, True))
+        together = [file for group in lists for file in group]
+        _require_same_rows(together)
+        require_same_floors(together)
         names = [name for name in tasks if tasks[name] == task]
-        there = [n for n in HEADLINE[task] if any(n in file.metrics for file in members)]
+        behind_first = sorted(HEADLINE[task], key=lambda name: name != BEHIND)
+        headline = [name for name in behind_first if first_alone or name != BEHIND]
+        there = [n for n in headline if any(n in file.metrics for file in members)]
         columns = _columns(members, names or there or HEADLINE[task][:1], headline=not names)
         figures = [] if paper == "none" else _figures(members, columns)
         ranking, used = _ranking(members, files, columns, figures, tested, links or {})
@@ -345,6 +353,8 @@ def _group_tables(
 def _title(file: ScoreFile) -> str:
     """Return task and truth, and the kind of the questions if all have one."""
     task = "Rooms" if file.task == "rooms" else "3D-IQTT"
+    if file.sees_first_view_alone:
+        task += " from the first view"
     if len(file.by_distractor) == 1:
         task += f", {plain(*file.by_distractor)} questions"
     test = known_test(file.meta.truth_digest)
@@ -365,6 +375,8 @@ def _notes(files: Sequence[ScoreFile]) -> Iterator[str]:
     first = files[0]
     if first.task == "rooms":
         yield f"{len(first.ids):,} images of {len(np.unique(first.clusters)):,} scenes."
+        if first.sees_first_view_alone:
+            yield "These methods saw each scene's first view alone; others have their own list."
     else:
         chance = 1.0 / first.meta.counts["answers"]
         yield f"{len(first.ids):,} questions; chance is {chance:.4f}."

@@ -27,6 +27,10 @@ def test_by_hand():
         "abs_rel": pytest.approx((0.5 + 1.0) / 4.0),
         "silog": pytest.approx(100.0 * np.log(2.0) / np.sqrt(2.0)),
         **dict.fromkeys(("delta_1", "delta_2", "delta_3"), 0.5),
+        "sq_rel": (4.0 / 4.0 + 4.0 / 2.0) / 4.0,
+        "rmse_log": pytest.approx(np.log(2.0) / np.sqrt(2.0)),
+        "log10": pytest.approx(np.log10(2.0) / 2.0),
+        "irmse": pytest.approx(0.25 / np.sqrt(2.0)),
     }
 
 

@@ -56,7 +56,7 @@ def test_scores_by_hand():
         "normal_mean_degrees": 15.3125,
         "normal_median_degrees": 15.625,
         "normal_rmse_degrees": pytest.approx(np.sqrt((11.25**2 + 400.0 + 900.0) / 4.0)),
-        "normal_within_11.25": 0.25,
+        **dict.fromkeys(("normal_within_5", "normal_within_7.5", "normal_within_11.25"), 0.25),
         "normal_within_22.5": 0.75,
         "normal_within_30": 0.75,
     }

@@ -52,7 +52,7 @@ def test_the_truth_is_perfect(folder):
         if not name.startswith(OTHER_SCENE):
             assert value.value == pytest.approx(best, abs=1e-10), name
     assert {(s.value, s.low, s.high) for s in found.skills.values()} == {(1.0, 1.0, 1.0)}
-    assert list(found.skills) == list(SKILLED)
+    assert set(found.skills) == set(SKILLED) - {"behind_depth_error"}  # of single views
     assert {"normal_mean_degrees", "derived_normal_mean_degrees"} <= set(found.metrics)
     floors = found.meta.noise_floors
     assert 0 < floors["object_completeness"] < floors["chamfer"] < floors["hausdorff"] < 0.2

@@ -9,11 +9,15 @@ from refusals import refused
 from scipy.spatial import cKDTree
 
 from metrics.measures.alignment import Alignment
+from metrics.measures.behind import behind_scores
+from metrics.measures.boundaries import boundary_scores
 from metrics.measures.chamfer_hausdorff import NearestDistances, point_scores
 from metrics.measures.depth import compare_depth, depth_scores
 from metrics.measures.normals import normal_scores
 from metrics.measures.objects import object_means, single_objects
+from metrics.measures.points import local_point_scores, point_map_scores
 from metrics.measures.relief import relief_scores
+from metrics.measures.shape import shape_scores
 from metrics.scoring.metric_names import (
     ALL,
     HEADLINE,
@@ -44,6 +48,16 @@ def all_scores(noise):
     objects = object_means(single_objects(ids, noise * relief, noise * relief))
     angle = normals["normal_mean_degrees"]
     objects |= {f"{way}object_normal_mean_degrees": angle for way in ("", "derived_")}
+    inside = rng.integers(1, 3, 200)
+    cloud = rng.random((200, 3)) + 1.0
+    said = cloud + noise * rng.standard_normal((200, 3))
+    found |= shape_scores(said, cloud, inside) | behind_scores(noise * relief, noise * relief)
+    found |= boundary_scores(wrong, true, np.ones_like(true, bool))
+    found |= point_map_scores(said, cloud) | local_point_scores(said, cloud, inside)
+    for alignment in ("scale", "scale_shift"):
+        found |= point_map_scores(said, cloud, alignment)
+    objects |= {f"{way}shape_normal_degrees": angle for way in ("", "derived_")}
+    found |= {"fov_error_degrees": 9.0 * noise}
     found |= relief_scores(relief + 9.0 * noise * rng.standard_normal(200), relief) | objects
     return found | normals | {f"derived_{name}": value for name, value in normals.items()}
 
@@ -75,7 +89,8 @@ def test_units_follow_the_scale_of_the_scene():
     rng = np.random.default_rng(1)
     true, wrong = rng.uniform(2.0, 3.0, (2, 8, 8))
     a, b = rng.random((2, 30))
-    powers = {"scene unit": 1, "scene unit squared": 2, "ratio": 0, "fraction": 0, "100 ln": 0}
+    powers = dict.fromkeys(("ratio", "fraction", "100 ln", "ln", "log10"), 0)
+    powers |= {"scene unit": 1, "scene unit squared": 2, "1 / scene unit": -1}
     for alignment in ALIGNMENTS:
         small = depth_scores(compare_depth(wrong, true), alignment)
         large = depth_scores(compare_depth(10.0 * wrong, 10.0 * true), alignment)

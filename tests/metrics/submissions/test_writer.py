@@ -43,7 +43,7 @@ def fill(writer, *rows):
 def test_round_trip_in_any_order(writer, truths, tmp_path):
     order = [5, 0, 7, 2, 1, 6, 3, 4]
     depth, normal = noise(1, 8, *SIZE), noise(2, 8, *SIZE, 3)
-    settings = {"run": "seed 4", "alignment": "scale", "notes": "a\nb"}
+    settings = {"run": "seed 4", "alignment": "scale", "notes": "a\nb", "shown": "first_view"}
     fill(writer(**settings), *((np.int64(row), depth[row], normal[row].tolist()) for row in order))
     path = tmp_path / "predictions.h5"
     with open_predictions(path) as predictions:
@@ -58,6 +58,7 @@ def test_round_trip_in_any_order(writer, truths, tmp_path):
         assert root == {
             "format": "pix2shape-bench/predictions", "format_version": "1.0", "task": "rooms",
             "method": "mine", "run": "seed 4", "notes": "a\nb", "alignment": "scale",
+            "shown": "first_view",
             "truth_path": str(truths.rooms), "truth_fingerprint": rooms.fingerprint,
         }  # fmt: skip
         assert set(file) == {"row", "depth", "normal"}

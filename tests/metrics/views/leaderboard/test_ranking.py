@@ -13,7 +13,7 @@ from metrics.score_file import Skill
 from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import UnknownMetricError
 from metrics.views.leaderboard.floors import FloorError
-from metrics.views.leaderboard.ranking import LeaderboardError, leaderboard
+from metrics.views.leaderboard.ranking import LeaderboardError, leaderboard, rankings
 from metrics.views.paper import TABLES
 
 
@@ -182,7 +182,10 @@ def relief(name, iou, floor):
 def test_the_skill_of_relief_ranks_and_its_floor_stands_beside_each_score():
     guess, seen = relief("guess", 0.37, 0.36), relief("seen", 0.35, 0.2)
     table = leaderboard([guess, seen], paper="none")[0]
-    assert table.head[2:] == ("Relief IoU: skill ↑", "Relief IoU ↑ (fraction)")
+    assert table.head[2:] == (
+        "Segmentation (relief IoU): skill ↑",
+        "Segmentation (relief IoU) ↑ (fraction)",
+    )
     rest = rests(table)
     assert list(rest) == ["seen", "guess", "floor: empty room"]
     assert [rest[n][1].split("floor ")[-1] for n in ("seen", "guess")] == ["0.2000", "0.3600"]
@@ -196,7 +199,7 @@ def test_what_is_too_wide_becomes_two_tables():
     ranking, scores = leaderboard([rooms_scores("a", columns, SCENES, skills=skills)], paper="none")
     names = ("Chamfer", "Hausdorff", "MSE-depth")
     assert ranking.head[2:] == tuple(f"{name}: skill ↑" for name in names)
-    assert scores.head[2] == "Relief IoU ↑ (fraction)"
+    assert scores.head[2] == "Segmentation (relief IoU) ↑ (fraction)"
     assert [ranks(table)[0][0] for table in (ranking, scores)] == ["1", ""]
 
 
@@ -300,3 +303,18 @@ def test_figures_of_other_scores_or_angles_do_not_slip_into_a_ranking():
         assert sum(row.kind == "reported" for row in people.rows) == len(TABLES[2].figures)
     label = "Human Evaluation, 3D-IQTT, 0 labels (Table 3) †"
     assert (values(people)[label][-1], rests(people)[label][-1]) == ("0.7329", "± 0.148")
+
+
+def test_methods_that_see_the_first_view_alone_are_ranked_apart():
+    columns = {name: [0.2] * 4 for name in ("shape_error", "behind_depth_error", "chamfer")}
+    shown = {"a": "scored_view", "b": "first_view", "c": "no_view", "d": "first_view"}
+    files = [replace(rooms_scores(n, columns, SCENES), shown=s) for n, s in shown.items()]
+    looks, first = rankings(files, paper="none")[0]
+    assert [file.method for file in looks.files] == ["a", "c"]
+    assert [file.method for file in first.files] == ["b", "d"]
+    heads = [ranking.tables[0].head[2:] for ranking in (looks, first)]
+    assert [head[0].split()[0] for head in heads] == ["Shape", "Depth"]
+    assert not any("behind" in column for column in heads[0])
+    alone = [replace(file, columns={**file.columns, "view_index": 0 * file.ids}) for file in files]
+    (together,) = rankings(alone, paper="none")[0]
+    assert len(together.files) == 4

@@ -1,0 +1,68 @@
+"""Surfaces behind: those that a scene's first view does not see, and another view does."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.camera import pixel_size
+
+Array = NDArray[Any]
+
+LEAST_PIXELS = 16
+RECALL_WITHIN = 0.05  # scene units
+# Scene units: a point so far behind all surfaces around its pixel in the first view is hidden.
+MARGIN = 0.01
+
+
+def hidden_from(
+    points: Array,
+    normals: Array,
+    first_depth: Array,
+    first_world_from_camera: Array,
+    fov_y_degrees: float,
+) -> Array:
+    """Return which surface points the first view does not see, (N,) bool.
+
+    Those outside of its picture, those that turn away from it, and those that lie by more than
+    MARGIN behind every surface at their pixel there and its 8 neighbours.
+
+    Args:
+        points, normals: world, (N, 3) each; normals face the view that sees them.
+        first_depth: planar depth of the first view, (H, W), scene units; NaN where no surface is.
+        first_world_from_camera, fov_y_degrees: its camera.
+    """
+    height, width = first_depth.shape
+    rotation, origin = first_world_from_camera[:3, :3], first_world_from_camera[:3, 3]
+    seen = (points - origin) @ rotation
+    depth = -seen[:, 2]
+    ahead = np.where(depth > 0.0, depth, 1.0)
+    pitch = pixel_size(height, fov_y_degrees)
+    column = np.floor(seen[:, 0] / ahead / pitch + width / 2.0)
+    row = np.floor(height / 2.0 - seen[:, 1] / ahead / pitch)
+    outside = (depth <= 0.0) | (column < 0) | (column >= width) | (row < 0) | (row >= height)
+    away = ((origin - points) * normals).sum(axis=1) <= 0.0
+    padded = np.pad(np.where(np.isfinite(first_depth), first_depth, np.inf), 1, mode="edge")
+    farthest = np.maximum.reduce(
+        [padded[i : i + height, j : j + width] for i, j in np.ndindex(3, 3)]
+    )
+    at = np.where(outside, 0, row).astype(int), np.where(outside, 0, column).astype(int)
+    return np.asarray(outside | away | (depth > farthest[at] + MARGIN))
+
+
+def behind_scores(errors: Array, nearest: Array) -> dict[str, float]:
+    """Return the scores of hidden surfaces, NaN where fewer than LEAST_PIXELS show them.
+
+    - behind_depth_error: mean |p - t| of planar depth.
+    - behind_recall_0.05: fraction of the points nearer than RECALL_WITHIN to a predicted one.
+
+    Args:
+        errors: absolute differences of predicted and true depth at the M hidden pixels, (M,).
+        nearest: distance of the true point there to the nearest predicted point, (M,).
+    """
+    few = len(errors) < LEAST_PIXELS
+    recall = np.nan if few else float(np.mean(nearest < RECALL_WITHIN))
+    return {
+        "behind_depth_error": np.nan if few else float(errors.mean()),
+        f"behind_recall_{RECALL_WITHIN:g}": recall,
+    }

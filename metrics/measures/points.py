@@ -1,0 +1,56 @@
+"""Errors of point maps: predicted against true surface points of the same pixels.
+
+Source: Wang et al. 2025 (MoGe), section 4 and its published evaluation.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.measures.alignment import Alignment, align_points
+
+Array = NDArray[Any]
+WITHIN = 0.25
+
+
+def point_map_scores(
+    points: Array, true_points: Array, alignment: Alignment = "none"
+) -> dict[str, float]:
+    """Return `points_rel` and `points_delta_1` of points (N, 3) after an alignment.
+
+    - points_rel: mean |p - t| / |t|, distances from the camera.
+    - points_delta_1: fraction with |p - t| < WITHIN min(|p|, |t|).
+
+    With an alignment the names end in `_after_` and its name.
+    """
+    p, t = align_points(points, true_points, alignment), true_points
+    errors, far, said = (np.linalg.norm(v, axis=-1) for v in (p - t, t, p))
+    ending = "" if alignment == "none" else f"_after_{alignment}"
+    return {
+        f"points_rel{ending}": float((errors / far).mean()),
+        f"points_delta_1{ending}": float(np.mean(errors < WITHIN * np.minimum(said, far))),
+    }
+
+
+def local_point_scores(points: Array, true_points: Array, object_id: Array) -> dict[str, float]:
+    """Return `local_points_rel` and `local_points_delta_1`: means over objects, each fitted alone.
+
+    The points of an object are aligned by scale and shift in least squares (MoGe: by L1). Its
+    errors are divided by its diameter, the longest side of the box along the axes of the camera
+    around its true points.
+
+    Args:
+        points, true_points: (N, 3) each.
+        object_id: of each; above 0 where an object that counts is seen, (N,).
+    """
+    errors = []
+    for number in np.unique(object_id[object_id > 0]).tolist():
+        own = object_id == number
+        t = true_points[own]
+        diameter = float(np.ptp(t, axis=0).max())
+        apart = np.linalg.norm(align_points(points[own], t, "scale_shift") - t, axis=-1)
+        errors.append(apart / max(diameter, np.finfo(np.float64).tiny))
+    rel = float(np.mean([error.mean() for error in errors])) if errors else np.nan
+    within = float(np.mean([np.mean(error < WITHIN) for error in errors])) if errors else np.nan
+    return {"local_points_rel": rel, "local_points_delta_1": within}
