@@ -74,7 +74,13 @@ def info(file: str) -> None:
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt audit iqtt-split --json audit.json")
-@click.argument("splits", nargs=-1, required=True, metavar="SPLIT...", type=QUESTIONS)
+@click.argument("splits", nargs=-1, metavar="SPLIT...", type=QUESTIONS)
+@click.option(
+    "--cubes",
+    type=InputPath(),
+    metavar="SHAPES.json",
+    help="Audit questions of other people instead, told as cubes and rotations.",
+)
 @option("--json", "json_path", type=OutputPath(), help="Write all numbers to this JSON file.")
 @option("--markdown", is_flag=True, help="Print the tables as Markdown.")
 @option(
@@ -89,6 +95,7 @@ def info(file: str) -> None:
 def audit(
     ctx: click.Context,
     splits: tuple[str, ...],
+    cubes: str | None,
     json_path: str | None,
     markdown: bool,
     probed: int,
@@ -113,6 +120,10 @@ def audit(
 
     if json_path:
         check_writable(Path(json_path), overwrite)
+    if (cubes is None) == (not splits):
+        raise click.UsageError("give SPLIT, or --cubes SHAPES.json")
+    if cubes is not None:
+        ctx.exit(_audit_cubes(cubes, json_path, overwrite))
     groups = find_splits(splits)
     with (
         on_scheduler(scheduler, 0, program_version) as cluster,
@@ -129,6 +140,19 @@ def audit(
             click.echo(f"{'## ' if markdown else ''}{', '.join(map(str, group))}\n")
         click.echo(report.markdown(one) if markdown else report.table(one))
     ctx.exit(0 if all(one.passed for one in found) else 1)
+
+
+def _audit_cubes(cubes: str, json_path: str | None, overwrite: bool) -> int:
+    """Print what is wrong with questions of other people; return the exit code."""
+    from iqtt.audit import strangers
+    from scenegen.files.new_file import write_text
+
+    with progress_bar(0, "question") as bar:
+        found = strangers.audit_strangers(cubes, bar.update)
+    if json_path:
+        write_text(json_path, strangers.as_json(found), overwrite)
+    click.echo(strangers.report(found))
+    return 0 if found.passed else 1
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt verify iqtt-split --items 20")
