@@ -1,78 +1,21 @@
 """A model behind a server: replies are kept, faults are tried again, nothing is asked twice."""
 
-import base64
 import io
-import json
-import threading
-from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
 import pytest
+from chat_server import KEY, completion, picture_of, serving
 from PIL import Image
 
 from iqtt.vlm.ask import AskError, Server, ask, read_heading, totals
 from iqtt.vlm.rows import Asked, vlm_rows
 from scenegen.common.errors import FileFormatError, SpecError
 
-KEY = "sk-secret-of-this-test"
-Reply = Callable[[dict[str, Any], int], tuple[int, bytes]]
-
-
-def completion(text: Any, **usage: int) -> tuple[int, bytes]:
-    value = {"choices": [{"message": {"content": text}}], "usage": usage}
-    return 200, json.dumps(value).encode()
-
-
-@contextmanager
-def serving(reply: Reply) -> Iterator[tuple[Server, list[dict[str, Any]]]]:
-    """Serve `reply`, told the body of a request and how often it came before."""
-    bodies: list[dict[str, Any]] = []
-    seen: Counter[str] = Counter()
-    lock = threading.Lock()
-
-    class Handler(BaseHTTPRequestHandler):
-        def do_POST(self) -> None:
-            content = self.rfile.read(int(self.headers["Content-Length"]))
-            assert self.headers["Authorization"] == f"Bearer {KEY}"
-            body = json.loads(content)
-            with lock:
-                bodies.append(body)
-                times = seen[content.decode()]
-                seen[content.decode()] += 1
-            status, answer = reply(body, times)
-            self.send_response(status)
-            self.send_header("Retry-After", "0")
-            cut = status == 200 and answer.endswith(b"...")
-            self.send_header("Content-Length", str(len(answer) + 100 * cut))
-            self.end_headers()
-            self.wfile.write(answer)
-
-        def log_message(self, *_: Any) -> None:
-            pass
-
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    thread = threading.Thread(target=server.serve_forever)
-    thread.start()
-    try:
-        url = f"http://127.0.0.1:{server.server_address[1]}/v1"
-        yield Server("tiny", url, KEY, timeout=1.0, tries=4, concurrency=2, pause=0.01), bodies
-    finally:
-        server.shutdown()
-        thread.join()
-        server.server_close()
-
 
 def right_letters(asked: Asked) -> dict[bytes, str]:
     return {row.image: row.answer or "" for row in vlm_rows(asked)}
-
-
-def picture_of(body: dict[str, Any]) -> bytes:
-    return base64.b64decode(body["messages"][0]["content"][0]["image_url"]["url"].split(",")[1])
 
 
 def test_right_letters_in_every_order_are_right_answers(asked: Asked, tmp_path: Path) -> None:
