@@ -19,7 +19,7 @@ command -v chromium > /dev/null || echo "No Chromium: tests of pages are skipped
 $(PIP) --no-compile -e '.[$(1)]'; status=$$?; wait; exit $$status
 endef
 
-.PHONY: demo demo-summary demo-model docs test test-all check bench bench-gpu results fuzz torture clean
+.PHONY: demo demo-summary demo-model docs test test-all check bench bench-gpu results fuzz torture dist clean
 
 demo: $(VENV)/.runtime
 	mkdir -p demo
@@ -119,6 +119,13 @@ fuzz: $(VENV)/.test
 # Fifteen minutes of runs that meet kills, signals, full disks and more, and then go on.
 torture: $(VENV)/.test
 	$(BIN)/python -m benchmarks.torture
+
+# A wheel and an sdist; each is installed in a fresh environment of every Python there is, and tried.
+dist: $(BIN)/python
+	rm -rf dist build
+	$(PIP) build
+	$(BIN)/python -m build --outdir dist . > /dev/null
+	$(BIN)/python tests/smoke.py dist
 
 clean:
 	rm -rf $(VENV) demo site build dist *.egg-info
