@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from trimesh.grouping import unique_rows
 
-from benchmarks.timing import repeat
+from benchmarks.timing import measured
 from iqtt.questions.distractors import make_pools
 from iqtt.questions.packing import Question, cube_centres
 from iqtt.questions.specs import SplitSpec
@@ -43,28 +43,31 @@ COARSE_FROM = 1000  # triangles; shapes with fewer stay as they are
 COARSE_GRID = 6  # cells in a unit, to whose corners coarse meshes are rounded
 
 
-def rooms(path: str, count: int, repeats: int, variant: str, coarse: bool) -> dict[str, Any]:
+def rooms(
+    path: str, count: int, repeats: int, variant: str, coarse: bool, **roots: str
+) -> dict[str, Any]:
     """Time load, render and conversion to numpy of the first scenes of a file.
 
     Coarse meshes have about a thousand triangles, which a user may accept who has to build them
-    anew for every scene. Raises AssertionError where the depths are not those of the file.
+    anew for every scene. `roots` are those of `file_objects`. Raises AssertionError where the
+    depths are not those of the file.
     """
     _choose(variant)
     with RoomsFile(path) as file:
         spec, scenes = file.spec, [file.scene(row) for row in range(count)]
         depth = np.asarray(file.read("depth", 0))
     names = {item.shape for scene in scenes for item in scene.objects}
-    objects = file_objects(spec)
+    objects = file_objects(spec, **roots)
     meshes = {name: _mesh(objects.shape(name), coarse) for name in names}
     integrator = {"type": "aov", "aovs": "distance:depth,normal:sh_normal", "colour": DIRECT}
-    seconds = {}
+    records = {}
     for way in WAYS:  # instances last: Mitsuba slows down with the number of shapes that are alive
         describe = _describer(spec, way, meshes)
         loaded = mi.load_dict(integrator)
         _check(_render(loaded, describe(scenes[0]), 0), scenes[0].cameras[0], depth)
-        seconds[way] = repeat(partial(_render_all, loaded, describe, scenes), repeats)
-    best = min(WAYS, key=lambda way: min(seconds[way]))
-    return {"seconds": seconds[best], "images": count, "note": best}
+        records[way] = measured(partial(_render_all, loaded, describe, scenes), repeats)
+    best = min(WAYS, key=lambda way: min(records[way]["seconds"]))
+    return {**records[best], "images": count, "note": best}
 
 
 def questions(count: int, repeats: int, variant: str) -> dict[str, Any]:
@@ -77,8 +80,8 @@ def questions(count: int, repeats: int, variant: str) -> dict[str, Any]:
     made = [item.question for batch in batches for item in batch]
     _choose(variant)
     images = [_cubes(spec, question, i) for question in made for i in range(4)]
-    seconds = repeat(partial(_render_all, mi.load_dict(DIRECT), dict, images), repeats)
-    return {"seconds": seconds, "images": len(images)}
+    record = measured(partial(_render_all, mi.load_dict(DIRECT), dict, images), repeats)
+    return {**record, "images": len(images)}
 
 
 def _choose(variant: str) -> None:

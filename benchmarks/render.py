@@ -1,14 +1,15 @@
-"""How fast rooms are rendered, beside plain Mitsuba and the bare ray cast: two Markdown tables.
+"""How fast rooms are rendered, beside plain Mitsuba and the bare ray cast: Markdown tables.
 
     python -m benchmarks.render [--quick]
 
-The first is of basic shapes, the second of the built-in objects, both at 128x128 pixels with depth
-and normals. (a) is plain Mitsuba, see `plain_mitsuba`; (c) casts the same rays and evaluates
-nothing but the ray parameter and an id, so it is an upper bound. MiB is the peak memory of the
-process and its workers.
+The first is of basic shapes, the second of the built-in objects, the third of a folder of meshes
+of 20,480 faces, all at 128x128 pixels with depth and normals. (a) is plain Mitsuba, see
+`plain_mitsuba`; (c) casts the same rays and evaluates nothing but the ray parameter and an id, so
+it is an upper bound. MiB is the peak memory of the process and its workers.
 """
 
 import argparse
+import shutil
 import statistics
 import tempfile
 import time
@@ -17,7 +18,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks.timing import Row, print_ratio, print_table, processors_busy, repeat
+from benchmarks.timing import Row, fastest, measured, print_ratio, print_table, processors_busy
 
 VARIANTS = ("llvm_ad_rgb", "scalar_rgb")
 
@@ -29,23 +30,36 @@ def end_to_end(
     preset: str = "shapes",
     workers: int = 0,
     cache: str | None = None,
+    empty: bool = False,
+    root: str | None = None,
     **settings: Any,
 ) -> dict[str, Any]:
     """Time make_dataset from nothing to a closed file; the last file stays.
 
-    The process is warm: it has made a small file before. Worker processes start anew for each file,
-    and `cache` is the folder of models on disk, as earlier rows left it.
+    The process is warm: it has made a small file before. Worker processes start anew for each file.
+
+    Args:
+        cache: folder of models on disk, as earlier rows left it.
+        empty: whether it is emptied before each file; the last one stays.
+        root: folder of meshes, which are all cleaned before.
     """
     from scenegen.description.presets import preset_spec
     from scenegen.objects.sources import object_source
     from scenegen.rendering.renderer import useful_workers
     from scenegen.rooms.make import DEFAULT_BATCH, make_dataset
 
-    source = object_source(preset, cache_dir=cache or f"{rooms}-cache")
+    cache = cache or f"{rooms}-cache"
+    source = object_source(preset, objects_root=root, cache_dir=cache)
     spec = preset_spec(preset, **source.settings, **settings)
+    if root and source.objects:
+        for names in source.objects.models.values():
+            for name in names:
+                source.objects.shape(name)
 
     def make(rows: int, seed: int) -> tuple[float, float]:
         Path(rooms).unlink(missing_ok=True)  # so that no file's disk pages burden the next one
+        if empty:
+            shutil.rmtree(cache, ignore_errors=True)
         how = {"objects": source.objects, "workers": workers}
         seeded = preset_spec(preset, **source.settings, **settings, seed=seed)
         return processors_busy(partial(make_dataset, rooms, seeded, rows, **how))
@@ -89,7 +103,7 @@ def stage(rooms: str, count: int, repeats: int) -> dict[str, Any]:
                 batch = packed(following)
             fetch()
 
-    return {"seconds": repeat(render_all, repeats), "images": count}
+    return {**measured(render_all, repeats), "images": count}
 
 
 def proposing(count: int, repeats: int) -> dict[str, Any]:
@@ -111,7 +125,7 @@ def proposing(count: int, repeats: int) -> dict[str, Any]:
 
     propose_all()
     seconds = [propose_all() for _ in range(repeats)]
-    return {"seconds": seconds, "images": count, "note": "processor time, on one core"}
+    return {"seconds": seconds, "images": count, "busy": 1.0, "note": "processor time"}
 
 
 def bare_cast(rooms: str, count: int, repeats: int, size: int) -> dict[str, Any]:
@@ -157,81 +171,113 @@ def bare_cast(rooms: str, count: int, repeats: int, size: int) -> dict[str, Any]
         t, object_id, _, _ = closest_hit(uploaded, item, origin, right * x + up * y - back)
         dr.eval(t, object_id)
 
-    ready = [(batch, upload_scenes(batch, variant)[0], cameras(batch)) for batch in batches]
+    ready = [(batch, upload_scenes(batch, variant, ())[0], cameras(batch)) for batch in batches]
 
     def cast_all() -> None:
         for arguments in ready:
             cast(*arguments)
         dr.sync_thread()
 
-    return {"seconds": repeat(cast_all, repeats), "images": count, "note": f"batches of {size}"}
+    return {**measured(cast_all, repeats), "images": count, "note": f"batches of {size}"}
+
+
+def mesh_folder(root: Path, count: int) -> None:
+    """Write meshes of 20,480 faces: balls with dents, of different lengths."""
+    import numpy as np
+    import trimesh
+
+    (root / "pebble").mkdir(parents=True)
+    ball = trimesh.creation.icosphere(subdivisions=5)
+    for number in range(count):
+        rng = np.random.default_rng(number)
+        waves = np.sin(ball.vertices @ rng.normal(0, 3, (3, 6)) + rng.uniform(0, 6, 6)).sum(axis=1)
+        points = ball.vertices * (1 + 0.06 * waves)[:, None] * rng.uniform(0.5, 1, 3)
+        trimesh.Trimesh(points, ball.faces, process=False).export(root / f"pebble/{number}.ply")
 
 
 def basic_shapes(folder: str, quick: bool) -> Iterator[Row]:
     """Yield the rows of basic shapes; the first makes the file whose scenes all others take."""
     rooms = f"{folder}/rooms.h5"
-    first, *larger = (1000,) if quick else (1000, 5000, 20000, 100_000)
-    scenes, few, repeats = (256, 8, 2) if quick else (1000, 100, 5)
+    first, second, largest = (500, 1000, 2000) if quick else (1000, 5000, 20000)
+    scenes, few, repeats = (256, 8, 2) if quick else (1000, 40, 3)
     whole = {"rooms": rooms, "repeats": repeats}
     yield f"(b) end to end, N = {first:,}", "render:end_to_end", {**whole, "count": first}
     shared = {"rooms": rooms, "count": scenes, "repeats": repeats}
     yield "(b) rendering stage alone", "render:stage", shared
-    propose = {"count": 1000 if quick else 5000, "repeats": repeats}
-    yield "(b) proposing scenes alone", "render:proposing", propose
-    for size in (64, 256):
-        yield f"(c) bare cast, batches of {size}", "render:bare_cast", {**shared, "size": size}
-    plain = {"path": rooms, "count": few, "repeats": min(repeats, 3)}
+    yield "(b) proposing scenes alone", "render:proposing", {"count": second, "repeats": repeats}
+    yield "(c) bare cast", "render:bare_cast", {**shared, "size": 256}
+    plain = {"path": rooms, "count": few, "repeats": repeats}
     for coarse, meshes in ((False, "the same"), (True, "coarse")):
         for variant in VARIANTS:
             how = {**plain, "variant": variant, "coarse": coarse}
             yield f"(a) {meshes} meshes, {variant}", "plain_mitsuba:rooms", how
-    for count in larger:
-        how = {**whole, "count": count, "repeats": 3 if count < 10_000 else 1}
-        if count == 5000:
-            name = f"(b) end to end, N = {count:,}, --workers 1"
-            yield name, "render:end_to_end", {**how, "workers": 1}
-        yield f"(b) end to end, N = {count:,}", "render:end_to_end", how
+    name, how = f"(b) end to end, N = {second:,}", {**whole, "count": second}
+    yield f"{name}, --workers 1", "render:end_to_end", {**how, "workers": 1}
+    yield name, "render:end_to_end", how
+    how = {**whole, "count": largest, "repeats": 1}
+    yield f"(b) end to end, N = {largest:,}", "render:end_to_end", how
 
 
 def built_in_objects(folder: str, quick: bool) -> Iterator[Row]:
     """Yield the rows of built-in objects, and of the two ways of shading."""
-    rooms, count = f"{folder}/objects.h5", 500 if quick else 5000
-    whole = {"rooms": rooms, "count": count, "repeats": 1, "preset": "shapenet"}
-    for cache in ("empty", "warm"):
-        name = f"(b) end to end, N = {count:,}, {cache} cache"
-        yield name, "render:end_to_end", {**whole, "cache": f"{folder}/cache"}
-    stage = {"rooms": rooms, "count": 128 if quick else 512, "repeats": 1 if quick else 3}
+    rooms = f"{folder}/objects.h5"
+    count, largest, repeats = (500, 1000, 2) if quick else (5000, 20000, 3)
+    # Two workers, as what one process keeps in memory would be neither empty nor on disk.
+    whole = {"rooms": rooms, "preset": "shapenet", "cache": f"{folder}/cache", "workers": 2}
+    name, how = f"(b) end to end, N = {count:,}", {**whole, "count": count, "repeats": repeats}
+    yield f"{name}, empty cache", "render:end_to_end", {**how, "empty": True}
+    yield f"{name}, warm cache", "render:end_to_end", how
+    how = {**whole, "count": largest, "repeats": 1}
+    yield f"(b) end to end, N = {largest:,}, warm cache", "render:end_to_end", how
+    stage = {"rooms": rooms, "count": 128 if quick else 512, "repeats": repeats}
     yield "(b) rendering stage alone", "render:stage", stage
-    plain = {"path": rooms, "count": 8 if quick else 60, "repeats": 2, "coarse": False}
+    plain = {"path": rooms, "count": 8 if quick else 60, "repeats": repeats, "coarse": False}
     for variant in VARIANTS:
         yield f"(a) {variant}", "plain_mitsuba:rooms", {**plain, "variant": variant}
-    few = {"rooms": rooms, "count": 16 if quick else 64, "repeats": 1}
+    few = {"rooms": rooms, "count": 16 if quick else 64, "repeats": 1, "workers": 1}
     for shading in ("paper", "path"):
-        name = f"(b) basic shapes, --shading {shading}"
+        name = f"basic shapes, --shading {shading}"
         yield name, "render:end_to_end", {**few, "shading": shading}
 
 
+def folder_of_meshes(folder: str, quick: bool) -> Iterator[Row]:
+    """Yield the rows of a folder of meshes."""
+    rooms, root = f"{folder}/meshes.h5", f"{folder}/models"
+    count, models, repeats = (200, 10, 2) if quick else (2000, 100, 3)
+    mesh_folder(Path(root), models)
+    whole = {"rooms": rooms, "count": count, "repeats": repeats, "root": root}
+    yield f"(b) end to end, N = {count:,}", "render:end_to_end", whole
+    plain = {"path": rooms, "count": 8 if quick else 20, "repeats": repeats, "coarse": False}
+    for variant in VARIANTS:
+        how = {**plain, "variant": variant, "objects_root": root}
+        yield f"(a) {variant}", "plain_mitsuba:rooms", how
+
+
 def main() -> None:
-    """Print both tables, and ratios of the fastest repeats: noise only ever adds time."""
+    """Print the tables, and ratios of medians beside their goals."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="measure fewer images")
     quick = parser.parse_args().quick
     with tempfile.TemporaryDirectory(prefix="bench-") as folder:
-
-        def best(rates: dict[str, float], start: str) -> float:
-            return max(rate for name, rate in rates.items() if name.startswith(start))
-
-        rates = print_table("basic shapes", basic_shapes(folder, quick), folder)
-        whole, stage = best(rates, "(b) end to end"), rates["(b) rendering stage alone"]
-        for meshes in ("the same", "coarse"):
-            plain = best(rates, f"(a) {meshes}")
-            print_ratio(f"end to end / (a), {meshes} meshes", whole, plain, 6)
-        print_ratio("end to end / (c)", whole, best(rates, "(c)"), 0.45)
-        print_ratio("rendering stage / (c)", stage, best(rates, "(c)"), 0.75)
+        shapes = print_table("basic shapes", basic_shapes(folder, quick), folder)
+        whole, cast = fastest(shapes, "(b) end to end"), fastest(shapes, "(c)")
+        print_ratio("end to end / (a), the same meshes", whole, fastest(shapes, "(a) the same"), 6)
+        print_ratio("end to end / (a), coarse meshes", whole, fastest(shapes, "(a) coarse"), 6)
+        print_ratio("end to end / (c)", whole, cast, 0.3)
+        print_ratio("rendering stage / (c)", fastest(shapes, "(b) rendering"), cast, 0.75)
         print()
-        rates = print_table("built-in objects", built_in_objects(folder, quick), folder)
-        print_ratio("end to end / (a)", best(rates, "(b) end to end"), best(rates, "(a)"), 8)
-        print_ratio("stage / (a)", rates["(b) rendering stage alone"], best(rates, "(a)"), 8)
+        objects = print_table("built-in objects", built_in_objects(folder, quick), folder)
+        plain = fastest(objects, "(a)")
+        for cache, goal in (("warm", 9), ("empty", 5)):
+            rows = {name: row for name, row in objects.items() if f"{cache} cache" in name}
+            ours = fastest(rows, "(b)")
+            print_ratio(f"end to end / (a), {cache} cache", ours, plain, goal)
+            if cache == "warm":
+                print_ratio("end to end / that of basic shapes", ours, whole, 0.75)
+        print()
+        meshes = print_table("folder of meshes", folder_of_meshes(folder, quick), folder)
+        ratio = fastest(meshes, "(b)"), fastest(meshes, "(a)")
+        print_ratio("end to end / (a)", *ratio, 20)
 
 
 if __name__ == "__main__":

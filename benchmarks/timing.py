@@ -6,8 +6,8 @@ lower than what its parent held when it started the child.
 
     python -m benchmarks.timing MODULE:FUNCTION ARGUMENTS-AS-JSON
 
-runs one function. It returns a record: `seconds` of each repeat, `images`, and maybe `workers`,
-`busy` (processors) and `note`.
+runs one function. It returns a record: `seconds` of each repeat, `images`, `busy` (processors), and
+maybe `workers` and `note`.
 """
 
 import importlib
@@ -22,10 +22,20 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from benchmarks.markdown import table
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Medians of a row: images a second, and processor time of an image in milliseconds."""
+
+    rate: float
+    cpu_ms: float
+
 
 # The name of a row, "module:function" of this package, and the arguments of the function.
 Row = tuple[str, str, dict[str, Any]]
@@ -42,6 +52,13 @@ def repeat(action: Callable[[], Any], repeats: int) -> list[float]:
     """Run an action once to warm up, then return the seconds of each repeat."""
     action()
     return [seconds_of(action) for _ in range(repeats)]
+
+
+def measured(action: Callable[[], Any], repeats: int) -> dict[str, Any]:
+    """Return `repeat` as a record, with the processors that were kept busy."""
+    action()
+    seconds, busy = zip(*(processors_busy(action) for _ in range(repeats)), strict=True)
+    return {"seconds": seconds, "busy": statistics.median(busy)}
 
 
 def processors_busy(action: Callable[[], Any]) -> tuple[float, float]:
@@ -68,7 +85,7 @@ def _peak_mib(workers: int) -> float:
     return peak / unit
 
 
-def print_table(head: str, rows: Iterable[Row], folder: str) -> dict[str, float]:
+def print_table(head: str, rows: Iterable[Row], folder: str) -> dict[str, Speed]:
     """Measure rows, one after another, and print their table.
 
     Args:
@@ -77,39 +94,52 @@ def print_table(head: str, rows: Iterable[Row], folder: str) -> dict[str, float]
             keeps compiled kernels there: they start from none.
 
     Returns:
-        Images a second of the fastest repeat, by the name of the row; 0 where a row failed.
+        Speeds by the name of the row, without those that failed.
     """
     info = Path("/proc/cpuinfo")
     model = re.search(r"model name\s*: (.*)", info.read_text()) if info.exists() else None
     print(f"{model[1] if model else platform.machine()}, {os.cpu_count()} cores,", end=" ")
     print(f"load {os.getloadavg()[0]:.1f}, Python {platform.python_version()}\n")
     environment = {**os.environ, "HOME": folder, "PYTHONUSERBASE": site.getuserbase()}
-    cells, rates = [], {}
+    cells, speeds = [], {}
     for name, function, arguments in rows:
         print(f"{name} ...", file=sys.stderr, flush=True)
         command = [sys.executable, "-m", "benchmarks.timing", function, json.dumps(arguments)]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
         if done.returncode:
             print(done.stderr, file=sys.stderr)
-            cells.append([name, *5 * "-", "failed"])
-            rates[name] = 0.0
+            cells.append([name, *6 * "-", "failed"])
             continue
         record = json.loads(done.stdout.splitlines()[-1])
         images, seconds = record["images"], record["seconds"]
-        rates[name] = images / min(seconds)
-        median = images / statistics.median(seconds)
-        busy = f"{record['busy']:.2f}" if "busy" in record else ""
-        numbers = [f"{median:,.0f}", f"{rates[name]:,.0f}", f"{images:,} x {len(seconds)}"]
-        cells.append([name, *numbers, busy, f"{record['peak_mib']:,.0f}", record.get("note", "")])
-    columns = [head, "images/s, median", "best", "images", "processors busy", "MiB", "remarks"]
+        median = statistics.median(seconds)
+        cpu_ms = 1e3 * record["busy"] * median / images
+        speeds[name] = Speed(images / median, cpu_ms)
+        numbers = [f"{images / median:,.0f}", f"{images / min(seconds):,.0f}"]
+        numbers += [f"{images:,} x {len(seconds)}", f"{record['busy']:.2f}", f"{cpu_ms:.2f}"]
+        cells.append([name, *numbers, f"{record['peak_mib']:,.0f}", record.get("note", "")])
+    columns = [
+        *(head, "images/s, median", "best", "images", "processors busy", "CPU-ms an image"),
+        *("MiB", "remarks"),
+    ]
     print(table(columns, cells), "\n")
-    return rates
+    return speeds
 
 
-def print_ratio(what: str, above: float, below: float, goal: float) -> None:
-    """Print a ratio of rates beside its goal, unless one of them failed."""
+def fastest(speeds: dict[str, Speed], start: str) -> Speed | None:
+    """Return the speed of the fastest row whose name starts with `start`."""
+    rows = [speed for name, speed in speeds.items() if name.startswith(start)]
+    return max(rows, key=lambda speed: speed.rate, default=None)
+
+
+def print_ratio(what: str, above: Speed | None, below: Speed | None, goal: float) -> None:
+    """Print a ratio of rates beside its goal, and that of processor times, unless a row failed.
+
+    On a machine that has other work, processor times say more.
+    """
     if above and below:
-        print(f"- {what}: {above / below:.2f}; goal {goal:g}")
+        rates, times = above.rate / below.rate, below.cpu_ms / above.cpu_ms
+        print(f"- {what}: {rates:.2f}, by processor time {times:.2f}; goal {goal:g}")
 
 
 if __name__ == "__main__":  # not in worker processes, which import this module again
