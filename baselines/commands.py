@@ -33,6 +33,12 @@ UNTRAINED = {
     "constant": "one depth everywhere, the mean of the training rooms",
     "mean-depth": "the mean depth of the training rooms at each pixel",
     "empty-room": "the room's walls and floor, which it is told; no objects",
+    "cut-out": "rooms: true masks, flat, at each object's true distance",
+    "picture-outline": "rooms: a mask from the picture, lifted by one constant",
+    "balls": "rooms: a ball for each blob of that mask in the first view",
+    "outline-regression": "rooms: that mask, lifted by a regression, from --train",
+    "outline-relief": "rooms: that mask, lifted by trees, from --train",
+    "nearest": "rooms: the relief of the most similar picture of --train",
     "oracle": "the truth itself, which must score perfectly",
     "chance": "random answers to questions",
     "outline": "questions: the nearest outline, without labels or 3D",
@@ -43,6 +49,10 @@ UNTRAINED = {
     "pix2shape-views": "questions: the same, with an encoder of its own",
 }
 REFERENCE = ("pix2shape", "pix2shape-compact", "pix2shape-rays", "pix2shape-views")
+# What `baselines.cut_outs` makes; it reads images, which takes scipy.
+CUT_OUTS = (
+    "cut-out", "picture-outline", "balls", "outline-regression", "outline-relief", "nearest",
+)  # fmt: skip
 # Baselines that are trained with `bench train NAME`: their modules, see `baselines.training`, and
 # what they are. A new one is a line here.
 HOMES = {
@@ -77,7 +87,8 @@ def _listed(baselines: Mapping[str, str]) -> str:
 @click.option(
     "--train",
     type=InputPath(),
-    help="What is learned from: rooms for constant and mean-depth, questions for outline-trees.",
+    help="What is learned from: rooms for constant, mean-depth, nearest, outline-regression and"
+    " outline-relief; questions for outline-trees.",
 )
 @click.option(
     "--labels",
@@ -130,6 +141,10 @@ def baseline(
             how: dict[str, Any] = {"overwrite": overwrite, "progress": show}
             if name in TRAINED:
                 _module(name).write_submission(data, out, weights, **how)
+            elif name in CUT_OUTS:
+                from baselines.cut_outs import write_cut_outs
+
+                write_cut_outs(name, data, out, train=train, **how)
             elif name in ("outline", "outline-trees"):
                 _answer_by_outline(name, data, out, train, labels, how)
             else:
