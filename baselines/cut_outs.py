@@ -36,7 +36,7 @@ DepthOf = Callable[[RoomsFile, int], Array]  # planar depth (H, W) of a row
 
 NAMES = ("cut-out", "picture-outline", "balls", "outline-regression", "outline-relief", "nearest")
 LEARNING = ("outline-regression", "outline-relief", "nearest")
-# Scene units: between median (0.166) and mean (0.182) of the relief of objects, measured in images of
+# Scene units: between the median (0.166) and the mean (0.182) of the relief of objects in images of
 # `--preset shapes --views 0,5,35,55,80 --n 300 --seed 7 --size 64`.
 LIFT = 0.17
 MOST_IMAGES = 1500  # of training rooms, spread evenly
