@@ -13,7 +13,10 @@ QUESTIONS = (
 )
 
 SCORES = (
-    *(f"metrics.commands.{name}" for name in ("submissions", "intake", "asking", "standings")),
+    *(
+        f"metrics.commands.{name}"
+        for name in ("submissions", "intake", "asking", "standings", "figures")
+    ),
     "baselines.commands",
 )
 

@@ -1,0 +1,312 @@
+"""Figures for papers: scores with intervals, scores by group, and a grid of pictures.
+
+Vector files embed their fonts (TrueType in PDF, outlines in SVG). The same numbers give the same
+bytes.
+"""
+
+import io
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iqtt.floors import floor_of_kind
+from metrics.scoring.estimates import ACCURACY
+from metrics.scoring.metric_names import HEADLINE, SKILLED, metric
+from metrics.scoring.records import Score, ScoreFile
+from metrics.submissions.reader import RoomPredictions, open_predictions
+from metrics.views.by_angle import angle_floors
+from metrics.views.plots import KINDS, LINE, kind_of
+from scenegen.common.errors import SceneGenError
+from scenegen.files.new_file import written_beside
+from scenegen.rendering.ground_truth import decode_image
+from scenegen.rooms.preview import srgb_bytes
+from scenegen.rooms.reader import RoomsFile
+
+Array = NDArray[Any]
+COLUMN, PAGE = 3.25, 6.75  # inches: a column, and both, of two-column papers
+SUFFIXES = (".pdf", ".svg", ".png")
+# The groupings that a figure can show, each with the words below it.
+GROUPINGS = {
+    "angle": {"rooms": "by_view_angle", "iqtt": "by_rotation_angle"},
+    "kind": {"rooms": "by_object_shape", "iqtt": "by_distractor"},
+    "size": {"rooms": "by_object_size"},
+}
+_STYLE: dict[Any, Any] = {
+    "font.size": 7,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 1.0,
+    "pdf.fonttype": 42,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "pix2shape-bench",
+    "savefig.dpi": 300,
+}
+
+
+class FigureError(SceneGenError):
+    """A figure that these files cannot give."""
+
+
+def draw_scores(
+    path: str | Path,
+    files: Sequence[ScoreFile],
+    name: str = "",
+    width: float = COLUMN,
+    overwrite: bool = False,
+) -> None:
+    """Draw one score of several methods: a dot and an interval each, and the floor, dashed.
+
+    Args:
+        path: to write; its suffix is one of SUFFIXES.
+        name: of the score; by default the first one of the headline that all files have.
+        width: inches.
+
+    Raises FigureError where the files are of two tasks, or one lacks the score; OSError.
+    """
+    name = _common(files, name)
+    floor = _floor(files[0], name)
+    with _figure(path, overwrite, width, 0.35 + 0.17 * len(files)) as axes:
+        for place, (file, label) in enumerate(zip(files, labels_of(files), strict=True)):
+            color, marker = KINDS[kind_of(place)]
+            _dot(axes, file.metrics[name], len(files) - place, color, marker, along="y")
+            axes.text(-0.02, len(files) - place, label, ha="right", va="center",
+                      transform=axes.get_yaxis_transform())  # fmt: skip
+        if floor is not None:
+            axes.axvline(floor, color=KINDS[LINE][0], linestyle="--", label="floor")
+            _legend(axes)
+        axes.set(yticks=[], ylim=(0.4, len(files) + 0.6), xlabel=_with_direction(name))
+        axes.spines["left"].set_visible(False)
+
+
+def draw_groups(
+    path: str | Path,
+    files: Sequence[ScoreFile],
+    by: str = "angle",
+    name: str = "",
+    width: float = COLUMN,
+    overwrite: bool = False,
+) -> None:
+    """Draw one score by group: by angle, kind or size, as GROUPINGS has them; floors are dashed.
+
+    Args and errors as of `draw_scores`; FigureError, too, where the files have no such groups.
+    """
+    name = _common(files, name)
+    grouping = GROUPINGS[by].get(files[0].task)
+    groups = [getattr(file, grouping) if grouping else {} for file in files]
+    keys = [key for key in groups[0] if all(name in group.get(key, {}) for group in groups)]
+    if not keys:
+        place = f"{files[0].method}: {name} by {by}"
+        raise FigureError(place, "no groups that all files have", "another --by or --score")
+    keys.sort(key=_number)
+    floors = [_group_floor(files[0], by, key, name) for key in keys]
+    with _figure(path, overwrite, width, 0.62 * width) as axes:
+        for number, (group, label) in enumerate(zip(groups, labels_of(files), strict=True)):
+            color, marker = KINDS[kind_of(number)]
+            aside = 0.12 * (number - (len(files) - 1) / 2)
+            for at, key in enumerate(keys):
+                _dot(axes, group[key][name], at + aside, color, marker, along="x")
+            values = [group[key][name].value for key in keys]
+            if by == "angle":
+                axes.plot(np.arange(len(keys)) + aside, values, color=color, alpha=0.5)
+            axes.plot([], [], marker, color=color, markersize=3, label=label)
+        for at, floor in enumerate(floors):
+            if floor is not None:
+                label = "floor" if at == 0 else "_"
+                axes.hlines(floor, at - 0.4, at + 0.4, KINDS[LINE][0], "--", label=label)
+        axes.set_xticks(range(len(keys)), keys, rotation=0 if by == "angle" else 20)
+        axes.set(xlabel=_words(by, files[0].task), ylabel=_with_direction(name, "\n"))
+        _legend(axes)
+
+
+def draw_grid(
+    path: str | Path,
+    truth: str | Path,
+    submissions: Sequence[str | Path],
+    rows: Sequence[int],
+    width: float = PAGE,
+    overwrite: bool = False,
+) -> None:
+    """Draw rows of a rooms file: image, true depth, then depth and error of each submission.
+
+    All depths share the range of the true ones. Errors are shown from none to a tenth of that
+    range, or more. Depth known up to a scale or shift is aligned as it is for its scores.
+
+    Raises FigureError where a row is not there, or a submission answers questions; OSError;
+    FileFormatError for damaged files.
+    """
+    from metrics.scoring.geometry import planar_depth
+
+    opened = [open_predictions(path) for path in submissions]
+    try:
+        with RoomsFile(truth) as rooms:
+            lines = []
+            for row in rows:
+                if not 0 <= row < len(rooms):
+                    raise FigureError(
+                        f"{truth}: row {row}", "no such row", f"0 to {len(rooms) - 1}"
+                    )
+                true = rooms.read("depth", row).astype(np.float64)
+                picture = srgb_bytes(np.nan_to_num(decode_image(rooms.read("image", row))))
+                depths = [_predicted(file, row, true, planar_depth) for file in opened]
+                lines.append((picture, true, depths))
+    finally:
+        for file in opened:
+            file.close()
+    _grid(path, lines, [file.method for file in opened], width, overwrite)
+
+
+def labels_of(files: Sequence[ScoreFile]) -> list[str]:
+    """Return the methods' names, cut where they are long; a number follows those that repeat."""
+    names = [file.method if len(file.method) <= 24 else f"{file.method[:23]}…" for file in files]
+    return [
+        f"{name} ({names[: i + 1].count(name)})" if names.count(name) > 1 else name
+        for i, name in enumerate(names)
+    ]
+
+
+def _predicted(
+    file: Any, row: int, true: Array, planar_depth: Callable[..., tuple[Array, Any]]
+) -> Array:
+    if not isinstance(file, RoomPredictions):
+        raise FigureError(file.path, "answers to questions", "predictions of rooms")
+    places = np.flatnonzero(file.rows == row)
+    if not len(places):
+        raise FigureError(f"{file.path}: row {row}", "no prediction", "one of this row")
+    return np.asarray(planar_depth(file.view(int(places[0])), true)[0], np.float64)
+
+
+def _grid(
+    path: str | Path,
+    lines: Sequence[tuple[Array, Array, Sequence[Array]]],
+    methods: Sequence[str],
+    width: float,
+    overwrite: bool,
+) -> None:
+    columns = 2 + 2 * len(methods)
+    titles = ["image", "true depth", *(text for m in methods for text in (m, "error"))]
+    tall, wide = lines[0][1].shape
+    height = width / columns * tall / wide * len(lines) + 0.55
+    known = np.concatenate([true[np.isfinite(true)] for _, true, _ in lines])
+    near, far = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    span = max(far - near, 1e-9)
+    with _figure(path, overwrite, width, height, (len(lines), columns)) as table:
+        for line, (picture, true, depths) in enumerate(lines):
+            axes_of_row = table[line]
+            seen = np.isfinite(true)
+            axes_of_row[0].imshow(picture, interpolation="nearest")
+            shades = [np.where(seen, true, np.nan)]
+            for depth in depths:
+                shades += [np.where(seen, depth, np.nan), np.abs(depth - true)]
+            for place, shade in enumerate(shades):
+                is_error = place > 0 and place % 2 == 0
+                limits = (0.0, 0.1 * span) if is_error else (near, far)
+                drawn = axes_of_row[1 + place].imshow(
+                    shade, "inferno" if is_error else "viridis", vmin=limits[0], vmax=limits[1],
+                    interpolation="nearest",
+                )  # fmt: skip
+                if line == len(lines) - 1 and place in (0, 2):
+                    bar = drawn.figure.colorbar(
+                        drawn, ax=list(table[:, 1 + place]), location="bottom", shrink=0.9,
+                        aspect=12,
+                    )  # fmt: skip
+                    bar.ax.tick_params(labelsize=5)
+        for axes, title in zip(table[0], titles, strict=True):
+            axes.set_title(title[:18], fontsize=6)
+        for axes in table.flat:
+            axes.set_axis_off()
+
+
+def _common(files: Sequence[ScoreFile], name: str) -> str:
+    """Return the score that is drawn. Raises FigureError."""
+    tasks = {file.task for file in files}
+    if len(tasks) > 1:
+        raise FigureError(files[-1].place, "scores of rooms and of questions", "one kind")
+    names = [name] if name else HEADLINE[files[0].task]
+    for candidate in names:
+        if all(candidate in file.metrics for file in files):
+            return candidate
+    lacking = next(file for file in files if not set(names) <= file.metrics.keys())
+    known = ", ".join(lacking.metrics)
+    raise FigureError(lacking.place, f"no score {name or names[0]}", f"one of {known}")
+
+
+def _floor(file: ScoreFile, name: str) -> float | None:
+    if name == ACCURACY:
+        return file.skills[name].floor if name in file.skills else None
+    floor = file.metrics.get(SKILLED.get(name, "-") + name)
+    return None if floor is None else floor.value
+
+
+def _group_floor(file: ScoreFile, by: str, key: str, name: str) -> float | None:
+    if file.task == "iqtt":
+        return floor_of_kind(key, file.meta.counts["answers"])[0] if by == "kind" else None
+    return angle_floors(file, name).get(key) if by == "angle" else None
+
+
+def _dot(axes: Any, score: Score, at: float, color: str, marker: str, along: str) -> None:
+    place = (score.value, at) if along == "y" else (at, score.value)
+    axes.plot(*place, marker, color=color, markersize=3)
+    if score.low is not None and score.high is not None:
+        draw = axes.hlines if along == "y" else axes.vlines
+        draw(at, score.low, score.high, color=color)
+
+
+def _with_direction(name: str, between: str = " ") -> str:
+    about = metric(name)
+    unit = "" if about.unit in ("1", "fraction") else f"{about.unit},{between}"
+    better = "higher" if about.higher_is_better else "lower"
+    return f"{about.title}{between}({unit}{better} is better)"
+
+
+def _legend(axes: Any) -> None:
+    axes.figure.legend(loc="outside upper left", ncols=3, frameon=False)
+
+
+def _words(by: str, task: str) -> str:
+    if by == "angle":
+        what = "degrees from the first view" if task == "rooms" else "degrees of rotation"
+    else:
+        what = {"kind": "shape" if task == "rooms" else "kind of question"}.get(by, "")
+        what = what or "share of the picture, percent"
+    return what
+
+
+def _number(key: str) -> tuple[float, str]:
+    first = key.split("-", maxsplit=1)[0]
+    return (float(first), key) if first.replace(".", "").isdigit() else (0.0, key)
+
+
+@contextmanager
+def _figure(
+    path: str | Path,
+    overwrite: bool,
+    width: float,
+    height: float,
+    table: tuple[int, int] | None = None,
+) -> Iterator[Any]:
+    """Give axes, or a table of them, of a figure that is written when the block ends well."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise FigureError(path, f"the ending {suffix!r}", " or ".join(SUFFIXES))
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_STYLE)
+        figure = Figure(figsize=(width, height), layout="constrained")
+        yield figure.add_subplot() if table is None else figure.subplots(*table, squeeze=False)
+        stream = io.BytesIO()
+        metadata: Mapping[str, Any] = {
+            ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+            ".svg": {"Date": None, "Creator": None},
+            ".png": {"Software": None},
+        }[suffix]
+        figure.savefig(stream, format=suffix[1:], metadata=dict(metadata))
+    with written_beside(path, overwrite) as temporary:
+        temporary.write_bytes(stream.getvalue())
