@@ -62,10 +62,10 @@ def seen_from(
 ) -> NDArray[np.bool_]:
     """Return whether surface points are visible in another view, which is known by its maps.
 
-    A point is visible where it lies on the surface of its object that one of the four nearest
-    pixels of the other view shows: no farther behind the plane of that pixel's surfel than
-    `tolerance` pixels are wide there. So the answer can be wrong in a band of a pixel along
-    silhouettes.
+    The four nearest pixels of the other view vote, with the weights of bilinear interpolation. A
+    pixel says yes if it shows the same object, and the point is no farther behind the plane of its
+    surfel than `tolerance` pixels are wide there. More than half of the weight makes a point
+    visible. So the answer can be wrong within half a pixel of a silhouette.
 
     Args:
         points: world, (..., 3); those with NaN are not visible.
@@ -86,14 +86,17 @@ def seen_from(
     )
     corner = np.floor(np.where(inside[..., None], pixels, 0.5) - 0.5).astype(np.int64)
     thickness = tolerance * pixel_size(height, fov_y_degrees) * depth
-    visible = np.zeros(inside.shape, bool)
+    share = np.where(inside[..., None], pixels, 0.5) - 0.5 - corner  # of the right, lower pixel
+    votes = np.zeros(inside.shape)
     for right, down in ((0, 0), (1, 0), (0, 1), (1, 1)):
         column = (corner[..., 0] + right).clip(0, width - 1)
         row = (corner[..., 1] + down).clip(0, height - 1)
         offset = np.nan_to_num(points) - np.nan_to_num(surfels[row, column])
         before = np.einsum("...i,...i->...", offset, normals[row, column])
-        visible |= (other_object_id[row, column] == object_id) & (before > -thickness)
-    return np.asarray(visible & inside)
+        shows = (other_object_id[row, column] == object_id) & (before > -thickness)
+        weight = np.abs(1 - right - share[..., 0]) * np.abs(1 - down - share[..., 1])
+        votes += weight * shows
+    return np.asarray((votes > 0.5) & inside)
 
 
 def object_coordinates(

@@ -1,9 +1,10 @@
 """The HDF5 layout of a file of rooms, as a table: name, axes, type, unit, frame and meaning.
 
-`python -m scenegen.layout` prints it as the table of `docs/rooms-file.md`.
+`python -m scenegen.layout` prints it as the tables of `docs/rooms-file.md`.
 """
 
 import re
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -50,7 +51,7 @@ SCORED = (
     "camera/fov_y_degrees",
 )
 # Sizes of axes that are the same in all files; those of the others follow from the spec.
-FIXED = {"channel": 3, "xyz": 3, "matrix_row": 4, "matrix_column": 4, "coefficient": 2}
+FIXED = {"channel": 3, "offset": 2, "xyz": 3, "matrix_row": 4, "matrix_column": 4, "coefficient": 2}
 MATRIX = ("matrix_row", "matrix_column")
 
 
@@ -114,7 +115,38 @@ FIELDS = (
            "pixels that show the object"),
     _column("scene", (), "text", "-", "-", "full description of the scene, JSON"),
 )
+FURTHER = {  # columns of `DatasetSpec.truth`, by its names
+    "amodal": (
+        _column("object/amodal_mask", ("object_slot", "y", "x"), "uint8",
+               "1", "pixels: row 0 on top",
+               "1 where the ray through the pixel's centre meets the object, whatever stands before"
+               " it; parts outside the image do not count", own_chunk=True),
+        _column("object/visible_fraction", ("object_slot",), "float32", "1", "-",
+               "pixels that show the object, over those of its mask; 0 in unused slots"),
+    ),
+    "coordinates": (
+        _column("object_coordinates", ("y", "x", "xyz"), "float32", "bounding radius", "object",
+               "where the hit lies in the frame of its unit shape, -1 to 1; (value + 1) / 2 are the"
+               " coordinates of NOCS; NaN where no object is hit", own_chunk=True),
+    ),
+    "flow": (
+        _column("flow", ("y", "x", "offset"), "float32", "pixel", "x right, y down",
+               "from the pixel to where the next view of the scene sees its point (the last view:"
+               " the first one); NaN where nothing is hit", own_chunk=True),
+        _column("flow_occluded", ("y", "x"), "uint8", "1", "pixels: row 0 on top",
+               "1 where that view does not show the point, or nothing is hit", own_chunk=True),
+    ),
+    "albedo": (
+        _column("albedo", ("y", "x", "channel"), "float32", "1", "RGB",
+               "rho of the surface, linear; NaN where nothing is hit", own_chunk=True),
+    ),
+}
 # fmt: on
+
+
+def fields(spec: DatasetSpec) -> list[Column]:
+    """Return the columns of a file that answers that spec, without the sizes of their axes."""
+    return [*FIELDS, *(column for name in spec.truth for column in FURTHER[name])]
 
 
 def columns(spec: DatasetSpec) -> list[Column]:
@@ -133,14 +165,14 @@ def columns(spec: DatasetSpec) -> list[Column]:
             dtype=spec.image_dtype if field.dtype == "image" else field.dtype,
             more=more.get(field.name, {}),
         )
-        for field in FIELDS
+        for field in fields(spec)
     ]
 
 
-def markdown_table() -> str:
+def markdown_table(fields: Iterable[Column] = FIELDS) -> str:
     """Return the layout as a Markdown table."""
     rows = [("dataset", "row", "type", "unit", "frame", "meaning")]
-    for field in FIELDS:
+    for field in fields:
         row = ", ".join(str(FIXED.get(axis, axis)) for axis in field.axes or ())
         dtype = {"image": "`--image-dtype`", "text": "UTF-8 string"}.get(field.dtype, field.dtype)
         rows.append((f"`{field.name}`", f"({row})", dtype, field.unit, field.frame, field.meaning))
@@ -149,3 +181,5 @@ def markdown_table() -> str:
 
 if __name__ == "__main__":
     print(markdown_table())
+    print("\nWith `--with`:\n")
+    print(markdown_table(column for some in FURTHER.values() for column in some))

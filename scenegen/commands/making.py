@@ -98,6 +98,10 @@ def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> l
               help="Field of view of a square image, degrees [28].")
 @click.option("--camera-radius", type=float,
               help="Distance of cameras from the target, scene units [1.5].")
+@click.option("--with", "truth", type=Names(),
+              help="More truth to store: some of amodal,coordinates,flow,albedo. That is masks of"
+              " whole objects and their visible fractions, object coordinates (NOCS), optical flow"
+              " to the next view with occlusion, reflectance of each pixel.")
 @IMAGE_DTYPE
 @COMPRESSION
 @click.option("--batch", type=int, default=64, show_default=True,

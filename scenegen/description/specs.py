@@ -15,6 +15,7 @@ IMAGE_DTYPES = ("uint8", "float16", "float32")
 BUILT_IN = {"shapes": SHAPE_NAMES, "families": FAMILY_NAMES}
 FOLDERS = ("shapenet-v1", "shapenet-v2", "folder")
 SPLITS = ("all", "train", "val", "test")
+TRUTHS = ("amodal", "coordinates", "flow", "albedo")
 MAX_CLASSES = 4000  # their names are an attribute, of which HDF5 allows 64 kB
 MAX_LIGHTS = 16
 MAX_PIXELS = 4096 * 4096
@@ -33,6 +34,7 @@ LIMITS: dict[str, tuple[float, float]] = {  # of settings that are a number or a
     "light_level": (0.0, 100.0),
     "light_saturation": (0.0, 1.0),
 }
+LATER: dict[str, object] = {"truth": ()}  # fields that came after 1.0, with their defaults
 CHOICES = {
     "image_dtype": IMAGE_DTYPES,
     "shading": ("paper", "path"),
@@ -79,6 +81,7 @@ class DatasetSpec:
         reflectance, room_reflectance: the RGB of rho, of objects and of the room.
         random_reflectance: draw every object's instead, from 0.15 to 0.95 each.
         specular, shininess: ranges of Phong's k_s and exponent of objects; the room is matte.
+        truth: further truth of each row, some of TRUTHS (`rooms.truth`).
     """
 
     seed: int = 0
@@ -112,6 +115,7 @@ class DatasetSpec:
     random_reflectance: bool = False
     specular: tuple[float, float] = (0.0, 0.0)
     shininess: tuple[float, float] = (1.0, 1.0)
+    truth: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         normalise(self)
@@ -123,6 +127,7 @@ class DatasetSpec:
         _check_image(self)
         _check_objects(self)
         _check_places(self)
+        _check_truth(self)
 
     @property
     def object_slots(self) -> int:
@@ -140,8 +145,12 @@ class DatasetSpec:
         return Camera.fov_y_from_square(self.fov_degrees, self.height, self.width)
 
     def to_json(self) -> str:
-        """Return the request as one line of JSON with sorted keys."""
-        return to_json(self, sort_keys=True)
+        """Return the request as one line of JSON with sorted keys.
+
+        Fields that came after version 1.0 of the format are left out where they have their default.
+        """
+        later = {name: value for name, value in LATER.items() if getattr(self, name) == value}
+        return to_json({k: v for k, v in vars(self).items() if k not in later}, sort_keys=True)
 
     @classmethod
     def from_json(cls, text: str) -> "DatasetSpec":
@@ -217,3 +226,11 @@ def _check_places(spec: DatasetSpec) -> None:
         spec.attenuation,
         "k_l and k_q from 0 to 100, not both 0",
     )
+
+
+def _check_truth(spec: DatasetSpec) -> None:
+    wrong = [name for name in spec.truth if name not in TRUTHS]
+    check(not wrong, "truth", ", ".join(wrong), f"some of {', '.join(TRUTHS)}")
+    object.__setattr__(spec, "truth", tuple(name for name in TRUTHS if name in spec.truth))
+    expected = "two views or more, such as --views 0,35"
+    check("flow" not in spec.truth or len(spec.views) > 1, "flow", "one view", expected)

@@ -22,7 +22,8 @@ class RenderedScene:
     Attributes:
         scenes, row: its description is a row of `scenes`.
         batch, first: where it is packed: its views are the images from `first` on.
-        pixels: image, depth, normal and object_id of the views, (V, ...) as in `GroundTruth`.
+        pixels: image, depth, normal and object_id of the views, (V, ...) as in `GroundTruth`, and
+            the columns of `layout.FURTHER` that the spec asks for.
         visible_pixels: how many pixels of each view show each object, (V, K).
     """
 

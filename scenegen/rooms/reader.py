@@ -1,6 +1,6 @@
 """Read a file of rooms: typed records by index, and a map-style dataset for training loops."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
@@ -20,7 +20,7 @@ from scenegen.files.content import SHA256, joint_digest
 from scenegen.files.input_file import describing
 from scenegen.files.rows import RowDataset, RowFile, chosen_rows
 from scenegen.files.shards import OpenFile
-from scenegen.layout import FIELDS, FORMAT, SCORED, TRUTH_DIGEST, columns
+from scenegen.layout import FORMAT, FURTHER, SCORED, TRUTH_DIGEST, columns
 from scenegen.rendering.ground_truth import decode_image
 
 Array = NDArray[Any]
@@ -28,7 +28,10 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Room:
-    """One row of a rooms file; frames, units and shapes as in `layout.FIELDS`."""
+    """One row of a rooms file; frames, units and shapes as in `layout.FIELDS`.
+
+    `truth` has the columns of `layout.FURTHER` that the file holds, by name.
+    """
 
     index: int
     view_index: int
@@ -40,6 +43,7 @@ class Room:
     world_from_camera: Array
     fov_y_degrees: float
     scene: SceneSpec
+    truth: Mapping[str, Array]
 
     @property
     def radiance(self) -> Array:
@@ -68,6 +72,7 @@ class RoomsFile(RowFile):
     Attributes, besides those of `RowFile`:
         spec: the request that it answers.
         fingerprint: SHA-256 of request and scenes (`content.fingerprint`).
+        further: names of the columns of `layout.FURTHER` that it holds.
     """
 
     SCORED = SCORED
@@ -86,6 +91,7 @@ class RoomsFile(RowFile):
         self.stored_truth_digest = self.attributes[TRUTH_DIGEST]
         with describing(f"{self.path}: attribute 'spec'"):
             self.spec = DatasetSpec.from_json(self.attributes["spec"])
+        self.further = [c.name for name in self.spec.truth for c in FURTHER[name]]
         self._count_rows("image")
         if not len(self):
             raise FileFormatError(f"{self.path}: image", "no rows", "at least one")
@@ -121,6 +127,7 @@ class RoomsFile(RowFile):
             world_from_camera=read("camera/world_from_camera", row),
             fov_y_degrees=float(read("camera/fov_y_degrees", row)),
             scene=self._described(row, read("scene", row)),
+            truth={name: read(name, row) for name in self.further},
         )
 
     def scene(self, index: int) -> SceneSpec:
@@ -153,9 +160,9 @@ class RoomsDataset(RowDataset):
 
         Raises as `RoomsFile`, and SpecError for an unknown field.
         """
-        numeric = [field.name for field in FIELDS if field.dtype != "text"]
-        for name in fields:
-            check(name in numeric, "field", repr(name), f"some of {', '.join(numeric)}")
         with nullcontext(rooms) if isinstance(rooms, RoomsFile) else RoomsFile(rooms) as file:
+            numeric = [column.name for column in columns(file.spec) if column.dtype != "text"]
+            for name in fields:
+                check(name in numeric, "field", repr(name), f"some of {', '.join(numeric)}")
             super().__init__(file, fields)
             self.path, self.spec, self.fingerprint = file.path, file.spec, file.fingerprint

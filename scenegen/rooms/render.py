@@ -21,10 +21,12 @@ from scenegen.files.workers import in_threads
 from scenegen.layout import columns
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.families.store import MEMBER_STORE
+from scenegen.rendering.amodal import amodal_masks
 from scenegen.rendering.ground_truth import GroundTruth, visible_pixels
 from scenegen.rendering.packing import SceneBatch, pack_arrays
 from scenegen.rendering.renderer import launch, share_processors
 from scenegen.rooms.pack import RenderedScene, pack_rooms
+from scenegen.rooms.truth import further_truth
 from scenegen.sampling.proposals import ProposalQueue
 
 Array = NDArray[Any]
@@ -113,8 +115,11 @@ def render_items(
         scenes, packed, fetch = begun
         following = propose()
         truth = fetch()
+        masks = amodal_masks(packed, device) if "amodal" in spec.truth else None
         begun = begin(following)
-        for item, shown in zip(scenes.index.tolist(), _shown(scenes, packed, truth), strict=True):
+        for item, shown in zip(
+            scenes.index.tolist(), _shown(scenes, packed, truth, masks), strict=True
+        ):
             if shown is None:
                 proposals.refuse(item)
             else:
@@ -129,7 +134,7 @@ def render_items(
 
 
 def _shown(
-    scenes: SceneArrays, batch: SceneBatch, truth: GroundTruth
+    scenes: SceneArrays, batch: SceneBatch, truth: GroundTruth, masks: Array | None
 ) -> Iterator[RenderedScene | None]:
     """Yield each scene with its pixels, or None where an object shows too few in some view."""
     spec = batch.spec
@@ -138,6 +143,10 @@ def _shown(
     enough = np.asarray((missing | (visible >= spec.min_visible_pixels)).all(axis=1))
     for row, first in enumerate(range(0, len(batch), len(spec.views))):
         images = slice(first, first + len(spec.views))
+        if not enough[images].all():
+            yield None
+            continue
         pixels = {name: values[images] for name, values in vars(truth).items()}
-        shown = RenderedScene(scenes, row, batch, first, pixels, visible[images])
-        yield shown if enough[images].all() else None
+        whole = None if masks is None else masks[images]
+        pixels |= further_truth(batch, first, pixels, whole)
+        yield RenderedScene(scenes, row, batch, first, pixels, visible[images])

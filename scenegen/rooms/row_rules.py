@@ -21,6 +21,7 @@ from scenegen.rendering.packing import SceneBatch, pack
 from scenegen.rendering.shading import shade
 from scenegen.rooms.pack import described
 from scenegen.rooms.reader import Room, RoomsFile
+from scenegen.rooms.truth import truth_problems
 
 Array = NDArray[Any]
 UNIT_TOLERANCE = 1e-5  # by which the length of a normal may differ from 1
@@ -37,8 +38,20 @@ _RULES = {
 }
 
 
+_FURTHER_RULES = {
+    "amodal": "masks hold what shows, stay in bounding spheres and give the visible fractions",
+    "coordinates": "they follow from depth and poses",
+    "flow": "flow and occlusion follow from depth and cameras",
+    "albedo": "reflectance of the object ids",
+}
+
+
 def row_rules(spec: DatasetSpec) -> dict[str, str]:
     """Return what is checked of each row, by name of the check."""
+    return {**_pixel_rules(spec), **{name: _FURTHER_RULES[name] for name in spec.truth}}
+
+
+def _pixel_rules(spec: DatasetSpec) -> dict[str, str]:
     if spec.shading == "path":
         return {**_RULES, "image": "finite and not negative"}
     if spec.spp > 1 or spec.shadows:
@@ -75,6 +88,22 @@ def row_problems(
             "image": _image_problems(rooms.spec, room, points, batch),
         }
         yield from ((name, problem) for name, some in found.items() for problem in some)
+        if rooms.spec.truth:
+            yield from _further_problems(rooms, block, room)
+
+
+def _further_problems(rooms: RoomsFile, block: RowBlock, room: Room) -> Iterable[tuple[str, str]]:
+    names = ("material/reflectance", "object/world_from_object")
+    other, views = room, len(rooms.spec.views)
+    if "flow" in rooms.spec.truth:
+        first = room.index - room.index % views
+        try:
+            other = rooms.room(first + (room.index + 1) % views, block.read)
+        except (SceneGenError, IndexError) as error:
+            yield "flow", str(error)
+            return
+    stored = {**room.truth, **{name: block.read(name, room.index) for name in names}}
+    yield from truth_problems(rooms.spec.truth, stored, room, other, room.scene)
 
 
 def _description_problems(

@@ -31,13 +31,13 @@ from scenegen.files.verify import (
 from scenegen.layout import FORMAT_VERSION
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.meshes.errors import BadMeshError
+from scenegen.rendering.amodal import amodal_masks
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import render
 from scenegen.rooms.reader import Room, RoomsFile
 from scenegen.rooms.row_rules import (
     LOBE_TOLERANCE,
-    PIXELS,
     RADIANCE_TOLERANCE,
     row_problems,
     row_rules,
@@ -54,6 +54,7 @@ NORMAL_TOLERANCE = 1e-3
 IMAGE_TOLERANCE = {"uint8": 0.0, "float16": 2.0**-10, "float32": 1e-4}
 PATH_TOLERANCE = 0.1  # share by which the mean of a path-traced image's channel may differ
 EDGE_SHARE = 1e-3  # of a row's pixels that may disagree
+AMODAL = "object/amodal_mask"
 BLOCK_PIXELS = 2**20  # of the rows that are read at once
 BATCH_PIXELS = 2**22  # of the rows that are rendered at once
 TRIED_AT_ONCE = 100  # proposals of a scene that is drawn again
@@ -173,7 +174,7 @@ def _rendered_again(rooms: RoomsFile, rows: Sequence[int], device: str, objects:
             wrong.append(f"row {row} (cannot be rendered)")
             continue
         room, pixels = again[row]
-        pairs = {name: (getattr(room, name), pixels[name]) for name in PIXELS}
+        pairs = {name: (_stored(room, name), values) for name, values in pixels.items()}
         differs = [
             name for name, pair in pairs.items() if not np.array_equal(*pair, equal_nan=True)
         ]
@@ -210,12 +211,14 @@ def _render(
             with np.errstate(all="ignore"):
                 batch = pack(rooms.spec, [room.scene for room in shown], (view,), objects)
                 pixels = vars(render(batch, device))
+                if "amodal" in rooms.spec.truth:
+                    pixels[AMODAL] = amodal_masks(batch, device)
         except (SpecError, BadMeshError):
             for room in shown if len(shown) > 1 else ():
                 draw(view, [room])
             return
         for k, room in enumerate(shown):
-            rendered[room.index] = room, {name: pixels[name][k] for name in PIXELS}
+            rendered[room.index] = room, {name: values[k] for name, values in pixels.items()}
 
     for view, same in views.items():
         for start in range(0, len(same), most):
@@ -223,12 +226,16 @@ def _render(
     return rendered
 
 
+def _stored(room: Room, name: str) -> Array:
+    return room.truth[name] if name in room.truth else np.asarray(getattr(room, name))
+
+
 def _within_tolerance(name: str, stored: Array, again: Array, spec: DatasetSpec) -> bool:
     """Return whether two arrays of pixels, (H, W, ...), agree as far as other versions can."""
     most: float | Array
     a, b = stored.astype(np.float64), again.astype(np.float64)
     if name != "image":
-        most = {"depth": DEPTH_TOLERANCE, "normal": NORMAL_TOLERANCE, "object_id": 0.0}[name]
+        most = {"depth": DEPTH_TOLERANCE, "normal": NORMAL_TOLERANCE}.get(name, 0.0)
     elif spec.shading == "path":
         # Another release may draw other paths: only the mean of each channel is comparable.
         means = a.mean(axis=(0, 1)), b.mean(axis=(0, 1))

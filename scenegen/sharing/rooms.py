@@ -10,7 +10,7 @@ from scenegen.common.records import check
 from scenegen.description.specs import BUILT_IN
 from scenegen.files.manifest import manifest_path
 from scenegen.files.schema import Column
-from scenegen.layout import columns, markdown_table
+from scenegen.layout import columns, fields, markdown_table
 from scenegen.rooms.reader import RoomsFile
 from scenegen.sharing.card import (
     HDF5,
@@ -193,10 +193,19 @@ def _description(files: Sequence[str | Path], tallies: Sequence[Tally]) -> DataD
         facts={"Files": facts, "What they hold": counts_table("images", names, tallies)},
         commands=commands,
         requests=requests,
-        layout=markdown_table(),
+        layout=markdown_table(_all_fields(files)),
         responsible={**RESPONSIBLE, "machine_annotation_tools": sorted(tools)},
         notes={"Reading": READING, "Splits": _splits(tallies)},
     )
+
+
+def _all_fields(files: Sequence[str | Path]) -> list[Column]:
+    """Return the columns of all files, each once."""
+    every: dict[str, Column] = {}
+    for file in files:
+        with RoomsFile(file) as rooms:
+            every |= {field.name: field for field in fields(rooms.spec)}
+    return list(every.values())
 
 
 def _files_of(rooms: RoomsFile) -> list[SharedFile]:

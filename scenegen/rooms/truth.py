@@ -1,0 +1,194 @@
+"""Further truth, which `--with` adds to the rows of a file: made here, and checked here.
+
+Masks of whole objects are rendered. All else follows from depth, cameras, poses and reflectance
+(`scenegen.derived`), and is stored so that readers need no code of ours.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.camera import back_project, pixel_directions, transform_points, transform_vectors
+from scenegen.derived import albedo, object_coordinates, optical_flow, seen_from
+from scenegen.rendering.packing import SceneBatch
+
+Array = NDArray[Any]
+COORDINATE_TOLERANCE = 1e-5  # bounding radii
+FLOW_TOLERANCE = 1e-3  # pixels
+EDGE_SHARE = 1e-3  # of pixels whose visibility rounding may turn
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """What the truth of one image follows from; a `reader.Room` has the same attributes."""
+
+    depth: Array
+    normal: Array
+    object_id: Array
+    world_from_camera: Array
+    fov_y_degrees: float
+
+    @property
+    def points_world(self) -> Array:
+        """Surface points in the world frame, (H, W, 3)."""
+        return transform_points(
+            self.world_from_camera, back_project(self.depth, self.fov_y_degrees)
+        )
+
+
+def further_truth(
+    batch: SceneBatch, first: int, pixels: Mapping[str, Array], masks: Array | None
+) -> dict[str, Array]:
+    """Return what `batch.spec.truth` asks for, by column, of the V views of one scene.
+
+    Args:
+        first: number of the scene's first image in the batch.
+        pixels: its depth, normal and object_id, (V, ...).
+        masks: as from `amodal.amodal_masks`, (V, K, H, W); needed for "amodal" only.
+    """
+    truth, made = batch.spec.truth, dict[str, Array]()
+    images = range(first, first + len(pixels["depth"]))
+    maps = zip(pixels["depth"], pixels["normal"], pixels["object_id"], strict=True)
+    views = [
+        View(depth, normal, ids, batch.world_from_camera[i], float(batch.fov_y_degrees[i]))
+        for (depth, normal, ids), i in zip(maps, images, strict=True)
+    ]
+    if masks is not None:
+        made["object/amodal_mask"] = masks.astype(np.uint8)
+        made["object/visible_fraction"] = np.stack(
+            [visible_fraction(v.object_id, m) for v, m in zip(views, masks, strict=True)]
+        )
+    if "coordinates" in truth:
+        poses = batch.world_from_object[images.start : images.stop]
+        made["object_coordinates"] = np.stack(
+            [coordinates(v, p) for v, p in zip(views, poses, strict=True)]
+        )
+    if "flow" in truth:
+        pairs = [flow(v, views[(i + 1) % len(views)]) for i, v in enumerate(views)]
+        made["flow"], made["flow_occluded"] = (np.stack(part) for part in zip(*pairs, strict=True))
+    if "albedo" in truth:
+        rho = batch.reflectance[images.start : images.stop]
+        made["albedo"] = np.stack(
+            [albedo(v.object_id, r).astype(np.float32) for v, r in zip(views, rho, strict=True)]
+        )
+    return made
+
+
+def visible_fraction(object_id: Array, masks: Array) -> NDArray[np.float32]:
+    """Return which part of each object's silhouette shows it, (K,); 0 where there is none.
+
+    Args:
+        object_id: (H, W).
+        masks: whole silhouettes, (K, H, W).
+    """
+    whole = masks.astype(bool).sum(axis=(1, 2))
+    shown = np.array([np.count_nonzero(object_id == k + 1) for k in range(len(masks))])
+    return np.asarray((shown / np.maximum(whole, 1)).astype(np.float32))
+
+
+def coordinates(view: Any, world_from_object: Array) -> NDArray[np.float32]:
+    """Return `derived.object_coordinates` of a view as they are stored, (H, W, 3)."""
+    found = object_coordinates(view.points_world, view.object_id, world_from_object)
+    return found.astype(np.float32)
+
+
+def flow(view: Any, other: Any) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    """Return the flow from a view to another one, (H, W, 2), and where it is occluded, (H, W).
+
+    Occluded is 1 where the other view does not show the point, and where there is none.
+    """
+    moved = optical_flow(
+        view.depth,
+        view.world_from_camera,
+        other.world_from_camera,
+        view.fov_y_degrees,
+        other.fov_y_degrees,
+    )
+    seen = seen_from(
+        view.points_world,
+        view.object_id,
+        other.depth,
+        other.normal,
+        other.object_id,
+        other.world_from_camera,
+        other.fov_y_degrees,
+    )
+    return moved.astype(np.float32), (~seen).astype(np.uint8)
+
+
+def truth_problems(
+    truth: Sequence[str], stored: Mapping[str, Array], view: Any, other: Any, scene: Any
+) -> Iterable[tuple[str, str]]:
+    """Yield name of the truth and a sentence for each problem of one row.
+
+    Args:
+        truth: what the file holds, as `DatasetSpec.truth`.
+        stored: values of the columns of this module, `material/reflectance` and
+            `object/world_from_object` of the row.
+        view, other: the row, and the one of the next view; `View`s or `Room`s.
+        scene: its description.
+    """
+    if "amodal" in truth:
+        for problem in _amodal_problems(stored, view, len(scene.objects)):
+            yield "amodal", problem
+    if "coordinates" in truth:
+        expected = coordinates(view, stored["object/world_from_object"])
+        if not np.allclose(
+            stored["object_coordinates"],
+            expected,
+            rtol=0,
+            atol=COORDINATE_TOLERANCE,
+            equal_nan=True,
+        ):
+            yield "coordinates", "object coordinates are not those of depth and poses"
+    if "flow" in truth:
+        moved, occluded = flow(view, other)
+        if not np.allclose(stored["flow"], moved, rtol=0, atol=FLOW_TOLERANCE, equal_nan=True):
+            yield "flow", "flow is not that of depth and cameras"
+        if (stored["flow_occluded"] != occluded).mean() > EDGE_SHARE:
+            yield "flow", "occlusion is not that of depth and cameras"
+    if "albedo" in truth:
+        rho = albedo(view.object_id, stored["material/reflectance"]).astype(np.float32)
+        if not np.array_equal(stored["albedo"], rho, equal_nan=True):
+            yield "albedo", "albedo is not the reflectance of the object ids"
+
+
+def _amodal_problems(stored: Mapping[str, Array], view: Any, count: int) -> Iterable[str]:
+    masks = stored["object/amodal_mask"]
+    if masks.max() > 1 or masks[count:].any():
+        yield "a mask holds other values than 0 and 1, or belongs to no object"
+        return
+    fraction = visible_fraction(view.object_id, masks)
+    if not np.array_equal(stored["object/visible_fraction"], fraction):
+        yield "visible fractions are not those of masks and object ids"
+    reach = _reach_of_spheres(view, stored["object/world_from_object"][:count])
+    for k in range(count):
+        mask = masks[k] > 0
+        if not mask[view.object_id == k + 1].all():
+            yield f"the mask of object {k + 1} lacks pixels that show it"
+        if not (mask <= (reach[k] > 0)).all():
+            yield f"the mask of object {k + 1} leaves its bounding sphere"
+        elif not (view.depth[mask] <= reach[k][mask] + 1e-4).all():
+            yield f"something farther than object {k + 1} shows in its mask"
+
+
+def _reach_of_spheres(view: Any, world_from_object: Array) -> Array:
+    """Return the depth at which each pixel's ray leaves each bounding sphere, (K, H, W).
+
+    It is -1 where the ray misses the sphere.
+    """
+    height, width = view.depth.shape
+    local = pixel_directions(height, width, view.fov_y_degrees)
+    rays = transform_vectors(view.world_from_camera, local)
+    squared = np.einsum("yxi,yxi->yx", rays, rays)
+    reach = np.full((len(world_from_object), *view.depth.shape), -1.0)
+    for k, matrix in enumerate(world_from_object):
+        toward = matrix[:3, 3] - view.world_from_camera[:3, 3]
+        middle = rays @ toward / squared
+        radius = np.linalg.norm(matrix[:3, 0]) * 1.001
+        inside = radius**2 - (toward @ toward - middle**2 * squared)
+        reach[k] = np.where(inside > 0, middle + np.sqrt(np.maximum(inside, 0) / squared), -1.0)
+    return reach
