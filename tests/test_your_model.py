@@ -6,7 +6,6 @@ import pytest
 from page_blocks import blocks, run_block
 
 BLOCKS = blocks("your-model.md")
-SPLIT = "iqtt make-split --size 32 --train 6 --labeled 3 --val 3 --test 9 --out iqtt-split"
 SCORE_ANSWERS = "bench score answers.h5 --truth iqtt-split/iqtt-test-answers.h5"
 BATCHES = {
     "class Rooms(Dataset)": "torch.Size([16, 3, 32, 32]) torch.Size([16, 32, 32])\n" * 4,
@@ -18,11 +17,14 @@ BATCHES = {
 def test_the_programs_read_every_row_and_what_they_write_can_be_scored(tmp_path):
     """One test, so that one worker runs the page, once."""
     pytest.importorskip("datasets")
-    run_block("bash", "", SPLIT, tmp_path)
     printed = {block[2]: run_block(*block, tmp_path) for block in BLOCKS}
     for words, lines in BATCHES.items():
         assert [text for code, text in printed.items() if words in code] == [lines]
     (scored,) = [text for code, text in printed.items() if "bench validate" in code]
     assert scored.startswith("mine.h5: valid\nmine: 32 images of 32 scenes of rooms.h5\n")
+    (training,) = [text for code, text in printed.items() if "metrics.evaluate(" in code]
+    first, second, last = (line.split() for line in training.splitlines())
+    assert float(second[2]) < float(first[2])  # half the shift has half the error
+    assert float(last[0]) == pytest.approx(0.025, rel=1e-3)
     assert json.loads((tmp_path / "mine.json").read_text())["summary"]["comparable"]
     assert "9 questions" in run_block("bash", "", SCORE_ANSWERS, tmp_path)

@@ -102,7 +102,8 @@ def run_model(
     with OpenFile(data, KIND) as opened:
         questions = holds_questions(opened)
     texts: dict[str, Any] = {"method": method, "run": run, "notes": notes, "overwrite": overwrite}
-    settings = {"model": model.sha256, **call.settings, "options": options or {}}
+    kept = {name: value for name, value in (options or {}).items() if name != "batch"}
+    settings = {"model": model.sha256, **call.settings, "options": kept}
     runner = _run_questions if questions else _run_rooms
     return runner(model, data, out, call, texts, settings, keep, progress)
 
