@@ -16,6 +16,7 @@ from scenegen.files.schema import DIGEST, Column, Format
 FORMAT_NAME = "pix2shape-bench/rooms"
 FORMAT_VERSION = "1.0"
 TRUTH_DIGEST = "truth_digest"
+WITHHELD = "withheld"  # "truth" in files of images and cameras alone
 CONVENTIONS = (
     "world: right-handed, y up, room = unit box with floor y = 0 and walls x = 0, z = 0; camera:"
     " x right, y up, looks along -z; pixels: row 0 on top, centres at +0.5; see docs/conventions.md"
@@ -38,7 +39,9 @@ FORMAT = Format(
         "fingerprint": DIGEST,
         TRUTH_DIGEST: DIGEST,
         CONTENT_DIGEST: DIGEST,
+        WITHHELD: "truth",
     },
+    optional=frozenset((WITHHELD,)),
 )
 # The datasets that scores depend on: the root attribute TRUTH_DIGEST is their joint digest.
 SCORED = (

@@ -4,6 +4,7 @@
     rows.py       a row of a table: training runs, their predictions, one score file for each column
     questions.py  Table 3: the accuracy of every method on every kind of question
     rooms.py      scores of rooms, as in Tables 1 and 2
+    perturbations.py  what each score sees: the truth spoilt in one way at a time, as a picture
     studies.py    the ablations of the paper: losses, depth supervision, mutual information
 
 Everything is kept in one folder. A product is not made again if the same commands made it from the

@@ -18,6 +18,7 @@ from metrics.submissions.rules import Against, as_doubles, value_problems
 from scenegen.common.errors import FileFormatError
 from scenegen.files import trial
 from scenegen.rooms.reader import RoomsFile
+from scenegen.rooms.withheld import truth_beside, truth_path
 
 if TYPE_CHECKING:
     from iqtt.files.reader import AnswersFile, QuestionsFile
@@ -65,8 +66,8 @@ def find_truth(predictions: Predictions, named: str | Path | None = None) -> Fou
     That is `named`, or else the path recorded in the submission, taken from the submission's folder
     and then from the working directory; a file of a stranger's choice is tried in another process.
     Only a regular file, or a link to one, is a truth. For a test file without answers it is the
-    file of answers beside it (iqtt-test-answers.h5). Where `named` is there, nothing that the
-    submission names is looked at.
+    file of answers beside it (iqtt-test-answers.h5), for rooms without truth rooms-truth.h5. Where
+    `named` is there, nothing that the submission names is looked at.
 
     Raises FileFormatError where nothing lies there, with the places that were looked at, and as
     `trial.try_file`.
@@ -84,6 +85,10 @@ def find_truth(predictions: Predictions, named: str | Path | None = None) -> Fou
             from iqtt.files.reader import answers_beside
 
             truth = answers_beside(place) or place
+        elif os.path.isfile(truth_path(place)):
+            if named is None:
+                trial.try_file(place)
+            truth = truth_beside(place) or place
         if named is None:  # whoever made the submission may have chosen the file
             trial.try_file(truth)
         return FoundTruth(truth, "submission" if named is None else "given")
@@ -107,6 +112,9 @@ def match_problems(
         expected = f"{(truth.fingerprint or 'none'):.12}, that of {truth.path}"
         return [Problem("truth_fingerprint", "match", expected, found)]
     problems = []
+    if isinstance(truth, RoomsFile) and not truth.has_truth:
+        expected = f"the file of truth, such as {truth_path(truth.path).name}"
+        return [Problem("truth", "present", expected, f"{truth.path}, rooms without truth")]
     if isinstance(predictions, RoomPredictions) and isinstance(truth, RoomsFile):
         height, width = truth.spec.height, truth.spec.width
         if (predictions.height, predictions.width) != (height, width):

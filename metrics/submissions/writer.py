@@ -111,7 +111,10 @@ class RoomPredictionWriter:
             raise PredictionError(self._path, "not open", "rows to be added inside the with block")
         row = self._checked_row(row)
         where = f"{self._path}: row {row}"
-        surface = np.isfinite(self._truth.read("depth", row))
+        if self._truth.has_truth:
+            surface = np.isfinite(self._truth.read("depth", row))
+        else:
+            surface = np.ones((self._truth.spec.height, self._truth.spec.width), np.bool_)
         sizes = dict(zip(("y", "x"), ((size,) for size in surface.shape), strict=True))
         images = {"depth": depth, "disparity": disparity, "points": points, "normal": normal}
         values = {}

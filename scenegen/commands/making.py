@@ -112,6 +112,9 @@ def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> l
               " one.")
 @SCHEDULER
 @DEVICE
+@click.option("--withhold-truth", is_flag=True,
+              help="Write images, cameras and row numbers to --out, to be handed out, and the whole"
+              " to a file beside it (rooms-truth.h5). Choose a large --seed that nobody guesses.")
 @OVERWRITE
 def render(
     count: int,
@@ -124,6 +127,7 @@ def render(
     scheduler: str | None,
     device: str,
     compression: str,
+    withhold_truth: bool,
     overwrite: bool,
     **settings: Any,
 ) -> None:
@@ -147,6 +151,7 @@ def render(
     spec = preset_spec(preset, **chosen, **source.settings)
     images = count * len(spec.views)
     started = time.perf_counter()
+    handed_out, out = out, _truth_place(out, overwrite) if withhold_truth else out
     with (
         _told_how_to_go_on(out),
         on_scheduler(scheduler, workers, partial(renderer_identity, device)) as cluster,
@@ -167,6 +172,11 @@ def render(
             cluster=cluster,
             progress=bar.update,
         )
+    if withhold_truth:
+        from scenegen.rooms.withheld import withhold_truth as withhold
+
+        withhold(out, handed_out, overwrite)
+        print_line(f"{handed_out}: images and cameras, to be handed out; {out} has the truth")
     seconds = time.perf_counter() - started
     megabytes = _set_bytes(out) / 1e6
     print_line(f"{out}: {images} images, {megabytes:.1f} MB, {images / seconds:.0f} images/s")
@@ -175,6 +185,20 @@ def render(
 
 
 # fmt: on
+def _truth_place(out: str, overwrite: bool) -> str:
+    """Return the file of truth that belongs to a file to be handed out. Raises OSError, SpecError.
+
+    Its rows are copied when it is complete, so both are files of this machine.
+    """
+    from scenegen.common.records import check
+    from scenegen.files.new_file import check_writable
+    from scenegen.rooms.withheld import truth_path
+
+    check("://" not in out, "--withhold-truth", out, "a path of this machine")
+    check_writable(Path(out), overwrite)
+    return str(truth_path(out))
+
+
 def _set_bytes(out: str) -> int:
     """Return the size of a file of rooms and of its shards, if it has any."""
     from scenegen.files.places import as_place, listing

@@ -20,10 +20,19 @@ from scenegen.files.content import SHA256, joint_digest
 from scenegen.files.input_file import describing
 from scenegen.files.rows import RowDataset, RowFile, chosen_rows
 from scenegen.files.shards import OpenFile
-from scenegen.layout import FORMAT, FURTHER, SCORED, TRUTH_DIGEST, columns
+from scenegen.layout import FORMAT, FURTHER, SCORED, TRUTH_DIGEST, WITHHELD, columns
 from scenegen.rendering.ground_truth import decode_image
 
 Array = NDArray[Any]
+# What a file without truth holds.
+INPUT = (
+    "image",
+    "scene_index",
+    "view_index",
+    "view_angle_degrees",
+    "camera/world_from_camera",
+    "camera/fov_y_degrees",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +82,7 @@ class RoomsFile(RowFile):
         spec: the request that it answers.
         fingerprint: SHA-256 of request and scenes (`content.fingerprint`).
         further: names of the columns of `layout.FURTHER` that it holds.
+        has_truth: whether it holds more than INPUT; see `rooms.withheld`.
     """
 
     SCORED = SCORED
@@ -95,7 +105,8 @@ class RoomsFile(RowFile):
         self._count_rows("image")
         if not len(self):
             raise FileFormatError(f"{self.path}: image", "no rows", "at least one")
-        self._take("", columns(self.spec))
+        self.has_truth = WITHHELD not in self.attributes
+        self._take("", [c for c in columns(self.spec) if self.has_truth or c.name in INPUT])
 
     @overload
     def __getitem__(self, index: int) -> Room: ...
@@ -137,6 +148,14 @@ class RoomsFile(RowFile):
     def _described(self, row: int, text: bytes) -> SceneSpec:
         with describing(f"{self.path}: scene, row {row}"):
             return SceneSpec.from_json(text)
+
+    def check_field(self, name: str) -> None:
+        """Raise SpecError unless `read` takes this name, FileFormatError if it is withheld."""
+        if not self.has_truth and name in {c.name for c in columns(self.spec)} - {*INPUT}:
+            beside = f"{self.path.stem}-truth{self.path.suffix}"
+            hint = f"the file of truth has it, such as {beside}"
+            raise FileFormatError(f"{self.path}: {name}", "rooms without truth", "it", hint)
+        super().check_field(name)
 
     def reopener(self) -> Callable[[], "RoomsFile"]:
         """Return a function, which can be pickled, that opens the same rows again."""
