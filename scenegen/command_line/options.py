@@ -120,6 +120,15 @@ class Color(_Parsed):
         return channels if len(channels) == 3 else channels * 3
 
 
+class Reflectance(Color):
+    """A `Color`, or `own`."""
+
+    name, expected = f"own, {Color.name}", f"own, {Color.expected}"
+
+    def _parse(self, text: str) -> Any:
+        return text if text == "own" else super()._parse(text)
+
+
 # fmt: off
 WORKERS = click.option("--workers", type=click.IntRange(0, 256), default=0,
                        show_default="one a processor, up to 8",

@@ -26,6 +26,7 @@ from scenegen.command_line.options import (
     Names,
     Numbers,
     Range,
+    Reflectance,
     Size,
 )
 from scenegen.command_line.output import on_scheduler, print_line, progress_bar
@@ -71,8 +72,9 @@ def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> l
               help="Fewest pixels that show an object, in every view [0.3%].")
 @click.option("--allow-cropped", is_flag=True, default=None,
               help="Let the image's border cut objects.")
-@click.option("--reflectance", type=Color(),
-              help="Reflectance of objects; also of the room, without --room-reflectance [0.8].")
+@click.option("--reflectance", type=Reflectance(),
+              help="Reflectance of objects; also of the room, without --room-reflectance [0.8];"
+              " with own, meshes from a folder keep their colours, times 0.8.")
 @click.option("--room-reflectance", type=Color(), help="Reflectance of floor and walls.")
 @click.option("--random-reflectance/--same-reflectance", default=None,
               help="Whether each object gets a random colour or all the same [same].")
@@ -145,6 +147,9 @@ def render(
     names = ("shapes", "classes", "object_split", "shapenet_root", "objects_root", "up")
     objects = {name: settings.pop(name) for name in (*names, "cache_dir")}
     chosen = {name: value for name, value in settings.items() if value is not None}
+    if chosen.get("reflectance") == "own":
+        del chosen["reflectance"]
+        chosen["own_reflectance"] = True
     if size is not None:
         chosen["height"], chosen["width"] = size
     source = object_source(preset, **objects)

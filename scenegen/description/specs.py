@@ -34,7 +34,10 @@ LIMITS: dict[str, tuple[float, float]] = {  # of settings that are a number or a
     "light_level": (0.0, 100.0),
     "light_saturation": (0.0, 1.0),
 }
-LATER: dict[str, object] = {"truth": ()}  # fields that came after 1.0, with their defaults
+LATER: dict[str, object] = {
+    "truth": (),
+    "own_reflectance": False,
+}  # fields that came after 1.0, with their defaults
 CHOICES = {
     "image_dtype": IMAGE_DTYPES,
     "shading": ("paper", "path"),
@@ -82,6 +85,8 @@ class DatasetSpec:
         random_reflectance: draw every object's instead, from 0.15 to 0.95 each.
         specular, shininess: ranges of Phong's k_s and exponent of objects; the room is matte.
         truth: further truth of each row, some of TRUTHS (`rooms.truth`).
+        own_reflectance: multiply the reflectance of objects by the colours of their files; the
+            truth then has "albedo", as no other column tells it.
     """
 
     seed: int = 0
@@ -116,6 +121,7 @@ class DatasetSpec:
     specular: tuple[float, float] = (0.0, 0.0)
     shininess: tuple[float, float] = (1.0, 1.0)
     truth: tuple[str, ...] = ()
+    own_reflectance: bool = False
 
     def __post_init__(self) -> None:
         normalise(self)
@@ -229,6 +235,13 @@ def _check_places(spec: DatasetSpec) -> None:
 
 
 def _check_truth(spec: DatasetSpec) -> None:
+    if spec.own_reflectance:
+        where, meshes = "own reflectance", "meshes from a folder"
+        check(spec.source in FOLDERS, where, spec.source, meshes)
+        check(spec.shading == "paper", where, f"shading {spec.shading}", "shading 'paper'")
+        both = "one of own and random reflectance"
+        check(not spec.random_reflectance, where, "with random reflectance", both)
+        object.__setattr__(spec, "truth", (*spec.truth, "albedo"))
     wrong = [name for name in spec.truth if name not in TRUTHS]
     check(not wrong, "truth", ", ".join(wrong), f"some of {', '.join(TRUTHS)}")
     object.__setattr__(spec, "truth", tuple(name for name in TRUTHS if name in spec.truth))

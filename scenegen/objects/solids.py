@@ -48,6 +48,7 @@ class UnitShape:
         is_sphere: whether it is the unit sphere, which path tracers know.
         surface: what is rendered instead of the triangles; None if those are rendered.
         coarse: as from `coarse_hulls.coarse_hull`, if it was kept.
+        make_colors: returns `colors`; None for a shape without colours of its own.
     """
 
     name: str
@@ -59,6 +60,14 @@ class UnitShape:
     is_sphere: bool = False
     surface: Surface | None = None
     coarse: tuple[Array, float] | None = None
+    make_colors: Callable[[], Array] | None = None
+
+    @cached_property
+    def colors(self) -> Array:
+        """Own colours at the corners of the faces: linear RGB, 0 to 1, (F, 3, 3); 1 without any."""
+        if self.make_colors is None:
+            return np.ones((len(self.mesh.faces), 3, 3), np.float32)
+        return self.make_colors()
 
     @cached_property
     def mesh(self) -> Mesh:

@@ -21,7 +21,13 @@ from scenegen.rendering.cubes import Cubes, closest_cube, upload_cubes
 from scenegen.rendering.model_scene import GRID, model_scene
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.pixel_samples import SAMPLE_STEPS
-from scenegen.rendering.rasteriser import Triangles, nearest_triangle, rasterise, upload_triangles
+from scenegen.rendering.rasteriser import (
+    Triangles,
+    color_of_nearest,
+    nearest_triangle,
+    rasterise,
+    upload_triangles,
+)
 from scenegen.rendering.rays import (
     BEFORE_LIGHTS,
     OBJECT,
@@ -30,10 +36,11 @@ from scenegen.rendering.rays import (
     nearer_than_room,
     normal_at,
     radiance_at,
+    reflectance_at,
     visible_normal,
 )
 from scenegen.rendering.surfaces.in_kernel import upload_surfaces
-from scenegen.rendering.tables import gather_row, upload_table
+from scenegen.rendering.tables import gather_row, upload_rows, upload_table
 from scenegen.rendering.unit_scene import UnitScene, unit_scene
 
 Array = NDArray[Any]
@@ -54,7 +61,11 @@ def launch_pixels(
     cubes = upload_cubes(batch) if batch.cubes_only else None
     if batch.spec.source != "shapes":
         meshes = upload_triangles(batch, models, padded_rays(batch.spec))
-    everything = _trace(batch, scenes, cameras, cubes, meshes)
+    colors = None
+    if batch.spec.own_reflectance:
+        own = [batch.shape_of(name).colors.reshape(-1, 9) for name in shown]
+        colors = upload_rows([np.ones((0, 9)), *own])[0]
+    everything = _trace(batch, scenes, cameras, cubes, meshes, colors)
     components = {name: everything[name] for name in fields}
     dr.eval(components)
     spec, count = batch.spec, len(batch)
@@ -134,9 +145,17 @@ def padded_rays(spec: DatasetSpec) -> int:
 
 
 def _trace(
-    batch: SceneBatch, scenes: Scenes, cameras: Any, cubes: Cubes | None, meshes: Triangles | None
+    batch: SceneBatch,
+    scenes: Scenes,
+    cameras: Any,
+    cubes: Cubes | None,
+    meshes: Triangles | None,
+    colors: Any,
 ) -> dict[str, list[Any]]:
-    """Return the components of the fields of `GroundTruth` for every ray, not yet evaluated."""
+    """Return the components of the fields of `GroundTruth` for every ray, not yet evaluated.
+
+    `colors` are those of the corners of all triangles, (F, 9), or None.
+    """
     spec = batch.spec
     height, width, rays = spec.height, spec.width, padded_rays(spec)
     index = dr.arange(mi.UInt32, len(batch) * rays)
@@ -147,20 +166,26 @@ def _trace(
     camera = gather_row(cameras, item, 13)
     right, up, back, origin = (mi.Vector3f(*camera[i:12:4]) for i in range(4))
 
-    def look(x: Any, y: Any) -> tuple[Any, Any, Any, Any]:
-        """Return what the rays through the point (x, y) of each pixel meet: t, id, normal, colour.
+    def look(x: Any, y: Any) -> tuple[Any, Any, Any, Any, Any]:
+        """Return what the rays through the point (x, y) of each pixel meet.
+
+        That is t, object id, normal, radiance and own colour.
 
         Their directions have -z = 1 in the camera frame, so t is planar depth.
         """
         dx = (mi.Float(column) + x - width / 2) * camera[12]
         dy = (height / 2 - (mi.Float(row) + y)) * camera[12]
         d = right * dx + up * dy - back
+        own = mi.Vector3f(1)
         if cubes:
             t, object_id, n = closest_cube(cubes, item, origin, d)
         elif meshes:
             keys = rasterise(meshes, x, y)
             hit = nearest_triangle(meshes, keys, item * rays + pixel, dx, dy)
             t, object_id, flat, smooth = nearer_than_room(scenes, item, origin, d, hit)
+            if colors is not None:
+                color = color_of_nearest(meshes, keys, item * rays + pixel, dx, dy, colors)
+                own = dr.select(object_id > 0, color, own)
         else:
             t, object_id, face, uv = closest_hit(scenes, item, origin, d)
         p = origin + dr.select(object_id >= 0, t, 0) * d
@@ -168,11 +193,13 @@ def _trace(
             n = visible_normal(scenes, item, p, d, object_id, (flat, smooth))
         elif not cubes:
             n = normal_at(scenes, item, p, d, object_id, face, uv)
-        return t, object_id, n, radiance_at(scenes, item, p, d, n, object_id, spec.shadows)
+        tint = None if colors is None else own
+        radiance = radiance_at(scenes, item, p, d, n, object_id, spec.shadows, tint)
+        return t, object_id, n, radiance, own
 
     # Positions in a pixel are variables for the rasteriser, whose kernel serves all of them.
     middle = dr.opaque(mi.Float, 0.5) if meshes else 0.5
-    t, object_id, n, image = look(middle, middle)
+    t, object_id, n, image, own = look(middle, middle)
     if spec.spp > 1:
         total = image if spec.spp % 2 else mi.Vector3f(0)
         image = _sum_of_samples(total, spec.spp // 2 * 2, look, bool(meshes)) / spec.spp
@@ -181,7 +208,9 @@ def _trace(
     elif spec.image_dtype == "float16":
         image = _cast(dr.float16_array_t(mi.Vector3f), image)
     normal = mi.Vector3f(dr.dot(n, right), dr.dot(n, up), dr.dot(n, back))
+    albedo = dr.select(object_id >= 0, reflectance_at(scenes, item, object_id) * own, dr.nan)
     return {
+        "albedo": list(albedo),
         "image": list(image),
         "depth": [dr.select(object_id >= 0, t, dr.nan)],
         "normal": list(normal),

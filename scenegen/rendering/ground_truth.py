@@ -22,12 +22,19 @@ class GroundTruth:
         normal: unit normal in the camera frame, facing the viewer, (B, H, W, 3) float32; zero
             where the ray hits nothing.
         object_id: (B, H, W) int8; -1 nothing, 0 the room, k the k-th object, counting from 1.
+        albedo: linear RGB reflectance, (B, H, W, 3) float32, NaN where the ray hits nothing; None
+            unless objects have colours of their own, as it then follows from object ids.
     """
 
     image: Array
     depth: Array
     normal: Array
     object_id: Array
+    albedo: Array | None = None
+
+    def pixels(self) -> dict[str, Array]:
+        """Return the fields that there are, by name."""
+        return {name: values for name, values in vars(self).items() if values is not None}
 
 
 def encode_image(radiance: Array, dtype: str) -> Array:

@@ -192,18 +192,9 @@ def nearest_triangle(triangles: Triangles, keys: Any, ray: Any, dx: Any, dy: Any
         dx, dy: its direction in the camera frame, where z is -1.
     """
     key = dr.gather(_key(), keys, ray)
-    hit = key != NOTHING
-    thread = mi.UInt32(dr.select(hit, key & 0xFFFFFFFF, 0))
+    hit, thread, draw, u, v = _barycentrics(triangles, key, dx, dy)
     depth = dr.reinterpret_array(mi.Float, mi.UInt32(key >> 32))
-    draw = dr.gather(mi.UInt32, triangles.draw, thread, hit)
     corners, vertex = _corners(triangles, thread, draw)
-    a, b, c, _ = _in_camera(triangles, draw, corners)
-    sides = [
-        dx * n.x + dy * n.y - n.z for n in (_edge_plane(b, c), _edge_plane(c, a), _edge_plane(a, b))
-    ]
-    total = sides[0] + sides[1] + sides[2]
-    inverse = dr.select(total == 0, 0, 1 / total)
-    u, v = sides[1] * inverse, sides[2] * inverse
     slot = dr.gather(mi.UInt32, triangles.slot, draw, hit)
     flat = _cross(corners[1] - corners[0], corners[2] - corners[0])
     first = dr.gather(mi.Vector4u, triangles.starts, draw, hit).w
@@ -212,6 +203,34 @@ def nearest_triangle(triangles: Triangles, keys: Any, ray: Any, dx: Any, dy: Any
     p, q, r = (mi.Vector3f(row.x, row.y, row.z) for row in rows)
     smooth = dr.select(curved, (1 - u - v) * p + u * q + v * r, flat)
     return dr.select(hit, depth, dr.inf), slot, flat, smooth
+
+
+def color_of_nearest(
+    triangles: Triangles, keys: Any, ray: Any, dx: Any, dy: Any, colors: Any
+) -> Any:
+    """Return the colour where rays meet what `nearest_triangle` finds, blended between corners.
+
+    `colors` has RGB of the three corners of each triangle, (F, 9), in the order of all models.
+    """
+    hit, thread, draw, u, v = _barycentrics(triangles, dr.gather(_key(), keys, ray), dx, dy)
+    face = thread + dr.gather(mi.Vector4u, triangles.starts, draw, hit).y
+    row = gather_row(colors, dr.select(hit, face, 0), 9)
+    p, q, r = (mi.Vector3f(*row[i : i + 3]) for i in (0, 3, 6))
+    return (1 - u - v) * p + u * q + v * r
+
+
+def _barycentrics(triangles: Triangles, key: Any, dx: Any, dy: Any) -> tuple[Any, ...]:
+    """Return whether a key is of a triangle, its thread and draw, and the hit's u and v on it."""
+    hit = key != NOTHING
+    thread = mi.UInt32(dr.select(hit, key & 0xFFFFFFFF, 0))
+    draw = dr.gather(mi.UInt32, triangles.draw, thread, hit)
+    a, b, c, _ = _in_camera(triangles, draw, _corners(triangles, thread, draw)[0])
+    sides = [
+        dx * n.x + dy * n.y - n.z for n in (_edge_plane(b, c), _edge_plane(c, a), _edge_plane(a, b))
+    ]
+    total = sides[0] + sides[1] + sides[2]
+    inverse = dr.select(total == 0, 0, 1 / total)
+    return hit, thread, draw, sides[1] * inverse, sides[2] * inverse
 
 
 def _corners(triangles: Triangles, thread: Any, draw: Any) -> tuple[list[Any], list[Any]]:

@@ -195,10 +195,26 @@ def visible_normal(
     return dr.select(object_id >= 0, n, mi.Vector3f(0))
 
 
+def reflectance_at(scenes: Scenes, item: Any, object_id: Any) -> Any:
+    """Return rho of the room or the object of a hit."""
+    row = item * (1 + scenes.slots) + mi.UInt32(dr.maximum(object_id, 0))
+    return mi.Vector3f(*gather_row(scenes.materials, row, 5 if scenes.glossy else 3)[:3])
+
+
 def radiance_at(
-    scenes: Scenes, item: Any, p: Any, d: Any, n: Any, object_id: Any, shadows: bool
+    scenes: Scenes,
+    item: Any,
+    p: Any,
+    d: Any,
+    n: Any,
+    object_id: Any,
+    shadows: bool,
+    tint: Any = None,
 ) -> Any:
-    """Return the radiance of a hit by the shading equation (`shading.shade`), or the background."""
+    """Return the radiance of a hit by the shading equation (`shading.shade`), or the background.
+
+    `tint` is a factor of rho, or None.
+    """
     record = gather_row(scenes.scenes, item, BEFORE_LIGHTS + 6 * scenes.light_slots)
     row = item * (1 + scenes.slots) + mi.UInt32(dr.maximum(object_id, 0))
     total, shine = mi.Vector3f(*record[:3]), mi.Vector3f(0)
@@ -222,6 +238,8 @@ def radiance_at(
             lobe = dr.select(amount > 0, specular * dr.power(toward, shininess) / falloff, 0)
             shine += lobe * mi.Vector3f(*light[3:])
     rho, background = mi.Vector3f(*material[:3]), mi.Vector3f(*record[8:BEFORE_LIGHTS])
+    if tint is not None:
+        rho = rho * tint
     return dr.select(object_id >= 0, rho * total + shine, background)
 
 

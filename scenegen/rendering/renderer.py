@@ -57,7 +57,10 @@ def launch(batch: SceneBatch, device: str = "auto") -> Callable[[], GroundTruth]
     The caller can do other work in between. The scalar fallback does all its work in the second
     call.
     """
-    fetch = launch_fields(batch, tuple(field.name for field in fields(GroundTruth)), device)
+    names = [field.name for field in fields(GroundTruth)]
+    if not batch.spec.own_reflectance:
+        names.remove("albedo")
+    fetch = launch_fields(batch, names, device)
     return lambda: GroundTruth(**fetch())
 
 
@@ -69,6 +72,8 @@ def launch_fields(
     if batch.spec.shading == "path" and "image" in names:
         return _with_traced_image(batch, names, variant, device)
     if variant == "scalar_rgb":
+        if batch.spec.own_reflectance:
+            raise BackendError("own reflectance", "no LLVM", hint=HOW_TO_GET_LLVM)
 
         def cast(name: str, origins: Array, directions: Array) -> tuple[Array, Array]:
             return _scalar_cast(batch.shape_of(name), origins, directions)

@@ -25,7 +25,7 @@ def renderer_identity(device: str = "auto") -> dict[str, str]:
     spec = DatasetSpec(seed=0, height=PIXELS, width=PIXELS)
     objects = objects_of(spec)
     _, drawn = sample_scenes(spec, [0] * 8, range(8), objects)
-    pixels = vars(render(pack(spec, [drawn.scene(0)], (0,), objects), device))
+    pixels = render(pack(spec, [drawn.scene(0)], (0,), objects), device).pixels()
     digest = hashlib.sha256(b"".join(pixels[name].tobytes() for name in sorted(pixels)))
     return {
         "writer": writer_name(),

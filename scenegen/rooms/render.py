@@ -146,7 +146,7 @@ def _shown(
         if not enough[images].all():
             yield None
             continue
-        pixels = {name: values[images] for name, values in vars(truth).items()}
+        pixels = {name: values[images] for name, values in truth.pixels().items()}
         whole = None if masks is None else masks[images]
         pixels |= further_truth(batch, first, pixels, whole)
         yield RenderedScene(scenes, row, batch, first, pixels, visible[images])

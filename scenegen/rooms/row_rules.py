@@ -103,7 +103,7 @@ def _further_problems(rooms: RoomsFile, block: RowBlock, room: Room) -> Iterable
             yield "flow", str(error)
             return
     stored = {**room.truth, **{name: block.read(name, room.index) for name in names}}
-    yield from truth_problems(rooms.spec.truth, stored, room, other, room.scene)
+    yield from truth_problems(rooms.spec, stored, room, other, room.scene)
 
 
 def _description_problems(
@@ -186,15 +186,19 @@ def _image_problems(
     if spec.spp > 1 or spec.shadows:
         # With shadows, or the mean of several samples, only a lower bound is known: ambient light.
         darkest = (batch.reflectance[0, : batch.object_count[0] + 1] * batch.ambient[0]).min(axis=0)
+        darkest = 0 * darkest if spec.own_reflectance else darkest
         if (room.object_id >= 0).all() and (radiance < darkest - 0.5 / 255 - 1e-3).any():
             yield "a pixel is darker than ambient light alone"
         return
     material = room.object_id.clip(0, spec.object_slots)
     specular, shininess = batch.gloss[0, material, 0], batch.gloss[0, material, 1]
+    rho = batch.reflectance[0, material]
+    if spec.own_reflectance:
+        rho = np.nan_to_num(room.truth["albedo"])
     matte = (
         np.nan_to_num(points),
         transform_vectors(room.world_from_camera, room.normal),
-        batch.reflectance[0, material],
+        rho,
         batch.light_position[0, : batch.light_count[0]],
         batch.light_color[0, : batch.light_count[0]],
         batch.ambient[0],

@@ -4,7 +4,7 @@ Masks of whole objects are rendered. All else follows from depth, cameras, poses
 (`scenegen.derived`), and is stored so that readers need no code of ours.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from scenegen.camera import back_project, pixel_directions, transform_points, transform_vectors
 from scenegen.derived import albedo, object_coordinates, optical_flow, seen_from
+from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.packing import SceneBatch
 
 Array = NDArray[Any]
@@ -46,7 +47,7 @@ def further_truth(
 
     Args:
         first: number of the scene's first image in the batch.
-        pixels: its depth, normal and object_id, (V, ...).
+        pixels: its depth, normal and object_id, (V, ...), and albedo where it was rendered.
         masks: as from `amodal.amodal_masks`, (V, K, H, W); needed for "amodal" only.
     """
     truth, made = batch.spec.truth, dict[str, Array]()
@@ -69,7 +70,7 @@ def further_truth(
     if "flow" in truth:
         pairs = [flow(v, views[(i + 1) % len(views)]) for i, v in enumerate(views)]
         made["flow"], made["flow_occluded"] = (np.stack(part) for part in zip(*pairs, strict=True))
-    if "albedo" in truth:
+    if "albedo" in truth and "albedo" not in pixels:
         rho = batch.reflectance[images.start : images.stop]
         made["albedo"] = np.stack(
             [albedo(v.object_id, r).astype(np.float32) for v, r in zip(views, rho, strict=True)]
@@ -120,17 +121,18 @@ def flow(view: Any, other: Any) -> tuple[NDArray[np.float32], NDArray[np.uint8]]
 
 
 def truth_problems(
-    truth: Sequence[str], stored: Mapping[str, Array], view: Any, other: Any, scene: Any
+    spec: DatasetSpec, stored: Mapping[str, Array], view: Any, other: Any, scene: Any
 ) -> Iterable[tuple[str, str]]:
     """Yield name of the truth and a sentence for each problem of one row.
 
     Args:
-        truth: what the file holds, as `DatasetSpec.truth`.
+        spec: of the file.
         stored: values of the columns of this module, `material/reflectance` and
             `object/world_from_object` of the row.
         view, other: the row, and the one of the next view; `View`s or `Room`s.
         scene: its description.
     """
+    truth = spec.truth
     if "amodal" in truth:
         for problem in _amodal_problems(stored, view, len(scene.objects)):
             yield "amodal", problem
@@ -152,8 +154,12 @@ def truth_problems(
             yield "flow", "occlusion is not that of depth and cameras"
     if "albedo" in truth:
         rho = albedo(view.object_id, stored["material/reflectance"]).astype(np.float32)
-        if not np.array_equal(stored["albedo"], rho, equal_nan=True):
+        own = (view.object_id > 0) & spec.own_reflectance
+        if not np.array_equal(stored["albedo"][~own], rho[~own], equal_nan=True):
             yield "albedo", "albedo is not the reflectance of the object ids"
+        shares = stored["albedo"][own] / np.maximum(rho[own], 1e-12)
+        if not ((shares >= 0) & (shares <= 1 + 1e-5)).all():
+            yield "albedo", "albedo of an object exceeds its reflectance"
 
 
 def _amodal_problems(stored: Mapping[str, Array], view: Any, count: int) -> Iterable[str]:

@@ -210,7 +210,7 @@ def _render(
         try:
             with np.errstate(all="ignore"):
                 batch = pack(rooms.spec, [room.scene for room in shown], (view,), objects)
-                pixels = vars(render(batch, device))
+                pixels = render(batch, device).pixels()
                 if "amodal" in rooms.spec.truth:
                     pixels[AMODAL] = amodal_masks(batch, device)
         except (SpecError, BadMeshError):
@@ -235,7 +235,8 @@ def _within_tolerance(name: str, stored: Array, again: Array, spec: DatasetSpec)
     most: float | Array
     a, b = stored.astype(np.float64), again.astype(np.float64)
     if name != "image":
-        most = {"depth": DEPTH_TOLERANCE, "normal": NORMAL_TOLERANCE}.get(name, 0.0)
+        tolerances = {"depth": DEPTH_TOLERANCE, "normal": NORMAL_TOLERANCE}
+        most = {**tolerances, "albedo": NORMAL_TOLERANCE}.get(name, 0.0)
     elif spec.shading == "path":
         # Another release may draw other paths: only the mean of each channel is comparable.
         means = a.mean(axis=(0, 1)), b.mean(axis=(0, 1))

@@ -27,7 +27,7 @@ Array = NDArray[Any]
 
 def bits(truth: GroundTruth, row: int) -> tuple[bytes, ...]:
     """Return the bytes of all fields of one image."""
-    return tuple(getattr(truth, name)[row].tobytes() for name in vars(truth))
+    return tuple(getattr(truth, name)[row].tobytes() for name in truth.pixels())
 
 
 def near_silhouettes(object_id: Array) -> Array:

@@ -72,7 +72,7 @@ def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
         if not len(faces):
             counts = ", ".join(f"{n} {name.replace('_', ' ')}" for name, n in mended.items() if n)
             raise BadMeshError("faces", f"none with an area ({counts})")
-        points = _normalised(turned, faces)
+        points = normalised(turned, faces)
         wide = _heights(points[faces].astype(np.float64), NARROWEST) > 0
         keep(wide, "degenerate_faces")
         if wide.all():
@@ -93,7 +93,7 @@ def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
     return CleanMesh(points, faces.astype(np.int32), mended)
 
 
-def _normalised(vertices: Array, faces: Array) -> Array:
+def normalised(vertices: Array, faces: Array) -> Array:
     """Return all vertices, float32, scaled such that those of the faces fill the unit sphere."""
     used = vertices[faces.ravel()]
     low, high = used.min(axis=0), used.max(axis=0)

@@ -1,5 +1,6 @@
 """The unit shapes of a folder's models, made when first used and kept in memory for a while."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,10 +8,12 @@ import numpy as np
 
 from scenegen.common.recent import Recent
 from scenegen.objects.cache import DiskCache
+from scenegen.objects.meshes.colors import corner_colors
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFolder
 from scenegen.objects.meshes.models import Model, load_model
-from scenegen.objects.solids import Mesh, UnitShape
+from scenegen.objects.meshes.read import read_bytes
+from scenegen.objects.solids import Array, Mesh, UnitShape
 
 MOST_FACES_KEPT = 8_000_000  # of all shapes in memory; a face takes about 20 bytes
 
@@ -42,7 +45,8 @@ class MeshStore:
         """
         shape = self._shapes.get(name)
         if shape is None:
-            shape = _unit_shape(name, self._load(name))
+            model = self._load(name)
+            shape = replace(_unit_shape(name, model), make_colors=lambda: self._colors(name, model))
             self._shapes.put(name, shape, len(shape.mesh.faces))
         return shape
 
@@ -54,6 +58,15 @@ class MeshStore:
         if name not in self._digests:
             self._load(name)
         return self._digests[name][:16]
+
+    def _colors(self, name: str, model: Model) -> Array:
+        """Return the own colours of a model. Raises BadMeshError."""
+        path = self._files[name].path
+        try:
+            mesh = model.vertices, model.faces
+            return corner_colors(read_bytes(path), path.suffix, self.folder.up, *mesh)
+        except BadMeshError as error:
+            raise error.inside(name) from error
 
     def _load(self, name: str) -> Model:
         if name not in self._files:

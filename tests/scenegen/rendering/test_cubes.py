@@ -113,7 +113,9 @@ def test_truth_and_image_agree_with_the_generic_kernel_and_with_embree(
     assert ours.object_id.min() == -1
     for row, scene in enumerate(SCENES[name]):
         one = slice(row, row + 1)
-        a, b, c = (GroundTruth(*(v[one] for v in vars(t).values())) for t in (ours, generic, other))
+        a, b, c = (
+            GroundTruth(*(v[one] for v in t.pixels().values())) for t in (ours, generic, other)
+        )
         size = scene.objects[0].scale
         check_same(a, c, size)
         # Straight at a face, the generic kernel's ray may slip between the face's two triangles.
@@ -211,7 +213,7 @@ def test_cubes_behind_the_camera_are_not_seen() -> None:
 
 def test_fields_asked_for_alone_are_the_same() -> None:
     batch = fast(pack(SPEC, SCENES["polycubes"]))
-    whole: Callable[[str], Array] = vars(render(batch)).__getitem__
+    whole: Callable[[str], Array] = render(batch).pixels().__getitem__
     for names in (("object_id",), ("image", "object_id"), ("normal",), ("depth",)):
         for name, values in launch_fields(batch, names)().items():
             assert values.tobytes() == whole(name).tobytes()

@@ -73,7 +73,7 @@ def test_a_batch_cut_into_parts_is_the_same(limits, scenes_of, monkeypatch):
         drawn = sum(counts[i] for i in part.shape.ravel().tolist() if i >= 0)
         assert len(part) == 1 or drawn <= renderer.MOST_DRAWN
     cut = render(batch)
-    for name in vars(whole):
+    for name in whole.pixels():
         assert getattr(cut, name).tobytes() == getattr(whole, name).tobytes()
     spec = DatasetSpec(height=16, width=16, min_visible_pixels=0)
     basic = pack(spec, scenes_of(spec, 4))
