@@ -220,7 +220,7 @@ def chosen_rows(index: Any, count: int) -> int | list[int]:
     rows = range(count)
     if isinstance(index, slice):
         return list(rows[index])
-    if isinstance(index, (list, tuple, np.ndarray)):
+    if isinstance(index, (list, np.ndarray)):
         numbers = np.asarray(index if len(index) else np.empty(0, int))
         if numbers.dtype == bool and numbers.shape == (count,):
             numbers = np.flatnonzero(numbers)
@@ -228,11 +228,13 @@ def chosen_rows(index: Any, count: int) -> int | list[int]:
             return [rows[number] for number in numbers.tolist()]
         message = f"rows are chosen by whole numbers, not by an array of {numbers.dtype}"
         raise IndexError(f"{message} with the shape {numbers.shape}")
-    try:
-        return rows[operator.index(index)]
-    except TypeError:
+    if isinstance(index, bool | np.bool_) or not hasattr(index, "__index__"):
         message = f"a row is a whole number, a slice or a list of them, not {type(index).__name__}"
-        raise TypeError(message) from None
+        raise TypeError(message)
+    row = operator.index(index)
+    if not -count <= row < count:
+        raise IndexError(f"row {row} of {count} rows")
+    return rows[row]
 
 
 class RowBlock:

@@ -1,6 +1,8 @@
 """Turn the command line's options on objects into `DatasetSpec` settings and a catalogue."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from scenegen.common.errors import SpecError
@@ -43,13 +45,18 @@ class ObjectSource:
 
 
 def unused_notes(folder: ModelFolder) -> list[str]:
-    """Return a line that names files beside a model with its name and another suffix, if any."""
-    if not folder.unused:
-        return []
-    names = ", ".join(path.name for path in folder.unused[:NOTES_SHOWN])
-    more = ", ..." if len(folder.unused) > NOTES_SHOWN else ""
-    count = len(folder.unused)
-    return [f"note: {count} files not used, as a file of the same name is: {names}{more}"]
+    """Return lines that name the mesh files of a folder that are no models, if any."""
+    reasons = (
+        (folder.unused, "a file of the same name is used"),
+        (folder.astray, "they are in no class's sub-folder"),
+    )
+    return [_unused_note(files, why) for files, why in reasons if files]
+
+
+def _unused_note(files: Sequence[Path], why: str) -> str:
+    names = ", ".join(path.name for path in files[:NOTES_SHOWN])
+    more = ", ..." if len(files) > NOTES_SHOWN else ""
+    return f"note: {len(files)} files not used, as {why}: {names}{more}"
 
 
 def object_source(

@@ -1,6 +1,7 @@
 """Folders of mesh files with one sub-folder per class; `open_models` also recognises ShapeNet."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from scenegen.objects.meshes.errors import MeshFolderError
@@ -63,6 +64,7 @@ def open_objects(
         for path in mesh_files(folder, _DEPTH, (root.resolve(),)):
             yield path.relative_to(folder).with_suffix("").as_posix(), path
 
-    return make_listing(
+    listing = make_listing(
         root, "folder", up, names, classes, split, models_of, lambda _, i: object_split(i)
     )
+    return replace(listing, astray=tuple(mesh_files(root, 0)))

@@ -31,6 +31,7 @@ class ModelFolder:
         classes: sorted, or in the order asked for.
         models: the models of the split by class, sorted by name.
         unused: files that differ from the file of a model in their suffix alone.
+        astray: files beside the classes' folders, which are in no class.
         splits: of all files of these classes, by `object_split`; empty where splits are official.
     """
 
@@ -39,6 +40,7 @@ class ModelFolder:
     classes: tuple[str, ...]
     models: Mapping[str, tuple[ModelFile, ...]]
     unused: tuple[Path, ...] = ()
+    astray: tuple[Path, ...] = ()
     splits: Mapping[Path, str | None] = field(default_factory=dict)
 
     def digest(self) -> str:
@@ -115,7 +117,7 @@ def make_listing(
             found = f"one object in two splits, {first} and {second}"
             raise MeshFolderError(root, found, hint="remove one of these files, equal in content")
     told = splits if check_splits else {}
-    return ModelFolder(kind, up, tuple(models), models, tuple(unused), told)
+    return ModelFolder(kind, up, tuple(models), models, tuple(unused), (), told)
 
 
 def _by_suffix(path: Path) -> tuple[int, str]:

@@ -144,6 +144,7 @@ def test_plain_folders(make):
     ]  # fmt: skip
     assert found.models["mug"][3].path.name == "twin.glb"
     assert [path.name for path in found.unused] == ["twin.off"]
+    assert [path.name for path in found.astray] == ["top.obj"]
     assert found.models["mug"][0] == ModelFile("mug/a", root / "mug" / "a.PLY")
     assert open_models(root).kind == "folder"
 
