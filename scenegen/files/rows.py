@@ -220,7 +220,7 @@ def chosen_rows(index: Any, count: int) -> int | list[int]:
     rows = range(count)
     if isinstance(index, slice):
         return list(rows[index])
-    if isinstance(index, (list, np.ndarray)):
+    if isinstance(index, (list, tuple, np.ndarray)):
         numbers = np.asarray(index if len(index) else np.empty(0, int))
         if numbers.dtype == bool and numbers.shape == (count,):
             numbers = np.flatnonzero(numbers)
