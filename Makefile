@@ -35,10 +35,10 @@ demo: $(VENV)/.runtime
 	$(BIN)/scenegen render --n 64 --seed 1 --out demo/train.h5 --overwrite
 	$(BIN)/bench baseline constant --train demo/train.h5 --data demo/rooms.h5 --out demo/constant.h5 --overwrite
 	$(BIN)/bench baseline mean-depth --train demo/train.h5 --data demo/rooms.h5 --out demo/mean-depth.h5 --overwrite
-	$(BIN)/bench baseline empty-room --data demo/rooms.h5 --out demo/empty-room.h5 --overwrite
+	$(BIN)/bench baseline nearest --train demo/train.h5 --data demo/rooms.h5 --out demo/nearest.h5 --overwrite
 	for name in constant mean-depth; do $(BIN)/bench score demo/$$name.h5 --truth demo/rooms.h5 --json demo/$$name.json --overwrite > /dev/null || exit 1; done
-	$(BIN)/bench score demo/empty-room.h5 --truth demo/rooms.h5 --json demo/empty-room.json --html demo/report.html --overwrite
-	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/empty-room.json --no-paper
+	$(BIN)/bench score demo/nearest.h5 --truth demo/rooms.h5 --json demo/nearest.json --html demo/report.html --overwrite
+	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/nearest.json --no-paper
 	@$(MAKE) --no-print-directory demo-summary
 
 # What `make demo` leaves; it gets here only if all of it was made.
@@ -47,7 +47,7 @@ define DEMO_SUMMARY
 In $(CURDIR)/demo:
 
   file            items                what it is
-  report.html     1 page               scores of the baseline empty-room, with its best and worst rooms
+  report.html     1 page               scores of the baseline nearest, with its best and worst rooms
   rooms.png       12 rooms             image, depth, normals and object ids, of rooms.h5
   objects.png     12 images            four scenes of everyday objects, each from three sides
   questions.png   8 questions          mental rotation, with the right answers
@@ -56,7 +56,7 @@ In $(CURDIR)/demo:
   objects.h5      12 images            the everyday objects
   iqtt            1,400 questions      1,000 for training, 200 for validation, 200 for test
   audit.json      1 audit              what was proved and guessed of these questions
-  *.json, *.h5    3 of each            scores and predictions of constant, mean-depth and empty-room
+  *.json, *.h5    3 of each            scores and predictions of constant, mean-depth and nearest
 
 Open first:  $(CURDIR)/demo/report.html
 Then try:    source $(VENV)/bin/activate

@@ -59,7 +59,7 @@ HOMES = {
     "cnn": ("resnets.cnn", "questions: ResNets and a softmax over the answers"),
     "depth-supervised": (
         "relief.depth_supervised",
-        "rooms: a network trained with true depth, as a ceiling",
+        "rooms: a network trained with true depth",
     ),
     "ptn": ("ptn", "rooms and questions: voxels, learned from silhouettes"),
     "rezende": ("rezende", "questions: meshes, by a renderer without gradients"),

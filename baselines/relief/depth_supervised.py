@@ -1,4 +1,4 @@
-"""`depth-supervised`: relief networks that learn from the true depth, as a ceiling."""
+"""`depth-supervised`: relief networks that learn from the true depth."""
 
 from functools import partial
 from pathlib import Path
