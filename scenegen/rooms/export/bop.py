@@ -5,6 +5,7 @@ are rigid: an object of another size is another model. Cameras are x right, y do
 +z; the centre of the first pixel is (0, 0).
 """
 
+from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from scenegen.camera import intrinsics
 from scenegen.description.scenes import PlacedObject
+from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.scene_mesh import welded, world_from_object
 from scenegen.rendering.amodal import amodal_masks
@@ -45,9 +47,7 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
         for item in views[0].scene.objects:
             models.setdefault((item.shape, item.scale), len(models) + 1)
         ids = [models[item.shape, item.scale] for item in views[0].scene.objects]
-        numbers = [room.view_index for room in views]
-        batch = pack(spec, [views[0].scene], numbers, objects)
-        masks = amodal_masks(batch, source.device)
+        masks = _silhouettes(spec, views, objects, source.device)
         cameras, poses, infos = {}, {}, {}
         for room, whole in zip(views, masks, strict=True):
             name, key = f"{room.index:06d}", str(room.index)
@@ -83,6 +83,16 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
             "depth": {"millimetres": encoding.depth_unit * MILLIMETRES, "nothing": 0},
         },
     }
+
+
+def _silhouettes(
+    spec: DatasetSpec, views: Sequence[Room], objects: Objects, device: str
+) -> Sequence[Array]:
+    """Return the whole silhouettes of each view, (K, H, W): as stored, or else rendered."""
+    if "amodal" in spec.truth:
+        return [room.truth["object/amodal_mask"] > 0 for room in views]
+    numbers = [room.view_index for room in views]
+    return list(amodal_masks(pack(spec, [views[0].scene], numbers, objects), device))
 
 
 def _camera(room: Room, depth_unit: float) -> dict[str, Any]:

@@ -123,6 +123,15 @@ def test_each_is_checked_against_depth_and_poses(edit, check, full, tmp_path):
     assert check in failed
 
 
+def test_the_command(run, tmp_path):
+    command = ("render", "--n", "1", "--size", "32", "--views", "0,20", "--out", "x.h5")
+    assert run(*command, "--with", "flow,amodal").exit_code == 0
+    with open_rooms(tmp_path / "x.h5") as rooms:
+        assert rooms.spec.truth == ("amodal", "flow")
+    assert run(*command, "--with", "shadow", "--overwrite").exit_code == 2
+    assert run(*command, "--reflectance", "own", "--overwrite").exit_code == 2
+
+
 @pytest.mark.parametrize(
     ("settings", "where"),
     [({"truth": ("depths",)}, "truth"), ({"truth": ("flow",)}, "flow")],
