@@ -63,13 +63,20 @@ class Bodies:
         reaches = np.empty((len(kind), len(directions)))
         for rows, corners in _members(self._coarse if coarse else self._hulls, kind):
             turned = _turned(rotation[rows, None], corners[..., :3])
-            reach = along(turned.reshape(-1, 3), directions).reshape(*turned.shape[:2], -1)
-            radius = corners[..., 3:]
-            if radius.any():
-                flat = rounded(rotation[rows], POINT_STEP)
-                ahead, across = along(flat[:, :, 0], directions), along(flat[:, :, 2], directions)
-                reach += radius * np.sqrt(ahead * ahead + across * across)[:, None]
-            reaches[rows] = reach.max(axis=1)
+            radius = np.broadcast_to(corners[..., 3:], (*turned.shape[:2], 1))
+            flat = rounded(rotation[rows], POINT_STEP)
+            ahead, across = along(flat[:, :, 0], directions), along(flat[:, :, 2], directions)
+            sine = np.sqrt(ahead * ahead + across * across)[:, None]
+            farthest = np.empty((len(rows), len(directions)))
+            count = turned.shape[1]
+            step = max(1, BLOCK // count)  # bodies, so few that all stays in the cache
+            for first in range(0, len(rows), step):
+                block = slice(first, first + step)
+                reach = along(turned[block].reshape(-1, 3), directions)
+                reach = reach.reshape(-1, count, len(directions))
+                reach += radius[block] * sine[block]
+                reach.max(axis=1, out=farthest[block])
+            reaches[rows] = farthest
         more = self._rounding + self._growth if coarse else self._rounding
         return np.asarray(reaches + more[kind, None])
 

@@ -57,19 +57,15 @@ class Frustums:
     normals: Array
 
     def reach(self, bodies: Bodies, kind: Array, rotation: Array, rows: Array) -> Array:
-        """Return how far turned bodies reach along `normals`, and down: (n, V + 1, 5), in radii.
+        """Return how far turned bodies reach along `normals` of each view, (n, V, 4), in radii.
 
-        [:, :V, :4] is along the borders of each view, [:, V, 4] along the world's -y. `kind` and
-        `rotation` are as in `Bodies.reach`, `rows` as in `hold`.
+        `kind` and `rotation` are as in `Bodies.reach`, `rows` as in `hold`.
         """
         turn = self.camera_from_world[rows]
-        rotation = rotation[:, None]
-        seen = sum(turn[..., i, None] * rotation[..., i, None, :] for i in range(3))
-        frames = np.concatenate([seen, rotation], axis=1)
-        directions = np.concatenate([self.normals, [[0.0, -1.0, 0.0]]])
-        each = np.repeat(kind, frames.shape[1])
-        reach = bodies.reach(each, frames.reshape(-1, 3, 3), directions)
-        return reach.reshape(*frames.shape[:2], 5)
+        seen: Any = sum(turn[..., i, None] * rotation[:, None, i, None, :] for i in range(3))
+        each = np.repeat(kind, seen.shape[1])
+        reach = bodies.reach(each, seen.reshape(-1, 3, 3), self.normals)
+        return reach.reshape(*seen.shape[:2], 4)
 
     def hold(self, rows: Array, places: Array, border: Array) -> Array:
         """Return at which places all images of a scene show a body whole.

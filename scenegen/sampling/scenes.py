@@ -37,6 +37,7 @@ Array = NDArray[Any]
 # these are rendered. In one of 20,000 rooms of built-in objects one proposal in forty finds room.
 MAX_ATTEMPTS, MAX_RENDERED = 1000, 100
 POSES_PER_OBJECT = 8  # sizes and orientations tried for one object of a proposal
+DOWN = np.array([[0.0, -1.0, 0.0]])
 _TOGETHER = (0, 1, 3, POSES_PER_OBJECT)  # poses 0, 1 to 2, and 3 to 7 are tried at once
 _POSE_NUMBERS = 6  # size, rotation, heading, and one to spare: positions in a stream are even
 _NUMBERS = _POSE_NUMBERS + 2 * CANDIDATES  # of one pose
@@ -168,10 +169,11 @@ def _place_objects(
             turn = random_rotations(bodies, kind, spec.pose, numbers[:, 1:5])
             matrix = rotation_matrix(turn.T)
             reach = size[:, None] * bodies.reach(kind, matrix, SEPARATORS, coarse=True) + MARGIN
-            ends = size[:, None, None] * frustums.reach(bodies, kind, matrix, rows) + MARGIN
-            border = 0.0 * ends[:, :-1, :4] if spec.allow_cropped else ends[:, :-1, :4]
+            down = size * bodies.reach(kind, matrix, DOWN)[:, 0] + MARGIN
+            border = size[:, None, None] * frustums.reach(bodies, kind, matrix, rows) + MARGIN
+            border = 0.0 * border if spec.allow_cropped else border
             free, place = find_places(
-                rows, reach, ends[:, -1, 4], border, frustums, placed[:, :slot],
+                rows, reach, down, border, frustums, placed[:, :slot],
                 numbers[:, _POSE_NUMBERS:].reshape(-1, CANDIDATES, 2),
             )  # fmt: skip
             free = free.reshape(-1, tries)
