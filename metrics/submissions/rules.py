@@ -169,6 +169,8 @@ def value_problems(
         found = f"{np.count_nonzero(wrong)} {rule.found}"
         if name == "answer":
             found += f", such as {values[wrong][0]}"
+            from_one = values.min() == 1 and values.max() == (against or Against()).answers
+            found += "; they look counted from 1" if from_one else ""
         problems.append(Problem(name, rule.name, rule.expected, found, first_ids(ids[wrong])))
     return problems
 

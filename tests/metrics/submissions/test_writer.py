@@ -310,6 +310,7 @@ EYE = np.eye(3)[[0, 1, 2, 0, 1, 2]]
         ({"scores": np.ma.masked_array(EYE, EYE == 1)}, ": scores", "6 NaN"),
         ({"answer": [True] * 6}, ": answer", "bool"),
         ({"answer": [0, 1, 2, 3, 0, 1]}, ": answer", "such as 3 (ids 3)"),
+        ({"answer": [1, 1, 2, 3, 2, 1]}, ": answer", "counted from 1"),
         ({"answer": [0, 1, 2, 0, -2, 1]}, ": answer", "such as -2 (ids 4)"),
         ({"answer": np.array([0, 1, 2, 0, 255, 1], "u1")}, ": answer", "such as 255"),
         ({"scores": np.zeros((6, 4))}, ": scores", "(6, 4)"),
