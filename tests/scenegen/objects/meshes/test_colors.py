@@ -108,6 +108,26 @@ def test_rooms_show_them_and_albedo_is_truth(folder, tmp_path, settings):
     assert all(check.ok for check in checks_of(tmp_path / "x.h5", objects=source.objects))
 
 
+def test_colours_are_blended_between_the_corners(tmp_path):
+    """Colours that are linear in the place at all corners are so on the whole surface."""
+    extents = np.array([1.0, 2.0, 1.4])
+    box = trimesh.creation.box(extents)
+    codes = (255 * (box.vertices > 0)).astype(np.uint8)
+    box.visual.vertex_colors = np.concatenate([codes, np.full((8, 1), 255, np.uint8)], axis=1)
+    (tmp_path / "objects" / "box").mkdir(parents=True)
+    box.export(tmp_path / "objects" / "box" / "cube.glb")
+    source = object_source("shapes", objects_root=str(tmp_path / "objects"))
+    spec = DatasetSpec(height=48, width=48, own_reflectance=True, truth=("coordinates",),
+                       **source.settings)  # fmt: skip
+    make_dataset(tmp_path / "x.h5", spec, 2, objects=source.objects)
+    radius = np.linalg.norm(extents) / 2
+    with open_rooms(tmp_path / "x.h5") as rooms:
+        for room in rooms:
+            on = room.object_id > 0
+            place = room.truth["object_coordinates"][on] * radius / extents
+            np.testing.assert_allclose(room.truth["albedo"][on], 0.8 * (place + 0.5), atol=1e-4)
+
+
 def test_refused_where_there_are_no_files():
     folder = {"source": "folder", "shapes": ("box",)}
     for settings in ({}, {**folder, "shading": "path"}, {**folder, "random_reflectance": True}):
