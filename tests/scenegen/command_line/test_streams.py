@@ -61,12 +61,6 @@ def test_no_stream_keeps_a_command_from_its_file_and_its_exit_code(tmp_path, she
     assert int((tmp_path / "mine.json").read_text()) > 2, "a data file behind a standard stream"
 
 
-def test_help_for_a_full_disk_is_one_line(tmp_path):
-    done = run("--help > /dev/full", tmp_path)
-    assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1
-
-
 def test_a_full_disk_is_told_once():
     program = """
 import sys

@@ -52,30 +52,6 @@ def test_a_folder_with_nothing_usable_is_refused_in_one_line(run: Run, tmp_path:
     assert not (tmp_path / "rooms.h5").exists()
 
 
-def test_many_broken_models_are_told_of_in_a_few_lines(run: Run, meshes: Path) -> None:
-    for i in range(30):
-        (meshes / "mug" / f"bad{i}.obj").write_text("")
-    lines = render(run, "--objects-root", meshes, count=40).stderr.splitlines()
-    assert len(lines) == 6
-    assert all(line.startswith("note: mug/") for line in lines[:5])
-    assert lines[5].startswith("note: and ")
-    assert "check-objects" in lines[5]
-
-
-def test_splits_of_a_folder_are_disjoint(run: Run, tmp_path: Path) -> None:
-    (tmp_path / "many" / "block").mkdir(parents=True)
-    for i in range(60):
-        trimesh.creation.box((1, 1 + i / 60, 1)).export(tmp_path / "many" / "block" / f"{i}.stl")
-    used = {}
-    for split in ("train", "val", "test"):
-        render(run, "--objects-root", "many", "--object-split", split, "--out", split, count=25)
-        used[split] = set(models_of(split))
-        assert used[split]
-    assert sum(map(len, used.values())) == len(set.union(*used.values()))
-    result = run("verify", "val", "--objects-root", "many", "--cache-dir", "cache")
-    assert result.exit_code == 0, result.output
-
-
 def test_presets_take_their_classes_from_a_folder_that_has_them(
     run: Run, meshes: Path, shapenet: Path
 ) -> None:

@@ -106,11 +106,3 @@ def test_huge_numbers_do_not_fill_the_memory(tmp_path, check_refusal, rooms_path
     )  # fmt: skip
     check_refusal(done.returncode, done.stdout, done.stderr)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("form", ["exr", "png", "ply", "obj"])
-def test_export_makes_its_folder_and_keeps_existing_files(run, refuses, rooms_path, tmp_path, form):
-    export = ("export", rooms_path, "--format", form, "--out", "exports", "--items")
-    assert run(*export, "1").exit_code == 0
-    assert any((tmp_path / "exports").iterdir())
-    refuses(*export, "0,1", words=("rooms-000001", "exists already", "--overwrite"))

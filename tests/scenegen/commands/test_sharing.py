@@ -25,15 +25,6 @@ def test_all_rows_go_to_a_folder_of_its_own(run, rooms_path, tmp_path):
     ]  # fmt: skip
 
 
-def test_some_rows_and_overwrite(run, refuses, rooms_path, tmp_path):
-    export = ("export", rooms_path, "--format", "webdataset", "--items", "2,5-6", "--out", "out")
-    assert run(*export).exit_code == 0
-    before = (tmp_path / "out" / "rooms-00000-of-00001.tar").read_bytes()
-    refuses(*export, words=("out", "--overwrite"))
-    assert run(*export, "--overwrite").exit_code == 0
-    assert (tmp_path / "out" / "rooms-00000-of-00001.tar").read_bytes() == before
-
-
 def test_refused_exports(refuses, rooms_path):
     refuses("export", rooms_path, "--format", "png", words=("--items",))
     refuses("export", rooms_path, "--format", "parquet", "--items", 8, words=("--items", "0 to 7"))

@@ -27,7 +27,6 @@ with ended_by_signals():
         print("cleaned up")
         raise SystemExit(3) from None
 """
-RENDER = ("render", "--size", "32", "--min-visible-pixels", "3", "--n", "10000", "--out", "x.h5")
 BLOCK = """
 import signal, sys, time
 from scenegen.common.signals import ended_by_signals
@@ -121,18 +120,3 @@ def test_signals_wait_only_in_the_main_thread():
     thread.start()
     thread.join()
     assert handlers == [signal.default_int_handler]
-
-
-def test_a_render_that_is_terminated_leaves_nothing(tmp_path):
-    command = [sys.executable, "-c", "import cli; cli.scenegen()", *RENDER]
-    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
-    end = time.monotonic() + 60
-    while not any(path.stat().st_size > 100_000 for path in tmp_path.rglob("*.h5")):
-        assert process.poll() is None, process.stderr.read()
-        assert time.monotonic() < end
-        time.sleep(0.02)
-    process.send_signal(signal.SIGTERM)
-    err = process.communicate(timeout=60)[1]
-    assert process.returncode == 143
-    assert "Traceback" not in err
-    assert list(tmp_path.iterdir()) == []

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenegen.common.text_table import (
-    aligned,
     by_number,
     distinct,
     markdown,
@@ -19,25 +18,6 @@ from scenegen.common.text_table import (
 )
 
 ANY_TEXT = st.text(st.characters(exclude_categories=()), max_size=30)
-
-
-@pytest.mark.parametrize(
-    ("name", "shown"),
-    [
-        ("Pix2Shape", "Pix2Shape"),
-        ("", "(unnamed)"),
-        (" \n\t\u3000", "(unnamed)"),
-        ("\u202e\u2066", r"\u202e\u2066"),
-        ("a\nb\r\n c\u2028d\x85e", "a b c d e"),
-        ("a\x00b\x1b[31m\ud800", r"a\x00b\x1b[31m\ud800"),
-        ("abc\u202edef", r"abc\u202edef"),
-        ("日本語 é 🎲", "日本語 é 🎲"),
-        ("x" * 60, "x" * 60),
-        ("x" * 61, "x" * 57 + "..."),
-    ],
-)
-def test_names_in_one_line(name, shown):
-    assert plain(name) == shown
 
 
 @pytest.mark.parametrize(
@@ -101,14 +81,6 @@ def test_names_that_are_alike_are_told_apart():
     assert distinct(["a", "b", "a"], ["x", "y", "z"]) == ["a [x]", "b", "a [z]"]
     assert distinct(["a", "a"], ["", "x"]) == ["a [(unnamed)]", "a [x]"]
     assert distinct(["a", "a\n", "b"], ["x", "x", "x"]) == ["a [x] #1", "a [x] #2", "b"]
-
-
-def test_columns_are_aligned_by_what_terminals_show():
-    assert aligned([("日本", "x"), ("abcde", "y"), ("e\u0301", "z")]) == [
-        "日本   x",
-        "abcde  y",
-        "e\u0301      z",
-    ]
 
 
 def test_keys_are_sorted_by_their_first_number():

@@ -8,7 +8,6 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from click.testing import Result
 from numpy.typing import NDArray
 from verified import checks_of
 
@@ -140,20 +139,6 @@ def test_what_presets_promise(preset_file: Callable[[str], Path]) -> None:
     assert rows_of(preset_file("views"))[1]["view_angle_degrees"][:5].tolist() == [*PAPER_VIEWS]
     assert PAPER_VIEWS == (0, 5, 35, 55, 80)
     assert preset_spec("shapes") == DatasetSpec(min_visible_pixels=49)
-
-
-def test_the_list_of_presets_is_whole(run: Callable[..., Result]) -> None:
-    result = run("presets")
-    assert result.exit_code == 0
-    lines = result.stdout.splitlines()
-    assert len(lines) == 2 * len(PRESETS)
-    for name, first, second in zip(PRESETS, lines[::2], lines[1::2], strict=True):
-        assert first.split(maxsplit=1) == [name, PRESETS[name].meaning]
-        for key, value in PRESETS[name].settings.items():
-            assert f"{key} " in second
-            for part in value if isinstance(value, tuple) else (value,):
-                assert str(part) in second
-    assert max(map(len, lines)) < 160
 
 
 @pytest.mark.parametrize("name", PRESETS)

@@ -156,14 +156,3 @@ def test_unknown_pixels_do_not_spoil_the_ranges(damaged):
     text = of_rooms.describe(damaged(edit))
     assert "nan" not in text
     assert re.search(r"object_id +-1 to", text)
-
-
-@pytest.mark.parametrize(
-    ("command", "line"),
-    [("a\x1b[31m\nb", r"a\x1b[31m\nb"), ("x" * 60_000, "x" * 997 + "...")],
-    ids=["controls", "long"],
-)
-def test_a_command_is_shown_on_one_short_line(damaged, command, line):
-    text = of_rooms.describe(damaged(lambda file: file.attrs.update(creation_command=command)))
-    assert value(text, "command") == line
-    assert all(one.isprintable() for one in text.split("\n"))

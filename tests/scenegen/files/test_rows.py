@@ -324,17 +324,6 @@ def test_reading_in_several_processes(sets, task, tmp_path):
     assert done.stdout == "equal 7\n", done.stderr
 
 
-@pytest.mark.slow
-def test_torch_loader_with_workers(whole, task):
-    torch = pytest.importorskip("torch")
-    data = DATASETS[task](whole, fields=(IMAGES[task],))
-    data[0]  # open here, before the workers are forked
-    loader = torch.utils.data.DataLoader(data, batch_size=4, num_workers=2)
-    images = torch.cat([batch[IMAGES[task]] for batch in loader])
-    with READERS[task](whole) as file:
-        np.testing.assert_array_equal(images.numpy(), file.read(IMAGES[task], slice(None)))
-
-
 @pytest.mark.parametrize("as_index", [list, tuple, np.array])
 def test_rows_are_chosen_as_numpy_does(whole, task, as_index):
     """By slices, lists and arrays of numbers or of truth values; what is no index says so."""

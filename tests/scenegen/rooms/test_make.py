@@ -1,10 +1,7 @@
 """A data set depends on its request alone: not on batches, on its own length, or on retries."""
 
-import multiprocessing
-import os
 import subprocess
 import sys
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -12,12 +9,10 @@ import pytest
 from trimesh import creation
 
 from scenegen import open_rooms
-from scenegen.common.errors import SceneGenError
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.sources import object_source
 from scenegen.rooms import render as rendering
 from scenegen.rooms.make import make_dataset
-from scenegen.rooms.render import render_items
 
 SPEC = DatasetSpec(height=32, width=32, min_visible_pixels=3, seed=3)
 PIXELS = ("image", "depth", "normal", "object_id")
@@ -154,34 +149,6 @@ def test_worker_processes_never_change_a_byte(tmp_path, monkeypatch, kind):
         found.append((path.read_bytes(), objects.problems if objects else {}))
     assert found[0] == found[1]
     assert (set(found[0][1]) == {"odd/bad"}) == (kind == "folder")
-
-
-def test_a_worker_that_is_killed_ends_the_run(tmp_path, monkeypatch):
-    def kill(done):
-        for worker in multiprocessing.active_children():
-            worker.kill()
-
-    monkeypatch.setattr(rendering, "BLOCK", 8)
-    with pytest.raises(SceneGenError) as refused:
-        make_dataset(tmp_path / "x.h5", SPEC, 400, workers=2, progress=kill)
-    assert "worker" in refused.value.where
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux how much memory is used")
-def test_waiting_items_take_no_memory():
-    """What is asked for, but not begun, must not exist: N may be a hundred million."""
-
-    def resident():
-        pages = Path("/proc/self/statm").read_text().split()[1]
-        return int(pages) * os.sysconf("SC_PAGE_SIZE")
-
-    next(render_items(SPEC, range(4), 4))
-    before = resident()
-    rooms = render_items(SPEC, range(3_000_000), 4)
-    assert next(rooms)[0].index == 0
-    assert resident() - before < 60e6, "24 MB for the pointers alone, 96 MB for the numbers"
-    rooms.close()
 
 
 @pytest.mark.slow

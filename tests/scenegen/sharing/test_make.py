@@ -113,18 +113,6 @@ def test_index_and_images_in_datasets(made, holey_set, load, tmp_path):
                 np.testing.assert_array_equal(pixels, rooms.read("image", line["row"]))
 
 
-def test_the_page_has_a_header_and_all_sections(made):
-    head, page = (made / "README.md").read_text().split("---\n")[1:3]
-    header = yaml.safe_load(head)
-    assert header["license"] == "cc-by-4.0"
-    assert header["size_categories"] == ["n<1K"]
-    assert header["configs"] == [{"config_name": "index", "data_files": "index.parquet"}]
-    titles = {line[3:] for line in page.splitlines() if line.startswith("## ")}
-    assert {"Intended use", "Limits", "Known biases", "Splits", "Licence", "Citation"} < titles
-    assert "| images | 14 | 5 |" in page
-    assert "| set.h5 | 14 | 7 |" in page
-
-
 def test_the_same_bytes_again(made, holey_set, float_path, tmp_path):
     make_rooms_card([holey_set, float_path], tmp_path / "card", TOLD)
     for name in NAMES:

@@ -121,14 +121,6 @@ else:  # in the worker processes
         return parse(data, suffix)
     models.parse_mesh = deadly
 """
-# Each worker process imports the caller's script, and so would start the check anew.
-UNGUARDED = """
-import sys
-from scenegen.objects.meshes import check
-from scenegen.objects.meshes.folders import open_objects
-from scenegen.objects.meshes.listing import object_split
-check.check_models(open_objects(sys.argv[1]), None, 2)
-"""
 
 
 def python(*arguments):
@@ -148,13 +140,6 @@ def test_a_model_that_crashes_its_process_is_refused_alone(tmp_path):
     found = [line.split(maxsplit=2)[:2] for line in done.stdout.splitlines()]
     assert found == [[f"box/{i}", str(i not in (3, 4))] for i in range(6)], done.stderr
     assert done.stdout.count("process") == 2
-
-
-def test_an_unguarded_script_is_told_so(root, tmp_path):
-    (tmp_path / "script.py").write_text(UNGUARDED)
-    done = python(tmp_path / "script.py", root)
-    assert done.returncode == 1
-    assert "__main__" in done.stderr.rstrip().splitlines()[-1]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="uses Linux system calls")
