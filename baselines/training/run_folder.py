@@ -16,7 +16,7 @@ from baselines.training.checkpoint import (
     new_state,
 )
 from scenegen.common.errors import SpecError
-from scenegen.files.run_lock import run_lock
+from scenegen.files.workspace import run_lock
 
 
 @contextmanager

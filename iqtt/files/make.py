@@ -19,8 +19,7 @@ from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
 from scenegen.files.cluster import Cluster
 from scenegen.files.making import make_set
-from scenegen.files.new_file import EXISTS
-from scenegen.files.new_folder import check_place
+from scenegen.files.new_file import EXISTS, check_place
 from scenegen.files.places import as_place, check_store, is_remote
 from scenegen.files.plan import Part
 from scenegen.files.sets import merge_file

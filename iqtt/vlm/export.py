@@ -15,7 +15,7 @@ from typing import Any
 
 from iqtt.vlm.prompt import CANARY
 from iqtt.vlm.rows import Asked, Row, count_rows, vlm_rows
-from scenegen.files.new_folder import folder_written_beside
+from scenegen.files.new_file import folder_written_beside
 
 COLUMNS = {
     "id": "name of the row: question and rotation",

@@ -3,5 +3,5 @@
 Reading: `input_file` opens what anyone may have written, `shards` shows a set as one file, `rows`
 reads columns of a `schema`, `verify` checks them. Writing: `table` writes columns, `plan` says what
 a set of files holds, `sets` writes its files, and `making` makes those that are missing, with
-`workers` or a `cluster`. `new_file`, `new_folder` and `workspace`: outputs appear when complete.
+`workers` or a `cluster`. `new_file` and `workspace`: outputs appear when complete.
 """

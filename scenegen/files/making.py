@@ -26,11 +26,10 @@ from scenegen.files.manifest import (
 from scenegen.files.new_file import check_writable
 from scenegen.files.places import check_store, is_remote, listing
 from scenegen.files.plan import Block, Piece, Plan
-from scenegen.files.run_lock import run_lock
 from scenegen.files.sets import Packed, Progress, write_piece, write_views
 from scenegen.files.shards import set_name
 from scenegen.files.workers import in_order, processors
-from scenegen.files.workspace import remove_leftovers
+from scenegen.files.workspace import remove_leftovers, run_lock
 
 SHARE = 0.05  # of the time that writing manifests may take; that of 10,000 shards has 3 MB
 Note = Callable[[Any], Any]

@@ -10,6 +10,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+from scenegen.files.content import SHA256, dataset_digest
+
 DIGEST = "[0-9a-f]{64}"  # SHA-256 as hex
 
 
@@ -21,7 +23,7 @@ class Column:
         shape: of a row.
         dtype: NumPy name, or "text" for UTF-8 strings.
         unit, frame, meaning: HDF5 attributes.
-        axes: names of a row's axes (`axes.name_axes`), or None; the axis of rows is called "row".
+        axes: names of a row's axes (`name_axes`), or None; the axis of rows is called "row".
         own_chunk: whether each row is a compressed chunk of its own, as images are.
         shuffle: whether own chunks go through HDF5's shuffle filter, if a number has several bytes.
         within: the range of its values; readers refuse others. None where all may be.
@@ -107,3 +109,25 @@ def other_attributes(dataset: h5py.Dataset, name: str, expected: Mapping[str, An
         if not (there and np.array_equal(np.asarray(dataset.attrs[key]), np.asarray(value))):
             problems.append(f"{name}: attribute {key!r} is not {value!s:.60}")
     return problems
+
+
+def name_axes(group: h5py.Group, dataset: h5py.Dataset, axes: Sequence[str]) -> None:
+    """Name each axis of a dataset after a scale of `group`: a dataset that counts from 0.
+
+    xarray and netCDF read such names. Scales are made when they are first named. Raises ValueError
+    where one name stands for axes of two lengths.
+    """
+    for axis, name, length in zip(dataset.dims, axes, dataset.shape, strict=True):
+        if name not in group:
+            _make_scale(group, name, length)
+        if group[name].shape != (length,):
+            raise ValueError(f"{dataset.name}: axis {name!r} of {length}, not {group[name].shape}")
+        axis.label = name
+        axis.attach_scale(group[name])
+
+
+def _make_scale(group: h5py.Group, name: str, length: int) -> None:
+    values = np.arange(length, dtype=np.int32)
+    scale = group.create_dataset(name, data=values)
+    scale.make_scale(name)
+    scale.attrs[SHA256] = dataset_digest(values)

@@ -11,13 +11,12 @@ import h5py
 import numpy as np
 
 from scenegen.common.errors import FileFormatError
-from scenegen.files.axes import name_axes
 from scenegen.files.content import CONTENT_DIGEST, SHA256, dataset_digest, seal
 from scenegen.files.manifest import FileRecord, file_sha256
 from scenegen.files.new_file import written_beside
 from scenegen.files.plan import Bundle, Part, Piece, Sheet
 from scenegen.files.row_file import new_file, new_hdf5
-from scenegen.files.schema import Column
+from scenegen.files.schema import Column, name_axes
 from scenegen.files.shards import (
     ROW_DIGESTS,
     SHARDS,

@@ -19,9 +19,8 @@ from isal import isal_zlib
 from numpy.typing import NDArray
 
 from scenegen.common.errors import SpecError
-from scenegen.files.axes import name_axes
 from scenegen.files.content import SHA256, ColumnDigest, row_digest
-from scenegen.files.schema import Column
+from scenegen.files.schema import Column, name_axes
 from scenegen.files.workers import processors
 
 Array = NDArray[Any]

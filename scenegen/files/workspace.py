@@ -1,4 +1,4 @@
-"""Hidden folders in which outputs are made before they get their names.
+"""Hidden folders in which outputs are made before they get their names, and locks of runs.
 
 A process holds a lock on each of its workspaces for as long as it lives. A workspace without a lock
 was left by a run that was killed: the next run in the same folder removes it.
@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from scenegen.common.errors import SceneGenError
 from scenegen.common.signals import held_back
 
 try:
@@ -29,6 +30,7 @@ NAME = re.compile(r"\.pix2shape-bench-[0-9a-f]{8}-[0-9a-f]{16}\.partial")
 # What a disk may say when it is written to. HDF5 and OpenEXR raise errors that only quote it.
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 TRIES = 100  # to make a workspace that no other run takes for a leftover
+_held: set[str] = set()  # run locks of this process, which the system would let it take twice
 _Workspace = tuple[Path, int | None]  # a folder, and the descriptor that holds its lock
 
 
@@ -173,3 +175,48 @@ def _about(error: OSError | RuntimeError, parent: Path, path: Path) -> OSError |
     if number is None:
         return None
     return OSError(number, f"cannot be written: {os.strerror(number)}", str(where))
+
+
+@contextmanager
+def run_lock(lock: Path, place: Path, hint: str = "wait until it ends") -> Iterator[None]:
+    """Hold a lock for the block: a file, which is removed at the end.
+
+    The lock ends with its process, also where that is killed and processes that it forked live on.
+    On a disk without locks nothing is locked.
+
+    Args:
+        place: what the run makes, for the error.
+        hint: what to do where another run makes it.
+
+    Raises SceneGenError where another run holds the lock; OSError.
+    """
+    name = os.path.realpath(lock)
+    busy = SceneGenError(f"{place}: another run is writing to it", hint=hint)
+    if name in _held:  # opening and closing the file would end the lock
+        raise busy
+    descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+    try:
+        if not _taken(lock, descriptor):
+            raise busy
+        _held.add(name)
+        try:
+            yield
+        finally:
+            _held.remove(name)
+            with suppress(OSError):
+                lock.unlink()
+    finally:
+        os.close(descriptor)
+
+
+def _taken(lock: Path, descriptor: int) -> bool:
+    """Take the lock if nobody has it; a run that has just ended may have removed the file."""
+    if fcntl is None:
+        return True
+    try:
+        fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return lock.exists() and os.path.samestat(os.fstat(descriptor), lock.stat())
+    except (BlockingIOError, PermissionError):  # POSIX allows either
+        return False
+    except OSError:  # a disk without locks
+        return True

@@ -14,7 +14,7 @@ from pathlib import Path
 from scenegen.common.records import check
 from scenegen.common.text_table import markdown, piped, printable
 from scenegen.files.manifest import file_sha256
-from scenegen.files.new_folder import folder_written_beside
+from scenegen.files.new_file import folder_written_beside
 from scenegen.files.schema import Column
 from scenegen.rendering.backend import VERSION_ATTRIBUTES
 

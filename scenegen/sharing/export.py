@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from scenegen.common.records import check
-from scenegen.files.new_folder import folder_written_beside
+from scenegen.files.new_file import folder_written_beside
 from scenegen.files.rows import RowFile
 from scenegen.files.schema import Column
 from scenegen.files.shards import cut, shard_name

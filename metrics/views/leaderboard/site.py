@@ -24,7 +24,7 @@ from metrics.views.report import html_report
 from metrics.views.score_tables import labels_of
 from metrics.views.table import Cell, Table, make_row, make_table
 from scenegen.common.text_table import plain, printable
-from scenegen.files.new_folder import folder_written_beside
+from scenegen.files.new_file import folder_written_beside
 
 INDEX, GALLERY = "index.html", "gallery.html"
 REPORT = re.compile(r"report-\d+-[a-z0-9-]*\.html")
@@ -49,7 +49,7 @@ def write_site(
     Pictures come from the truths and submissions that the score files name, where they still lie
     there unchanged. With `overwrite` an older site is replaced as a whole.
 
-    Raises as `ranking.rankings` and `new_folder.folder_written_beside`.
+    Raises as `ranking.rankings` and `new_file.folder_written_beside`.
     """
     folder = Path(folder)
     names = report_names(files)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from scenegen.common.records import check
-from scenegen.files.new_folder import folder_written_beside
+from scenegen.files.new_file import folder_written_beside
 from scenegen.objects.catalogue import Objects
 from scenegen.rooms.export.encoding import PLAIN, Encoding, write_json
 from scenegen.rooms.reader import Room, RoomsFile

@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 from signals_at_lines import interrupted_at_each_line
 
-from scenegen.files import new_folder
-from scenegen.files.new_folder import folder_written_beside
+from scenegen.files import new_file
+from scenegen.files.new_file import folder_written_beside
 
 NAMES = ("a", "b", "c")
 # Writes a folder, and is killed as it is about to change the number-th name, or not at all.
 KILLED = """
 import os, signal, sys
-from scenegen.files import new_folder
+from scenegen.files import new_file
 path, number = sys.argv[1], int(sys.argv[2])
 real, done = {name: getattr(os, name) for name in ("rename", "replace", "unlink")}, [0]
 def counted(name):
@@ -26,7 +26,7 @@ def counted(name):
             os.kill(os.getpid(), signal.SIGKILL)
         return real[name](*arguments, **named)
     return call
-with new_folder.folder_written_beside(path, "abc", overwrite=True) as made:
+with new_file.folder_written_beside(path, "abc", overwrite=True) as made:
     for name in "abc":
         (made / name).write_text("new")
     for name in real:
@@ -82,7 +82,7 @@ def test_a_signal_leaves_the_files_of_one_run(tmp_path, older):
     if older:
         write(folder, "old")
     run = lambda: write(folder, "new")  # noqa: E731
-    for at in interrupted_at_each_line(run, (new_folder,), signal.SIGINT):
+    for at in interrupted_at_each_line(run, (new_file,), signal.SIGINT):
         assert (texts(folder) if folder.exists() else {}) in expected, at
         for path in folder.glob("*"):
             path.unlink()

@@ -81,10 +81,12 @@ def test_lists_and_counts(verdict, rooms_path):
     ],
     ids=str,
 )
-@pytest.mark.parametrize("dtype", ["uint8", "float16", "float32"])
+@pytest.mark.parametrize(
+    "dtype", ["uint8", "float16", pytest.param("float32", marks=pytest.mark.slow)]
+)
 def test_no_honest_file_fails(how, dtype, make_rooms, tmp_path):
     rooms = {"image_dtype": dtype, "objects": (2, 3), "lights": (2, 3), **how}
-    assert failures(make_rooms(tmp_path / "x.h5", 12, **rooms), 1) == {}
+    assert failures(make_rooms(tmp_path / "x.h5", 6, **rooms), 1) == {}
 
 
 OTHERS = {
