@@ -53,7 +53,8 @@ def stages(preset: str, folder: str) -> Counter[str]:
         fetch = timed("upload, cast, shade", lambda: launch(packed))
         truth = timed("fetch", fetch)
         rooms = timed(
-            "count visible pixels", lambda: [room for room in _shown(scenes, packed, truth) if room]
+            "count visible pixels",
+            lambda: [room for room in _shown(scenes, packed, truth, None) if room],
         )
         done = timed("pack rows", lambda: pack_rooms(rooms, columns(spec), "gzip"))
         pixels = [values[0] for room in rooms for values in room.pixels.values()]
