@@ -5,7 +5,10 @@ import json
 import pytest
 from page_blocks import blocks, run_block
 
+from metrics.submissions.reader import open_predictions
+
 BLOCKS = blocks("your-model.md")
+DOORS = ("bench import --depth", "bench run my_model.py", "metrics.evaluate(")
 SCORE_ANSWERS = "bench score answers.h5 --truth iqtt-split/iqtt-test-answers.h5"
 BATCHES = {
     "class Rooms(Dataset)": "torch.Size([16, 3, 32, 32]) torch.Size([16, 32, 32])\n" * 4,
@@ -27,4 +30,8 @@ def test_the_programs_read_every_row_and_what_they_write_can_be_scored(tmp_path)
     assert float(second[2]) < float(first[2])  # half the shift has half the error
     assert float(last[0]) == pytest.approx(0.025, rel=1e-3)
     assert json.loads((tmp_path / "mine.json").read_text())["summary"]["comparable"]
+    doors = (next(c for c in printed if words in c) for words in DOORS)
+    assert all(len(code.splitlines()) <= 10 for code in doors)
+    with open_predictions(tmp_path / "letters.h5") as found:
+        assert found.answers.tolist() == [0, 1, 2] * 3
     assert "9 questions" in run_block("bash", "", SCORE_ANSWERS, tmp_path)
