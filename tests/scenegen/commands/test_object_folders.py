@@ -37,19 +37,11 @@ def test_the_same_bytes_with_and_without_the_cache_and_in_any_batch(run: Run, me
                 np.testing.assert_array_equal(a[name][:], other[name][:])
 
 
-def test_a_folder_with_nothing_usable_is_refused_in_one_line(run: Run, tmp_path: Path) -> None:
-    for name in ("mug", "bowl"):
-        (tmp_path / "bad" / name).mkdir(parents=True)
-        for i in range(2):
-            (tmp_path / "bad" / name / f"{i}.obj").write_text("nothing of use")
-    result = run("render", "--n", 2, *SMALL, "--objects-root", "bad")
-    assert result.exit_code == 2
-    assert result.stdout == ""
-    (line,) = result.stderr.splitlines()
-    assert line.startswith("Error: classes: ")
-    assert "cannot be used, the last one since" in line
-    assert "check-objects" in line
-    assert not (tmp_path / "rooms.h5").exists()
+def test_a_folder_with_nothing_usable_is_refused(refuses: Callable[..., str], meshes: Path) -> None:
+    for path in meshes.glob("*/*.*"):
+        path.write_text("nothing of use")
+    render_two = ("render", "--n", 2, *SMALL[:-2], "--objects-root", meshes)
+    refuses(*render_two, words=("classes", "check-objects"))
 
 
 def test_presets_take_their_classes_from_a_folder_that_has_them(

@@ -15,16 +15,12 @@ RENDER = ("render", "--n", "2", "--size", "32", "--min-visible-pixels", "3", "--
 RENDER_MISTAKES = [
     ("--n 0", "n: found 0", "from 1 to"),
     (f"--n {2**70}", f"found {2**70}", "expected"),
-    ("--size 12xx", "--size", "'12xx'", "HxW"),
     ("--size 4096", "batch: found 64", "at most 16 images of this size"),
     ("--shapes box,", "shapes: found ''", "box, sphere, cone"),
     ("--batch 0", "batch: found 0", "1 to 4096"),
-    (f"--batch {10**9}", f"batch: found {10**9}", "1 to 4096"),
     ("--object-radius 0.5", "item 0", "objects", "smaller --object-radius"),
     ("--min-visible-pixels 1024", "item ", "1024 pixels", "--min-visible-pixels"),
-    ("--objects 1-40", "item 0", "its 8 objects", "try", "--objects", "--object-radius"),
     ("--preset nosuch", "preset: found nosuch", "shapes-single", "views"),
-    ("--shading path --no-shadows", "shadows: found with shading 'path'", "one of the two"),
     ("--shininess 32", "shininess: found no specular"),
     ("--classes MUG", "classes: found 'MUG'", "mug"),
     ("--shapes box --classes mug", "--shapes beside --classes", "one of them"),
@@ -46,7 +42,6 @@ RENDER_MISTAKES = [
 PREVIEW_MISTAKES = [
     ("--items 0-500", "items: found 8", "0 to 7"),
     (f"--items {'9' * 30}", "items: found 999", "0 to 7"),
-    ("--items 5-2", "--items", "5-2"),
     ("--items 0 --random 2", "items", "random", "one of them"),
     ("--random 2 --seed -1", "seed: found -1"),
     ("--out folder.png", "folder.png: ", "is a folder"),
@@ -56,7 +51,6 @@ PREVIEW_MISTAKES = [
 ]
 EXPORT_MISTAKES = [
     ("--items 8", "items: found 8", "0 to 7"),
-    ("--items -1", "--items", "'-1'"),
     ("--out none/deep", "none", "o such file"),
     ("--out text", "text: ", "not a folder"),
     ("--out /proc", "/proc"),

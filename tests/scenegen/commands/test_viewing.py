@@ -1,6 +1,5 @@
 """`scenegen view` as a user types it: one line, Ctrl-C, and mistakes."""
 
-import importlib.util
 import re
 import signal
 import socket
@@ -43,11 +42,3 @@ def test_mistakes(refuses, rooms_path, tmp_path):
     (tmp_path / "no.h5").write_text("nothing")
     refuses("view", tmp_path / "no.h5", words=("no.h5",))
     refuses("view", tmp_path / "none.h5", words=("none.h5",))
-
-
-def test_without_viser(refuses, rooms_path, monkeypatch):
-    find = importlib.util.find_spec
-    monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name: None if name == "viser" else find(name)
-    )
-    refuses("view", rooms_path, words=("viser", "[view]"))
