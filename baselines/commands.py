@@ -24,7 +24,7 @@ from baselines.pix2shape.commands import (
     shown_rows,
     shown_training,
 )
-from scenegen.command_line.groups import EXAMPLE
+from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import LARGEST, OVERWRITE
 from scenegen.command_line.output import print_line
 from scenegen.command_line.paths import InputPath, OutputFolder
@@ -41,6 +41,7 @@ UNTRAINED = {
     "nearest": "rooms: the relief of the most similar picture of --train",
     "oracle": "the truth itself, which must score perfectly",
     "chance": "random answers to questions",
+    "cubes": "questions: pictures decoded to cubes in 3D; nothing is learned",
     "outline": "questions: the nearest outline, without labels or 3D",
     "outline-trees": "questions: trees on outline features, from --train",
     "pix2shape": "the reference model, trained by the paper's losses",
@@ -145,6 +146,8 @@ def baseline(
                 from baselines.cut_outs import write_cut_outs
 
                 write_cut_outs(name, data, out, train=train, **how)
+            elif name == "cubes":
+                _answer_by_cubes(data, out, how)
             elif name in ("outline", "outline-trees"):
                 _answer_by_outline(name, data, out, train, labels, how)
             else:
@@ -152,6 +155,13 @@ def baseline(
 
                 write_room_baseline(name, data, out, train=train, **how)
     print_line(f"{out}: {method} on {data}; {score_it(out, data)}")
+
+
+def _answer_by_cubes(data: str, out: str, how: Mapping[str, Any]) -> None:
+    needs("cubes", ("numba",), "cubes")
+    from baselines.cubes.answer import write_cubes
+
+    write_cubes(data, out, **how)
 
 
 def _answer_by_outline(

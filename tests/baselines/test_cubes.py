@@ -1,0 +1,70 @@
+"""Cubes: a picture of a chiral shape gives that shape, and bad pictures give answers as well."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("numba")
+
+from baselines.cubes.answer import answer_scores, decode, explain, picture
+from iqtt.questions.specs import SplitSpec
+from iqtt.shapes.polycube import ROTATIONS, canonical, is_chiral, mirror
+
+SPEC = SplitSpec()
+HALF = np.tan(np.radians(SPEC.fov_y_degrees) / 2)
+CHAIN = np.array(
+    [(0, 0, 0), (1, 0, 0), (2, 0, 0), (2, 1, 0), (2, 2, 0), (2, 2, 1), (2, 2, 2), (1, 2, 2)]
+)
+COLORS = np.array([(200, 90, 60), (80, 140, 60), (50, 60, 130)])
+
+
+def rotation(x, y):
+    """Return a turn about x after one about y, radians."""
+    (a, b), (c, d) = (np.cos(x), np.sin(x)), (np.cos(y), np.sin(y))
+    return np.array([(1, 0, 0), (0, a, -b), (0, b, a)]) @ np.array(
+        [(c, 0, d), (0, 1, 0), (-d, 0, c)]
+    )
+
+
+def drawn(cubes, turn):
+    """Return a picture of cubes, by the nearest of all boxes that each ray meets."""
+    centres = cubes - (cubes.min(axis=0) + cubes.max(axis=0)) / 2
+    n, distance = SPEC.height, SPEC.framing_distance(3.0)
+    at = ((np.arange(n) + 0.5) * 2 / n - 1) * HALF
+    x, y = np.meshgrid(at, -at)
+    rays = np.stack([x, y, -np.ones_like(x)], axis=-1) @ turn
+    origin = np.array([0, 0, distance]) @ turn
+    image, nearest = np.full((n, n, 3), 255), np.full((n, n), np.inf)
+    for centre in centres:
+        slabs = np.sort([(centre + s - origin) / rays for s in (-0.5, 0.5)], axis=0)
+        near, axis = slabs[0].max(axis=-1), slabs[0].argmax(axis=-1)
+        hit = (near < slabs[1].min(axis=-1)) & (near < nearest)
+        nearest[hit], image[hit] = near[hit], COLORS[axis][hit]
+    return image.astype(np.uint8)
+
+
+@pytest.mark.slow
+def test_a_picture_gives_its_shape_and_not_the_mirror_image():
+    assert is_chiral(CHAIN[None])[0]
+    image = drawn(CHAIN, rotation(0.5, 0.7))
+    seen = picture(image, HALF, (0, 0))
+    found = decode(seen, SPEC)
+    assert (canonical(found.cubes[None]) == canonical(CHAIN[None])).all()
+    assert found.misfit < 0.03
+    assert (decode(picture(image, HALF, (0, 0)), SPEC).cubes == found.cubes).all()
+    other = picture(drawn(CHAIN @ ROTATIONS[7].T, rotation(-0.6, 0.4)), HALF, (0, 1))
+    wrong = picture(drawn(mirror(CHAIN), rotation(-0.6, 0.4)), HALF, (0, 2))
+    assert explain(found, other, HALF) < 0.05 < explain(found, wrong, HALF)
+
+
+@pytest.mark.parametrize(
+    "image", ["empty", "one colour", pytest.param("noise", marks=pytest.mark.slow)]
+)
+def test_a_picture_without_a_shape_has_scores(image):
+    images = np.full((4, 64, 64, 3), 255, np.uint8)
+    if image == "one colour":
+        images[:, 20:40, 20:40] = 90
+    elif image == "noise":
+        images = np.random.default_rng(0).integers(0, 256, images.shape).astype(np.uint8)
+    assert np.isfinite(
+        answer_scores(images, SplitSpec(height=64, width=64, min_cube_pixels=8))
+    ).all()
