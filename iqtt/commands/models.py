@@ -5,8 +5,7 @@ from typing import Any
 
 import click
 
-from iqtt.vlm.pictures import LARGEST, SMALLEST
-from iqtt.vlm.rows import SIZE
+from iqtt.vlm.prompt import LARGEST, SIZE, SMALLEST
 from scenegen.command_line.options import Items
 from scenegen.command_line.paths import InputPath
 

@@ -13,13 +13,13 @@ from iqtt.files.truth import QuestionTruth
 from iqtt.questions.distractors import Shapes
 from iqtt.questions.packing import Question, pack_questions
 from iqtt.questions.specs import SplitSpec
+from iqtt.vlm.prompt import LARGEST, SMALLEST
 from iqtt.vlm.reading import LETTERS
 from scenegen.common.records import check
 from scenegen.rendering.renderer import launch_fields
 from scenegen.rooms.preview import BACKGROUND, INK, srgb_bytes
 
 Array = NDArray[Any]
-SMALLEST, LARGEST = 64, 1024  # pixels of a side
 FINER = 2  # a pixel is the mean of FINER x FINER rays
 _CURVE = srgb_bytes(np.linspace(0.0, 1.0, 1 << 16))  # a table is 20 times faster than the power
 PIXELS_AT_ONCE = 1 << 24  # rays of one launch, so that memory stays flat

@@ -1,7 +1,8 @@
-"""What a model is asked, in words."""
+"""What a model is asked: words, and the sizes of pictures."""
 
 from iqtt.vlm.reading import LETTERS
 
+SMALLEST, SIZE, LARGEST = 64, 512, 1024  # pixels of a picture's shorter side
 RULE = (
     "Each shape is made of unit cubes that touch face to face. Every cube of a shape shows in every"
     " picture of it. One of the answers shows the same shape as the reference, turned in space. The"

@@ -13,7 +13,7 @@ from iqtt.files.truth import QuestionTruth
 from iqtt.floors import floor_of_kind
 from iqtt.questions.specs import DISTRACTOR_KINDS, question_kind
 from iqtt.vlm.pictures import composed, draw_pictures, png, stored_question
-from iqtt.vlm.prompt import question_text
+from iqtt.vlm.prompt import SIZE, question_text
 from iqtt.vlm.reading import LETTERS
 from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
@@ -21,7 +21,6 @@ from scenegen.files.rows import chosen_rows
 
 Array = NDArray[Any]
 Layout = Literal["composed", "separate"]
-SIZE = 512  # pixels of a picture's shorter side
 AT_ONCE = 16  # questions whose truth is in memory
 
 
