@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.cubes.filling import SIDE, explained, fill, misfit, refine
+from baselines.cubes.filling import SIDE, explained, fill, misfit, refine, shown_cells
 from baselines.cubes.poses import likely_poses, outline_pixels
 from baselines.cubes.segmentation import face_labels
 from iqtt.audit.features.statistics import border_color
 from iqtt.files.reader import open_questions
 from iqtt.questions.specs import SplitSpec
-from iqtt.shapes.polycube import ROTATIONS
+from iqtt.shapes.near import is_chain, is_connected
+from iqtt.shapes.polycube import ROTATIONS, bounding_radius, box_centre
 from metrics.prediction_writer import write_answers
 
 Array = NDArray[Any]
@@ -99,7 +100,7 @@ def picture(image: Array, half: float, seed: tuple[int, ...]) -> Picture:
 
 
 def decode(shown: Picture, spec: SplitSpec, seed: tuple[int, ...] = (0,)) -> Decoded:
-    """Return the cubes that a picture shows; none where nothing fits at all."""
+    """Return the cubes that a picture shows; none where no shape of the split's rule fits."""
     half = math.tan(math.radians(spec.fov_y_degrees) / 2)
     labels, step = shown.labels, max(1, min(shown.labels.shape) // 64)
     radii = [math.sqrt(q) / 2 for q in QUARTERS if math.sqrt(q) / 2 <= spec.max_radius]
@@ -124,11 +125,26 @@ def decode(shown: Picture, spec: SplitSpec, seed: tuple[int, ...] = (0,)) -> Dec
         for _ in range(2):
             filled, _ = fill(pose, distance, low, labels, half, step, *spec.cubes, 12000, rng)
             pose, distance, value = refine(pose, distance, low, filled, labels, half, step)
-            if value < best.misfit and filled.any():
+            filled &= shown_cells(pose, distance, low, filled, labels, half)
+            if value < best.misfit and obeys_rules(filled, low, spec):
                 best = Decoded(_cubes(filled, pose), distance, value)
         if best.misfit < ENOUGH:
             break
     return best
+
+
+def obeys_rules(filled: Array, low: Array, spec: SplitSpec) -> bool:
+    """Return whether cells are a shape of the split about the origin.
+
+    Its number of cubes, kind and radius are the split's, and its bounding box is centred.
+    """
+    cubes = np.stack(np.unravel_index(np.flatnonzero(filled), (SIDE,) * 3), axis=1)
+    if not spec.cubes[0] <= len(cubes) <= spec.cubes[1]:
+        return False
+    shape = cubes.astype(np.int64)[None]
+    linked = is_chain(shape) if spec.shapes == "chain" else is_connected(shape)
+    centred = (box_centre(shape)[0] + low == 0).all()
+    return bool(linked[0] and centred and bounding_radius(shape)[0] <= spec.max_radius)
 
 
 def explain(decoded: Decoded, shown: Picture, half: float) -> float:

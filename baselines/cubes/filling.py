@@ -82,6 +82,24 @@ def misfit(
 
 
 @njit(cache=True)
+def shown_cells(
+    pose: Array, distance: float, low: Array, filled: Array, labels: Array, half: float
+) -> Array:
+    """Return which filled cells show in the picture, (SIDE**3,) bool."""
+    height, width = labels.shape
+    cells, faces = np.empty(MOST, np.int64), np.empty(MOST, np.int64)
+    shown = np.zeros(SIDE**3, np.bool_)
+    for i in range(height):
+        for j in range(width):
+            x, y = (2 * j + 1 - width) / height * half, -(2 * i + 1 - height) / height * half
+            for k in range(trace(pose, distance, low, x, y, cells, faces)):
+                if filled[cells[k]]:
+                    shown[cells[k]] = True
+                    break
+    return shown
+
+
+@njit(cache=True)
 def _rays(pose: Array, distance: float, low: Array, labels: Array, half: float, step: int) -> Any:
     height, width = labels.shape
     rows = ((height - step // 2 + step - 1) // step) * ((width - step // 2 + step - 1) // step)
