@@ -100,7 +100,14 @@ def nudged(name, by):
     return values(name, lambda array: array + array.dtype.type(by))
 
 
-@pytest.mark.parametrize("other", [None, *OTHERS])
+@pytest.mark.parametrize(
+    "other",
+    [
+        None,
+        "Mitsuba",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("LLVM", "variant")),
+    ],
+)
 @pytest.mark.parametrize(
     ("edit", "alike"),
     [
