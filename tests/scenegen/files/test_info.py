@@ -67,25 +67,6 @@ def test_facts_and_settings_are_those_of_the_file(file):
     assert "fov_degrees" not in changed
 
 
-def test_every_column_with_row_type_unit_and_size(file):
-    path, text = file
-    with h5py.File(path) as raw:
-        for table in re.split(r" dataset .*\n", text)[1:]:
-            for line in table.split("\n\n")[0].splitlines():
-                name, row, kind, rest = re.fullmatch(r" +(\S+) +(\(.*\)) +(\w+)(.*)", line).groups()
-                group = "labeled" if "iqtt-train" in path.name else ""
-                places = (name, f"{group}/{name}", f"truth/{group}/{name}".replace("//", "/"))
-                dataset = raw[next(place for place in places if place in raw)]
-                assert row == "(" + ", ".join(map(str, dataset.shape[1:])) + ")"
-                if kind == "text":
-                    continue  # HDF5 does not tell the size of the heaps that hold texts
-                assert (kind, dataset.attrs["unit"][:20] in rest) == (str(dataset.dtype), True)
-                if not group:
-                    stored = dataset.id.get_storage_size()
-                    assert f"{stored / 1e3:.1f} kB" in rest or f"{stored / 1e6:.1f} MB" in rest
-                    assert rest.endswith(f" {dataset.nbytes / stored:.1f}")
-
-
 def test_ranges_of_rooms(float_path):
     """Few rows, so that all of them are read."""
     text = of_rooms.describe(float_path)
