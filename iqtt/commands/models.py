@@ -1,16 +1,13 @@
 """Options of the commands that ask models: which pictures and texts they get."""
 
-from collections.abc import Callable
-from typing import Any
-
 import click
 
 from iqtt.vlm.prompt import LARGEST, SIZE, SMALLEST
-from scenegen.command_line.options import Items
+from scenegen.command_line.options import Items, together
 from scenegen.command_line.paths import InputPath
 
 # fmt: off
-_OPTIONS = (
+model_options = together(  # those of `iqtt.vlm.rows.Asked`
     click.option("--answers", type=InputPath(),
                  help="File with the answers of a test file: it tells the cubes to draw"
                  " [default: the one beside FILE]."),
@@ -26,10 +23,3 @@ _OPTIONS = (
     click.option("--items", type=Items(), help="Questions to take [default: all]."),
 )
 # fmt: on
-
-
-def model_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of `iqtt.vlm.rows.Asked`."""
-    for option in reversed(_OPTIONS):
-        command = option(command)
-    return command

@@ -35,7 +35,6 @@ RESPONSIBLE: dict[str, str | list[str]] = {
     "data_collection": "Nothing was collected. Shapes are drawn by a program from settings and a"
     " seed, turned and lit at random, and rendered by ray casting. The page README.md has all"
     " settings.",
-    "data_collection_type": ["Software Collection"],
     "data_collection_missing_data": "Questions of `unlabeled` and of the test have no answers"
     " beside them. Where depth is stored it is NaN on the background. Nothing is filled in.",
     "data_preprocessing_protocol": [
@@ -72,7 +71,4 @@ RESPONSIBLE: dict[str, str | list[str]] = {
         "None: no people, no places, no text in the images. The recorded command, where the page"
         " has it, holds names of files of those who made the data."
     ],
-    "data_social_impact": "None is expected: the images show no people, and nothing that exists.",
-    "data_release_maintenance_plan": "A file is not changed after it is published; a correction"
-    " gets a new version and new SHA-256s.",
 }

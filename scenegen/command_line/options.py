@@ -11,6 +11,7 @@ from scenegen.command_line.paths import InputPath, OutputFolder
 
 MESH_FILES = (".glb", ".obj", ".off", ".ply", ".stl")
 NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
+Command = Callable[..., Any]
 LARGEST = 2**63 - 1  # whole number that files can hold
 MOST_PROCESSES = 1024
 MOST_ITEMS = 1_000_000  # numbers of a range; keeps 0-99999999999 from filling the memory
@@ -36,6 +37,17 @@ class _Parsed(click.ParamType):  # type: ignore[type-arg]
             return self._parse(value)
         except ValueError:
             self.fail(f"found {value!r:.60}, expected {self.expected}", param, ctx)
+
+
+def together(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
+    """Return what adds some options to a command, in the order of its help."""
+
+    def added(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return added
 
 
 def _matched(pattern: str, text: str) -> re.Match[str]:
@@ -157,14 +169,12 @@ UP = click.option("--up", type=click.Choice(["y", "z"]), default="y", show_defau
                   help="Axis that points up in the meshes; in ShapeNet it is y.")
 CACHE_DIR = click.option("--cache-dir", type=OutputFolder(),
                          help="Folder for meshes that are ready to render [the user's cache].")
+MESHES = together(  # the folder of meshes that objects are taken from
+    click.option("--shapenet-root", type=InputPath(within=MESH_FILES),
+                 help="Folder of ShapeNetCore 1 or 2 with the objects."),
+    click.option("--objects-root", type=InputPath(within=MESH_FILES),
+                 help="Folder with the objects, a sub-folder per class."),
+    UP,
+    CACHE_DIR,
+)
 # fmt: on
-
-
-def MESHES(command: Any) -> Any:  # noqa: N802
-    """Add the options that name the folder of meshes that objects are taken from."""
-    command = UP(CACHE_DIR(command))  # the last option comes first
-    folder = InputPath(within=MESH_FILES)
-    text = "Folder with the objects, a sub-folder per class."
-    command = click.option("--objects-root", type=folder, help=text)(command)
-    text = "Folder of ShapeNetCore 1 or 2 with the objects."
-    return click.option("--shapenet-root", type=folder, help=text)(command)

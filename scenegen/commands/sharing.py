@@ -3,14 +3,13 @@
 import datetime
 import os
 from collections.abc import Callable
-from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from scenegen.command_line.groups import EXAMPLE, needs
-from scenegen.command_line.options import OVERWRITE
+from scenegen.command_line.options import OVERWRITE, Command, together
 from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputFolder, refuse_command_inputs
 from scenegen.common.errors import SpecError
@@ -18,13 +17,12 @@ from scenegen.common.errors import SpecError
 if TYPE_CHECKING:
     from scenegen.sharing.card import Publication
 
-Command = Callable[..., Any]
 SHARE = ("datasets", "mlcroissant", "pyarrow")  # libraries that a card needs
 
 
 def publication_options(title: str, license_: str) -> Callable[[Command], Command]:
     """Return options for what only the publisher knows; the texts name two of their defaults."""
-    options = (
+    return together(
         click.option("--creator", "creators", multiple=True, required=True,
                      help="Who made the data; may be said several times."),
         click.option("--title", help=f"Name of the data [{title}]."),
@@ -36,7 +34,6 @@ def publication_options(title: str, license_: str) -> Callable[[Command], Comman
                      help="Version of the data."),
         click.option("--url", default="", help="Page where the data will be."),
     )  # fmt: skip
-    return lambda command: reduce(lambda made, option: option(made), reversed(options), command)
 
 
 def publication_of(

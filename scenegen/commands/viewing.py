@@ -1,22 +1,19 @@
 """The command that shows rooms in 3D, in the browser, and options of all that serve pages."""
 
 from collections.abc import Callable
-from functools import reduce
 from typing import Any
 
 import click
 
 from scenegen.command_line.groups import EXAMPLE, needs
-from scenegen.command_line.options import MESHES, Items
+from scenegen.command_line.options import MESHES, Command, Items, together
 from scenegen.command_line.output import print_line
 from scenegen.command_line.paths import InputPath
-
-Command = Callable[..., Any]
 
 
 def host_options(port: int) -> Callable[[Command], Command]:
     """Return what adds the options that say where pages are served; `port` is the default."""
-    options = (
+    return together(
         click.option("--host", metavar="ADDRESS",
                      help="Address to listen at [default: 127.0.0.1, which only this machine"
                      " reaches; with --public all addresses of this machine]."),
@@ -28,7 +25,6 @@ def host_options(port: int) -> Callable[[Command], Command]:
         click.option("--name", "names", multiple=True, metavar="HOST",
                      help="Another name under which browsers reach the pages; may be repeated."),
     )  # fmt: skip
-    return lambda command: reduce(lambda made, add: add(made), reversed(options), command)
 
 
 OPEN = click.option(

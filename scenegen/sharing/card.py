@@ -46,6 +46,13 @@ RESPONSIBLE = {  # titles of sections, by the fields of mlcroissant's RAI vocabu
     "data_social_impact": "Impact on society",
     "data_release_maintenance_plan": "Maintenance",
 }
+# Paragraphs on all data that this program makes, by the same names.
+ALL_DATA: dict[str, str | list[str]] = {
+    "data_collection_type": ["Software Collection"],
+    "data_social_impact": "None is expected: the images show no people, and nothing that exists.",
+    "data_release_maintenance_plan": "A file is not changed after it is published; a correction"
+    " gets a new version and new SHA-256s.",
+}
 
 
 @dataclass(frozen=True)
@@ -167,7 +174,8 @@ class DataDescription:
         commands: of each file, by its name, the command that made it; texts from anywhere.
         requests: of each file, by its name, the request as JSON.
         layout: a Markdown table of ours: data sets of the HDF5 files, with units and frames.
-        responsible: paragraphs of ours, by mlcroissant's names of the fields of RAI.
+        responsible: paragraphs of ours, by mlcroissant's names of the fields of RAI, besides
+            ALL_DATA.
         notes: more sections of ours, by their titles.
     """
 
@@ -217,6 +225,7 @@ def card_page(publication: Publication, data: DataDescription, files: Sequence[S
         f"The data: {markdown(publication.license)}, <{address}>. The program that made it:"
         " Apache-2.0, which says nothing about the data."
     )
+    responsible = {**data.responsible, **ALL_DATA}
     checksums = [("file", "bytes", "SHA-256", "holds")]
     checksums += [(file.name, str(file.bytes), file.sha256, file.meaning) for file in files]
     citation = "The data, and the paper whose setting it follows:"
@@ -227,7 +236,7 @@ def card_page(publication: Publication, data: DataDescription, files: Sequence[S
         "Data sets of the files": (data.layout,),
         "Columns of the index": _index_lines(data.columns),
         **{title: (text,) for title, text in data.notes.items()},
-        **{RESPONSIBLE[name]: _paragraphs(text) for name, text in data.responsible.items()
+        **{RESPONSIBLE[name]: _paragraphs(text) for name, text in responsible.items()
            if name in RESPONSIBLE},
         "Licence": (license_line,),
         "Citation": (citation, *_block(publication.citation), *_block(PAPER)),

@@ -13,7 +13,7 @@ import mlcroissant
 
 from scenegen.common.text_table import printable
 from scenegen.files.schema import Column
-from scenegen.sharing.card import INDEX, DataDescription, Publication, SharedFile
+from scenegen.sharing.card import ALL_DATA, INDEX, DataDescription, Publication, SharedFile
 
 CONFORMS = ["http://mlcommons.org/croissant/1.1", "http://mlcommons.org/croissant/RAI/1.0"]
 RECORDS = "rows"  # id of the record set
@@ -48,6 +48,7 @@ def croissant_json(
         distribution=[_file_object(context, file) for file in files],
         record_sets=[records],
         **data.responsible,
+        **ALL_DATA,
     )
     record = {**metadata.to_json(), "conformsTo": CONFORMS, "isLiveDataset": False}
     return json.dumps(record, indent=2) + "\n"

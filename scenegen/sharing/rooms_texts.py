@@ -25,7 +25,6 @@ RESPONSIBLE: dict[str, str | list[str]] = {
     "data_collection": "Nothing was collected. Scenes are drawn by a program from a specification"
     " and a seed, and rendered by ray casting; the ground truth is what the rays hit. The page"
     " README.md has the commands and all settings.",
-    "data_collection_type": ["Software Collection"],
     "data_collection_missing_data": "Depth is NaN, the normal zero and the object id -1 where a"
     " pixel's ray meets nothing. Nothing else is missing and nothing is filled in.",
     "data_preprocessing_protocol": [
@@ -62,7 +61,4 @@ RESPONSIBLE: dict[str, str | list[str]] = {
         "None: no people, no places, no text. The recorded commands hold names of files of those"
         " who made the data."
     ],
-    "data_social_impact": "None is expected: the images show no people, and nothing that exists.",
-    "data_release_maintenance_plan": "A file is not changed after it is published; a correction"
-    " gets a new version and new SHA-256s.",
 }
