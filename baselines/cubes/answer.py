@@ -83,11 +83,12 @@ def answer_scores(images: Array, spec: SplitSpec, seed: int = 0) -> Array:
     half = math.tan(math.radians(spec.fov_y_degrees) / 2)
     pictures = [picture(image, half, (seed, i)) for i, image in enumerate(images)]
     decoded = [decode(shown, spec, (seed, i)) for i, shown in enumerate(pictures)]
-    fits = [
-        [d.misfit if i == j else explain(d, shown, half) for j, shown in enumerate(pictures)]
-        for i, d in enumerate(decoded)
-    ]
-    costs = [min(max(fits[i][0], fits[i][k]) for i in (0, k)) for k in range(1, len(images))]
+    reference, shape = pictures[0], decoded[0]
+    costs = []
+    for seen, own in zip(pictures[1:], decoded[1:], strict=True):
+        by_reference = max(shape.misfit, explain(shape, seen, half))
+        by_answer = max(own.misfit, explain(own, reference, half))
+        costs.append(min(by_reference, by_answer))
     return -np.array(costs)
 
 
