@@ -82,7 +82,8 @@ def test_lists_and_counts(verdict, rooms_path):
     ids=str,
 )
 @pytest.mark.parametrize(
-    "dtype", ["uint8", "float16", pytest.param("float32", marks=pytest.mark.slow)]
+    "dtype",
+    ["uint8", *(pytest.param(name, marks=pytest.mark.slow) for name in ("float16", "float32"))],
 )
 def test_no_honest_file_fails(how, dtype, make_rooms, tmp_path):
     rooms = {"image_dtype": dtype, "objects": (2, 3), "lights": (2, 3), **how}
