@@ -211,6 +211,8 @@ def test_every_setting_with_a_range_is_tried_above():
         "allow_cropped",
         "listing",
         "random_reflectance",
+        "own_reflectance",
+        "truth",
     }
 
 
